@@ -1,0 +1,1 @@
+"""Where in millimetres is this pixel, and how surely? For any flat scene."""

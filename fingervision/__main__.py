@@ -1,0 +1,5 @@
+"""`python -m fingervision` is the command line."""
+
+from fingervision.cli import main
+
+main()

@@ -1,0 +1,1 @@
+"""The nouns: frozen records with their units, shared by every layer above."""

@@ -1,0 +1,87 @@
+"""What one frame says about the gap between two fingers."""
+
+from dataclasses import dataclass
+from math import hypot
+
+from fingervision.domain.direction import Direction
+from fingervision.domain.status import Status
+
+
+@dataclass(frozen=True, slots=True)
+class FingerEdge:
+    """The inner edge of one finger at the measuring height, and the tip that the height is counted from.
+
+    Pixel coordinates: x right, y down, the centre of the full frame's first pixel is (0, 0).
+
+    Parameters
+    ----------
+    x_px, y_px : float
+        The measuring point.
+    tip_px : float
+        The tip's coordinate along the fingers' axis (y for tips up or down, x for tips left or right).
+    u_across_px : float
+        Standard uncertainty of the measuring point across the fingers, the tip's share included.
+    u_tip_px : float
+        Standard uncertainty of the tip along the fingers' axis.
+    slope : float
+        How far the edge moves across per pixel towards the root, at the measuring point.
+    blur_px : float
+        Standard deviation sigma_e of the edge's Gaussian spread, the pixel's own width included.
+    contrast : float
+        Grey levels between the two plateaus, on the frame's own scale.
+    """
+
+    x_px: float
+    y_px: float
+    tip_px: float
+    u_across_px: float
+    u_tip_px: float
+    slope: float
+    blur_px: float
+    contrast: float
+
+
+@dataclass(frozen=True, slots=True)
+class GapMeasurement:
+    """The two measuring points of one frame and the distance between them.
+
+    Parameters
+    ----------
+    left, right : FingerEdge
+        `left` is the finger with the smaller coordinate across the fingers.
+    direction : Direction
+        Where the tips point.
+    u_gap_px : float
+        Standard uncertainty of `gap_px` from frame to frame.
+    light_gap : bool
+        True for dark fingers on a light ground; False for light fingers on a dark one.
+    """
+
+    left: FingerEdge
+    right: FingerEdge
+    direction: Direction
+    u_gap_px: float
+    light_gap: bool
+
+    status = Status.OK
+
+    @property
+    def gap_px(self) -> float:
+        """Distance between the two measuring points; slanted where the tips are at different heights."""
+        return hypot(self.right.x_px - self.left.x_px, self.right.y_px - self.left.y_px)
+
+
+@dataclass(frozen=True, slots=True)
+class NoGap:
+    """There is no number in this frame, and this is why.
+
+    Parameters
+    ----------
+    status : Status
+        The reason, as it stands in the table.
+    words : str
+        The reason in a sentence.
+    """
+
+    status: Status
+    words: str

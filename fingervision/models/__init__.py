@@ -1,0 +1,1 @@
+"""Gripper models, one a file: input displacement in, gap out."""

@@ -1,0 +1,1 @@
+"""Scenes with known truth, drawn to frames: blur, noise, light, lens, compression."""
