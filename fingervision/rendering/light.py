@@ -1,0 +1,73 @@
+"""The light on the scene: levels of the ground and the fingers, a slope across the frame, a step."""
+
+from dataclasses import dataclass
+from math import cos, hypot, radians, sin, sqrt
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import erf
+
+
+@dataclass(frozen=True, slots=True)
+class LightStep:
+    """A straight border beyond which the light is stronger or weaker.
+
+    Parameters
+    ----------
+    factor : float
+        Light beyond the border, relative to this side.
+    at_px : float
+        Where the border passes, counted from the frame's centre.
+    towards_deg : float
+        The direction of "beyond": 0 is to the right, 90 is down.
+    """
+
+    factor: float
+    at_px: float = 0.0
+    towards_deg: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class Light:
+    """Grey levels and their change over the frame.
+
+    Parameters
+    ----------
+    ground : float
+        Grey level 0..255 of the ground.
+    fingers : float
+        Grey level 0..255 of the fingers; below `ground` for dark fingers on a light ground, above for the reverse.
+    slope_x, slope_y : float
+        Relative rise of the light from one border of the frame to the other, 0 at the centre: 0.4 is -20 % to +20 %.
+    step : LightStep or None
+        A step in the light.
+    exposure : float
+        Factor on everything; above the full scale the picture clips.
+    """
+
+    ground: float = 200.0
+    fingers: float = 40.0
+    slope_x: float = 0.0
+    slope_y: float = 0.0
+    step: LightStep | None = None
+    exposure: float = 1.0
+
+    def field(self, width_px: int, height_px: int, blur_px: float) -> NDArray[np.float64] | float:
+        """Factor on each pixel's grey level; a plain number where the light is even."""
+        field: NDArray[np.float64] | float = self.exposure
+        if self.slope_x:
+            field = field * (1.0 + self.slope_x * (np.arange(width_px) - (width_px - 1) / 2) / width_px)
+        if self.slope_y:
+            column = 1.0 + self.slope_y * (np.arange(height_px) - (height_px - 1) / 2) / height_px
+            field = field * column[:, None]
+        if self.step is not None:
+            angle = radians(self.step.towards_deg)
+            x = (np.arange(width_px) - (width_px - 1) / 2) * cos(angle)
+            y = (np.arange(height_px) - (height_px - 1) / 2) * sin(angle)
+            spread = sqrt(2.0) * hypot(blur_px, sqrt(1 / 12))
+            beyond = 0.5 * (1.0 + erf((x + y[:, None] - self.step.at_px) / spread))
+            field = field * (1.0 + (self.step.factor - 1.0) * beyond)
+        return field
+
+
+EVEN_LIGHT = Light()

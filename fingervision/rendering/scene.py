@@ -1,0 +1,86 @@
+"""What stands before the camera: fingers, other things, dust, highlights, a bright rim, light."""
+
+from dataclasses import dataclass
+
+from fingervision.domain.errors import FingervisionError
+from fingervision.rendering.finger import Finger
+from fingervision.rendering.light import EVEN_LIGHT, Light
+from fingervision.rendering.outline import Outline
+
+
+@dataclass(frozen=True, slots=True)
+class Patch:
+    """Something with a grey level of its own, painted over what was there before.
+
+    Parameters
+    ----------
+    outlines : tuple of Outline
+        Solids that do not overlap, and holes in them.
+    level : float
+        Grey level 0..255.
+    """
+
+    outlines: tuple[Outline, ...]
+    level: float
+
+
+@dataclass(frozen=True, slots=True)
+class Rim:
+    """A bright line along the outside of the fingers' edges.
+
+    Parameters
+    ----------
+    width_px : float
+        How far it reaches outwards.
+    level : float
+        Grey level 0..255.
+    """
+
+    width_px: float
+    level: float
+
+
+@dataclass(frozen=True, slots=True)
+class Scene:
+    """Everything that is drawn, in the ideal picture: no lens, no blur, no noise.
+
+    Parameters
+    ----------
+    fingers : tuple of Finger
+        They may overlap: touching fingers are one blob.
+    width_px, height_px : int
+        Size of the frame.
+    light : Light
+        Levels, slope, step, exposure.
+    behind : tuple of Patch
+        Other things in view; the fingers cover them.
+    before : tuple of Patch
+        Dust, and highlights inside the fingers; painted over everything.
+    rim : Rim or None
+        A bright rim outside the fingers.
+
+    Raises
+    ------
+    FingervisionError
+        A level outside 0..255, or a frame without pixels.
+    """
+
+    fingers: tuple[Finger, ...] = ()
+    width_px: int = 640
+    height_px: int = 480
+    light: Light = EVEN_LIGHT
+    behind: tuple[Patch, ...] = ()
+    before: tuple[Patch, ...] = ()
+    rim: Rim | None = None
+
+    def __post_init__(self) -> None:
+        if self.width_px < 1 or self.height_px < 1:
+            msg = f"A frame must have at least one pixel each way, but is {self.width_px} x {self.height_px}."
+            raise FingervisionError(msg)
+        levels = [self.light.ground, self.light.fingers]
+        levels += [patch.level for patch in self.behind + self.before]
+        levels += [self.rim.level] if self.rim else []
+        for level in levels:
+            if not 0.0 <= level <= 255.0:
+                msg = f"A grey level must lie between 0 and 255, but is {level:g}."
+                raise FingervisionError(msg)

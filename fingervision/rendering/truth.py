@@ -1,0 +1,166 @@
+"""What the gap between two fingers truly is: from the outline before blur."""
+
+from dataclasses import dataclass
+from math import hypot
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import brentq, minimize_scalar
+
+from fingervision.domain.direction import Direction
+from fingervision.domain.gap import NoGap
+from fingervision.domain.status import Status
+from fingervision.rendering.camera import Camera
+from fingervision.rendering.finger import axis_motion
+from fingervision.rendering.outline import Outline, Piece
+from fingervision.rendering.scene import Scene
+
+# An extremum is bracketed by this many points on each piece before it is refined.
+BRACKET_POINTS = 17
+
+
+@dataclass(frozen=True, slots=True)
+class TrueEdge:
+    """A finger's measuring point and tip.
+
+    Parameters
+    ----------
+    x_px, y_px : float
+        Where the inner edge crosses the line below the tip.
+    tip_px : float
+        The tip's coordinate along the fingers' axis.
+    """
+
+    x_px: float
+    y_px: float
+    tip_px: float
+
+
+@dataclass(frozen=True, slots=True)
+class TrueGap:
+    """Both measuring points; `left` has the smaller coordinate across the fingers."""
+
+    left: TrueEdge
+    right: TrueEdge
+
+    @property
+    def gap_px(self) -> float:
+        """Distance between the two measuring points."""
+        return hypot(self.right.x_px - self.left.x_px, self.right.y_px - self.left.y_px)
+
+
+def truth(scene: Scene, camera: Camera, below_tip_px: float) -> TrueGap | NoGap:
+    """Find the true gap of a scene, or say why there is none.
+
+    Parameters
+    ----------
+    scene : Scene
+        Its two fingers point the same way.
+    camera : Camera
+        Lens and tilt move the outline, and with it the truth; nothing else of the camera does. For the truth in the
+        ideal picture give `IDEAL_CAMERA`.
+    below_tip_px : float
+        Distance of each measuring point from its own finger's tip, along the image axis.
+
+    Returns
+    -------
+    TrueGap or NoGap
+        Exact to 1e-6 px; in the picture's coordinates.
+    """
+    if len(scene.fingers) < 2:
+        status = Status.ONE_FINGER if scene.fingers else Status.NO_FINGERS
+        return NoGap(status, f"The scene has {len(scene.fingers)} of two fingers.")
+    first, second = scene.fingers
+    direction = first.direction
+    shapes = [first.outline, second.outline]
+    tips = [_tip(shape, direction) for shape in shapes]
+    spans = [_crossings(shape, direction, tip + below_tip_px) for shape, tip in zip(shapes, tips, strict=True)]
+    if not all(spans):
+        return NoGap(Status.NO_FINGERS, f"A finger ends less than {below_tip_px:g} px below its tip.")
+    if sum(spans[0]) > sum(spans[1]):
+        shapes, tips, spans = shapes[::-1], tips[::-1], spans[::-1]
+    inner = (max(spans[0]), min(spans[1]))
+    points = [axis_motion(direction).place(across, tip + below_tip_px) for across, tip in zip(inner, tips, strict=True)]
+    for x_px, y_px in points:
+        if not (-0.5 <= x_px <= scene.width_px - 0.5 and -0.5 <= y_px <= scene.height_px - 0.5):
+            return NoGap(
+                Status.TIP_OUT_OF_VIEW, f"The measuring point ({x_px:.1f}, {y_px:.1f}) lies outside the frame."
+            )
+    covered = [shapes[1 - i].winding(np.array([points[i]]))[0] > 0.0 for i in range(2)]
+    if inner[0] >= inner[1] or any(covered):
+        return NoGap(Status.TOUCHING, "The fingers overlap at the measuring height.")
+    edges = [
+        TrueEdge(*point, axis_motion(direction).place(0.0, tip)[1 if direction.is_vertical else 0])
+        for point, tip in zip(points, tips, strict=True)
+    ]
+    return TrueGap(edges[0], edges[1])
+
+
+def _in_axes(piece: Piece, direction: Direction, t: float | NDArray[np.float64]) -> NDArray[np.float64]:
+    """Coordinates (across, towards the root) of points on a piece, shape (..., 2)."""
+    points = piece.points(np.asarray(t, dtype=np.float64))
+    match direction:
+        case Direction.UP:
+            return points
+        case Direction.DOWN:
+            return points * (1.0, -1.0)
+        case Direction.LEFT:
+            return points[..., ::-1]
+        case Direction.RIGHT:
+            return points[..., ::-1] * (1.0, -1.0)
+
+
+def _tip(outline: Outline, direction: Direction) -> float:
+    """Least coordinate towards the root."""
+    grid = np.linspace(0.0, 1.0, BRACKET_POINTS)
+    least = np.inf
+    for piece in outline.pieces:
+        along = _in_axes(piece, direction, grid)[:, 1]
+        place = int(np.argmin(along))
+        least = min(least, float(along[place]))
+        if 0 < place < BRACKET_POINTS - 1:
+
+            def height_px(t: float, piece: Piece = piece) -> float:
+                return float(_in_axes(piece, direction, t)[1])
+
+            bounds = (float(grid[place - 1]), float(grid[place + 1]))
+            least = min(least, float(minimize_scalar(height_px, bounds=bounds, options={"xatol": 1e-10}).fun))
+    return least
+
+
+def _crossings(outline: Outline, direction: Direction, along_px: float) -> list[float]:
+    """Coordinates across at which the outline crosses a line across the fingers."""
+    grid = np.linspace(0.0, 1.0, BRACKET_POINTS)
+    crossings = []
+    for piece in outline.pieces:
+
+        def beyond_px(t: float, piece: Piece = piece) -> float:
+            return float(_in_axes(piece, direction, t)[1] - along_px)
+
+        below = _in_axes(piece, direction, grid)[:, 1] < along_px
+        for k in np.flatnonzero(below[:-1] != below[1:]):
+            t = brentq(beyond_px, grid[k], grid[k + 1], xtol=1e-14)
+            crossings.append(float(_in_axes(piece, direction, t)[0]))
+    return crossings
+
+
+def measuring_point(shape: Outline, below_tip_px: float, side: int) -> tuple[float, float]:
+    """Inner edge of one finger in its own axes: x across, y towards the root.
+
+    Parameters
+    ----------
+    shape : Outline
+        The finger, pointing towards negative y.
+    below_tip_px : float
+        Distance from the tip.
+    side : int
+        -1 for the left finger, whose inner edge is its right one; 1 for the right finger.
+
+    Returns
+    -------
+    across_px, tip_px : float
+        The edge across, and the tip along.
+    """
+    tip = _tip(shape, Direction.UP)
+    crossings = _crossings(shape, Direction.UP, tip + below_tip_px)
+    return (max(crossings) if side < 0 else min(crossings)), tip

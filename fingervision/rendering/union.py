@@ -1,0 +1,132 @@
+"""The outline of several solids that may overlap: two fingers that touch are one blob."""
+
+from itertools import combinations
+from math import acos, atan2, hypot, pi, sqrt
+
+import numpy as np
+
+from fingervision.rendering.outline import SAME_POINT_PX, Arc, Line, Outline, Piece, bridged
+
+
+def union(outlines: tuple[Outline, ...]) -> tuple[Outline, ...]:
+    """Boundary of everything that lies inside at least one of the outlines.
+
+    Pieces are cut where outlines cross; a part stays if it lies inside no other outline.
+
+    Parameters
+    ----------
+    outlines : tuple of Outline
+        Solids without holes. Edges that coincide exactly cancel where the solids lie on opposite sides.
+
+    Returns
+    -------
+    tuple of Outline
+        Solids that do not overlap (and holes, where outlines enclose one). The input itself where nothing overlaps.
+    """
+    if not any(_boxes_meet(a, b) for a, b in combinations(outlines, 2)):
+        return outlines
+    kept: list[Piece] = []
+    for i, outline in enumerate(outlines):
+        others = [other for j, other in enumerate(outlines) if j != i and _boxes_meet(outline, other)]
+        for piece in outline.pieces:
+            cuts = [0.0, 1.0]
+            for other in others:
+                for edge in other.pieces:
+                    cuts += _crossings(piece, edge)
+            places = np.unique(np.array(cuts))
+            for t0, t1 in zip(places[:-1].tolist(), places[1:].tolist(), strict=True):
+                if (t1 - t0) * piece.length_px <= SAME_POINT_PX:
+                    continue
+                middle = piece.points(np.array([(t0 + t1) / 2]))
+                if not any(other.winding(middle)[0] > 0.0 for other in others):
+                    kept.append(piece if (t0, t1) == (0.0, 1.0) else piece.part(t0, t1))
+    return _chained(kept)
+
+
+def _boxes_meet(a: Outline, b: Outline) -> bool:
+    (ax0, ay0, ax1, ay1), (bx0, by0, bx1, by1) = a.box_px, b.box_px
+    return ax0 <= bx1 and bx0 <= ax1 and ay0 <= by1 and by0 <= ay1
+
+
+def _crossings(piece: Piece, edge: Piece) -> list[float]:
+    """Fractions of `piece` at which `edge` crosses it."""
+    if isinstance(piece, Line) and isinstance(edge, Line):
+        return _line_line(piece, edge)
+    if isinstance(piece, Line):
+        points = _line_circle(piece, edge)  # type: ignore[arg-type]
+    elif isinstance(edge, Line):
+        points = _line_circle(edge, piece)
+    else:
+        points = _circle_circle(piece, edge)
+    return [
+        t for point in points for t in [_fraction(piece, point)] if t is not None and _fraction(edge, point) is not None
+    ]
+
+
+def _line_line(a: Line, b: Line) -> list[float]:
+    ux, uy = a.x1_px - a.x0_px, a.y1_px - a.y0_px
+    vx, vy = b.x1_px - b.x0_px, b.y1_px - b.y0_px
+    cross = ux * vy - uy * vx
+    if abs(cross) <= 1e-12 * a.length_px * b.length_px:
+        return []
+    wx, wy = b.x0_px - a.x0_px, b.y0_px - a.y0_px
+    t, s = (wx * vy - wy * vx) / cross, (wx * uy - wy * ux) / cross
+    return [t] if 0.0 <= t <= 1.0 and 0.0 <= s <= 1.0 else []
+
+
+def _line_circle(line: Line, arc: Arc) -> list[tuple[float, float]]:
+    length = line.length_px
+    ux, uy = (line.x1_px - line.x0_px) / length, (line.y1_px - line.y0_px) / length
+    wx, wy = arc.x_px - line.x0_px, arc.y_px - line.y0_px
+    along, off = wx * ux + wy * uy, wx * uy - wy * ux
+    if abs(off) >= abs(arc.radius_px):
+        return []
+    half = sqrt(arc.radius_px**2 - off**2)
+    return [(line.x0_px + s * ux, line.y0_px + s * uy) for s in (along - half, along + half)]
+
+
+def _circle_circle(a: Arc, b: Arc) -> list[tuple[float, float]]:
+    distance = hypot(b.x_px - a.x_px, b.y_px - a.y_px)
+    ra, rb = abs(a.radius_px), abs(b.radius_px)
+    if distance == 0.0 or not abs(ra - rb) < distance < ra + rb:
+        return []
+    half_angle = acos((distance**2 + ra**2 - rb**2) / (2 * distance * ra))
+    towards = atan2(b.y_px - a.y_px, b.x_px - a.x_px)
+    return [
+        (
+            a.x_px + ra * float(np.cos(towards + side * half_angle)),
+            a.y_px + ra * float(np.sin(towards + side * half_angle)),
+        )
+        for side in (-1.0, 1.0)
+    ]
+
+
+def _fraction(piece: Piece, point: tuple[float, float]) -> float | None:
+    """Fraction of the piece at a point on its line or circle; None beyond its ends."""
+    x, y = point
+    if isinstance(piece, Line):
+        ux, uy = piece.x1_px - piece.x0_px, piece.y1_px - piece.y0_px
+        t = ((x - piece.x0_px) * ux + (y - piece.y0_px) * uy) / (ux * ux + uy * uy)
+        return t if 0.0 <= t <= 1.0 else None
+    sense = 1.0 if piece.sweep_rad > 0.0 else -1.0
+    flip = pi if piece.radius_px < 0.0 else 0.0
+    turned = sense * (atan2(y - piece.y_px, x - piece.x_px) + flip - piece.start_rad) % (2 * pi)
+    t = turned / abs(piece.sweep_rad)
+    return t if t <= 1.0 else None
+
+
+def _chained(pieces: list[Piece]) -> tuple[Outline, ...]:
+    """Join pieces in any order to closed curves: each is followed by the piece that starts nearest to its end."""
+    left = list(pieces)
+    curves = []
+    while left:
+        chain = [left.pop(0)]
+        while True:
+            x, y = chain[-1].end
+            to_close = hypot(chain[0].start[0] - x, chain[0].start[1] - y)
+            distances = [hypot(piece.start[0] - x, piece.start[1] - y) for piece in left]
+            if not distances or min(distances) >= to_close:
+                break
+            chain.append(left.pop(int(np.argmin(distances))))
+        curves.append(Outline(bridged(chain)))
+    return tuple(curves)
