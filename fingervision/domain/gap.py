@@ -1,6 +1,6 @@
 """What one frame says about the gap between two fingers."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import hypot
 
 from fingervision.domain.direction import Direction
@@ -63,12 +63,25 @@ class GapMeasurement:
     u_gap_px: float
     light_gap: bool
 
-    status = Status.OK
+    @property
+    def status(self) -> Status:
+        """A measurement is always `Status.OK`."""
+        return Status.OK
 
     @property
     def gap_px(self) -> float:
         """Distance between the two measuring points; slanted where the tips are at different heights."""
         return hypot(self.right.x_px - self.left.x_px, self.right.y_px - self.left.y_px)
+
+
+    def shifted(self, x_px: float, y_px: float) -> "GapMeasurement":
+        """The same measurement in a picture whose origin lies so far to the left and above."""
+        along_px = y_px if self.direction.is_vertical else x_px
+        left, right = (
+            replace(edge, x_px=edge.x_px + x_px, y_px=edge.y_px + y_px, tip_px=edge.tip_px + along_px)
+            for edge in (self.left, self.right)
+        )
+        return replace(self, left=left, right=right)
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,0 +1,325 @@
+"""Step 7, the gap: the two points below the tips, the distance between them, and how surely it is known."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fingervision.domain.gap import FingerEdge, GapMeasurement, NoGap
+from fingervision.domain.status import Status
+from fingervision.vision.edges import EdgePoints
+from fingervision.vision.finger_end import (
+    INNER_M,
+    OUTER_M,
+    OUTER_R,
+    PARAMETERS,
+    TOP_M,
+    FingerEnds,
+    OutlinePoints,
+    fit_finger_ends,
+    tip_and_edge,
+)
+from fingervision.vision.fingers import CoarseFinger, CoarseFingers
+from fingervision.vision.local_outline import FingerPoints, local_edge, local_tip
+from fingervision.vision.orientation import Orientation
+
+Floats = NDArray[np.float64]
+
+# Above this blur (sigma_e, pixels) an edge is no longer an edge.
+BLUR_LIMIT_PX = 5.0
+# Below this ratio of contrast to noise nothing is measured.
+CONTRAST_TO_NOISE = 3.0
+# The three-sided shape holds where its mean residual near the two points that matter is below so many of its own sigma.
+SHAPE_LIMIT = 4.0
+# Residuals within so many pixels of a point speak of the shape there.
+SHAPE_REACH_PX = 8.0
+# Neighbouring points share what the model leaves unexplained, and a codec's blocks, over so many of them.
+WHITE_LAGS, LOSSY_LAGS = 8, 16
+PIXEL_VARIANCE = 1.0 / 12.0
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class MeasuredFinger:
+    """One finger's measuring point in the finger's own axes, relative to its origin.
+
+    Parameters
+    ----------
+    tip, edge, slope : float
+        Height of the tip, inner edge at the measuring height, and the edge's change per pixel to the root.
+    covariance : ndarray of float, shape (2, 2)
+        Of (tip, edge).
+    """
+
+    tip: float
+    edge: float
+    slope: float
+    covariance: Floats
+
+
+def outline_points(fingers: CoarseFingers, edges: EdgePoints) -> tuple[OutlinePoints, Floats]:
+    """Each finger's sub-pixel points in its own axes (inner side at larger x, tip at small y), and their origins."""
+    lines = edges.lines
+    blur = np.sqrt(edges.blur_px**2 + PIXEL_VARIANCE)[lines.group]
+    side = np.where(lines.is_row, np.where(lines.is_inner, 0, 2), 1)
+    origins, members = [], []
+    for number, finger in enumerate((fingers.left, fingers.right)):
+        mine = np.flatnonzero(lines.group // 2 == number)
+        members.append(mine)
+        origins.append((float(finger.outline[0, 0]), float(finger.top_along_px)))
+    n = max(len(mine) for mine in members)
+    index = np.stack([np.resize(mine, n) for mine in members])
+    real = np.stack([np.arange(n) < len(mine) for mine in members])
+    origin = np.array(origins)
+    sign = np.array([[fingers.left.inner_sign], [fingers.right.inner_sign]])
+    is_row = lines.is_row[index]
+    position, fixed = edges.position[index], lines.fixed[index].astype(np.float64)
+    points = OutlinePoints(
+        x=sign * (np.where(is_row, position, fixed) - origin[:, :1]),
+        y=np.where(is_row, fixed, position) - origin[:, 1:],
+        u=edges.u_position[index],
+        is_row=is_row,
+        weight=real.astype(np.float64),
+        blur=blur[index],
+        side=side[index],
+    )
+    return points, origin
+
+
+def measure_gap(
+    fingers: CoarseFingers, edges: EdgePoints, below_tip_px: float, full_scale: int, light_gap: bool, lossy: bool
+) -> GapMeasurement | NoGap:
+    """Measure the gap from the edge points of both fingers.
+
+    Parameters
+    ----------
+    fingers : CoarseFingers
+        Where they were found.
+    edges : EdgePoints
+        Their sub-pixel outlines.
+    below_tip_px : float
+        Height of measuring below the tips.
+    full_scale : int
+        Largest grey level.
+    light_gap : bool
+        Whether the fingers are dark.
+    lossy : bool
+        Whether a lossy codec was at work.
+
+    Returns
+    -------
+    GapMeasurement or NoGap
+        The number, or why there is none.
+    """
+    refusal = _refuse(edges, full_scale, light_gap)
+    if refusal is not None:
+        return refusal
+    points, origin = outline_points(fingers, edges)
+    start, y0, prior = _first_guess(points, below_tip_px)
+    ends = fit_finger_ends(points, start, y0, prior)
+    inflation = _inflation(points, ends, lossy)
+    tip, edge, slope, covariance = _evaluate(ends, below_tip_px)
+    measured: list[MeasuredFinger] = []
+    for k in range(2):
+        if _shape_holds(points, ends, k, float(tip[k]), float(edge[k]), below_tip_px):
+            finger: MeasuredFinger | None = MeasuredFinger(
+                float(tip[k]), float(edge[k]), float(slope[k]), covariance[k] * inflation[k]
+            )
+        else:
+            finger = _measure_locally(points, k, below_tip_px, lossy)
+        if finger is None:
+            return NoGap(Status.NO_FINGERS, "The outline near the measuring height is broken.")
+        measured.append(finger)
+    return _assemble(fingers, edges, origin, measured, below_tip_px, light_gap)
+
+
+def _refuse(edges: EdgePoints, full_scale: int, light_gap: bool) -> NoGap | None:
+    """Reasons to give no number that the edges themselves show."""
+    inner = edges.lines.is_inner
+    if inner.sum() < 4:  # noqa: PLR2004 - a line and its scatter need more
+        return NoGap(Status.NO_FINGERS, "The inner edges are too short to be measured.")
+    contrast = np.median(edges.contrast[inner]) * (1.0 if light_gap else -1.0)
+    if contrast < CONTRAST_TO_NOISE * edges.noise or contrast < 0.02 * full_scale:
+        return NoGap(Status.LOW_CONTRAST, "The fingers hardly differ from their ground.")
+    if edges.clipped[inner].mean() > 0.5:  # noqa: PLR2004 - more than half of the rows
+        return NoGap(Status.SATURATED, "The flank of the edges is cut off at the end of the grey scale.")
+    blur = float(np.sqrt(np.max(edges.blur_px[[0, 2]]) ** 2 + PIXEL_VARIANCE))
+    if blur > BLUR_LIMIT_PX:
+        return NoGap(Status.BLURRED, f"The edges are spread over {blur:.1f} px (standard deviation).")
+    return None
+
+
+def _first_guess(points: OutlinePoints, below_tip_px: float) -> tuple[Floats, Floats, Floats]:
+    """Lines through the three sides and the corners' radii from the coarse points."""
+    count = len(points.x)
+    start, prior = np.zeros((count, PARAMETERS)), np.full((count, PARAMETERS), 1e3)
+    prior[:, [INNER_M, TOP_M, OUTER_M]] = 10.0
+    origin = np.zeros((count, 2))
+    for k in range(count):
+        real = points.weight[k] > 0
+        x, y, side = points.x[k][real], points.y[k][real], points.side[k][real]
+        crest = side == 1
+        xt, yt = (x[crest], y[crest]) if crest.sum() > 2 else (x, y)  # noqa: PLR2004
+        x0, y0 = float(np.median(xt)), below_tip_px
+        middle = np.abs(xt - x0) <= 0.3 * np.ptp(xt) + 1.0
+        top_c, top_m = _line(xt[middle] - x0, yt[middle])
+        inner_c, inner_m = _lower_flank(x, y - y0, side == 0) or (float(x.max()), 0.0)
+        outer = _lower_flank(x, y - y0, side == 2)  # noqa: PLR2004
+        outer_c, outer_m = outer or (float(x.min()) - 3.0, 0.0)
+        if outer is None:  # cut off by the border: nothing speaks of the far corner
+            prior[k, [4, OUTER_M, OUTER_R]] = 1.0, 0.05, 1.0
+        width = max(inner_c - outer_c, 2.0)
+        radii = [
+            _radius(x, y, c, m, (top_c, top_m), x0, y0, width) for c, m in ((inner_c, inner_m), (outer_c, outer_m))
+        ]
+        start[k] = inner_c, inner_m, top_c, top_m, outer_c, outer_m, *radii
+        origin[k] = x0, y0
+    return start, origin, prior
+
+
+def _line(t: Floats, v: Floats) -> tuple[float, float]:
+    """Least-squares line v = c + m t."""
+    if len(t) == 0:
+        return 0.0, 0.0
+    mean_t, mean_v = t.mean(), v.mean()
+    spread = float(((t - mean_t) ** 2).sum())
+    slope = float(((t - mean_t) * (v - mean_v)).sum()) / spread if spread > 1.0 else 0.0
+    return float(mean_v - slope * mean_t), slope
+
+
+def _lower_flank(x: Floats, y: Floats, mine: NDArray[np.bool_]) -> tuple[float, float] | None:
+    if mine.sum() < 4:  # noqa: PLR2004
+        return None
+    low = y[mine] >= np.median(y[mine])
+    return _line(y[mine][low], x[mine][low])
+
+
+def _radius(
+    x: Floats, y: Floats, c: float, m: float, top: tuple[float, float], x0: float, y0: float, width: float
+) -> float:
+    """Fillet radius from how far the outline stays away from the corner of the two lines."""
+    corner_y = (top[0] + top[1] * (c - m * y0 - x0)) / (1.0 - top[1] * m)
+    corner_x = c + m * (corner_y - y0)
+    nearest = float(np.hypot(x - corner_x, y - corner_y).min())
+    return float(np.clip(nearest / (np.sqrt(2.0) - 1.0), 1.0, 0.49 * width))
+
+
+def _evaluate(ends: FingerEnds, below_tip_px: float) -> tuple[Floats, Floats, Floats, Floats]:
+    """Tip, edge, slope, and the covariance of (tip, edge) by the parameters' covariance."""
+    count = len(ends.parameters)
+    move = 1e-3 * np.concatenate((np.zeros((1, PARAMETERS)), np.eye(PARAMETERS), -np.eye(PARAMETERS)))
+    every = (ends.parameters[:, None, :] + move).reshape(-1, PARAMETERS)
+    origin = np.repeat(ends.origin, len(move), axis=0)
+    tip, edge, slope = (a.reshape(count, -1) for a in tip_and_edge(every, origin, below_tip_px))
+    gradient = np.stack([(a[:, 1 : PARAMETERS + 1] - a[:, PARAMETERS + 1 :]) / 2e-3 for a in (tip, edge)], axis=1)
+    covariance = gradient @ ends.covariance @ np.swapaxes(gradient, 1, 2)
+    return tip[:, 0], edge[:, 0], slope[:, 0], covariance
+
+
+def _inflation(points: OutlinePoints, ends: FingerEnds, lossy: bool) -> Floats:
+    """What multiplies the variances: the residuals' own spread, and how far neighbours share them (Newey-West)."""
+    weight = ends.robust * points.weight
+    spread = (weight * ends.residual**2).sum(axis=1) / np.maximum(weight.sum(axis=1) - PARAMETERS, 1.0)
+    lags = LOSSY_LAGS if lossy else WHITE_LAGS
+    sequence = np.where(points.weight > 0, np.sqrt(weight) * ends.residual, 0.0)
+    power = np.maximum((sequence**2).sum(axis=1), 1e-12)
+    shared = np.ones(len(power))
+    for lag in range(1, lags + 1):
+        taper = 1.0 - lag / (lags + 1.0)
+        shared += 2.0 * taper * (sequence[:, lag:] * sequence[:, :-lag]).sum(axis=1) / power
+    return np.maximum(spread, 0.5) * np.maximum(shared.mean(), 1.0)
+
+
+def _shape_holds(points: OutlinePoints, ends: FingerEnds, k: int, tip: float, edge: float, below_tip_px: float) -> bool:
+    """Whether the three-sided shape leaves nothing systematic near the measuring point and near the tip."""
+    weight = points.weight[k] * ends.robust[k]
+    near_edge = np.abs(points.y[k] - tip - below_tip_px) < SHAPE_REACH_PX
+    near_edge &= np.abs(points.x[k] - edge) < 2.0 * SHAPE_REACH_PX
+    near_tip = points.y[k] - tip < 0.5 * SHAPE_REACH_PX
+    spread = max(float(ends.misfit[k]), 1.0)
+    for near in (near_edge, near_tip):
+        total = float((weight * near).sum())
+        if total < 3.0:  # noqa: PLR2004 - the robust fit threw the neighbourhood out
+            return False
+        mean = float((weight * near * ends.residual[k]).sum()) / total
+        if abs(mean) * np.sqrt(total) > SHAPE_LIMIT * spread:
+            return False
+    return spread < 2.0  # noqa: PLR2004
+
+
+def _measure_locally(points: OutlinePoints, k: int, below_tip_px: float, lossy: bool) -> MeasuredFinger | None:
+    """Tip and edge of a finger of any smooth shape."""
+    real = points.weight[k] > 0
+    own = FingerPoints(
+        points.x[k][real], points.y[k][real], points.u[k][real], points.is_row[k][real], points.blur[k][real]
+    )
+    blur = float(np.median(own.blur))
+    top = int(np.argmin(own.y))
+    tip = local_tip(own, float(own.x[top]), float(own.y[top]), blur)
+    if tip is None:
+        return None
+    height = tip.y + below_tip_px
+    inner = own.x > tip.x
+    if not inner.any():
+        return None
+    nearest = np.flatnonzero(inner)[np.argmin(np.abs(own.y[inner] - height))]
+    first_slope = _slope_near(own, inner, height)
+    found = local_edge(own, float(own.x[nearest]), height, first_slope, blur)
+    if found is None:
+        return None
+    edge, slope = found
+    lossy_factor = 2.0 if lossy else 1.0
+    var_tip = (lossy_factor * tip.u_normal) ** 2
+    var_edge = (lossy_factor * edge.u_normal / abs(edge.nx)) ** 2
+    covariance = np.array([[var_tip, slope * var_tip], [slope * var_tip, var_edge + slope**2 * var_tip]])
+    return MeasuredFinger(tip.y, edge.x, slope, covariance)
+
+
+def _slope_near(points: FingerPoints, inner: NDArray[np.bool_], height: float) -> float:
+    near = inner & (np.abs(points.y - height) < SHAPE_REACH_PX)
+    if near.sum() < 3:  # noqa: PLR2004
+        return 0.0
+    return float(np.clip(_line(points.y[near] - height, points.x[near])[1], -3.0, 3.0))
+
+
+def _assemble(
+    fingers: CoarseFingers,
+    edges: EdgePoints,
+    origin: Floats,
+    measured: list[MeasuredFinger],
+    below_tip_px: float,
+    light_gap: bool,
+) -> GapMeasurement | NoGap:
+    """From the fingers' own axes back to the picture."""
+    orientation: Orientation = fingers.orientation
+    across, along, found = [], [], []
+    for k, (finger, m) in enumerate(zip((fingers.left, fingers.right), measured, strict=True)):
+        across.append(origin[k, 0] + finger.inner_sign * m.edge)
+        along.append(origin[k, 1] + m.tip + below_tip_px)
+        x, y = orientation.to_pixels(across[k], along[k])
+        found.append(_finger_edge(finger, m, edges, k, (x, y), orientation.along_to_pixels(along[k] - below_tip_px)))
+    dx, dy = across[1] - across[0], along[1] - along[0]
+    if dx <= 0:
+        return NoGap(Status.TOUCHING, "The fingers touch at the measuring height.")
+    gap = float(np.hypot(dx, dy))
+    variance = 0.0
+    for m, end in zip(measured, (-1.0, 1.0), strict=True):
+        # Either edge closes the gap as it grows, each seen from its own finger; the tips move the points' heights.
+        gradient = np.array([end * dy / gap, -dx / gap])
+        variance += float(gradient @ m.covariance @ gradient)
+    return GapMeasurement(found[0], found[1], orientation.direction, float(np.sqrt(variance)), light_gap)
+
+
+def _finger_edge(
+    finger: CoarseFinger, m: MeasuredFinger, edges: EdgePoints, k: int, point: tuple[float, float], tip: float
+) -> FingerEdge:
+    mine = edges.lines.is_inner & (edges.lines.group == 2 * k)
+    return FingerEdge(
+        x_px=point[0],
+        y_px=point[1],
+        tip_px=tip,
+        u_across_px=float(np.sqrt(m.covariance[1, 1])),
+        u_tip_px=float(np.sqrt(m.covariance[0, 0])),
+        slope=finger.inner_sign * m.slope,
+        blur_px=float(np.sqrt(edges.blur_px[2 * k] ** 2 + PIXEL_VARIANCE)),
+        contrast=float(np.median(edges.contrast[mine])) if mine.any() else 0.0,
+    )

@@ -1,0 +1,162 @@
+"""Step 6 for shapes of any other kind: the outline near one point as a polynomial in the direction of its tangent.
+
+Drops, ellipses and worn tips are not three straight sides. Near the tip and near the measuring point any smooth
+outline is a low polynomial; its reach is as long as the residuals allow (Lepski's principle: the longest window whose
+spread is still that of the shortest). Weights taper off smoothly (Cleveland, JASA 74, 1979), so that a shift by part of
+a pixel changes nothing by a jump.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fingervision.vision.finger_end import BIWEIGHT_REACH
+
+Floats = NDArray[np.float64]
+
+DEGREE = 4
+# Half-lengths tried, in pixels and in units of the blur.
+REACHES_PX = (12.0, 18.0, 27.0, 40.0)
+SHORTEST_IN_BLURS = 6.0
+# A longer window must not leave more than this times the spread of the shortest one.
+SPREAD_LIMIT = 1.15
+FEWEST_POINTS = 12
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FingerPoints:
+    """The points of one finger's half-level outline; arrays of shape (n,), as in `OutlinePoints`."""
+
+    x: Floats
+    y: Floats
+    u: Floats
+    is_row: NDArray[np.bool_]
+    blur: Floats
+
+
+@dataclass(frozen=True, slots=True)
+class LocalOutline:
+    """The outline near a point.
+
+    Parameters
+    ----------
+    x, y : float
+        The point of the outline before blur that was asked for.
+    u_normal : float
+        Standard uncertainty across the outline.
+    nx, ny : float
+        Outward normal.
+    """
+
+    x: float
+    y: float
+    u_normal: float
+    nx: float
+    ny: float
+
+
+def _polynomial(
+    points: FingerPoints, centre: tuple[float, float], normal: tuple[float, float], reach: float
+) -> tuple[Floats, float, float] | None:
+    """Coefficients of normal distance over tangent distance, the variance at the centre, and the spread."""
+    nx, ny = normal
+    dx, dy = points.x - centre[0], points.y - centre[1]
+    s, n = dx * -ny + dy * nx, dx * nx + dy * ny
+    taper = np.clip(1.0 - np.abs(s / reach) ** 3, 0.0, None) ** 3 * (np.abs(n) < reach)
+    inside = taper > 0
+    if inside.sum() < FEWEST_POINTS:
+        return None
+    s, n, taper = s[inside] / reach, n[inside], taper[inside]
+    # An outline seen in a row moves along the normal by the normal's component only.
+    share = np.where(points.is_row[inside], abs(nx), abs(ny))
+    u = points.u[inside] * np.maximum(share, 0.3)
+    powers = s[:, None] ** np.arange(DEGREE + 1)
+    weight = taper / u**2
+    for iteration in range(4):
+        scaled = powers * weight[:, None]
+        normal_matrix = scaled.T @ powers
+        coefficients = np.linalg.lstsq(normal_matrix, scaled.T @ n, rcond=1e-12)[0]
+        residual = (n - powers @ coefficients) / u
+        spread = float(1.4826 * np.median(np.abs(residual)))
+        if iteration < 3:
+            robust = np.clip(1.0 - (residual / (BIWEIGHT_REACH * max(spread, 0.1))) ** 2, 0.0, None) ** 2
+            weight = taper * robust / u**2
+    inverse = np.linalg.pinv(normal_matrix)
+    influence = inverse @ scaled.T
+    spread = float(np.sqrt(np.sum(weight * (n - powers @ coefficients) ** 2) / max(weight.sum(), 1e-12) * 1.0))
+    spread /= float(np.sqrt(np.sum(weight * u**2) / max(weight.sum(), 1e-12)))
+    variance = float(np.sum((influence[0] * u) ** 2))
+    return coefficients / reach ** np.arange(DEGREE + 1), variance, spread
+
+
+def outline_near(
+    points: FingerPoints, centre: tuple[float, float], normal: tuple[float, float], blur_px: float
+) -> tuple[Floats, float] | None:
+    """Polynomial (normal over tangent distance) near a point, corrected for blur, and its uncertainty at the point.
+
+    Returns
+    -------
+    (coefficients, u_normal) or None
+        None where there are too few points.
+    """
+    best: tuple[Floats, float] | None = None
+    first_spread = 0.0
+    for reach in REACHES_PX:
+        if reach < SHORTEST_IN_BLURS * blur_px and reach != REACHES_PX[-1]:
+            continue
+        fit = _polynomial(points, centre, normal, reach)
+        if fit is None:
+            continue
+        coefficients, variance, spread = fit
+        if best is not None and spread > SPREAD_LIMIT * first_spread:
+            break
+        first_spread = first_spread or max(spread, 0.2)
+        curvature = 2.0 * coefficients[2] / (1.0 + coefficients[1] ** 2) ** 1.5
+        corrected = coefficients.copy()
+        corrected[0] -= 0.5 * blur_px**2 * curvature
+        best = corrected, float(np.sqrt(variance)) * max(spread, 0.5)
+    return best
+
+
+def local_tip(points: FingerPoints, x: float, y: float, blur_px: float) -> LocalOutline | None:
+    """The outermost point of a smooth outline near a first guess."""
+    for _step in range(3):
+        fit = outline_near(points, (x, y), (0.0, -1.0), blur_px)
+        if fit is None:
+            return None
+        c, u = fit
+        # s runs along +x for the normal (0, -1); the tip is where the normal distance is largest.
+        grid = np.linspace(-6.0, 6.0, 241)
+        height = np.polynomial.polynomial.polyval(grid, c)
+        best = int(np.argmax(height))
+        x += float(grid[best])
+        y -= float(height[best])
+        if abs(grid[best]) < 0.1:
+            break
+    return LocalOutline(x, y, u, 0.0, -1.0)
+
+
+def local_edge(
+    points: FingerPoints, x: float, y: float, slope: float, blur_px: float
+) -> tuple[LocalOutline, float] | None:
+    """Where a smooth inner edge crosses the height `y`, and its slope there, from a first guess."""
+    for _step in range(3):
+        length = float(np.hypot(1.0, slope))
+        nx, ny = 1.0 / length, -slope / length
+        fit = outline_near(points, (x, y), (nx, ny), blur_px)
+        if fit is None:
+            return None
+        c, u = fit
+        # The crossing of the curve n(s) with the horizontal through the centre, to second order.
+        s = 0.0
+        for _newton in range(4):
+            n = float(np.polynomial.polynomial.polyval(s, c))
+            dn = float(np.polynomial.polynomial.polyval(s, np.polynomial.polynomial.polyder(c)))
+            # y offset of the curve's point: s * nx + n * ny (tangent is (-ny, nx))
+            s -= (s * nx + n * ny) / (nx + dn * ny)
+        n = float(np.polynomial.polynomial.polyval(s, c))
+        dn = float(np.polynomial.polynomial.polyval(s, np.polynomial.polynomial.polyder(c)))
+        x += -s * ny + n * nx
+        slope = (-ny + dn * nx) / (nx + dn * ny)
+    return LocalOutline(x, y, u, nx, ny), slope

@@ -1,0 +1,64 @@
+"""The fingers' own axes: every direction is measured as if the tips pointed up.
+
+`across` grows to the image's right for tips up or down, and downwards for tips left or right. `along` grows from the
+tips towards the roots. A picture is turned by a view of its memory, never by copying or resampling, so a recording
+that is turned or mirrored gives the same numbers.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fingervision.domain.direction import Direction
+
+
+@dataclass(frozen=True, slots=True)
+class Orientation:
+    """The map between a picture's pixels and the fingers' axes.
+
+    Parameters
+    ----------
+    direction : Direction
+        Where the tips point.
+    height_px, width_px : int
+        Size of the picture.
+    """
+
+    direction: Direction
+    height_px: int
+    width_px: int
+
+    @property
+    def across_size(self) -> int:
+        """Pixels across the fingers."""
+        return self.width_px if self.direction.is_vertical else self.height_px
+
+    @property
+    def along_size(self) -> int:
+        """Pixels along the fingers."""
+        return self.height_px if self.direction.is_vertical else self.width_px
+
+    @property
+    def _is_flipped(self) -> bool:
+        return self.direction in (Direction.DOWN, Direction.RIGHT)
+
+    def view(self, image: NDArray[np.generic]) -> NDArray[np.generic]:
+        """The picture as if the tips pointed up: rows run along the fingers, columns across them."""
+        upright = image if self.direction.is_vertical else image.T
+        return upright[::-1] if self._is_flipped else upright
+
+    def to_axes(self, x: NDArray[np.int_], y: NDArray[np.int_]) -> tuple[NDArray[np.int_], NDArray[np.int_]]:
+        """Pixel coordinates to (across, along)."""
+        across, along = (x, y) if self.direction.is_vertical else (y, x)
+        return across, (self.along_size - 1 - along if self._is_flipped else along)
+
+    def to_pixels(self, across: float, along: float) -> tuple[float, float]:
+        """(across, along) to pixel coordinates (x, y)."""
+        if self._is_flipped:
+            along = self.along_size - 1 - along
+        return (across, along) if self.direction.is_vertical else (along, across)
+
+    def along_to_pixels(self, along: float) -> float:
+        """A coordinate along the fingers to the picture's coordinate on the same axis."""
+        return self.along_size - 1 - along if self._is_flipped else along

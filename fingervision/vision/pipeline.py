@@ -1,0 +1,128 @@
+"""The order of the steps: grey, denoise, binarise, fingers, edges, tip, gap. Only this file knows it."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from fingervision.domain.direction import Direction
+from fingervision.domain.frame import Frame
+from fingervision.domain.gap import GapMeasurement, NoGap
+from fingervision.domain.region import Region
+from fingervision.domain.status import Status
+from fingervision.vision.binarise import Binary, binarise, binarise_local
+from fingervision.vision.denoise import denoise
+from fingervision.vision.edges import fit_edges, profile_lines
+from fingervision.vision.fingers import CoarseFingers, find_fingers
+from fingervision.vision.gap import measure_gap
+from fingervision.vision.grey import GreyImage, full_scale, to_grey
+
+# A picture whose two classes differ by less (share of full scale, and in units of the spread within) shows nothing.
+CONTRAST_FLOOR, SEPARATION_FLOOR = 0.03, 3.0
+SATURATED_SHARE = 0.99
+# The outline is followed so far below the measuring height (pixels, or in units of that height).
+REACH_BELOW_PX, REACH_BELOW_HEIGHTS = 45.0, 1.5
+
+
+@dataclass(frozen=True, slots=True)
+class Settings:
+    """What the user chose.
+
+    Parameters
+    ----------
+    below_tip_px : float
+        Height of measuring below each finger's tip; positive.
+    direction : Direction or None
+        Where the tips point; None finds out in every frame.
+    region : Region or None
+        The part of the frame that is looked at; None is all of it.
+    """
+
+    below_tip_px: float
+    direction: Direction | None = None
+    region: Region | None = None
+
+
+def measure_frame(frame: Frame, settings: Settings) -> GapMeasurement | NoGap:
+    """Measure one frame, without any memory of earlier ones.
+
+    Parameters
+    ----------
+    frame : Frame
+        The picture.
+    settings : Settings
+        What the user chose.
+
+    Returns
+    -------
+    GapMeasurement or NoGap
+        The number with its uncertainty, or why there is none.
+    """
+    grey = _part(to_grey(frame.pixels), settings.region)
+    return _shifted(_measure(grey, settings, frame.lossy), settings.region)
+
+
+def _part(grey: GreyImage, region: Region | None) -> GreyImage:
+    if region is None:
+        return grey
+    rows = slice(region.y_px, region.y_px + region.height_px)
+    return grey[rows, region.x_px : region.x_px + region.width_px]
+
+
+def _measure(grey: GreyImage, settings: Settings, lossy: bool) -> GapMeasurement | NoGap:
+    scale = full_scale(grey)
+    if np.count_nonzero(grey == scale) > SATURATED_SHARE * grey.size:
+        return NoGap(Status.SATURATED, "The picture is white: nearly every pixel is at full scale.")
+    denoised = denoise(grey)
+    binary = binarise(denoised)
+    if binary.contrast < CONTRAST_FLOOR * scale or binary.separation < SEPARATION_FLOOR:
+        return NoGap(Status.LOW_CONTRAST, "The picture is uniform: nothing in it differs from anything else.")
+    found: GapMeasurement | NoGap | None = None
+    for candidate, light_gap in _candidates(denoised, binary, settings):
+        if isinstance(candidate, NoGap):
+            found = found or candidate
+            continue
+        orientation = candidate.orientation
+        upright = orientation.view(grey)
+        limits = (0, orientation.across_size, 0, orientation.along_size)
+        edges = fit_edges(upright, profile_lines(candidate.left, candidate.right), limits)  # type: ignore[arg-type]
+        measured = measure_gap(candidate, edges, settings.below_tip_px, scale, light_gap, lossy)
+        if isinstance(measured, GapMeasurement):
+            return measured
+        if not isinstance(found, NoGap) or found.status in (Status.NO_FINGERS, Status.ONE_FINGER):
+            found = measured
+    return found or NoGap(Status.NO_FINGERS, "Nothing in the picture looks like two fingers.")
+
+
+def _candidates(
+    denoised: GreyImage, binary: Binary, settings: Settings
+) -> Iterator[tuple[CoarseFingers | NoGap, bool]]:
+    """Where the fingers may be, the likelier first: by polarity, then against the picture's own light."""
+    directions = tuple(Direction) if settings.direction is None else (settings.direction,)
+    below = settings.below_tip_px
+    reach = below + max(REACH_BELOW_PX, REACH_BELOW_HEIGHTS * below)
+    for split in (lambda: binary, lambda: binarise_local(denoised)):
+        black_and_white = split()
+        dark_first = _border_is_light(black_and_white)
+        found = []
+        for light_gap in (dark_first, not dark_first):
+            mask = black_and_white.dark if light_gap else black_and_white.light
+            fingers = find_fingers(mask, directions, below, reach)
+            found.append((fingers, light_gap))
+            if isinstance(fingers, CoarseFingers) and fingers.is_rooted:
+                break
+        yield from sorted(found, key=lambda one: -one[0].score if isinstance(one[0], CoarseFingers) else 1.0)
+
+
+def _border_is_light(binary: Binary) -> bool:
+    """Whether most of the picture's border is ground of the light kind."""
+    dark = binary.dark
+    border = np.concatenate((dark[0], dark[-1], dark[:, 0], dark[:, -1]))
+    return bool(np.count_nonzero(border) < 0.5 * border.size)
+
+
+def _shifted(measured: GapMeasurement | NoGap, region: Region | None) -> GapMeasurement | NoGap:
+    """From the region's pixels to the full frame's."""
+    if region is None or isinstance(measured, NoGap):
+        return measured
+    return measured.shifted(region.x_px, region.y_px)
