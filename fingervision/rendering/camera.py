@@ -1,8 +1,11 @@
 """The camera: tilt, lens, blooming, blur and noise between the ideal scene and the frame."""
 
 from dataclasses import dataclass
+from math import isfinite
 
 from fingervision.domain.errors import FingervisionError
+from fingervision.rendering.lens import RadialLens, Tilt, View
+from fingervision.rendering.outline import Outline
 
 # Below this blur the panels of the line integral become many; a real lens on real pixels has at least three times it.
 LEAST_BLUR_PX = 0.1
@@ -10,7 +13,7 @@ LEAST_BLUR_PX = 0.1
 
 @dataclass(frozen=True, slots=True)
 class Camera:
-    """How the scene becomes a frame.
+    """How the scene becomes a frame, in the order of the light's way.
 
     Parameters
     ----------
@@ -21,11 +24,16 @@ class Camera:
     shot_grey : float
         Variance of the shot noise per grey level: a level g has the variance shot_grey * g.
     bloom_px : float
-        How far light spreads over every edge into the dark.
+        How far light spreads over every edge into the dark; a gap of light between dark fingers widens by twice that.
+    tilt : Tilt or None
+        Perspective of a plane that is not square to the optical axis.
+    lens : RadialLens or None
+        Radial distortion.
     bits : int
-        8 or 16; 16 bits scale the levels so that 255 is 65535.
+        8 or 16; with 16 bits a grey level g is 257 g, so that 255 is 65535.
     tint : (float, float, float) or None
-        None gives grey frames; three factors give red, green and blue.
+        None gives grey frames; three factors give frames of red, green and blue. The noise is that of the luma, the
+        same in all three.
 
     Raises
     ------
@@ -37,19 +45,33 @@ class Camera:
     noise_grey: float = 0.0
     shot_grey: float = 0.0
     bloom_px: float = 0.0
+    tilt: Tilt | None = None
+    lens: RadialLens | None = None
     bits: int = 8
     tint: tuple[float, float, float] | None = None
 
     def __post_init__(self) -> None:
-        if not self.blur_px >= LEAST_BLUR_PX:
+        if not (isfinite(self.blur_px) and self.blur_px >= LEAST_BLUR_PX):
             msg = f"blur_px must be at least {LEAST_BLUR_PX}, but is {self.blur_px:g}."
             raise FingervisionError(msg)
-        if not (self.noise_grey >= 0.0 and self.shot_grey >= 0.0):
-            msg = f"Noise must be 0 or more, but is {self.noise_grey:g} grey (white), {self.shot_grey:g} (shot)."
+        for name, value in (("noise_grey", self.noise_grey), ("shot_grey", self.shot_grey)):
+            if not (isfinite(value) and value >= 0.0):
+                msg = f"{name} must be 0 or more, but is {value:g}."
+                raise FingervisionError(msg)
+        if not isfinite(self.bloom_px):
+            msg = f"bloom_px must be a number of pixels, but is {self.bloom_px:g}."
             raise FingervisionError(msg)
         if self.bits not in (8, 16):
-            msg = f"A frame's depth must be 8 or 16 bits, but is {self.bits}."
+            msg = f"bits must be 8 or 16, but is {self.bits}."
             raise FingervisionError(msg)
+
+    def sees(self, outlines: tuple[Outline, ...], width_px: int, height_px: int) -> tuple[Outline, ...]:
+        """Map outlines of the ideal picture into the camera's, through tilt and lens; without blooming and blur."""
+        if self.tilt is None and self.lens is None:
+            return outlines
+        view = View(self.lens or RadialLens(), self.tilt or Tilt(), width_px, height_px)
+        return tuple(view.outline(outline) for outline in outlines)
 
 
 IDEAL_CAMERA = Camera()
+"""No tilt and no lens: what it sees is the ideal picture itself."""

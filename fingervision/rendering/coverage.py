@@ -3,31 +3,33 @@
 Blur and the pixel's own square act together as the kernel K(x, y) = k(x) k(y), where k is the Gaussian averaged over
 one pixel. The covered part of the pixel at p is the integral of K(p - q) over the shape; by Green's theorem this is
 
-    V(p) = - integral round the outline of  c(p_x - q_x) k(p_y - q_y) dq_y,      c' = k,
+    V(p) = integral round the outline of  k(p_x - q_x) c(p_y - q_y) dq_x,      c' = k,
 
 and k and c have closed forms (error function and its integral). The outline is cut into panels of a few sigma, each
 integrated by Gauss-Legendre: the integrand is analytic, so the error falls geometrically, without any raster. Panels
-only touch pixels within REACH sigma; what lies to the right of them follows from a running sum along the row.
+only touch pixels within REACH_SIGMAS; what lies below them follows from a running sum down the columns, so that the
+sides of an upright finger cost nothing.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from math import pi, sqrt
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.special import erf
 
+from fingervision.domain.region import Region
 from fingervision.rendering.outline import Line, Outline, Points
 
 # Nodes of one panel and its length in sigma: together good to 1e-7 of full coverage (tests/rendering/test_coverage.py).
-NODES = 10
-PANEL_SIGMAS = 4.0
+NODES = 12
+PANEL_SIGMAS = 6.0
 # The Gaussian's tail beyond this many sigma holds 6e-7.
 REACH_SIGMAS = 5.0
-# An arc is cut so that no panel turns further than this; a lens bends a straight line less per panel than this arc.
+# A panel whose extent across the columns is below this adds nothing.
+LEAST_WEIGHT_PX = 1e-12
+# An arc is cut so that no panel turns further than this.
 PANEL_TURN_RAD = 0.8
-# No panel is longer, however wide the blur: the lens's map is then smooth along each.
-PANEL_LONGEST_PX = 24.0
 
 _GAUSS_X, _GAUSS_W = np.polynomial.legendre.leggauss(NODES)
 _FRACTIONS = (_GAUSS_X + 1) / 2
@@ -55,7 +57,7 @@ def panels(outlines: Sequence[Outline], blur_px: float) -> Points:
     ndarray of float, shape (panels, NODES, 2)
         Points at the Gauss-Legendre nodes.
     """
-    longest = min(PANEL_SIGMAS * blur_px, PANEL_LONGEST_PX)
+    longest = PANEL_SIGMAS * blur_px
     lines: list[tuple[float, ...]] = []
     arcs: list[tuple[float, ...]] = []
     for outline in outlines:
@@ -86,63 +88,62 @@ def _fractions(rows: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[
     return (place[:, None] + _FRACTIONS) / row[:, :1], row
 
 
-def coverage(
-    outlines: Sequence[Outline],
-    blur_px: float,
-    width_px: int,
-    height_px: int,
-    picture_from_ideal: Callable[[Points], Points] | None = None,
-) -> NDArray[np.float64]:
+def coverage(outlines: Sequence[Outline], blur_px: float, window: Region) -> NDArray[np.float64]:
     """Covered part of each pixel after blur and pixel integration.
 
     Parameters
     ----------
     outlines : sequence of Outline
-        Solids that do not overlap, and holes.
+        Solids that do not overlap, and holes, in the picture.
     blur_px : float
-        Standard deviation of the Gaussian blur in the picture; positive.
-    width_px, height_px : int
-        Size of the frame.
-    picture_from_ideal : callable, optional
-        Lens and tilt: maps points (..., 2) from the ideal plane into the picture.
+        Standard deviation of the Gaussian blur; positive.
+    window : Region
+        The pixels that are wanted.
 
     Returns
     -------
-    ndarray of float, shape (height_px, width_px)
+    ndarray of float, shape (window.height_px, window.width_px)
         0 outside, 1 inside.
     """
-    nodes = panels(outlines, blur_px)
-    if picture_from_ideal is not None:
-        nodes = picture_from_ideal(nodes)
-    return integrate(nodes, blur_px, width_px, height_px)
-
-
-def integrate(nodes: Points, blur_px: float, width_px: int, height_px: int) -> NDArray[np.float64]:
-    """Integrate along panels that together are closed curves in the picture; see `coverage`."""
+    height, width = window.height_px, window.width_px
+    nodes = panels(outlines, blur_px) - (window.x_px, window.y_px)
     reach = REACH_SIGMAS * blur_px + 1.0
     low, high = nodes.min(axis=1), nodes.max(axis=1)
-    seen = (high[:, 1] > -reach - 1) & (low[:, 1] < height_px + reach) & (low[:, 0] < width_px + reach)
-    nodes, low, high = nodes[seen], low[seen], high[seen]
-    if len(nodes) == 0:
-        return np.zeros((height_px, width_px))
-    weight = -_WEIGHTS * (nodes[..., 1] @ _DERIVATIVE.T)
+    weight = _WEIGHTS * (nodes[..., 0] @ _DERIVATIVE.T)
+    seen = (high[:, 0] > -reach) & (low[:, 0] < width + reach) & (low[:, 1] < height + reach)
+    seen &= np.abs(weight).max(axis=1) > LEAST_WEIGHT_PX
+    if not seen.any():
+        return np.zeros((height, width))
+    nodes, low, high, weight = nodes[seen], low[seen], high[seen], weight[seen]
     first = np.floor(low - reach).astype(int)
     columns, rows = (np.ceil((high - low).max(axis=0) + 2 * reach).astype(int) + 2).tolist()
 
     # Positions of the pixels' edges about each node; differences of the primitives are integrals over pixels.
-    y = first[:, None, 1:] + np.arange(rows + 1) - 0.5 - nodes[..., 1:]
-    x = first[:, None, :1] + np.arange(columns + 2) - 1.5 - nodes[..., :1]
-    kernel_y = np.diff(_gaussian_step(y, blur_px), axis=-1)
-    kernel_x = np.diff(_gaussian_ramp(x, blur_px), n=2, axis=-1)
-    patch = np.matmul(np.swapaxes(kernel_y, 1, 2) * weight[:, None, :], kernel_x)
+    x = first[:, None, :1] + np.arange(columns + 1) - 0.5 - nodes[..., :1]
+    y = first[:, None, 1:] + np.arange(rows + 2) - 1.5 - nodes[..., 1:]
+    kernel_x = np.diff(_gaussian_step(x, blur_px), axis=-1)
+    kernel_y = np.diff(_gaussian_ramp(y, blur_px), n=2, axis=-1)
+    patch = np.matmul(np.swapaxes(kernel_y, 1, 2), kernel_x * weight[..., None])
 
-    # Left of the frame everything adds to the first column; right of it and above and below it goes to waste.
-    row = np.clip(first[:, 1:] + np.arange(rows), -1, height_px) + 1
-    column = np.clip(first[:, :1] + np.arange(columns), 0, width_px)
-    index = row[:, :, None] * (width_px + 1) + column[:, None, :]
-    size = (height_px + 2) * (width_px + 1)
-    steps = np.bincount(index.ravel(), weights=patch.ravel(), minlength=size).reshape(height_px + 2, width_px + 1)
-    return np.cumsum(steps[1:-1, :-1], axis=1)
+    # Above the window everything adds to the first row; below it and beside it, to a border that is cut off.
+    row = np.clip(first[:, 1:] + np.arange(rows), 0, height)
+    column = np.clip(first[:, :1] + np.arange(columns), -1, width) + 1
+    index = row[:, :, None] * (width + 2) + column[:, None, :]
+    steps = np.bincount(index.ravel(), weights=patch.ravel(), minlength=(height + 1) * (width + 2))
+    covered = steps.reshape(height + 1, width + 2).astype(np.float64, copy=False)
+    np.cumsum(covered, axis=0, out=covered)
+    return covered[:-1, 1:-1]
+
+
+def window_of(outlines: Sequence[Outline], blur_px: float, width_px: int, height_px: int) -> Region:
+    """Find the part of a frame that the outlines can darken or lighten; its sizes may be 0."""
+    boxes = np.array([outline.box_px for outline in outlines])
+    reach = REACH_SIGMAS * blur_px + 1.0
+    limits = (width_px, height_px)
+    first = np.clip(np.floor(boxes[:, :2].min(axis=0) - reach), 0, limits).astype(int)
+    last = np.clip(np.ceil(boxes[:, 2:].max(axis=0) + reach) + 1, first, limits).astype(int)
+    size = last - first
+    return Region(int(first[0]), int(first[1]), int(size[0]), int(size[1]))
 
 
 def _gaussian_step(t: NDArray[np.float64], sigma: float) -> NDArray[np.float64]:

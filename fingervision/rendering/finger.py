@@ -1,12 +1,14 @@
 """One finger: a bar with a tip of a given shape, placed along an image axis and tilted."""
 
 from dataclasses import dataclass
-from itertools import pairwise
-from math import atan2, cos, hypot, pi, radians, sin, tan
+from math import radians, tan
+
+import numpy as np
 
 from fingervision.domain.direction import Direction
 from fingervision.domain.errors import FingervisionError
-from fingervision.rendering.outline import Arc, Line, Motion, Outline, Piece, polygon
+from fingervision.rendering.biarc import biarcs
+from fingervision.rendering.outline import Line, Motion, Outline, Piece, polygon
 
 # A half ellipse is drawn as this many circular arcs; they, not the ellipse, are the truth (they differ by 1e-4 px).
 ELLIPSE_ARCS = 48
@@ -42,6 +44,29 @@ class EllipticTip:
 
 
 Tip = SquareTip | EllipticTip
+
+
+@dataclass(frozen=True, slots=True)
+class Highlight:
+    """A bright stripe with round ends inside a finger, along its axis.
+
+    Parameters
+    ----------
+    level : float
+        Grey level 0..255.
+    width_px, length_px : float
+        Size.
+    below_tip_px : float
+        Where it begins, along the finger's own axis.
+    off_axis_px : float
+        How far its middle lies from the finger's, towards the greater coordinate across.
+    """
+
+    level: float
+    width_px: float = 8.0
+    length_px: float = 120.0
+    below_tip_px: float = 40.0
+    off_axis_px: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,7 +121,7 @@ def finger_shape(width_px: float, length_px: float, tip: Tip, tilt_deg: float = 
         The tip does not fit on the finger.
     """
     half = width_px / 2
-    if width_px <= 0.0 or length_px <= 0.0:
+    if not (width_px > 0.0 and length_px > 0.0):
         msg = f"A finger's width and length must be positive, but are {width_px:g} px and {length_px:g} px."
         raise FingervisionError(msg)
     if isinstance(tip, SquareTip):
@@ -107,44 +132,27 @@ def finger_shape(width_px: float, length_px: float, tip: Tip, tilt_deg: float = 
         if not 0.0 < tip.height_px < length_px:
             msg = f"An elliptic tip's height must lie between 0 and the finger's length, but is {tip.height_px:g} px."
             raise FingervisionError(msg)
-        pieces: list[Piece] = list(half_ellipse(half, tip.height_px))
-        pieces.append(Line(half, tip.height_px, half, length_px))
-        pieces.append(Line(half, length_px, -half, length_px))
-        pieces.append(Line(-half, length_px, -half, tip.height_px))
-        shape = Outline(tuple(pieces))
+        sides: list[Piece] = [
+            Line(half, tip.height_px, half, length_px),
+            Line(half, length_px, -half, length_px),
+            Line(-half, length_px, -half, tip.height_px),
+        ]
+        shape = Outline((*half_ellipse(half, tip.height_px), *sides))
     return shape.moved(Motion.turn(radians(tilt_deg)))
 
 
-def half_ellipse(half_width_px: float, height_px: float) -> tuple[Arc, ...]:
-    """Half an ellipse from (-half_width, height) over (0, 0) to (half_width, height), as circular arcs.
+def highlight_shape(highlight: Highlight, tilt_deg: float) -> Outline:
+    """Outline of a highlight in the coordinates of `finger_shape`."""
+    left, top = highlight.off_axis_px - highlight.width_px / 2, highlight.below_tip_px
+    right, low = left + highlight.width_px, top + highlight.length_px
+    radius = min(highlight.width_px, highlight.length_px) / 2
+    stripe = polygon(((right, low), (left, low), (left, top), (right, top)), (radius,) * 4)
+    return stripe.moved(Motion.turn(radians(tilt_deg)))
 
-    Neighbouring arcs share their tangent: each pair is a biarc between two points of the ellipse with its tangents
-    there (Bolton, Biarc curves, Computer-Aided Design 7, 1975).
-    """
-    pairs = ELLIPSE_ARCS // 2
-    knots = []
-    for i in range(pairs + 1):
-        angle = pi * i / pairs
-        x, y = -half_width_px * cos(angle), height_px * (1.0 - sin(angle))
-        tx, ty = half_width_px * sin(angle), -height_px * cos(angle)
-        size = hypot(tx, ty)
-        knots.append((x, y, tx / size, ty / size))
-    arcs: list[Arc] = []
-    for (x0, y0, tx0, ty0), (x1, y1, tx1, ty1) in pairwise(knots):
-        # Equal handles d: |chord|^2 - 2 d chord.(t0 + t1) + 2 d^2 (t0.t1 - 1) = 0.
-        vx, vy = x1 - x0, y1 - y0
-        a = 2 * (1 - (tx0 * tx1 + ty0 * ty1))
-        b = 2 * (vx * (tx0 + tx1) + vy * (ty0 + ty1))
-        c = vx * vx + vy * vy
-        handle = 2 * c / (b + (b * b + 4 * a * c) ** 0.5)
-        mx = (x0 + handle * tx0 + x1 - handle * tx1) / 2
-        my = (y0 + handle * ty0 + y1 - handle * ty1) / 2
-        for ax, ay, tx, ty, bx, by in ((x0, y0, tx0, ty0, mx, my), (x1, y1, -tx1, -ty1, mx, my)):
-            nx, ny = -ty, tx
-            dx, dy = bx - ax, by - ay
-            radius = (dx * dx + dy * dy) / (2 * (nx * dx + ny * dy))
-            cx, cy = ax + radius * nx, ay + radius * ny
-            start, stop = atan2(ay - cy, ax - cx), atan2(by - cy, bx - cx)
-            arc = Arc(cx, cy, abs(radius), start, (stop - start + pi) % (2 * pi) - pi)
-            arcs.append(arc if (tx, ty) == (tx0, ty0) else arc.backwards())
-    return tuple(arcs)
+
+def half_ellipse(half_width_px: float, height_px: float) -> tuple[Piece, ...]:
+    """Half an ellipse from (-half_width, height) over (0, 0) to (half_width, height), as circular arcs."""
+    angle = np.linspace(0.0, np.pi, ELLIPSE_ARCS // 2 + 1)
+    points = np.stack([-half_width_px * np.cos(angle), height_px * (1.0 - np.sin(angle))], axis=-1)
+    tangents = np.stack([half_width_px * np.sin(angle), -height_px * np.cos(angle)], axis=-1)
+    return biarcs(points, tangents)

@@ -5,9 +5,9 @@ from numpy.typing import NDArray
 
 from fingervision.domain.frame import Pixels
 from fingervision.rendering.camera import Camera
-from fingervision.rendering.coverage import coverage
+from fingervision.rendering.coverage import coverage, window_of
 from fingervision.rendering.outline import Outline
-from fingervision.rendering.scene import Patch, Scene
+from fingervision.rendering.scene import Scene
 from fingervision.rendering.union import union
 
 
@@ -34,20 +34,19 @@ def render(scene: Scene, camera: Camera, rng: np.random.Generator) -> Pixels:
 def exact_grey(scene: Scene, camera: Camera) -> NDArray[np.float64]:
     """Grey levels before noise and rounding, shape (height_px, width_px); 255 is full scale, and not clipped."""
     light = scene.light
-    grey: NDArray[np.float64] = np.full((scene.height_px, scene.width_px), light.ground)
+    grey: NDArray[np.float64] = np.full((scene.height_px, scene.width_px), light.ground, dtype=np.float64)
     for patch in scene.behind:
-        grey = _painted(grey, patch, light.ground, scene, camera)
-    fingers = tuple(finger.outline for finger in scene.fingers)
-    if fingers:
-        covered = _covered(union(fingers), light.ground > light.fingers, scene, camera)
+        _paint(grey, patch.outlines, patch.level, light.ground, camera)
+    outlines = tuple(finger.outline for finger in scene.fingers)
+    if outlines:
         if scene.rim is not None:
-            grown = union(tuple(outline.grown(scene.rim.width_px) for outline in fingers))
-            rimmed = _covered(grown, light.ground > scene.rim.level, scene, camera)
-            grey = grey + (scene.rim.level - grey) * (rimmed - covered)
-        grey = grey + (light.fingers - grey) * covered
+            rimmed = union(tuple(outline.grown(scene.rim.width_px) for outline in outlines))
+            _paint(grey, rimmed, scene.rim.level, light.ground, camera)
+        _paint(grey, union(outlines), light.fingers, scene.rim.level if scene.rim else light.ground, camera)
     for patch in scene.before:
-        grey = _painted(grey, patch, light.fingers, scene, camera)
-    return grey * light.field(scene.width_px, scene.height_px, camera.blur_px)
+        _paint(grey, patch.outlines, patch.level, light.fingers, camera)
+    grey *= light.field(scene.width_px, scene.height_px, camera.blur_px)
+    return grey
 
 
 def with_noise(grey: NDArray[np.float64], camera: Camera, rng: np.random.Generator) -> NDArray[np.float64]:
@@ -56,7 +55,10 @@ def with_noise(grey: NDArray[np.float64], camera: Camera, rng: np.random.Generat
         spread = np.sqrt(camera.noise_grey**2 + camera.shot_grey * np.maximum(grey, 0.0))
         return grey + spread * rng.standard_normal(grey.shape)
     if camera.noise_grey > 0.0:
-        return grey + camera.noise_grey * rng.standard_normal(grey.shape)
+        noise = rng.standard_normal(grey.shape)
+        noise *= camera.noise_grey
+        noise += grey
+        return noise
     return grey
 
 
@@ -69,14 +71,17 @@ def digitised(grey: NDArray[np.float64], camera: Camera) -> Pixels:
     return np.clip(np.rint(grey * 257.0), 0, 65535).astype(np.uint16)
 
 
-def _covered(outlines: tuple[Outline, ...], dark: bool, scene: Scene, camera: Camera) -> NDArray[np.float64]:
-    grown_px = -camera.bloom_px if dark else camera.bloom_px
-    outlines = tuple(outline.grown(grown_px) for outline in outlines)
-    return coverage(outlines, camera.blur_px, scene.width_px, scene.height_px)
-
-
-def _painted(
-    grey: NDArray[np.float64], patch: Patch, ground: float, scene: Scene, camera: Camera
-) -> NDArray[np.float64]:
-    covered = _covered(patch.outlines, ground > patch.level, scene, camera)
-    return grey + (patch.level - grey) * covered
+def _paint(
+    grey: NDArray[np.float64], outlines: tuple[Outline, ...], level: float, around: float, camera: Camera
+) -> None:
+    """Cover the picture with solids of one level; `around` is the level about them, which says where light spreads."""
+    height_px, width_px = grey.shape
+    seen = camera.sees(outlines, width_px, height_px)
+    spread_px = camera.bloom_px if level > around else -camera.bloom_px
+    grown = tuple(outline.grown(spread_px) for outline in seen)
+    window = window_of(grown, camera.blur_px, width_px, height_px)
+    part = grey[window.y_px : window.y_px + window.height_px, window.x_px : window.x_px + window.width_px]
+    if part.size:
+        change = level - part
+        change *= coverage(grown, camera.blur_px, window)
+        part += change

@@ -72,7 +72,7 @@ def truth(scene: Scene, camera: Camera, below_tip_px: float) -> TrueGap | NoGap:
         return NoGap(status, f"The scene has {len(scene.fingers)} of two fingers.")
     first, second = scene.fingers
     direction = first.direction
-    shapes = [first.outline, second.outline]
+    shapes = list(camera.sees((first.outline, second.outline), scene.width_px, scene.height_px))
     tips = [_tip(shape, direction) for shape in shapes]
     spans = [_crossings(shape, direction, tip + below_tip_px) for shape, tip in zip(shapes, tips, strict=True)]
     if not all(spans):

@@ -4,8 +4,8 @@ from math import sqrt
 
 from fingervision.domain.direction import Direction
 from fingervision.domain.errors import FingervisionError
-from fingervision.rendering.finger import Finger, SquareTip, Tip, axis_motion, finger_shape
-from fingervision.rendering.light import Light
+from fingervision.rendering.finger import Finger, Highlight, SquareTip, Tip, axis_motion, finger_shape, highlight_shape
+from fingervision.rendering.light import EVEN_LIGHT, Light
 from fingervision.rendering.outline import Motion
 from fingervision.rendering.scene import Patch, Rim, Scene
 from fingervision.rendering.truth import measuring_point
@@ -32,6 +32,7 @@ def two_fingers(
     behind: tuple[Patch, ...] = (),
     before: tuple[Patch, ...] = (),
     rim: Rim | None = None,
+    highlight: Highlight | None = None,
 ) -> Scene:
     """Two fingers whose true gap, `below_tip_px` below their tips, is `gap_px`.
 
@@ -63,6 +64,8 @@ def two_fingers(
         Width and height of the frame.
     light, behind, before, rim
         See `Scene`.
+    highlight : Highlight, optional
+        A bright stripe in each finger.
 
     Returns
     -------
@@ -94,9 +97,13 @@ def two_fingers(
     component = sqrt(gap_px**2 - tip_step_px**2) * (1.0 if gap_px >= 0.0 else -1.0)
     middle = (across_size - 1) / 2 + centre_px
     fingers = []
+    stripes: list[Patch] = []
     for side, form, tilt, along in zip((-1, 1), (shape, mirrored), tilts, tips_along, strict=True):
         own = finger_shape(width_px, reach, form, tilt)
         across, tip_along = measuring_point(own, below_tip_px, side)
         shift = Motion(x_px=middle + side * component / 2 - across, y_px=along - tip_along)
         fingers.append(Finger(own.moved(shift).moved(axes), direction))
-    return Scene(tuple(fingers), frame[0], frame[1], light or Light(), behind, before, rim)
+        if highlight is not None:
+            stripe = highlight_shape(highlight, tilt).moved(shift).moved(axes)
+            stripes.append(Patch((stripe,), highlight.level))
+    return Scene(tuple(fingers), frame[0], frame[1], light or EVEN_LIGHT, behind, (*stripes, *before), rim)

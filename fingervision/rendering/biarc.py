@@ -1,0 +1,59 @@
+"""A smooth curve as circular arcs: two between each pair of points, sharing their tangents.
+
+Everything that is drawn stays a chain of lines and arcs that way, also an ellipse and what a lens makes of a line, and
+parallel curves, crossings and areas remain in closed form. Source: K. M. Bolton, Biarc curves, Computer-Aided Design
+7(2), 1975. The distance from the curve falls with the third power of the spacing of the points, in proportion to the
+change of curvature along the curve.
+"""
+
+from itertools import pairwise
+from math import atan2, hypot, pi, sqrt
+
+from fingervision.rendering.outline import Arc, Line, Piece, Points
+
+# An arc that bulges less than this over its chord is a line: its centre would lie too far away to be computed with.
+STRAIGHT_PX = 2e-8
+
+
+def biarcs(points: Points, tangents: Points) -> tuple[Piece, ...]:
+    """Pieces through the points with the given directions of travel.
+
+    Parameters
+    ----------
+    points, tangents : ndarray of float, shape (n, 2)
+        Points of the curve, and vectors along it there, of any length.
+
+    Returns
+    -------
+    tuple of Line or Arc
+        Two pieces for each pair of neighbours.
+    """
+    pieces: list[Piece] = []
+    knots = []
+    for (x, y), (tx, ty) in zip(points.tolist(), tangents.tolist(), strict=True):
+        size = hypot(tx, ty)
+        knots.append((x, y, tx / size, ty / size))
+    for (x0, y0, tx0, ty0), (x1, y1, tx1, ty1) in pairwise(knots):
+        # Both handles have the length d that makes the tangents meet in the joint:
+        # |chord|^2 - 2 d chord . (t0 + t1) - 2 d^2 (1 - t0 . t1) = 0.
+        chord_x, chord_y = x1 - x0, y1 - y0
+        a = 2 * (1 - (tx0 * tx1 + ty0 * ty1))
+        b = 2 * (chord_x * (tx0 + tx1) + chord_y * (ty0 + ty1))
+        c = chord_x * chord_x + chord_y * chord_y
+        d = 2 * c / (b + sqrt(b * b + 4 * a * c))
+        joint = ((x0 + d * tx0 + x1 - d * tx1) / 2, (y0 + d * ty0 + y1 - d * ty1) / 2)
+        pieces.append(_arc((x0, y0), joint, (tx0, ty0)))
+        pieces.append(_arc((x1, y1), joint, (-tx1, -ty1)).backwards())
+    return tuple(pieces)
+
+
+def _arc(start: tuple[float, float], end: tuple[float, float], tangent: tuple[float, float]) -> Piece:
+    """Give the arc that leaves `start` along the unit vector `tangent` and reaches `end`."""
+    dx, dy = end[0] - start[0], end[1] - start[1]
+    aside = tangent[0] * dy - tangent[1] * dx
+    if abs(aside) < 4 * STRAIGHT_PX:
+        return Line(*start, *end)
+    radius = (dx * dx + dy * dy) / (2 * aside)
+    x, y = start[0] - radius * tangent[1], start[1] + radius * tangent[0]
+    first, last = atan2(start[1] - y, start[0] - x), atan2(end[1] - y, end[0] - x)
+    return Arc(x, y, abs(radius), first, (last - first + pi) % (2 * pi) - pi)

@@ -1,0 +1,175 @@
+"""Clips: frames with their own times, through a camera's codec into a video file."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from fractions import Fraction
+from itertools import chain
+from pathlib import Path
+
+import av
+import numpy as np
+from av.video.reformatter import ColorRange
+
+from fingervision.domain.errors import FingervisionError
+from fingervision.domain.frame import Frame, Pixels
+
+# MPEG's clock. MP4 and QuickTime keep it to the tick; Matroska rounds every time to 1 ms.
+CLOCK_HZ = 90_000
+# What the muxers must be told: MP4 rounds the start of a clip to its movie's own clock, 1 ms if nothing is said.
+CONTAINERS = {
+    ".mp4": {"fflags": "+bitexact", "movie_timescale": str(CLOCK_HZ)},
+    ".mov": {"fflags": "+bitexact", "movie_timescale": str(CLOCK_HZ)},
+    ".mkv": {"fflags": "+bitexact"},
+}
+
+# Full-range luma and colour differences (ITU-R BT.601, as in JPEG's JFIF).
+YCBCR_FROM_RGB = np.array([[0.299, 0.587, 0.114], [-0.168736, -0.331264, 0.5], [0.5, -0.418688, -0.081312]])
+
+
+@dataclass(frozen=True, slots=True)
+class H264:
+    """H.264 by x264.
+
+    Parameters
+    ----------
+    crf : float
+        Constant rate factor: 18 is visually lossless, 23 ordinary, 28 poor.
+    """
+
+    crf: float = 23.0
+
+
+@dataclass(frozen=True, slots=True)
+class Mjpeg:
+    """Motion JPEG.
+
+    Parameters
+    ----------
+    qscale : int
+        Quantiser scale of FFmpeg: 2 is the best, 5 ordinary, 31 the worst.
+    """
+
+    qscale: int = 3
+
+
+@dataclass(frozen=True, slots=True)
+class Ffv1:
+    """FFV1, lossless; 8 or 16 bits."""
+
+
+Codec = H264 | Mjpeg | Ffv1
+
+
+def write_clip(path: Path, frames: Iterable[Frame], codec: Codec) -> None:
+    """Write frames with their presentation times, at any rate, also a changing one.
+
+    Grey levels become the luma as they are (full range), so that the luma plane of the clip is the frame.
+
+    Parameters
+    ----------
+    path : Path
+        The container goes by its suffix: .mp4, .mov or .mkv.
+    frames : iterable of Frame
+        All of one size, with increasing times.
+    codec : H264, Mjpeg or Ffv1
+        How they are compressed.
+
+    Raises
+    ------
+    FingervisionError
+        Times are missing or do not increase, sizes change, the clip is empty, or the container or codec cannot hold
+        the frames.
+    """
+    if path.suffix not in CONTAINERS:
+        msg = f"A clip's name must end in {', '.join(CONTAINERS)}, because these keep every time, but is {path.name}."
+        raise FingervisionError(msg)
+    source = iter(frames)
+    first = next(source, None)
+    if first is None:
+        msg = f"A clip must have at least one frame, but {path.name} would have none."
+        raise FingervisionError(msg)
+    pixel_format = _pixel_format(first.pixels, codec)
+    with av.open(path, "w", options=CONTAINERS[path.suffix]) as container:
+        match codec:
+            case H264(crf=crf):
+                # So the same frames give the same bytes with the same x264 (its lookahead else depends on memory's layout).
+                options = {"crf": f"{crf:g}", "threads": "1", "x264-params": "threads=1:cpu-independent=1"}
+                stream = container.add_stream("libx264", options=options)
+            case Mjpeg(qscale=qscale):
+                stream = container.add_stream("mjpeg", options={"qmin": str(qscale), "qmax": str(qscale)})
+            case Ffv1():
+                stream = container.add_stream("ffv1", options={"level": "3", "slicecrc": "1"})
+        stream.width, stream.height, stream.pix_fmt = first.width_px, first.height_px, pixel_format
+        stream.codec_context.time_base = stream.time_base = Fraction(1, CLOCK_HZ)
+        stream.codec_context.color_range = ColorRange.JPEG
+        stream.codec_context.flags |= av.codec.context.Flags.bitexact.value
+        last_tick = -1
+        for frame in chain([first], source):
+            tick = _tick(frame, last_tick)
+            if frame.pixels.shape != first.pixels.shape or frame.pixels.dtype != first.pixels.dtype:
+                msg = (
+                    f"All frames of a clip must be alike, but frame {frame.index} is {frame.pixels.shape} of "
+                    f"{frame.pixels.dtype} and the first {first.pixels.shape} of {first.pixels.dtype}."
+                )
+                raise FingervisionError(msg)
+            picture = _picture(frame.pixels, pixel_format)
+            picture.pts, picture.time_base = tick, Fraction(1, CLOCK_HZ)
+            container.mux(stream.encode(picture))
+            last_tick = tick
+        container.mux(stream.encode(None))
+
+
+def _tick(frame: Frame, last_tick: int) -> int:
+    """Time of a frame on the clip's clock."""
+    if frame.time_s is None:
+        msg = f"A frame of a clip must have its time, but frame {frame.index} has none."
+        raise FingervisionError(msg)
+    tick = round(frame.time_s * CLOCK_HZ)
+    if tick <= last_tick:
+        msg = (
+            f"Times in a clip must start at 0 or later and increase, but frame {frame.index} is at "
+            f"{frame.time_s:g} s, after {last_tick / CLOCK_HZ:g} s."
+        )
+        raise FingervisionError(msg)
+    return tick
+
+
+def _pixel_format(pixels: Pixels, codec: Codec) -> str:
+    """FFmpeg's name of the layout that a codec stores such frames in."""
+    wide, colour = pixels.dtype == np.uint16, pixels.ndim == 3
+    if isinstance(codec, Ffv1):
+        if colour:
+            if wide:
+                msg = "FFV1 clips hold colour with 8 bits, but the frames have 16: render grey frames or bits=8."
+                raise FingervisionError(msg)
+            return "bgr0"
+        return "gray16le" if wide else "gray"
+    if wide:
+        msg = f"{type(codec).__name__} holds 8 bits, but the frames have 16: render with bits=8 or write FFV1."
+        raise FingervisionError(msg)
+    if pixels.shape[0] % 2 or pixels.shape[1] % 2:
+        msg = (
+            f"{type(codec).__name__} needs an even width and height, but the frames have "
+            f"{pixels.shape[1]} x {pixels.shape[0]} pixels."
+        )
+        raise FingervisionError(msg)
+    return "yuvj420p" if isinstance(codec, Mjpeg) else "yuv420p"
+
+
+def _picture(pixels: Pixels, pixel_format: str) -> av.VideoFrame:
+    """Wrap a frame for the encoder."""
+    if pixel_format == "bgr0":
+        return av.VideoFrame.from_ndarray(pixels, format="rgb24").reformat(format=pixel_format)
+    if pixel_format.startswith("gray"):
+        return av.VideoFrame.from_ndarray(pixels, format=pixel_format)
+    height, width = pixels.shape[:2]
+    if pixels.ndim == 2:
+        planes = np.vstack([pixels, np.full((height // 2, width), 128, dtype=np.uint8)])
+    else:
+        luma, blue, red = np.moveaxis(pixels @ YCBCR_FROM_RGB.T, -1, 0)
+        blue, red = (c.reshape(height // 2, 2, width // 2, 2).mean(axis=(1, 3)) + 128 for c in (blue, red))
+        planes = np.concatenate([luma.ravel(), blue.ravel(), red.ravel()]).reshape(height * 3 // 2, width)
+        planes = np.clip(np.rint(planes), 0, 255).astype(np.uint8)
+    picture = av.VideoFrame.from_ndarray(planes, format=pixel_format)
+    picture.color_range = ColorRange.JPEG
+    return picture

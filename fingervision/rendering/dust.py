@@ -1,0 +1,51 @@
+"""Specks of dust: small dark or light grains anywhere in the frame."""
+
+from math import radians
+
+import numpy as np
+
+from fingervision.rendering.outline import Motion, polygon
+from fingervision.rendering.scene import Patch
+
+# A grain is up to this much longer than wide.
+LONGEST_RATIO = 2.0
+
+
+def dust(
+    count: int,
+    rng: np.random.Generator,
+    *,
+    frame: tuple[int, int] = (640, 480),
+    size_px: tuple[float, float] = (1.0, 6.0),
+    levels: tuple[float, ...] = (20.0, 230.0),
+) -> tuple[Patch, ...]:
+    """Strew grains over the frame.
+
+    Parameters
+    ----------
+    count : int
+        Number of grains.
+    rng : numpy.random.Generator
+        Source of places, sizes, turns and levels.
+    frame : (int, int)
+        Width and height of the frame.
+    size_px : (float, float)
+        Least and greatest length of a grain.
+    levels : tuple of float
+        Grey levels 0..255, each as likely as the others.
+
+    Returns
+    -------
+    tuple of Patch
+        One a grain, to be painted over everything.
+    """
+    grains = []
+    for _ in range(count):
+        length = rng.uniform(*size_px)
+        width = length / rng.uniform(1.0, LONGEST_RATIO)
+        a, b = length / 2, width / 2
+        place = Motion(x_px=rng.uniform(0, frame[0] - 1), y_px=rng.uniform(0, frame[1] - 1))
+        grain = polygon(((-a, -b), (a, -b), (a, b), (-a, b)), (b,) * 4)
+        turned = grain.moved(Motion.turn(radians(rng.uniform(0.0, 180.0)))).moved(place)
+        grains.append(Patch((turned,), float(rng.choice(np.array(levels)))))
+    return tuple(grains)

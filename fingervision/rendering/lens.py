@@ -1,0 +1,125 @@
+"""What tilt and lens do to an outline: the perspective of a tilted plane, then radial distortion.
+
+Outlines are mapped, never pictures: a mapped outline is again one of lines and arcs, so it is drawn as exactly as
+any other, and the truth is read from it.
+"""
+
+from dataclasses import dataclass
+from math import cos, hypot, radians, sin
+
+import numpy as np
+
+from fingervision.domain.errors import FingervisionError
+from fingervision.rendering.biarc import biarcs
+from fingervision.rendering.outline import Line, Outline, Piece, Points
+
+# The distortion must still grow at this multiple of the frame's half diagonal; beyond it the factor stays the same.
+DISTORTED_TO = 1.5
+# Spacing of the points that are mapped exactly, along lines and (in radians) along arcs. Between them biarcs stay
+# within 1e-6 px of the mapped curve for 10 % distortion (tests/rendering/test_lens.py).
+SPACING_PX = 5.0
+SPACING_RAD = 0.12
+
+
+@dataclass(frozen=True, slots=True)
+class RadialLens:
+    """Radial distortion about the frame's centre, in Brown's form: r becomes r (1 + k1 q^2 + k2 q^4).
+
+    Parameters
+    ----------
+    k1, k2 : float
+        Coefficients for q = r / half the frame's diagonal; k1 is the relative shift at the corners (negative: barrel).
+
+    Raises
+    ------
+    FingervisionError
+        The picture would fold over at its border.
+    """
+
+    k1: float = 0.0
+    k2: float = 0.0
+
+    def __post_init__(self) -> None:
+        q2 = np.linspace(0.0, DISTORTED_TO, 31) ** 2
+        if np.min(1 + 3 * self.k1 * q2 + 5 * self.k2 * q2**2) <= 0.0:
+            msg = (
+                f"A lens must not fold the picture, but k1 = {self.k1:g} with k2 = {self.k2:g} does within "
+                f"{DISTORTED_TO:g} half diagonals: choose coefficients nearer to 0."
+            )
+            raise FingervisionError(msg)
+
+
+@dataclass(frozen=True, slots=True)
+class Tilt:
+    """A plane that is not square to the optical axis; the scale at the frame's centre stays what it was.
+
+    Parameters
+    ----------
+    about_x_deg : float
+        Turn about the horizontal axis; positive moves the lower part away from the camera.
+    about_y_deg : float
+        Turn about the vertical axis; positive moves the right part away from the camera.
+    distance_px : float
+        Distance of the camera from the plane, in pixels of the plane's scale (100 mm at 34 px/mm by default).
+
+    Raises
+    ------
+    FingervisionError
+        The camera is not before the plane, or sees it edge on.
+    """
+
+    about_x_deg: float = 0.0
+    about_y_deg: float = 0.0
+    distance_px: float = 3400.0
+
+    def __post_init__(self) -> None:
+        if max(abs(self.about_x_deg), abs(self.about_y_deg)) > 45.0 or self.distance_px <= 0.0:
+            msg = (
+                f"A tilt must be at most 45 degrees, seen from a positive distance, but is {self.about_x_deg:g} and "
+                f"{self.about_y_deg:g} degrees from {self.distance_px:g} px."
+            )
+            raise FingervisionError(msg)
+
+
+@dataclass(frozen=True, slots=True)
+class View:
+    """The map from the ideal picture to the camera's, for frames of one size.
+
+    Parameters
+    ----------
+    lens : RadialLens
+        Distortion.
+    tilt : Tilt
+        Perspective.
+    width_px, height_px : int
+        Size of the frame.
+    """
+
+    lens: RadialLens
+    tilt: Tilt
+    width_px: int
+    height_px: int
+
+    def points(self, ideal: Points) -> Points:
+        """Where points (..., 2) of the ideal picture lie in the camera's."""
+        centre = np.array([(self.width_px - 1) / 2, (self.height_px - 1) / 2])
+        x, y = np.moveaxis(ideal - centre, -1, 0)
+        ax, ay = radians(self.tilt.about_x_deg), radians(self.tilt.about_y_deg)
+        depth = 1.0 + (y * sin(ax) + x * cos(ax) * sin(ay)) / self.tilt.distance_px
+        seen = np.stack([x * cos(ay), y * cos(ax) - x * sin(ax) * sin(ay)], axis=-1) / depth[..., None]
+        half_diagonal = hypot(self.width_px, self.height_px) / 2
+        q2 = np.minimum(np.sum(seen**2, axis=-1, keepdims=True) / half_diagonal**2, DISTORTED_TO**2)
+        distorted: Points = centre + seen * (1 + self.lens.k1 * q2 + self.lens.k2 * q2**2)
+        return distorted
+
+    def outline(self, ideal: Outline) -> Outline:
+        """Map an outline; its corners stay corners."""
+        pieces: list[Piece] = []
+        for piece in ideal.pieces:
+            spacing = piece.length_px / SPACING_PX if isinstance(piece, Line) else abs(piece.sweep_rad) / SPACING_RAD
+            t = np.linspace(0.0, 1.0, max(2, int(np.ceil(spacing)) + 1))
+            # Central difference along the piece: its own curvature and the lens's add errors of the second order only.
+            step = 1e-4 / piece.length_px
+            tangents = self.points(piece.points(t + step)) - self.points(piece.points(t - step))
+            pieces += biarcs(self.points(piece.points(t)), tangents)
+        return Outline(tuple(pieces))
