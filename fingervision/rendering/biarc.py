@@ -9,7 +9,10 @@ change of curvature along the curve.
 from itertools import pairwise
 from math import atan2, hypot, pi, sqrt
 
-from fingervision.rendering.outline import Arc, Line, Piece, Points
+from fingervision.rendering.arc import Arc
+from fingervision.rendering.line import Line
+from fingervision.rendering.outline import Piece
+from fingervision.rendering.plane import Points
 
 # An arc that bulges less than this over its chord is a line: its centre would lie too far away to be computed with.
 STRAIGHT_PX = 2e-8

@@ -92,7 +92,7 @@ def write_clip(path: Path, frames: Iterable[Frame], codec: Codec) -> None:
     with av.open(path, "w", options=CONTAINERS[path.suffix]) as container:
         match codec:
             case H264(crf=crf):
-                # So the same frames give the same bytes with the same x264 (its lookahead else depends on memory's layout).
+                # The same frames shall give the same bytes; x264's lookahead else depends on the memory's layout.
                 options = {"crf": f"{crf:g}", "threads": "1", "x264-params": "threads=1:cpu-independent=1"}
                 stream = container.add_stream("libx264", options=options)
             case Mjpeg(qscale=qscale):

@@ -19,7 +19,9 @@ from numpy.typing import NDArray
 from scipy.special import erf
 
 from fingervision.domain.region import Region
-from fingervision.rendering.outline import Line, Outline, Points
+from fingervision.rendering.line import Line
+from fingervision.rendering.outline import Outline
+from fingervision.rendering.plane import Points
 
 # Nodes of one panel and its length in sigma: together good to 1e-7 of full coverage (tests/rendering/test_coverage.py).
 NODES = 12

@@ -4,7 +4,8 @@ from math import radians
 
 import numpy as np
 
-from fingervision.rendering.outline import Motion, polygon
+from fingervision.rendering.plane import Motion
+from fingervision.rendering.polygon import polygon
 from fingervision.rendering.scene import Patch
 
 # A grain is up to this much longer than wide.
@@ -38,7 +39,15 @@ def dust(
     -------
     tuple of Patch
         One a grain, to be painted over everything.
+
+    Raises
+    ------
+    FingervisionError
+        A grain without size, or no level to choose from.
     """
+    if not (0.0 < size_px[0] <= size_px[1] and levels):
+        msg = f"Grains must have a size and a level, but size_px is {size_px} and levels is {levels}."
+        raise FingervisionError(msg)
     grains = []
     for _ in range(count):
         length = rng.uniform(*size_px)

@@ -8,7 +8,10 @@ import numpy as np
 from fingervision.domain.direction import Direction
 from fingervision.domain.errors import FingervisionError
 from fingervision.rendering.biarc import biarcs
-from fingervision.rendering.outline import Line, Motion, Outline, Piece, polygon
+from fingervision.rendering.line import Line
+from fingervision.rendering.outline import Outline, Piece
+from fingervision.rendering.plane import Motion
+from fingervision.rendering.polygon import polygon
 
 # A half ellipse is drawn as this many circular arcs; they, not the ellipse, are the truth (they differ by 1e-4 px).
 ELLIPSE_ARCS = 48

@@ -11,7 +11,9 @@ import numpy as np
 
 from fingervision.domain.errors import FingervisionError
 from fingervision.rendering.biarc import biarcs
-from fingervision.rendering.outline import Line, Outline, Piece, Points
+from fingervision.rendering.line import Line
+from fingervision.rendering.outline import Outline, Piece
+from fingervision.rendering.plane import Points
 
 # The distortion must still grow at this multiple of the frame's half diagonal; beyond it the factor stays the same.
 DISTORTED_TO = 1.5
@@ -41,7 +43,7 @@ class RadialLens:
 
     def __post_init__(self) -> None:
         q2 = np.linspace(0.0, DISTORTED_TO, 31) ** 2
-        if np.min(1 + 3 * self.k1 * q2 + 5 * self.k2 * q2**2) <= 0.0:
+        if not np.min(1 + 3 * self.k1 * q2 + 5 * self.k2 * q2**2) > 0.0:
             msg = (
                 f"A lens must not fold the picture, but k1 = {self.k1:g} with k2 = {self.k2:g} does within "
                 f"{DISTORTED_TO:g} half diagonals: choose coefficients nearer to 0."
@@ -73,7 +75,8 @@ class Tilt:
     distance_px: float = 3400.0
 
     def __post_init__(self) -> None:
-        if max(abs(self.about_x_deg), abs(self.about_y_deg)) > 45.0 or self.distance_px <= 0.0:
+        turns_deg = (abs(self.about_x_deg), abs(self.about_y_deg))
+        if not (max(turns_deg) <= 45.0 and self.distance_px > 0.0):
             msg = (
                 f"A tilt must be at most 45 degrees, seen from a positive distance, but is {self.about_x_deg:g} and "
                 f"{self.about_y_deg:g} degrees from {self.distance_px:g} px."

@@ -7,6 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import erf
 
+from fingervision.domain.errors import FingervisionError
+
 
 @dataclass(frozen=True, slots=True)
 class LightStep:
@@ -43,6 +45,11 @@ class Light:
         A step in the light.
     exposure : float
         Factor on everything; above the full scale the picture clips.
+
+    Raises
+    ------
+    FingervisionError
+        Somewhere the light would be negative.
     """
 
     ground: float = 200.0
@@ -51,6 +58,15 @@ class Light:
     slope_y: float = 0.0
     step: LightStep | None = None
     exposure: float = 1.0
+
+    def __post_init__(self) -> None:
+        factor = 1.0 if self.step is None else self.step.factor
+        if not (abs(self.slope_x) <= 2.0 and abs(self.slope_y) <= 2.0 and factor >= 0.0 and self.exposure >= 0.0):
+            msg = (
+                "Light must not be negative: slopes lie between -2 and 2, factors are 0 or more, but there are "
+                f"slope_x = {self.slope_x:g}, slope_y = {self.slope_y:g}, step = {factor:g}, exposure = {self.exposure:g}."
+            )
+            raise FingervisionError(msg)
 
     def field(self, width_px: int, height_px: int, blur_px: float) -> NDArray[np.float64] | float:
         """Factor on each pixel's grey level; a plain number where the light is even."""

@@ -34,10 +34,20 @@ class Rim:
         How far it reaches outwards.
     level : float
         Grey level 0..255.
+
+    Raises
+    ------
+    FingervisionError
+        The rim has no width.
     """
 
     width_px: float
     level: float
+
+    def __post_init__(self) -> None:
+        if not self.width_px > 0.0:
+            msg = f"width_px of a rim must be positive, but is {self.width_px:g}."
+            raise FingervisionError(msg)
 
 
 @dataclass(frozen=True, slots=True)

@@ -3,12 +3,14 @@
 from math import radians
 
 from fingervision.domain.errors import FingervisionError
-from fingervision.rendering.outline import Motion, Outline, disc, polygon
+from fingervision.rendering.outline import Outline, disc
+from fingervision.rendering.plane import Motion
+from fingervision.rendering.polygon import polygon
 
 __all__ = ["bar", "chessboard", "disc", "needle", "slot"]
 
 # A plate or needle that leaves the frame ends this far beyond it.
-BEYOND_FRAME_PX = 80.0
+BEYOND_FRAME_PX = 200.0
 
 
 def bar(size_px: float, length_px: float, *, x_px: float, y_px: float, turn_deg: float = 0.0) -> tuple[Outline]:

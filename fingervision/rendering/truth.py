@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from scipy.optimize import brentq, minimize_scalar
 
 from fingervision.domain.direction import Direction
+from fingervision.domain.errors import FingervisionError
 from fingervision.domain.gap import NoGap
 from fingervision.domain.status import Status
 from fingervision.rendering.camera import Camera
@@ -160,7 +161,15 @@ def measuring_point(shape: Outline, below_tip_px: float, side: int) -> tuple[flo
     -------
     across_px, tip_px : float
         The edge across, and the tip along.
+
+    Raises
+    ------
+    FingervisionError
+        The finger does not reach to that line.
     """
     tip = _tip(shape, Direction.UP)
     crossings = _crossings(shape, Direction.UP, tip + below_tip_px)
+    if not crossings:
+        msg = f"below_tip_px must lie between 0 and the finger's length, but is {below_tip_px:g}."
+        raise FingervisionError(msg)
     return (max(crossings) if side < 0 else min(crossings)), tip

@@ -6,12 +6,12 @@ from fingervision.domain.direction import Direction
 from fingervision.domain.errors import FingervisionError
 from fingervision.rendering.finger import Finger, Highlight, SquareTip, Tip, axis_motion, finger_shape, highlight_shape
 from fingervision.rendering.light import EVEN_LIGHT, Light
-from fingervision.rendering.outline import Motion
+from fingervision.rendering.plane import Motion
 from fingervision.rendering.scene import Patch, Rim, Scene
 from fingervision.rendering.truth import measuring_point
 
 # A finger that leaves the frame ends this far beyond the border: further than any blur and any lens can fetch.
-BEYOND_FRAME_PX = 80.0
+BEYOND_FRAME_PX = 200.0
 
 
 def two_fingers(
@@ -75,7 +75,7 @@ def two_fingers(
     Raises
     ------
     FingervisionError
-        The step between the tips is greater than the gap.
+        The step between the tips is greater than the gap, or the tips do not reach to the measuring height.
     """
     axes = axis_motion(direction)
     across_size, along_size = frame if direction.is_vertical else frame[::-1]
@@ -91,7 +91,7 @@ def two_fingers(
     reach = length_px if length_px is not None else border - root_side + width_px + abs(tip_step_px) + BEYOND_FRAME_PX
     tips_along = (root_side, root_side - tip_step_px)
 
-    if abs(gap_px) < abs(tip_step_px):
+    if not abs(gap_px) >= abs(tip_step_px):
         msg = f"gap_px must be at least the step between the tips ({abs(tip_step_px):g} px), but is {gap_px:g}."
         raise FingervisionError(msg)
     component = sqrt(gap_px**2 - tip_step_px**2) * (1.0 if gap_px >= 0.0 else -1.0)

@@ -5,7 +5,10 @@ from math import acos, atan2, hypot, pi, sqrt
 
 import numpy as np
 
-from fingervision.rendering.outline import SAME_POINT_PX, Arc, Line, Outline, Piece, bridged
+from fingervision.rendering.arc import Arc
+from fingervision.rendering.line import Line
+from fingervision.rendering.outline import Outline, Piece, bridged
+from fingervision.rendering.plane import SAME_POINT_PX
 
 
 def union(outlines: tuple[Outline, ...]) -> tuple[Outline, ...]:

@@ -1,0 +1,72 @@
+"""A circular piece of an outline."""
+
+from dataclasses import dataclass
+from math import atan2, cos, pi, sin
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fingervision.rendering.plane import Motion, Points
+
+
+@dataclass(frozen=True, slots=True)
+class Arc:
+    """A circular piece about (x, y), from the angle `start_rad` on by `sweep_rad` (positive from x towards y)."""
+
+    x_px: float
+    y_px: float
+    radius_px: float
+    start_rad: float
+    sweep_rad: float
+
+    @property
+    def start(self) -> tuple[float, float]:
+        """First point."""
+        return self._at(0.0)
+
+    @property
+    def end(self) -> tuple[float, float]:
+        """Last point."""
+        return self._at(1.0)
+
+    def _at(self, t: float) -> tuple[float, float]:
+        angle = self.start_rad + t * self.sweep_rad
+        return (self.x_px + self.radius_px * cos(angle), self.y_px + self.radius_px * sin(angle))
+
+    @property
+    def length_px(self) -> float:
+        """Length along the arc."""
+        return abs(self.radius_px * self.sweep_rad)
+
+    def points(self, t: NDArray[np.float64]) -> Points:
+        """Points at the fractions `t` of the length, shape (n, 2)."""
+        angle = self.start_rad + np.asarray(t, dtype=np.float64) * self.sweep_rad
+        x = self.x_px + self.radius_px * np.cos(angle)
+        y = self.y_px + self.radius_px * np.sin(angle)
+        return np.stack([x, y], axis=-1)
+
+    def heading_rad(self, t: float) -> float:
+        """Direction of travel at the fraction `t`, from x towards y."""
+        quarter = pi / 2 if self.sweep_rad * self.radius_px >= 0.0 else -pi / 2
+        return self.start_rad + t * self.sweep_rad + quarter
+
+    def part(self, t0: float, t1: float) -> "Arc":
+        """Cut out the piece between two fractions of the length."""
+        start = self.start_rad + t0 * self.sweep_rad
+        return Arc(self.x_px, self.y_px, self.radius_px, start, (t1 - t0) * self.sweep_rad)
+
+    def backwards(self) -> "Arc":
+        """Run the same piece from its end."""
+        return Arc(self.x_px, self.y_px, self.radius_px, self.start_rad + self.sweep_rad, -self.sweep_rad)
+
+    def moved(self, motion: Motion) -> "Arc":
+        """Place the piece by a rigid motion."""
+        x, y = motion.place(self.x_px, self.y_px)
+        first_x, first_y = motion.place(*self.start)
+        sweep = -self.sweep_rad if motion.mirrors else self.sweep_rad
+        return Arc(x, y, self.radius_px, atan2(first_y - y, first_x - x), sweep)
+
+    def grown(self, by_px: float) -> "Arc":
+        """Shift the piece parallel to itself, `by_px` further out than its outline now lies."""
+        outwards = 1.0 if self.sweep_rad >= 0.0 else -1.0
+        return Arc(self.x_px, self.y_px, self.radius_px + outwards * by_px, self.start_rad, self.sweep_rad)

@@ -1,0 +1,50 @@
+"""The plane of the picture: its points and its rigid motions.
+
+Coordinates are those of the picture: x right, y down, the centre of the first pixel is (0, 0), lengths in pixels.
+"""
+
+from dataclasses import dataclass
+from math import cos, sin
+
+import numpy as np
+from numpy.typing import NDArray
+
+Points = NDArray[np.float64]
+"""Points in the picture, shape (..., 2): x and y."""
+
+# Ends that are nearer than this are the same point: far below every tolerance, far above rounding at 4K.
+SAME_POINT_PX = 1e-7
+
+
+@dataclass(frozen=True, slots=True)
+class Motion:
+    """A rigid motion of the plane, reflections included: matrix times point plus shift.
+
+    Parameters
+    ----------
+    xx, xy, yx, yy : float
+        Orthogonal matrix: new x = xx x + xy y, new y = yx x + yy y.
+    x_px, y_px : float
+        Shift.
+    """
+
+    xx: float = 1.0
+    xy: float = 0.0
+    yx: float = 0.0
+    yy: float = 1.0
+    x_px: float = 0.0
+    y_px: float = 0.0
+
+    @staticmethod
+    def turn(angle_rad: float) -> "Motion":
+        """Turn about the origin, from x towards y (clockwise to the eye, because y points down)."""
+        return Motion(cos(angle_rad), -sin(angle_rad), sin(angle_rad), cos(angle_rad))
+
+    @property
+    def mirrors(self) -> bool:
+        """Whether left and right hands are exchanged."""
+        return self.xx * self.yy - self.xy * self.yx < 0.0
+
+    def place(self, x_px: float, y_px: float) -> tuple[float, float]:
+        """Where a point comes to lie."""
+        return (self.xx * x_px + self.xy * y_px + self.x_px, self.yx * x_px + self.yy * y_px + self.y_px)
