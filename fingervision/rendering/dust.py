@@ -4,6 +4,7 @@ from math import radians
 
 import numpy as np
 
+from fingervision.domain.errors import FingervisionError
 from fingervision.rendering.plane import Motion
 from fingervision.rendering.polygon import polygon
 from fingervision.rendering.scene import Patch
