@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from math import hypot
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import brentq, minimize_scalar
 
 from fingervision.domain.direction import Direction
@@ -18,6 +18,8 @@ from fingervision.rendering.scene import Scene
 
 # An extremum is bracketed by this many points on each piece before it is refined.
 BRACKET_POINTS = 17
+# Points within this of the outermost one belong to the tip.
+FLAT_PX = 1e-6
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,7 +76,11 @@ def truth(scene: Scene, camera: Camera, below_tip_px: float) -> TrueGap | NoGap:
     first, second = scene.fingers
     direction = first.direction
     shapes = list(camera.sees((first.outline, second.outline), scene.width_px, scene.height_px))
-    tips = [_tip(shape, direction) for shape in shapes]
+    ends = [_tip(shape, direction) for shape in shapes]
+    across_size = scene.width_px if direction.is_vertical else scene.height_px
+    if any(end.last_px < -0.5 or end.first_px > across_size - 0.5 for end in ends):
+        return NoGap(Status.TIP_OUT_OF_VIEW, "The outermost point of a finger lies beside the frame.")
+    tips = [end.along_px for end in ends]
     spans = [_crossings(shape, direction, tip + below_tip_px) for shape, tip in zip(shapes, tips, strict=True)]
     if not all(spans):
         return NoGap(Status.NO_FINGERS, f"A finger ends less than {below_tip_px:g} px below its tip.")
@@ -97,7 +103,7 @@ def truth(scene: Scene, camera: Camera, below_tip_px: float) -> TrueGap | NoGap:
     return TrueGap(edges[0], edges[1])
 
 
-def _in_axes(piece: Piece, direction: Direction, t: float | NDArray[np.float64]) -> NDArray[np.float64]:
+def _in_axes(piece: Piece, direction: Direction, t: ArrayLike) -> NDArray[np.float64]:
     """Coordinates (across, towards the root) of points on a piece, shape (..., 2)."""
     points = piece.points(np.asarray(t, dtype=np.float64))
     match direction:
@@ -111,22 +117,34 @@ def _in_axes(piece: Piece, direction: Direction, t: float | NDArray[np.float64])
             return points[..., ::-1] * (1.0, -1.0)
 
 
-def _tip(outline: Outline, direction: Direction) -> float:
-    """Least coordinate towards the root."""
+@dataclass(frozen=True, slots=True)
+class _Tip:
+    """Least coordinate towards the root, and where across it is reached: a flat tip reaches it over a stretch."""
+
+    along_px: float
+    first_px: float
+    last_px: float
+
+
+def _tip(outline: Outline, direction: Direction) -> _Tip:
     grid = np.linspace(0.0, 1.0, BRACKET_POINTS)
-    least = np.inf
+    found = []
     for piece in outline.pieces:
-        along = _in_axes(piece, direction, grid)[:, 1]
-        place = int(np.argmin(along))
-        least = min(least, float(along[place]))
+        points = _in_axes(piece, direction, grid)
+        place = int(np.argmin(points[:, 1]))
+        found.append(points)
         if 0 < place < BRACKET_POINTS - 1:
 
             def height_px(t: float, piece: Piece = piece) -> float:
                 return float(_in_axes(piece, direction, t)[1])
 
             bounds = (float(grid[place - 1]), float(grid[place + 1]))
-            least = min(least, float(minimize_scalar(height_px, bounds=bounds, options={"xatol": 1e-10}).fun))
-    return least
+            best = float(minimize_scalar(height_px, bounds=bounds, options={"xatol": 1e-10}).x)
+            found.append(_in_axes(piece, direction, [best]))
+    everything = np.concatenate(found)
+    along_px = float(everything[:, 1].min())
+    across = everything[everything[:, 1] <= along_px + FLAT_PX, 0]
+    return _Tip(along_px, float(across.min()), float(across.max()))
 
 
 def _crossings(outline: Outline, direction: Direction, along_px: float) -> list[float]:
@@ -167,7 +185,7 @@ def measuring_point(shape: Outline, below_tip_px: float, side: int) -> tuple[flo
     FingervisionError
         The finger does not reach to that line.
     """
-    tip = _tip(shape, Direction.UP)
+    tip = _tip(shape, Direction.UP).along_px
     crossings = _crossings(shape, Direction.UP, tip + below_tip_px)
     if not crossings:
         msg = f"below_tip_px must lie between 0 and the finger's length, but is {below_tip_px:g}."
