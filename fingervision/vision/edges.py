@@ -79,6 +79,8 @@ class EdgePoints:
         Gaussian sigma of the optics in each group, without the pixel.
     noise : float
         Standard deviation of the grey levels about the model.
+    curvature_gain : ndarray of float, shape (n,)
+        How much more than the half-level a fit along this line feels the outline's curvature.
     clipped : ndarray of bool, shape (n,)
         Whether the flank itself, not only the plateau, touches the end of the scale.
     """
@@ -89,6 +91,7 @@ class EdgePoints:
     contrast: Floats
     blur_px: Floats
     noise: float
+    curvature_gain: Floats
     clipped: NDArray[np.bool_]
 
 
@@ -215,6 +218,7 @@ def _fit(values: Floats, weight: Floats, lines: ProfileLines, blur: Floats, reac
     position = np.full(n, 0.5)
     blur = blur.copy()
     in_group = lines.group[:, None] == np.arange(4)
+    facing, partner = _facing(lines, reach)
 
     def centred(a: Floats) -> Floats:
         return np.asarray(a - ((weight * a).sum(axis=1) / count)[:, None])
@@ -229,6 +233,16 @@ def _fit(values: Floats, weight: Floats, lines: ProfileLines, blur: Floats, reac
         step = np.diff(z * cumulative + sigma[:, None] * density, axis=1)
         by_position = -np.diff(cumulative, axis=1)
         by_sigma = np.diff(density, axis=1)
+        if len(facing):
+            # The ground between two near edges is a stripe: what the other edge takes away belongs to the model.
+            other = (lines.coarse + lines.outward * position)[partner] - lines.coarse[facing]
+            z = borders - (lines.outward[facing] * other)[:, None]
+            spread = sigma[partner][:, None]
+            q = z / spread
+            cumulative = ndtr(q)
+            density = np.exp(-0.5 * q * q) * (1.0 / np.sqrt(2.0 * np.pi))
+            step[facing] -= np.diff(z * cumulative + spread * density, axis=1)
+            by_sigma[facing] -= np.diff(density, axis=1)
         s0, t0, v0 = centred(step) * weight, centred(by_position) * weight, centred(by_sigma) * weight
         ss, st, tt = (s0 * s0).sum(axis=1), (s0 * t0).sum(axis=1), (t0 * t0).sum(axis=1)
         sy, ty = (s0 * y0).sum(axis=1), (t0 * y0).sum(axis=1)
@@ -266,8 +280,32 @@ def _fit(values: Floats, weight: Floats, lines: ProfileLines, blur: Floats, reac
         contrast,
         blur,
         noise,
+        1.0 + lines.slope**2 * _skew(reach / sigma),
         clipped,
     )
+
+
+def _facing(lines: ProfileLines, reach: int) -> tuple[Ints, Ints]:
+    """Lines whose window holds the other finger's inner edge, and the line on which that edge is measured."""
+    left = np.flatnonzero(lines.is_inner & (lines.group == 0))
+    right = np.flatnonzero(lines.is_inner & (lines.group == 2))  # noqa: PLR2004 - the right finger's flank
+    _, in_left, in_right = np.intersect1d(lines.fixed[left], lines.fixed[right], return_indices=True)
+    left, right = left[in_left], right[in_right]
+    near = lines.coarse[right] - lines.coarse[left] < 2 * reach
+    left, right = left[near], right[near]
+    return np.concatenate((left, right)), np.concatenate((right, left))
+
+
+def _skew(reach_sigmas: Floats) -> Floats:
+    """What a fit with two free levels makes of an edge whose distance along the line is not quite straight.
+
+    Along a line that meets a curved edge at a slant of slope m, the distance to the edge is t + kappa m^2 t^2 / (2 (1 +
+    m^2)^(1/2)). Projected on the fit's own directions over a window of w standard deviations this moves the position by
+    m^2 c sigma^2 kappa / 2 across the edge, c = (1 / (4 sqrt pi) - 1 / 2w) / (1 / (2 sqrt pi) - 1 / 2w).
+    """
+    level = 0.5 / np.maximum(reach_sigmas, 2.5)
+    root = 0.5 / np.sqrt(np.pi)
+    return np.asarray((0.5 * root - level) / (root - level))
 
 
 # Gauss-Newton converges quadratically from the first look; the fifth pass changes positions by less than 1e-4 px.

@@ -20,10 +20,12 @@ Floats = NDArray[np.float64]
 # Order of the parameters. A line is across = c + m (along - y0), or along = c + m (across - x0) for the top.
 INNER_C, INNER_M, TOP_C, TOP_M, OUTER_C, OUTER_M, INNER_R, OUTER_R = range(8)
 PARAMETERS = 8
-ITERATIONS = 6
+# The first passes forgive what the first guess got wrong; only the last ones tell dust from shape.
+PATIENCE = (100.0, 20.0, 4.0, 1.0, 1.0, 1.0)
 # Tukey's biweight at 95 % efficiency (Holland & Welsch, Commun. Stat. A6, 1977).
 BIWEIGHT_REACH = 4.685
-SMALLEST_RADIUS_PX = 0.3
+# Fillets below so many sigma are sharp corners in the picture, which say nothing within so many sigma.
+SHARP_IN_BLURS, SHARP_REACH = 1.5, 2.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -136,8 +138,10 @@ def _shape(p: Floats, origin: Floats) -> _Shape:
     return _Shape(*(a[:, None] for a in every))
 
 
-def _distance(s: _Shape, p: Floats, origin: Floats, points: OutlinePoints) -> tuple[Floats, Floats, Floats]:
-    """Signed normal distance of the points from the half-level outline, its derivatives, and |normal component|."""
+def _distance(
+    s: _Shape, p: Floats, origin: Floats, points: OutlinePoints
+) -> tuple[Floats, Floats, Floats, NDArray[np.bool_]]:
+    """Signed distance of the points from the half-level outline, its derivatives, |normal component|, and who counts."""
     x, y = points.x, points.y
     x0, y0 = origin[:, :1], origin[:, 1:]
     # Coordinates of p - C in the (oblique) basis of the two normals that meet at the fillet.
@@ -153,8 +157,8 @@ def _distance(s: _Shape, p: Floats, origin: Floats, points: OutlinePoints) -> tu
     inner_half = x > 0.5 * (s.c1x + s.c2x)
     fillet1 = (alpha1 > 0) & (beta1 > 0) & inner_half
     fillet2 = (alpha2 > 0) & (beta2 > 0) & ~inner_half
-    flank1 = inner_half & ~fillet1 & (beta1 <= 0)
-    flank2 = ~inner_half & ~fillet2 & (beta2 <= 0)
+    flank1 = inner_half & ~fillet1 & (beta1 <= 0) & (alpha1 > beta1)
+    flank2 = ~inner_half & ~fillet2 & (beta2 <= 0) & (alpha2 > beta2)
 
     h1, h2 = np.hypot(ux, uy), np.hypot(vx, vy)
     h1, h2 = np.maximum(h1, 1e-6), np.maximum(h2, 1e-6)
@@ -173,6 +177,11 @@ def _distance(s: _Shape, p: Floats, origin: Floats, points: OutlinePoints) -> tu
     )
     # Half-level of a blurred curved edge: curvature felt through a Gaussian along the outline. Arc length from the
     # fillet's two ends follows from the angle on the fillet and from the distance beyond it on the straight sides.
+    # A fillet that is small against the blur is no fillet in the picture: its neighbourhood says nothing of the sides.
+    reach1 = SHARP_REACH * points.blur + s.r1
+    reach2 = SHARP_REACH * points.blur + s.r2
+    blurred_out = (s.r1 < SHARP_IN_BLURS * points.blur) & (alpha1 > -reach1) & (beta1 > -reach1)
+    blurred_out |= (s.r2 < SHARP_IN_BLURS * points.blur) & (alpha2 > -reach2) & (beta2 > -reach2)
     d = d + np.where(
         inner_half,
         _blur_shift(
@@ -201,7 +210,7 @@ def _distance(s: _Shape, p: Floats, origin: Floats, points: OutlinePoints) -> tu
     nx = a_inner * s.nix + a_top * s.ntx + a_outer * s.nox
     ny = a_inner * s.niy + a_top * s.nty + a_outer * s.noy
     along_line = np.where(points.is_row, np.abs(nx), np.abs(ny))
-    return d, jacobian, along_line
+    return d, jacobian, along_line, ~blurred_out
 
 
 def _blur_shift(
@@ -246,20 +255,21 @@ def fit_finger_ends(points: OutlinePoints, start: Floats, origin: Floats, u_prio
     robust = points.weight
     information_prior = 1.0 / u_prior**2
     misfit = np.ones(len(p))
-    for iteration in range(ITERATIONS):
-        d, jacobian, along_line = _distance(_shape(p, origin), p, origin, points)
+    for iteration in range(len(PATIENCE)):
+        d, jacobian, along_line, counts = _distance(_shape(p, origin), p, origin, points)
         u_normal = points.u * np.maximum(along_line, 0.3)
         residual = d / u_normal
-        spread = _spread(residual, points.weight)
+        counted = points.weight * counts
+        spread = _spread(residual, counted)
         misfit = np.maximum(spread, 1.0)
-        reach = BIWEIGHT_REACH * np.maximum(misfit, 1.0)[:, None] * (3.0 if iteration == 0 else 1.0)
-        robust = points.weight * np.clip(1.0 - (residual / reach) ** 2, 0.0, None) ** 2
+        reach = BIWEIGHT_REACH * np.maximum(misfit, 1.0)[:, None] * PATIENCE[iteration]
+        robust = counted * np.clip(1.0 - (residual / reach) ** 2, 0.0, None) ** 2
         scaled = jacobian * (robust / u_normal**2)[..., None]
         normal = np.swapaxes(scaled, 1, 2) @ jacobian
         normal[:, np.arange(PARAMETERS), np.arange(PARAMETERS)] += information_prior
         right = -(scaled * d[..., None]).sum(axis=1) - (p - start) * information_prior
         p = p + np.linalg.solve(normal, right[..., None])[..., 0]
-        p[:, INNER_R:] = np.maximum(p[:, INNER_R:], SMALLEST_RADIUS_PX)
+        p[:, INNER_R:] = np.maximum(p[:, INNER_R:], 0.0)
     covariance = np.linalg.inv(normal)
     return FingerEnds(p, covariance, origin, misfit, residual, robust)
 
@@ -270,8 +280,14 @@ def _spread(residual: Floats, weight: Floats) -> Floats:
     return np.asarray(1.4826 * np.nanmedian(magnitude, axis=1))
 
 
-def tip_and_edge(p: Floats, origin: Floats, below_tip_px: float) -> tuple[Floats, Floats, Floats]:
-    """The outermost point along the axis, the inner edge so far below it, and the edge's slope there.
+def corner_tops(p: Floats, origin: Floats) -> tuple[Floats, Floats]:
+    """Outermost point of the inner and of the outer fillet along the axis, each shape (m,)."""
+    s = _shape(p, origin)
+    return (s.c1y - s.r1)[:, 0], (s.c2y - s.r2)[:, 0]
+
+
+def inner_edge(p: Floats, origin: Floats, y: Floats) -> tuple[Floats, Floats]:
+    """Where the inner side of the outline crosses a height, and its slope there.
 
     Parameters
     ----------
@@ -279,25 +295,23 @@ def tip_and_edge(p: Floats, origin: Floats, below_tip_px: float) -> tuple[Floats
         Finger ends.
     origin : ndarray of float, shape (m, 2)
         x0 and y0 of the lines.
-    below_tip_px : float
-        Height of measuring below the tip.
+    y : ndarray of float, shape (m,)
+        Height of measuring.
 
     Returns
     -------
-    tip, edge, slope : ndarray of float, shape (m,)
-        `y` of the tip, `x` of the inner edge, and its change per pixel towards the root.
+    x, slope : ndarray of float, shape (m,)
+        The crossing and its change per pixel towards the root.
     """
     s = _shape(p, origin)
     c1x, c1y, r1 = s.c1x[:, 0], s.c1y[:, 0], s.r1[:, 0]
-    tip = np.minimum(c1y - r1, s.c2y[:, 0] - s.r2[:, 0])
-    y = tip + below_tip_px
     flank_from = c1y + r1 * s.niy[:, 0]
     top_until = c1y + r1 * s.nty[:, 0]
     inside = np.clip(y - c1y, -0.999 * r1, 0.999 * r1)
-    half_width = np.sqrt(r1**2 - inside**2)
+    half_width = np.sqrt(np.maximum(r1**2 - inside**2, 1e-12))
     on_flank = p[:, INNER_C] + p[:, INNER_M] * (y - origin[:, 1])
     steepness = np.where(np.abs(p[:, TOP_M]) < 1e-3, 1e-3, p[:, TOP_M])
     on_top = origin[:, 0] + (y - p[:, TOP_C]) / steepness
-    edge = np.where(y >= flank_from, on_flank, np.where(y <= top_until, on_top, c1x + half_width))
+    x = np.where(y >= flank_from, on_flank, np.where(y <= top_until, on_top, c1x + half_width))
     slope = np.where(y >= flank_from, p[:, INNER_M], np.where(y <= top_until, 1.0 / steepness, -inside / half_width))
-    return tip, edge, slope
+    return x, slope

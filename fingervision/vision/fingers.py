@@ -24,6 +24,8 @@ Outline = NDArray[np.int_]
 
 # A top that is lower than this is noise or dust on an outline, whatever the scale (pixels).
 SMALLEST_PROMINENCE_PX = 5.0
+# An outline that comes back up by more than this has passed the bottom of a notch.
+SMALLEST_NOTCH_PX = 3
 # Tops beyond this number are texture; the fingers are among the most prominent.
 MOST_TOPS = 8
 # Fingers come in from the picture's border; things that lie in view are less likely to be fingers.
@@ -155,7 +157,8 @@ def _tops(mask: NDArray[np.uint8], outlines: list[Outline], orientation: Orienta
         across, along = orientation.to_axes(pixels[:, 0], pixels[:, 1])
         lowest = int(np.argmax(along))
         outline = np.column_stack((np.roll(across, -lowest), np.roll(along, -lowest)))
-        height = -outline[:, 1].astype(np.float64)
+        # Of two equally high places on one flat top the earlier is a little lower, so that one top remains.
+        height = 1e-6 * np.arange(len(outline)) - outline[:, 1]
         # The outline is closed: its lowest point stands at both ends.
         peaks, properties = find_peaks(np.append(height, height[0]), prominence=SMALLEST_PROMINENCE_PX, plateau_size=1)
         for peak, prominence in zip(peaks, properties["prominences"], strict=True):
@@ -163,7 +166,8 @@ def _tops(mask: NDArray[np.uint8], outlines: list[Outline], orientation: Orienta
             below = min(int(r) + 2, orientation.along_size - 1)
             if not upright[below, a]:
                 continue  # the top of a hole, not of a thing
-            is_rooted = bool(-height[0] == orientation.along_size - 1 and prominence > 0.5 * (-height[0] - r))
+            lowest_along = outline[0, 1]
+            is_rooted = bool(lowest_along == orientation.along_size - 1 and prominence > 0.5 * (lowest_along - r))
             yield Top(outline, int(peak), float(prominence), is_rooted)
 
 
@@ -219,8 +223,9 @@ def _follow(top: Top, inner_sign: int, below_tip_px: float, reach_px: float) -> 
 
 
 def _down_from(along: NDArray[np.int_], limit: float) -> int:
-    """Steps until the outline has gone down to `limit`, or turns back up for good."""
-    reached = along >= limit
-    if reached.any():
-        return int(np.argmax(reached))
-    return int(np.argmax(along))
+    """Steps until the outline has gone down to `limit`, or turns back up: at a notch, or at its own end."""
+    lowest = np.maximum.accumulate(along)
+    turned = lowest - along > SMALLEST_NOTCH_PX
+    past = int(np.argmax(turned)) if turned.any() else len(along)
+    reached = along[:past] >= limit
+    return int(np.argmax(reached)) if reached.any() else int(np.argmax(along[:past]))

@@ -10,14 +10,17 @@ from fingervision.domain.status import Status
 from fingervision.vision.edges import EdgePoints
 from fingervision.vision.finger_end import (
     INNER_M,
+    INNER_R,
     OUTER_M,
     OUTER_R,
     PARAMETERS,
+    SHARP_IN_BLURS,
     TOP_M,
     FingerEnds,
     OutlinePoints,
+    corner_tops,
     fit_finger_ends,
-    tip_and_edge,
+    inner_edge,
 )
 from fingervision.vision.fingers import CoarseFinger, CoarseFingers
 from fingervision.vision.local_outline import FingerPoints, local_edge, local_tip
@@ -27,6 +30,14 @@ Floats = NDArray[np.float64]
 
 # Above this blur (sigma_e, pixels) an edge is no longer an edge.
 BLUR_LIMIT_PX = 5.0
+# Where the outline runs at 45 degrees, rows and columns look at the same pixels: each counts for less.
+SHARED_SLOPE, SHARED_FACTOR = 0.75, 1.25
+# A line and its scatter need so many points.
+FEWEST_ROWS = 4
+# Flanks that differ more in slope are not both flanks; a flank that is not in view is parallel to the other within this.
+MOST_TAPER, TAPER_PRIOR = 0.15, 0.03
+# A measuring point farther from every point of the outline would be extrapolated (pixels).
+FARTHEST_POINT_PX = 2.5
 # Below this ratio of contrast to noise nothing is measured.
 CONTRAST_TO_NOISE = 3.0
 # The three-sided shape holds where its mean residual near the two points that matter is below so many of its own sigma.
@@ -35,7 +46,16 @@ SHAPE_LIMIT = 4.0
 SHAPE_REACH_PX = 8.0
 # Neighbouring points share what the model leaves unexplained, and a codec's blocks, over so many of them.
 WHITE_LAGS, LOSSY_LAGS = 8, 16
+# Mean of w r^2 over mean of w for normal residuals under the biweight: the weights shrink the spread by this.
+BIWEIGHT_SPREAD = 0.828
 PIXEL_VARIANCE = 1.0 / 12.0
+# A sharp corner's half-level stays away by so many sigma; points so close to a corner give its radius.
+SHARP_CORNER, NEAR_CORNER = 0.7706, 7
+# A fillet below so many sigma is blurred into the corner: its radius is known from the corner alone, to so much.
+SHARP_PRIOR_PX = 0.3
+# A top whose two corners differ in height by less than so many sigma is level
+# (a corner that is not in view says nothing: never by more than this).
+LEVEL_IN_SIGMAS, LEVEL_LIMIT_PX = 2.0, 0.5
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -59,7 +79,7 @@ class MeasuredFinger:
 def outline_points(fingers: CoarseFingers, edges: EdgePoints) -> tuple[OutlinePoints, Floats]:
     """Each finger's sub-pixel points in its own axes (inner side at larger x, tip at small y), and their origins."""
     lines = edges.lines
-    blur = np.sqrt(edges.blur_px**2 + PIXEL_VARIANCE)[lines.group]
+    blur = np.sqrt((edges.blur_px**2 + PIXEL_VARIANCE)[lines.group] * edges.curvature_gain)
     side = np.where(lines.is_row, np.where(lines.is_inner, 0, 2), 1)
     origins, members = [], []
     for number, finger in enumerate((fingers.left, fingers.right)):
@@ -76,7 +96,7 @@ def outline_points(fingers: CoarseFingers, edges: EdgePoints) -> tuple[OutlinePo
     points = OutlinePoints(
         x=sign * (np.where(is_row, position, fixed) - origin[:, :1]),
         y=np.where(is_row, fixed, position) - origin[:, 1:],
-        u=edges.u_position[index],
+        u=(edges.u_position * np.where(np.abs(lines.slope) > SHARED_SLOPE, SHARED_FACTOR, 1.0))[index],
         is_row=is_row,
         weight=real.astype(np.float64),
         blur=blur[index],
@@ -135,7 +155,9 @@ def measure_gap(
 def _refuse(edges: EdgePoints, full_scale: int, light_gap: bool) -> NoGap | None:
     """Reasons to give no number that the edges themselves show."""
     inner = edges.lines.is_inner
-    if inner.sum() < 4:  # noqa: PLR2004 - a line and its scatter need more
+    if inner.sum() < FEWEST_ROWS:  # a slanted or touching tip: what faces the gap is seen in columns
+        inner = ~edges.lines.is_row
+    if inner.sum() < FEWEST_ROWS:
         return NoGap(Status.NO_FINGERS, "The inner edges are too short to be measured.")
     contrast = np.median(edges.contrast[inner]) * (1.0 if light_gap else -1.0)
     if contrast < CONTRAST_TO_NOISE * edges.noise or contrast < 0.02 * full_scale:
@@ -164,13 +186,21 @@ def _first_guess(points: OutlinePoints, below_tip_px: float) -> tuple[Floats, Fl
         top_c, top_m = _line(xt[middle] - x0, yt[middle])
         inner_c, inner_m = _lower_flank(x, y - y0, side == 0) or (float(x.max()), 0.0)
         outer = _lower_flank(x, y - y0, side == 2)  # noqa: PLR2004
+        if outer is not None and abs(inner_m - outer[1]) > MOST_TAPER:
+            # Nothing of the inner flank is in view below the round corner: it runs parallel to the outer one.
+            inner_c, inner_m = float(x.max()) + 1.0, outer[1]
+            prior[k, INNER_M] = TAPER_PRIOR
         outer_c, outer_m = outer or (float(x.min()) - 3.0, 0.0)
         if outer is None:  # cut off by the border: nothing speaks of the far corner
             prior[k, [4, OUTER_M, OUTER_R]] = 1.0, 0.05, 1.0
         width = max(inner_c - outer_c, 2.0)
-        radii = [
-            _radius(x, y, c, m, (top_c, top_m), x0, y0, width) for c, m in ((inner_c, inner_m), (outer_c, outer_m))
-        ]
+        blur = float(np.median(points.blur[k][real]))
+        radii = []
+        for number, flank in ((INNER_R, (inner_c, inner_m)), (OUTER_R, (outer_c, outer_m))):
+            radius = _radius((x, y), flank, (top_c, top_m), (x0, y0), blur)
+            radii.append(min(radius, 0.49 * width))
+            if radius < SHARP_IN_BLURS * blur and prior[k, number] > 1.0:
+                prior[k, number] = SHARP_PRIOR_PX
         start[k] = inner_c, inner_m, top_c, top_m, outer_c, outer_m, *radii
         origin[k] = x0, y0
     return start, origin, prior
@@ -194,25 +224,62 @@ def _lower_flank(x: Floats, y: Floats, mine: NDArray[np.bool_]) -> tuple[float, 
 
 
 def _radius(
-    x: Floats, y: Floats, c: float, m: float, top: tuple[float, float], x0: float, y0: float, width: float
+    points: tuple[Floats, Floats],
+    flank: tuple[float, float],
+    top: tuple[float, float],
+    origin: tuple[float, float],
+    blur: float,
 ) -> float:
-    """Fillet radius from how far the outline stays away from the corner of the two lines."""
+    """Fillet radius from how far the half-level outline stays away from the corner of the two lines.
+
+    On the bisector of a right angle a fillet stays away by (sqrt 2 - 1) r, and blur moves the half-level further in: by
+    sigma^2 / 2r on a large fillet, by 0.77 sigma in a sharp corner (where the product of two error functions is one
+    half). The root of the two in between is within 0.02 sigma of the exact contour.
+    """
+    (x, y), (c, m), (x0, y0) = points, flank, origin
     corner_y = (top[0] + top[1] * (c - m * y0 - x0)) / (1.0 - top[1] * m)
     corner_x = c + m * (corner_y - y0)
-    nearest = float(np.hypot(x - corner_x, y - corner_y).min())
-    return float(np.clip(nearest / (np.sqrt(2.0) - 1.0), 1.0, 0.49 * width))
+    towards = np.array([np.sign(x.mean() - corner_x), 1.0]) / np.sqrt(2.0)
+    dx, dy = x - corner_x, y - corner_y
+    nearest = np.argsort(np.hypot(dx, dy))[:NEAR_CORNER]
+    into, aside = (
+        dx[nearest] * towards[0] + dy[nearest] * towards[1],
+        dx[nearest] * towards[1] - dy[nearest] * towards[0],
+    )
+    retreat = float(np.sqrt(max(np.median(into**2 - aside**2), 0.0)))  # a hyperbola between the two sides
+    radius = max(retreat, 0.0) / (np.sqrt(2.0) - 1.0)
+    for _step in range(20):
+        shift = blur / np.sqrt((2.0 * radius / blur) ** 2 + SHARP_CORNER**-2)
+        radius = 0.5 * (radius + max(retreat - shift, 0.0) / (np.sqrt(2.0) - 1.0))
+    return float(radius)
 
 
 def _evaluate(ends: FingerEnds, below_tip_px: float) -> tuple[Floats, Floats, Floats, Floats]:
-    """Tip, edge, slope, and the covariance of (tip, edge) by the parameters' covariance."""
+    """Tip, edge, slope, and the covariance of (tip, edge) by the parameters' covariance.
+
+    The tip is the higher of the two corners. Where noise alone decides which that is, the higher of two would be too
+    high on average: a top that is level within twice its uncertainty counts as level.
+    """
     count = len(ends.parameters)
     move = 1e-3 * np.concatenate((np.zeros((1, PARAMETERS)), np.eye(PARAMETERS), -np.eye(PARAMETERS)))
     every = (ends.parameters[:, None, :] + move).reshape(-1, PARAMETERS)
     origin = np.repeat(ends.origin, len(move), axis=0)
-    tip, edge, slope = (a.reshape(count, -1) for a in tip_and_edge(every, origin, below_tip_px))
-    gradient = np.stack([(a[:, 1 : PARAMETERS + 1] - a[:, PARAMETERS + 1 :]) / 2e-3 for a in (tip, edge)], axis=1)
-    covariance = gradient @ ends.covariance @ np.swapaxes(gradient, 1, 2)
+    inner, outer = (a.reshape(count, -1) for a in corner_tops(every, origin))
+    gradient = _gradient(outer - inner)
+    u_lean = np.sqrt(np.einsum("ki,kij,kj->k", gradient, ends.covariance, gradient)) * ends.misfit
+    lean = (outer - inner)[:, 0]
+    is_level = np.abs(lean) < np.minimum(LEVEL_IN_SIGMAS * u_lean, LEVEL_LIMIT_PX)
+    inner_share = np.where(is_level, 0.5, lean > 0)[:, None]
+    tip = inner_share * inner + (1.0 - inner_share) * outer
+    edge, slope = (a.reshape(count, -1) for a in inner_edge(every, origin, (tip + below_tip_px).reshape(-1)))
+    gradients = np.stack([_gradient(tip), _gradient(edge)], axis=1)
+    covariance = gradients @ ends.covariance @ np.swapaxes(gradients, 1, 2)
     return tip[:, 0], edge[:, 0], slope[:, 0], covariance
+
+
+def _gradient(moved: Floats) -> Floats:
+    """Central differences of what was evaluated at the parameters, then at each moved up, then down by 1e-3."""
+    return np.asarray((moved[:, 1 : PARAMETERS + 1] - moved[:, PARAMETERS + 1 :]) / 2e-3)
 
 
 def _inflation(points: OutlinePoints, ends: FingerEnds, lossy: bool) -> Floats:
@@ -226,24 +293,31 @@ def _inflation(points: OutlinePoints, ends: FingerEnds, lossy: bool) -> Floats:
     for lag in range(1, lags + 1):
         taper = 1.0 - lag / (lags + 1.0)
         shared += 2.0 * taper * (sequence[:, lag:] * sequence[:, :-lag]).sum(axis=1) / power
-    return np.maximum(spread, 0.5) * np.maximum(shared.mean(), 1.0)
+    return np.maximum(spread / BIWEIGHT_SPREAD, 0.5) * np.maximum(shared.mean(), 1.0)
 
 
 def _shape_holds(points: OutlinePoints, ends: FingerEnds, k: int, tip: float, edge: float, below_tip_px: float) -> bool:
     """Whether the three-sided shape leaves nothing systematic near the measuring point and near the tip."""
     weight = points.weight[k] * ends.robust[k]
+    if not _is_on_outline(points.x[k][weight > 0], points.y[k][weight > 0], edge, tip + below_tip_px):
+        return False
     near_edge = np.abs(points.y[k] - tip - below_tip_px) < SHAPE_REACH_PX
     near_edge &= np.abs(points.x[k] - edge) < 2.0 * SHAPE_REACH_PX
     near_tip = points.y[k] - tip < 0.5 * SHAPE_REACH_PX
     spread = max(float(ends.misfit[k]), 1.0)
     for near in (near_edge, near_tip):
         total = float((weight * near).sum())
-        if total < 3.0:  # noqa: PLR2004 - the robust fit threw the neighbourhood out
-            return False
+        if total < 3.0:  # noqa: PLR2004 - a sharp corner has no points of its own: the two sides speak for it
+            continue
         mean = float((weight * near * ends.residual[k]).sum()) / total
         if abs(mean) * np.sqrt(total) > SHAPE_LIMIT * spread:
             return False
     return spread < 2.0  # noqa: PLR2004
+
+
+def _is_on_outline(x: Floats, y: Floats, edge: float, height: float) -> bool:
+    """Whether a measuring point has points of the outline beside it: nothing is ever extrapolated."""
+    return bool(len(x)) and float(np.hypot(x - edge, y - height).min()) < FARTHEST_POINT_PX
 
 
 def _measure_locally(points: OutlinePoints, k: int, below_tip_px: float, lossy: bool) -> MeasuredFinger | None:
@@ -267,6 +341,8 @@ def _measure_locally(points: OutlinePoints, k: int, below_tip_px: float, lossy: 
     if found is None:
         return None
     edge, slope = found
+    if not _is_on_outline(own.x, own.y, edge.x, height):
+        return None
     lossy_factor = 2.0 if lossy else 1.0
     var_tip = (lossy_factor * tip.u_normal) ** 2
     var_edge = (lossy_factor * edge.u_normal / abs(edge.nx)) ** 2
