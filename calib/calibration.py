@@ -1,6 +1,14 @@
-"""The scale of a flat scene, and how surely it is known."""
+"""A scale that somebody states, without saying how surely."""
 
 from dataclasses import dataclass
+from math import isfinite
+
+import numpy as np
+from numpy.typing import NDArray
+
+from calib.distances import Distances
+
+Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True)
@@ -11,11 +19,67 @@ class BareScale:
     ----------
     px_per_mm : float
         Pixels to the millimetre; positive.
+
+    Raises
+    ------
+    ValueError
+        The scale is not positive.
     """
 
     px_per_mm: float
 
     def __post_init__(self) -> None:
         """Refuse what cannot be a scale."""
-        if not self.px_per_mm > 0:
+        if not (isfinite(self.px_per_mm) and self.px_per_mm > 0.0):
             raise ValueError(f"px_per_mm must be positive, but is {self.px_per_mm}.")
+
+    def distances(self, points_px: Floats, u_random_px: Floats, light_gap: NDArray[np.bool_]) -> Distances:
+        """Distances between pairs of points; nothing is known of the scale's own uncertainty.
+
+        Parameters
+        ----------
+        points_px : ndarray, shape (n, 2, 2)
+            Frame, first or second point, x or y.
+        u_random_px : ndarray, shape (n,)
+            Standard uncertainty of each distance from frame to frame.
+        light_gap : ndarray of bool, shape (n,)
+            True where the gap is light between dark edges; without an edge bias it makes no difference.
+
+        Returns
+        -------
+        Distances
+            Values and their random part; `u_mm` is None.
+        """
+        points = np.asarray(points_px, dtype=np.float64)
+        length_px = np.linalg.norm(points[:, 1] - points[:, 0], axis=1)
+        return Distances(
+            value_mm=length_px / self.px_per_mm,
+            u_mm=None,
+            u_random_mm=np.asarray(u_random_px, dtype=np.float64) / self.px_per_mm,
+        )
+
+    def positions_mm(
+        self, points_px: Floats, axis: int, light_gap: NDArray[np.bool_], frame_size_px: tuple[int, int]
+    ) -> Floats:
+        """Where both points are along an axis of the picture, from its middle.
+
+        Parameters
+        ----------
+        points_px, light_gap
+            As for `distances`.
+        axis : int
+            0 for x (to the right), 1 for y (downwards).
+        frame_size_px : tuple of int
+            Width and height of the frames.
+
+        Returns
+        -------
+        ndarray, shape (n, 2)
+            Millimetres.
+        """
+        middle_px = (frame_size_px[axis] - 1) / 2
+        points = np.asarray(points_px, dtype=np.float64)
+        return np.asarray((points[:, :, axis] - middle_px) / self.px_per_mm)
+
+    def check_frame_size(self, width_px: int, height_px: int) -> None:
+        """Nothing to refuse: a bare scale was made on no particular frame."""

@@ -1,0 +1,25 @@
+"""Distances in millimetres, and how surely they are known."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Distances:
+    """Distances between pairs of points of a flat scene.
+
+    Parameters
+    ----------
+    value_mm : ndarray of float, shape (n,)
+        The distances.
+    u_mm : ndarray of float, shape (n,), or None
+        Standard uncertainties with everything in the scale's budget; None where the scale has no uncertainty stated.
+    u_random_mm : ndarray of float, shape (n,)
+        Their random part alone, from frame to frame.
+    """
+
+    value_mm: NDArray[np.float64]
+    u_mm: NDArray[np.float64] | None
+    u_random_mm: NDArray[np.float64]
