@@ -38,6 +38,8 @@ FEWEST_ROWS = 4
 MOST_TAPER, TAPER_PRIOR = 0.15, 0.03
 # A measuring point farther from every point of the outline would be extrapolated (pixels).
 FARTHEST_POINT_PX = 2.5
+# A local polynomial that is less sure than this (pixels) has not found a smooth outline.
+LOCAL_LIMIT_PX = 1.0
 # Below this ratio of contrast to noise nothing is measured.
 CONTRAST_TO_NOISE = 3.0
 # The three-sided shape holds where its mean residual near the two points that matter is below so many of its own sigma.
@@ -45,7 +47,8 @@ SHAPE_LIMIT = 4.0
 # Residuals within so many pixels of a point speak of the shape there.
 SHAPE_REACH_PX = 8.0
 # Neighbouring points share what the model leaves unexplained, and a codec's blocks, over so many of them.
-WHITE_LAGS, LOSSY_LAGS = 8, 16
+LAGS = 8
+CODING_BLOCK_PX = 12.0
 # Mean of w r^2 over mean of w for normal residuals under the biweight: the weights shrink the spread by this.
 BIWEIGHT_SPREAD = 0.828
 PIXEL_VARIANCE = 1.0 / 12.0
@@ -286,20 +289,21 @@ def _inflation(points: OutlinePoints, ends: FingerEnds, lossy: bool) -> Floats:
     """What multiplies the variances: the residuals' own spread, and how far neighbours share them (Newey-West)."""
     weight = ends.robust * points.weight
     spread = (weight * ends.residual**2).sum(axis=1) / np.maximum(weight.sum(axis=1) - PARAMETERS, 1.0)
-    lags = LOSSY_LAGS if lossy else WHITE_LAGS
     sequence = np.where(points.weight > 0, np.sqrt(weight) * ends.residual, 0.0)
     power = np.maximum((sequence**2).sum(axis=1), 1e-12)
     shared = np.ones(len(power))
-    for lag in range(1, lags + 1):
-        taper = 1.0 - lag / (lags + 1.0)
+    for lag in range(1, LAGS + 1):
+        taper = 1.0 - lag / (LAGS + 1.0)
         shared += 2.0 * taper * (sequence[:, lag:] * sequence[:, :-lag]).sum(axis=1) / power
-    return np.maximum(spread / BIWEIGHT_SPREAD, 0.5) * np.maximum(shared.mean(), 1.0)
+    # What a codec does to a whole block the fit takes for shape: the residuals do not show it, the block's side does.
+    return np.maximum(spread / BIWEIGHT_SPREAD, 0.5) * max(float(shared.mean()), CODING_BLOCK_PX if lossy else 1.0)
 
 
 def _shape_holds(points: OutlinePoints, ends: FingerEnds, k: int, tip: float, edge: float, below_tip_px: float) -> bool:
     """Whether the three-sided shape leaves nothing systematic near the measuring point and near the tip."""
     weight = points.weight[k] * ends.robust[k]
-    if not _is_on_outline(points.x[k][weight > 0], points.y[k][weight > 0], edge, tip + below_tip_px):
+    real = points.weight[k] > 0
+    if not _is_on_outline(points.x[k][real], points.y[k][real], edge, tip + below_tip_px):
         return False
     near_edge = np.abs(points.y[k] - tip - below_tip_px) < SHAPE_REACH_PX
     near_edge &= np.abs(points.x[k] - edge) < 2.0 * SHAPE_REACH_PX
@@ -343,9 +347,11 @@ def _measure_locally(points: OutlinePoints, k: int, below_tip_px: float, lossy: 
     edge, slope = found
     if not _is_on_outline(own.x, own.y, edge.x, height):
         return None
-    lossy_factor = 2.0 if lossy else 1.0
+    lossy_factor = np.sqrt(CODING_BLOCK_PX) if lossy else 1.0
     var_tip = (lossy_factor * tip.u_normal) ** 2
     var_edge = (lossy_factor * edge.u_normal / abs(edge.nx)) ** 2
+    if var_edge + slope**2 * var_tip > LOCAL_LIMIT_PX**2:
+        return None
     covariance = np.array([[var_tip, slope * var_tip], [slope * var_tip, var_edge + slope**2 * var_tip]])
     return MeasuredFinger(tip.y, edge.x, slope, covariance)
 
