@@ -1,0 +1,160 @@
+"""Where a distance's uncertainty comes from: every contribution side by side, and the one place that combines them."""
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from calib import contributions
+from calib.picture_shift import change_of_distance_px, lens_shift_px, tilt_shift_px
+
+if TYPE_CHECKING:
+    from calib.measured_scale import Calibration
+
+Floats = NDArray[np.float64]
+
+# Steps for differentiating a distance by the lens's parameters, as part of the parameter's standard uncertainty.
+LENS_STEP = 0.1
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class BudgetLine:
+    """One source of uncertainty.
+
+    Parameters
+    ----------
+    source : str
+        What it is.
+    u_mm : ndarray, shape (n,)
+        Standard uncertainty of each distance from this source alone.
+    supplied : str
+        What the user has to supply to make it true, and what was taken.
+    shared : bool
+        True where all frames have the same error; False where it differs from frame to frame.
+    """
+
+    source: str
+    u_mm: Floats
+    supplied: str
+    shared: bool = True
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Budget:
+    """All sources of n distances' uncertainty."""
+
+    lines: tuple[BudgetLine, ...]
+
+    @property
+    def u_mm(self) -> Floats:
+        """Combined standard uncertainty: independent sources add in square (JCGM 100:2008, equation 10)."""
+        return self._combined(self.lines)
+
+    @property
+    def u_random_mm(self) -> Floats:
+        """The part that differs from frame to frame."""
+        return self._combined(tuple(line for line in self.lines if not line.shared))
+
+    @staticmethod
+    def _combined(lines: tuple[BudgetLine, ...]) -> Floats:
+        return np.asarray(np.sqrt(np.sum([line.u_mm**2 for line in lines], axis=0)))
+
+    def table(self) -> str:
+        """Contributions of the first distance as a table, the largest first, in micrometres."""
+        ordered = sorted(self.lines, key=lambda line: -float(line.u_mm[0]))
+        width = max(len(line.source) for line in ordered)
+        rows = [f"{'source':<{width}}  u, um   kind    from"]
+        for line in ordered:
+            kind = "shared" if line.shared else "random"
+            rows.append(f"{line.source:<{width}}  {1e3 * line.u_mm[0]:6.3f}  {kind}  {line.supplied}")
+        total_um = 1e3 * float(self.u_mm[0])
+        rows.append(f"{'combined':<{width}}  {total_um:6.3f}          U = {2 * total_um:.3f} um (k = 2)")
+        return "\n".join(rows)
+
+
+def distance_budget(
+    scale: "Calibration", points_px: Floats, flat_px: Floats, value_mm: Floats, u_random_px: Floats, polarity: Floats
+) -> Budget:
+    """Every contribution to n distances.
+
+    Parameters
+    ----------
+    scale : Calibration
+        The calibration and the limits that it states.
+    points_px, flat_px : ndarray, shape (n, 2, 2)
+        The measured points, and the same with lens and perspective taken off.
+    value_mm : ndarray, shape (n,)
+        The distances.
+    u_random_px : ndarray, shape (n,)
+        Their random part, in pixels of `flat_px`.
+    polarity : ndarray, shape (n,)
+        +1 for a light gap, -1 for a dark one.
+    """
+    limits, s = scale.limits, scale.px_per_mm
+    said = scale.how_stated
+    lines = [
+        BudgetLine(
+            "edge noise", contributions.edge_noise_mm(u_random_px, s), "the fit of each frame's edges", shared=False
+        ),
+        BudgetLine(
+            "estimator", contributions.estimator_mm(limits, s, len(value_mm)), said("estimator_px", "px an edge")
+        ),
+    ]
+    for part in scale.parts:
+        u_mm = contributions.scale_and_bias_mm(value_mm, polarity, s, part.covariance)
+        lines.append(BudgetLine(part.source, u_mm, part.supplied))
+    plane_words = f"{said('plane_mm', 'mm')}, camera {said('camera_distance_mm', 'mm away').removeprefix('+-')}"
+    lines += [
+        BudgetLine("distance from the calibrated plane", contributions.plane_mm(value_mm, limits), plane_words),
+        BudgetLine(
+            "tilt: foreshortening", contributions.foreshortening_mm(value_mm, limits), said("tilt_deg", "degrees")
+        ),
+        BudgetLine(
+            "tilt: perspective",
+            contributions.keystone_mm(_keystone_change(scale, flat_px, value_mm, polarity), limits),
+            said("tilt_deg", "degrees"),
+        ),
+        BudgetLine(
+            "lens residual",
+            contributions.lens_mm(_lens_change(scale, flat_px, value_mm, polarity), limits),
+            said("lens_relative", "of the radius at the corner"),
+        ),
+        BudgetLine("temperature", contributions.temperature_mm(value_mm, limits), said("temperature_k", "K")),
+    ]
+    if scale.lens is not None:
+        u_mm = contributions.lens_fit_mm(_lens_fit_change_px(scale, points_px), scale.lens.covariance, s)
+        lines.append(BudgetLine("lens calibration", u_mm, "the fit of the board's corners"))
+    return Budget(tuple(lines))
+
+
+def _through_scale(scale: "Calibration", change_px: Floats, of_scale: Floats, value_mm: Floats, sign: Floats) -> Floats:
+    # The same imperfection moved the reference's edges, and with them scale and bias: the two changes partly cancel.
+    return np.asarray((change_px + sign * of_scale[1] - value_mm * of_scale[0]) / scale.px_per_mm)
+
+
+def _lens_change(scale: "Calibration", flat_px: Floats, value_mm: Floats, polarity: Floats) -> Floats:
+    change = change_of_distance_px(flat_px, lens_shift_px(flat_px, scale.frame_size_px))
+    return _through_scale(scale, change, scale.response.lens, value_mm, polarity)
+
+
+def _keystone_change(scale: "Calibration", flat_px: Floats, value_mm: Floats, polarity: Floats) -> Floats:
+    distance_px = scale.limits.camera_distance_mm * scale.px_per_mm
+    changes = []
+    for axis in (0, 1):
+        shift = tilt_shift_px(flat_px, scale.frame_size_px, distance_px, axis)
+        change = change_of_distance_px(flat_px, shift)
+        changes.append(_through_scale(scale, change, scale.response.tilt[axis], value_mm, polarity))
+    return np.array(changes)
+
+
+def _lens_fit_change_px(scale: "Calibration", points_px: Floats) -> Floats:
+    assert scale.lens is not None  # noqa: S101 - the caller asks only where there is a lens
+    lens = scale.lens
+    middle = np.linalg.norm(np.diff(scale.flatten(points_px), axis=1)[:, 0], axis=1)
+    changes = np.zeros((len(lens.parameters), len(points_px)))
+    for index, u in enumerate(np.sqrt(np.diag(lens.covariance))):
+        if u > 0.0:
+            moved = scale.flatten_by(lens.moved(index, LENS_STEP * u), points_px)
+            changes[index] = (np.linalg.norm(moved[:, 1] - moved[:, 0], axis=1) - middle) / (LENS_STEP * u)
+    return changes

@@ -1,0 +1,66 @@
+"""The sources of a distance's uncertainty, one function each; `calib.budget` alone combines them.
+
+Every function returns a standard uncertainty in millimetres, shape (n,), for n distances. The formula is
+gap_mm = (gap_px + p b) / s, with p = +1 for a light gap and -1 for a dark one (JCGM 100:2008, equation 13).
+"""
+
+from math import cos, sqrt
+
+import numpy as np
+from numpy.typing import NDArray
+
+from calib.limits import Limits, rectangular
+
+Floats = NDArray[np.float64]
+
+
+def edge_noise_mm(u_random_px: Floats, px_per_mm: float) -> Floats:
+    """Noise of the two edges in one frame; the only part that differs from frame to frame."""
+    return np.asarray(u_random_px / px_per_mm)
+
+
+def estimator_mm(limits: Limits, px_per_mm: float, count: int) -> Floats:
+    """Phase bias of the edge finder, two independent edges."""
+    return np.full(count, sqrt(2.0) * rectangular(limits.estimator_px) / px_per_mm)
+
+
+def scale_and_bias_mm(value_mm: Floats, polarity: Floats, px_per_mm: float, covariance: Floats) -> Floats:
+    """Whatever moves scale and edge bias, by the covariance of (px_per_mm, edge_bias_px).
+
+    Called once for each cause: the reference's size, the reference's edges, and the edge bias that no reference tells.
+    """
+    variance = (
+        covariance[1, 1] + value_mm**2 * covariance[0, 0] - 2.0 * polarity * value_mm * covariance[0, 1]
+    ) / px_per_mm**2
+    return np.asarray(np.sqrt(np.maximum(variance, 0.0)))
+
+
+def plane_mm(value_mm: Floats, limits: Limits) -> Floats:
+    """Gripper nearer or farther than the reference: dg / g = dz / Z."""
+    return np.asarray(np.abs(value_mm) * rectangular(limits.plane_mm) / limits.camera_distance_mm)
+
+
+def foreshortening_mm(value_mm: Floats, limits: Limits) -> Floats:
+    """Gripper seen obliquely: a distance shrinks by 1 - cos(tilt)."""
+    return np.asarray(np.abs(value_mm) * rectangular(1.0 - cos(limits.tilt_rad)))
+
+
+def keystone_mm(change_mm_per_rad: Floats, limits: Limits) -> Floats:
+    """Perspective of a tilted plane: one side of the picture is nearer; two axes, `change_mm_per_rad` shape (2, n)."""
+    return np.asarray(np.hypot(change_mm_per_rad[0], change_mm_per_rad[1]) * rectangular(limits.tilt_rad))
+
+
+def lens_mm(change_mm_per_unit: Floats, limits: Limits) -> Floats:
+    """Distortion that is left: its change of the distance, less its change of the scale; per unit of distortion."""
+    return np.asarray(np.abs(change_mm_per_unit) * rectangular(limits.lens_relative))
+
+
+def lens_fit_mm(change_px: Floats, covariance: Floats, px_per_mm: float) -> Floats:
+    """Uncertainty of a calibrated lens: `change_px`, shape (p, n), per unit of each parameter, and their covariance."""
+    variance = np.einsum("in,ij,jn->n", change_px, covariance, change_px)
+    return np.asarray(np.sqrt(np.maximum(variance, 0.0)) / px_per_mm)
+
+
+def temperature_mm(value_mm: Floats, limits: Limits) -> Floats:
+    """Thermal expansion of the reference against the temperature of its certificate."""
+    return np.asarray(np.abs(value_mm) * limits.expansion_per_k * rectangular(limits.temperature_k))

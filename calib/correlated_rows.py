@@ -1,0 +1,30 @@
+"""How many neighbouring rows carry one independent error."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+# Correlation is looked for over at most this part of the rows.
+LONGEST_PART = 0.25
+
+
+def rows_in_one(residual: NDArray[np.float64]) -> float:
+    """Return the integrated correlation time of residuals in rows, at least 1.
+
+    The variance of a mean over n rows is that of one row times this over n. The sum over lags ends where pairs of
+    correlations turn negative (Geyer, Statistical Science 7(4), 1992, 473-483, initial positive sequence).
+
+    Parameters
+    ----------
+    residual : ndarray, shape (n,)
+        What a straight line leaves, row by row.
+    """
+    count = residual.size
+    power = float(residual @ residual)
+    if count < 8 or power <= 0.0:
+        return 1.0
+    lags = int(LONGEST_PART * count)
+    correlation = np.array([float(residual[: count - lag] @ residual[lag:]) for lag in range(lags + 1)]) / power
+    pairs = correlation[: lags + 1 - (lags + 1) % 2].reshape(-1, 2).sum(axis=1)
+    negative = np.flatnonzero(pairs <= 0.0)
+    total = float(pairs[: negative[0] if negative.size else pairs.size].sum())
+    return max(1.0, 2.0 * total - 1.0)

@@ -1,0 +1,63 @@
+"""Lens distortion: where a pixel would be if straight lines stayed straight."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+
+# The distortion polynomial is inverted by repeated substitution; each step gains about a digit for ordinary lenses.
+UNDISTORT_STEPS = 25
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Lens:
+    """Radial and tangential distortion after Brown (Photogrammetric Engineering 37(8), 1971, 855-866).
+
+    Parameters
+    ----------
+    parameters : ndarray, shape (9,)
+        Focal lengths f_x, f_y and principal point c_x, c_y in pixels, then k1, k2, p1, p2, k3.
+    covariance : ndarray, shape (9, 9)
+        Covariance of `parameters`; zero rows for a parameter that was held.
+    """
+
+    parameters: Floats
+    covariance: Floats
+
+    @property
+    def camera_matrix(self) -> Floats:
+        """The pinhole camera's matrix, shape (3, 3), pixels."""
+        f_x, f_y, c_x, c_y = self.parameters[:4]
+        return np.array([[f_x, 0.0, c_x], [0.0, f_y, c_y], [0.0, 0.0, 1.0]])
+
+    def undistort(self, points_px: Floats) -> Floats:
+        """Where the points would be seen without distortion, by the same pinhole camera.
+
+        Parameters
+        ----------
+        points_px : ndarray, shape (..., 2)
+            Measured points.
+
+        Returns
+        -------
+        ndarray, shape (..., 2)
+            Pixels.
+        """
+        f_x, f_y, c_x, c_y, k1, k2, p1, p2, k3 = self.parameters
+        seen_x, seen_y = (points_px[..., 0] - c_x) / f_x, (points_px[..., 1] - c_y) / f_y
+        x, y = seen_x, seen_y
+        for _ in range(UNDISTORT_STEPS):
+            r2 = x * x + y * y
+            radial = 1.0 + r2 * (k1 + r2 * (k2 + r2 * k3))
+            shift_x = 2.0 * p1 * x * y + p2 * (r2 + 2.0 * x * x)
+            shift_y = p1 * (r2 + 2.0 * y * y) + 2.0 * p2 * x * y
+            x, y = (seen_x - shift_x) / radial, (seen_y - shift_y) / radial
+        return np.stack([x * f_x + c_x, y * f_y + c_y], axis=-1)
+
+    def moved(self, index: int, step: float) -> "Lens":
+        """Return the same lens with one parameter moved, for propagating `covariance`."""
+        parameters = self.parameters.copy()
+        parameters[index] += step
+        return replace(self, parameters=parameters)

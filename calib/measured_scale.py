@@ -1,0 +1,249 @@
+"""A scale that was measured on a reference: what `calib.calibration.BareScale` says, with its uncertainty."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from math import sqrt
+
+import numpy as np
+from numpy.typing import NDArray
+
+from calib.budget import Budget, distance_budget
+from calib.distances import Distances
+from calib.errors import CalibrationError
+from calib.lens import Lens
+from calib.limits import Limits
+from calib.picture_shift import centre_px
+from calib.plane import Plane
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class Reference:
+    """One object whose size is known.
+
+    Parameters
+    ----------
+    what : str
+        Bar, slot, chessboard or ChArUco board, and the picture's name.
+    size_mm, u_size_mm : float
+        Certified size and its standard uncertainty.
+    certificate, date : str
+        Name of the certificate and its date; empty where not stated.
+    """
+
+    what: str
+    size_mm: float
+    u_size_mm: float
+    certificate: str = ""
+    date: str = ""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ScalePart:
+    """Share of one cause in the covariance of scale and edge bias.
+
+    Parameters
+    ----------
+    source : str
+        The cause.
+    covariance : ndarray, shape (2, 2)
+        Covariance of (px_per_mm, edge_bias_px) from this cause alone.
+    supplied : str
+        Where the figure comes from.
+    """
+
+    source: str
+    covariance: Floats
+    supplied: str = ""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Response:
+    """How the fitted (px_per_mm, edge_bias_px) moved with the imperfections that the reference was seen through.
+
+    Parameters
+    ----------
+    lens : ndarray, shape (2,)
+        Per unit of `calib.picture_shift.lens_shift_px`.
+    tilt : ndarray, shape (2, 2)
+        Per radian about each axis; first index the axis.
+    """
+
+    lens: Floats = field(default_factory=lambda: np.zeros(2))
+    tilt: Floats = field(default_factory=lambda: np.zeros((2, 2)))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Calibration:
+    """Where in millimetres a pixel of a flat scene is, and how surely: gap_mm = (gap_px + b) / s for a light gap.
+
+    Parameters
+    ----------
+    px_per_mm : float
+        Scale s.
+    edge_bias_px : float
+        Edge bias b of a light gap between dark edges; the sign reverses for a dark gap.
+    parts : tuple of ScalePart
+        The covariance of (s, b), cause by cause.
+    frame_size_px : tuple of int
+        Width and height of the pictures that it holds for.
+    limits : Limits
+        What the user states about the bench.
+    stated : frozenset of str
+        Names of the limits that the user stated; the others are defaults.
+    response : Response
+        How scale and bias moved with lens and tilt.
+    lens : Lens or None
+        Distortion to take off.
+    plane : Plane or None
+        Perspective to take off.
+    references : tuple of Reference
+        What it was made from.
+    camera : mapping of str to str
+        The camera's settings, where known.
+    made_at, software : str
+        When (ISO 8601) and by what.
+    """
+
+    px_per_mm: float
+    edge_bias_px: float
+    parts: tuple[ScalePart, ...]
+    frame_size_px: tuple[int, int]
+    limits: Limits = field(default_factory=Limits)
+    stated: frozenset[str] = frozenset()
+    response: Response = field(default_factory=Response)
+    lens: Lens | None = None
+    plane: Plane | None = None
+    references: tuple[Reference, ...] = ()
+    camera: Mapping[str, str] = field(default_factory=dict)
+    made_at: str = ""
+    software: str = ""
+
+    def __post_init__(self) -> None:
+        """Refuse what cannot be a calibration."""
+        if not 0.0 < self.px_per_mm < float("inf"):
+            raise CalibrationError(f"px_per_mm must be positive, but is {self.px_per_mm}.")
+        if not np.isfinite(self.edge_bias_px):
+            raise CalibrationError(f"edge_bias_px must be a number, but is {self.edge_bias_px}.")
+        if min(self.frame_size_px) < 1:
+            raise CalibrationError(f"The frame size must be positive, but is {self.frame_size_px}.")
+
+    @property
+    def covariance(self) -> Floats:
+        """Covariance of (px_per_mm, edge_bias_px), shape (2, 2): the independent causes added."""
+        return np.asarray(np.sum([part.covariance for part in self.parts] or [np.zeros((2, 2))], axis=0))
+
+    @property
+    def u_px_per_mm(self) -> float:
+        """Standard uncertainty of the scale; plane, tilt and lens belong to the distance's budget and are not in it."""
+        return sqrt(float(self.covariance[0, 0]))
+
+    @property
+    def u_edge_bias_px(self) -> float:
+        """Standard uncertainty of the edge bias."""
+        return sqrt(float(self.covariance[1, 1]))
+
+    def how_stated(self, name: str, unit: str) -> str:
+        """Limit `name` in words, and whether the user stated it."""
+        return f"+-{getattr(self.limits, name):g} {unit} ({'stated' if name in self.stated else 'default'})"
+
+    def flatten(self, points_px: Floats) -> Floats:
+        """Take lens and perspective off measured points, shape (..., 2); pictures are never resampled."""
+        return self.flatten_by(self.lens, points_px)
+
+    def flatten_by(self, lens: Lens | None, points_px: Floats) -> Floats:
+        """As `flatten`, with another lens."""
+        flat = np.asarray(points_px, dtype=np.float64)
+        if lens is not None:
+            flat = lens.undistort(flat)
+        return flat if self.plane is None else self.plane.flatten(flat)
+
+    def budget(self, points_px: Floats, u_random_px: Floats, light_gap: NDArray[np.bool_]) -> Budget:
+        """Where the uncertainty of each distance comes from; arguments as for `distances`."""
+        return self._measured(points_px, u_random_px, light_gap)[1]
+
+    def distances(self, points_px: Floats, u_random_px: Floats, light_gap: NDArray[np.bool_]) -> Distances:
+        """Distances between pairs of points.
+
+        Parameters
+        ----------
+        points_px : ndarray, shape (n, 2, 2)
+            Frame, first or second point, x or y; as measured in the picture.
+        u_random_px : ndarray, shape (n,)
+            Standard uncertainty of each distance from frame to frame.
+        light_gap : ndarray of bool, shape (n,)
+            True where the gap is light between dark edges.
+
+        Returns
+        -------
+        Distances
+            Values, standard uncertainties with the full budget, and their random part alone; millimetres.
+        """
+        value_mm, budget = self._measured(points_px, u_random_px, light_gap)
+        return Distances(value_mm=value_mm, u_mm=budget.u_mm, u_random_mm=budget.u_random_mm)
+
+    def positions_mm(
+        self,
+        points_px: Floats,
+        axis: int,
+        light_gap: NDArray[np.bool_],
+        frame_size_px: tuple[int, int],
+    ) -> Floats:
+        """Where both points are along an axis of the picture, from its middle.
+
+        Each edge takes half of the edge bias, so that the difference is the distance's component along the axis.
+
+        Parameters
+        ----------
+        points_px, light_gap
+            As for `distances`.
+        axis : int
+            0 for x (to the right), 1 for y (downwards).
+        frame_size_px : tuple of int
+            Width and height of the frames.
+
+        Returns
+        -------
+        ndarray, shape (n, 2)
+            Millimetres.
+        """
+        flat = self.flatten(points_px)
+        apart = flat[:, 1] - flat[:, 0]
+        length = np.linalg.norm(apart, axis=1)
+        along = np.divide(apart[:, axis], length, out=np.ones_like(length), where=length > 0.0)
+        half_px = np.where(light_gap, 0.5, -0.5) * self.edge_bias_px * along
+        outward_px = np.stack([-half_px, half_px], axis=1)
+        return np.asarray((flat[:, :, axis] - centre_px(frame_size_px)[axis] + outward_px) / self.px_per_mm)
+
+    def check_frame_size(self, width_px: int, height_px: int) -> None:
+        """Refuse frames of another size: another size is another camera, binning or crop, so another scale."""
+        if (width_px, height_px) != self.frame_size_px:
+            width, height = self.frame_size_px
+            raise CalibrationError(
+                f"The calibration was made on frames of {width}x{height} pixels, but these are {width_px}x{height_px}: "
+                "calibrate again with the camera as it is now."
+            )
+
+    def check_camera(self, settings: Mapping[str, str]) -> None:
+        """Refuse a camera whose settings, where both are known, differ from the calibration's."""
+        for name, value in settings.items():
+            known = self.camera.get(name)
+            if known is not None and known != value:
+                raise CalibrationError(
+                    f"The calibration was made with the camera's {name} = {known}, but it is {value} now: "
+                    "set it back or calibrate again."
+                )
+
+    def _measured(self, points_px: Floats, u_random_px: Floats, light_gap: NDArray[np.bool_]) -> tuple[Floats, Budget]:
+        points = np.asarray(points_px, dtype=np.float64)
+        flat = self.flatten(points)
+        flat_gap_px = np.linalg.norm(flat[:, 1] - flat[:, 0], axis=1)
+        gap_px = np.linalg.norm(points[:, 1] - points[:, 0], axis=1)
+        magnified = np.divide(flat_gap_px, gap_px, out=np.ones_like(gap_px), where=gap_px > 0.0)
+        polarity = np.where(light_gap, 1.0, -1.0)
+        value_mm = (flat_gap_px + polarity * self.edge_bias_px) / self.px_per_mm
+        budget = distance_budget(
+            self, points, flat, value_mm, magnified * np.asarray(u_random_px, dtype=np.float64), polarity
+        )
+        return value_mm, budget

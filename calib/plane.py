@@ -1,0 +1,33 @@
+"""The plane of a flat scene: perspective taken off, so that a distance in pixels is the same everywhere."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Plane:
+    """Homography from the picture to the plane, scaled so that the middle of the picture stays where it is.
+
+    Hartley & Zisserman, Multiple View Geometry, 2nd ed., 2.3.
+
+    Parameters
+    ----------
+    homography : ndarray, shape (3, 3)
+        Maps undistorted pixels to pixels of the squarely seen plane.
+    """
+
+    homography: Floats
+
+    def flatten(self, points_px: Floats) -> Floats:
+        """Where the points would be seen by a camera that looks squarely; `points_px` has shape (..., 2)."""
+        return apply_homography(self.homography, points_px)
+
+
+def apply_homography(homography: Floats, points: Floats) -> Floats:
+    """Map points of one plane to another; `points` has shape (..., 2)."""
+    mapped = points @ homography[:, :2].T + homography[:, 2]
+    return np.asarray(mapped[..., :2] / mapped[..., 2:])
