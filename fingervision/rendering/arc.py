@@ -1,7 +1,7 @@
 """A circular piece of an outline."""
 
 from dataclasses import dataclass
-from math import atan2, cos, pi, sin
+from math import atan2, ceil, cos, floor, pi, sin
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,6 +37,16 @@ class Arc:
     def length_px(self) -> float:
         """Length along the arc."""
         return abs(self.radius_px * self.sweep_rad)
+
+    @property
+    def box_px(self) -> tuple[float, float, float, float]:
+        """The rectangle about the piece: least x, least y, greatest x, greatest y."""
+        # Besides its ends, an arc is outermost where it crosses an axis through its centre.
+        quarters = sorted((self.start_rad / (pi / 2), (self.start_rad + self.sweep_rad) / (pi / 2)))
+        passed = [quarter * pi / 2 for quarter in range(ceil(quarters[0]), floor(quarters[1]) + 1)]
+        x = [self.start[0], self.end[0]] + [self.x_px + self.radius_px * cos(angle) for angle in passed]
+        y = [self.start[1], self.end[1]] + [self.y_px + self.radius_px * sin(angle) for angle in passed]
+        return (min(x), min(y), max(x), max(y))
 
     def points(self, t: NDArray[np.float64]) -> Points:
         """Points at the fractions `t` of the length, shape (n, 2)."""

@@ -33,6 +33,12 @@ class Line:
         """Length."""
         return hypot(self.x1_px - self.x0_px, self.y1_px - self.y0_px)
 
+    @property
+    def box_px(self) -> tuple[float, float, float, float]:
+        """The rectangle about the piece: least x, least y, greatest x, greatest y."""
+        (x0, y0), (x1, y1) = self.start, self.end
+        return (min(x0, x1), min(y0, y1), max(x0, x1), max(y0, y1))
+
     def points(self, t: NDArray[np.float64]) -> Points:
         """Points at the fractions `t` of the length, shape (n, 2)."""
         t = np.asarray(t, dtype=np.float64)

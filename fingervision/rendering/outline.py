@@ -57,18 +57,10 @@ class Outline:
 
     @property
     def box_px(self) -> tuple[float, float, float, float]:
-        """A rectangle that holds the curve: least x, least y, greatest x, greatest y."""
-        x: list[float] = []
-        y: list[float] = []
-        for piece in self.pieces:
-            if isinstance(piece, Line):
-                x += [piece.x0_px, piece.x1_px]
-                y += [piece.y0_px, piece.y1_px]
-            else:
-                reach = abs(piece.radius_px)
-                x += [piece.x_px - reach, piece.x_px + reach]
-                y += [piece.y_px - reach, piece.y_px + reach]
-        return (min(x), min(y), max(x), max(y))
+        """The rectangle about the curve: least x, least y, greatest x, greatest y."""
+        boxes = [piece.box_px for piece in self.pieces]
+        least_x, least_y, greatest_x, greatest_y = zip(*boxes, strict=True)
+        return (min(least_x), min(least_y), max(greatest_x), max(greatest_y))
 
     def backwards(self) -> "Outline":
         """Run the curve the other way: a solid becomes a hole."""
@@ -112,6 +104,9 @@ class Outline:
         """
         x, y = points[..., 0], points[..., 1]
         angle = np.zeros(x.shape)
+        least_x, least_y, greatest_x, greatest_y = self.box_px
+        if not ((x >= least_x) & (x <= greatest_x) & (y >= least_y) & (y <= greatest_y)).any():
+            return angle
         for whole in self.pieces:
             for piece in _short(whole):
                 (x0, y0), (x1, y1) = piece.start, piece.end

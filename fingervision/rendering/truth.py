@@ -117,6 +117,12 @@ def _in_axes(piece: Piece, direction: Direction, t: ArrayLike) -> NDArray[np.flo
             return points[..., ::-1] * (1.0, -1.0)
 
 
+def _along(point: tuple[float, float], direction: Direction) -> float:
+    """Coordinate of a point towards the root."""
+    along = point[1] if direction.is_vertical else point[0]
+    return along if direction in (Direction.UP, Direction.LEFT) else -along
+
+
 @dataclass(frozen=True, slots=True)
 class _Tip:
     """Least coordinate towards the root, and where across it is reached: a flat tip reaches it over a stretch."""
@@ -128,8 +134,13 @@ class _Tip:
 
 def _tip(outline: Outline, direction: Direction) -> _Tip:
     grid = np.linspace(0.0, 1.0, BRACKET_POINTS)
+    starts = [_along(piece.start, direction) for piece in outline.pieces]
+    outermost_px = min(starts)
     found = []
-    for piece in outline.pieces:
+    for piece, start_px in zip(outline.pieces, starts, strict=True):
+        # No point of a piece lies further from its start than its length.
+        if start_px - piece.length_px > outermost_px:
+            continue
         points = _in_axes(piece, direction, grid)
         place = int(np.argmin(points[:, 1]))
         found.append(points)
@@ -152,6 +163,8 @@ def _crossings(outline: Outline, direction: Direction, along_px: float) -> list[
     grid = np.linspace(0.0, 1.0, BRACKET_POINTS)
     crossings = []
     for piece in outline.pieces:
+        if abs(_along(piece.start, direction) - along_px) > piece.length_px:
+            continue
 
         def beyond_px(t: float, piece: Piece = piece) -> float:
             return float(_in_axes(piece, direction, t)[1] - along_px)

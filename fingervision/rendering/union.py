@@ -1,6 +1,6 @@
 """The outline of several solids that may overlap: two fingers that touch are one blob."""
 
-from itertools import combinations
+from itertools import combinations, pairwise
 from math import acos, atan2, hypot, pi, sqrt
 
 import numpy as np
@@ -31,19 +31,32 @@ def union(outlines: tuple[Outline, ...]) -> tuple[Outline, ...]:
     kept: list[Piece] = []
     for i, outline in enumerate(outlines):
         others = [other for j, other in enumerate(outlines) if j != i and _boxes_meet(outline, other)]
-        for piece in outline.pieces:
-            cuts = [0.0, 1.0]
-            for other in others:
-                for edge in other.pieces:
-                    cuts += _crossings(piece, edge)
-            places = np.unique(np.array(cuts))
-            for t0, t1 in zip(places[:-1].tolist(), places[1:].tolist(), strict=True):
-                if (t1 - t0) * piece.length_px <= SAME_POINT_PX:
-                    continue
-                middle = piece.points(np.array([(t0 + t1) / 2]))
-                if not any(other.winding(middle)[0] > 0.0 for other in others):
-                    kept.append(piece if (t0, t1) == (0.0, 1.0) else piece.part(t0, t1))
+        parts = [part for piece in outline.pieces for part in _parts(piece, others)]
+        middles = np.array([part.points(np.array(0.5)) for part in parts])
+        covered = np.zeros(len(parts), dtype=bool)
+        for other in others:
+            covered |= other.winding(middles) > 0.0
+        kept += [part for part, hidden in zip(parts, covered.tolist(), strict=True) if not hidden]
     return _chained(kept)
+
+
+def _parts(piece: Piece, others: list[Outline]) -> list[Piece]:
+    """Cut a piece where other outlines cross it."""
+    cuts = {0.0, 1.0}
+    for other in others:
+        for edge in other.pieces:
+            if _may_cross(piece, edge):
+                cuts.update(_crossings(piece, edge))
+    places = sorted(cuts)
+    if len(places) == 2:
+        return [piece]
+    return [piece.part(t0, t1) for t0, t1 in pairwise(places) if (t1 - t0) * piece.length_px > SAME_POINT_PX]
+
+
+def _may_cross(a: Piece, b: Piece) -> bool:
+    """Whether both pieces can reach the same point: neither strays further from its start than its length."""
+    reach = a.length_px + b.length_px
+    return abs(a.start[0] - b.start[0]) <= reach and abs(a.start[1] - b.start[1]) <= reach
 
 
 def _boxes_meet(a: Outline, b: Outline) -> bool:

@@ -1,0 +1,65 @@
+"""Solids that overlap are one."""
+
+from math import acos, sqrt
+
+import numpy as np
+import pytest
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+
+from fingervision.rendering.outline import disc
+from fingervision.rendering.plane import Motion
+from fingervision.rendering.polygon import polygon
+from fingervision.rendering.two_fingers import two_fingers
+from fingervision.rendering.union import union
+
+# Rounding of closed forms with coordinates of some hundred pixels.
+AREA_PX2 = 1e-7
+
+
+@given(distance_px=st.floats(3.1, 16.9), phase=st.floats(0.0, 6.28))
+def test_two_discs_lose_their_common_lens_once(distance_px: float, phase: float) -> None:
+    r, s, d = 10.0, 7.0, distance_px
+    lens = r**2 * acos((d**2 + r**2 - s**2) / (2 * d * r)) + s**2 * acos((d**2 + s**2 - r**2) / (2 * d * s))
+    lens -= sqrt((-d + r + s) * (d + r - s) * (d - r + s) * (d + r + s)) / 2
+    discs = (disc(0.0, 0.0, r), disc(d * np.cos(phase), d * np.sin(phase), s))
+    joined = union(discs)
+    total = sum(outline.area_px2 for outline in joined)
+    assert len(joined) == 1
+    assert total == pytest.approx(discs[0].area_px2 + discs[1].area_px2 - lens, abs=AREA_PX2)
+
+
+@settings(deadline=None, max_examples=40)
+@given(seed=st.integers(0, 10_000))
+def test_a_point_is_inside_the_union_if_it_is_inside_any(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    shapes = tuple(
+        polygon(((-20.0, -8.0), (20.0, -8.0), (20.0, 8.0), (-20.0, 8.0)), (rng.uniform(0.0, 8.0),) * 4)
+        .moved(Motion.turn(rng.uniform(0.0, 6.28)))
+        .moved(Motion(x_px=rng.uniform(-15.0, 15.0), y_px=rng.uniform(-15.0, 15.0)))
+        for _ in range(3)
+    )
+    points = rng.uniform(-45.0, 45.0, (300, 2))
+    inside = np.max([shape.winding(points) for shape in shapes], axis=0)
+    assert np.array_equal(sum(outline.winding(points) for outline in union(shapes)), inside)
+
+
+@given(gap_px=st.floats(-40.0, 18.0), radius_px=st.floats(20.0, 51.0), tilt_deg=st.floats(-3.0, 3.0))
+def test_fingers_that_overlap_are_one_blob(gap_px: float, radius_px: float, tilt_deg: float) -> None:
+    scene = two_fingers(gap_px, radius_px=radius_px, tilt_deg=(tilt_deg, -tilt_deg))
+    left, right = (finger.outline for finger in scene.fingers)
+    overlap = left.winding(np.array([[319.5, 300.0]]))[0] and right.winding(np.array([[319.5, 300.0]]))[0]
+    assume(overlap)
+    joined = union((left, right))
+    assert sum(outline.area_px2 for outline in joined) < left.area_px2 + right.area_px2
+
+
+def test_what_does_not_overlap_stays_as_it_is() -> None:
+    discs = (disc(0.0, 0.0, 5.0), disc(20.0, 0.0, 5.0))
+    assert union(discs) is discs
+
+
+def test_what_lies_inside_another_vanishes() -> None:
+    large = disc(0.0, 0.0, 20.0)
+    (joined,) = union((large, disc(2.0, 1.0, 5.0)))
+    assert joined.area_px2 == pytest.approx(large.area_px2, abs=AREA_PX2)
