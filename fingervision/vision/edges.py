@@ -10,8 +10,9 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import ndtr, ndtri
+from scipy.special import ndtri
 
+from fingervision.vision.edge_filters import LARGEST_OFFSET_PX, EdgeFilters, blurred_step, edge_filters, reach_for
 from fingervision.vision.fingers import CoarseFinger
 from fingervision.vision.grey import GreyImage
 
@@ -22,8 +23,14 @@ Ints = NDArray[np.int_]
 FIRST_REACH_PX = 20
 # Blur of an edge is looked for within these limits (pixels); `blurred` begins at 5.
 SMALLEST_BLUR_PX, LARGEST_BLUR_PX = 0.2, 8.0
-# A profile reaches this many standard deviations, and so many pixels more, to either side of the edge.
-REACH_SIGMAS, REACH_EXTRA_PX = 3.0, 2.5
+# Two flanks and two tips.
+GROUPS = 4
+# The passes of Gauss-Newton, and whether each also refines the blur. It converges quadratically from the first look.
+BLUR_PASSES = (True, True, False)
+# Variance of rounding to whole grey levels: no noise is smaller.
+PIXEL_ROUNDING = 1.0 / 12.0
+# Wide tips and long flanks have points enough: so many columns of a tip, so many rows of an outer flank.
+TIP_COLUMNS, OUTER_ROWS = 100, 20
 # Outline slopes are taken over so many rows or columns to either side.
 SLOPE_REACH_PX = 4
 
@@ -112,8 +119,10 @@ def _finger_lines(finger: CoarseFinger, group: int) -> list[tuple[NDArray[np.gen
         np.maximum.at(reach, along[part] - first, sign * across[part])
         rows = np.arange(first, last + 1)
         slope = sign * _slope(reach)
-        keep = np.abs(slope) <= 1.0
-        n = int(keep.sum())
+        keep = np.flatnonzero(np.abs(slope) <= 1.0)
+        if sign != finger.inner_sign:
+            keep = keep[:: max(1, len(keep) // OUTER_ROWS)]
+        n = len(keep)
         sides.append(
             (
                 np.full(n, group),
@@ -129,8 +138,9 @@ def _finger_lines(finger: CoarseFinger, group: int) -> list[tuple[NDArray[np.gen
     height = np.full(last - first + 1, np.inf)
     np.minimum.at(height, across - first, along)
     slope = _slope(height)
-    keep = np.abs(slope) < 1.0
-    n = int(keep.sum())
+    keep = np.flatnonzero(np.abs(slope) < 1.0)
+    keep = keep[:: max(1, len(keep) // TIP_COLUMNS)]
+    n = len(keep)
     crest_lines = (
         np.full(n, group + 1),
         np.zeros(n, dtype=bool),
@@ -151,7 +161,7 @@ def _slope(values: Floats) -> Floats:
     return (values[high] - values[low]) / np.maximum(high - low, 1)
 
 
-def fit_edges(upright: GreyImage, lines: ProfileLines, limits: tuple[int, int, int, int]) -> EdgePoints:
+def fit_edges(upright: GreyImage, lines: ProfileLines) -> EdgePoints:
     """Sub-pixel position of the edge on every line.
 
     Parameters
@@ -160,129 +170,132 @@ def fit_edges(upright: GreyImage, lines: ProfileLines, limits: tuple[int, int, i
         Grey levels, seen with the tips up.
     lines : ProfileLines
         Where to look.
-    limits : tuple of int
-        First and one past the last column, first and one past the last row that may be used.
 
     Returns
     -------
     EdgePoints
         One point a line.
     """
-    blur = _first_blur(upright, lines, limits)
-    reach = int(np.ceil(REACH_SIGMAS * np.hypot(blur.max(), 0.3) + REACH_EXTRA_PX))
-    values, weight = _gather(upright, lines, reach, limits)
-    return _fit(values, weight, lines, blur, reach, float(np.iinfo(upright.dtype).max))
+    blur = _first_blur(upright, lines)
+    filters = edge_filters(reach_for(float(blur.max())))
+    values = _gather(upright, lines, filters.reach_px)
+    return _fit(values, lines, blur, filters, float(np.iinfo(upright.dtype).max))
 
 
-def _gather(
-    upright: GreyImage, lines: ProfileLines, reach: int, limits: tuple[int, int, int, int]
-) -> tuple[Floats, Floats]:
-    """Grey levels from inside to outside, `reach` pixels to either side of the coarse edge, and which are in view."""
-    steps = np.arange(-reach, reach + 1)
-    moving = lines.coarse[:, None] + lines.outward[:, None] * steps
-    fixed = lines.fixed[:, None]
-    column = np.where(lines.is_row[:, None], moving, fixed)
-    row = np.where(lines.is_row[:, None], fixed, moving)
-    first_column, past_column, first_row, past_row = limits
-    weight = (column >= first_column) & (column < past_column) & (row >= first_row) & (row < past_row)
-    np.clip(column, first_column, past_column - 1, out=column)
-    np.clip(row, first_row, past_row - 1, out=row)
-    return upright[row, column].astype(np.float64), weight.astype(np.float64)
+def _gather(upright: GreyImage, lines: ProfileLines, reach: int) -> Floats:
+    """Grey levels from inside to outside, `reach` pixels to either side of the coarse edge.
+
+    Beyond the picture's border the last pixel is repeated: what is cut off there is a finger's inside or the ground.
+    """
+    moving = lines.coarse[:, None] + lines.outward[:, None] * np.arange(-reach, reach + 1)
+    is_row = lines.is_row
+    rows, columns = upright.shape
+    values = np.empty(moving.shape)
+    across, along = moving[is_row], moving[~is_row]
+    np.clip(across, 0, columns - 1, out=across)
+    np.clip(along, 0, rows - 1, out=along)
+    values[is_row] = upright[lines.fixed[is_row][:, None], across]
+    values[~is_row] = upright[along, lines.fixed[~is_row][:, None]]
+    return values
 
 
-def _first_blur(upright: GreyImage, lines: ProfileLines, limits: tuple[int, int, int, int]) -> Floats:
+def _first_blur(upright: GreyImage, lines: ProfileLines) -> Floats:
     """Blur of each group from the steepest place of some of its profiles, robustly."""
-    blur = np.full(4, 1.0)
-    some = np.zeros(len(lines.group), dtype=bool)
-    some[::4] = True
-    chosen = ProfileLines(*(getattr(lines, name)[some] for name in ProfileLines.__slots__))
-    values, _ = _gather(upright, chosen, FIRST_REACH_PX, limits)
-    middle = slice(FIRST_REACH_PX - 8, FIRST_REACH_PX + 9)
-    steepest = np.abs(values[:, 2:] - values[:, :-2])[:, middle].max(axis=1) / 2.0
-    contrast = np.abs(np.median(values[:, -8:], axis=1) - np.median(values[:, :8], axis=1))
+    blur = np.full(GROUPS, 1.0)
+    some = ProfileLines(*(getattr(lines, name)[::4] for name in ProfileLines.__slots__))
+    values = _gather(upright, some, FIRST_REACH_PX)
+    middle = values[:, FIRST_REACH_PX - 9 : FIRST_REACH_PX + 10]
+    steepest = np.abs(middle[:, 2:] - middle[:, :-2]).max(axis=1) / 2.0
+    contrast = np.abs(values[:, -6:].mean(axis=1) - values[:, :6].mean(axis=1))
     share = np.clip(steepest / np.maximum(contrast, 1.0), 0.02, 0.49)
-    for group in range(4):
-        mine = chosen.group == group
+    for group in range(GROUPS):
+        mine = some.group == group
         if mine.any():
             blur[group] = 1.0 / ndtri(0.5 + float(np.median(share[mine])))
     return np.clip(blur, SMALLEST_BLUR_PX, LARGEST_BLUR_PX)
 
 
-def _fit(values: Floats, weight: Floats, lines: ProfileLines, blur: Floats, reach: int, top_level: float) -> EdgePoints:
-    """Gauss-Newton over every profile's two levels and position, and every group's blur."""
-    n = len(values)
-    borders = np.arange(-reach - 0.5, reach + 1.0)
+def _fit(values: Floats, lines: ProfileLines, blur: Floats, filters: EdgeFilters, top_level: float) -> EdgePoints:
+    """Gauss-Newton over every line's two levels and position, and every group's blur."""
     stretch = 1.0 + lines.slope**2
     from_slope = lines.slope**2 / 12.0
-    count = np.maximum(weight.sum(axis=1), 1.0)
-    position = np.full(n, 0.5)
-    blur = blur.copy()
-    in_group = lines.group[:, None] == np.arange(4)
-    facing, partner = _facing(lines, reach)
-
-    def centred(a: Floats) -> Floats:
-        return np.asarray(a - ((weight * a).sum(axis=1) / count)[:, None])
-
-    y0 = centred(values) * weight
-    for _iteration in range(ITERATIONS):
-        sigma = np.sqrt(np.maximum(blur, SMALLEST_BLUR_PX)[lines.group] ** 2 * stretch + from_slope)
-        z = borders - position[:, None]
-        q = z / sigma[:, None]
-        cumulative = ndtr(q)
-        density = np.exp(-0.5 * q * q) * (1.0 / np.sqrt(2.0 * np.pi))
-        step = np.diff(z * cumulative + sigma[:, None] * density, axis=1)
-        by_position = -np.diff(cumulative, axis=1)
-        by_sigma = np.diff(density, axis=1)
+    facing, partner = _facing(lines, filters.reach_px)
+    position, levels = _first_position(values), values
+    limit = LARGEST_OFFSET_PX
+    for change_blur in BLUR_PASSES:
+        sigma = np.sqrt(blur[lines.group] ** 2 * stretch + from_slope)
+        row, column = filters.rows(sigma), filters.columns(position)
+        start = filters.offsets_px[column]
+        contrast = np.einsum("nk,nk->n", filters.contrast[row, column], levels)
+        safe = np.where(np.abs(contrast) < 1e-3, 1e-3, contrast)
+        move = np.einsum("nk,nk->n", filters.shift[row, column], levels) / safe
+        position = np.clip(start + np.clip(move, -1.0, 1.0), -limit, limit)
+        if change_blur:
+            change = np.einsum("nk,nk->n", filters.blur[row, column], levels) / safe
+            by_blur = np.clip(change * sigma / (blur[lines.group] * stretch), -0.3, 0.3)
+            count = np.maximum(np.bincount(lines.group, minlength=GROUPS), 1)
+            blur = np.clip(
+                blur + np.bincount(lines.group, by_blur, minlength=GROUPS) / count, SMALLEST_BLUR_PX, LARGEST_BLUR_PX
+            )
         if len(facing):
-            # The ground between two near edges is a stripe: what the other edge takes away belongs to the model.
-            other = (lines.coarse + lines.outward * position)[partner] - lines.coarse[facing]
-            z = borders - (lines.outward[facing] * other)[:, None]
-            spread = sigma[partner][:, None]
-            q = z / spread
-            cumulative = ndtr(q)
-            density = np.exp(-0.5 * q * q) * (1.0 / np.sqrt(2.0 * np.pi))
-            step[facing] -= np.diff(z * cumulative + spread * density, axis=1)
-            by_sigma[facing] -= np.diff(density, axis=1)
-        s0, t0, v0 = centred(step) * weight, centred(by_position) * weight, centred(by_sigma) * weight
-        ss, st, tt = (s0 * s0).sum(axis=1), (s0 * t0).sum(axis=1), (t0 * t0).sum(axis=1)
-        sy, ty = (s0 * y0).sum(axis=1), (t0 * y0).sum(axis=1)
-        determinant = np.maximum(ss * tt - st * st, 1e-12)
-        contrast = (sy * tt - ty * st) / determinant
-        move_contrast = (ty * ss - sy * st) / determinant
-        safe_contrast = np.where(np.abs(contrast) < 1e-6, 1e-6, contrast)
-        move = np.clip(move_contrast / safe_contrast, -1.5, 1.5)
-        residual = y0 - contrast[:, None] * s0 - move_contrast[:, None] * t0
-        # The blur's own direction, freed of what levels and position can do.
-        sv, tv = (s0 * v0).sum(axis=1), (t0 * v0).sum(axis=1)
-        free = (
-            v0 - ((sv * tt - tv * st) / determinant)[:, None] * s0 - ((tv * ss - sv * st) / determinant)[:, None] * t0
-        )
-        gain = sigma / np.maximum(blur[lines.group], SMALLEST_BLUR_PX)  # d sigma / d blur is blur stretch / sigma
-        direction = contrast * stretch / gain
-        mean_square = (residual * residual).sum(axis=1) / np.maximum(count - 3.0, 1.0)
-        typical = np.median(mean_square)
-        trust = 1.0 / (1.0 + (mean_square / max(4.0 * typical, 1e-9)) ** 2)
-        top = (trust * direction * (free * residual).sum(axis=1)) @ in_group
-        bottom = (trust * direction**2 * (free * free).sum(axis=1)) @ in_group
-        position = np.clip(position + move, -reach + 2.0, reach - 2.0)
-        blur = np.clip(
-            blur + np.clip(top / np.maximum(bottom, 1e-12), -0.5 * blur, 0.5 * blur), SMALLEST_BLUR_PX, LARGEST_BLUR_PX
-        )
-    noise = float(np.sqrt(max(typical, 1.0 / 12.0)))
+            levels = _without_the_other(values, lines, filters.reach_px, facing, partner, position, contrast, sigma)
+    residual = levels - levels.mean(axis=1, keepdims=True)
+    residual -= contrast[:, None] * filters.step[row, filters.columns(position)]
+    mean_square = np.einsum("nk,nk->n", residual, residual) / (levels.shape[1] - 3.0)
+    # The last step of an eighth of a pixel is not in the residual's table: taken off to first order.
+    mean_square -= (contrast * (position - filters.offsets_px[filters.columns(position)])) ** 2 * (
+        filters.shift_gain[row, column] ** 2 / (levels.shape[1] - 3.0)
+    )
+    noise = float(np.sqrt(max(float(np.median(mean_square)), PIXEL_ROUNDING)))
     own_noise = np.sqrt(np.maximum(mean_square, noise**2))
-    u_position = own_noise / np.sqrt(np.maximum(safe_contrast**2 * (tt - st * st / np.maximum(ss, 1e-12)), 1e-12))
-    near = (np.abs(borders[:-1] + 0.5 - position[:, None]) < 0.7 * sigma[:, None]) & (weight > 0)
-    clipped = (near & ((values <= 0) | (values >= top_level))).any(axis=1)
     return EdgePoints(
         lines,
         lines.coarse + lines.outward * position,
-        u_position,
+        own_noise / (np.abs(safe) * filters.shift_gain[row, column]),
         contrast,
         blur,
         noise,
-        1.0 + lines.slope**2 * _skew(reach / sigma),
-        clipped,
+        1.0 + lines.slope**2 * _skew(filters.reach_px / sigma),
+        _clipped(values, position, sigma, filters.reach_px, top_level),
     )
+
+
+def _first_position(values: Floats) -> Floats:
+    """Where an edge between the window's two end levels would have the same mean level as the window."""
+    reach = values.shape[1] // 2
+    inside, outside = values[:, :3].mean(axis=1), values[:, -3:].mean(axis=1)
+    contrast = outside - inside
+    safe = np.where(np.abs(contrast) < 1e-3, 1e-3, contrast)
+    share = (outside - values.mean(axis=1)) / safe
+    return np.asarray(np.clip(share * values.shape[1] - reach - 0.5, -2.0, 2.0))
+
+
+def _without_the_other(
+    values: Floats,
+    lines: ProfileLines,
+    reach: int,
+    facing: Ints,
+    partner: Ints,
+    position: Floats,
+    contrast: Floats,
+    sigma: Floats,
+) -> Floats:
+    """Grey levels without the other finger, where it reaches into the window: the ground between is a stripe."""
+    other = (lines.coarse + lines.outward * position)[partner] - lines.coarse[facing]
+    borders = np.arange(-reach - 0.5, reach + 1.0) - (lines.outward[facing] * other)[:, None]
+    step, _, _ = blurred_step(borders, sigma[partner][:, None])
+    levels = values.copy()
+    levels[facing] += contrast[facing][:, None] * step
+    return levels
+
+
+def _clipped(values: Floats, position: Floats, sigma: Floats, reach: int, top_level: float) -> NDArray[np.bool_]:
+    """Whether the flank itself, within 0.7 sigma of the edge, touches the end of the scale."""
+    ends = (values <= 0) | (values >= top_level)
+    if not ends.any():
+        return np.zeros(len(values), dtype=bool)
+    near = np.abs(np.arange(-reach, reach + 1) - position[:, None]) < 0.7 * sigma[:, None]
+    return np.asarray((ends & near).any(axis=1))
 
 
 def _facing(lines: ProfileLines, reach: int) -> tuple[Ints, Ints]:
@@ -306,7 +319,3 @@ def _skew(reach_sigmas: Floats) -> Floats:
     level = 0.5 / np.maximum(reach_sigmas, 2.5)
     root = 0.5 / np.sqrt(np.pi)
     return np.asarray((0.5 * root - level) / (root - level))
-
-
-# Gauss-Newton converges quadratically from the first look; the fifth pass changes positions by less than 1e-4 px.
-ITERATIONS = 4

@@ -52,8 +52,8 @@ CODING_BLOCK_PX = 12.0
 # Mean of w r^2 over mean of w for normal residuals under the biweight: the weights shrink the spread by this.
 BIWEIGHT_SPREAD = 0.828
 PIXEL_VARIANCE = 1.0 / 12.0
-# A sharp corner's half-level stays away by so many sigma; points so close to a corner give its radius.
-SHARP_CORNER, NEAR_CORNER = 0.7706, 7
+# A sharp corner's half-level stays away by so many sigma; points that lie so far inside both sides are on a fillet.
+SHARP_CORNER, INSIDE_CORNER_PX = 0.7706, 0.5
 # A fillet below so many sigma is blurred into the corner: its radius is known from the corner alone, to so much.
 SHARP_PRIOR_PX = 0.3
 # A top whose two corners differ in height by less than so many sigma is level
@@ -198,9 +198,14 @@ def _first_guess(points: OutlinePoints, below_tip_px: float) -> tuple[Floats, Fl
             prior[k, [4, OUTER_M, OUTER_R]] = 1.0, 0.05, 1.0
         width = max(inner_c - outer_c, 2.0)
         blur = float(np.median(points.blur[k][real]))
+        inside_top = y - top_c - top_m * (x - x0)
+        inner_half = x > x0
         radii = []
-        for number, flank in ((INNER_R, (inner_c, inner_m)), (OUTER_R, (outer_c, outer_m))):
-            radius = _radius((x, y), flank, (top_c, top_m), (x0, y0), blur)
+        for number, half, inside in (
+            (INNER_R, inner_half, inner_c + inner_m * (y - y0) - x),
+            (OUTER_R, ~inner_half, x - outer_c - outer_m * (y - y0)),
+        ):
+            radius = _radius(inside[half], inside_top[half], blur)
             radii.append(min(radius, 0.49 * width))
             if radius < SHARP_IN_BLURS * blur and prior[k, number] > 1.0:
                 prior[k, number] = SHARP_PRIOR_PX
@@ -226,35 +231,28 @@ def _lower_flank(x: Floats, y: Floats, mine: NDArray[np.bool_]) -> tuple[float, 
     return _line(y[mine][low], x[mine][low])
 
 
-def _radius(
-    points: tuple[Floats, Floats],
-    flank: tuple[float, float],
-    top: tuple[float, float],
-    origin: tuple[float, float],
-    blur: float,
-) -> float:
-    """Fillet radius from how far the half-level outline stays away from the corner of the two lines.
+def _radius(inside_flank: Floats, inside_top: Floats, blur: float) -> float:
+    """Fillet radius from the points that lie inside both sides of a corner.
 
-    On the bisector of a right angle a fillet stays away by (sqrt 2 - 1) r, and blur moves the half-level further in: by
-    sigma^2 / 2r on a large fillet, by 0.77 sigma in a sharp corner (where the product of two error functions is one
-    half). The root of the two in between is within 0.02 sigma of the exact contour.
+    A fillet of radius r in a right angle passes through every point whose distances a and b from the two sides
+    satisfy (r - a)^2 + (r - b)^2 = r^2; the median over the points does not mind dust. Blur moves the half-level further
+    in: on the bisector by sigma^2 / 2r on a large fillet, by 0.77 sigma in a sharp corner (where the product of two
+    error functions is one half), and the root of the two in between is within 0.02 sigma of the exact contour.
     """
-    (x, y), (c, m), (x0, y0) = points, flank, origin
-    corner_y = (top[0] + top[1] * (c - m * y0 - x0)) / (1.0 - top[1] * m)
-    corner_x = c + m * (corner_y - y0)
-    towards = np.array([np.sign(x.mean() - corner_x), 1.0]) / np.sqrt(2.0)
-    dx, dy = x - corner_x, y - corner_y
-    nearest = np.argsort(np.hypot(dx, dy))[:NEAR_CORNER]
-    into, aside = (
-        dx[nearest] * towards[0] + dy[nearest] * towards[1],
-        dx[nearest] * towards[1] - dy[nearest] * towards[0],
-    )
-    retreat = float(np.sqrt(max(np.median(into**2 - aside**2), 0.0)))  # a hyperbola between the two sides
-    radius = max(retreat, 0.0) / (np.sqrt(2.0) - 1.0)
-    for _step in range(20):
+    a, b = np.maximum(inside_flank, 0.0), np.maximum(inside_top, 0.0)
+    through = a + b + np.sqrt(2.0 * a * b)
+    on_fillet = np.minimum(a, b) > INSIDE_CORNER_PX
+    if not on_fillet.any():
+        return 0.0
+    # Points outside the fillet's own reach belong to the other corner.
+    nearest = through[on_fillet].min()
+    rough = float(np.median(through[on_fillet & (through < 3.0 * nearest + 3.0)]))
+    retreat = rough * (np.sqrt(2.0) - 1.0)
+    radius = rough
+    for _step in range(12):
         shift = blur / np.sqrt((2.0 * radius / blur) ** 2 + SHARP_CORNER**-2)
         radius = 0.5 * (radius + max(retreat - shift, 0.0) / (np.sqrt(2.0) - 1.0))
-    return float(radius)
+    return radius
 
 
 def _evaluate(ends: FingerEnds, below_tip_px: float) -> tuple[Floats, Floats, Floats, Floats]:

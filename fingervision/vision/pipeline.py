@@ -84,8 +84,7 @@ def _measure(grey: GreyImage, settings: Settings, lossy: bool) -> GapMeasurement
             continue
         orientation = candidate.orientation
         upright = orientation.view(grey)
-        limits = (0, orientation.across_size, 0, orientation.along_size)
-        edges = fit_edges(upright, profile_lines(candidate.left, candidate.right), limits)  # type: ignore[arg-type]
+        edges = fit_edges(upright, profile_lines(candidate.left, candidate.right))  # type: ignore[arg-type]
         measured = measure_gap(candidate, edges, settings.below_tip_px, scale, light_gap, lossy)
         if isinstance(measured, GapMeasurement):
             return measured
