@@ -82,6 +82,9 @@ def _paint(
     window = window_of(grown, camera.blur_px, width_px, height_px)
     part = grey[window.y_px : window.y_px + window.height_px, window.x_px : window.x_px + window.width_px]
     if part.size:
-        change = level - part
-        change *= coverage(grown, camera.blur_px, window)
-        part += change
+        # level + (part - level) (1 - covered), in place: fresh arrays of a frame's size cost more than the sums.
+        uncovered = coverage(grown, camera.blur_px, window)
+        np.subtract(1.0, uncovered, out=uncovered)
+        part -= level
+        part *= uncovered
+        part += level
