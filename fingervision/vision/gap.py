@@ -288,11 +288,11 @@ def _inflation(points: OutlinePoints, ends: FingerEnds, lossy: bool) -> Floats:
     weight = ends.robust * points.weight
     spread = (weight * ends.residual**2).sum(axis=1) / np.maximum(weight.sum(axis=1) - PARAMETERS, 1.0)
     sequence = np.where(points.weight > 0, np.sqrt(weight) * ends.residual, 0.0)
+    # With Bartlett's weights the sum over lags is the mean square of the moving sums over that many neighbours.
+    padded = np.cumsum(np.pad(sequence, ((0, 0), (LAGS + 2, LAGS + 1))), axis=1)
+    moving = padded[:, LAGS + 1 :] - padded[:, : -LAGS - 1]
     power = np.maximum((sequence**2).sum(axis=1), 1e-12)
-    shared = np.ones(len(power))
-    for lag in range(1, LAGS + 1):
-        taper = 1.0 - lag / (LAGS + 1.0)
-        shared += 2.0 * taper * (sequence[:, lag:] * sequence[:, :-lag]).sum(axis=1) / power
+    shared = (moving**2).sum(axis=1) / ((LAGS + 1.0) * power)
     # What a codec does to a whole block the fit takes for shape: the residuals do not show it, the block's side does.
     return np.maximum(spread / BIWEIGHT_SPREAD, 0.5) * max(float(shared.mean()), CODING_BLOCK_PX if lossy else 1.0)
 

@@ -1,0 +1,107 @@
+"""What was measured, drawn into the frame."""
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from fingervision.domain.direction import Direction
+from fingervision.domain.frame import Frame
+from fingervision.domain.gap import FingerEdge, GapMeasurement, NoGap
+
+# Red, green, blue.
+EDGE, TIP, POINT, DISTANCE, WORDS, FAILURE, BACKING = (
+    (64, 200, 255),
+    (255, 176, 32),
+    (255, 64, 64),
+    (64, 255, 96),
+    (255, 255, 255),
+    (255, 96, 96),
+    (0, 0, 0),
+)
+# OpenCV draws sub-pixel places as whole numbers of 1/16 px.
+FRACTION_BITS = 4
+# A frame of this height is drawn with lines one pixel wide and letters of the usual size.
+USUAL_HEIGHT_PX = 480.0
+EDGE_LENGTH_PX, TIP_LENGTH_PX, POINT_PX = 40.0, 26.0, 6.0
+
+Canvas = NDArray[np.uint8]
+
+
+def draw_overlay(frame: Frame, outcome: GapMeasurement | NoGap, words: str) -> Canvas:
+    """Draw edges, tips, measuring points, the distance between these, and a line of text.
+
+    Parameters
+    ----------
+    frame : Frame
+        The picture that was measured.
+    outcome : GapMeasurement or NoGap
+        What came out.
+    words : str
+        The value, or why there is none.
+
+    Returns
+    -------
+    ndarray of uint8, shape (height, width, 3)
+        Red, green and blue.
+    """
+    canvas = _as_colour(frame)
+    size = max(0.4, min(frame.height_px, frame.width_px) / USUAL_HEIGHT_PX)
+    if isinstance(outcome, GapMeasurement):
+        for edge in (outcome.left, outcome.right):
+            _draw_finger(canvas, edge, outcome.direction, size)
+        left, right = outcome.left, outcome.right
+        _line(canvas, (left.x_px, left.y_px), (right.x_px, right.y_px), DISTANCE, size)
+        for edge in (left, right):
+            _cross(canvas, edge.x_px, edge.y_px, POINT_PX * size, size)
+    _write(canvas, words, WORDS if isinstance(outcome, GapMeasurement) else FAILURE, size)
+    return canvas
+
+
+def _as_colour(frame: Frame) -> Canvas:
+    """Eight bits, three colours, memory of its own."""
+    pixels = frame.pixels
+    levels = (pixels >> 8).astype(np.uint8) if pixels.dtype == np.uint16 else pixels
+    if levels.ndim == 3:
+        return np.array(levels, dtype=np.uint8)
+    return cv2.cvtColor(np.ascontiguousarray(levels), cv2.COLOR_GRAY2RGB)  # type: ignore[return-value]
+
+
+def _draw_finger(canvas: Canvas, edge: FingerEdge, direction: Direction, size: float) -> None:
+    """The edge's tangent at the measuring point, and the tip's line across the fingers."""
+    root = 1.0 if direction in (Direction.UP, Direction.LEFT) else -1.0
+    steepness = float(np.hypot(1.0, edge.slope))
+    along, across = EDGE_LENGTH_PX * size / steepness * root, EDGE_LENGTH_PX * size / steepness * edge.slope
+    vertical = direction.is_vertical
+    step = (across, along) if vertical else (along, across)
+    start = (edge.x_px - 0.25 * step[0], edge.y_px - 0.25 * step[1])
+    _line(canvas, start, (edge.x_px + step[0], edge.y_px + step[1]), EDGE, size)
+    half = TIP_LENGTH_PX * size
+    if vertical:
+        _line(canvas, (edge.x_px - half, edge.tip_px), (edge.x_px + half, edge.tip_px), TIP, size)
+    else:
+        _line(canvas, (edge.tip_px, edge.y_px - half), (edge.tip_px, edge.y_px + half), TIP, size)
+
+
+def _cross(canvas: Canvas, x_px: float, y_px: float, half: float, size: float) -> None:
+    _line(canvas, (x_px - half, y_px), (x_px + half, y_px), POINT, size)
+    _line(canvas, (x_px, y_px - half), (x_px, y_px + half), POINT, size)
+
+
+def _line(
+    canvas: Canvas, start: tuple[float, float], end: tuple[float, float], colour: tuple[int, int, int], size: float
+) -> None:
+    fraction = 1 << FRACTION_BITS
+    first, last = ((round(x * fraction), round(y * fraction)) for x, y in (start, end))
+    cv2.line(canvas, first, last, colour, max(1, round(size)), cv2.LINE_AA, FRACTION_BITS)
+
+
+def _write(canvas: Canvas, words: str, colour: tuple[int, int, int], size: float) -> None:
+    """Text at the lower left, on a dark ground so that it can be read on any picture."""
+    font, letter = cv2.FONT_HERSHEY_SIMPLEX, 0.5 * size
+    (width, height), below = cv2.getTextSize(words, font, letter, max(1, round(size)))
+    letter *= min(1.0, 0.96 * canvas.shape[1] / max(width, 1))
+    (width, height), below = cv2.getTextSize(words, font, letter, max(1, round(size)))
+    margin = round(5 * size)
+    bottom = canvas.shape[0] - margin - below
+    cv2.rectangle(canvas, (0, bottom - height - margin), (width + 2 * margin, canvas.shape[0] - 1), BACKING, -1)
+    cv2.putText(canvas, words, (margin, bottom), font, letter, colour, max(1, round(size)), cv2.LINE_AA)
