@@ -67,7 +67,7 @@ def _as_colour(frame: Frame) -> Canvas:
 
 
 def _draw_finger(canvas: Canvas, edge: FingerEdge, direction: Direction, size: float) -> None:
-    """The edge's tangent at the measuring point, and the tip's line across the fingers."""
+    """Draw the edge's tangent at the measuring point, and the tip's line across the fingers."""
     root = 1.0 if direction in (Direction.UP, Direction.LEFT) else -1.0
     steepness = float(np.hypot(1.0, edge.slope))
     along, across = EDGE_LENGTH_PX * size / steepness * root, EDGE_LENGTH_PX * size / steepness * edge.slope

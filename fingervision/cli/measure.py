@@ -1,0 +1,241 @@
+"""`fingervision measure`: a recording in, the finger gap over time out."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from fingervision.domain.errors import UsageError
+
+if TYPE_CHECKING:
+    from fingervision.domain.region import Region
+    from fingervision.measuring.measure import Measured, Progress
+    from fingervision.measuring.scale import Scale
+
+EXAMPLES = """
+\b
+Examples:
+  fingervision measure opening.mp4 --calibration calibration.json
+  fingervision measure opening.mp4 --px-per-mm 34 --overlay --out results/opening
+  fingervision measure frames/ --rate-hz 25 --px-per-mm 34
+  fingervision measure 'frames/*.png' --px-per-mm 34 --tips down --roi 100,80,400,300
+  fingervision measure run.mkv --calibration calibration.json --drive drive.csv --drive-offset-s 0.12
+  fingervision measure run.mkv --px-per-mm 34 --steps 10
+
+\b
+Files written to --out:
+  gaps.csv      one row a frame: gap with its uncertainty, points, tips, or why there is no number
+  summary.json  counts, statistics, settings, scale, what the uncertainty covers and what it does not
+  gap.png       the gap over time
+  overlay.mp4   with --overlay: edges, tips, points and value drawn in
+  steps/        with --steps: a picture of every step
+
+\b
+Exit codes: 0 done; 1 could not, or no frame gave a number; 2 wrong usage;
+3 done, but the recording was damaged: what could be read is written.
+"""
+
+
+@click.command(epilog=EXAMPLES)
+@click.argument("recording")
+@click.option(
+    "--calibration", type=click.Path(path_type=Path), help="calibration.json: the scale with its uncertainty."
+)
+@click.option("--px-per-mm", type=float, help="The scale alone; the uncertainty then holds the random part alone.")
+@click.option(
+    "--below-tip-mm",
+    type=float,
+    default=0.3,
+    show_default=True,
+    help="How far below each finger's tip the gap is measured.",
+)
+@click.option(
+    "--tips",
+    type=click.Choice(["auto", "up", "down", "left", "right"]),
+    default="auto",
+    show_default=True,
+    help="Where the fingers point in the picture.",
+)
+@click.option("--roi", metavar="X,Y,W,H", help="Region of interest: first column, first row, width, height in pixels.")
+@click.option("--rate-hz", type=float, help="Images in a second, where they have no times of their own.")
+@click.option("--drive", type=click.Path(path_type=Path), help="drive.csv: time_s,input_mm[,run][,force_n].")
+@click.option(
+    "--drive-offset-s",
+    type=float,
+    default=0.0,
+    show_default=True,
+    help="Added to the drive's times to get the recording's.",
+)
+@click.option("--overlay", is_flag=True, help="Also write overlay.mp4.")
+@click.option("--steps", "steps_frame", type=int, metavar="FRAME", help="Also write every step of this frame (from 0).")
+@click.option(
+    "--out",
+    type=click.Path(path_type=Path),
+    help="Folder for the results; measured/<name of the recording> if not given.",
+)
+@click.option("--json", "as_json", is_flag=True, help="Print the summary as JSON.")
+def command(
+    recording: str,
+    calibration: Path | None,
+    px_per_mm: float | None,
+    below_tip_mm: float,
+    tips: str,
+    roi: str | None,
+    rate_hz: float | None,
+    drive: Path | None,
+    drive_offset_s: float,
+    overlay: bool,
+    steps_frame: int | None,
+    out: Path | None,
+    as_json: bool,
+) -> None:
+    """Measure the gap between two fingers in RECORDING: a video file, a folder of images, or a glob in quotes.
+
+    The gap is the distance between the fingers' inner edges, 0.3 mm below their tips, in every frame, with its standard
+    uncertainty. One of --calibration and --px-per-mm is required.
+    """
+    from fingervision.domain.direction import Direction
+    from fingervision.frames.source import Wish, open_source
+    from fingervision.measuring.measure import Task, measure
+    from fingervision.storage.drive_csv import read_drive
+
+    task = Task(
+        scale=_scale(calibration, px_per_mm),
+        scale_file=calibration,
+        below_tip_mm=below_tip_mm,
+        direction=None if tips == "auto" else Direction(tips),
+        region=None if roi is None else _region(roi),
+        drive=None if drive is None else read_drive(drive),
+        drive_offset_s=drive_offset_s,
+        overlay=overlay,
+        steps_frame=steps_frame,
+    )
+    source = open_source(recording, Wish(rate_hz=rate_hz))
+    with _Bar() as bar:
+        measured = measure(source, task, out or _default_out(recording), bar)
+    _report(measured, as_json)
+    raise SystemExit(int(measured.exit_code))
+
+
+def _scale(calibration: Path | None, px_per_mm: float | None) -> "Scale":
+    from calib.calibration import BareScale
+    from fingervision.storage.calibration_json import read_calibration
+
+    if calibration is not None and px_per_mm is not None:
+        raise UsageError("Either --calibration or --px-per-mm gives the scale, but both are there: leave one out.")
+    if calibration is not None:
+        return read_calibration(calibration)
+    if px_per_mm is None:
+        raise UsageError(
+            "The scale must be given, but is not: add --calibration FILE (made by `fingervision calibrate`) "
+            "or --px-per-mm S."
+        )
+    try:
+        return BareScale(px_per_mm)
+    except ValueError as error:
+        raise UsageError(f"--px-per-mm must be positive, but is {px_per_mm:g}.") from error
+
+
+def _region(words: str) -> "Region":
+    from fingervision.domain.region import Region
+
+    try:
+        x_px, y_px, width_px, height_px = (int(part) for part in words.split(","))
+    except ValueError:
+        raise UsageError(f"--roi must be four whole numbers X,Y,W,H in pixels, but is '{words}'.") from None
+    return Region(x_px, y_px, width_px, height_px)
+
+
+def _default_out(recording: str) -> Path:
+    """measured/<file or folder>; for a glob the folder that it looks in."""
+    path = Path(recording)
+    name = path.name if path.exists() else path.parent.name
+    return Path("measured") / (name or path.resolve().name or "images")
+
+
+class _Bar:
+    """Progress with the time left, on a terminal only."""
+
+    def __init__(self) -> None:
+        from contextlib import ExitStack
+
+        self._stack = ExitStack()
+        self._bar: object = None
+        self._done = 0
+
+    def __enter__(self) -> "Progress":
+        return self._show
+
+    def __exit__(self, *_: object) -> None:
+        self._stack.close()
+
+    def _show(self, done: int, of: int | None) -> None:
+        import sys
+
+        if not sys.stderr.isatty() or not of:
+            return
+        if self._bar is None:
+            bar = click.progressbar(length=of, label="Measuring", file=sys.stderr, show_pos=True)
+            self._bar = self._stack.enter_context(bar)
+        assert hasattr(self._bar, "update")  # noqa: S101 - click's class has no public name
+        self._bar.update(done - self._done)
+        self._done = done
+
+
+def _report(measured: "Measured", as_json: bool) -> None:
+    """Say what came out on standard output, and what went wrong on the error stream."""
+    from fingervision.domain.status import Status
+    from fingervision.storage.summary_json import summary_text
+
+    summary, series, folder = measured.summary, measured.series, measured.folder
+    if as_json:
+        click.echo(summary_text(summary), nl=False)
+    else:
+        _print_result(measured)
+    counts = ", ".join(f"{count} {status.value}" for status, count in series.counts.most_common())
+    if measured.stopped:
+        _complain(
+            f"Stopped by the user after {series.frames} frames; what was measured until then is in {folder.path}."
+        )
+    elif not series.frames:
+        _complain(f"{summary['recording']['name']} must have at least one picture, but has none: record it again.")
+    elif not series.counts[Status.OK]:
+        first = min(series.first_without.values(), key=lambda bad: bad.frame)
+        _complain(
+            f"None of the {series.frames} frames gave a number ({counts}). Frame {first.frame}: {first.words} "
+            f"See --steps {first.frame}; the table is {folder.gaps}."
+        )
+    elif series.first_damaged is not None:
+        bad = series.first_damaged
+        _complain(
+            f"The recording is damaged: {series.counts[Status.DAMAGED]} of {series.frames} frames could not be read, "
+            f"the first is frame {bad.frame}. {bad.words} Everything else is measured."
+        )
+
+
+def _print_result(measured: "Measured") -> None:
+    summary, series, folder = measured.summary, measured.series, measured.folder
+    gap = summary["gap"]
+    click.echo(f"{gap['count']} of {series.frames} frames measured.")
+    for status, why in summary["why"].items():
+        click.echo(f"  {summary['counts'][status]} {status}, first frame {why['first_frame']}: {why['words']}")
+    if gap["count"]:
+        click.echo(f"Gap {gap['least_mm']:.4f} to {gap['greatest_mm']:.4f} mm, mean {gap['mean_mm']:.4f} mm.")
+        if gap["median_u_gap_mm"] is not None:
+            click.echo(
+                f"U = {2e3 * gap['median_u_gap_mm']:.2f} µm (k = 2, median), of which from frame to frame "
+                f"{2e3 * gap['median_u_random_mm']:.2f} µm."
+            )
+        else:
+            click.echo(
+                f"U = {2e3 * gap['median_u_random_mm']:.2f} µm (k = 2, median) from frame to frame; the scale was "
+                "stated without an uncertainty, which is not in it."
+            )
+    for advice in summary["advice"]:
+        click.echo(advice)
+    files = [folder.gaps, folder.summary, folder.figure, folder.overlay, folder.steps]
+    click.echo("Written: " + ", ".join(str(file) for file in files if file.exists()))
+
+
+def _complain(sentence: str) -> None:
+    click.echo(f"fingervision: {sentence}", err=True)

@@ -1,0 +1,83 @@
+"""Decoding ahead: the next frames are read on another core while this one is measured."""
+
+from collections.abc import Generator, Iterable
+from dataclasses import dataclass
+from queue import Empty, Full, Queue
+from threading import Event, Thread
+
+from fingervision.domain.frame import Frame, LostFrame
+
+# Frames that wait between decoder and measurement: enough to even out slow key frames, few enough for 4K pictures.
+FRAMES_AHEAD = 8
+# How soon the decoder notices that nobody wants its frames any more, and the reader that the decoder is gone.
+PATIENCE_S = 0.2
+
+
+@dataclass(frozen=True, slots=True)
+class _End:
+    """After the last frame: how reading ended."""
+
+    error: BaseException | None
+
+
+def decoded_ahead(source: Iterable[Frame | LostFrame]) -> Generator[Frame | LostFrame, None, None]:
+    """Pass on the frames of a source, read by a thread of its own.
+
+    The decoders leave Python's lock while they work, so decoding and measuring use two cores. However long the
+    recording, at most `FRAMES_AHEAD` frames wait.
+
+    Parameters
+    ----------
+    source : iterable of Frame or LostFrame
+        Read from the other thread alone.
+
+    Yields
+    ------
+    Frame or LostFrame
+        In order; an error of the source is raised here, after the frames that came before it.
+    """
+    waiting: Queue[Frame | LostFrame | _End] = Queue(FRAMES_AHEAD)
+    unwanted = Event()
+    reader = Thread(target=_read, args=(source, waiting, unwanted), name="decoder", daemon=True)
+    reader.start()
+    try:
+        while True:
+            item = waiting.get()
+            if isinstance(item, _End):
+                if item.error is not None:
+                    raise item.error
+                return
+            yield item
+    finally:
+        unwanted.set()
+        _emptied(waiting)
+        reader.join()
+
+
+def _read(source: Iterable[Frame | LostFrame], waiting: "Queue[Frame | LostFrame | _End]", unwanted: Event) -> None:
+    error: BaseException | None = None
+    try:
+        for item in source:
+            if not _put(waiting, item, unwanted):
+                return
+    except Exception as raised:
+        error = raised
+    _put(waiting, _End(error), unwanted)
+
+
+def _put(waiting: "Queue[Frame | LostFrame | _End]", item: Frame | LostFrame | _End, unwanted: Event) -> bool:
+    while not unwanted.is_set():
+        try:
+            waiting.put(item, timeout=PATIENCE_S)
+        except Full:
+            continue
+        return True
+    return False
+
+
+def _emptied(waiting: "Queue[Frame | LostFrame | _End]") -> None:
+    try:
+        while True:
+            waiting.get_nowait()
+    except Empty:
+        return

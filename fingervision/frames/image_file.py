@@ -1,0 +1,92 @@
+"""One image file: PNG, JPEG, BMP or TIFF, 8 or 16 bits, grey or colour, whole or not at all."""
+
+import struct
+import zlib
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from fingervision.domain.frame import Pixels
+
+LOSSY_SUFFIXES = frozenset({".jpg", ".jpeg"})
+IMAGE_SUFFIXES = LOSSY_SUFFIXES | {".png", ".bmp", ".tif", ".tiff"}
+
+PNG_SIGNATURE = b"\x89PNG\r\n\x1a\n"
+JPEG_START, JPEG_END = b"\xff\xd8", b"\xff\xd9"
+
+
+class UnreadableImageError(Exception):
+    """An image cannot be measured; the message says why in a sentence."""
+
+
+def read_image(file: Path) -> Pixels:
+    """Read an image at its own bit depth.
+
+    An alpha channel is left out; the levels below it are as stored. A file that ends early or fails its checksum is
+    refused, because the decoders fill in what is missing.
+
+    Parameters
+    ----------
+    file : Path
+        The image.
+
+    Returns
+    -------
+    ndarray of uint8 or uint16, shape (height, width) or (height, width, 3)
+        Grey, or red, green and blue.
+
+    Raises
+    ------
+    UnreadableImageError
+        The file cannot be read, is damaged, holds several pictures, or levels other than 8 or 16 bits.
+    """
+    try:
+        content = file.read_bytes()
+    except OSError as error:
+        raise UnreadableImageError(f"{file.name} could not be read ({error.strerror}).") from error
+    if not content:
+        raise UnreadableImageError(f"{file.name} is empty.")
+    if content.startswith(PNG_SIGNATURE):
+        _check_png(file.name, content)
+    elif content.startswith(JPEG_START) and JPEG_END not in content[-4096:]:
+        raise UnreadableImageError(f"{file.name} ends before its picture does.")
+    pixels = _decoded(content)
+    if pixels is None:
+        raise UnreadableImageError(f"{file.name} is damaged or no image.")
+    if pixels.dtype not in (np.uint8, np.uint16):
+        raise UnreadableImageError(f"{file.name} must have levels of 8 or 16 bits, but they are {pixels.dtype}.")
+    if pixels.ndim == 2:
+        return pixels
+    if pixels.shape[2] < 3:
+        return np.ascontiguousarray(pixels[:, :, 0])
+    return np.ascontiguousarray(pixels[:, :, 2::-1])
+
+
+def _decoded(content: bytes) -> NDArray[Any] | None:
+    """Levels in OpenCV's order (blue first), or None."""
+    try:
+        return cv2.imdecode(np.frombuffer(content, np.uint8), cv2.IMREAD_UNCHANGED)
+    except cv2.error:
+        return None
+
+
+def _check_png(name: str, content: bytes) -> None:
+    """Go through the chunks (PNG specification, section 5): each has its length, type and CRC-32, the last is IEND."""
+    place = len(PNG_SIGNATURE)
+    while True:
+        if place + 12 > len(content):
+            raise UnreadableImageError(f"{name} ends before its picture does.")
+        (length,) = struct.unpack_from(">I", content, place)
+        end = place + 8 + length
+        if end + 4 > len(content):
+            raise UnreadableImageError(f"{name} ends before its picture does.")
+        kind = content[place + 4 : place + 8]
+        (stated,) = struct.unpack_from(">I", content, end)
+        if zlib.crc32(memoryview(content)[place + 4 : end]) != stated:
+            raise UnreadableImageError(f"{name} is damaged: a part of it fails its checksum.")
+        if kind == b"IEND":
+            return
+        place = end + 4

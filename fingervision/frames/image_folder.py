@@ -1,0 +1,153 @@
+"""Folders and globs of images, in natural order, with times where there are any."""
+
+import glob
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from fingervision.domain.errors import FingervisionError, UsageError
+from fingervision.domain.frame import Frame, LostFrame
+from fingervision.domain.status import Status
+from fingervision.frames.image_file import IMAGE_SUFFIXES, LOSSY_SUFFIXES, UnreadableImageError, read_image
+from fingervision.frames.image_times import TIMES_FILE, times_of
+from fingervision.frames.source import Description, Wish
+
+
+def accepts(name: str) -> bool:
+    """Whether this is a folder, an image, or a pattern that files match."""
+    path = Path(name)
+    if path.exists():
+        return path.is_dir() or (path.is_file() and path.suffix.lower() in IMAGE_SUFFIXES)
+    return glob.has_magic(name) and "://" not in name
+
+
+def open_frames(name: str, wish: Wish) -> "ImageFolder":
+    """Open the images of a folder, of a pattern, or a single one.
+
+    Raises
+    ------
+    FingervisionError
+        There are no images, or none can be read, or their times make no sense.
+    UsageError
+        The rate is not positive, or the images have times already.
+    """
+    return ImageFolder(name, wish.rate_hz)
+
+
+@dataclass(frozen=True, slots=True)
+class ImageFolder:
+    """Images as a recording.
+
+    Parameters
+    ----------
+    name : str
+        A folder, a glob, or one image.
+    rate_hz : float or None
+        Images in a second. Without a rate and without times, frames have no time.
+    """
+
+    name: str
+    rate_hz: float | None = None
+    description: Description = field(init=False)
+    times_s: tuple[float, ...] | None = field(init=False)
+
+    def __post_init__(self) -> None:
+        if self.rate_hz is not None and not 0.0 < self.rate_hz < float("inf"):
+            raise UsageError(f"--rate-hz must be positive, but is {self.rate_hz:g}.")
+        files = _files(self.name)
+        times_s = times_of(files)
+        if times_s is not None and self.rate_hz is not None:
+            raise UsageError(
+                f"The images have their times in {files[0].parent / TIMES_FILE}: leave out --rate-hz, "
+                "or remove that file."
+            )
+        height_px, width_px = _first_readable(self.name, files)
+        lossy = any(file.suffix.lower() in LOSSY_SUFFIXES for file in files)
+        object.__setattr__(self, "times_s", times_s)
+        object.__setattr__(
+            self,
+            "description",
+            Description(
+                name=self.name,
+                kind="images",
+                codec=", ".join(sorted({file.suffix.lower().lstrip(".") for file in files})),
+                lossy=lossy,
+                width_px=width_px,
+                height_px=height_px,
+                rate_hz=self.rate_hz,
+                has_times=times_s is not None or self.rate_hz is not None,
+                frame_count=len(files),
+                files=files,
+            ),
+        )
+
+    def __iter__(self) -> Iterator[Frame | LostFrame]:
+        """Read the images one by one."""
+        last_s: float | None = None
+        size_px = (self.description.height_px, self.description.width_px)
+        for index, file in enumerate(self.description.files):
+            time_s = self._time_s(index)
+            if self.times_s is not None and time_s == last_s:
+                yield LostFrame(index, time_s, Status.DUPLICATE, "It has the same time as the frame before.")
+                continue
+            last_s = time_s
+            try:
+                pixels = read_image(file)
+            except UnreadableImageError as error:
+                yield LostFrame(index, time_s, Status.DAMAGED, str(error))
+                continue
+            if pixels.shape[:2] == size_px:
+                yield Frame(pixels, index, time_s, file.suffix.lower() in LOSSY_SUFFIXES)
+            else:
+                words = (
+                    f"{file.name} has {pixels.shape[1]}x{pixels.shape[0]} pixels, but the recording "
+                    f"{size_px[1]}x{size_px[0]}."
+                )
+                yield LostFrame(index, time_s, Status.DAMAGED, words)
+
+    def _time_s(self, index: int) -> float | None:
+        if self.times_s is not None:
+            return self.times_s[index]
+        return None if self.rate_hz is None else index / self.rate_hz
+
+
+def _files(name: str) -> tuple[Path, ...]:
+    """Images in natural order: frame2 before frame10."""
+    path = Path(name)
+    if path.is_dir():
+        try:
+            found = list(path.iterdir())
+        except PermissionError:
+            raise FingervisionError(f"The folder {name} may not be read: change its permissions.") from None
+        what = f"The folder {name} must hold images"
+    elif path.is_file():
+        found = [path]
+        what = f"{name} must be an image"
+    else:
+        found = [Path(match) for match in glob.glob(name)]  # noqa: PTH207 - the pattern may be absolute
+        what = f"The pattern {name} must match images"
+    images = [file for file in found if file.suffix.lower() in IMAGE_SUFFIXES and not file.name.startswith(".")]
+    files = tuple(sorted((file for file in images if file.is_file()), key=_natural))
+    if not files:
+        raise FingervisionError(f"{what} ({', '.join(sorted(IMAGE_SUFFIXES))}), but there is none.")
+    return files
+
+
+def _natural(file: Path) -> tuple[tuple[int, int, str], ...]:
+    """Digits count as numbers, everything else as letters."""
+    parts = re.split(r"([0-9]+)", str(file))
+    return tuple((1, int(part), part) if place % 2 else (0, 0, part) for place, part in enumerate(parts))
+
+
+def _first_readable(name: str, files: tuple[Path, ...]) -> tuple[int, int]:
+    """Height and width of the first image that can be read; the recording has its size."""
+    first_words = ""
+    for file in files:
+        try:
+            pixels = read_image(file)
+        except UnreadableImageError as error:
+            first_words = first_words or str(error)
+            continue
+        return int(pixels.shape[0]), int(pixels.shape[1])
+    raise FingervisionError(f"None of the {len(files)} images of {name} can be read: {first_words}")

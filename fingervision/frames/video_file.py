@@ -1,0 +1,218 @@
+"""Video files through PyAV: any container, the container's own times, read in sequence and never by seeking."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from itertools import count
+from pathlib import Path
+
+import av
+
+from fingervision.domain.errors import FingervisionError, UsageError
+from fingervision.domain.frame import Frame, LostFrame
+from fingervision.domain.status import Status
+from fingervision.frames.damage import DamageTrail
+from fingervision.frames.image_file import IMAGE_SUFFIXES
+from fingervision.frames.luma import luma
+from fingervision.frames.source import Description, Wish
+
+# FFmpeg's AV_CODEC_PROP_LOSSY. A codec that can do both (H.264) counts as lossy: the stream does not say.
+LOSSY_PROPERTY = 2
+# A damaged slice is an error, not a guess from the picture before it; checksums are looked at where there are any.
+STRICT = {"err_detect": "crccheck+explode"}
+
+
+def accepts(name: str) -> bool:
+    """Whether this is a file that is not an image."""
+    path = Path(name)
+    return path.is_file() and path.suffix.lower() not in IMAGE_SUFFIXES
+
+
+def open_frames(name: str, wish: Wish) -> "VideoFile":
+    """Open a video file.
+
+    Raises
+    ------
+    FingervisionError
+        It cannot be read, is no video, or has no picture in it.
+    UsageError
+        A rate is given for what has its own times.
+    """
+    if wish.rate_hz is not None:
+        raise UsageError(f"--rate-hz is for images without times, but {name} is a video with its own: leave it out.")
+    return VideoFile(name)
+
+
+@dataclass(frozen=True, slots=True)
+class VideoFile:
+    """A video file; every pass over it opens it anew.
+
+    Parameters
+    ----------
+    name : str
+        Its path.
+    """
+
+    name: str
+    description: Description = field(init=False)
+
+    def __post_init__(self) -> None:
+        with self._opened() as container:
+            stream = _stream(container, self.name)
+            codec = stream.codec_context
+            if codec.width < 1 or codec.height < 1:
+                raise FingervisionError(
+                    f"{self.name} has no pictures in its video: it is empty or was cut off at once; record it again."
+                )
+            rate = float(stream.average_rate) if stream.average_rate else None
+            length_s = float(container.duration / av.time_base) if container.duration else None
+            expected = stream.frames or (round(length_s * rate) if length_s and rate else None)
+            ratio = stream.sample_aspect_ratio
+            notes = (
+                ()
+                if ratio in (None, 0, 1)
+                else (f"The file states pixels that are not square ({ratio}): one scale cannot hold along both axes.",)
+            )
+            object.__setattr__(
+                self,
+                "description",
+                Description(
+                    name=self.name,
+                    kind=f"video file ({container.format.long_name})",
+                    codec=codec.name,
+                    lossy=bool(codec.codec.properties & LOSSY_PROPERTY),
+                    width_px=codec.width,
+                    height_px=codec.height,
+                    rate_hz=rate,
+                    has_times=True,
+                    frame_count=expected or None,
+                    files=(Path(self.name),),
+                    notes=notes,
+                ),
+            )
+
+    def __iter__(self) -> Iterator[Frame | LostFrame]:
+        """Decode in sequence; what cannot be decoded, and what hangs on it, is damaged."""
+        numbers = count()
+        last_tick: int | None = None
+        with self._opened() as container:
+            stream = _stream(container, self.name)
+            stream.codec_context.options = STRICT
+            for tick, found in _pictures(container, stream):
+                index = next(numbers)
+                time_s = None if tick is None or stream.time_base is None else float(tick * stream.time_base)
+                if isinstance(found, str):
+                    yield LostFrame(index, time_s, Status.DAMAGED, found)
+                elif (found.width, found.height) != (self.description.width_px, self.description.height_px):
+                    yield LostFrame(index, time_s, Status.DAMAGED, _of_another_size(found, self.description))
+                elif tick is not None and tick == last_tick:
+                    yield LostFrame(index, time_s, Status.DUPLICATE, "It has the same time as the frame before.")
+                else:
+                    yield Frame(luma(found), index, time_s, self.description.lossy)
+                last_tick = tick
+
+    def _opened(self) -> av.container.InputContainer:
+        try:
+            return av.open(self.name)
+        except (av.FFmpegError, OSError) as error:
+            raise FingervisionError(_not_a_video(self.name, error)) from error
+
+
+def _pictures(
+    container: av.container.InputContainer, stream: av.VideoStream
+) -> Iterator[tuple[int | None, av.VideoFrame | str]]:
+    """Pictures with their ticks in order of presentation, or what happened instead of one."""
+    trail = DamageTrail()
+    packets, last_end_s = 0, None
+    demuxed = container.demux(stream)
+    while True:
+        try:
+            packet = next(demuxed, None)
+        except av.FFmpegError as error:
+            yield from trail.rest()
+            yield None, f"The file cannot be read any further ({error.strerror})."
+            return
+        if packet is None:
+            break
+        if packet.size:
+            packets += 1
+            trail.enters(packet)
+            if packet.pts is not None and packet.time_base is not None:
+                last_end_s = max(last_end_s or 0.0, float((packet.pts + (packet.duration or 0)) * packet.time_base))
+        try:
+            pictures = packet.decode()
+        except av.FFmpegError as error:
+            trail.breaks(f"It could not be decoded ({error.strerror}).")
+            continue
+        for picture in pictures:
+            yield from trail.leaves(picture)
+    yield from trail.rest()
+    missing = _cut_off(container, stream, packets, last_end_s)
+    if missing:
+        yield None, missing
+
+
+def _cut_off(
+    container: av.container.InputContainer, stream: av.VideoStream, packets: int, last_end_s: float | None
+) -> str | None:
+    """Say so if the file states more than it holds."""
+    kind = container.format.name
+    if "mp4" in kind and stream.frames > packets:
+        return f"The recording is cut off here: the file announces {stream.frames} frames and holds {packets}."
+    stated_s = None
+    if "matroska" in kind:
+        stated_s = _clock_s(stream.metadata.get("DURATION")) or (
+            container.duration / av.time_base if container.duration and len(container.streams) == 1 else None
+        )
+    elif "avi" in kind and stream.duration and stream.time_base:
+        stated_s = float(stream.duration * stream.time_base)
+    if stated_s is None or not stream.average_rate:
+        return None
+    # One frame and a half: containers round, and some count up to the last frame's start, others to its end.
+    if stated_s - (last_end_s or 0.0) > 1.5 / float(stream.average_rate):
+        return (
+            f"The recording is cut off here: the file announces {stated_s:.2f} s and holds {last_end_s or 0.0:.2f} s."
+        )
+    return None
+
+
+def _clock_s(clock: str | None) -> float | None:
+    """Seconds of Matroska's hours:minutes:seconds."""
+    try:
+        hours, minutes, seconds = (float(part) for part in (clock or "").split(":"))
+    except ValueError:
+        return None
+    return 3600.0 * hours + 60.0 * minutes + seconds
+
+
+def _stream(container: av.container.InputContainer, name: str) -> av.VideoStream:
+    """Find the first video stream, and its decoder."""
+    if not container.streams.video:
+        raise FingervisionError(f"{name} must hold a video, but has no video stream: give another file.")
+    stream = container.streams.video[0]
+    if stream.codec_context is None:
+        raise FingervisionError(
+            f"{name} is stored with a codec that cannot be decoded here: convert it losslessly, for instance with "
+            "`ffmpeg -i IN -c:v ffv1 OUT.mkv`."
+        )
+    return stream
+
+
+def _of_another_size(picture: av.VideoFrame, description: Description) -> str:
+    return (
+        f"It has {picture.width}x{picture.height} pixels, but the recording "
+        f"{description.width_px}x{description.height_px}."
+    )
+
+
+def _not_a_video(name: str, error: Exception) -> str:
+    path = Path(name)
+    if not path.exists():
+        return f"There is no file {name}."
+    if isinstance(error, PermissionError):
+        return f"{name} may not be read: change its permissions."
+    if path.is_file() and path.stat().st_size == 0:
+        return f"{name} must be a video, but the file is empty: record or copy it again."
+    return (
+        f"{name} must be a video, but cannot be read as one: it is of another kind, or was cut off before its index "
+        "was written (an MP4 file needs its end); record or copy it again."
+    )

@@ -1,0 +1,123 @@
+"""The gap over time with its uncertainty, as a picture."""
+
+from pathlib import Path
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+from fingervision.domain.errors import FingervisionError
+from fingervision.measuring.series import GapSeries
+
+SIZE_INCHES, DOTS_PER_INCH = (9.0, 5.5), 130
+# More points than this cannot be told apart on the picture; each column then shows the range that it covers.
+MOST_POINTS = 2000
+COVERAGE_FACTOR = 2.0
+GAP_COLOUR, BAND_COLOUR, FAILURE_COLOUR = "#11507a", "#8fbcdb", "#c0392b"
+
+Floats = NDArray[np.float64]
+
+
+def draw_gap(path: Path, series: GapSeries) -> None:
+    """Draw the gap with the band of its expanded uncertainty, and below it that uncertainty alone.
+
+    Frames without a number are marked at the lower edge.
+
+    Raises
+    ------
+    FingervisionError
+        The picture cannot be written.
+    """
+    figure = Figure(figsize=SIZE_INCHES, layout="constrained")
+    upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=(3, 1))
+    where, where_not, label = _axis(series)
+    gap_mm, expanded_um = series.gap_mm, COVERAGE_FACTOR * 1e3 * series.u_mm
+    if gap_mm.size:
+        _line(upper, where, gap_mm, expanded_um * 1e-3)
+        lower.plot(*_thinned(where, expanded_um), color=GAP_COLOUR, linewidth=0.8)
+        upper.legend(loc="best", framealpha=0.8, fontsize="small")
+    else:
+        upper.text(0.5, 0.5, "no frame gave a number", ha="center", va="center", transform=upper.transAxes)
+    if where_not.size:
+        marks = where_not[:: max(1, where_not.size // MOST_POINTS)]
+        upper.plot(
+            marks,
+            np.full(marks.size, 0.02),
+            "x",
+            color=FAILURE_COLOUR,
+            markersize=5,
+            transform=upper.get_xaxis_transform(),
+            label=f"no number ({where_not.size} frames: {_reasons(series)})",
+            clip_on=False,
+        )
+        upper.legend(loc="best", framealpha=0.8, fontsize="small")
+    upper.set_ylabel("gap (mm)")
+    lower.set_ylabel("U, k = 2 (µm)")
+    lower.set_ylim(bottom=0.0)
+    lower.set_xlabel(label)
+    for axes in (upper, lower):
+        axes.grid(visible=True, alpha=0.3)
+        axes.ticklabel_format(useOffset=False)
+    part = path.with_name(f".{path.name}.part")
+    try:
+        figure.savefig(part, dpi=DOTS_PER_INCH, format="png")
+        part.replace(path)
+    except OSError as error:
+        part.unlink(missing_ok=True)
+        raise FingervisionError(
+            f"{path} could not be written ({error.strerror}): make room or name another --out, and measure again."
+        ) from error
+
+
+def _axis(series: GapSeries) -> tuple[Floats, Floats, str]:
+    """Where frames with and without a number stand, and what the axis says."""
+    times = series.times_s()
+    if times is not None:
+        return (*times, "time (s)")
+    frames, frames_without = series.frame_numbers()
+    return frames.astype(np.float64), frames_without.astype(np.float64), "frame"
+
+
+def _line(axes: Axes, where: Floats, gap_mm: Floats, expanded_mm: Floats) -> None:
+    band = "U = 2 u" + (" (frame to frame)" if expanded_mm.size else "")
+    low, high = gap_mm - expanded_mm, gap_mm + expanded_mm
+    few = gap_mm.size <= 60
+    if gap_mm.size <= MOST_POINTS:
+        axes.fill_between(where, low, high, color=BAND_COLOUR, linewidth=0, label=band)
+        axes.plot(where, gap_mm, ".-" if few else "-", color=GAP_COLOUR, linewidth=1.0, markersize=4, label="gap")
+        return
+    starts = _starts(gap_mm.size)
+    place = where[starts]
+    axes.fill_between(
+        place,
+        np.minimum.reduceat(low, starts),
+        np.maximum.reduceat(high, starts),
+        color=BAND_COLOUR,
+        linewidth=0,
+        label=band,
+    )
+    axes.fill_between(
+        place,
+        np.minimum.reduceat(gap_mm, starts),
+        np.maximum.reduceat(gap_mm, starts),
+        color=GAP_COLOUR,
+        linewidth=0.8,
+        label="gap",
+    )
+
+
+def _thinned(where: Floats, values: Floats) -> tuple[Floats, Floats]:
+    """Keep the greatest value of each column of the picture."""
+    if values.size <= MOST_POINTS:
+        return where, values
+    starts = _starts(values.size)
+    return where[starts], np.maximum.reduceat(values, starts)
+
+
+def _starts(size: int) -> NDArray[np.int64]:
+    return np.unique(np.linspace(0, size - 1, MOST_POINTS // 2).astype(np.int64))
+
+
+def _reasons(series: GapSeries) -> str:
+    return ", ".join(f"{status.value} {series.counts[status]}" for status in series.first_without)

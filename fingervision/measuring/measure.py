@@ -1,0 +1,246 @@
+"""A recording goes in; the gap over time, its summary and its figure come out."""
+
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, closing
+from dataclasses import dataclass, field
+from pathlib import Path
+from time import monotonic
+from typing import Any
+
+from fingervision.domain.direction import Direction
+from fingervision.domain.drive import DriveHistory
+from fingervision.domain.errors import ExitCode, FingervisionError, UsageError
+from fingervision.domain.frame import Frame, LostFrame
+from fingervision.domain.gap import GapMeasurement, NoGap
+from fingervision.domain.region import Region
+from fingervision.domain.status import Status
+from fingervision.frames.ahead import decoded_ahead
+from fingervision.frames.source import Description, FrameSource
+from fingervision.measuring.gap_figure import draw_gap
+from fingervision.measuring.output_folder import OutputFolder, claimed
+from fingervision.measuring.overlay_video import OverlayVideo
+from fingervision.measuring.rows import Result, RowMaker
+from fingervision.measuring.scale import Scale
+from fingervision.measuring.series import GapSeries
+from fingervision.measuring.step_pictures import write_steps
+from fingervision.measuring.summary import summarise
+from fingervision.storage.gaps_csv import GapsCsv
+from fingervision.storage.summary_json import write_summary
+from fingervision.vision.pipeline import Settings, measure_frame
+
+# Rows are made for so many frames at once, or for what has come in so many seconds, and then handed to the table.
+FRAMES_AT_ONCE, SECONDS_AT_ONCE = 128, 0.5
+
+
+@dataclass(frozen=True, slots=True)
+class Task:
+    """What shall be measured, and how.
+
+    Parameters
+    ----------
+    scale : Scale
+        From pixels to millimetres.
+    scale_file : Path or None
+        The calibration that the scale was read from.
+    below_tip_mm : float
+        Height of measuring below each finger's tip.
+    direction : Direction or None
+        Where the tips point; None finds out in every frame.
+    region : Region or None
+        The part of the frame that is looked at.
+    drive : DriveHistory or None
+        The recorded input.
+    drive_offset_s : float
+        Added to the drive's times to get the recording's.
+    overlay : bool
+        Whether a video is written with what was measured drawn in.
+    steps_frame : int or None
+        The frame of which every step is written as a picture.
+    """
+
+    scale: Scale
+    scale_file: Path | None = None
+    below_tip_mm: float = 0.3
+    direction: Direction | None = None
+    region: Region | None = None
+    drive: DriveHistory | None = None
+    drive_offset_s: float = 0.0
+    overlay: bool = False
+    steps_frame: int | None = None
+
+    def __post_init__(self) -> None:
+        if not 0.0 < self.below_tip_mm < float("inf"):
+            raise UsageError(f"--below-tip-mm must be positive, but is {self.below_tip_mm:g}.")
+        if not -float("inf") < self.drive_offset_s < float("inf"):
+            raise UsageError(f"--drive-offset-s must be a number of seconds, but is {self.drive_offset_s:g}.")
+        if self.steps_frame is not None and self.steps_frame < 0:
+            raise UsageError(f"--steps must be the number of a frame, from 0, but is {self.steps_frame}.")
+
+    @property
+    def settings(self) -> Settings:
+        """What vision needs of it."""
+        return Settings(self.below_tip_mm * self.scale.px_per_mm, self.direction, self.region)
+
+    @property
+    def drive_columns(self) -> tuple[str, ...]:
+        """Columns that the drive adds to the table."""
+        if self.drive is None:
+            return ()
+        return ("run", "input_mm") if self.drive.force_n is None else ("run", "input_mm", "force_n")
+
+
+@dataclass(frozen=True, slots=True)
+class Measured:
+    """What a measurement left behind.
+
+    Parameters
+    ----------
+    folder : OutputFolder
+        The files.
+    series : GapSeries
+        The gap over time.
+    summary : dict
+        As in summary.json.
+    stopped : bool
+        Whether the user stopped it before the recording's end.
+    """
+
+    folder: OutputFolder
+    series: GapSeries
+    summary: dict[str, Any] = field(repr=False)
+    stopped: bool
+
+    @property
+    def exit_code(self) -> ExitCode:
+        """How the measurement ended."""
+        if self.stopped or not self.series.counts[Status.OK]:
+            return ExitCode.COULD_NOT
+        return ExitCode.DAMAGED_INPUT if self.series.counts[Status.DAMAGED] else ExitCode.DONE
+
+
+Progress = Callable[[int, int | None], None]
+
+
+def measure(source: FrameSource, task: Task, out: Path, on_progress: Progress | None = None) -> Measured:
+    """Measure a recording from its first frame to its last.
+
+    Parameters
+    ----------
+    source : FrameSource
+        The recording; read once, by a thread of its own.
+    task : Task
+        What shall be measured.
+    out : Path
+        Folder for the results; see `claimed`.
+    on_progress : callable, optional
+        Called now and then with the frames done and the frames that the source announces.
+
+    Returns
+    -------
+    Measured
+        Also where the user stopped it: everything until then is in the files.
+
+    Raises
+    ------
+    UsageError
+        The region lies outside the frame, or a frame is asked for that there is not.
+    FingervisionError
+        The results cannot be written, or the scale is for other frames. The rows until then are in gaps.csv.
+    """
+    description = source.description
+    _check(task, description)
+    folder = claimed(out, description.files)
+    frame_size_px = (description.width_px, description.height_px)
+    row_maker = RowMaker(task.scale, frame_size_px, task.drive, task.drive_offset_s)
+    series = GapSeries()
+    stopped = False
+    with ExitStack() as stack:
+        table = stack.enter_context(GapsCsv(folder.gaps, task.drive_columns))
+        video = stack.enter_context(OverlayVideo(folder.overlay, description)) if task.overlay else None
+        pending: list[Result] = []
+
+        def hand_over() -> None:
+            results = pending.copy()
+            pending.clear()
+            rows = row_maker.rows(results)
+            series.add(results, rows)
+            table.add(rows)
+
+        # Before the table is closed, whatever ends the loop.
+        stack.callback(hand_over)
+        handed_over_at = monotonic()
+        try:
+            for item, outcome in _outcomes(source, task):
+                result = Result(item.index, item.time_s, outcome)
+                pending.append(result)
+                if video is not None and isinstance(item, Frame):
+                    video.add(item, outcome, row_maker.rows([result])[0])
+                if isinstance(item, Frame) and item.index == task.steps_frame:
+                    write_steps(item, task.settings, folder.steps)
+                if len(pending) >= FRAMES_AT_ONCE or monotonic() - handed_over_at >= SECONDS_AT_ONCE:
+                    hand_over()
+                    handed_over_at = monotonic()
+                    if on_progress is not None:
+                        on_progress(series.frames, description.frame_count)
+        except KeyboardInterrupt:
+            stopped = True
+    if on_progress is not None:
+        on_progress(series.frames, description.frame_count)
+    draw_gap(folder.figure, series)
+    summary = summarise(description, _in_words(task), task.scale, task.scale_file, series, complete=not stopped)
+    write_summary(folder.summary, summary)
+    if task.steps_frame is not None and not folder.steps.exists() and not stopped:
+        raise UsageError(
+            f"--steps must be the number of a frame that can be read, 0 to {series.frames - 1}, "
+            f"but is {task.steps_frame}; the gaps are in {folder.gaps}."
+        )
+    return Measured(folder, series, summary, stopped)
+
+
+def _outcomes(
+    source: FrameSource, task: Task
+) -> Iterator[tuple[Frame | LostFrame, GapMeasurement | NoGap | LostFrame]]:
+    """Every frame with what it says; the decoder runs ahead and is stopped when this is."""
+    settings = task.settings
+    with closing(decoded_ahead(source)) as frames:
+        for item in frames:
+            yield item, (item if isinstance(item, LostFrame) else measure_frame(item, settings))
+
+
+def _check(task: Task, description: Description) -> None:
+    """Refuse what cannot be meant for these frames."""
+    width_px, height_px = description.width_px, description.height_px
+    region = task.region
+    if region is not None and not (
+        region.x_px >= 0
+        and region.y_px >= 0
+        and region.width_px > 0
+        and region.height_px > 0
+        and region.x_px + region.width_px <= width_px
+        and region.y_px + region.height_px <= height_px
+    ):
+        raise UsageError(
+            f"--roi must lie inside the frame of {width_px}x{height_px} pixels, but is "
+            f"{region.x_px},{region.y_px},{region.width_px},{region.height_px} (first column, row, width, height)."
+        )
+    if task.drive is not None and not description.has_times:
+        raise UsageError(
+            f"--drive needs a recording with times, but {description.name} has none: "
+            "give --rate-hz, or a times.csv beside the images."
+        )
+    try:
+        task.scale.check_frame_size(width_px, height_px)
+    except ValueError as error:
+        raise FingervisionError(str(error)) from error
+
+
+def _in_words(task: Task) -> dict[str, Any]:
+    """Put the task as it stands in the summary."""
+    region = task.region
+    return {
+        "below_tip_mm": task.below_tip_mm,
+        "tips": "auto" if task.direction is None else task.direction.value,
+        "roi": None if region is None else [region.x_px, region.y_px, region.width_px, region.height_px],
+        "drive": task.drive is not None,
+        "drive_offset_s": task.drive_offset_s if task.drive is not None else None,
+    }

@@ -1,0 +1,97 @@
+"""The folder that results are written to: made, and never at the cost of somebody else's files."""
+
+import shutil
+from dataclasses import dataclass
+from pathlib import Path
+
+from fingervision.domain.errors import FingervisionError, UsageError
+from fingervision.storage.gaps_csv import COLUMNS
+
+GAPS, SUMMARY, FIGURE, OVERLAY, STEPS = "gaps.csv", "summary.json", "gap.png", "overlay.mp4", "steps"
+
+
+@dataclass(frozen=True, slots=True)
+class OutputFolder:
+    """Where the files of one measurement are."""
+
+    path: Path
+
+    @property
+    def gaps(self) -> Path:
+        """The table."""
+        return self.path / GAPS
+
+    @property
+    def summary(self) -> Path:
+        """The summary."""
+        return self.path / SUMMARY
+
+    @property
+    def figure(self) -> Path:
+        """The gap over time."""
+        return self.path / FIGURE
+
+    @property
+    def overlay(self) -> Path:
+        """The video with what was measured drawn in."""
+        return self.path / OVERLAY
+
+    @property
+    def steps(self) -> Path:
+        """The pictures of every step."""
+        return self.path / STEPS
+
+
+def claimed(path: Path, recording_files: tuple[Path, ...]) -> OutputFolder:
+    """Make the folder, or take one over from an earlier measurement and remove that one's files.
+
+    Parameters
+    ----------
+    path : Path
+        The folder.
+    recording_files : tuple of Path
+        What is measured; none of it may be replaced, and results may not lie among the images.
+
+    Raises
+    ------
+    FingervisionError
+        The folder cannot be made or written, or holds files of these names that no measurement wrote.
+    UsageError
+        The folder is where the recording's images are, or the recording would be replaced.
+    """
+    names = (GAPS, SUMMARY, FIGURE, OVERLAY, STEPS)
+    for file in recording_files:
+        same = file.resolve().parent == path.resolve()
+        if same and (len(recording_files) > 1 or file.name in names):
+            raise UsageError(f"--out must not be the folder of the recording, but {path} is: name another folder.")
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+        present = [name for name in names if (path / name).exists()]
+        if present and not _is_ours(path / GAPS):
+            raise FingervisionError(
+                f"{path} already holds {present[0]}, and no earlier measurement of fingervision wrote it: "
+                "name another folder with --out."
+            )
+        for name in present:
+            if name == STEPS:
+                shutil.rmtree(path / name)
+            else:
+                (path / name).unlink()
+        trial = path / ".fingervision.part"
+        trial.touch()
+        trial.unlink()
+    except FileExistsError:
+        raise FingervisionError(f"--out must be a folder, but {path} is a file: name another.") from None
+    except OSError as error:
+        raise FingervisionError(
+            f"The folder {path} cannot be written ({error.strerror}): name another with --out."
+        ) from error
+    return OutputFolder(path)
+
+
+def _is_ours(table: Path) -> bool:
+    """Whether a table starts with the header that only a measurement writes."""
+    if not table.is_file():
+        return False
+    with table.open("rb") as file:
+        return file.read(len(COLUMNS)) == COLUMNS.encode()

@@ -1,0 +1,101 @@
+"""overlay.mp4: the recording with what was measured drawn in, at the recording's own times."""
+
+from fractions import Fraction
+from pathlib import Path
+from types import TracebackType
+
+import av
+import numpy as np
+
+from fingervision.domain.errors import FingervisionError
+from fingervision.domain.frame import Frame, LostFrame
+from fingervision.domain.gap import GapMeasurement, NoGap
+from fingervision.frames.source import Description
+from fingervision.storage.gaps_csv import GapRow
+from fingervision.vision.overlay import draw_overlay
+
+# MPEG's clock, which MP4 keeps to the tick.
+CLOCK_HZ = 90_000
+# Frames without times are shown at this rate.
+SHOWN_AT_HZ = 25.0
+OPTIONS = {"crf": "20", "preset": "veryfast"}
+
+
+class OverlayVideo:
+    """Writes the overlay frame by frame.
+
+    Frames that could not be decoded are not in it, and neither is one that comes no later than the one before.
+
+    Parameters
+    ----------
+    path : Path
+        The video.
+    description : Description
+        Of the recording.
+
+    Raises
+    ------
+    FingervisionError
+        It cannot be written; also from `add` and on leaving.
+    """
+
+    def __init__(self, path: Path, description: Description) -> None:
+        self._path = path
+        self._last_tick = -1
+        self._first_s: float | None = None
+        # H.264 with halved colour needs even sides; the last column or row is repeated where they are odd.
+        self._pad = ((0, description.height_px % 2), (0, description.width_px % 2), (0, 0))
+        try:
+            self._container = av.open(str(path), "w", options={"movie_timescale": str(CLOCK_HZ)})
+            self._stream = self._container.add_stream("libx264", options=OPTIONS)
+        except (av.FFmpegError, OSError, ValueError) as error:
+            raise self._failed(error) from error
+        self._stream.width = description.width_px + description.width_px % 2
+        self._stream.height = description.height_px + description.height_px % 2
+        self._stream.pix_fmt = "yuv420p"
+        self._stream.codec_context.time_base = self._stream.time_base = Fraction(1, CLOCK_HZ)
+
+    def __enter__(self) -> "OverlayVideo":
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        try:
+            self._container.mux(self._stream.encode(None))
+            self._container.close()
+        except (av.FFmpegError, OSError) as failure:
+            if error is None:
+                raise self._failed(failure) from failure
+
+    def add(self, frame: Frame, outcome: GapMeasurement | NoGap | LostFrame, row: GapRow) -> None:
+        """Draw one frame and write it."""
+        time_s = frame.index / SHOWN_AT_HZ if frame.time_s is None else frame.time_s
+        if self._first_s is None:
+            self._first_s = min(0.0, time_s)  # a video cannot start before 0
+        tick = round((time_s - self._first_s) * CLOCK_HZ)
+        if tick <= self._last_tick or isinstance(outcome, LostFrame):
+            return
+        self._last_tick = tick
+        drawn = np.pad(draw_overlay(frame, outcome, _words(row)), self._pad, mode="edge")
+        picture = av.VideoFrame.from_ndarray(drawn, format="rgb24")
+        picture.pts, picture.time_base = tick, Fraction(1, CLOCK_HZ)
+        try:
+            self._container.mux(self._stream.encode(picture))
+        except (av.FFmpegError, OSError) as error:
+            raise self._failed(error) from error
+
+    def _failed(self, error: Exception) -> FingervisionError:
+        why = getattr(error, "strerror", None) or str(error)
+        return FingervisionError(
+            f"{self._path} could not be written ({why}): make room, name another --out, or leave out --overlay."
+        )
+
+
+def _words(row: GapRow) -> str:
+    """Frame, time and value in a line; U = 2 u, of the random part where nothing else is known."""
+    place = f"{row.frame}" if row.time_s is None else f"{row.frame}  {row.time_s:.3f} s"
+    if row.gap_mm is None or row.u_random_mm is None:
+        return f"{place}  {row.status.value}"
+    u_mm = row.u_random_mm if row.u_gap_mm is None else row.u_gap_mm
+    return f"{place}  gap {row.gap_mm:.4f} mm  U {2.0 * u_mm:.4f} mm"

@@ -1,0 +1,33 @@
+"""What measuring asks of a scale: a bare number of pixels to the millimetre, or a calibration."""
+
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from calib.distances import Distances
+
+Floats = NDArray[np.float64]
+
+
+class Scale(Protocol):
+    """From pixels to millimetres; see `calib.calibration.BareScale` for shapes and units."""
+
+    @property
+    def px_per_mm(self) -> float:
+        """Pixels to the millimetre."""
+        ...
+
+    def distances(self, points_px: Floats, u_random_px: Floats, light_gap: NDArray[np.bool_]) -> Distances:
+        """Distances between pairs of points."""
+        ...
+
+    def positions_mm(
+        self, points_px: Floats, axis: int, light_gap: NDArray[np.bool_], frame_size_px: tuple[int, int]
+    ) -> Floats:
+        """Where both points are along an axis, from the picture's middle."""
+        ...
+
+    def check_frame_size(self, width_px: int, height_px: int) -> None:
+        """Refuse frames that the scale was not made for."""
+        ...

@@ -1,0 +1,123 @@
+"""What is kept of every frame until the end: a few numbers, so that an hour of video fits into a few megabytes."""
+
+from __future__ import annotations
+
+from array import array
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fingervision.domain.status import Status
+from fingervision.measuring.rows import Result
+from fingervision.storage.gaps_csv import GapRow
+
+
+@dataclass(frozen=True, slots=True)
+class FirstBad:
+    """The first frame that could not be read.
+
+    Parameters
+    ----------
+    frame : int
+        Place in the recording.
+    time_s : float or None
+        Presentation time, where it is known.
+    words : str
+        What happened to it, in a sentence.
+    """
+
+    frame: int
+    time_s: float | None
+    words: str
+
+
+@dataclass(slots=True)
+class GapSeries:
+    """The gap over time, growing while a recording is measured.
+
+    Parameters
+    ----------
+    counts : Counter of Status
+        Frames with each status.
+    first_without : dict of Status to FirstBad
+        The first frame with each status but ok, and why.
+    has_budget : bool
+        Whether the scale said how surely it is known.
+    """
+
+    counts: Counter[Status] = field(default_factory=Counter)
+    first_without: dict[Status, FirstBad] = field(default_factory=dict)
+    has_budget: bool = False
+    _frame: array[int] = field(default_factory=lambda: array("q"))
+    _time_s: array[float] = field(default_factory=lambda: array("d"))
+    _gap_mm: array[float] = field(default_factory=lambda: array("d"))
+    _u_mm: array[float] = field(default_factory=lambda: array("d"))
+    _u_random_mm: array[float] = field(default_factory=lambda: array("d"))
+    _u_gap_px: array[float] = field(default_factory=lambda: array("d"))
+    _bad_frame: array[int] = field(default_factory=lambda: array("q"))
+    _bad_time_s: array[float] = field(default_factory=lambda: array("d"))
+
+    def add(self, results: Sequence[Result], rows: Sequence[GapRow]) -> None:
+        """Take in the rows of a few frames."""
+        for result, row in zip(results, rows, strict=True):
+            self.counts[row.status] += 1
+            # In memory alone: without a time a frame is drawn at its number.
+            time_s = float("nan") if row.time_s is None else row.time_s
+            if row.gap_mm is None or row.u_random_mm is None or row.u_gap_px is None:
+                self._bad_frame.append(row.frame)
+                self._bad_time_s.append(time_s)
+                if row.status not in self.first_without:
+                    words = getattr(result.outcome, "words", "")
+                    self.first_without[row.status] = FirstBad(row.frame, row.time_s, words)
+                continue
+            self._frame.append(row.frame)
+            self._time_s.append(time_s)
+            self._gap_mm.append(row.gap_mm)
+            self._u_random_mm.append(row.u_random_mm)
+            self._u_gap_px.append(row.u_gap_px)
+            self.has_budget = row.u_gap_mm is not None
+            self._u_mm.append(row.u_random_mm if row.u_gap_mm is None else row.u_gap_mm)
+
+    @property
+    def frames(self) -> int:
+        """Frames so far, with a number or without."""
+        return sum(self.counts.values())
+
+    @property
+    def first_damaged(self) -> FirstBad | None:
+        """The first damaged frame."""
+        return self.first_without.get(Status.DAMAGED)
+
+    @property
+    def gap_mm(self) -> NDArray[np.float64]:
+        """Gaps of the frames that have one."""
+        return np.array(self._gap_mm)
+
+    @property
+    def u_mm(self) -> NDArray[np.float64]:
+        """Standard uncertainty of each gap: the whole budget, or the random part where no budget is known."""
+        return np.array(self._u_mm)
+
+    @property
+    def u_random_mm(self) -> NDArray[np.float64]:
+        """Random part of each gap's standard uncertainty."""
+        return np.array(self._u_random_mm)
+
+    @property
+    def u_gap_px(self) -> NDArray[np.float64]:
+        """Random part in pixels."""
+        return np.array(self._u_gap_px)
+
+    def times_s(self) -> tuple[NDArray[np.float64], NDArray[np.float64]] | None:
+        """Give the times of the frames with and without a gap; None where frames have no times."""
+        times, bad = np.array(self._time_s), np.array(self._bad_time_s)
+        if np.isnan(times).any() or times.size + np.count_nonzero(~np.isnan(bad)) == 0:
+            return None
+        return times, bad[~np.isnan(bad)]
+
+    def frame_numbers(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+        """Numbers of the frames with and without a gap."""
+        return np.array(self._frame, dtype=np.int64), np.array(self._bad_frame, dtype=np.int64)

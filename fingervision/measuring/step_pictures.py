@@ -1,0 +1,50 @@
+"""One picture for each step of vision, numbered in their order."""
+
+import re
+from pathlib import Path
+
+import cv2
+
+from fingervision.domain.errors import FingervisionError
+from fingervision.domain.frame import Frame
+from fingervision.vision.pipeline import Settings
+
+
+def write_steps(frame: Frame, settings: Settings, folder: Path) -> tuple[Path, ...]:
+    """Write every step of one frame as `01_grey.png`, `02_...` and so on.
+
+    Parameters
+    ----------
+    frame : Frame
+        The frame.
+    settings : Settings
+        As for its measurement.
+    folder : Path
+        Made if it is not there.
+
+    Returns
+    -------
+    tuple of Path
+        The pictures in order.
+
+    Raises
+    ------
+    FingervisionError
+        A picture cannot be written.
+    """
+    from fingervision.vision.pipeline import steps
+
+    written = []
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        for number, (name, picture) in enumerate(steps(frame, settings), start=1):
+            path = folder / f"{number:02d}_{re.sub('[^a-z0-9]+', '_', name.lower()).strip('_')}.png"
+            stored = picture if picture.ndim == 2 else cv2.cvtColor(picture, cv2.COLOR_RGB2BGR)
+            path.write_bytes(cv2.imencode(".png", stored)[1].tobytes())
+            written.append(path)
+    except OSError as error:
+        raise FingervisionError(
+            f"The pictures of the steps could not be written to {folder} ({error.strerror}): "
+            "make room or name another --out, and measure again."
+        ) from error
+    return tuple(written)

@@ -1,0 +1,192 @@
+"""The summary of a measurement: counts, sizes, how surely, and what is not in that."""
+
+import hashlib
+from collections.abc import Mapping
+from dataclasses import asdict
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from calib.measured_scale import Calibration
+from fingervision import __version__
+from fingervision.domain.errors import FingervisionError
+from fingervision.domain.status import Status
+from fingervision.frames.source import Description
+from fingervision.measuring.scale import Scale
+from fingervision.measuring.series import GapSeries
+
+# Of the expanded uncertainty U = k u (JCGM 100:2008, 6.2): about 95 % for a normal distribution.
+COVERAGE_FACTOR = 2
+LOSSLESS_ADVICE = (
+    "The recording is lossy ({codec}): its errors are several times those of the camera's noise and correlated from "
+    "pixel to pixel and frame to frame. Record losslessly (FFV1 or raw) where the last hundredth of a pixel counts."
+)
+BYTES_AT_ONCE = 1 << 20
+
+
+def summarise(
+    description: Description,
+    settings: Mapping[str, Any],
+    scale: Scale,
+    scale_file: Path | None,
+    series: GapSeries,
+    *,
+    complete: bool,
+) -> dict[str, Any]:
+    """Put together summary.json.
+
+    Parameters
+    ----------
+    description : Description
+        The recording.
+    settings : mapping
+        What the user chose.
+    scale : Scale
+        From pixels to millimetres.
+    scale_file : Path or None
+        Where the scale was read from.
+    series : GapSeries
+        The gap over time.
+    complete : bool
+        Whether the recording was measured to its end.
+
+    Returns
+    -------
+    dict
+        Only what JSON knows; None for what is not known.
+    """
+    first = series.first_damaged
+    return {
+        "software": {"name": "fingervision", "version": __version__},
+        "made_at": datetime.now(UTC).isoformat(timespec="seconds"),
+        "complete": complete,
+        "recording": {
+            "name": description.name,
+            "kind": description.kind,
+            "codec": description.codec,
+            "lossy": description.lossy,
+            "width_px": description.width_px,
+            "height_px": description.height_px,
+            "rate_hz": description.rate_hz,
+            "sha256": _sha256(description.files),
+        },
+        "settings": dict(settings),
+        "scale": _scale(scale, scale_file),
+        "frames": series.frames,
+        "counts": {status.value: series.counts[status] for status in Status},
+        "first_damaged": None if first is None else asdict(first),
+        "why": {
+            status.value: {"first_frame": found.frame, "words": found.words}
+            for status, found in series.first_without.items()
+        },
+        "gap": _statistics(series),
+        "uncertainty": _uncertainty(scale),
+        "advice": [
+            *([LOSSLESS_ADVICE.format(codec=description.codec)] if description.lossy else []),
+            *description.notes,
+        ],
+    }
+
+
+def _statistics(series: GapSeries) -> dict[str, float | int | None]:
+    gap_mm = series.gap_mm
+    u_mm = series.u_mm if series.has_budget else np.empty(0)
+    return {
+        "count": int(gap_mm.size),
+        "mean_mm": _of(np.mean, gap_mm),
+        "standard_deviation_mm": float(np.std(gap_mm, ddof=1)) if gap_mm.size > 1 else None,
+        "least_mm": _of(np.min, gap_mm),
+        "median_mm": _of(np.median, gap_mm),
+        "greatest_mm": _of(np.max, gap_mm),
+        "median_u_gap_mm": _of(np.median, u_mm),
+        "median_u_random_mm": _of(np.median, series.u_random_mm),
+        "median_u_gap_px": _of(np.median, series.u_gap_px),
+    }
+
+
+def _of(statistic: Any, values: NDArray[np.float64]) -> float | None:
+    return float(statistic(values)) if values.size else None
+
+
+def _scale(scale: Scale, file: Path | None) -> dict[str, Any]:
+    if not isinstance(scale, Calibration):
+        return {"kind": "stated", "px_per_mm": scale.px_per_mm, "u_px_per_mm": None}
+    return {
+        "kind": "calibration",
+        "file": None if file is None else str(file),
+        "sha256": None if file is None else _sha256((file,)),
+        "px_per_mm": scale.px_per_mm,
+        "u_px_per_mm": scale.u_px_per_mm,
+        "edge_bias_px": scale.edge_bias_px,
+        "u_edge_bias_px": scale.u_edge_bias_px,
+        "reference": [asdict(reference) for reference in scale.references],
+        "made_at": scale.made_at,
+    }
+
+
+def _uncertainty(scale: Scale) -> dict[str, Any]:
+    random = (
+        "u_random_mm and u_gap_px: what changes from frame to frame - noise at both edges, both tips through the slope "
+        "of the edges, what the edge model leaves unexplained, compression"
+    )
+    never = [
+        "movement during the exposure",
+        "change of the bench since the calibration (focus, camera, light)",
+        "a finger's outline that is not the edge seen from above (thickness, burr)",
+    ]
+    if not isinstance(scale, Calibration):
+        return {
+            "coverage_factor": COVERAGE_FACTOR,
+            "expanded": "U = k u_random_mm with k = 2; it holds the random part alone.",
+            "covers": [random],
+            "not_included": [
+                f"everything of the scale: {scale.px_per_mm:g} px/mm was stated without an uncertainty, "
+                "so u_gap_mm is empty; calibrate to know it",
+                "edge bias (blooming), lens distortion, tilt, distance from the plane of the scale, temperature",
+                *never,
+            ],
+        }
+    return {
+        "coverage_factor": COVERAGE_FACTOR,
+        "expanded": "U = k u_gap_mm with k = 2 (JCGM 100); about 95 %.",
+        "covers": [
+            random,
+            "scale and edge bias with their covariance, from the calibration",
+            *(
+                f"{words}: {scale.how_stated(name, unit)}"
+                for name, words, unit in (
+                    ("plane_mm", "distance of the fingers from the calibration plane", "mm"),
+                    ("tilt_deg", "tilt of the plane", "degrees"),
+                    ("lens_relative", "lens distortion left over, relative", ""),
+                    ("temperature_k", "temperature", "K"),
+                )
+                if hasattr(scale.limits, name)
+            ),
+        ],
+        "not_included": never,
+    }
+
+
+def _sha256(files: tuple[Path, ...]) -> str | None:
+    """Hash of one file's bytes; of several, of their names and hashes in order. None for a live source."""
+    if not files:
+        return None
+    hashes = [_hash_of(file) for file in files]
+    if len(files) == 1:
+        return hashes[0]
+    together = "".join(f"{found}  {file.name}\n" for found, file in zip(hashes, files, strict=True))
+    return hashlib.sha256(together.encode()).hexdigest()
+
+
+def _hash_of(file: Path) -> str:
+    found = hashlib.sha256()
+    try:
+        with file.open("rb") as content:
+            while block := content.read(BYTES_AT_ONCE):
+                found.update(block)
+    except OSError as error:
+        raise FingervisionError(f"{file} could not be read again ({error.strerror}).") from error
+    return found.hexdigest()
