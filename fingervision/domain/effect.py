@@ -1,0 +1,163 @@
+"""A physical effect: something that happens between the recorded input and the measured points."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from enum import StrEnum
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fingervision.domain.parameter import Parameter
+from fingervision.domain.response import Response
+
+Values = Mapping[str, float]
+Array = NDArray[np.float64]
+
+
+class Stage(StrEnum):
+    """Where in the measuring chain an effect acts."""
+
+    DRIVE = "drive"
+    MECHANISM = "mechanism"
+    CAMERA = "camera"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class History:
+    """The samples that a chain runs over: what an effect may know besides the signal it acts on.
+
+    Parameters
+    ----------
+    input_mm : ndarray of float, shape (n,)
+        Recorded input; runs one after the other, sorted by time within each.
+    time_s : ndarray of float, shape (n,), or None
+        Times; None where the table has none, and the order of rows then means nothing.
+    runs : tuple of slice
+        The samples of each run.
+    rest_gap_mm : float
+        g0, the model's gap at input zero.
+    opening_mm : float
+        Largest absolute opening that the model predicts.
+    shared_clock : bool
+        Whether times go on from run to run. Where they restart, the runs share no clock.
+    input_sigma_mm : float
+        Standard uncertainty of one recorded input (noise, encoder step).
+    input_step_mm : float
+        Step of the encoder; 0 where none shows.
+    both_edges : bool
+        Whether left and right were measured, or the gap alone.
+    force : bool
+        Whether a force was measured.
+    """
+
+    input_mm: Array
+    time_s: Array | None
+    runs: tuple[slice, ...]
+    rest_gap_mm: float
+    opening_mm: float
+    shared_clock: bool = True
+    input_sigma_mm: float = 0.0
+    input_step_mm: float = 0.0
+    both_edges: bool = True
+    force: bool = False
+
+    @property
+    def times(self) -> Array:
+        """Times, shape (n,); only for effects that declared that they need them."""
+        if self.time_s is None:
+            message = "an effect that needs times was run on a table without them."
+            raise ValueError(message)
+        return self.time_s
+
+    @property
+    def clock_s(self) -> Array:
+        """Time since the table's first sample, shape (n,)."""
+        return self.times - self.times.min()
+
+    @property
+    def sample_time_s(self) -> float:
+        """Median time between neighbouring samples of a run."""
+        steps = np.concatenate([np.diff(self.times[run]) for run in self.runs])
+        return float(np.median(steps)) if steps.size else 1.0
+
+    @property
+    def input_span_mm(self) -> float:
+        """Range of the recorded input."""
+        return float(np.ptp(self.input_mm))
+
+
+DriveAct = Callable[[Array, History, Values], Array]
+PointAct = Callable[[Response, History, Values], Response]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Effect:
+    """One entry of the catalogue.
+
+    Parameters
+    ----------
+    name : str
+        Canonical name.
+    stage : Stage
+        Drive, mechanism or camera.
+    order : int
+        Place in the chain; effects act in ascending order.
+    words : str
+        What happens, in half a sentence.
+    formula : str
+        The definition with a simulation table.
+    source : str
+        Where the law is from.
+    residual : str
+        How it looks in measured minus simulated.
+    parameters : tuple of Parameter
+        With bounds that hold for every table.
+    needs_times, needs_shared_clock, needs_edges, needs_force : bool
+        Data without which the effect is excluded.
+    memory : bool
+        Whether the past counts; such effects start each run at rest.
+    narrow : callable or None
+        Bounds that follow from the data: `narrow(history)` gives the parameters to search, or the reason why
+        these data cannot show the effect.
+    """
+
+    name: str
+    stage: Stage
+    order: int
+    words: str
+    formula: str
+    source: str
+    residual: str
+    parameters: tuple[Parameter, ...]
+    needs_times: bool = False
+    needs_shared_clock: bool = False
+    needs_edges: bool = False
+    needs_force: bool = False
+    memory: bool = False
+    narrow: Callable[[History], "tuple[Parameter, ...] | str"] | None = None
+
+    def search(self, history: History) -> tuple[Parameter, ...] | str:
+        """The parameters with the bounds that these data leave, or the reason why they cannot show the effect."""
+        if self.needs_times and history.time_s is None:
+            return "the table has no time_s, and without times the order of rows means nothing"
+        if self.needs_shared_clock and not history.shared_clock:
+            return "time_s restarts between runs, so the runs share no clock"
+        if self.needs_edges and not history.both_edges:
+            return "the table has no left_mm and right_mm, and the gap alone does not show it"
+        if self.needs_force and not history.force:
+            return "the table has no force_n, and the gap hardly shows it"
+        return self.parameters if self.narrow is None else self.narrow(history)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DriveEffect(Effect):
+    """An effect on what the mechanism receives: `act(input_mm, history, values)` gives the input after it."""
+
+    act: DriveAct
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PointEffect(Effect):
+    """An effect of the mechanism or camera: `act(response, history, values)` gives the points after it."""
+
+    act: PointAct

@@ -1,0 +1,42 @@
+"""Where the two measuring points are: the answer of a gripper, or of a measuring chain, to an input history."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Response:
+    """The measuring points of both fingers over a history, and the force at the drive where there is one.
+
+    Parameters
+    ----------
+    left_mm, right_mm : ndarray of float, shape (n,)
+        Across the fingers, origin at the image centre; `left` is the smaller.
+    force_n : ndarray of float, shape (n,), or None
+        Force at the drive.
+    """
+
+    left_mm: NDArray[np.float64]
+    right_mm: NDArray[np.float64]
+    force_n: NDArray[np.float64] | None = None
+
+    @property
+    def gap_mm(self) -> NDArray[np.float64]:
+        """Distance between the points across the fingers, shape (n,)."""
+        return self.right_mm - self.left_mm
+
+    @property
+    def midline_mm(self) -> NDArray[np.float64]:
+        """The middle between the points, shape (n,)."""
+        return 0.5 * (self.left_mm + self.right_mm)
+
+    def with_gap(self, gap_mm: NDArray[np.float64]) -> "Response":
+        """The same midline with another gap: both fingers move equally, in opposite directions."""
+        half_mm = 0.5 * (gap_mm - self.gap_mm)
+        return replace(self, left_mm=self.left_mm - half_mm, right_mm=self.right_mm + half_mm)
+
+    def shifted(self, by_mm: NDArray[np.float64] | float) -> "Response":
+        """Both points moved together, to the right where `by_mm` is positive."""
+        return replace(self, left_mm=self.left_mm + by_mm, right_mm=self.right_mm + by_mm)
