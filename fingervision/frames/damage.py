@@ -26,6 +26,7 @@ class DamageTrail:
         self._last = -1
         self._broken_from: int | None = None
         self._why = ""
+        self._given_up: set[int] = set()  # ticks of lost pictures since the damage
 
     def enters(self, packet: av.Packet[av.VideoStream]) -> None:
         """Note a packet that goes into the decoder."""
@@ -43,6 +44,8 @@ class DamageTrail:
     def leaves(self, picture: av.VideoFrame) -> Iterator[Picture]:
         """Give the picture that came out, after the lost ones that should have come before it."""
         tick = picture.pts
+        if tick in self._given_up:
+            return  # behind damage pictures may leave too late; its place is taken
         number = self._last
         while tick is not None and self._entered and self._entered[0][0] <= tick:
             early, early_number = heapq.heappop(self._entered)
@@ -50,6 +53,7 @@ class DamageTrail:
                 number = early_number
                 break
             if self._broken_from is not None:
+                self._given_up.add(early)
                 yield early, self._words(early_number)
         if picture.is_corrupt and self._broken_from is None:
             self._broken_from, self._why = number, "It was decoded with errors."
@@ -60,6 +64,7 @@ class DamageTrail:
             and number > self._broken_from
         ):
             self._broken_from = None
+            self._given_up.clear()
         if self._hangs_on_damage(number):
             yield tick, self._words(number)
         else:

@@ -1,5 +1,6 @@
 """The gap over time with its uncertainty, as a picture."""
 
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -8,6 +9,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from fingervision.domain.errors import FingervisionError
+from fingervision.domain.status import Status
 from fingervision.measuring.series import GapSeries
 
 SIZE_INCHES, DOTS_PER_INCH = (9.0, 5.5), 130
@@ -32,10 +34,12 @@ def draw_gap(path: Path, series: GapSeries) -> None:
     figure = Figure(figsize=SIZE_INCHES, layout="constrained")
     upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=(3, 1))
     where, where_not, label = _axis(series)
+    pieces = _pieces(series)
     gap_mm, expanded_um = series.gap_mm, COVERAGE_FACTOR * 1e3 * series.u_mm
     if gap_mm.size:
-        _line(upper, where, gap_mm, expanded_um * 1e-3)
-        lower.plot(*_thinned(where, expanded_um), color=GAP_COLOUR, linewidth=0.8)
+        for number, piece in enumerate(pieces):
+            _line(upper, where[piece], gap_mm[piece], expanded_um[piece] * 1e-3, series, named=number == 0)
+            lower.plot(*_thinned(where[piece], expanded_um[piece]), ".-", color=GAP_COLOUR, linewidth=0.8, markersize=1)
         upper.legend(loc="best", framealpha=0.8, fontsize="small")
     else:
         upper.text(0.5, 0.5, "no frame gave a number", ha="center", va="center", transform=upper.transAxes)
@@ -79,32 +83,40 @@ def _axis(series: GapSeries) -> tuple[Floats, Floats, str]:
     return frames.astype(np.float64), frames_without.astype(np.float64), "frame"
 
 
-def _line(axes: Axes, where: Floats, gap_mm: Floats, expanded_mm: Floats) -> None:
-    band = "U = 2 u" + (" (frame to frame)" if expanded_mm.size else "")
+def _pieces(series: GapSeries) -> list[slice]:
+    """Give stretches of frames without a hole: no line is drawn across what was not measured."""
+    frames, _ = series.frame_numbers()
+    if not frames.size:
+        return []
+    ends = [0, *(np.flatnonzero(np.diff(frames) > 1) + 1).tolist(), frames.size]
+    if len(ends) > MOST_POINTS // 4:  # more holes than the picture has room for
+        ends = [0, frames.size]
+    return [slice(start, end) for start, end in pairwise(ends)]
+
+
+def _line(axes: Axes, where: Floats, gap_mm: Floats, expanded_mm: Floats, series: GapSeries, *, named: bool) -> None:
+    """Draw one stretch; only the first is named in the legend."""
+    band_words = "U = 2 u" if series.has_budget else "U = 2 u (from frame to frame)"
+    gap_label, band_label = ("gap", band_words) if named else (None, None)
     low, high = gap_mm - expanded_mm, gap_mm + expanded_mm
-    few = gap_mm.size <= 60
     if gap_mm.size <= MOST_POINTS:
-        axes.fill_between(where, low, high, color=BAND_COLOUR, linewidth=0, label=band)
-        axes.plot(where, gap_mm, ".-" if few else "-", color=GAP_COLOUR, linewidth=1.0, markersize=4, label="gap")
+        mark = ".-" if series.counts[Status.OK] <= 60 or gap_mm.size == 1 else "-"
+        axes.fill_between(where, low, high, color=BAND_COLOUR, linewidth=0, label=band_label)
+        axes.plot(where, gap_mm, mark, color=GAP_COLOUR, linewidth=1.0, markersize=4, label=gap_label)
         return
     starts = _starts(gap_mm.size)
-    place = where[starts]
-    axes.fill_between(
-        place,
-        np.minimum.reduceat(low, starts),
-        np.maximum.reduceat(high, starts),
-        color=BAND_COLOUR,
-        linewidth=0,
-        label=band,
-    )
-    axes.fill_between(
-        place,
-        np.minimum.reduceat(gap_mm, starts),
-        np.maximum.reduceat(gap_mm, starts),
-        color=GAP_COLOUR,
-        linewidth=0.8,
-        label="gap",
-    )
+    for lowest, highest, colour, label in (
+        (low, high, BAND_COLOUR, band_label),
+        (gap_mm, gap_mm, GAP_COLOUR, gap_label),
+    ):
+        axes.fill_between(
+            where[starts],
+            np.minimum.reduceat(lowest, starts),
+            np.maximum.reduceat(highest, starts),
+            color=colour,
+            linewidth=0.8,
+            label=label,
+        )
 
 
 def _thinned(where: Floats, values: Floats) -> tuple[Floats, Floats]:
