@@ -64,6 +64,9 @@ class Camera:
         if self.bits not in (8, 16):
             msg = f"bits must be 8 or 16, but is {self.bits}."
             raise FingervisionError(msg)
+        if self.tint is not None and (len(tuple(self.tint)) != 3 or min(self.tint) < 0.0):
+            msg = f"tint must be three factors of 0 or more, for red, green and blue, but is {self.tint}."
+            raise FingervisionError(msg)
 
     def sees(self, outlines: tuple[Outline, ...], width_px: int, height_px: int) -> tuple[Outline, ...]:
         """Map outlines of the ideal picture into the camera's, through tilt and lens; without blooming and blur."""

@@ -1,6 +1,6 @@
 """Clips: frames with their own times, through a camera's codec into a video file."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from fractions import Fraction
 from itertools import chain
@@ -8,6 +8,7 @@ from pathlib import Path
 
 import av
 import numpy as np
+from av.container import OutputContainer
 from av.video.reformatter import ColorRange
 
 from fingervision.domain.errors import FingervisionError
@@ -77,8 +78,8 @@ def write_clip(path: Path, frames: Iterable[Frame], codec: Codec) -> None:
     Raises
     ------
     FingervisionError
-        Times are missing or do not increase, sizes change, the clip is empty, or the container or codec cannot hold
-        the frames.
+        The file cannot be written, times are missing or do not increase, sizes change, the clip is empty, or the
+        container or codec cannot hold the frames.
     """
     if path.suffix not in CONTAINERS:
         msg = f"A clip's name must end in {', '.join(CONTAINERS)}, because these keep every time, but is {path.name}."
@@ -88,35 +89,44 @@ def write_clip(path: Path, frames: Iterable[Frame], codec: Codec) -> None:
     if first is None:
         msg = f"A clip must have at least one frame, but {path.name} would have none."
         raise FingervisionError(msg)
+    try:
+        with av.open(path, "w", options=CONTAINERS[path.suffix]) as container:
+            _encode(container, first, source, codec)
+    except OSError as error:
+        msg = f"{path} must be a file that can be written, but it could not be: {error.strerror}."
+        raise FingervisionError(msg) from error
+
+
+def _encode(container: OutputContainer, first: Frame, others: Iterator[Frame], codec: Codec) -> None:
+    """Compress frames into an open container."""
     pixel_format = _pixel_format(first.pixels, codec)
-    with av.open(path, "w", options=CONTAINERS[path.suffix]) as container:
-        match codec:
-            case H264(crf=crf):
-                # The same frames shall give the same bytes; x264's lookahead else depends on the memory's layout.
-                options = {"crf": f"{crf:g}", "threads": "1", "x264-params": "threads=1:cpu-independent=1"}
-                stream = container.add_stream("libx264", options=options)
-            case Mjpeg(qscale=qscale):
-                stream = container.add_stream("mjpeg", options={"qmin": str(qscale), "qmax": str(qscale)})
-            case Ffv1():
-                stream = container.add_stream("ffv1", options={"level": "3", "slicecrc": "1"})
-        stream.width, stream.height, stream.pix_fmt = first.width_px, first.height_px, pixel_format
-        stream.codec_context.time_base = stream.time_base = Fraction(1, CLOCK_HZ)
-        stream.codec_context.color_range = ColorRange.JPEG
-        stream.codec_context.flags |= av.codec.context.Flags.bitexact.value
-        last_tick = -1
-        for frame in chain([first], source):
-            tick = _tick(frame, last_tick)
-            if frame.pixels.shape != first.pixels.shape or frame.pixels.dtype != first.pixels.dtype:
-                msg = (
-                    f"All frames of a clip must be alike, but frame {frame.index} is {frame.pixels.shape} of "
-                    f"{frame.pixels.dtype} and the first {first.pixels.shape} of {first.pixels.dtype}."
-                )
-                raise FingervisionError(msg)
-            picture = _picture(frame.pixels, pixel_format)
-            picture.pts, picture.time_base = tick, Fraction(1, CLOCK_HZ)
-            container.mux(stream.encode(picture))
-            last_tick = tick
-        container.mux(stream.encode(None))
+    match codec:
+        case H264(crf=crf):
+            # The same frames shall give the same bytes; x264's lookahead else depends on the memory's layout.
+            options = {"crf": f"{crf:g}", "threads": "1", "x264-params": "threads=1:cpu-independent=1"}
+            stream = container.add_stream("libx264", options=options)
+        case Mjpeg(qscale=qscale):
+            stream = container.add_stream("mjpeg", options={"qmin": str(qscale), "qmax": str(qscale)})
+        case Ffv1():
+            stream = container.add_stream("ffv1", options={"level": "3", "slicecrc": "1"})
+    stream.width, stream.height, stream.pix_fmt = first.width_px, first.height_px, pixel_format
+    stream.codec_context.time_base = stream.time_base = Fraction(1, CLOCK_HZ)
+    stream.codec_context.color_range = ColorRange.JPEG
+    stream.codec_context.flags |= av.codec.context.Flags.bitexact.value
+    last_tick = -1
+    for frame in chain([first], others):
+        tick = _tick(frame, last_tick)
+        if frame.pixels.shape != first.pixels.shape or frame.pixels.dtype != first.pixels.dtype:
+            msg = (
+                f"All frames of a clip must be alike, but frame {frame.index} is {frame.pixels.shape} of "
+                f"{frame.pixels.dtype} and the first {first.pixels.shape} of {first.pixels.dtype}."
+            )
+            raise FingervisionError(msg)
+        picture = _picture(frame.pixels, pixel_format)
+        picture.pts, picture.time_base = tick, Fraction(1, CLOCK_HZ)
+        container.mux(stream.encode(picture))
+        last_tick = tick
+    container.mux(stream.encode(None))
 
 
 def _tick(frame: Frame, last_tick: int) -> int:

@@ -46,8 +46,8 @@ def dust(
     FingervisionError
         A grain without size, or no level to choose from.
     """
-    if not (0.0 < size_px[0] <= size_px[1] and levels):
-        msg = f"Grains must have a size and a level, but size_px is {size_px} and levels is {levels}."
+    if not (count >= 0 and 0.0 < size_px[0] <= size_px[1] and levels):
+        msg = f"Grains must have a number, a size and a level, but these are {count}, {size_px} px and {levels}."
         raise FingervisionError(msg)
     grains = []
     for _ in range(count):

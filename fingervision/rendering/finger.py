@@ -15,6 +15,8 @@ from fingervision.rendering.polygon import polygon
 
 # A half ellipse is drawn as this many circular arcs; they, not the ellipse, are the truth (they differ by 1e-4 px).
 ELLIPSE_ARCS = 48
+# A finger that is tilted further points in another direction.
+STEEPEST_DEG = 45.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -121,13 +123,21 @@ def finger_shape(width_px: float, length_px: float, tip: Tip, tilt_deg: float = 
     Raises
     ------
     FingervisionError
-        The tip does not fit on the finger.
+        The tip does not fit on the finger, or it is tilted or slanted by more than STEEPEST_DEG.
     """
     half = width_px / 2
     if not (width_px > 0.0 and length_px > 0.0):
         msg = f"A finger's width and length must be positive, but are {width_px:g} px and {length_px:g} px."
         raise FingervisionError(msg)
+    if not abs(tilt_deg) <= STEEPEST_DEG:
+        msg = (
+            f"A finger's tilt must be at most {STEEPEST_DEG:g} degrees, but is {tilt_deg:g}: choose another direction."
+        )
+        raise FingervisionError(msg)
     if isinstance(tip, SquareTip):
+        if not abs(tip.slant_deg) <= STEEPEST_DEG:
+            msg = f"A tip's slant must be at most {STEEPEST_DEG:g} degrees, but is {tip.slant_deg:g}."
+            raise FingervisionError(msg)
         rise = half * tan(radians(tip.slant_deg))
         corners = ((half, length_px), (-half, length_px), (-half, rise), (half, -rise))
         shape = polygon(corners, (0.0, 0.0, tip.radius_px, tip.radius_px))

@@ -75,6 +75,7 @@ class Outline:
         """Shift every edge parallel to itself, `by_px` further out (negative: further in).
 
         Corners that open are closed by an arc about the corner, corners that close are cut where the parallels meet.
+        Where nothing is left, the outline has no pieces.
         """
         if by_px == 0.0:
             return self
@@ -82,20 +83,44 @@ class Outline:
             (follower.heading_rad(0.0) - piece.heading_rad(1.0) + pi) % (2 * pi) - pi
             for piece, follower in zip(self.pieces, self.pieces[1:] + self.pieces[:1], strict=True)
         ]
+        cuts_px = [max(0.0, -by_px * tan(turn / 2)) for turn in turns]
+        if self._vanishes(by_px, turns, cuts_px):
+            return Outline(())
         grown: list[Piece] = []
         for i, piece in enumerate(self.pieces):
             moved = piece.grown(by_px)
-            if moved.length_px <= SAME_POINT_PX:
-                continue
-            cut_start = max(0.0, -by_px * tan(turns[i - 1] / 2)) / moved.length_px
-            cut_end = max(0.0, -by_px * tan(turns[i] / 2)) / moved.length_px
-            if cut_start + cut_end < 1.0:
-                grown.append(moved.part(cut_start, 1.0 - cut_end))
+            if cuts_px[i - 1] + cuts_px[i] < moved.length_px:
+                grown.append(moved.part(cuts_px[i - 1] / moved.length_px, 1.0 - cuts_px[i] / moved.length_px))
             if by_px * turns[i] > SAME_POINT_PX:
                 x, y = piece.end
                 outwards = piece.heading_rad(1.0) - pi / 2
                 grown.append(Arc(x, y, by_px, outwards, turns[i]))
         return Outline(bridged(grown))
+
+    def _vanishes(self, by_px: float, turns: list[float], cuts_px: list[float]) -> bool:
+        """Whether the two sides meet: the growth uses up a stretch that turns by half a turn or more."""
+        used = []
+        for i, piece in enumerate(self.pieces):
+            if isinstance(piece, Arc):
+                used.append(by_px * piece.sweep_rad < 0.0 and piece.radius_px <= abs(by_px))
+            else:
+                used.append(cuts_px[i - 1] + cuts_px[i] >= piece.length_px)
+        if not any(used):
+            return False
+        if all(used):
+            return True
+        first = used.index(False)
+        turned = 0.0
+        for i in range(first - len(used), first):
+            if not used[i]:
+                turned = turns[i]
+                continue
+            piece = self.pieces[i]
+            turned += turns[i] + (piece.sweep_rad if isinstance(piece, Arc) else 0.0)
+            # Less a billionth, which is rounding.
+            if -by_px * turned > 0.0 and abs(turned) > pi * (1.0 - 1e-9):
+                return True
+        return False
 
     def winding(self, points: Points) -> NDArray[np.float64]:
         """How often the curve runs round each point: 1 inside a solid, 0 outside; shape (n,).

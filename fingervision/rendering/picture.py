@@ -78,7 +78,9 @@ def _paint(
     height_px, width_px = grey.shape
     seen = camera.sees(outlines, width_px, height_px)
     spread_px = camera.bloom_px if level > around else -camera.bloom_px
-    grown = tuple(outline.grown(spread_px) for outline in seen)
+    grown = tuple(whole for whole in (outline.grown(spread_px) for outline in seen) if whole.pieces)
+    if not grown:
+        return
     window = window_of(grown, camera.blur_px, width_px, height_px)
     part = grey[window.y_px : window.y_px + window.height_px, window.x_px : window.x_px + window.width_px]
     if part.size:

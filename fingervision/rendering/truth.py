@@ -69,11 +69,20 @@ def truth(scene: Scene, camera: Camera, below_tip_px: float) -> TrueGap | NoGap:
     -------
     TrueGap or NoGap
         Exact to 1e-6 px; in the picture's coordinates.
+
+    Raises
+    ------
+    FingervisionError
+        More than two fingers, or two that point different ways.
     """
     if len(scene.fingers) < 2:
         status = Status.ONE_FINGER if scene.fingers else Status.NO_FINGERS
         return NoGap(status, f"The scene has {len(scene.fingers)} of two fingers.")
-    first, second = scene.fingers
+    first, second, *others = scene.fingers
+    if others or first.direction is not second.direction:
+        ways = ", ".join(finger.direction for finger in scene.fingers)
+        msg = f"The fingers of a scene must be two and point the same way, but point {ways}."
+        raise FingervisionError(msg)
     direction = first.direction
     shapes = list(camera.sees((first.outline, second.outline), scene.width_px, scene.height_px))
     ends = [_tip(shape, direction) for shape in shapes]

@@ -2,6 +2,8 @@
 
 from math import sqrt
 
+import numpy as np
+
 from fingervision.domain.direction import Direction
 from fingervision.domain.errors import FingervisionError
 from fingervision.rendering.finger import Finger, Highlight, SquareTip, Tip, axis_motion, finger_shape, highlight_shape
@@ -75,8 +77,15 @@ def two_fingers(
     Raises
     ------
     FingervisionError
-        The step between the tips is greater than the gap, or the tips do not reach to the measuring height.
+        A size is no number, the step between the tips is greater than the gap, or the tips do not reach to the
+        measuring height.
     """
+    numbers = (gap_px, below_tip_px, width_px, radius_px, tip_step_px, centre_px, *np.atleast_1d(tilt_deg))
+    if not np.isfinite(numbers).all():
+        msg = (
+            f"Every size and tilt of two fingers must be a number, but among {[float(x) for x in numbers]} one is not."
+        )
+        raise FingervisionError(msg)
     axes = axis_motion(direction)
     across_size, along_size = frame if direction.is_vertical else frame[::-1]
     shape = tip if tip is not None else SquareTip(radius_px)

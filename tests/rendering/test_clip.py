@@ -106,6 +106,10 @@ def test_refusals_say_what_must_be(tmp_path: Path) -> None:
             write_clip(tmp_path / "clip.mp4", bad, codec)
     with pytest.raises(FingervisionError, match=r"must end in .mp4, .mov, .mkv, .* but is clip.avi"):
         write_clip(tmp_path / "clip.avi", frames, H264())
+    with pytest.raises(
+        FingervisionError, match=r"must be a file that can be written, but it could not be: No such file"
+    ):
+        write_clip(tmp_path / "missing" / "clip.mp4", frames, H264())
     with pytest.raises(FingervisionError, match=r"quality must lie between 0 and 100, but is 101"):
         through_jpeg(frames[0].pixels, 101)
     with pytest.raises(FingervisionError, match=r"JPEG holds 8 bits, but the frame has 16"):

@@ -18,6 +18,7 @@ from fingervision.rendering.light import Light, LightStep
 from fingervision.rendering.outline import disc
 from fingervision.rendering.picture import exact_grey, render
 from fingervision.rendering.scene import Patch, Rim, Scene
+from fingervision.rendering.targets import bar
 from fingervision.rendering.truth import truth
 from fingervision.rendering.two_fingers import two_fingers
 
@@ -49,6 +50,20 @@ def test_blooming_behind_a_lens_is_still_in_picture_pixels() -> None:
     for row in (150, 240, 420):
         # The edges lean by less than 3 degrees there: 1/cos is 1 to 1.4e-3.
         assert gap_by_area_px(bloomed, row) - gap_by_area_px(plain, row) == pytest.approx(1.0, abs=2e-3)
+
+
+@pytest.mark.parametrize("bloom_px", [0.0, 0.4, 0.9, 5.0, 60.0])
+def test_light_that_spreads_over_all_of_a_dark_thing_swallows_it(bloom_px: float) -> None:
+    """A grain of 1.5 px, a pin of 1.6 px and a disc of 8 px on light ground vanish one after the other."""
+    rng = np.random.default_rng(2)
+    for patches, half_width_px in [
+        (dust(1, rng, size_px=(1.5, 1.5), levels=(20.0,)), 0.75),
+        ((Patch(bar(1.6, 100.0, x_px=320.0, y_px=240.0, turn_deg=30.0), 20.0),), 0.8),
+        ((Patch((disc(320.0, 240.0, 4.0),), 20.0),), 4.0),
+    ]:
+        grey = exact_grey(Scene(behind=patches), Camera(blur_px=0.5, bloom_px=bloom_px))
+        assert grey.max() < 200.0 + GREY
+        assert (grey.min() > 200.0 - GREY) == (bloom_px > half_width_px)
 
 
 @pytest.mark.parametrize("noise_grey", [1.0, 6.0])
@@ -212,6 +227,8 @@ def test_refusals_say_what_must_be() -> None:
         Camera(bloom_px=float("inf"))
     with pytest.raises(FingervisionError, match=r"bits must be 8 or 16, but is 12"):
         Camera(bits=12)
+    with pytest.raises(FingervisionError, match=r"tint must be three factors of 0 or more.* but is \(1.0, 2.0\)"):
+        Camera(tint=(1.0, 2.0))
     with pytest.raises(FingervisionError, match=r"grey level must lie between 0 and 255, but is 300"):
         Scene(light=Light(ground=300.0))
     with pytest.raises(FingervisionError, match=r"at least one pixel each way, but is 0 x 480"):
@@ -220,5 +237,5 @@ def test_refusals_say_what_must_be() -> None:
         Light(slope_x=2.5)
     with pytest.raises(FingervisionError, match=r"width_px of a rim must be positive, but is 0"):
         Rim(0.0, 250.0)
-    with pytest.raises(FingervisionError, match=r"Grains must have a size and a level"):
+    with pytest.raises(FingervisionError, match=r"Grains must have a number, a size and a level"):
         dust(3, np.random.default_rng(0), size_px=(0.0, 2.0))

@@ -180,10 +180,19 @@ def test_where_there_is_no_gap_there_is_a_reason(scene: Scene, status: Status) -
 def test_refusals_say_what_must_be() -> None:
     with pytest.raises(FingervisionError, match=r"at least the step between the tips \(30 px\), but is 20"):
         two_fingers(20.0, tip_step_px=30.0)
-    with pytest.raises(FingervisionError, match=r"at least the step between the tips \(0 px\), but is nan"):
+    with pytest.raises(FingervisionError, match=r"Every size and tilt of two fingers must be a number"):
         two_fingers(float("nan"))
     with pytest.raises(FingervisionError, match=r"below_tip_px must lie between 0 and the finger's length, but is -1"):
         two_fingers(20.0, below_tip_px=-1.0)
+    with pytest.raises(
+        FingervisionError, match=r"tilt must be at most 45 degrees, but is 90: choose another direction"
+    ):
+        two_fingers(20.0, tilt_deg=90.0)
+    with pytest.raises(FingervisionError, match=r"slant must be at most 45 degrees, but is 80"):
+        two_fingers(20.0, tip=SquareTip(slant_deg=80.0))
+    up, left = two_fingers(20.0), two_fingers(20.0, direction=Direction.LEFT)
+    with pytest.raises(FingervisionError, match=r"must be two and point the same way, but point up, left"):
+        truth(replace(up, fingers=(up.fingers[0], left.fingers[0])), IDEAL_CAMERA, BELOW_TIP_PX)
     with pytest.raises(FingervisionError, match=r"width and length must be positive, but are 0 px and"):
         two_fingers(20.0, width_px=0.0)
     with pytest.raises(FingervisionError, match=r"at most half the width"):
