@@ -38,6 +38,8 @@ class History:
         g0, the model's gap at input zero.
     opening_mm : float
         Largest absolute opening that the model predicts.
+    closing_mm : float
+        Largest closing below the rest gap that the model predicts; 0 where it only opens.
     shared_clock : bool
         Whether times go on from run to run. Where they restart, the runs share no clock.
     input_sigma_mm : float
@@ -55,6 +57,7 @@ class History:
     runs: tuple[slice, ...]
     rest_gap_mm: float
     opening_mm: float
+    closing_mm: float = 0.0
     shared_clock: bool = True
     input_sigma_mm: float = 0.0
     input_step_mm: float = 0.0
@@ -72,7 +75,7 @@ class History:
     @property
     def clock_s(self) -> Array:
         """Time since the table's first sample, shape (n,)."""
-        return self.times - self.times.min()
+        return np.asarray(self.times - self.times.min(), dtype=np.float64)
 
     @property
     def sample_time_s(self) -> float:
@@ -137,7 +140,7 @@ class Effect:
     narrow: Callable[[History], "tuple[Parameter, ...] | str"] | None = None
 
     def search(self, history: History) -> tuple[Parameter, ...] | str:
-        """The parameters with the bounds that these data leave, or the reason why they cannot show the effect."""
+        """Return the parameters with the bounds that these data leave, or the reason why these cannot show it."""
         if self.needs_times and history.time_s is None:
             return "the table has no time_s, and without times the order of rows means nothing"
         if self.needs_shared_clock and not history.shared_clock:

@@ -1,4 +1,4 @@
-"""What the diagnosis asks of a gripper's model: input displacement in, measuring points out."""
+"""The seam between a gripper's model and whatever asks it."""
 
 from collections.abc import Mapping
 from typing import Protocol, runtime_checkable
@@ -11,45 +11,15 @@ from fingervision.domain.response import Response
 
 @runtime_checkable
 class Model(Protocol):
-    """A gripper that answers an input at once, without memory; memory belongs to the effects.
-
-    Attributes
-    ----------
-    name : str
-        How the report calls it.
-    rest_gap_mm : float
-        The gap g0 at input zero.
-    input_range_mm : tuple of two floats
-        Inputs that the model covers; measured inputs outside are refused.
-    """
-
-    @property
-    def name(self) -> str:
-        """How the report calls it."""
-        ...
-
-    @property
-    def rest_gap_mm(self) -> float:
-        """The gap at input zero."""
-        ...
-
-    @property
-    def input_range_mm(self) -> tuple[float, float]:
-        """Smallest and largest input that the model covers."""
-        ...
+    """Anything that predicts the gap from the input, at rest at each input."""
 
     def respond(self, input_mm: NDArray[np.float64]) -> Response:
-        """The measuring points for each input, centred on the model's own symmetry axis.
+        """Answer statically at each input; positive inputs open the gripper.
 
         Parameters
         ----------
         input_mm : ndarray of float, shape (n,)
-            Positive opens. Effects may move it a little beyond `input_range_mm`: answer there by the straight line.
-
-        Returns
-        -------
-        Response
-            Arrays of shape (n,).
+            Displacement of the drive point.
         """
         ...
 
@@ -64,5 +34,5 @@ class PhysicalModel(Model, Protocol):
         ...
 
     def with_physics(self, name: str, values: Mapping[str, float]) -> Model:
-        """The same gripper with this effect's physics switched on; parameters are named as in the catalogue."""
+        """Return the same gripper with this effect switched on; parameters are named as in the catalogue."""
         ...

@@ -33,7 +33,7 @@ class Response:
         return 0.5 * (self.left_mm + self.right_mm)
 
     def with_gap(self, gap_mm: NDArray[np.float64]) -> "Response":
-        """The same midline with another gap: both fingers move equally, in opposite directions."""
+        """Return the same midline with another gap: both fingers move equally, in opposite directions."""
         half_mm = 0.5 * (gap_mm - self.gap_mm)
         return replace(self, left_mm=self.left_mm - half_mm, right_mm=self.right_mm + half_mm)
 

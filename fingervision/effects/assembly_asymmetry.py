@@ -1,0 +1,24 @@
+"""One finger opens more than the other."""
+
+from fingervision.domain.effect import History, PointEffect, Stage, Values
+from fingervision.domain.parameter import Parameter
+from fingervision.domain.response import Response
+
+
+def act(response: Response, history: History, values: Values) -> Response:
+    """Apply the effect: one finger opens more than the other."""
+    return response.shifted(values["share"] * (response.gap_mm - history.rest_gap_mm))
+
+
+EFFECT = PointEffect(
+    name="assembly_asymmetry",
+    stage=Stage.MECHANISM,
+    order=140,
+    words="one finger opens more than the other",
+    formula="right share 1/2 + share, left 1/2 - share; the gap does not change",
+    source="definition",
+    residual="the midline moves in proportion to the opening",
+    parameters=(Parameter("share", "", -0.5, 0.5, "share that moves from left to right"),),
+    needs_edges=True,
+    act=act,
+)

@@ -1,0 +1,26 @@
+"""The camera or its clamp moves, both points together."""
+
+from fingervision.domain.effect import History, PointEffect, Stage, Values
+from fingervision.domain.parameter import Parameter
+from fingervision.domain.response import Response
+
+
+def act(response: Response, history: History, values: Values) -> Response:
+    """Apply the effect: the camera or its clamp moves, both points together."""
+    return response.shifted(values["rate_mm_per_s"] * history.clock_s)
+
+
+EFFECT = PointEffect(
+    name="camera_drift",
+    stage=Stage.CAMERA,
+    order=180,
+    words="the camera or its clamp moves, both points together",
+    formula="x + rate_mm_per_s t",
+    source="definition",
+    residual="the midline moves evenly in time",
+    parameters=(Parameter("rate_mm_per_s", "mm/s", -0.05, 0.05, "drift"),),
+    needs_times=True,
+    needs_shared_clock=True,
+    needs_edges=True,
+    act=act,
+)

@@ -1,0 +1,30 @@
+"""The plane is tilted: keystone."""
+
+from dataclasses import replace
+
+from fingervision.domain.effect import History, PointEffect, Stage, Values
+from fingervision.domain.parameter import Parameter
+from fingervision.domain.response import Response
+
+
+def act(response: Response, history: History, values: Values) -> Response:
+    """Apply the effect: the plane is tilted: keystone."""
+    return replace(
+        response,
+        left_mm=response.left_mm / (1.0 + values["k_per_mm"] * response.left_mm),
+        right_mm=response.right_mm / (1.0 + values["k_per_mm"] * response.right_mm),
+    )
+
+
+EFFECT = PointEffect(
+    name="camera_tilt",
+    stage=Stage.CAMERA,
+    order=230,
+    words="the plane is tilted: keystone",
+    formula="x / (1 + k_per_mm x)",
+    source="central projection of a tilted plane",
+    residual="the square of the coordinate: the midline moves with the opening squared",
+    parameters=(Parameter("k_per_mm", "1/mm", -0.02, 0.02, "keystone"),),
+    needs_edges=True,
+    act=act,
+)

@@ -1,0 +1,23 @@
+"""Threshold or blooming moves both edges."""
+
+from fingervision.domain.effect import History, PointEffect, Stage, Values
+from fingervision.domain.parameter import Parameter
+from fingervision.domain.response import Response
+
+
+def act(response: Response, history: History, values: Values) -> Response:
+    """Apply the effect: threshold or blooming moves both edges."""
+    return response.with_gap(response.gap_mm + values["offset_mm"])
+
+
+EFFECT = PointEffect(
+    name="edge_bias",
+    stage=Stage.CAMERA,
+    order=240,
+    words="threshold or blooming moves both edges",
+    formula="g + offset_mm",
+    source="definition",
+    residual="a constant in the gap",
+    parameters=(Parameter("offset_mm", "mm", -0.1, 0.1, "offset of the measured gap"),),
+    act=act,
+)

@@ -1,0 +1,43 @@
+"""An error that repeats with the scale's period."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from fingervision.domain.effect import Array, DriveEffect, History, Stage, Values
+from fingervision.domain.parameter import Parameter
+
+
+def act(input_mm: Array, history: History, values: Values) -> Array:
+    """Apply the effect: an error that repeats with the scale's period."""
+    phase = 2.0 * np.pi * input_mm / values["period_mm"] + values["phase_rad"]
+    return input_mm + values["amplitude_mm"] * np.sin(phase)
+
+
+def narrow(history: History) -> tuple[Parameter, ...] | str:
+    """Bound the parameters by what these data can show."""
+    steps = np.abs(np.diff(np.sort(history.input_mm)) if history.time_s is None else np.diff(history.input_mm))
+    moving = steps[steps > max(4.0 * history.input_sigma_mm, 1e-3 * history.input_span_mm / len(steps))]
+    shortest_mm = 4.0 * float(np.median(moving)) if moving.size else np.inf
+    if shortest_mm >= 0.5 * history.input_span_mm:
+        return "the input's steps are too wide to resolve a period within half its range"
+    amplitude, period, phase = EFFECT.parameters
+    return amplitude, replace(period, lower=shortest_mm, upper=0.5 * history.input_span_mm), phase
+
+
+EFFECT = DriveEffect(
+    name="encoder_cyclic_error",
+    stage=Stage.DRIVE,
+    order=40,
+    words="an error that repeats with the scale's period",
+    formula="u + amplitude_mm sin(2 pi u / period_mm + phase_rad)",
+    source="interpolation error of incremental encoders (Heydemann 1981)",
+    residual="a sinusoid over the input, the same in every run",
+    parameters=(
+        Parameter("amplitude_mm", "mm", 0.0, 0.2, "amplitude"),
+        Parameter("period_mm", "mm", 0.0001, 10.0, "period of the scale", neutral=None, starts=24, logarithmic=True),
+        Parameter("phase_rad", "rad", -3.15, 3.15, "phase", neutral=None, starts=2),
+    ),
+    narrow=narrow,
+    act=act,
+)

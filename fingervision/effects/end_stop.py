@@ -1,0 +1,40 @@
+"""The stage stops short."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from fingervision.domain.effect import Array, DriveEffect, History, Stage, Values
+from fingervision.domain.parameter import Parameter
+
+
+def act(input_mm: Array, history: History, values: Values) -> Array:
+    """Apply the effect: the stage stops short."""
+    return np.maximum(np.minimum(input_mm, values["upper_mm"]), values["lower_mm"])
+
+
+def narrow(history: History) -> tuple[Parameter, ...] | str:
+    """Bound the parameters by what these data can show."""
+    lowest, highest = float(history.input_mm.min()), float(history.input_mm.max())
+    upper, lower = EFFECT.parameters
+    return (
+        replace(upper, lower=lowest, upper=highest, neutral=highest),
+        replace(lower, lower=lowest, upper=highest, neutral=lowest),
+    )
+
+
+EFFECT = DriveEffect(
+    name="end_stop",
+    stage=Stage.DRIVE,
+    order=50,
+    words="the stage stops short",
+    formula="min(u, upper_mm), max(., lower_mm)",
+    source="definition",
+    residual="zero up to the stop, then the slope times what is missing",
+    parameters=(
+        Parameter("upper_mm", "mm", -1e3, 1e3, "upper stop", neutral=1e3, starts=4),
+        Parameter("lower_mm", "mm", -1e3, 1e3, "lower stop", neutral=-1e3, starts=4),
+    ),
+    narrow=narrow,
+    act=act,
+)

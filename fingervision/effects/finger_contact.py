@@ -1,0 +1,41 @@
+"""The fingers meet."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from fingervision.domain.effect import History, PointEffect, Stage, Values
+from fingervision.domain.parameter import Parameter
+from fingervision.domain.response import Response
+
+
+def act(response: Response, history: History, values: Values) -> Response:
+    """Apply the effect: the fingers meet."""
+    missing_mm = np.maximum(values["floor_mm"] - response.gap_mm, 0.0)
+    return response.with_gap(response.gap_mm + (1.0 - values["remaining_slope"]) * missing_mm)
+
+
+def narrow(history: History) -> tuple[Parameter, ...] | str:
+    """Bound the parameters by what these data can show."""
+    lowest_mm = max(0.0, history.rest_gap_mm - history.closing_mm)
+    if history.closing_mm <= 0.0:
+        return "the gripper is never closed below its rest gap"
+    floor, slope = EFFECT.parameters
+    return replace(floor, lower=lowest_mm, upper=history.rest_gap_mm, neutral=lowest_mm), slope
+
+
+EFFECT = PointEffect(
+    name="finger_contact",
+    stage=Stage.MECHANISM,
+    order=150,
+    words="the fingers meet",
+    formula="where g < floor_mm: floor_mm - remaining_slope (floor_mm - g), shared equally",
+    source="unilateral contact with compliance",
+    residual="zero above the floor, then the simulation goes on closing and the fingers do not",
+    parameters=(
+        Parameter("floor_mm", "mm", 0.0, 100.0, "gap at which they meet", starts=6),
+        Parameter("remaining_slope", "", 0.0, 0.5, "share of the closing that goes on", neutral=None, starts=2),
+    ),
+    narrow=narrow,
+    act=act,
+)

@@ -1,0 +1,54 @@
+"""A smooth loop, independent of speed."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from fingervision.domain.effect import Array, DriveEffect, History, Stage, Values
+from fingervision.domain.parameter import Parameter
+from fingervision.effects.play_operator import play
+
+
+def act(input_mm: Array, history: History, values: Values) -> Array:
+    """Apply the effect: a smooth loop, independent of speed."""
+    out = np.empty_like(input_mm)
+    for run in history.runs:
+        lag = np.zeros_like(input_mm[run])
+        for k in range(1, 9):
+            lag += input_mm[run] - play(input_mm[run], 2.0 * values["reach_mm"] * k / 8.0)
+        out[run] = input_mm[run] - values["fraction"] * lag / 8.0
+    return out
+
+
+def narrow(history: History) -> tuple[Parameter, ...] | str:
+    """Bound the parameters by what these data can show."""
+    fraction, reach = EFFECT.parameters
+    return fraction, replace(reach, lower=0.02 * history.input_span_mm, upper=0.6 * history.input_span_mm)
+
+
+EFFECT = DriveEffect(
+    name="friction_hysteresis",
+    stage=Stage.DRIVE,
+    order=80,
+    words="a smooth loop, independent of speed",
+    formula="u - fraction * mean of eight elastic sliders, each clipped to reach_mm k / 8",
+    source="Iwan 1966; Maxwell slip",
+    residual="a lens-shaped loop that closes at the reversals",
+    parameters=(
+        Parameter("fraction", "", 0.0, 0.9, "share of the drive that the sliders hold back", starts=3),
+        Parameter(
+            "reach_mm",
+            "mm",
+            0.0001,
+            10.0,
+            "travel until the last slider slips",
+            neutral=None,
+            starts=6,
+            logarithmic=True,
+        ),
+    ),
+    needs_times=True,
+    memory=True,
+    narrow=narrow,
+    act=act,
+)

@@ -1,0 +1,28 @@
+"""The force differs (modulus, hinge thickness), the gap hardly."""
+
+from dataclasses import replace
+
+from fingervision.domain.effect import History, PointEffect, Stage, Values
+from fingervision.domain.parameter import Parameter
+from fingervision.domain.response import Response
+
+
+def act(response: Response, history: History, values: Values) -> Response:
+    """Apply the effect: the force differs (modulus, hinge thickness), the gap hardly."""
+    return (
+        response if response.force_n is None else replace(response, force_n=(1.0 + values["ratio"]) * response.force_n)
+    )
+
+
+EFFECT = PointEffect(
+    name="hinge_stiffness_error",
+    stage=Stage.MECHANISM,
+    order=170,
+    words="the force differs (modulus, hinge thickness), the gap hardly",
+    formula="force (1 + ratio)",
+    source="linear elasticity",
+    residual="force only",
+    parameters=(Parameter("ratio", "", -0.9, 0.9, "relative error of the stiffness"),),
+    needs_force=True,
+    act=act,
+)

@@ -1,0 +1,22 @@
+"""The input's zero is off."""
+
+from fingervision.domain.effect import Array, DriveEffect, History, Stage, Values
+from fingervision.domain.parameter import Parameter
+
+
+def act(input_mm: Array, history: History, values: Values) -> Array:
+    """Apply the effect: the input's zero is off."""
+    return input_mm + values["offset_mm"]
+
+
+EFFECT = DriveEffect(
+    name="input_offset",
+    stage=Stage.DRIVE,
+    order=20,
+    words="the input's zero is off",
+    formula="u + offset_mm",
+    source="definition",
+    residual="nearly a constant; follows the slope of a curved model",
+    parameters=(Parameter("offset_mm", "mm", -0.5, 0.5, "offset of the input"),),
+    act=act,
+)

@@ -1,0 +1,22 @@
+"""The input's unit is off."""
+
+from fingervision.domain.effect import Array, DriveEffect, History, Stage, Values
+from fingervision.domain.parameter import Parameter
+
+
+def act(input_mm: Array, history: History, values: Values) -> Array:
+    """Apply the effect: the input's unit is off."""
+    return (1.0 + values["ratio"]) * input_mm
+
+
+EFFECT = DriveEffect(
+    name="input_scale",
+    stage=Stage.DRIVE,
+    order=30,
+    words="the input's unit is off",
+    formula="(1 + ratio) u",
+    source="definition",
+    residual="proportional to the input",
+    parameters=(Parameter("ratio", "", -0.3, 0.3, "relative error of the unit"),),
+    act=act,
+)

@@ -1,0 +1,29 @@
+"""Radial distortion about the image centre."""
+
+from dataclasses import replace
+
+from fingervision.domain.effect import History, PointEffect, Stage, Values
+from fingervision.domain.parameter import Parameter
+from fingervision.domain.response import Response
+
+
+def act(response: Response, history: History, values: Values) -> Response:
+    """Apply the effect: radial distortion about the image centre."""
+    return replace(
+        response,
+        left_mm=response.left_mm * (1.0 + values["k_per_mm2"] * response.left_mm**2),
+        right_mm=response.right_mm * (1.0 + values["k_per_mm2"] * response.right_mm**2),
+    )
+
+
+EFFECT = PointEffect(
+    name="lens_distortion",
+    stage=Stage.CAMERA,
+    order=220,
+    words="radial distortion about the image centre",
+    formula="x (1 + k_per_mm2 x^2)",
+    source="Brown 1966, first radial term",
+    residual="the cube of the coordinate",
+    parameters=(Parameter("k_per_mm2", "1/mm2", -0.005, 0.005, "first radial coefficient"),),
+    act=act,
+)

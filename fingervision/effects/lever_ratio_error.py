@@ -1,0 +1,24 @@
+"""The amplification differs (link length, hinge position)."""
+
+from fingervision.domain.effect import History, PointEffect, Stage, Values
+from fingervision.domain.parameter import Parameter
+from fingervision.domain.response import Response
+
+
+def act(response: Response, history: History, values: Values) -> Response:
+    """Apply the effect: the amplification differs (link length, hinge position)."""
+    opening_mm = response.gap_mm - history.rest_gap_mm
+    return response.with_gap(history.rest_gap_mm + (1.0 + values["ratio"]) * opening_mm)
+
+
+EFFECT = PointEffect(
+    name="lever_ratio_error",
+    stage=Stage.MECHANISM,
+    order=90,
+    words="the amplification differs (link length, hinge position)",
+    formula="o (1 + ratio)",
+    source="definition",
+    residual="proportional to the opening",
+    parameters=(Parameter("ratio", "", -0.3, 0.3, "relative error of the lever ratio"),),
+    act=act,
+)

@@ -1,0 +1,29 @@
+"""The tips come nearer or go farther as they open."""
+
+from dataclasses import replace
+
+from fingervision.domain.effect import History, PointEffect, Stage, Values
+from fingervision.domain.parameter import Parameter
+from fingervision.domain.response import Response
+
+
+def act(response: Response, history: History, values: Values) -> Response:
+    """Apply the effect: the tips come nearer or go farther as they open."""
+    return replace(
+        response,
+        left_mm=response.left_mm / (1.0 - values["relative_per_mm"] * (response.gap_mm - history.rest_gap_mm)),
+        right_mm=response.right_mm / (1.0 - values["relative_per_mm"] * (response.gap_mm - history.rest_gap_mm)),
+    )
+
+
+EFFECT = PointEffect(
+    name="out_of_plane_motion",
+    stage=Stage.CAMERA,
+    order=200,
+    words="the tips come nearer or go farther as they open",
+    formula="x / (1 - relative_per_mm (g - g0))",
+    source="central projection",
+    residual="the gap times the opening: curved",
+    parameters=(Parameter("relative_per_mm", "1/mm", -0.02, 0.02, "relative change of the distance per opening"),),
+    act=act,
+)

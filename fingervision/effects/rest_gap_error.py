@@ -1,0 +1,23 @@
+"""The fingers rest at another gap."""
+
+from fingervision.domain.effect import History, PointEffect, Stage, Values
+from fingervision.domain.parameter import Parameter
+from fingervision.domain.response import Response
+
+
+def act(response: Response, history: History, values: Values) -> Response:
+    """Apply the effect: the fingers rest at another gap."""
+    return response.with_gap(response.gap_mm + values["offset_mm"])
+
+
+EFFECT = PointEffect(
+    name="rest_gap_error",
+    stage=Stage.MECHANISM,
+    order=130,
+    words="the fingers rest at another gap",
+    formula="g + offset_mm, symmetric",
+    source="definition",
+    residual="a constant in the gap, in all runs alike",
+    parameters=(Parameter("offset_mm", "mm", -2.0, 2.0, "offset of the gap at rest"),),
+    act=act,
+)

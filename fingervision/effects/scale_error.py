@@ -1,0 +1,29 @@
+"""Px/mm is off."""
+
+from dataclasses import replace
+
+from fingervision.domain.effect import History, PointEffect, Stage, Values
+from fingervision.domain.parameter import Parameter
+from fingervision.domain.response import Response
+
+
+def act(response: Response, history: History, values: Values) -> Response:
+    """Apply the effect: px/mm is off."""
+    return replace(
+        response,
+        left_mm=response.left_mm * (1.0 + values["ratio"]),
+        right_mm=response.right_mm * (1.0 + values["ratio"]),
+    )
+
+
+EFFECT = PointEffect(
+    name="scale_error",
+    stage=Stage.CAMERA,
+    order=210,
+    words="px/mm is off",
+    formula="x (1 + ratio)",
+    source="definition",
+    residual="proportional to the gap",
+    parameters=(Parameter("ratio", "", -0.2, 0.2, "relative error of the scale"),),
+    act=act,
+)

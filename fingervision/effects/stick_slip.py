@@ -1,0 +1,56 @@
+"""Moves in jumps."""
+
+from dataclasses import replace
+
+import numba
+import numpy as np
+
+from fingervision.domain.effect import Array, DriveEffect, History, Stage, Values
+from fingervision.domain.parameter import Parameter
+
+
+@numba.njit(cache=True)
+def stick(input_mm: Array, jump_mm: float) -> Array:
+    """Hold one run's input until it has moved on by more than `jump_mm`; shape (n,)."""
+    out = np.empty_like(input_mm)
+    state = input_mm[0]
+    for i in range(input_mm.size):
+        if abs(input_mm[i] - state) > jump_mm:
+            state = input_mm[i]
+        out[i] = state
+    return out
+
+
+def act(input_mm: Array, history: History, values: Values) -> Array:
+    """Apply the effect: moves in jumps."""
+    out = np.empty_like(input_mm)
+    for run in history.runs:
+        out[run] = stick(input_mm[run], values["jump_mm"])
+    return out
+
+
+def narrow(history: History) -> tuple[Parameter, ...] | str:
+    """Bound the parameters by what these data can show."""
+    smallest_mm = max(2.0 * history.input_step_mm, 6.0 * history.input_sigma_mm)
+    if smallest_mm >= 0.5:
+        return "the recorded input is too noisy to show jumps of less than 0.5 mm"
+    (jump,) = EFFECT.parameters
+    return (replace(jump, lower=smallest_mm, neutral=smallest_mm if smallest_mm > 0.0 else 0.0),)
+
+
+EFFECT = DriveEffect(
+    name="stick_slip",
+    stage=Stage.DRIVE,
+    order=70,
+    words="moves in jumps",
+    formula="if abs(u - s) > jump_mm then s = u, else s stays",
+    source="definition: stiction released at a fixed extension",
+    residual="a saw-tooth over the input whose teeth are jump_mm wide",
+    parameters=(
+        Parameter("jump_mm", "mm", 0.0, 0.5, "input that builds up before a jump", starts=10, logarithmic=True),
+    ),
+    needs_times=True,
+    memory=True,
+    narrow=narrow,
+    act=act,
+)

@@ -1,0 +1,72 @@
+"""Rings after fast moves."""
+
+from dataclasses import replace
+
+import numba
+import numpy as np
+
+from fingervision.domain.effect import Array, History, PointEffect, Stage, Values
+from fingervision.domain.parameter import Parameter
+from fingervision.domain.response import Response
+
+
+@numba.njit(cache=True)
+def ring(signal: Array, time_s: Array, frequency_hz: float, damping_ratio: float) -> Array:
+    """Drive a second-order system with one run's signal, at rest at the first sample; exact; shape (n,)."""
+    out = np.empty_like(signal)
+    damping = min(damping_ratio, 0.9999)
+    omega = 2.0 * np.pi * frequency_hz
+    damped = omega * np.sqrt(1.0 - damping * damping)
+    decay = damping * omega
+    x, v = signal[0], 0.0
+    out[0] = x
+    for i in range(1, signal.size):
+        step_s = time_s[i] - time_s[i - 1]
+        slope = (signal[i] - signal[i - 1]) / step_s
+        lag = 2.0 * damping * slope / omega
+        a = x - signal[i - 1] + lag
+        b = (v - slope + decay * a) / damped
+        e, c, s = np.exp(-decay * step_s), np.cos(damped * step_s), np.sin(damped * step_s)
+        x = signal[i] - lag + e * (a * c + b * s)
+        v = slope + e * ((damped * b - decay * a) * c - (damped * a + decay * b) * s)
+        out[i] = x
+    return out
+
+
+def act(response: Response, history: History, values: Values) -> Response:
+    """Apply the effect: rings after fast moves."""
+    opening_mm = response.gap_mm - history.rest_gap_mm
+    out_mm = np.empty_like(opening_mm)
+    for run in history.runs:
+        out_mm[run] = ring(opening_mm[run], history.times[run], values["frequency_hz"], values["damping_ratio"])
+    return response.with_gap(history.rest_gap_mm + out_mm)
+
+
+def narrow(history: History) -> tuple[Parameter, ...] | str:
+    """Bound the parameters by what these data can show."""
+    highest_hz = 0.4 / history.sample_time_s
+    if highest_hz <= 0.5:
+        return f"the sample rate of {1.0 / history.sample_time_s:.3g} Hz is too low to show 0.5 Hz and more"
+    frequency, damping = EFFECT.parameters
+    return replace(frequency, upper=highest_hz), damping
+
+
+EFFECT = PointEffect(
+    name="structural_resonance",
+    stage=Stage.MECHANISM,
+    order=120,
+    words="rings after fast moves",
+    formula="x'' + 2 d w x' + w^2 x = w^2 o, linear input between samples",
+    source="linear oscillator, damping to ground",
+    residual="a decaying oscillation after each change of speed",
+    parameters=(
+        Parameter("frequency_hz", "Hz", 0.5, 10000.0, "natural frequency", neutral=None, starts=10, logarithmic=True),
+        Parameter(
+            "damping_ratio", "", 0.005, 1.0, "share of critical damping", neutral=None, starts=2, logarithmic=True
+        ),
+    ),
+    needs_times=True,
+    memory=True,
+    narrow=narrow,
+    act=act,
+)

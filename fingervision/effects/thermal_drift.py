@@ -1,0 +1,30 @@
+"""A slow symmetric change, whatever the input."""
+
+import numpy as np
+
+from fingervision.domain.effect import History, PointEffect, Stage, Values
+from fingervision.domain.parameter import Parameter
+from fingervision.domain.response import Response
+
+
+def act(response: Response, history: History, values: Values) -> Response:
+    """Apply the effect: a slow symmetric change, whatever the input."""
+    return response.with_gap(response.gap_mm - values["amplitude_mm"] * np.expm1(-history.clock_s / values["tau_s"]))
+
+
+EFFECT = PointEffect(
+    name="thermal_drift",
+    stage=Stage.MECHANISM,
+    order=160,
+    words="a slow symmetric change, whatever the input",
+    formula="g + amplitude_mm (1 - exp(-t / tau_s))",
+    source="first-order warming",
+    residual="an exponential over the time of the whole table, gap only",
+    parameters=(
+        Parameter("amplitude_mm", "mm", -2.0, 2.0, "final change"),
+        Parameter("tau_s", "s", 2.0, 3000.0, "time constant", neutral=None, starts=5, logarithmic=True),
+    ),
+    needs_times=True,
+    needs_shared_clock=True,
+    act=act,
+)

@@ -1,0 +1,42 @@
+"""The opening goes on moving under a held input."""
+
+from fingervision.domain.effect import History, PointEffect, Stage, Values
+from fingervision.domain.parameter import Parameter
+from fingervision.domain.response import Response
+from fingervision.effects.low_pass import low_pass
+
+TAUS_S = (1, 4, 16, 64)
+
+
+def act(response: Response, history: History, values: Values) -> Response:
+    """Apply the effect: the opening goes on moving under a held input."""
+    opening_mm = response.gap_mm - history.rest_gap_mm
+    crept_mm = opening_mm.copy()
+    for tau_s in TAUS_S:
+        fraction = values[f"fraction_{tau_s}s"]
+        if fraction != 0.0:
+            for run in history.runs:
+                crept_mm[run] -= fraction * (
+                    opening_mm[run] - low_pass(opening_mm[run], history.times[run], float(tau_s))
+                )
+    return response.with_gap(history.rest_gap_mm + crept_mm)
+
+
+EFFECT = PointEffect(
+    name="viscoelastic_creep",
+    stage=Stage.MECHANISM,
+    order=110,
+    words="the opening goes on moving under a held input",
+    formula="o - sum of a_k (o - low-pass_k[o]), tau_k = 1, 4, 16, 64 s",
+    source="generalised Maxwell body (Ferry 1980)",
+    residual="approaches zero exponentially in holds",
+    parameters=(
+        Parameter("fraction_1s", "", 0.0, 0.5, "share that follows with 1 s"),
+        Parameter("fraction_4s", "", 0.0, 0.5, "share that follows with 4 s"),
+        Parameter("fraction_16s", "", 0.0, 0.5, "share that follows with 16 s"),
+        Parameter("fraction_64s", "", 0.0, 0.5, "share that follows with 64 s"),
+    ),
+    needs_times=True,
+    memory=True,
+    act=act,
+)
