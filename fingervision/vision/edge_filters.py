@@ -103,7 +103,9 @@ def edge_filters(reach_px: int) -> EdgeFilters:
     sigmas = SMALLEST_SIGMA_PX * SIGMA_RATIO ** np.arange(count)
     offsets = np.arange(-LARGEST_OFFSET_PX, LARGEST_OFFSET_PX + 1e-9, OFFSET_STEP_PX)
     borders = np.arange(-reach_px - 0.5, reach_px + 1.0) - offsets[None, :, None]
-    model = np.stack(blurred_step(np.broadcast_to(borders, (count, *borders.shape[1:])), sigmas[:, None, None]), axis=-2)
+    model = np.stack(
+        blurred_step(np.broadcast_to(borders, (count, *borders.shape[1:])), sigmas[:, None, None]), axis=-2
+    )
     model = model - model.mean(axis=-1, keepdims=True)
     gram = model @ np.swapaxes(model, -1, -2)
     filters = np.linalg.pinv(gram, rcond=1e-10, hermitian=True) @ model

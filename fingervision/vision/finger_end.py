@@ -47,8 +47,6 @@ class OutlinePoints:
         1 for a point, 0 for padding.
     blur : ndarray of float
         Gaussian sigma of the optics at the point, the pixel included.
-    side : ndarray of int
-        0 inner flank, 1 top, 2 outer flank, as the coarse outline saw it.
     """
 
     x: Floats
@@ -57,7 +55,6 @@ class OutlinePoints:
     is_row: NDArray[np.bool_]
     weight: Floats
     blur: Floats
-    side: NDArray[np.int_]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -245,7 +242,7 @@ def fit_finger_ends(points: OutlinePoints, start: Floats, origin: Floats, u_prio
             counted = points.weight * counts
         distance = at.distance + shift
         residual = distance / u_normal
-        misfit = np.maximum(_spread(residual), 1.0)
+        misfit = np.maximum(_spread(residual, counted), 1.0)
         robust = counted * np.maximum(1.0 - (residual / (BIWEIGHT_REACH * patience * misfit[:, None])) ** 2, 0.0) ** 2
         jacobian = _jacobian(at, s, points, origin, is_inner)
         scaled = jacobian * (robust / u_normal**2)[:, None, :]
@@ -258,10 +255,11 @@ def fit_finger_ends(points: OutlinePoints, start: Floats, origin: Floats, u_prio
     return FingerEnds(p, np.linalg.inv(normal), origin, misfit, residual, robust)
 
 
-def _spread(residual: Floats) -> Floats:
+def _spread(residual: Floats, weight: Floats) -> Floats:
     """Robust standard deviation of each finger's residuals (1.4826 times the median absolute value)."""
-    middle = residual.shape[1] // 2
-    return np.asarray(1.4826 * np.partition(np.abs(residual), middle, axis=1)[:, middle])
+    magnitude = np.sort(np.where(weight > 0, np.abs(residual), np.inf), axis=1)
+    middle = np.maximum((weight > 0).sum(axis=1) // 2, 0)
+    return np.asarray(1.4826 * magnitude[np.arange(len(magnitude)), middle])
 
 
 def corner_tops(p: Floats, origin: Floats) -> tuple[Floats, Floats]:

@@ -7,15 +7,9 @@ from numpy.typing import NDArray
 
 from fingervision.domain.gap import FingerEdge, GapMeasurement, NoGap
 from fingervision.domain.status import Status
-from fingervision.vision.edges import EdgePoints
+from fingervision.vision.edges import PIXEL_VARIANCE, EdgePoints, outline_blur
 from fingervision.vision.finger_end import (
-    INNER_M,
-    INNER_R,
-    OUTER_M,
-    OUTER_R,
     PARAMETERS,
-    SHARP_IN_BLURS,
-    TOP_M,
     FingerEnds,
     OutlinePoints,
     corner_tops,
@@ -23,8 +17,9 @@ from fingervision.vision.finger_end import (
     inner_edge,
 )
 from fingervision.vision.fingers import CoarseFinger, CoarseFingers
+from fingervision.vision.first_guess import first_guess, line
 from fingervision.vision.local_outline import FingerPoints, local_edge, local_tip
-from fingervision.vision.orientation import Orientation
+from fingervision.vision.profile_lines import IS_INNER, IS_ROW, ROWS
 
 Floats = NDArray[np.float64]
 
@@ -34,16 +29,16 @@ BLUR_LIMIT_PX = 5.0
 SHARED_SLOPE, SHARED_FACTOR = 0.75, 1.25
 # A line and its scatter need so many points.
 FEWEST_ROWS = 4
-# Flanks that differ more in slope are not both flanks; a flank that is not in view is parallel to the other within this.
-MOST_TAPER, TAPER_PRIOR = 0.15, 0.03
 # A measuring point farther from every point of the outline would be extrapolated (pixels).
 FARTHEST_POINT_PX = 2.5
 # A local polynomial that is less sure than this (pixels) has not found a smooth outline.
 LOCAL_LIMIT_PX = 1.0
+# A line whose contrast is below this share of the typical one meets the border of the picture, not of a finger.
+LEAST_CONTRAST = 0.3
 # Below this ratio of contrast to noise nothing is measured.
 CONTRAST_TO_NOISE = 3.0
 # The three-sided shape holds where its mean residual near the two points that matter is below so many of its own sigma.
-SHAPE_LIMIT = 4.0
+SHAPE_LIMIT, MISFIT_LIMIT = 3.5, 2.5
 # Residuals within so many pixels of a point speak of the shape there.
 SHAPE_REACH_PX = 8.0
 # Neighbouring points share what the model leaves unexplained, and a codec's blocks, over so many of them.
@@ -51,11 +46,6 @@ LAGS = 8
 CODING_BLOCK_PX = 12.0
 # Mean of w r^2 over mean of w for normal residuals under the biweight: the weights shrink the spread by this.
 BIWEIGHT_SPREAD = 0.828
-PIXEL_VARIANCE = 1.0 / 12.0
-# A sharp corner's half-level stays away by so many sigma; points that lie so far inside both sides are on a fillet.
-SHARP_CORNER, INSIDE_CORNER_PX = 0.7706, 0.5
-# A fillet below so many sigma is blurred into the corner: its radius is known from the corner alone, to so much.
-SHARP_PRIOR_PX = 0.3
 # A top whose two corners differ in height by less than so many sigma is level
 # (a corner that is not in view says nothing: never by more than this).
 LEVEL_IN_SIGMAS, LEVEL_LIMIT_PX = 2.0, 0.5
@@ -82,28 +72,19 @@ class MeasuredFinger:
 def outline_points(fingers: CoarseFingers, edges: EdgePoints) -> tuple[OutlinePoints, Floats]:
     """Each finger's sub-pixel points in its own axes (inner side at larger x, tip at small y), and their origins."""
     lines = edges.lines
-    blur = np.sqrt((edges.blur_px**2 + PIXEL_VARIANCE)[lines.group] * edges.curvature_gain)
-    side = np.where(lines.is_row, np.where(lines.is_inner, 0, 2), 1)
-    origins, members = [], []
-    for number, finger in enumerate((fingers.left, fingers.right)):
-        mine = np.flatnonzero(lines.group // 2 == number)
-        members.append(mine)
-        origins.append((float(finger.outline[0, 0]), float(finger.top_along_px)))
-    n = max(len(mine) for mine in members)
-    index = np.stack([np.resize(mine, n) for mine in members])
-    real = np.stack([np.arange(n) < len(mine) for mine in members])
-    origin = np.array(origins)
+    origin = np.array([(finger.outline[0, 0], finger.top_along_px) for finger in (fingers.left, fingers.right)], float)
     sign = np.array([[fingers.left.inner_sign], [fingers.right.inner_sign]])
-    is_row = lines.is_row[index]
-    position, fixed = edges.position[index], lines.fixed[index].astype(np.float64)
+    across, along = edges.position.copy(), lines.fixed.astype(np.float64)
+    across[:, ROWS:], along[:, ROWS:] = lines.fixed[:, ROWS:], edges.position[:, ROWS:]
+    is_edge = np.abs(edges.contrast) > LEAST_CONTRAST * np.median(np.abs(edges.contrast[lines.weight > 0]))
+    u = np.where(np.abs(lines.slope) > SHARED_SLOPE, SHARED_FACTOR * edges.u_position, edges.u_position)
     points = OutlinePoints(
-        x=sign * (np.where(is_row, position, fixed) - origin[:, :1]),
-        y=np.where(is_row, fixed, position) - origin[:, 1:],
-        u=(edges.u_position * np.where(np.abs(lines.slope) > SHARED_SLOPE, SHARED_FACTOR, 1.0))[index],
-        is_row=is_row,
-        weight=real.astype(np.float64),
-        blur=blur[index],
-        side=side[index],
+        x=sign * (across - origin[:, :1]),
+        y=along - origin[:, 1:],
+        u=u,
+        is_row=np.broadcast_to(IS_ROW, u.shape),
+        weight=lines.weight * is_edge,
+        blur=outline_blur(edges),
     )
     return points, origin
 
@@ -137,8 +118,7 @@ def measure_gap(
     if refusal is not None:
         return refusal
     points, origin = outline_points(fingers, edges)
-    start, y0, prior = _first_guess(points, below_tip_px)
-    ends = fit_finger_ends(points, start, y0, prior)
+    ends = fit_finger_ends(points, *first_guess(points, below_tip_px))
     inflation = _inflation(points, ends, lossy)
     tip, edge, slope, covariance = _evaluate(ends, below_tip_px)
     measured: list[MeasuredFinger] = []
@@ -157,102 +137,21 @@ def measure_gap(
 
 def _refuse(edges: EdgePoints, full_scale: int, light_gap: bool) -> NoGap | None:
     """Reasons to give no number that the edges themselves show."""
-    inner = edges.lines.is_inner
+    real = edges.lines.weight > 0
+    inner = real & IS_INNER
     if inner.sum() < FEWEST_ROWS:  # a slanted or touching tip: what faces the gap is seen in columns
-        inner = ~edges.lines.is_row
+        inner = real & ~IS_ROW
     if inner.sum() < FEWEST_ROWS:
         return NoGap(Status.NO_FINGERS, "The inner edges are too short to be measured.")
-    contrast = np.median(edges.contrast[inner]) * (1.0 if light_gap else -1.0)
+    contrast = float(np.median(edges.contrast[inner])) * (1.0 if light_gap else -1.0)
     if contrast < CONTRAST_TO_NOISE * edges.noise or contrast < 0.02 * full_scale:
         return NoGap(Status.LOW_CONTRAST, "The fingers hardly differ from their ground.")
-    if edges.clipped[inner].mean() > 0.5:  # noqa: PLR2004 - more than half of the rows
+    if edges.is_clipped[inner].mean() > 0.5:  # noqa: PLR2004 - more than half of the rows
         return NoGap(Status.SATURATED, "The flank of the edges is cut off at the end of the grey scale.")
-    blur = float(np.sqrt(np.max(edges.blur_px[[0, 2]]) ** 2 + PIXEL_VARIANCE))
+    blur = float(np.sqrt(edges.blur_px[:, 0].max() ** 2 + PIXEL_VARIANCE))
     if blur > BLUR_LIMIT_PX:
         return NoGap(Status.BLURRED, f"The edges are spread over {blur:.1f} px (standard deviation).")
     return None
-
-
-def _first_guess(points: OutlinePoints, below_tip_px: float) -> tuple[Floats, Floats, Floats]:
-    """Lines through the three sides and the corners' radii from the coarse points."""
-    count = len(points.x)
-    start, prior = np.zeros((count, PARAMETERS)), np.full((count, PARAMETERS), 1e3)
-    prior[:, [INNER_M, TOP_M, OUTER_M]] = 10.0
-    origin = np.zeros((count, 2))
-    for k in range(count):
-        real = points.weight[k] > 0
-        x, y, side = points.x[k][real], points.y[k][real], points.side[k][real]
-        crest = side == 1
-        xt, yt = (x[crest], y[crest]) if crest.sum() > 2 else (x, y)  # noqa: PLR2004
-        x0, y0 = float(np.median(xt)), below_tip_px
-        middle = np.abs(xt - x0) <= 0.3 * np.ptp(xt) + 1.0
-        top_c, top_m = _line(xt[middle] - x0, yt[middle])
-        inner_c, inner_m = _lower_flank(x, y - y0, side == 0) or (float(x.max()), 0.0)
-        outer = _lower_flank(x, y - y0, side == 2)  # noqa: PLR2004
-        if outer is not None and abs(inner_m - outer[1]) > MOST_TAPER:
-            # Nothing of the inner flank is in view below the round corner: it runs parallel to the outer one.
-            inner_c, inner_m = float(x.max()) + 1.0, outer[1]
-            prior[k, INNER_M] = TAPER_PRIOR
-        outer_c, outer_m = outer or (float(x.min()) - 3.0, 0.0)
-        if outer is None:  # cut off by the border: nothing speaks of the far corner
-            prior[k, [4, OUTER_M, OUTER_R]] = 1.0, 0.05, 1.0
-        width = max(inner_c - outer_c, 2.0)
-        blur = float(np.median(points.blur[k][real]))
-        inside_top = y - top_c - top_m * (x - x0)
-        inner_half = x > x0
-        radii = []
-        for number, half, inside in (
-            (INNER_R, inner_half, inner_c + inner_m * (y - y0) - x),
-            (OUTER_R, ~inner_half, x - outer_c - outer_m * (y - y0)),
-        ):
-            radius = _radius(inside[half], inside_top[half], blur)
-            radii.append(min(radius, 0.49 * width))
-            if radius < SHARP_IN_BLURS * blur and prior[k, number] > 1.0:
-                prior[k, number] = SHARP_PRIOR_PX
-        start[k] = inner_c, inner_m, top_c, top_m, outer_c, outer_m, *radii
-        origin[k] = x0, y0
-    return start, origin, prior
-
-
-def _line(t: Floats, v: Floats) -> tuple[float, float]:
-    """Least-squares line v = c + m t."""
-    if len(t) == 0:
-        return 0.0, 0.0
-    mean_t, mean_v = t.mean(), v.mean()
-    spread = float(((t - mean_t) ** 2).sum())
-    slope = float(((t - mean_t) * (v - mean_v)).sum()) / spread if spread > 1.0 else 0.0
-    return float(mean_v - slope * mean_t), slope
-
-
-def _lower_flank(x: Floats, y: Floats, mine: NDArray[np.bool_]) -> tuple[float, float] | None:
-    if mine.sum() < 4:  # noqa: PLR2004
-        return None
-    low = y[mine] >= np.median(y[mine])
-    return _line(y[mine][low], x[mine][low])
-
-
-def _radius(inside_flank: Floats, inside_top: Floats, blur: float) -> float:
-    """Fillet radius from the points that lie inside both sides of a corner.
-
-    A fillet of radius r in a right angle passes through every point whose distances a and b from the two sides
-    satisfy (r - a)^2 + (r - b)^2 = r^2; the median over the points does not mind dust. Blur moves the half-level further
-    in: on the bisector by sigma^2 / 2r on a large fillet, by 0.77 sigma in a sharp corner (where the product of two
-    error functions is one half), and the root of the two in between is within 0.02 sigma of the exact contour.
-    """
-    a, b = np.maximum(inside_flank, 0.0), np.maximum(inside_top, 0.0)
-    through = a + b + np.sqrt(2.0 * a * b)
-    on_fillet = np.minimum(a, b) > INSIDE_CORNER_PX
-    if not on_fillet.any():
-        return 0.0
-    # Points outside the fillet's own reach belong to the other corner.
-    nearest = through[on_fillet].min()
-    rough = float(np.median(through[on_fillet & (through < 3.0 * nearest + 3.0)]))
-    retreat = rough * (np.sqrt(2.0) - 1.0)
-    radius = rough
-    for _step in range(12):
-        shift = blur / np.sqrt((2.0 * radius / blur) ** 2 + SHARP_CORNER**-2)
-        radius = 0.5 * (radius + max(retreat - shift, 0.0) / (np.sqrt(2.0) - 1.0))
-    return radius
 
 
 def _evaluate(ends: FingerEnds, below_tip_px: float) -> tuple[Floats, Floats, Floats, Floats]:
@@ -306,15 +205,19 @@ def _shape_holds(points: OutlinePoints, ends: FingerEnds, k: int, tip: float, ed
     near_edge = np.abs(points.y[k] - tip - below_tip_px) < SHAPE_REACH_PX
     near_edge &= np.abs(points.x[k] - edge) < 2.0 * SHAPE_REACH_PX
     near_tip = points.y[k] - tip < 0.5 * SHAPE_REACH_PX
-    spread = max(float(ends.misfit[k]), 1.0)
+    counted = weight > 0
+    if counted.sum() < PARAMETERS:
+        return False
+    # Noise differs from point to point, a wrong shape from one end to the other.
+    roughness = 1.4826 * float(np.median(np.abs(np.diff(ends.residual[k][counted])))) / np.sqrt(2.0)
     for near in (near_edge, near_tip):
         total = float((weight * near).sum())
         if total < 3.0:  # noqa: PLR2004 - a sharp corner has no points of its own: the two sides speak for it
             continue
         mean = float((weight * near * ends.residual[k]).sum()) / total
-        if abs(mean) * np.sqrt(total) > SHAPE_LIMIT * spread:
+        if abs(mean) * np.sqrt(total) > SHAPE_LIMIT * max(roughness, 1.0):
             return False
-    return spread < 2.0  # noqa: PLR2004
+    return bool(ends.misfit[k] < MISFIT_LIMIT * max(roughness, 1.0))
 
 
 def _is_on_outline(x: Floats, y: Floats, edge: float, height: float) -> bool:
@@ -358,7 +261,7 @@ def _slope_near(points: FingerPoints, inner: NDArray[np.bool_], height: float) -
     near = inner & (np.abs(points.y - height) < SHAPE_REACH_PX)
     if near.sum() < 3:  # noqa: PLR2004
         return 0.0
-    return float(np.clip(_line(points.y[near] - height, points.x[near])[1], -3.0, 3.0))
+    return float(np.clip(line(points.y[near] - height, points.x[near])[1], -3.0, 3.0))
 
 
 def _assemble(
@@ -370,7 +273,7 @@ def _assemble(
     light_gap: bool,
 ) -> GapMeasurement | NoGap:
     """From the fingers' own axes back to the picture."""
-    orientation: Orientation = fingers.orientation
+    orientation = fingers.orientation
     across, along, found = [], [], []
     for k, (finger, m) in enumerate(zip((fingers.left, fingers.right), measured, strict=True)):
         across.append(origin[k, 0] + finger.inner_sign * m.edge)
@@ -392,7 +295,7 @@ def _assemble(
 def _finger_edge(
     finger: CoarseFinger, m: MeasuredFinger, edges: EdgePoints, k: int, point: tuple[float, float], tip: float
 ) -> FingerEdge:
-    mine = edges.lines.is_inner & (edges.lines.group == 2 * k)
+    mine = (edges.lines.weight[k] > 0) & IS_INNER
     return FingerEdge(
         x_px=point[0],
         y_px=point[1],
@@ -400,6 +303,6 @@ def _finger_edge(
         u_across_px=float(np.sqrt(m.covariance[1, 1])),
         u_tip_px=float(np.sqrt(m.covariance[0, 0])),
         slope=finger.inner_sign * m.slope,
-        blur_px=float(np.sqrt(edges.blur_px[2 * k] ** 2 + PIXEL_VARIANCE)),
-        contrast=float(np.median(edges.contrast[mine])) if mine.any() else 0.0,
+        blur_px=float(np.sqrt(edges.blur_px[k, 0] ** 2 + PIXEL_VARIANCE)),
+        contrast=float(np.median(edges.contrast[k, mine])) if mine.any() else 0.0,
     )

@@ -12,10 +12,11 @@ from fingervision.domain.region import Region
 from fingervision.domain.status import Status
 from fingervision.vision.binarise import Binary, binarise, binarise_local
 from fingervision.vision.denoise import denoise
-from fingervision.vision.edges import fit_edges, profile_lines
+from fingervision.vision.edges import fit_edges
 from fingervision.vision.fingers import CoarseFingers, find_fingers
 from fingervision.vision.gap import measure_gap
 from fingervision.vision.grey import GreyImage, full_scale, to_grey
+from fingervision.vision.profile_lines import profile_lines
 
 # A picture whose two classes differ by less (share of full scale, and in units of the spread within) shows nothing.
 CONTRAST_FLOOR, SEPARATION_FLOOR = 0.03, 3.0
@@ -84,7 +85,7 @@ def _measure(grey: GreyImage, settings: Settings, lossy: bool) -> GapMeasurement
             continue
         orientation = candidate.orientation
         upright = orientation.view(grey)
-        edges = fit_edges(upright, profile_lines(candidate.left, candidate.right))  # type: ignore[arg-type]
+        edges = fit_edges(upright, profile_lines((candidate.left, candidate.right)))  # type: ignore[arg-type]
         measured = measure_gap(candidate, edges, settings.below_tip_px, scale, light_gap, lossy)
         if isinstance(measured, GapMeasurement):
             return measured
