@@ -20,7 +20,7 @@ Ints = NDArray[np.int_]
 # The first look reaches so far from the coarse edge (pixels); enough for the strongest blur that is still measured.
 FIRST_REACH_PX = 20
 # The fit reaches so many standard deviations, and so many pixels more, to either side. Uneven light over that reach
-# moves the two edges of a pair the same way, so that their distance stays right to 0.002 px for 40 % across the picture.
+# moves both edges of a pair the same way: their distance stays right to 0.002 px for 40 % across the picture.
 REACH_SIGMAS, REACH_EXTRA_PX = 4.0, 4.0
 # Blur of an edge is looked for within these limits (pixels).
 SMALLEST_BLUR_PX, LARGEST_BLUR_PX = 0.15, 8.0
@@ -175,10 +175,10 @@ def _mean_profile(grey: Floats, rows: Ints, coarse: CoarseEdge, reach: int) -> _
     inside = (columns - reach >= 0) & (columns + reach < grey.shape[1])
     if reach < 2 or not np.any(inside):
         raise CalibrationError("The edge has no room: it is nearer to the border or to another edge than its own blur.")
-    window = columns[inside, None] + np.arange(-reach, reach + 1)
+    window: Ints = columns[inside, None] + np.arange(-reach, reach + 1)
     seen = grey[rows[inside, None], window]
-    levels = np.median(seen, axis=0)
-    away: Floats = np.arange(-reach, reach + 1) + float(np.mean(columns[inside] - middle[inside]))
+    levels = np.median(seen, axis=0).astype(np.float64)
+    away = np.arange(-reach, reach + 1) + float(np.mean(columns[inside] - middle[inside]))
     if not coarse.rising:
         levels = -levels
     ends = max(1, reach // 3)

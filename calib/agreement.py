@@ -1,0 +1,41 @@
+"""Whether a measured object agrees with its certificate."""
+
+from dataclasses import dataclass
+from math import hypot
+
+# Expanded uncertainties are stated with this factor, about 95 % (JCGM 100:2008, 6.2).
+COVERAGE_FACTOR = 2.0
+
+
+@dataclass(frozen=True, slots=True)
+class Agreement:
+    """A measurement beside a certified value.
+
+    Parameters
+    ----------
+    measured_mm, u_measured_mm : float
+        Measured, with its standard uncertainty.
+    certified_mm, u_certified_mm : float
+        Certified, with its standard uncertainty.
+    """
+
+    measured_mm: float
+    u_measured_mm: float
+    certified_mm: float
+    u_certified_mm: float
+
+    @property
+    def deviation_mm(self) -> float:
+        """Measured less certified."""
+        return self.measured_mm - self.certified_mm
+
+    @property
+    def e_n(self) -> float:
+        """Deviation over the expanded uncertainty of the deviation (ISO 13528:2022, 9.6): within +-1 they agree."""
+        expanded = COVERAGE_FACTOR * hypot(self.u_measured_mm, self.u_certified_mm)
+        return self.deviation_mm / expanded if expanded > 0.0 else float("inf")
+
+    @property
+    def agrees(self) -> bool:
+        """Whether the deviation lies within its expanded uncertainty."""
+        return abs(self.e_n) <= 1.0

@@ -1,0 +1,125 @@
+"""Gauge repeatability and reproducibility: how much of a tolerance the measurement itself takes up."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import hypot, isfinite
+
+import numpy as np
+from numpy.typing import NDArray
+
+from calib.errors import CalibrationError
+
+Floats = NDArray[np.float64]
+
+# A gauge is said to take up this many standard deviations (AIAG, Measurement Systems Analysis, 4th ed. 2010, chapter III).
+SPREAD = 6.0
+# Verdicts of the same manual: good below 10 %, doubtful up to 30 %.
+GOOD_PERCENT, DOUBTFUL_PERCENT = 10.0, 30.0
+
+
+@dataclass(frozen=True, slots=True)
+class GaugeStudy:
+    """Standard deviations of a gauge, by analysis of variance.
+
+    Parameters
+    ----------
+    repeatability_mm : float
+        Equipment variation: the same part again, in the same recording.
+    reproducibility_mm : float
+        Appraiser variation: the same part in another recording (set up again, by somebody else, on another day), parts
+        and recordings crossed included.
+    part_mm : float
+        Variation of the parts themselves.
+    parts, recordings, trials : int
+        How many of each; trials are those of each part in each recording.
+    """
+
+    repeatability_mm: float
+    reproducibility_mm: float
+    part_mm: float
+    parts: int
+    recordings: int
+    trials: int
+
+    @property
+    def grr_mm(self) -> float:
+        """Repeatability and reproducibility together."""
+        return hypot(self.repeatability_mm, self.reproducibility_mm)
+
+    def percent_of(self, tolerance_mm: float) -> float:
+        """%GRR: six standard deviations of the gauge as part of a tolerance's whole width.
+
+        Raises
+        ------
+        CalibrationError
+            The tolerance is not positive.
+        """
+        if not (isfinite(tolerance_mm) and tolerance_mm > 0.0):
+            raise CalibrationError(f"The tolerance must be positive, but is {tolerance_mm} mm: give its whole width.")
+        return 100.0 * SPREAD * self.grr_mm / tolerance_mm
+
+    @property
+    def percent_of_total(self) -> float | None:
+        """%GRR of the total variation; None where all parts are one part, so that there is no other variation."""
+        total = hypot(self.grr_mm, self.part_mm)
+        return 100.0 * self.grr_mm / total if self.parts > 1 and total > 0.0 else None
+
+
+def gauge_study(readings_mm: Sequence[Sequence[Sequence[float]]]) -> GaugeStudy:
+    """Analyse a crossed study with random parts and recordings.
+
+    AIAG, Measurement Systems Analysis, 4th ed. 2010, appendix A (analysis of variance): components from mean squares, a
+    negative one taken as zero; an interaction that does not show is pooled with repeatability.
+
+    Parameters
+    ----------
+    readings_mm : nested sequence, shape (recordings, parts, trials)
+        Each cell the same number of trials, at least two in all.
+
+    Raises
+    ------
+    CalibrationError
+        There is nothing to compare.
+    """
+    lengths = {len(cell) for recording in readings_mm for cell in recording}
+    if len(lengths) != 1 or len({len(recording) for recording in readings_mm}) != 1:
+        raise CalibrationError("Every recording must hold the same parts, and every part the same number of readings.")
+    values = np.array(readings_mm, dtype=np.float64)
+    recordings, parts, trials = values.shape
+    if recordings < 2:
+        raise CalibrationError(f"Reproducibility needs at least two recordings, but there are {recordings}.")
+    if trials < 2:
+        raise CalibrationError(f"Repeatability needs at least two readings of each part, but there are {trials}.")
+    if not np.all(np.isfinite(values)):
+        raise CalibrationError("Every reading must be a number, but some are missing: leave those parts out.")
+    mean = float(values.mean())
+    cells, by_recording, by_part = values.mean(axis=2), values.mean(axis=(1, 2)), values.mean(axis=(0, 2))
+    within = float(np.sum((values - cells[:, :, None]) ** 2))
+    among_recordings = parts * trials * float(np.sum((by_recording - mean) ** 2))
+    among_parts = recordings * trials * float(np.sum((by_part - mean) ** 2))
+    crossed = trials * float(np.sum((cells - by_recording[:, None] - by_part + mean) ** 2))
+    freedom_within, freedom_crossed = recordings * parts * (trials - 1), (recordings - 1) * (parts - 1)
+    repeatability = within / freedom_within
+    interaction = crossed / freedom_crossed if freedom_crossed else repeatability
+    shows = interaction > repeatability
+    if not shows:
+        repeatability = (within + crossed) / (freedom_within + freedom_crossed)
+        interaction = repeatability
+    of_interaction = (interaction - repeatability) / trials
+    of_recording = max(0.0, (among_recordings / (recordings - 1) - interaction) / (parts * trials))
+    of_part = max(0.0, (among_parts / (parts - 1) - interaction) / (recordings * trials)) if parts > 1 else 0.0
+    return GaugeStudy(
+        repeatability_mm=float(np.sqrt(repeatability)),
+        reproducibility_mm=float(np.sqrt(of_recording + of_interaction)),
+        part_mm=float(np.sqrt(of_part)),
+        parts=parts,
+        recordings=recordings,
+        trials=trials,
+    )
+
+
+def verdict(percent: float) -> str:
+    """Say what %GRR means, in the manual's words."""
+    if percent < GOOD_PERCENT:
+        return "acceptable"
+    return "may be acceptable for some uses" if percent <= DOUBTFUL_PERCENT else "not acceptable"

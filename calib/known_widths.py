@@ -1,0 +1,219 @@
+"""Bars and slots of known size: which pair of edges in each picture is the one that was certified."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import product
+from math import isfinite
+from typing import NoReturn
+
+import numpy as np
+from numpy.typing import NDArray
+
+from calib.edge_pairs import find_edge_pairs, straight_edges_in_view
+from calib.errors import CalibrationError
+from calib.parallel_edges import ParallelEdges
+
+Grey = NDArray[np.uint8] | NDArray[np.uint16]
+
+KINDS = ("bar", "slot")
+# Objects whose edges are shorter than this part of the longest's are chips and shadows.
+SHORTEST_OF_LONGEST = 0.2
+# A rectangle seen whole has two widths. Alone, that of its longer edges is taken if they are so much longer.
+CLEARLY_LONGER = 1.3
+# Pictures of one scene agree on the scale to this part: more than any blooming, far less than a wrong unit.
+SAME_SCALE = 0.06
+# What a size is multiplied by where it was stated in another unit.
+WRONG_UNITS = {0.1: "ten", 10.0: "ten", 25.4: "25.4", 1.0 / 25.4: "25.4", 0.001: "a thousand", 1000.0: "a thousand"}
+# With more pictures than this, combinations are not tried; the longer edges are taken.
+MOST_COMBINED = 12
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class KnownSize:
+    """A picture of an object whose size is known.
+
+    Parameters
+    ----------
+    name : str
+        The picture's name, for sentences.
+    kind : str
+        "bar" (an object) or "slot" (a gap between objects).
+    size_mm, u_size_mm : float
+        Certified size and its standard uncertainty.
+    grey : ndarray, shape (height, width)
+        Original grey levels.
+    """
+
+    name: str
+    kind: str
+    size_mm: float
+    u_size_mm: float
+    grey: Grey
+
+    def __post_init__(self) -> None:
+        """Refuse what cannot be a size."""
+        if self.kind not in KINDS:
+            raise CalibrationError(f"{self.name} must show a bar or a slot, but {self.kind!r} is stated.")
+        if not (isfinite(self.size_mm) and self.size_mm > 0.0):
+            raise CalibrationError(f"The size of {self.name} must be positive, but is {self.size_mm} mm.")
+        if not (isfinite(self.u_size_mm) and self.u_size_mm >= 0.0):
+            raise CalibrationError(
+                f"The uncertainty of the size of {self.name} must be zero or more, but is {self.u_size_mm} mm."
+            )
+
+
+def find_widths(
+    pictures: Sequence[KnownSize],
+    region: tuple[int, int, int, int] | None = None,
+    px_per_mm: float | None = None,
+) -> list[ParallelEdges]:
+    """Find and measure the certified width in every picture.
+
+    Parameters
+    ----------
+    pictures : sequence of KnownSize
+        At least one; all of one scene, so of one scale.
+    region : tuple of int, optional
+        x, y, width and height of the part of every picture to look in.
+    px_per_mm : float, optional
+        The scale, where it is known already.
+
+    Raises
+    ------
+    CalibrationError
+        No object, several, a clipped flank, or sizes that contradict each other.
+    """
+    choices = [_choices(picture, find_edge_pairs(picture.grey, region), region) for picture in pictures]
+    widths = _settled(pictures, choices) if px_per_mm is None else _expected(pictures, choices, px_per_mm)
+    for picture, width in zip(pictures, widths, strict=True):
+        if width.clipped:
+            raise CalibrationError(
+                f"The flank of an edge in {picture.name} is cut off by the sensor's full scale, so its place is "
+                "unknown: lower the exposure or the light and take the picture again."
+            )
+    return widths
+
+
+def _choices(
+    picture: KnownSize, pairs: Sequence[ParallelEdges], region: tuple[int, int, int, int] | None
+) -> list[ParallelEdges]:
+    """List the widths of the one object: one, or two where a rectangle is seen whole; longer edges first."""
+    where = "the region" if region is not None else "the picture"
+    if not pairs:
+        edges = straight_edges_in_view(picture.grey)
+        if edges:
+            raise CalibrationError(
+                f"{picture.name} must show two parallel straight edges, but only {edges} straight edge"
+                f"{'s stand' if edges > 1 else ' stands'} in it and none has a partner in {where}: bring both edges "
+                f"of the {picture.kind} into view, away from the border, or give a region with --roi."
+            )
+        raise CalibrationError(
+            f"{picture.name} must show a {picture.kind} with two parallel straight edges, but there is no straight "
+            f"edge in {where}: check the picture, its light and its focus."
+        )
+    longest = max(pair.length_px for pair in pairs)
+    pairs = [pair for pair in _of_kind(picture.kind, pairs) if pair.length_px >= SHORTEST_OF_LONGEST * longest]
+    objects: list[list[ParallelEdges]] = []
+    for pair in pairs:
+        one = next((found for found in objects if _one_object(found[0], pair)), None)
+        if one is None:
+            objects.append([pair])
+        else:
+            one.append(pair)
+    if len(objects) > 1:
+        named = ", ".join(found[0].words() for found in objects[:5])
+        raise CalibrationError(
+            f"{picture.name} must show one {picture.kind}, but {len(objects)} candidates stand in {where} ({named}): "
+            "choose one with --roi X,Y,W,H."
+        )
+    return objects[0][:2]
+
+
+def _of_kind(kind: str, pairs: Sequence[ParallelEdges]) -> list[ParallelEdges]:
+    """Bars among bars and gaps: what lies outermost is a bar, what lies between two bars is a slot."""
+    if len({pair.light for pair in pairs}) == 1:
+        return list(pairs)
+    main = pairs[0]
+    across = (main.points_px[1] - main.points_px[0]) / main.width_px
+    parallel = [pair for pair in pairs if abs(float(np.diff(pair.points_px, axis=0)[0] @ across)) > 0.9 * pair.width_px]
+    outermost = min(parallel, key=lambda pair: float(pair.middle_px @ across))
+    mixed = len({pair.light for pair in parallel}) > 1
+    light = outermost.light == (kind == "bar") if mixed else kind == "slot"
+    return [pair for pair in pairs if pair.light == light]
+
+
+def _one_object(pair: ParallelEdges, other: ParallelEdges) -> bool:
+    across, other_across = (np.diff(each.points_px, axis=0)[0] / each.width_px for each in (pair, other))
+    apart = float(np.linalg.norm(pair.middle_px - other.middle_px))
+    return bool(abs(across @ other_across) < 0.3) and apart < 0.25 * max(pair.width_px, other.width_px)
+
+
+def _expected(
+    pictures: Sequence[KnownSize], choices: Sequence[Sequence[ParallelEdges]], px_per_mm: float
+) -> list[ParallelEdges]:
+    widths = []
+    for picture, found in zip(pictures, choices, strict=True):
+        nearest = min(found, key=lambda pair: abs(pair.width_px - picture.size_mm * px_per_mm))
+        if not 0.8 < nearest.width_px / (picture.size_mm * px_per_mm) < 1.25:
+            raise CalibrationError(
+                f"{picture.name} is stated to be {picture.size_mm:g} mm, but by the calibration it is about "
+                f"{nearest.width_px / px_per_mm:.4g} mm: check the object, and that the size is in millimetres."
+            )
+        widths.append(nearest)
+    return widths
+
+
+def _settled(pictures: Sequence[KnownSize], choices: Sequence[Sequence[ParallelEdges]]) -> list[ParallelEdges]:
+    """Take the widths that agree on the scale."""
+    sizes = np.array([picture.size_mm for picture in pictures])
+    longer_edges = [found[0] for found in choices]
+    combinations = [list(each) for each in product(*choices)] if len(choices) <= MOST_COMBINED else [longer_edges]
+    agreeing = [each for each in combinations if _disagreement(each, sizes) < SAME_SCALE]
+    if not agreeing:
+        _refuse_unit(pictures, combinations, sizes)
+        _refuse_sizes(pictures, min(combinations, key=lambda each: _disagreement(each, sizes)), sizes)
+    if len(agreeing) == 1:
+        return agreeing[0]
+    for picture, found in zip(pictures, choices, strict=True):
+        if len(found) > 1 and found[0].length_px < CLEARLY_LONGER * found[1].length_px:
+            raise CalibrationError(
+                f"{picture.name} shows a rectangle that is {found[0].width_px:.1f} px one way and "
+                f"{found[1].width_px:.1f} px the other, and either could be the {picture.size_mm:g} mm: give a region "
+                "with --roi that holds the two measured edges and leaves the other two out."
+            )
+    return (
+        longer_edges
+        if any(each == longer_edges for each in agreeing)
+        else min(agreeing, key=lambda each: _disagreement(each, sizes))
+    )
+
+
+def _disagreement(widths: Sequence[ParallelEdges], sizes: NDArray[np.float64]) -> float:
+    scales = np.array([width.width_px for width in widths]) / sizes
+    return float(scales.max() / scales.min() - 1.0)
+
+
+def _refuse_unit(
+    pictures: Sequence[KnownSize], combinations: Sequence[Sequence[ParallelEdges]], sizes: NDArray[np.float64]
+) -> None:
+    """Refuse where a single size in another unit would make all pictures agree."""
+    for index, picture in enumerate(pictures):
+        for factor, words in WRONG_UNITS.items():
+            other = sizes.copy()
+            other[index] *= factor
+            if any(_disagreement(each, other) < SAME_SCALE for each in combinations):
+                raise CalibrationError(
+                    f"All pictures must have one scale, but {picture.name} would have to be {other[index]:.4g} mm instead of "
+                    f"{picture.size_mm:g} mm, a factor of {words}, to agree with the others: state every size in millimetres."
+                )
+
+
+def _refuse_sizes(pictures: Sequence[KnownSize], widths: Sequence[ParallelEdges], sizes: NDArray[np.float64]) -> None:
+    scales = np.array([width.width_px for width in widths]) / sizes
+    odd = int(np.argmax(np.abs(np.log(scales / float(np.median(scales))))))
+    others = float(np.median(np.delete(scales, odd)))
+    raise CalibrationError(
+        f"All pictures must have one scale, but {pictures[odd].name} of {pictures[odd].size_mm:g} mm gives "
+        f"{scales[odd]:.4g} px/mm where the others give {others:.4g}: check the sizes, and that the camera was not moved or "
+        "refocused between the pictures."
+    )

@@ -1,0 +1,172 @@
+"""Scale and edge bias from objects of known size."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import chdtrc
+
+from calib.errors import CalibrationError
+from calib.limits import Limits, rectangular
+from calib.measured_scale import Calibration, Reference, Response, ScalePart
+from calib.picture_shift import change_of_distance_px, lens_shift_px, tilt_shift_px
+from calib.straight_line import StraightLine, line_through_origin, line_with_errors
+
+Floats = NDArray[np.float64]
+
+# Residuals that chance gives less often than this are a misfit: they enlarge the covariance and are reported.
+CHANCE = 0.01
+# Sizes nearer than this part of each other are one size.
+SAME_SIZE = 0.01
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class MeasuredSize:
+    """One object of known size, measured in the picture.
+
+    Parameters
+    ----------
+    reference : Reference
+        Its certified size.
+    width_px, u_width_px : float
+        Its width in the picture, lens and plane taken off, and the standard uncertainty from its edges.
+    points_px : ndarray, shape (2, 2)
+        Where the width begins and ends.
+    light : bool
+        Whether it is light between the edges.
+    """
+
+    reference: Reference
+    width_px: float
+    u_width_px: float
+    points_px: Floats
+    light: bool
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ScaleFit:
+    """The calibration and how well the straight line holds.
+
+    Parameters
+    ----------
+    calibration : Calibration
+        The result.
+    bias_known : bool
+        Whether the edge bias was found; otherwise it is zero, with its limit as an uncertainty.
+    residual_mm : ndarray, shape (n,)
+        Linearity residuals: each size as measured, less its certified size.
+    chi_square : float
+        Of the residuals, against sizes, edges, lens and perspective.
+    freedom : int
+        Degrees of freedom; 0 where nothing is left to check the line with.
+    probability : float
+        Chance of so large a `chi_square`.
+    """
+
+    calibration: Calibration
+    bias_known: bool
+    residual_mm: Floats
+    chi_square: float
+    freedom: int
+    probability: float
+
+
+def scale_from_sizes(
+    sizes: Sequence[MeasuredSize],
+    frame_size_px: tuple[int, int],
+    limits: Limits,
+    stated: frozenset[str] = frozenset(),
+) -> ScaleFit:
+    """Fit gap_mm = (gap_px + p b) / s to objects of known size, with p = +1 for a light gap and -1 for a dark object.
+
+    As a straight line: p gap_px = s (p gap_mm) - b. Three different sizes, or a light and a dark one, give s and b;
+    fewer give s alone, and b stays in the budget with its limit.
+
+    Parameters
+    ----------
+    sizes : sequence of MeasuredSize
+        At least one.
+    frame_size_px : tuple of int
+        Width and height of the pictures.
+    limits, stated
+        What the user states about the bench, and which of it is not a default.
+    """
+    if not sizes:
+        raise CalibrationError("A scale needs at least one object of known size, but there is none.")
+    polarity = np.array([1.0 if size.light else -1.0 for size in sizes])
+    x = polarity * np.array([size.reference.size_mm for size in sizes])
+    y = polarity * np.array([size.width_px for size in sizes])
+    u_x = np.array([size.reference.u_size_mm for size in sizes])
+    u_y = np.hypot([size.u_width_px for size in sizes], np.sqrt(2.0) * rectangular(limits.estimator_px))
+    # Edges can be told no better than this, however still the picture; zero would give one picture all the weight.
+    u_y = np.maximum(u_y, 1e-4)
+    bias_known = _different(x) >= 3 or len(set(polarity.tolist())) == 2
+    line = line_with_errors(x, y, u_x, u_y) if bias_known else line_through_origin(x, y, u_x, u_y)
+    to_scale_and_bias = np.array([[1.0], [-1.0]]) * line.response
+    parts = [
+        ScalePart("reference size", _spread(to_scale_and_bias, line.slope * u_x), "the certificate (--u-size-mm)"),
+        ScalePart("reference edges", _spread(to_scale_and_bias, u_y), "the fit of the reference's edges"),
+    ]
+    if not bias_known:
+        by_bias = np.array([-float(line.response[0].sum()), -1.0])
+        covariance = np.outer(by_bias, by_bias) * rectangular(limits.edge_bias_px) ** 2
+        how = f"+-{limits.edge_bias_px:g} px ({'stated' if 'edge_bias_px' in stated else 'default'})"
+        parts.append(ScalePart("edge bias", covariance, f"{how}; three sizes, or a bar and a slot, would find it"))
+    lens, tilt = _seen_through(sizes, polarity, frame_size_px, limits.camera_distance_mm * line.slope)
+    expected = np.diag(u_y**2 + (line.slope * u_x) ** 2) + np.outer(lens, lens) * rectangular(limits.lens_relative) ** 2
+    expected += (tilt.T @ tilt) * rectangular(limits.tilt_rad) ** 2
+    if not bias_known:
+        expected += rectangular(limits.edge_bias_px) ** 2
+    chi_square = _chi_square(line, x, expected, bias_known)
+    probability = float(chdtrc(line.freedom, chi_square)) if line.freedom > 0 else 1.0
+    if probability < CHANCE:
+        excess = chi_square / line.freedom - 1.0
+        found = np.sum([part.covariance for part in parts[:2]], axis=0)
+        parts.append(ScalePart("misfit of the straight line", excess * found, "the linearity residuals (Birge ratio)"))
+    calibration = Calibration(
+        px_per_mm=line.slope,
+        edge_bias_px=-line.intercept if bias_known else 0.0,
+        parts=tuple(parts),
+        frame_size_px=frame_size_px,
+        limits=limits,
+        stated=stated,
+        response=Response(lens=to_scale_and_bias @ lens, tilt=np.array([to_scale_and_bias @ each for each in tilt])),
+        references=tuple(size.reference for size in sizes),
+    )
+    return ScaleFit(
+        calibration=calibration,
+        bias_known=bias_known,
+        residual_mm=polarity * line.residual / line.slope,
+        chi_square=chi_square,
+        freedom=line.freedom,
+        probability=probability,
+    )
+
+
+def _different(sizes: Floats) -> int:
+    ordered = np.sort(sizes)
+    return 1 + int(np.count_nonzero(np.diff(ordered) > SAME_SIZE * np.abs(ordered[1:])))
+
+
+def _spread(response: Floats, u: Floats) -> Floats:
+    return np.asarray((response * u**2) @ response.T)
+
+
+def _seen_through(
+    sizes: Sequence[MeasuredSize], polarity: Floats, frame_size_px: tuple[int, int], distance_px: float
+) -> tuple[Floats, Floats]:
+    """Change of each signed width per unit of distortion, shape (n,), and per radian of tilt, shape (2, n)."""
+    points = np.array([size.points_px for size in sizes])
+    lens = change_of_distance_px(points, lens_shift_px(points, frame_size_px))
+    tilt = [change_of_distance_px(points, tilt_shift_px(points, frame_size_px, distance_px, axis)) for axis in (0, 1)]
+    return np.asarray(polarity * lens), np.asarray(polarity * np.array(tilt))
+
+
+def _chi_square(line: StraightLine, x: Floats, covariance: Floats, bias_known: bool) -> float:
+    """Residuals against all that the user expects: a lens that bends the line within its limit is no misfit."""
+    design = np.stack([x, np.ones_like(x)], axis=1) if bias_known else x[:, None]
+    inverse = np.linalg.inv(covariance)
+    refit = np.linalg.solve(design.T @ inverse @ design, design.T @ inverse @ line.residual)
+    left = line.residual - design @ refit
+    return float(left @ inverse @ left)

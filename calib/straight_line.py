@@ -1,0 +1,128 @@
+"""The straight line through points that are uncertain in both directions."""
+
+from dataclasses import dataclass
+from math import sqrt
+
+import numpy as np
+from numpy.typing import NDArray
+
+from calib.errors import CalibrationError
+
+Floats = NDArray[np.float64]
+
+# York's iteration gains several digits a step.
+STEPS, SETTLED = 50, 1e-15
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class StraightLine:
+    """y = intercept + slope x.
+
+    Parameters
+    ----------
+    slope, intercept : float
+        The line.
+    response : ndarray, shape (2, n)
+        Change of (slope, intercept) per change of each y; minus the slope times that, per change of each x.
+    covariance : ndarray, shape (2, 2)
+        Covariance of (slope, intercept) from the stated uncertainties.
+    residual : ndarray, shape (n,)
+        y less the line.
+    residual_sd : float
+        Standard deviation of the residuals with n - p degrees of freedom, weighted relative to the mean weight.
+    chi_square : float
+        Sum of squared residuals over their variances.
+    freedom : int
+        n - p; p = 2, or 1 through the origin.
+    """
+
+    slope: float
+    intercept: float
+    response: Floats
+    covariance: Floats
+    residual: Floats
+    residual_sd: float
+    chi_square: float
+    freedom: int
+
+
+def line_with_errors(x: Floats, y: Floats, u_x: Floats, u_y: Floats) -> StraightLine:
+    """Maximum-likelihood line where x and y are both uncertain, and independent.
+
+    York, Evensen, Lopez Martinez & De Basabe Delgado, American Journal of Physics 72 (2004), 367-375. With `u_x` of zero
+    it is the weighted least-squares line.
+
+    Parameters
+    ----------
+    x, y, u_x, u_y : ndarray, shape (n,)
+        Points and their standard uncertainties.
+
+    Raises
+    ------
+    CalibrationError
+        The points do not define a line.
+    """
+    if len(x) < 2 or np.ptp(x) <= 0.0:
+        raise CalibrationError(
+            f"A straight line needs at least two different sizes, but there are {len(np.unique(x))}."
+        )
+    # Sums about a point within the data lose no digits.
+    x0, y0 = float(x.mean()), float(y.mean())
+    slope = float((x - x0) @ (y - y0) / ((x - x0) @ (x - x0)))
+    for _ in range(STEPS):
+        weight, from_x, from_y, best = _york(x - x0, y - y0, u_x, u_y, slope)
+        new = float(np.sum(weight * best * from_y) / np.sum(weight * best * from_x))
+        settled = abs(new - slope) <= SETTLED * abs(new)
+        slope = new
+        if settled:
+            break
+    weight, from_x, from_y, best = _york(x - x0, y - y0, u_x, u_y, slope)
+    share = weight / weight.sum()
+    middle_x, middle_y = x0 + float(share @ (x - x0)), y0 + float(share @ (y - y0))
+    adjusted = best - float(share @ best)
+    by_slope = weight * adjusted / float(weight @ adjusted**2)
+    at_x = middle_x + float(share @ best)
+    response = np.array([by_slope, share - at_x * by_slope])
+    residual = from_y - slope * from_x
+    return _line(slope, middle_y - slope * middle_x, response, weight, residual, parameters=2)
+
+
+def _york(x: Floats, y: Floats, u_x: Floats, u_y: Floats, slope: float) -> tuple[Floats, Floats, Floats, Floats]:
+    weight = 1.0 / (u_y**2 + slope**2 * u_x**2)
+    from_x, from_y = x - float(weight @ x) / weight.sum(), y - float(weight @ y) / weight.sum()
+    best = weight * (from_x * u_y**2 + slope * from_y * u_x**2)
+    return weight, from_x, from_y, best
+
+
+def line_through_origin(x: Floats, y: Floats, u_x: Floats, u_y: Floats) -> StraightLine:
+    """Line through the origin, each point weighted by its uncertainty in both directions; arguments as above."""
+    if not np.any(x):
+        raise CalibrationError("A straight line through the origin needs a size other than zero.")
+    slope = float(x @ y / (x @ x))
+    for _ in range(STEPS):
+        weight = 1.0 / (u_y**2 + slope**2 * u_x**2)
+        new = float(np.sum(weight * x * y) / np.sum(weight * x * x))
+        settled = abs(new - slope) <= SETTLED * abs(new)
+        slope = new
+        if settled:
+            break
+    by_slope = weight * x / float(np.sum(weight * x * x))
+    response = np.array([by_slope, np.zeros_like(by_slope)])
+    return _line(slope, 0.0, response, weight, y - slope * x, parameters=1)
+
+
+def _line(
+    slope: float, intercept: float, response: Floats, weight: Floats, residual: Floats, parameters: int
+) -> StraightLine:
+    freedom = len(residual) - parameters
+    chi_square = float(weight @ residual**2)
+    return StraightLine(
+        slope=slope,
+        intercept=intercept,
+        response=response,
+        covariance=np.asarray((response / weight) @ response.T),
+        residual=residual,
+        residual_sd=sqrt(chi_square / weight.mean() / freedom) if freedom > 0 else 0.0,
+        chi_square=chi_square,
+        freedom=freedom,
+    )

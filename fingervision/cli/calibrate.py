@@ -1,0 +1,441 @@
+"""fingervision calibrate: pixels to millimetres from a reference, with an uncertainty that is true."""
+
+import json
+from collections.abc import Callable, Sequence
+from contextlib import contextmanager
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Iterator
+
+import click
+
+from fingervision import __version__
+from fingervision.cli._bench_limits import limit_options, limits_from
+from fingervision.cli._references import read_pictures, read_references, region_from
+from fingervision.domain.errors import FingervisionError, UsageError
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from calib.measured_scale import Calibration
+
+Command = Callable[..., Any]
+
+
+@click.group("calibrate")
+def command() -> None:
+    """Calibrate pixels to millimetres from a reference of known size."""
+
+
+@contextmanager
+def _sentences() -> Iterator[None]:
+    """Let calib's errors reach the user as this program's."""
+    from calib.errors import CalibrationError
+
+    try:
+        yield
+    except CalibrationError as error:
+        raise FingervisionError(str(error)) from error
+
+
+def _output_options(command: Command) -> Command:
+    for option in reversed(
+        (
+            click.option("-o", "--out", default="calibration.json", type=click.Path(path_type=Path), show_default=True),
+            click.option("--certificate", default="", help="Name of the reference's certificate."),
+            click.option("--date", default="", help="Date of the certificate."),
+            click.option("--camera", multiple=True, metavar="NAME=VALUE", help="A setting of the camera; repeatable."),
+            click.option("--no-picture", is_flag=True, help="Write no calibration picture."),
+            click.option("--json", "as_json", is_flag=True, help="Print the result for programs."),
+        )
+    ):
+        command = option(command)
+    return command
+
+
+def _size_options(command: Command) -> Command:
+    for option in reversed(
+        (
+            click.argument("items", nargs=-1, required=True, metavar="IMAGE=SIZE_MM..."),
+            click.option(
+                "--u-size-mm", default=0.001, show_default=True, help="Standard uncertainty of every size, mm."
+            ),
+            click.option("--roi", metavar="X,Y,W,H", help="Look in this part of every picture."),
+        )
+    ):
+        command = option(command)
+    return command
+
+
+@command.command("bar")
+@_size_options
+@limit_options
+@_output_options
+def bar(**options: Any) -> None:
+    """Calibrate on bars: objects with two parallel straight edges a known distance apart.
+
+    One object a picture, in any direction; it may leave the frame. Three sizes give scale and edge bias; fewer give the
+    scale, and the bias stays in the budget. Prefix an item to mix: slot:ref3.png=3.000.
+
+    \b
+    Examples:
+      fingervision calibrate bar ref5.png=5.000 ref10.png=10.000 ref15.png=15.000 -o calibration.json
+      fingervision calibrate bar ref5.png=5.000 slot:ref3.png=3.000 --u-size-mm 0.0005 --plane-mm 0.2
+    """
+    _on_sizes("bar", **options)
+
+
+@command.command("slot")
+@_size_options
+@limit_options
+@_output_options
+def slot(**options: Any) -> None:
+    """Calibrate on slots: gaps between two parallel straight edges a known distance apart.
+
+    As `bar`; prefix an item to mix: bar:ref5.png=5.000.
+
+    \b
+    Example:
+      fingervision calibrate slot ref3.png=3.000 bar:ref5.png=5.000 -o calibration.json
+    """
+    _on_sizes("slot", **options)
+
+
+def _on_sizes(
+    kind: str,
+    items: Sequence[str],
+    u_size_mm: float,
+    roi: str | None,
+    out: Path,
+    certificate: str,
+    date: str,
+    camera: Sequence[str],
+    no_picture: bool,
+    as_json: bool,
+    **limits: float | None,
+) -> None:
+    with _sentences():
+        from calib.calibration_picture import picture_of_edges
+        from calib.known_widths import find_widths
+        from calib.measured_scale import Reference
+        from calib.scale_from_sizes import MeasuredSize, scale_from_sizes
+        from fingervision.cli import _calibration_report as report
+
+        _refuse_foreign(out)
+        pictures = read_references(items, kind, u_size_mm)
+        bench, stated = limits_from(limits, lens_calibrated=False)
+        edges = find_widths(pictures, region_from(roi))
+        sizes = [
+            MeasuredSize(
+                Reference(f"{picture.kind} {picture.name}", picture.size_mm, picture.u_size_mm, certificate, date),
+                edge.width_px,
+                edge.u_width_px,
+                edge.points_px,
+                edge.light,
+            )
+            for picture, edge in zip(pictures, edges, strict=True)
+        ]
+        height, width = pictures[0].grey.shape
+        fit = scale_from_sizes(sizes, (width, height), bench, stated)
+        calibration = _written(fit.calibration, out, camera)
+        if not no_picture:
+            for picture, edge in zip(pictures, edges, strict=True):
+                words = f"{picture.name}: {picture.size_mm:g} mm = {edge.width_px:.3f} px"
+                _write_picture(out, picture.name, picture_of_edges(picture.grey, edge, words))
+        if as_json:
+            more = {
+                "out": str(out),
+                "bias_known": fit.bias_known,
+                "chi_square": fit.chi_square,
+                "freedom": fit.freedom,
+                "references": [
+                    {
+                        "what": size.reference.what,
+                        "size_mm": size.reference.size_mm,
+                        "width_px": edge.width_px,
+                        "u_width_px": edge.u_width_px,
+                        "profiles": edge.profiles,
+                        "first": edge.first,
+                        "last": edge.last,
+                        "count": edge.count,
+                        "taper_px": edge.taper,
+                        "u_taper_px": edge.u_taper,
+                        "residual_mm": float(residual),
+                    }
+                    for size, edge, residual in zip(sizes, edges, fit.residual_mm, strict=True)
+                ],
+            }
+            click.echo(json.dumps(report.as_json(calibration, more)))
+            return
+        lines = [*report.scale_lines(calibration), *report.sizes_lines(fit, edges), *report.budget_lines(calibration)]
+        click.echo("\n".join([*lines, "", f"Written: {out}"]))
+
+
+def _board_options(command: Command) -> Command:
+    for option in reversed(
+        (
+            click.argument("images", nargs=-1, required=True, metavar="IMAGE...", type=click.Path(path_type=Path)),
+            click.option("--square-mm", type=float, required=True, help="Side of a square, mm."),
+            click.option(
+                "--u-square-mm",
+                type=float,
+                default=None,
+                help="Standard uncertainty of a square's side, mm.  [default: 0.1 % of it]",
+            ),
+        )
+    ):
+        command = option(command)
+    return command
+
+
+@command.command("chessboard")
+@_board_options
+@click.option("--squares", required=True, metavar="9x6", help="Inner corners: 9x6 for a board of 10x7 squares.")
+@limit_options
+@_output_options
+def chessboard(**options: Any) -> None:
+    """Calibrate on a chessboard: lens and tilt from three pictures or more, the plane alone from one.
+
+    The first picture defines the plane in which distances are measured: put the board where the gripper moves. In the
+    others tilt it differently each time.
+
+    \b
+    Example:
+      fingervision calibrate chessboard plane.png tilted*.png --squares 9x6 --square-mm 2.5 -o calibration.json
+    """
+    _on_board(marker_mm=None, **options)
+
+
+@command.command("charuco")
+@_board_options
+@click.option("--squares", required=True, metavar="8x6", help="Squares along x and y.")
+@click.option("--marker-mm", type=float, default=None, help="Side of a marker, mm.  [default: 0.75 of a square]")
+@limit_options
+@_output_options
+def charuco(marker_mm: float | None, square_mm: float, **options: Any) -> None:
+    """Calibrate on a ChArUco board; it may leave the frame. The dictionary of its markers is found by itself.
+
+    As `chessboard`, but --squares counts squares.
+
+    \b
+    Example:
+      fingervision calibrate charuco plane.png tilted*.png --squares 8x6 --square-mm 3 --marker-mm 2.2
+    """
+    _on_board(marker_mm=0.75 * square_mm if marker_mm is None else marker_mm, square_mm=square_mm, **options)
+
+
+def _on_board(
+    images: Sequence[Path],
+    squares: str,
+    square_mm: float,
+    u_square_mm: float | None,
+    marker_mm: float | None,
+    out: Path,
+    certificate: str,
+    date: str,
+    camera: Sequence[str],
+    no_picture: bool,
+    as_json: bool,
+    **limits: float | None,
+) -> None:
+    with _sentences():
+        from calib.board import Board, find_corners
+        from calib.calibration_picture import picture_of_corners
+        from calib.scale_from_board import scale_from_board
+        from fingervision.cli import _calibration_report as report
+
+        _refuse_foreign(out)
+        columns, rows = _squares(squares)
+        u_square = 0.001 * square_mm if u_square_mm is None else u_square_mm
+        board = Board(columns, rows, square_mm, u_square, marker_mm)
+        bench, stated = limits_from(limits, lens_calibrated=len(images) > 1)
+        pictures = read_pictures(images)
+        corners = [find_corners(grey, board, path.name) for grey, path in zip(pictures, images, strict=True)]
+        height, width = pictures[0].shape
+        fit = scale_from_board(corners, board, (width, height), bench, stated)
+        certified = tuple(replace(each, certificate=certificate, date=date) for each in fit.calibration.references)
+        calibration = _written(replace(fit.calibration, references=certified), out, camera)
+        if not no_picture:
+            residuals = [fit.plane.residual_px] if fit.lens is None else fit.lens.residual_px
+            for grey, found, residual in zip(pictures, corners, residuals, strict=True):
+                words = f"{found.name}: {len(found.points_px)} corners"
+                _write_picture(out, found.name, picture_of_corners(grey, found.points_px, residual, words))
+        if as_json:
+            more = {
+                "out": str(out),
+                "rms_px": None if fit.lens is None else fit.lens.rms_px,
+                "straightness_px": fit.straightness_px,
+                "tilt_deg": fit.plane.tilt_deg,
+            }
+            click.echo(json.dumps(report.as_json(calibration, more)))
+            return
+        lines = [*report.scale_lines(calibration), *report.board_lines(fit), *report.budget_lines(calibration)]
+        click.echo("\n".join([*lines, "", f"Written: {out}"]))
+
+
+@command.command("check")
+@click.argument("calibration", type=click.Path(path_type=Path))
+@_size_options
+@click.option("--json", "as_json", is_flag=True, help="Print the result for programs.")
+def check(calibration: Path, items: Sequence[str], u_size_mm: float, roi: str | None, as_json: bool) -> None:
+    """Measure a known object with an existing calibration and say whether it agrees (E_n number).
+
+    \b
+    Example:
+      fingervision calibrate check calibration.json object.png=7.500 --u-size-mm 0.001
+    """
+    with _sentences():
+        import numpy as np
+
+        from calib.agreement import Agreement
+        from calib.known_widths import find_widths
+        from fingervision.storage.calibration_json import read_calibration
+
+        scale = read_calibration(calibration)
+        pictures = read_references(items, "bar", u_size_mm)
+        height, width = pictures[0].grey.shape
+        scale.check_frame_size(width, height)
+        edges = find_widths(pictures, region_from(roi), scale.px_per_mm)
+        points = np.array([edge.points_px for edge in edges])
+        u_random = np.array([edge.u_width_px for edge in edges])
+        distances = scale.distances(points, u_random, np.array([edge.light for edge in edges]))
+        assert distances.u_mm is not None  # noqa: S101 - a calibration always has an uncertainty
+        results = [
+            Agreement(float(value), float(u), picture.size_mm, picture.u_size_mm)
+            for picture, value, u in zip(pictures, distances.value_mm, distances.u_mm, strict=True)
+        ]
+        if as_json:
+            content = [
+                {
+                    "image": picture.name,
+                    "measured_mm": each.measured_mm,
+                    "u_measured_mm": each.u_measured_mm,
+                    "size_mm": each.certified_mm,
+                    "deviation_mm": each.deviation_mm,
+                    "e_n": each.e_n,
+                    "agrees": each.agrees,
+                }
+                for picture, each in zip(pictures, results, strict=True)
+            ]
+            click.echo(json.dumps(content))
+            return
+        for picture, each in zip(pictures, results, strict=True):
+            words = "agrees with" if each.agrees else "DISAGREES with"
+            click.echo(
+                f"{picture.name}: measured {each.measured_mm:.4f} mm, U = {2 * each.u_measured_mm:.4f} mm (k = 2); "
+                f"{words} {each.certified_mm:g} mm: deviation {1e3 * each.deviation_mm:+.2f} um, E_n = {each.e_n:+.2f}"
+            )
+
+
+@command.command("repeat")
+@click.argument("tables", nargs=-1, required=True, metavar="GAPS.csv...", type=click.Path(path_type=Path))
+@click.option("--tolerance-mm", type=float, default=None, help="Whole width of the tolerance, for %GRR.")
+@click.option("--by-input", is_flag=True, help="Every input_mm of the drive is a part of its own.")
+@click.option("--json", "as_json", is_flag=True, help="Print the result for programs.")
+def repeat(tables: Sequence[Path], tolerance_mm: float | None, by_input: bool, as_json: bool) -> None:
+    """Gauge repeatability and reproducibility over repeated recordings (AIAG, analysis of variance).
+
+    Frames of one recording repeat; recordings of the same thing, set up again each time, reproduce.
+
+    \b
+    Examples:
+      fingervision calibrate repeat monday/gaps.csv tuesday/gaps.csv wednesday/gaps.csv --tolerance-mm 0.02
+      fingervision calibrate repeat a/gaps.csv b/gaps.csv --by-input
+    """
+    with _sentences():
+        from calib.gauge_study import gauge_study, verdict
+        from fingervision.storage.gap_readings import read_gap_readings
+
+        if len({table.resolve() for table in tables}) < len(tables):
+            raise UsageError("Every table may be named once, but one is named twice: leave it out.")
+        recordings = [read_gap_readings(table, by_input) for table in tables]
+        parts = [part for part in recordings[0] if all(len(each.get(part, ())) >= 2 for each in recordings)]
+        if not parts:
+            raise FingervisionError(
+                "The recordings must share at least one part with two readings in each, but share none: "
+                "record the same thing in all of them."
+            )
+        # Every cell of the study holds the same number of readings: as many as the shortest offers.
+        trials = min(len(each[part]) for each in recordings for part in parts)
+        study = gauge_study([[each[part][:trials] for part in parts] for each in recordings])
+        percent = None if tolerance_mm is None else study.percent_of(tolerance_mm)
+        if as_json:
+            content = {
+                "repeatability_mm": study.repeatability_mm,
+                "reproducibility_mm": study.reproducibility_mm,
+                "grr_mm": study.grr_mm,
+                "part_mm": study.part_mm,
+                "percent_of_tolerance": percent,
+                "percent_of_total": study.percent_of_total,
+                "recordings": study.recordings,
+                "parts": study.parts,
+                "trials": study.trials,
+            }
+            click.echo(json.dumps(content))
+            return
+        click.echo(f"{study.recordings} recordings, {study.parts} part(s), {study.trials} readings each")
+        click.echo(
+            f"repeatability    {1e3 * study.repeatability_mm:9.4f} um   (equipment variation, standard deviation)"
+        )
+        click.echo(f"reproducibility  {1e3 * study.reproducibility_mm:9.4f} um   (from recording to recording)")
+        click.echo(f"gauge R&R        {1e3 * study.grr_mm:9.4f} um")
+        if study.percent_of_total is not None:
+            click.echo(f"%GRR of the total variation: {study.percent_of_total:.2f} %")
+        if percent is not None:
+            click.echo(f"%GRR of {tolerance_mm:g} mm: {percent:.2f} % (6 s): {verdict(percent)}")
+        else:
+            click.echo("State --tolerance-mm to see which part of it the gauge takes up.")
+
+
+def _squares(squares: str) -> tuple[int, int]:
+    try:
+        columns, rows = (int(part) for part in squares.lower().split("x"))
+    except ValueError:
+        raise UsageError(f"--squares must be two whole numbers such as 9x6, but is {squares!r}.") from None
+    return columns, rows
+
+
+def _refuse_foreign(out: Path) -> None:
+    """Overwrite a calibration, never anything else."""
+    if not out.exists():
+        return
+    try:
+        content = json.loads(out.read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        content = None
+    if not (isinstance(content, dict) and "px_per_mm" in content):
+        raise FingervisionError(f"{out} stands there already and is no calibration; name another file with -o.")
+
+
+def _written(calibration: "Calibration", out: Path, camera: Sequence[str]) -> "Calibration":
+    from datetime import UTC, datetime
+
+    from fingervision.storage.calibration_json import write_calibration
+
+    settings = {}
+    for setting in camera:
+        name, equals, value = setting.partition("=")
+        if not (name and equals):
+            raise UsageError(f"--camera must be NAME=VALUE, but is {setting!r}.")
+        settings[name] = value
+    complete = replace(
+        calibration,
+        camera=settings,
+        made_at=datetime.now(UTC).isoformat(timespec="seconds"),
+        software=f"fingervision {__version__}",
+    )
+    write_calibration(complete, out)
+    return complete
+
+
+def _write_picture(out: Path, name: str, picture: "NDArray[np.uint8]") -> None:
+    import cv2
+
+    path = out.with_name(f"{out.stem}_{Path(name).stem}.png")
+    written, content = cv2.imencode(".png", picture[:, :, ::-1])
+    if written:
+        try:
+            path.write_bytes(content.tobytes())
+        except OSError as error:
+            raise FingervisionError(f"The picture {path} could not be written: {error.strerror}.") from error

@@ -1,0 +1,53 @@
+"""Gaps of a gaps.csv as repeated readings of parts, for a gauge study."""
+
+import csv
+from math import isfinite
+from pathlib import Path
+
+from fingervision.domain.errors import FingervisionError
+
+# Inputs nearer than this are one part (mm): stages return to a place no better.
+SAME_INPUT_PLACES = 3
+
+
+def read_gap_readings(path: Path, by_input: bool) -> dict[float | None, list[float]]:
+    """Read the gaps of all frames that gave one.
+
+    Parameters
+    ----------
+    path : Path
+        A gaps.csv.
+    by_input : bool
+        Whether every input of the drive is a part of its own; otherwise the recording shows one part, named None.
+
+    Raises
+    ------
+    FingervisionError
+        The file cannot be read or holds no gaps.
+    """
+    readings: dict[float | None, list[float]] = {}
+    try:
+        lines = [line for line in path.read_text(encoding="utf-8").splitlines() if not line.startswith("#")]
+    except (OSError, UnicodeDecodeError) as error:
+        raise FingervisionError(f"The table {path} could not be read: {error}; give a gaps.csv.") from error
+    table = csv.DictReader(lines)
+    needed = {"gap_mm"} | ({"input_mm"} if by_input else set())
+    missing = needed - set(table.fieldnames or ())
+    if missing:
+        raise FingervisionError(f"The table {path} must have a column {min(missing)}, but has none: give a gaps.csv.")
+    for number, row in enumerate(table, start=2):
+        if not row["gap_mm"] or (by_input and not row["input_mm"]):
+            continue
+        try:
+            gap_mm = float(row["gap_mm"])
+            part = round(float(row["input_mm"]), SAME_INPUT_PLACES) if by_input else None
+        except ValueError:
+            gap_mm, part = float("nan"), None
+        if not isfinite(gap_mm):
+            raise FingervisionError(
+                f"Row {number} of {path} must hold a number as gap_mm, but holds {row['gap_mm']!r}."
+            )
+        readings.setdefault(part, []).append(gap_mm)
+    if not readings:
+        raise FingervisionError(f"The table {path} must hold at least one gap, but holds none.")
+    return readings
