@@ -108,6 +108,8 @@ def coverage(outlines: Sequence[Outline], blur_px: float, window: Region) -> NDA
         0 outside, 1 inside.
     """
     height, width = window.height_px, window.width_px
+    if height == 0 or width == 0:
+        return np.zeros((height, width))
     nodes = panels(outlines, blur_px) - (window.x_px, window.y_px)
     reach = REACH_SIGMAS * blur_px + 1.0
     low, high = nodes.min(axis=1), nodes.max(axis=1)
@@ -139,7 +141,9 @@ def coverage(outlines: Sequence[Outline], blur_px: float, window: Region) -> NDA
 
 def window_of(outlines: Sequence[Outline], blur_px: float, width_px: int, height_px: int) -> Region:
     """Find the part of a frame that the outlines can darken or lighten; its sizes may be 0."""
-    boxes = np.array([outline.box_px for outline in outlines])
+    boxes = np.array([outline.box_px for outline in outlines if outline.pieces])
+    if not boxes.size:
+        return Region(0, 0, 0, 0)
     reach = REACH_SIGMAS * blur_px + 1.0
     limits = (width_px, height_px)
     first = np.clip(np.floor(boxes[:, :2].min(axis=0) - reach), 0, limits).astype(int)

@@ -38,11 +38,14 @@ def exact_grey(scene: Scene, camera: Camera) -> NDArray[np.float64]:
     for patch in scene.behind:
         _paint(grey, patch.outlines, patch.level, light.ground, camera)
     outlines = tuple(finger.outline for finger in scene.fingers)
-    if outlines:
-        if scene.rim is not None:
-            rimmed = union(tuple(outline.grown(scene.rim.width_px) for outline in outlines))
-            _paint(grey, rimmed, scene.rim.level, light.ground, camera)
-        _paint(grey, union(outlines), light.fingers, scene.rim.level if scene.rim else light.ground, camera)
+    if outlines and scene.rim is None:
+        _paint(grey, union(outlines), light.fingers, light.ground, camera)
+    elif outlines and scene.rim is not None:
+        rimmed = union(tuple(outline.grown(scene.rim.width_px) for outline in outlines))
+        _paint(grey, rimmed, scene.rim.level, light.ground, camera)
+        # The rim reaches under the fingers and is narrow: there only the difference to it is exact where both blur.
+        part, covered = _covered(grey, union(outlines), light.fingers < scene.rim.level, camera)
+        part += (light.fingers - scene.rim.level) * covered
     for patch in scene.before:
         _paint(grey, patch.outlines, patch.level, light.fingers, camera)
     grey *= light.field(scene.width_px, scene.height_px, camera.blur_px)
@@ -75,18 +78,21 @@ def _paint(
     grey: NDArray[np.float64], outlines: tuple[Outline, ...], level: float, around: float, camera: Camera
 ) -> None:
     """Cover the picture with solids of one level; `around` is the level about them, which says where light spreads."""
+    part, covered = _covered(grey, outlines, level < around, camera)
+    # level + (part - level) (1 - covered), in place: fresh arrays of a frame's size cost more than the sums.
+    np.subtract(1.0, covered, out=covered)
+    part -= level
+    part *= covered
+    part += level
+
+
+def _covered(
+    grey: NDArray[np.float64], outlines: tuple[Outline, ...], dark: bool, camera: Camera
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Give the part of the picture that solids can change, as a view, and how much of each pixel there they cover."""
     height_px, width_px = grey.shape
-    seen = camera.sees(outlines, width_px, height_px)
-    spread_px = camera.bloom_px if level > around else -camera.bloom_px
-    grown = tuple(whole for whole in (outline.grown(spread_px) for outline in seen) if whole.pieces)
-    if not grown:
-        return
+    spread_px = -camera.bloom_px if dark else camera.bloom_px
+    grown = [outline.grown(spread_px) for outline in camera.sees(outlines, width_px, height_px)]
     window = window_of(grown, camera.blur_px, width_px, height_px)
     part = grey[window.y_px : window.y_px + window.height_px, window.x_px : window.x_px + window.width_px]
-    if part.size:
-        # level + (part - level) (1 - covered), in place: fresh arrays of a frame's size cost more than the sums.
-        uncovered = coverage(grown, camera.blur_px, window)
-        np.subtract(1.0, uncovered, out=uncovered)
-        part -= level
-        part *= uncovered
-        part += level
+    return part, coverage(grown, camera.blur_px, window)

@@ -140,6 +140,15 @@ def test_a_rim_lies_outside_the_edge_and_leaves_it_where_it_was() -> None:
     assert first - 0.5 + ((row[first : last + 1] - 40.0) / 210.0).sum() == pytest.approx(inner, abs=EDGE_PX)
 
 
+@pytest.mark.parametrize("rim_px", [0.7, 2.0, 5.0])
+def test_a_rim_narrower_than_the_blur_keeps_its_area_and_the_edge_its_place(rim_px: float) -> None:
+    row = exact_grey(two_fingers(90.4, rim=Rim(rim_px, 250.0)), Camera(blur_px=0.9))[300]
+    inner = 319.5 + 45.2
+    first, last = 340, 390
+    light = 200.0 * (inner - rim_px - (first - 0.5)) + 250.0 * rim_px + 40.0 * (last + 0.5 - inner)
+    assert (row[first : last + 1].sum() - light) / 160.0 == pytest.approx(0.0, abs=EDGE_PX)
+
+
 @pytest.mark.parametrize("direction", Direction)
 def test_a_highlight_lies_inside_each_finger(direction: Direction) -> None:
     plain = two_fingers(90.0, direction=direction, tilt_deg=5.0)
