@@ -1,0 +1,49 @@
+"""What was measured at the bench: gap and fingers against the recorded input."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class MeasuredTable:
+    """Rows of a measured table that have a value, runs one after the other, sorted by time within each.
+
+    Parameters
+    ----------
+    input_mm, gap_mm : ndarray of float, shape (n,)
+        Recorded input and measured gap (`right_mm - left_mm` where both exist).
+    midline_mm : ndarray of float, shape (n,), or None
+        The middle between the fingers; None where only the gap was measured.
+    time_s : ndarray of float, shape (n,), or None
+        Times.
+    runs : tuple of slice
+        Samples of each run.
+    run_names : tuple of str
+        As in the table.
+    u_random_mm : ndarray of float, shape (n,), or None
+        The measurement's own random uncertainty of the gap.
+    force_n : ndarray of float, shape (n,), or None
+        Force at the drive.
+    notes : tuple of str
+        What the reader mended or left out, a sentence each.
+    """
+
+    input_mm: NDArray[np.float64]
+    gap_mm: NDArray[np.float64]
+    midline_mm: NDArray[np.float64] | None
+    time_s: NDArray[np.float64] | None
+    runs: tuple[slice, ...]
+    run_names: tuple[str, ...]
+    u_random_mm: NDArray[np.float64] | None = None
+    force_n: NDArray[np.float64] | None = None
+    notes: tuple[str, ...] = ()
+
+    @property
+    def shared_clock(self) -> bool:
+        """Whether the runs' times follow one another without overlap."""
+        if self.time_s is None:
+            return False
+        spans = sorted((self.time_s[run][0], self.time_s[run][-1]) for run in self.runs)
+        return all(before[1] < after[0] for before, after in zip(spans, spans[1:], strict=False))

@@ -1,0 +1,84 @@
+"""What a diagnosis found: the noun that report.json and report.html are written from."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from enum import StrEnum
+
+from fingervision.domain.parameter import Estimate
+
+
+class Verdict(StrEnum):
+    """The four answers."""
+
+    AGREES = "agrees"
+    NAMED = "named"
+    AMBIGUOUS = "ambiguous"
+    UNKNOWN = "unknown"
+
+
+@dataclass(frozen=True, slots=True)
+class NamedEffect:
+    """An effect of the answer with its parameters."""
+
+    name: str
+    stage: str
+    parameters: Mapping[str, Estimate]
+
+
+@dataclass(frozen=True, slots=True)
+class Place:
+    """A region where the residual cannot be noise: channel, variable, its limits, size, significance, a sentence."""
+
+    channel: str
+    variable: str
+    start: float
+    end: float
+    size: float
+    unit: str
+    sigma: float
+    words: str
+
+
+@dataclass(frozen=True, slots=True)
+class Disagreement:
+    """RMS of measured minus predicted in mm, midline constant removed; unseen: runs left out in turn."""
+
+    before_rms_mm: float
+    after_rms_mm: float
+    noise_rms_mm: float
+    unseen_before_rms_mm: float | None
+    unseen_after_rms_mm: float | None
+    by_channel: Mapping[str, Mapping[str, float]]
+
+
+@dataclass(frozen=True, slots=True)
+class NextRun:
+    """The run that would separate what is open: its steps, the promised gain in chi-square and its interval."""
+
+    name: str
+    steps: tuple[Mapping[str, object], ...]
+    gain: float
+    gain_interval: tuple[float, float]
+    separates: tuple[str, ...]
+    words: str
+
+
+@dataclass(frozen=True, slots=True)
+class DiagnosisReport:
+    """The whole answer; fields as in report.json."""
+
+    verdict: Verdict
+    sentence: str
+    effects: tuple[NamedEffect, ...]
+    alternatives: tuple[tuple[str, ...], ...]
+    where: tuple[Place, ...]
+    disagreement: Disagreement
+    smallest_seen: Mapping[str, Mapping[str, object]]
+    unknown: str | None
+    remaining: str
+    next_run: NextRun | None
+    excluded: tuple[Mapping[str, str], ...]
+    outliers: tuple[str, ...]
+    runners_up: tuple[Mapping[str, object], ...]
+    notes: tuple[str, ...]
+    seconds: float

@@ -1,0 +1,32 @@
+"""A model with effects added to it: what `model.toml` holds."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from fingervision.domain.model import Model
+from fingervision.domain.parameter import Estimate
+
+
+@dataclass(frozen=True, slots=True)
+class CorrectedModel:
+    """A base model and the effects that act around it, by name; the chain of the diagnosis runs them.
+
+    Parameters
+    ----------
+    name : str
+        How the report calls it.
+    base : Model
+        The gripper without effects.
+    base_path : str
+        File of the base model.
+    input_range_mm : tuple of two floats
+        Inputs that the base covers.
+    effects : mapping of str to mapping of str to Estimate
+        Parameters of each effect.
+    """
+
+    name: str
+    base: Model
+    base_path: str
+    input_range_mm: tuple[float, float]
+    effects: Mapping[str, Mapping[str, Estimate]]

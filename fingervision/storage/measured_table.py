@@ -1,0 +1,102 @@
+"""A measured table: any CSV with `input_mm,gap_mm`, and what else the bench recorded; `gaps.csv` with a drive is one."""
+
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fingervision.domain.errors import FingervisionError
+from fingervision.domain.measured_table import MeasuredTable
+from fingervision.storage.csv_columns import number, read_columns
+
+FEWEST_ROWS = 5
+NUMBERS = ("input_mm", "gap_mm", "time_s", "left_mm", "right_mm", "u_gap_mm", "u_random_mm", "force_n")
+
+
+def read_measured_table(path: Path) -> MeasuredTable:
+    """Read a measured table; rows without an input or a gap are left out and counted.
+
+    Raises
+    ------
+    FingervisionError
+        In a sentence: columns missing, cells that are no numbers, fewer than five rows, an input or a gap that
+        never changes, times that repeat within a run.
+    """
+    cells = read_columns(path, ("input_mm", "gap_mm"), (*NUMBERS[2:], "run"))
+    values = {
+        name: [number(path, name, row, cell) for row, cell in enumerate(cells[name])]
+        for name in NUMBERS
+        if name in cells
+    }
+    edges = "left_mm" in values and "right_mm" in values
+    needed = [
+        "input_mm",
+        *(["left_mm", "right_mm"] if edges else ["gap_mm"]),
+        *(["time_s"] if "time_s" in values else []),
+    ]
+    if "time_s" in values and not any(cell is not None for cell in values["time_s"]):
+        needed.remove("time_s")
+        del values["time_s"]
+    total = len(values["input_mm"])
+    kept = [row for row in range(total) if all(values[name][row] is not None for name in needed)]
+    notes = [f"{total - len(kept)} of {total} rows have no value and were left out."] if len(kept) < total else []
+    if len(kept) < FEWEST_ROWS:
+        raise FingervisionError(
+            f"{path} must have at least {FEWEST_ROWS} rows with an input and a gap, but has {len(kept)}: measure more."
+        )
+    column = {
+        name: np.array([values[name][row] for row in kept], dtype=np.float64)
+        for name in values
+        if all(values[name][row] is not None for row in kept)
+    }
+    names = [cells["run"][row] for row in kept] if "run" in cells else [""] * len(kept)
+    time = column.get("time_s")
+    if time is not None and "run" not in cells and np.any(np.diff(time) < 0.0):
+        notes.append("times run backwards and there is no run column: rows were sorted by time as one run.")
+    order, runs, run_names = _runs(column["input_mm"], time, names)
+    column = {name: value[order] for name, value in column.items()}
+    if time is not None:
+        for run, name in zip(runs, run_names, strict=True):
+            repeated = np.flatnonzero(np.diff(column["time_s"][run]) == 0.0)
+            if repeated.size:
+                raise FingervisionError(
+                    f"time_s must be unique within a run, but {column['time_s'][run][repeated[0]]:g} s stands twice in "
+                    f"run {name or '(unnamed)'} of {path}: add a run column, or remove the repeated rows."
+                )
+    if edges and np.median(column["right_mm"] - column["left_mm"]) < 0.0:
+        notes.append("left_mm is larger than right_mm: the two columns were taken as exchanged and swapped back.")
+        column["left_mm"], column["right_mm"] = column["right_mm"], column["left_mm"]
+    gap = column["right_mm"] - column["left_mm"] if edges else column["gap_mm"]
+    for label, signal in (("input_mm", column["input_mm"]), ("gap_mm", gap)):
+        if np.ptp(signal) == 0.0:
+            raise FingervisionError(
+                f"{label} must change, but is {signal[0]:g} in every row of {path}: record a run that moves."
+            )
+    if len(runs) == 1:
+        notes.append("there is one run only: it cannot tell a re-zeroing of the bench from an offset.")
+    return MeasuredTable(
+        input_mm=column["input_mm"],
+        gap_mm=gap,
+        midline_mm=0.5 * (column["left_mm"] + column["right_mm"]) if edges else None,
+        time_s=column.get("time_s"),
+        runs=runs,
+        run_names=run_names,
+        u_random_mm=column.get("u_random_mm", column.get("u_gap_mm")),
+        force_n=column.get("force_n"),
+        notes=tuple(notes),
+    )
+
+
+def _runs(
+    inputs: NDArray[np.float64], time: NDArray[np.float64] | None, names: list[str]
+) -> tuple[NDArray[np.intp], tuple[slice, ...], tuple[str, ...]]:
+    """Order of the rows, runs by their first time (or smallest input), so that no name decides anything."""
+    key = inputs if time is None else time
+    groups = {name: [row for row in range(len(names)) if names[row] == name] for name in dict.fromkeys(names)}
+    ordered = sorted(groups.items(), key=lambda item: (min(key[item[1]]), float(np.sum(inputs[item[1]]))))
+    order: list[int] = []
+    runs: list[slice] = []
+    for _, rows in ordered:
+        runs.append(slice(len(order), len(order) + len(rows)))
+        order += sorted(rows, key=lambda row: key[row])
+    return np.array(order, dtype=np.intp), tuple(runs), tuple(name for name, _ in ordered)

@@ -1,0 +1,61 @@
+"""model.toml, a corrected model; and the choice of reader for every kind of model file."""
+
+import os
+import tomllib
+from collections.abc import Mapping
+from pathlib import Path
+
+from fingervision.domain.errors import FingervisionError
+from fingervision.domain.parameter import Estimate
+from fingervision.models.corrected import CorrectedModel
+from fingervision.storage.simulation_table import read_simulation_table
+
+
+def read_model(path: Path) -> CorrectedModel:
+    """Read a simulation table (without effects) or a corrected model.
+
+    Raises
+    ------
+    FingervisionError
+        The file is neither, or its base is missing.
+    """
+    if path.suffix.lower() != ".toml":
+        table = read_simulation_table(path)
+        return CorrectedModel(table.name, table, str(path), table.input_range_mm, {})
+    try:
+        document = tomllib.loads(path.read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        raise FingervisionError(f"There is no model {path}.") from None
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError, OSError) as error:
+        raise FingervisionError(f"{path} must be a TOML file, but could not be read: {error}.") from error
+    if "base" not in document:
+        raise FingervisionError(
+            f"{path} must be a corrected model with a key base, but has {', '.join(document) or 'nothing'}: "
+            "give a simulation table (.csv) or a model.toml."
+        )
+    base = read_model(path.parent / str(document["base"]))
+    effects: dict[str, Mapping[str, Estimate]] = dict(base.effects)
+    for entry in document.get("effect", []):
+        try:
+            effects[str(entry["name"])] = {
+                name: Estimate(float(value["value"]), float(value["u"]) if "u" in value else None)
+                for name, value in entry["parameters"].items()
+            }
+        except (KeyError, TypeError, ValueError) as error:
+            raise FingervisionError(
+                f"An effect in {path} must have a name and parameters like play_mm = {{ value = 0.01, u = 0.001 }}, "
+                f"but is {entry}: mend it."
+            ) from error
+    return CorrectedModel(base.name, base.base, base.base_path, base.input_range_mm, effects)
+
+
+def write_model(path: Path, base_path: Path, effects: Mapping[str, Mapping[str, Estimate]]) -> None:
+    """Write a corrected model; the base is named relative to the file."""
+    base = Path(os.path.relpath(base_path.resolve(), path.parent.resolve())).as_posix()
+    lines = ["schema = 1", f'base = "{base}"']
+    for name, parameters in effects.items():
+        lines += ["", "[[effect]]", f'name = "{name}"', "[effect.parameters]"]
+        for key, estimate in parameters.items():
+            u = "" if estimate.u is None else f", u = {estimate.u!r}"
+            lines.append(f"{key} = {{ value = {estimate.value!r}{u} }}")
+    path.write_text("\n".join(lines) + "\n", encoding="utf-8")

@@ -1,0 +1,48 @@
+"""A simulation table: `input_mm,gap_mm[,left_mm,right_mm,force_n]`, any order, at least two rows."""
+
+from pathlib import Path
+
+import numpy as np
+
+from fingervision.domain.errors import FingervisionError
+from fingervision.models.table import TableModel
+from fingervision.storage.csv_columns import number, read_columns
+
+
+def read_simulation_table(path: Path) -> TableModel:
+    """Read a simulation table as a model.
+
+    Raises
+    ------
+    FingervisionError
+        In a sentence: columns missing, empty cells, fewer than two rows, an input that stands twice, a gap that
+        does not depend on the input at all.
+    """
+    cells = read_columns(path, ("input_mm", "gap_mm"), ("left_mm", "right_mm", "force_n"))
+    column = {}
+    for name, texts in cells.items():
+        values = [number(path, name, row, text) for row, text in enumerate(texts)]
+        if None in values:
+            raise FingervisionError(
+                f"{name} must have a number in every row of a simulation table, but data row {values.index(None) + 1} "
+                f"of {path} is empty: fill it, or remove the row."
+            )
+        column[name] = np.array(values, dtype=np.float64)
+    inputs = column["input_mm"]
+    if inputs.size < 2:
+        raise FingervisionError(f"{path} must have at least two rows, but has {inputs.size}: simulate more inputs.")
+    order = np.argsort(inputs)
+    if np.any(np.diff(inputs[order]) == 0.0):
+        twice = inputs[order][np.flatnonzero(np.diff(inputs[order]) == 0.0)[0]]
+        raise FingervisionError(f"input_mm must be unique, but {twice:g} stands twice in {path}: remove one row.")
+    if np.ptp(column["gap_mm"]) == 0.0:
+        raise FingervisionError(
+            f"gap_mm must depend on the input, but is {column['gap_mm'][0]:g} in every row of {path}: "
+            "check what the simulation exported."
+        )
+    if "left_mm" in column and "right_mm" in column:
+        left, right = column["left_mm"], column["right_mm"]
+    else:
+        left, right = -0.5 * column["gap_mm"], 0.5 * column["gap_mm"]
+    force = column["force_n"][order] if "force_n" in column else None
+    return TableModel(path.name, inputs[order], left[order], right[order], force)
