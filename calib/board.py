@@ -13,8 +13,8 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int_]
 Grey = NDArray[np.uint8] | NDArray[np.uint16]
 
-# A corner is refined within this part of the distance to its nearest neighbour: as many grey levels as there are without
-# meeting another edge.
+# A corner is refined within this part of the distance to its nearest neighbour: as many grey levels as there are
+# without meeting another edge.
 WINDOW_PART = 0.3
 # A marker stands in every light square of a ChArUco board, and the window must end before it begins.
 MARKER_MARGIN_PART = 0.8
@@ -102,21 +102,21 @@ def find_corners(grey: Grey, board: Board, name: str) -> BoardCorners:
     CalibrationError
         The picture does not show this board.
     """
-    eight_bit = grey if grey.dtype == np.uint8 else (grey // 257).astype(np.uint8)
+    eight_bit = np.asarray(grey if grey.dtype == np.uint8 else grey // 257, dtype=np.uint8)
     found = _chessboard(eight_bit, board) if board.marker_mm is None else _charuco(eight_bit, board)
     if found is None:
         if board.marker_mm is None:
             raise CalibrationError(
-                f"{name} must show a chessboard of {board.columns}x{board.rows} inner corners, the whole of it, but does "
-                f"not: check --squares, which counts inner corners (a board of {board.columns + 1}x{board.rows + 1} "
-                "squares), and that the board has a light margin."
+                f"{name} must show a chessboard of {board.columns}x{board.rows} inner corners, the whole of it, but "
+                f"does not: check --squares, which counts inner corners (a board of {board.columns + 1}x"
+                f"{board.rows + 1} squares), and that the board has a light margin."
             )
         raise CalibrationError(
-            f"{name} must show a ChArUco board of {board.columns}x{board.rows} squares, but does not: check --squares and "
-            "that at least six corners between markers are in view."
+            f"{name} must show a ChArUco board of {board.columns}x{board.rows} squares, but does not: check --squares "
+            "and that at least six corners between markers are in view."
         )
     points_px, cells = found
-    return BoardCorners(name, points_px, cells, cells * board.square_mm)
+    return BoardCorners(name, points_px, cells, np.asarray(cells * board.square_mm, dtype=np.float64))
 
 
 def _chessboard(grey: NDArray[np.uint8], board: Board) -> tuple[Floats, Ints] | None:
@@ -138,16 +138,16 @@ def _charuco(grey: NDArray[np.uint8], board: Board) -> tuple[Floats, Ints] | Non
     best: tuple[Floats, Ints] | None = None
     for name in DICTIONARIES:
         dictionary = cv2.aruco.getPredefinedDictionary(getattr(cv2.aruco, name))
-        _, marker_ids, _ = cv2.aruco.ArucoDetector(dictionary).detectMarkers(grey)
-        if marker_ids is None or len(marker_ids) < 3:
+        found = cv2.aruco.ArucoDetector(dictionary).detectMarkers(grey)[0]
+        if len(found) < 3:
             continue
         for legacy in (False, True):
             pattern = cv2.aruco.CharucoBoard((board.columns, board.rows), board.square_mm, board.marker_mm, dictionary)
             pattern.setLegacyPattern(legacy)
             corners, ids, _, _ = cv2.aruco.CharucoDetector(pattern).detectBoard(grey)
-            if ids is None or len(ids) < FEWEST_CORNERS:
+            number = np.asarray(ids if np.ndim(ids) else [], dtype=np.int_).reshape(-1)
+            if number.size < FEWEST_CORNERS:
                 continue
-            number = np.asarray(ids).reshape(-1).astype(np.int_)
             cells = np.stack([number % (board.columns - 1), number // (board.columns - 1)], axis=1)
             coarse = np.asarray(corners, dtype=np.float32).reshape(-1, 2)
             if _is_one_board(coarse, cells) and (best is None or len(cells) > len(best[1])):
@@ -175,7 +175,7 @@ def _spacing_px(points_px: NDArray[np.float32]) -> float:
 
 
 def _refined(grey: NDArray[np.uint8], coarse: NDArray[np.float32], reach_px: float) -> Floats:
-    # Where the gradient is at right angles to the line from the corner (Foerstner & Guelch, ISPRS 1987), on grey levels.
+    # Where the gradient is at right angles to the line from the corner (Foerstner & Guelch, ISPRS 1987).
     reach = max(2, round(reach_px))
     criteria = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, REFINING_STEPS, REFINED_PX)
     corners = cv2.cornerSubPix(grey, coarse.reshape(-1, 1, 2).copy(), (reach, reach), (-1, -1), criteria)

@@ -33,13 +33,27 @@ def picture_of_edges(grey: NDArray[np.uint8] | NDArray[np.uint16], edges: Parall
     across = (edges.points_px[1] - edges.points_px[0]) / edges.width_px
     for points, residual in zip(edges.edges_px, edges.residuals_px, strict=True):
         line = points - residual[:, None] * across
-        _polyline(canvas, line[[0, -1]] * zoom, GREEN)
-        _polyline(canvas, (line + times * residual[:, None] * across) * zoom, ORANGE)
+        _polyline(canvas, _zoomed(line[[0, -1]], zoom), GREEN)
+        _polyline(canvas, _zoomed(line + times * residual[:, None] * across, zoom), ORANGE)
     cv2.arrowedLine(
-        canvas, _at(edges.points_px[0] * zoom), _at(edges.points_px[1] * zoom), BLUE, 1, cv2.LINE_AA, SHIFT, 0.03
+        canvas,
+        _at(_zoomed(edges.points_px[0], zoom)),
+        _at(_zoomed(edges.points_px[1], zoom)),
+        BLUE,
+        1,
+        cv2.LINE_AA,
+        SHIFT,
+        0.03,
     )
     cv2.arrowedLine(
-        canvas, _at(edges.points_px[1] * zoom), _at(edges.points_px[0] * zoom), BLUE, 1, cv2.LINE_AA, SHIFT, 0.03
+        canvas,
+        _at(_zoomed(edges.points_px[1], zoom)),
+        _at(_zoomed(edges.points_px[0], zoom)),
+        BLUE,
+        1,
+        cv2.LINE_AA,
+        SHIFT,
+        0.03,
     )
     return _signed(canvas, f"{words}   green: edges   orange: residuals x {times}")
 
@@ -51,8 +65,16 @@ def picture_of_corners(
     canvas, zoom = _canvas(grey)
     times = _magnification(float(np.percentile(np.linalg.norm(residual_px, axis=1), 95)))
     for corner, residual in zip(corners_px, residual_px, strict=True):
-        cv2.circle(canvas, _at(corner * zoom), round(3 * 2**SHIFT), GREEN, 1, cv2.LINE_AA, SHIFT)
-        cv2.line(canvas, _at(corner * zoom), _at((corner + times * residual) * zoom), ORANGE, 1, cv2.LINE_AA, SHIFT)
+        cv2.circle(canvas, _at(_zoomed(corner, zoom)), round(3 * 2**SHIFT), GREEN, 1, cv2.LINE_AA, SHIFT)
+        cv2.line(
+            canvas,
+            _at(_zoomed(corner, zoom)),
+            _at(_zoomed(corner + times * residual, zoom)),
+            ORANGE,
+            1,
+            cv2.LINE_AA,
+            SHIFT,
+        )
     return _signed(canvas, f"{words}   green: corners   orange: residuals x {times}")
 
 
@@ -61,6 +83,11 @@ def _canvas(grey: NDArray[np.uint8] | NDArray[np.uint16]) -> tuple[Picture, int]
     zoom = max(1, -(-LEAST_SIDE_PX // max(grey.shape)))
     large = np.repeat(np.repeat(eight_bit, zoom, axis=0), zoom, axis=1)
     return np.ascontiguousarray(np.stack([large] * 3, axis=2)), zoom
+
+
+def _zoomed(points: Floats, zoom: int) -> Floats:
+    # The centre of the first pixel is (0, 0), before and after every pixel became zoom x zoom of them.
+    return np.asarray((points + 0.5) * zoom - 0.5)
 
 
 def _magnification(largest_px: float) -> int:

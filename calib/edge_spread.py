@@ -175,10 +175,10 @@ def _mean_profile(grey: Floats, rows: Ints, coarse: CoarseEdge, reach: int) -> _
     inside = (columns - reach >= 0) & (columns + reach < grey.shape[1])
     if reach < 2 or not np.any(inside):
         raise CalibrationError("The edge has no room: it is nearer to the border or to another edge than its own blur.")
-    window: Ints = columns[inside, None] + np.arange(-reach, reach + 1)
+    window = columns[inside, None] + np.arange(-reach, reach + 1)
     seen = grey[rows[inside, None], window]
     levels = np.median(seen, axis=0).astype(np.float64)
-    away = np.arange(-reach, reach + 1) + float(np.mean(columns[inside] - middle[inside]))
+    away = np.arange(-reach, reach + 1.0) + float(np.mean(columns[inside] - middle[inside]))
     if not coarse.rising:
         levels = -levels
     ends = max(1, reach // 3)

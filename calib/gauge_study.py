@@ -11,7 +11,8 @@ from calib.errors import CalibrationError
 
 Floats = NDArray[np.float64]
 
-# A gauge is said to take up this many standard deviations (AIAG, Measurement Systems Analysis, 4th ed. 2010, chapter III).
+# A gauge is said to take up this many standard deviations (AIAG, Measurement Systems Analysis, 4th ed.
+# 2010, chapter III).
 SPREAD = 6.0
 # Verdicts of the same manual: good below 10 %, doubtful up to 30 %.
 GOOD_PERCENT, DOUBTFUL_PERCENT = 10.0, 30.0

@@ -4,7 +4,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import product
 from math import isfinite
-from typing import NoReturn
 
 import numpy as np
 from numpy.typing import NDArray
@@ -203,8 +202,9 @@ def _refuse_unit(
             other[index] *= factor
             if any(_disagreement(each, other) < SAME_SCALE for each in combinations):
                 raise CalibrationError(
-                    f"All pictures must have one scale, but {picture.name} would have to be {other[index]:.4g} mm instead of "
-                    f"{picture.size_mm:g} mm, a factor of {words}, to agree with the others: state every size in millimetres."
+                    f"All pictures must have one scale, but {picture.name} would have to be {other[index]:.4g} mm "
+                    f"instead of {picture.size_mm:g} mm, a factor of {words}, to agree with the others: state every "
+                    "size in millimetres."
                 )
 
 
@@ -214,6 +214,6 @@ def _refuse_sizes(pictures: Sequence[KnownSize], widths: Sequence[ParallelEdges]
     others = float(np.median(np.delete(scales, odd)))
     raise CalibrationError(
         f"All pictures must have one scale, but {pictures[odd].name} of {pictures[odd].size_mm:g} mm gives "
-        f"{scales[odd]:.4g} px/mm where the others give {others:.4g}: check the sizes, and that the camera was not moved or "
-        "refocused between the pictures."
+        f"{scales[odd]:.4g} px/mm where the others give {others:.4g}: check the sizes, and that the camera was not "
+        "moved or refocused between the pictures."
     )

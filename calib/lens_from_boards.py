@@ -53,8 +53,8 @@ def lens_from_boards(pictures: Sequence[BoardCorners], frame_size_px: tuple[int,
     """
     if len(pictures) < 3:
         raise CalibrationError(
-            f"A lens needs at least three pictures of the board at different tilts, but there are {len(pictures)}: take "
-            "more, or give a single one for the plane alone."
+            f"A lens needs at least three pictures of the board at different tilts, but there are {len(pictures)}: "
+            "take more, or give a single one for the plane alone."
         )
     board = [np.column_stack([each.board_mm, np.zeros(len(each.board_mm))]).astype(np.float32) for each in pictures]
     seen = [each.points_px.astype(np.float32).reshape(-1, 1, 2) for each in pictures]
@@ -65,16 +65,16 @@ def lens_from_boards(pictures: Sequence[BoardCorners], frame_size_px: tuple[int,
     count = 2 * sum(len(each.points_px) for each in pictures)
     without, with_k3 = (float(fit[0]) ** 2 * count / 2.0 for fit in fits)
     variance = with_k3 / max(count - LENS - POSE * len(pictures), 1)
-    rms, matrix, coefficients, rotations, translations, u_lens = fits[
-        int(without - with_k3 > WORTH_A_PARAMETER * variance)
-    ][:6]
+    fit = fits[int(without - with_k3 > WORTH_A_PARAMETER * variance)]
+    matrix, coefficients, u_lens = (np.asarray(fit[k], dtype=np.float64) for k in (1, 2, 5))
+    rotations, translations = (np.array(fit[k], dtype=np.float64).reshape(-1, 3) for k in (3, 4))
     parameters = np.concatenate([[matrix[0, 0], matrix[1, 1], matrix[0, 2], matrix[1, 2]], coefficients.ravel()[:5]])
     if not (np.all(np.isfinite(parameters)) and min(parameters[:2]) > 0.0):
         raise CalibrationError("The pictures do not define a lens: tilt the board differently in each of them.")
     covariance, residual = _covariance(pictures, board, matrix, coefficients, rotations, translations)
     if parameters[8] == 0.0:
         covariance[8], covariance[:, 8] = 0.0, 0.0
-    return LensFit(Lens(parameters, covariance), np.asarray(u_lens).ravel()[:LENS], float(rms), residual)
+    return LensFit(Lens(parameters, covariance), u_lens.ravel()[:LENS], float(fit[0]), residual)
 
 
 def _covariance(
@@ -82,8 +82,8 @@ def _covariance(
     board: Sequence[NDArray[np.float32]],
     matrix: Floats,
     coefficients: Floats,
-    rotations: Sequence[Floats],
-    translations: Sequence[Floats],
+    rotations: Floats,
+    translations: Floats,
 ) -> tuple[Floats, tuple[Floats, ...]]:
     """Covariance of the lens with all poses free; OpenCV gives standard deviations alone, and they hang together."""
     normal, count, squares = np.zeros((LENS, LENS)), 0, 0.0
@@ -104,7 +104,8 @@ def _covariance(
     variance = squares / max(count - LENS - POSE * len(pictures), 1)
     unit = np.sqrt(np.maximum(np.diag(normal), np.finfo(float).tiny))
     scaled = normal / np.outer(unit, unit)
-    return variance * np.linalg.pinv(scaled, rcond=1e-12, hermitian=True) / np.outer(unit, unit), tuple(residuals)
+    inverse = np.asarray(np.linalg.pinv(scaled, rcond=1e-12, hermitian=True), dtype=np.float64)
+    return variance * inverse / np.outer(unit, unit), tuple(residuals)
 
 
 def straightness_px(corners: BoardCorners, lens: Lens | None) -> Floats:

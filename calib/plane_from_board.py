@@ -83,14 +83,15 @@ def plane_from_board(corners: BoardCorners, ideal_px: Floats, frame_size_px: tup
 
 def _homography(board_mm: Floats, points_px: Floats) -> Floats:
     homography, _ = cv2.findHomography(board_mm, points_px, 0)
-    if homography is None or not np.all(np.isfinite(homography)):
+    matrix = np.array(homography, dtype=np.float64)  # no homography becomes a number of no shape
+    if matrix.shape != (3, 3) or not np.all(np.isfinite(matrix)):
         raise CalibrationError("The board's corners do not define a plane: at least four must not lie on a line.")
-    return np.asarray(homography, dtype=np.float64)
+    return matrix
 
 
 def _squared(to_picture: Floats, middle: Floats) -> tuple[Plane, float, float]:
-    """Plane that keeps the middle and the picture's directions there, its scale, and its least stretch over its greatest."""
-    to_board = np.linalg.inv(to_picture)
+    """Plane that keeps the middle and the directions there, its scale, and its least stretch over its greatest."""
+    to_board = np.asarray(np.linalg.inv(to_picture), dtype=np.float64)
     at = apply_homography(to_board, middle)
     steps = MIDDLE_PX * np.array([[1.0, 0.0], [-1.0, 0.0], [0.0, 1.0], [0.0, -1.0]])
     seen = apply_homography(to_board, middle + steps)
@@ -107,7 +108,7 @@ def _squared(to_picture: Floats, middle: Floats) -> tuple[Plane, float, float]:
 
 def _log_scales(to_picture: Floats, middle: Floats) -> Floats:
     """Logarithms of the scale along x and along y in the middle of the picture, shape (2,)."""
-    to_board = np.linalg.inv(to_picture)
+    to_board = np.asarray(np.linalg.inv(to_picture), dtype=np.float64)
     steps = MIDDLE_PX * np.array([[1.0, 0.0], [-1.0, 0.0], [0.0, 1.0], [0.0, -1.0]])
     seen = apply_homography(to_board, middle + steps)
     return -np.log([float(np.linalg.norm(seen[0] - seen[1])), float(np.linalg.norm(seen[2] - seen[3]))])

@@ -49,8 +49,8 @@ class StraightLine:
 def line_with_errors(x: Floats, y: Floats, u_x: Floats, u_y: Floats) -> StraightLine:
     """Maximum-likelihood line where x and y are both uncertain, and independent.
 
-    York, Evensen, Lopez Martinez & De Basabe Delgado, American Journal of Physics 72 (2004), 367-375. With `u_x` of zero
-    it is the weighted least-squares line.
+    York, Evensen, Lopez Martinez & De Basabe Delgado, American Journal of Physics 72 (2004), 367-375. With `u_x` of
+    zero it is the weighted least-squares line.
 
     Parameters
     ----------

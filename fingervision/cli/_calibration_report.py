@@ -35,8 +35,8 @@ def budget_lines(calibration: "Calibration") -> list[str]:
         "",
         f"Budget of a light gap of {TABLE_GAP_MM:g} mm in the middle of the picture (standard uncertainties):",
         *table.splitlines(),
-        "Not included: motion blur, a change of focus, aperture or exposure since the calibration, edges that are not the",
-        "gripper's outline (dirt, burrs, reflections). What is marked default was not stated: see the options of this command.",
+        "Not included: motion blur, a change of focus, aperture or exposure since the calibration, edges that are not",
+        "the gripper's outline (dirt, burrs, reflections). What is marked default was not stated: see --help.",
     ]
 
 
@@ -67,7 +67,7 @@ def sizes_lines(fit: "ScaleFit", edges: Sequence["ParallelEdges"]) -> list[str]:
         )
     if any(part.source.startswith("misfit") for part in fit.calibration.parts):
         lines.append(
-            "The sizes do not lie on a straight line within their uncertainties; the uncertainty was enlarged to match. "
+            "The sizes do not lie on a straight line within their uncertainties, which were enlarged to match. "
             "Check certificates, dirt, and that nothing moved."
         )
     for reference, edge in zip(fit.calibration.references, edges, strict=True):

@@ -2,23 +2,48 @@
 
 import json
 from collections.abc import Callable, Sequence
-from contextlib import contextmanager
-from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Iterator
+from typing import Any
 
 import click
 
-from fingervision import __version__
-from fingervision.cli._bench_limits import limit_options, limits_from
-from fingervision.cli._references import read_pictures, read_references, region_from
+from fingervision.cli._bench_limits import limit_options
+from fingervision.cli._calibrating import calibrate_on_board, calibrate_on_sizes, sentences
+from fingervision.cli._references import read_references, region_from
 from fingervision.domain.errors import FingervisionError, UsageError
 
-if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
-
-    from calib.measured_scale import Calibration
+BAR_EXAMPLES = """
+\b
+Examples:
+  fingervision calibrate bar ref5.png=5.000 ref10.png=10.000 ref15.png=15.000 -o calibration.json
+  fingervision calibrate bar ref5.png=5.000 slot:ref3.png=3.000 --u-size-mm 0.0005 --plane-mm 0.2
+"""
+SLOT_EXAMPLES = """
+\b
+Example:
+  fingervision calibrate slot ref3.png=3.000 bar:ref5.png=5.000 -o calibration.json
+"""
+CHESSBOARD_EXAMPLES = """
+\b
+Example:
+  fingervision calibrate chessboard plane.png tilted*.png --squares 9x6 --square-mm 2.5 -o calibration.json
+"""
+CHARUCO_EXAMPLES = """
+\b
+Example:
+  fingervision calibrate charuco plane.png tilted*.png --squares 8x6 --square-mm 3 --marker-mm 2.2
+"""
+CHECK_EXAMPLES = """
+\b
+Example:
+  fingervision calibrate check calibration.json object.png=7.500 --u-size-mm 0.001
+"""
+REPEAT_EXAMPLES = """
+\b
+Examples:
+  fingervision calibrate repeat monday/gaps.csv tuesday/gaps.csv wednesday/gaps.csv --tolerance-mm 0.02
+  fingervision calibrate repeat a/gaps.csv b/gaps.csv --by-input
+"""
 
 Command = Callable[..., Any]
 
@@ -26,17 +51,6 @@ Command = Callable[..., Any]
 @click.group("calibrate")
 def command() -> None:
     """Calibrate pixels to millimetres from a reference of known size."""
-
-
-@contextmanager
-def _sentences() -> Iterator[None]:
-    """Let calib's errors reach the user as this program's."""
-    from calib.errors import CalibrationError
-
-    try:
-        yield
-    except CalibrationError as error:
-        raise FingervisionError(str(error)) from error
 
 
 def _output_options(command: Command) -> Command:
@@ -68,7 +82,7 @@ def _size_options(command: Command) -> Command:
     return command
 
 
-@command.command("bar")
+@command.command("bar", epilog=BAR_EXAMPLES)
 @_size_options
 @limit_options
 @_output_options
@@ -77,16 +91,11 @@ def bar(**options: Any) -> None:
 
     One object a picture, in any direction; it may leave the frame. Three sizes give scale and edge bias; fewer give the
     scale, and the bias stays in the budget. Prefix an item to mix: slot:ref3.png=3.000.
-
-    \b
-    Examples:
-      fingervision calibrate bar ref5.png=5.000 ref10.png=10.000 ref15.png=15.000 -o calibration.json
-      fingervision calibrate bar ref5.png=5.000 slot:ref3.png=3.000 --u-size-mm 0.0005 --plane-mm 0.2
     """
-    _on_sizes("bar", **options)
+    calibrate_on_sizes("bar", **options)
 
 
-@command.command("slot")
+@command.command("slot", epilog=SLOT_EXAMPLES)
 @_size_options
 @limit_options
 @_output_options
@@ -94,82 +103,8 @@ def slot(**options: Any) -> None:
     """Calibrate on slots: gaps between two parallel straight edges a known distance apart.
 
     As `bar`; prefix an item to mix: bar:ref5.png=5.000.
-
-    \b
-    Example:
-      fingervision calibrate slot ref3.png=3.000 bar:ref5.png=5.000 -o calibration.json
     """
-    _on_sizes("slot", **options)
-
-
-def _on_sizes(
-    kind: str,
-    items: Sequence[str],
-    u_size_mm: float,
-    roi: str | None,
-    out: Path,
-    certificate: str,
-    date: str,
-    camera: Sequence[str],
-    no_picture: bool,
-    as_json: bool,
-    **limits: float | None,
-) -> None:
-    with _sentences():
-        from calib.calibration_picture import picture_of_edges
-        from calib.known_widths import find_widths
-        from calib.measured_scale import Reference
-        from calib.scale_from_sizes import MeasuredSize, scale_from_sizes
-        from fingervision.cli import _calibration_report as report
-
-        _refuse_foreign(out)
-        pictures = read_references(items, kind, u_size_mm)
-        bench, stated = limits_from(limits, lens_calibrated=False)
-        edges = find_widths(pictures, region_from(roi))
-        sizes = [
-            MeasuredSize(
-                Reference(f"{picture.kind} {picture.name}", picture.size_mm, picture.u_size_mm, certificate, date),
-                edge.width_px,
-                edge.u_width_px,
-                edge.points_px,
-                edge.light,
-            )
-            for picture, edge in zip(pictures, edges, strict=True)
-        ]
-        height, width = pictures[0].grey.shape
-        fit = scale_from_sizes(sizes, (width, height), bench, stated)
-        calibration = _written(fit.calibration, out, camera)
-        if not no_picture:
-            for picture, edge in zip(pictures, edges, strict=True):
-                words = f"{picture.name}: {picture.size_mm:g} mm = {edge.width_px:.3f} px"
-                _write_picture(out, picture.name, picture_of_edges(picture.grey, edge, words))
-        if as_json:
-            more = {
-                "out": str(out),
-                "bias_known": fit.bias_known,
-                "chi_square": fit.chi_square,
-                "freedom": fit.freedom,
-                "references": [
-                    {
-                        "what": size.reference.what,
-                        "size_mm": size.reference.size_mm,
-                        "width_px": edge.width_px,
-                        "u_width_px": edge.u_width_px,
-                        "profiles": edge.profiles,
-                        "first": edge.first,
-                        "last": edge.last,
-                        "count": edge.count,
-                        "taper_px": edge.taper,
-                        "u_taper_px": edge.u_taper,
-                        "residual_mm": float(residual),
-                    }
-                    for size, edge, residual in zip(sizes, edges, fit.residual_mm, strict=True)
-                ],
-            }
-            click.echo(json.dumps(report.as_json(calibration, more)))
-            return
-        lines = [*report.scale_lines(calibration), *report.sizes_lines(fit, edges), *report.budget_lines(calibration)]
-        click.echo("\n".join([*lines, "", f"Written: {out}"]))
+    calibrate_on_sizes("slot", **options)
 
 
 def _board_options(command: Command) -> Command:
@@ -189,7 +124,7 @@ def _board_options(command: Command) -> Command:
     return command
 
 
-@command.command("chessboard")
+@command.command("chessboard", epilog=CHESSBOARD_EXAMPLES)
 @_board_options
 @click.option("--squares", required=True, metavar="9x6", help="Inner corners: 9x6 for a board of 10x7 squares.")
 @limit_options
@@ -199,15 +134,11 @@ def chessboard(**options: Any) -> None:
 
     The first picture defines the plane in which distances are measured: put the board where the gripper moves. In the
     others tilt it differently each time.
-
-    \b
-    Example:
-      fingervision calibrate chessboard plane.png tilted*.png --squares 9x6 --square-mm 2.5 -o calibration.json
     """
-    _on_board(marker_mm=None, **options)
+    calibrate_on_board(marker_mm=None, **options)
 
 
-@command.command("charuco")
+@command.command("charuco", epilog=CHARUCO_EXAMPLES)
 @_board_options
 @click.option("--squares", required=True, metavar="8x6", help="Squares along x and y.")
 @click.option("--marker-mm", type=float, default=None, help="Side of a marker, mm.  [default: 0.75 of a square]")
@@ -217,75 +148,17 @@ def charuco(marker_mm: float | None, square_mm: float, **options: Any) -> None:
     """Calibrate on a ChArUco board; it may leave the frame. The dictionary of its markers is found by itself.
 
     As `chessboard`, but --squares counts squares.
-
-    \b
-    Example:
-      fingervision calibrate charuco plane.png tilted*.png --squares 8x6 --square-mm 3 --marker-mm 2.2
     """
-    _on_board(marker_mm=0.75 * square_mm if marker_mm is None else marker_mm, square_mm=square_mm, **options)
+    calibrate_on_board(marker_mm=0.75 * square_mm if marker_mm is None else marker_mm, square_mm=square_mm, **options)
 
 
-def _on_board(
-    images: Sequence[Path],
-    squares: str,
-    square_mm: float,
-    u_square_mm: float | None,
-    marker_mm: float | None,
-    out: Path,
-    certificate: str,
-    date: str,
-    camera: Sequence[str],
-    no_picture: bool,
-    as_json: bool,
-    **limits: float | None,
-) -> None:
-    with _sentences():
-        from calib.board import Board, find_corners
-        from calib.calibration_picture import picture_of_corners
-        from calib.scale_from_board import scale_from_board
-        from fingervision.cli import _calibration_report as report
-
-        _refuse_foreign(out)
-        columns, rows = _squares(squares)
-        u_square = 0.001 * square_mm if u_square_mm is None else u_square_mm
-        board = Board(columns, rows, square_mm, u_square, marker_mm)
-        bench, stated = limits_from(limits, lens_calibrated=len(images) > 1)
-        pictures = read_pictures(images)
-        corners = [find_corners(grey, board, path.name) for grey, path in zip(pictures, images, strict=True)]
-        height, width = pictures[0].shape
-        fit = scale_from_board(corners, board, (width, height), bench, stated)
-        certified = tuple(replace(each, certificate=certificate, date=date) for each in fit.calibration.references)
-        calibration = _written(replace(fit.calibration, references=certified), out, camera)
-        if not no_picture:
-            residuals = [fit.plane.residual_px] if fit.lens is None else fit.lens.residual_px
-            for grey, found, residual in zip(pictures, corners, residuals, strict=True):
-                words = f"{found.name}: {len(found.points_px)} corners"
-                _write_picture(out, found.name, picture_of_corners(grey, found.points_px, residual, words))
-        if as_json:
-            more = {
-                "out": str(out),
-                "rms_px": None if fit.lens is None else fit.lens.rms_px,
-                "straightness_px": fit.straightness_px,
-                "tilt_deg": fit.plane.tilt_deg,
-            }
-            click.echo(json.dumps(report.as_json(calibration, more)))
-            return
-        lines = [*report.scale_lines(calibration), *report.board_lines(fit), *report.budget_lines(calibration)]
-        click.echo("\n".join([*lines, "", f"Written: {out}"]))
-
-
-@command.command("check")
+@command.command("check", epilog=CHECK_EXAMPLES)
 @click.argument("calibration", type=click.Path(path_type=Path))
 @_size_options
 @click.option("--json", "as_json", is_flag=True, help="Print the result for programs.")
 def check(calibration: Path, items: Sequence[str], u_size_mm: float, roi: str | None, as_json: bool) -> None:
-    """Measure a known object with an existing calibration and say whether it agrees (E_n number).
-
-    \b
-    Example:
-      fingervision calibrate check calibration.json object.png=7.500 --u-size-mm 0.001
-    """
-    with _sentences():
+    """Measure a known object with an existing calibration and say whether it agrees (E_n number)."""
+    with sentences():
         import numpy as np
 
         from calib.agreement import Agreement
@@ -328,7 +201,7 @@ def check(calibration: Path, items: Sequence[str], u_size_mm: float, roi: str | 
             )
 
 
-@command.command("repeat")
+@command.command("repeat", epilog=REPEAT_EXAMPLES)
 @click.argument("tables", nargs=-1, required=True, metavar="GAPS.csv...", type=click.Path(path_type=Path))
 @click.option("--tolerance-mm", type=float, default=None, help="Whole width of the tolerance, for %GRR.")
 @click.option("--by-input", is_flag=True, help="Every input_mm of the drive is a part of its own.")
@@ -337,13 +210,8 @@ def repeat(tables: Sequence[Path], tolerance_mm: float | None, by_input: bool, a
     """Gauge repeatability and reproducibility over repeated recordings (AIAG, analysis of variance).
 
     Frames of one recording repeat; recordings of the same thing, set up again each time, reproduce.
-
-    \b
-    Examples:
-      fingervision calibrate repeat monday/gaps.csv tuesday/gaps.csv wednesday/gaps.csv --tolerance-mm 0.02
-      fingervision calibrate repeat a/gaps.csv b/gaps.csv --by-input
     """
-    with _sentences():
+    with sentences():
         from calib.gauge_study import gauge_study, verdict
         from fingervision.storage.gap_readings import read_gap_readings
 
@@ -386,56 +254,3 @@ def repeat(tables: Sequence[Path], tolerance_mm: float | None, by_input: bool, a
             click.echo(f"%GRR of {tolerance_mm:g} mm: {percent:.2f} % (6 s): {verdict(percent)}")
         else:
             click.echo("State --tolerance-mm to see which part of it the gauge takes up.")
-
-
-def _squares(squares: str) -> tuple[int, int]:
-    try:
-        columns, rows = (int(part) for part in squares.lower().split("x"))
-    except ValueError:
-        raise UsageError(f"--squares must be two whole numbers such as 9x6, but is {squares!r}.") from None
-    return columns, rows
-
-
-def _refuse_foreign(out: Path) -> None:
-    """Overwrite a calibration, never anything else."""
-    if not out.exists():
-        return
-    try:
-        content = json.loads(out.read_text(encoding="utf-8"))
-    except (OSError, ValueError):
-        content = None
-    if not (isinstance(content, dict) and "px_per_mm" in content):
-        raise FingervisionError(f"{out} stands there already and is no calibration; name another file with -o.")
-
-
-def _written(calibration: "Calibration", out: Path, camera: Sequence[str]) -> "Calibration":
-    from datetime import UTC, datetime
-
-    from fingervision.storage.calibration_json import write_calibration
-
-    settings = {}
-    for setting in camera:
-        name, equals, value = setting.partition("=")
-        if not (name and equals):
-            raise UsageError(f"--camera must be NAME=VALUE, but is {setting!r}.")
-        settings[name] = value
-    complete = replace(
-        calibration,
-        camera=settings,
-        made_at=datetime.now(UTC).isoformat(timespec="seconds"),
-        software=f"fingervision {__version__}",
-    )
-    write_calibration(complete, out)
-    return complete
-
-
-def _write_picture(out: Path, name: str, picture: "NDArray[np.uint8]") -> None:
-    import cv2
-
-    path = out.with_name(f"{out.stem}_{Path(name).stem}.png")
-    written, content = cv2.imencode(".png", picture[:, :, ::-1])
-    if written:
-        try:
-            path.write_bytes(content.tobytes())
-        except OSError as error:
-            raise FingervisionError(f"The picture {path} could not be written: {error.strerror}.") from error
