@@ -1,0 +1,179 @@
+"""The gripper as its drawing states it: material, body, hinges, lever and links."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from types import MappingProxyType
+
+PointMm = tuple[float, float]
+
+
+@dataclass(frozen=True, slots=True)
+class Material:
+    """An isotropic elastic material.
+
+    Parameters
+    ----------
+    name : str
+        What it is called.
+    youngs_modulus_mpa, poisson_ratio : float
+        Linear elastic constants.
+    density_kg_m3 : float
+        Mass per volume.
+    yield_mpa : float
+        Stress beyond which the answer of an elastic model is wrong.
+    """
+
+    name: str
+    youngs_modulus_mpa: float
+    poisson_ratio: float
+    density_kg_m3: float
+    yield_mpa: float
+
+    @property
+    def shear_modulus_mpa(self) -> float:
+        """G = E / (2 (1 + nu))."""
+        return self.youngs_modulus_mpa / (2.0 * (1.0 + self.poisson_ratio))
+
+    @property
+    def density_t_mm3(self) -> float:
+        """Mass per volume in the unit that goes with mm, N, MPa and s."""
+        return self.density_kg_m3 * 1e-12
+
+
+@dataclass(frozen=True, slots=True)
+class Body:
+    """Overall size of the plate and where the gap is measured.
+
+    Parameters
+    ----------
+    width_mm, height_mm, plate_mm : float
+        Width across both halves, height above the clamp, thickness of the plate.
+    rest_gap_mm : float
+        Distance between the tips at rest.
+    measured_below_tip_mm : float
+        Height of the measuring point below the top of the tip.
+    """
+
+    width_mm: float
+    height_mm: float
+    plate_mm: float
+    rest_gap_mm: float
+    measured_below_tip_mm: float
+
+
+@dataclass(frozen=True, slots=True)
+class Hinge:
+    """A two-sided circular notch.
+
+    Parameters
+    ----------
+    thickness_mm : float
+        Smallest height of material between the two notches.
+    radius_mm : float
+        Radius of the notches.
+    web_mm : float
+        Height of the bar that the notches are cut into; at least the hinge's own thickness.
+    """
+
+    thickness_mm: float
+    radius_mm: float
+    web_mm: float
+
+
+@dataclass(frozen=True, slots=True)
+class Lever:
+    """Where the hinges and the drive lie in one half; x from the symmetry axis, y up from the clamp.
+
+    Parameters
+    ----------
+    l1_mm, l2_mm, l3_mm, l4_mm : float
+        The paper's link lengths: hinge 2 lies (-l2, -l1) from hinge 1, the drive point (-l4, -l3) from hinge 2.
+    hinge1_mm, hinge2_mm : (float, float)
+        Centres of the notches.
+    hinge1_axis_deg, hinge2_axis_deg : float
+        Direction of each hinge's long axis from x.
+    drive_mm : (float, float)
+        The drive point O_A on the symmetry axis.
+    drive_face_y_mm, drive_face_half_width_mm : float
+        The face that the actuator pushes.
+    """
+
+    l1_mm: float
+    l2_mm: float
+    l3_mm: float
+    l4_mm: float
+    hinge1_mm: PointMm
+    hinge1_axis_deg: float
+    hinge2_mm: PointMm
+    hinge2_axis_deg: float
+    drive_mm: PointMm
+    drive_face_y_mm: float
+    drive_face_half_width_mm: float
+
+
+@dataclass(frozen=True, slots=True)
+class Links:
+    """The bars and polygons whose union, less the notches, is the right half of the body.
+
+    Parameters
+    ----------
+    pillar_and_root_mm, drive_block_mm : (float, float, float, float)
+        Upright rectangles: x from, x to, y from, y to. The pillar is clamped at its lower face.
+    shuttle_from_mm, shuttle_to_mm, shuttle_width_mm : (float, float), (float, float), float
+        Bar from the drive point through hinge 2.
+    cross_bar_mm, finger_mm : (float, float, float, float)
+        Bars: x, y of one end, x, y of the other.
+    cross_bar_width_mm, finger_width_mm : float
+        Widths of those bars.
+    tip_polygon_mm : tuple of (float, float)
+        The tip; its inner face is the edge at the smallest x.
+    """
+
+    pillar_and_root_mm: tuple[float, float, float, float]
+    shuttle_from_mm: PointMm
+    shuttle_to_mm: PointMm
+    shuttle_width_mm: float
+    drive_block_mm: tuple[float, float, float, float]
+    cross_bar_mm: tuple[float, float, float, float]
+    cross_bar_width_mm: float
+    finger_mm: tuple[float, float, float, float]
+    finger_width_mm: float
+    tip_polygon_mm: tuple[PointMm, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Gripper:
+    """One compliant gripper: two mirrored halves of a flat plate.
+
+    Parameters
+    ----------
+    material, body, hinge, lever, links
+        The five sections of `gripper.toml`.
+    uncertainties : mapping of str to float
+        Standard uncertainty of a number in its own unit, by its dotted name (`hinge.thickness_mm`), where stated.
+    """
+
+    material: Material
+    body: Body
+    hinge: Hinge
+    lever: Lever
+    links: Links
+    uncertainties: Mapping[str, float] = field(default_factory=lambda: MappingProxyType({}))
+
+    @property
+    def tip_corner_mm(self) -> PointMm:
+        """Top of the inner face: the point that touches the symmetry plane first when the fingers close."""
+        inner_mm = min(x for x, _ in self.links.tip_polygon_mm)
+        return inner_mm, max(y for x, y in self.links.tip_polygon_mm if x == inner_mm)
+
+    @property
+    def tip_heel_mm(self) -> PointMm:
+        """Foot of the inner face."""
+        inner_mm = min(x for x, _ in self.links.tip_polygon_mm)
+        return inner_mm, min(y for x, y in self.links.tip_polygon_mm if x == inner_mm)
+
+    @property
+    def measuring_point_mm(self) -> PointMm:
+        """The material point on the inner face whose distance from its mirror image is the gap."""
+        x_mm, y_mm = self.tip_corner_mm
+        return x_mm, y_mm - self.body.measured_below_tip_mm

@@ -1,0 +1,22 @@
+"""Which physics a model answers with beyond small displacements."""
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True, slots=True)
+class Physics:
+    """Switches of a mechanical model; all off is the linear model that the paper computed.
+
+    Parameters
+    ----------
+    large_rotation : bool
+        Equilibrium in the deformed shape. For the reference gripper +0.3 % of gap and +6 % of force at 18 mm.
+    contact : bool
+        The fingers cannot pass through the symmetry plane.
+    """
+
+    large_rotation: bool = False
+    contact: bool = False
+
+
+LINEAR = Physics()

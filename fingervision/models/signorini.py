@@ -1,0 +1,34 @@
+"""Frictionless contact with a rigid plane (Signorini's problem), condensed to the points that may touch."""
+
+import numpy as np
+import scipy.linalg
+import scipy.optimize
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+def contact_forces_n(compliance_mm_n: Array, free_gap_mm: Array) -> Array:
+    """Forces that keep every point on its side of the plane.
+
+    Solves gap = free_gap + C force with gap >= 0, force >= 0, gap * force = 0. That is the optimum of the quadratic
+    programme min f' C f / 2 + g' f over f >= 0, written as a non-negative least squares problem by C = L L'.
+
+    Parameters
+    ----------
+    compliance_mm_n : ndarray of float, shape (n, n)
+        Displacement away from the plane at point i by a unit force at point j; symmetric and positive definite.
+    free_gap_mm : ndarray of float, shape (n,)
+        Distance from the plane without contact; negative where a point would pass through.
+
+    Returns
+    -------
+    ndarray of float, shape (n,)
+        Contact forces.
+    """
+    if np.all(free_gap_mm >= 0.0):
+        return np.zeros_like(free_gap_mm)
+    factor = np.linalg.cholesky(compliance_mm_n)
+    target = scipy.linalg.solve_triangular(factor, -free_gap_mm, lower=True)
+    forces, _ = scipy.optimize.nnls(factor.T, target)
+    return np.asarray(forces)

@@ -1,0 +1,165 @@
+"""gripper.toml: a gripper's drawing; every number with its unit, an uncertainty beside it where one is known."""
+
+import difflib
+import math
+import tomllib
+from collections.abc import Mapping
+from dataclasses import fields
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any
+
+from fingervision.domain.errors import FingervisionError
+from fingervision.domain.gripper import Body, Gripper, Hinge, Lever, Links, Material
+
+_SECTIONS: Mapping[str, type] = MappingProxyType(
+    {"material": Material, "body": Body, "hinge": Hinge, "lever": Lever, "links": Links}
+)
+_MAY_BE_ANY_SIGN = frozenset({"lever.l1_mm", "lever.l2_mm", "lever.l3_mm", "lever.l4_mm", "lever.hinge1_axis_deg",
+                              "lever.hinge2_axis_deg", "lever.drive_face_y_mm"})  # fmt: skip
+_MEET_MM = 0.02
+_METRES_BELOW_MM = 2.0
+
+
+def read_gripper(path: Path) -> Gripper:
+    """Read and check a drawing.
+
+    A number may be written with its standard uncertainty: `thickness_mm = {value = 1.0, u = 0.1}`.
+
+    Raises
+    ------
+    FingervisionError
+        The file cannot be read, a key is missing, unknown or no number, or the drawing cannot be a gripper.
+    """
+    try:
+        text = path.read_text(encoding="utf-8-sig")
+    except FileNotFoundError:
+        raise FingervisionError(f"There is no gripper {path}.") from None
+    except OSError as error:
+        raise FingervisionError(f"The gripper {path} could not be read ({error.strerror}).") from error
+    except UnicodeDecodeError as error:
+        raise FingervisionError(f"{path} must be TOML in UTF-8, but is not: {error.reason}.") from error
+    try:
+        tables = tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise FingervisionError(f"{path} must be TOML, but is not: {error}.") from error
+    return gripper_from_tables(tables, str(path))
+
+
+def gripper_from_tables(tables: Mapping[str, Any], origin: str) -> Gripper:
+    """Build a checked drawing from the five tables of `gripper.toml`; `origin` is named in errors."""
+    _refuse_unknown(tables, _SECTIONS, origin, "section")
+    uncertainties: dict[str, float] = {}
+    parts: dict[str, Any] = {}
+    for section, record in _SECTIONS.items():
+        table = tables.get(section)
+        if not isinstance(table, dict):
+            raise FingervisionError(f"{origin} must have a section [{section}], but has none.")
+        names = {field.name: field.type for field in fields(record)}
+        _refuse_unknown(table, names, origin, f"key in [{section}]")
+        values: dict[str, Any] = {}
+        for name in names:
+            if name not in table:
+                raise FingervisionError(f"{origin} must state {section}.{name}, but does not.")
+            values[name] = _value(table[name], f"{section}.{name}", origin, uncertainties)
+        parts[section] = record(**values)
+    gripper = Gripper(**parts, uncertainties=MappingProxyType(uncertainties))
+    _check(gripper, origin)
+    return gripper
+
+
+def _refuse_unknown(given: Mapping[str, Any], known: Mapping[str, Any], origin: str, kind: str) -> None:
+    for name in given:
+        if name not in known:
+            near = difflib.get_close_matches(name, list(known), 1, cutoff=0.0)
+            raise FingervisionError(f"{origin} has an unknown {kind}, {name}; did you mean {near[0]}?")
+
+
+def _value(raw: Any, name: str, origin: str, uncertainties: dict[str, float]) -> Any:
+    if name == "material.name":
+        if not isinstance(raw, str):
+            raise FingervisionError(f"{name} in {origin} must be a text, but is {raw!r}.")
+        return raw
+    if isinstance(raw, dict):
+        if set(raw) != {"value", "u"}:
+            raise FingervisionError(
+                f"{name} in {origin} must be a number or {{value = ..., u = ...}}, but has the keys {', '.join(raw)}."
+            )
+        u = _number(raw["u"], f"The uncertainty of {name}", origin)
+        if u < 0.0:
+            raise FingervisionError(f"The uncertainty of {name} in {origin} must not be negative, but is {u:g}.")
+        uncertainties[name] = u
+        raw = raw["value"]
+    if name.startswith("links.") and not name.endswith("width_mm"):
+        if name == "links.tip_polygon_mm":
+            if not isinstance(raw, list) or len(raw) < 3:
+                raise FingervisionError(f"{name} in {origin} must be at least three points, but is {raw!r}.")
+            return tuple(_numbers(point, 2, name, origin) for point in raw)
+        return _numbers(raw, 2 if name.startswith("links.shuttle") else 4, name, origin)
+    if name in ("lever.hinge1_mm", "lever.hinge2_mm", "lever.drive_mm"):
+        return _numbers(raw, 2, name, origin)
+    value = _number(raw, name, origin)
+    if name not in _MAY_BE_ANY_SIGN and value <= 0.0:
+        raise FingervisionError(f"{name} in {origin} must be positive, but is {value:g}.")
+    return value
+
+
+def _number(raw: Any, name: str, origin: str) -> float:
+    if isinstance(raw, bool) or not isinstance(raw, int | float) or not math.isfinite(raw):
+        raise FingervisionError(f"{name} in {origin} must be a finite number, but is {raw!r}.")
+    return float(raw)
+
+
+def _numbers(raw: Any, count: int, name: str, origin: str) -> tuple[float, ...]:
+    if not isinstance(raw, list) or len(raw) != count:
+        raise FingervisionError(f"{name} in {origin} must be a list of {count} numbers, but is {raw!r}.")
+    return tuple(_number(part, name, origin) for part in raw)
+
+
+def _check(gripper: Gripper, origin: str) -> None:
+    material, body, hinge, lever, links = (
+        gripper.material,
+        gripper.body,
+        gripper.hinge,
+        gripper.lever,
+        gripper.links,
+    )
+    if material.poisson_ratio >= 0.5:
+        raise FingervisionError(
+            f"material.poisson_ratio in {origin} must be below 0.5, but is {material.poisson_ratio:g}."
+        )
+    if body.height_mm < _METRES_BELOW_MM * hinge.thickness_mm or body.measured_below_tip_mm >= body.height_mm:
+        raise FingervisionError(
+            f"body.height_mm in {origin} must be larger than the hinges and the measuring height, "
+            f"but is {body.height_mm:g}; are its lengths in metres?"
+        )
+    if hinge.thickness_mm >= hinge.web_mm:
+        raise FingervisionError(
+            f"hinge.thickness_mm in {origin} must be smaller than the web that the notches cut, {hinge.web_mm:g} mm, "
+            f"but is {hinge.thickness_mm:g}; a hinge cannot be thicker than its web."
+        )
+    if 2.0 * hinge.radius_mm + hinge.thickness_mm > hinge.web_mm + _MEET_MM:
+        raise FingervisionError(
+            f"The notches in {origin} must end inside the web of {hinge.web_mm:g} mm, but 2 radius + thickness is "
+            f"{2.0 * hinge.radius_mm + hinge.thickness_mm:g} mm, which cuts the body in two; reduce hinge.radius_mm."
+        )
+    drawn = (lever.hinge1_mm[0] - lever.l2_mm, lever.hinge1_mm[1] - lever.l1_mm)
+    _must_meet("lever.hinge2_mm", lever.hinge2_mm, "hinge 1 less (l2, l1)", drawn, origin)
+    drawn = (lever.hinge2_mm[0] - lever.l4_mm, lever.hinge2_mm[1] - lever.l3_mm)
+    _must_meet("lever.drive_mm", lever.drive_mm, "hinge 2 less (l4, l3)", drawn, origin)
+    _must_meet("links.shuttle_from_mm", links.shuttle_from_mm, "lever.drive_mm", lever.drive_mm, origin)
+    inner_mm = gripper.tip_corner_mm[0]
+    if abs(2.0 * inner_mm - body.rest_gap_mm) > _MEET_MM:
+        raise FingervisionError(
+            f"The tip's inner face in {origin} must lie at half of body.rest_gap_mm, {body.rest_gap_mm / 2.0:g} mm, "
+            f"but lies at {inner_mm:g} mm."
+        )
+
+
+def _must_meet(name: str, at_mm: tuple[float, float], other: str, other_mm: tuple[float, float], origin: str) -> None:
+    apart_mm = math.dist(at_mm, other_mm)
+    if apart_mm > _MEET_MM:
+        raise FingervisionError(
+            f"{name} in {origin} must lie at {other} = ({other_mm[0]:g}, {other_mm[1]:g}), but lies at "
+            f"({at_mm[0]:g}, {at_mm[1]:g}), {apart_mm:.3g} mm away: the links do not meet."
+        )
