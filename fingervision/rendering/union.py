@@ -1,7 +1,8 @@
 """The outline of several solids that may overlap: two fingers that touch are one blob."""
 
+from collections.abc import Iterable, Sequence
 from itertools import combinations, pairwise
-from math import acos, atan2, hypot, pi, sqrt
+from math import acos, atan2, cos, hypot, pi, sqrt
 
 import numpy as np
 
@@ -19,7 +20,7 @@ def union(outlines: tuple[Outline, ...]) -> tuple[Outline, ...]:
     Parameters
     ----------
     outlines : tuple of Outline
-        Solids without holes. Edges that coincide exactly cancel where the solids lie on opposite sides.
+        Solids without holes. Where edges coincide, one stays, or none if the solids lie on opposite sides of it.
 
     Returns
     -------
@@ -30,17 +31,44 @@ def union(outlines: tuple[Outline, ...]) -> tuple[Outline, ...]:
         return outlines
     kept: list[Piece] = []
     for i, outline in enumerate(outlines):
-        others = [other for j, other in enumerate(outlines) if j != i and _boxes_meet(outline, other)]
-        parts = [part for piece in outline.pieces for part in _parts(piece, others)]
+        others = {j: other for j, other in enumerate(outlines) if j != i and _boxes_meet(outline, other)}
+        parts = [part for piece in outline.pieces for part in _parts(piece, others.values())]
         middles = np.array([part.points(np.array(0.5)) for part in parts])
-        covered = np.zeros(len(parts), dtype=bool)
-        for other in others:
-            covered |= other.winding(middles) > 0.0
-        kept += [part for part, hidden in zip(parts, covered.tolist(), strict=True) if not hidden]
+        hidden = np.zeros(len(parts), dtype=bool)
+        for j, other in others.items():
+            # On a common edge, rounding decides whether the winding counts: the edge's own rule is asked first.
+            inside = other.winding(middles) > 0.0
+            for k, part in enumerate(parts):
+                sense = _shared(part, other)
+                hidden[k] |= inside[k] if sense is None else sense < 0.0 or j < i
+        kept += [part for part, gone in zip(parts, hidden.tolist(), strict=True) if not gone]
     return _chained(kept)
 
 
-def _parts(piece: Piece, others: list[Outline]) -> list[Piece]:
+def _shared(part: Piece, other: Outline) -> float | None:
+    """Whether a part lies on an edge of another outline: positive if both run the same way there, else negative."""
+    x, y = part.points(np.array(0.5)).tolist()
+    for edge in other.pieces:
+        if not _may_cross(part, edge) or not _same_track(part, edge):
+            continue
+        t = _fraction(edge, (x, y))
+        if t is not None:
+            return cos(edge.heading_rad(t) - part.heading_rad(0.5))
+    return None
+
+
+def _same_track(a: Piece, b: Piece) -> bool:
+    """Whether two pieces lie on the same straight line or on the same circle."""
+    if isinstance(a, Line) and isinstance(b, Line):
+        ux, uy = (a.x1_px - a.x0_px) / a.length_px, (a.y1_px - a.y0_px) / a.length_px
+        return all(abs((x - a.x0_px) * uy - (y - a.y0_px) * ux) <= SAME_POINT_PX for x, y in (b.start, b.end))
+    if isinstance(a, Arc) and isinstance(b, Arc):
+        apart = hypot(a.x_px - b.x_px, a.y_px - b.y_px)
+        return apart + abs(abs(a.radius_px) - abs(b.radius_px)) <= SAME_POINT_PX
+    return False
+
+
+def _parts(piece: Piece, others: Iterable[Outline]) -> list[Piece]:
     """Cut a piece where other outlines cross it."""
     cuts = {0.0, 1.0}
     for other in others:
@@ -66,9 +94,12 @@ def _boxes_meet(a: Outline, b: Outline) -> bool:
 
 def _crossings(piece: Piece, edge: Piece) -> list[float]:
     """Fractions of `piece` at which `edge` crosses it."""
-    if isinstance(piece, Line) and isinstance(edge, Line):
+    points: Sequence[tuple[float, float]]
+    if _same_track(piece, edge):
+        points = (edge.start, edge.end)
+    elif isinstance(piece, Line) and isinstance(edge, Line):
         return _line_line(piece, edge)
-    if isinstance(piece, Line):
+    elif isinstance(piece, Line):
         points = _line_circle(piece, edge)  # type: ignore[arg-type]
     elif isinstance(edge, Line):
         points = _line_circle(edge, piece)

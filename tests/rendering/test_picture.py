@@ -66,6 +66,17 @@ def test_light_that_spreads_over_all_of_a_dark_thing_swallows_it(bloom_px: float
         assert (grey.min() > 200.0 - GREY) == (bloom_px > half_width_px)
 
 
+@pytest.mark.parametrize("rim", [None, Rim(5.0, 250.0)])
+@pytest.mark.parametrize("bloom_px", [0.0, 0.5])
+def test_touching_fingers_are_dark_all_through(rim: Rim | None, bloom_px: float) -> None:
+    """No seam, no double shade: also where both rims and both roots lie on common lines."""
+    for gap_px in (4.0, 15.0, 16.0):
+        grey = exact_grey(two_fingers(gap_px, radius_px=34.0, rim=rim), Camera(bloom_px=bloom_px))
+        assert grey.min() > 40.0 - GREY
+        assert np.max(np.abs(grey[300:, 235:405] - 40.0)) < GREY
+        assert grey.max() < (250.0 if rim else 200.0) + GREY
+
+
 @pytest.mark.parametrize("noise_grey", [1.0, 6.0])
 def test_noise_is_white_and_has_its_size(noise_grey: float) -> None:
     camera = Camera(noise_grey=noise_grey, bits=16)

@@ -54,6 +54,28 @@ def test_fingers_that_overlap_are_one_blob(gap_px: float, radius_px: float, tilt
     assert sum(outline.area_px2 for outline in joined) < left.area_px2 + right.area_px2
 
 
+@pytest.mark.parametrize("shift_px", [0.0, 3.0, 10.0])
+def test_common_edges_are_counted_once_or_cancel(shift_px: float) -> None:
+    """Two squares whose upper and lower sides lie on the same lines; at a shift of 10 px they touch along a side."""
+    square = polygon(((0.0, 0.0), (10.0, 0.0), (10.0, 10.0), (0.0, 10.0)), (2.0, 0.0, 0.0, 2.0))
+    (joined,) = union((square, square.moved(Motion(xx=-1.0, x_px=20.0 - (10.0 - shift_px)))))
+    missing = 4 * (4.0 - np.pi)
+    assert joined.area_px2 == pytest.approx(
+        10.0 * (10.0 + shift_px) - missing * (1.0 if shift_px >= 3.0 else 0.0), abs=AREA_PX2
+    )
+    # What is one solid grows as one.
+    straight = [piece for piece in joined.pieces if piece.length_px > 1e-6]
+    assert joined.grown(0.5).area_px2 > joined.area_px2
+    assert sum(piece.length_px for piece in straight) < 2 * (10.0 + 10.0 + shift_px) + 1e-6
+
+
+def test_an_outline_joined_with_itself_is_itself() -> None:
+    shape = polygon(((0.0, 0.0), (10.0, 1.0), (12.0, 10.0), (0.0, 10.0)), (2.0, 1.0, 3.0, 2.0))
+    (joined,) = union((shape, shape))
+    assert joined.area_px2 == pytest.approx(shape.area_px2, abs=AREA_PX2)
+    assert joined.grown(0.5).area_px2 == pytest.approx(shape.grown(0.5).area_px2, abs=AREA_PX2)
+
+
 def test_what_does_not_overlap_stays_as_it_is() -> None:
     discs = (disc(0.0, 0.0, 5.0), disc(20.0, 0.0, 5.0))
     assert union(discs) is discs
