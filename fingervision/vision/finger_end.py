@@ -18,13 +18,15 @@ from scipy.special import ndtr
 Floats = NDArray[np.float64]
 
 # Order of the parameters. A line is across = c + m (along - y0), or along = c + m (across - x0) for the top.
-INNER_C, INNER_M, TOP_C, TOP_M, OUTER_C, OUTER_M, INNER_R, OUTER_R = range(8)
+INNER_C, OUTER_C, INNER_M, OUTER_M, INNER_R, OUTER_R, TOP_C, TOP_M = range(8)
 PARAMETERS = 8
+_C, _M, _R = slice(INNER_C, OUTER_C + 1), slice(INNER_M, OUTER_M + 1), slice(INNER_R, OUTER_R + 1)
+_FACING = np.array([1.0, -1.0])
 # Tukey's biweight at 95 % efficiency (Holland & Welsch, Commun. Stat. A6, 1977).
 BIWEIGHT_REACH = 4.685
-# The first passes forgive what the first guess got wrong; only the last ones tell dust from shape. Each pass: how many
-# times the biweight's reach, and whether the half-level's shift is looked at anew.
-PASSES = ((100.0, True), (10.0, False), (1.5, True), (1.0, False), (1.0, True))
+# How often the outline is looked at anew, and how many times the biweight's own reach a residual may have in the steps
+# of each look: the first forgive what the first guess got wrong, only the last tell dust from shape.
+PASSES = ((100.0,), (10.0, 10.0), (1.5, 1.0), (1.0, 1.0))
 # Fillets below so many sigma are sharp corners in the picture, which say nothing within so many sigma.
 SHARP_IN_BLURS, SHARP_REACH = 1.5, 2.0
 
@@ -64,7 +66,7 @@ class FingerEnds:
     Parameters
     ----------
     parameters : ndarray of float, shape (fingers, 8)
-        Inner line, top line, outer line (offset, slope each), inner and outer fillet radius.
+        Offsets, slopes and fillet radii of the inner and outer flank, offset and slope of the top.
     covariance : ndarray of float, shape (fingers, 8, 8)
         From the points' own uncertainties.
     origin : ndarray of float, shape (fingers, 2)
@@ -105,14 +107,13 @@ class _Sides:
 
 
 def _sides(p: Floats, origin: Floats) -> _Sides:
-    slope, top_slope = p[:, [INNER_M, OUTER_M]], p[:, TOP_M : TOP_M + 1]
-    flank_x = np.array([1.0, -1.0]) / np.sqrt(1.0 + slope**2)
+    slope, top_slope, radius = p[:, _M], p[:, TOP_M:], p[:, _R]
+    flank_x = _FACING / np.sqrt(1.0 + slope * slope)
     flank_y = -slope * flank_x
-    top_y = -1.0 / np.sqrt(1.0 + top_slope**2)
+    top_y = -1.0 / np.sqrt(1.0 + top_slope * top_slope)
     top_x = -top_slope * top_y
-    flank_k = flank_x * p[:, [INNER_C, OUTER_C]] + flank_y * origin[:, 1:]
-    top_k = top_x * origin[:, :1] + top_y * p[:, TOP_C : TOP_C + 1]
-    radius = p[:, INNER_R:]
+    flank_k = flank_x * p[:, _C] + flank_y * origin[:, 1:]
+    top_k = top_x * origin[:, :1] + top_y * p[:, TOP_C:TOP_M]
     determinant = flank_x * top_y - flank_y * top_x
     from_flank, from_top = flank_k - radius, top_k - radius
     centre_x = (from_flank * top_y - from_top * flank_y) / determinant
@@ -171,18 +172,14 @@ def _jacobian(at: _Place, s: _Sides, points: OutlinePoints, origin: Floats, is_i
     qx = np.where(at.on_fillet, points.x - at.from_centre_x, points.x) - origin[:, :1]
     qy = np.where(at.on_fillet, points.y - at.from_centre_y, points.y) - origin[:, 1:]
     by_flank = -at.to_flank * at.flank_x
-    by_slope = by_flank * qy
     by_top = -at.to_top * s.top_y
     by_radius = np.where(at.on_fillet, at.to_flank + at.to_top - 1.0, 0.0)
     jacobian = np.empty((len(qx), PARAMETERS, qx.shape[1]))
-    jacobian[:, INNER_C] = by_flank * is_inner
-    jacobian[:, OUTER_C] = by_flank - jacobian[:, INNER_C]
-    jacobian[:, INNER_M] = by_slope * is_inner
-    jacobian[:, OUTER_M] = by_slope - jacobian[:, INNER_M]
+    for number, change in ((INNER_C, by_flank), (INNER_M, by_flank * qy), (INNER_R, by_radius)):
+        np.multiply(change, is_inner, out=jacobian[:, number])
+        np.subtract(change, jacobian[:, number], out=jacobian[:, number + 1])
     jacobian[:, TOP_C] = by_top
-    jacobian[:, TOP_M] = by_top * qx
-    jacobian[:, INNER_R] = by_radius * is_inner
-    jacobian[:, OUTER_R] = by_radius - jacobian[:, INNER_R]
+    np.multiply(by_top, qx, out=jacobian[:, TOP_M])
     return jacobian
 
 
@@ -225,34 +222,42 @@ def fit_finger_ends(points: OutlinePoints, start: Floats, origin: Floats, u_prio
     """
     p = start
     information_prior = 1.0 / u_prior**2
-    every = np.arange(PARAMETERS)
     s = _sides(p, origin)
     half = (points.x <= 0.5 * s.centre_x.sum(axis=1, keepdims=True)).astype(np.intp)
     is_inner = 1.0 - half
-    for patience, is_refreshed in PASSES:
+    for patiences in PASSES:
         at = _place(s, points, half)
-        if is_refreshed:  # these follow the shape so slowly that every pass would be waste
-            shift, counts = _half_level(at, s, points.blur)
-            along_line = np.where(
-                points.is_row,
-                np.abs(at.to_flank * at.flank_x + at.to_top * s.top_x),
-                np.abs(at.to_flank * at.flank_y + at.to_top * s.top_y),
-            )
-            u_normal = points.u * np.maximum(along_line, 0.3)
-            counted = points.weight * counts
-        distance = at.distance + shift
-        residual = distance / u_normal
-        misfit = np.maximum(_spread(residual, counted), 1.0)
-        robust = counted * np.maximum(1.0 - (residual / (BIWEIGHT_REACH * patience * misfit[:, None])) ** 2, 0.0) ** 2
-        jacobian = _jacobian(at, s, points, origin, is_inner)
-        scaled = jacobian * (robust / u_normal**2)[:, None, :]
-        normal = scaled @ np.swapaxes(jacobian, 1, 2)
-        normal[:, every, every] += information_prior
-        right = (scaled @ distance[..., None])[..., 0] + (p - start) * information_prior
-        p = p - np.linalg.solve(normal, right[..., None])[..., 0]
-        np.maximum(p[:, INNER_R:], 0.0, out=p[:, INNER_R:])
+        shift, counts = _half_level(at, s, points.blur)
+        along_line = np.where(
+            points.is_row,
+            np.abs(at.to_flank * at.flank_x + at.to_top * s.top_x),
+            np.abs(at.to_flank * at.flank_y + at.to_top * s.top_y),
+        )
+        u_normal = points.u * np.maximum(along_line, 0.3)
+        counted = points.weight * counts
+        jacobian = _jacobian(at, s, points, origin, is_inner) / u_normal[:, None, :]
+        turned = jacobian.transpose(0, 2, 1)
+        distance = (at.distance + shift) / u_normal
+        # While the weights settle, the outline follows its parameters in a straight line.
+        move = np.zeros_like(p)
+        for patience in patiences:
+            residual = distance + (turned @ move[..., None])[..., 0]
+            misfit = np.maximum(_spread(residual, counted), 1.0)
+            cut = residual * (1.0 / (BIWEIGHT_REACH * patience * misfit))[:, None]
+            robust = counted * np.maximum(1.0 - cut * cut, 0.0) ** 2
+            scaled = jacobian * robust[:, None, :]
+            normal = scaled @ turned
+            normal[:, _EVERY, _EVERY] += information_prior
+            right = (scaled @ distance[..., None])[..., 0] + (p - start) * information_prior
+            move = -np.linalg.solve(normal, right[..., None])[..., 0]
+        p = p + move
+        np.maximum(p[:, _R], 0.0, out=p[:, _R])
         s = _sides(p, origin)
+    residual = (_place(s, points, half).distance + shift) / u_normal
     return FingerEnds(p, np.linalg.inv(normal), origin, misfit, residual, robust)
+
+
+_EVERY = np.arange(PARAMETERS)
 
 
 def _spread(residual: Floats, weight: Floats) -> Floats:

@@ -85,11 +85,11 @@ SLOPE_OF_A_TIP = 0.999
 def _side(lines: Ints, values: Ints, sense: int, steepest: float, places: int) -> tuple[Ints, Ints, Floats]:
     """The outermost pixel on every line that meets the outline steeply enough, its slope, thinned to the places."""
     first = int(lines.min())
-    reach = np.full(int(lines.max()) - first + 1, -(10**9))
+    count = int(lines.max()) - first + 1
+    reach = np.full(count, -(10**9))
     np.maximum.at(reach, lines - first, sense * values)
-    last = len(reach) - 1
-    index = np.arange(len(reach))
-    low, high = np.maximum(index - SLOPE_REACH_PX, 0), np.minimum(index + SLOPE_REACH_PX, last)
+    index = np.arange(count)
+    low, high = np.maximum(index - SLOPE_REACH_PX, 0), np.minimum(index + SLOPE_REACH_PX, count - 1)
     slope = sense * (reach[high] - reach[low]) / np.maximum(high - low, 1)
     keep = np.flatnonzero(np.abs(slope) <= steepest)
     keep = keep[:: -(-len(keep) // places) or 1]
