@@ -1,6 +1,7 @@
 """Video files through PyAV: any container, the container's own times, read in sequence and never by seeking."""
 
 from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from itertools import count
 from pathlib import Path
@@ -17,6 +18,9 @@ from fingervision.frames.source import Description, Wish
 
 # FFmpeg's AV_CODEC_PROP_LOSSY. A codec that can do both (H.264) counts as lossy: the stream does not say.
 LOSSY_PROPERTY = 2
+# These decoders fill in a damaged part from the picture before, and say so in FFmpeg's log alone: beginnings of lines.
+# Codecs without a checksum (H.264) can be damaged without anybody noticing; FFV1 has one for each slice.
+SPOKEN_DAMAGE = {"ffv1": ("",), "mjpeg": ("overread", "error ")}
 # A damaged slice is an error, not a guess from the picture before it; checksums are looked at where there are any.
 STRICT = {"err_detect": "crccheck+explode"}
 
@@ -124,31 +128,56 @@ def _pictures(
     trail = DamageTrail()
     packets, last_end_s = 0, None
     demuxed = container.demux(stream)
-    while True:
-        try:
-            packet = next(demuxed, None)
-        except av.FFmpegError as error:
-            yield from trail.rest()
-            yield None, f"The file cannot be read any further ({error.strerror})."
-            return
-        if packet is None:
-            break
-        if packet.size:
-            packets += 1
-            trail.enters(packet)
-            if packet.pts is not None and packet.time_base is not None:
-                last_end_s = max(last_end_s or 0.0, float((packet.pts + (packet.duration or 0)) * packet.time_base))
-        try:
-            pictures = packet.decode()
-        except av.FFmpegError as error:
-            trail.breaks(f"It could not be decoded ({error.strerror}).")
-            continue
-        for picture in pictures:
-            yield from trail.leaves(picture)
+    with _log_of_decoders() as log:
+        while True:
+            try:
+                packet = next(demuxed, None)
+            except av.FFmpegError as error:
+                yield from trail.rest()
+                yield None, f"The file cannot be read any further ({error.strerror})."
+                return
+            if packet is None:
+                break
+            if packet.size:
+                packets += 1
+                trail.enters(packet)
+                if packet.pts is not None and packet.time_base is not None:
+                    last_end_s = max(last_end_s or 0.0, float((packet.pts + (packet.duration or 0)) * packet.time_base))
+            log.clear()
+            try:
+                pictures = packet.decode()
+            except av.FFmpegError as error:
+                trail.breaks(f"It could not be decoded ({error.strerror}).")
+                continue
+            if log and (said := _spoken_damage(stream.codec_context.name, log)):
+                trail.breaks(f"It is damaged in the file ({said}).")
+            for picture in pictures:
+                yield from trail.leaves(picture)
     yield from trail.rest()
     missing = _cut_off(container, stream, packets, last_end_s)
     if missing:
         yield None, missing
+
+
+@contextmanager
+def _log_of_decoders() -> Iterator[list[tuple[int, str, str]]]:
+    """Listen to what FFmpeg says of errors, and keep it off the user's screen."""
+    before = av.logging.get_level()
+    av.logging.set_level(av.logging.ERROR)
+    try:
+        # Slices are decoded by threads of FFmpeg's own, so not this thread alone.
+        with av.logging.Capture(local=False) as log:
+            yield log
+    finally:
+        av.logging.set_level(before)
+
+
+def _spoken_damage(codec: str, log: list[tuple[int, str, str]]) -> str:
+    """Find what a decoder says of damage; empty where it says nothing of it."""
+    for _, speaker, words in log:
+        if speaker == codec and words.startswith(SPOKEN_DAMAGE.get(codec, ())):
+            return words.strip()
+    return ""
 
 
 def _cut_off(

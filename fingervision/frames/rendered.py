@@ -1,0 +1,67 @@
+"""Rendered scenes as a recording: frames whose true gap is known."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from fingervision.domain.errors import FingervisionError
+from fingervision.domain.frame import Frame, LostFrame
+from fingervision.frames.source import Description
+from fingervision.rendering import Camera, Scene, render
+
+
+@dataclass(frozen=True, slots=True)
+class RenderedFrames:
+    """A sequence of scenes through a camera.
+
+    Parameters
+    ----------
+    scenes : sequence of Scene
+        One a frame, all of one size.
+    camera : Camera
+        How they are seen.
+    rng : numpy.random.Generator
+        Source of the noise; a second pass over the frames has other noise.
+    rate_hz : float or None
+        Frames in a second; None gives frames without times.
+
+    Raises
+    ------
+    FingervisionError
+        There is no scene, or the frames are not of one size.
+    """
+
+    scenes: Sequence[Scene]
+    camera: Camera
+    rng: np.random.Generator
+    rate_hz: float | None = 25.0
+
+    def __post_init__(self) -> None:
+        if not self.scenes:
+            raise FingervisionError("A rendered recording must have at least one scene, but has none.")
+        sizes = {(scene.width_px, scene.height_px) for scene in self.scenes}
+        if len(sizes) > 1:
+            raise FingervisionError(f"Scenes of a recording must be of one size, but are of {sorted(sizes)}.")
+
+    @property
+    def description(self) -> Description:
+        """What is known before the frames are drawn."""
+        first = self.scenes[0]
+        return Description(
+            name="rendered",
+            kind="rendered scenes",
+            codec="none",
+            lossy=False,
+            width_px=first.width_px,
+            height_px=first.height_px,
+            rate_hz=self.rate_hz,
+            has_times=self.rate_hz is not None,
+            frame_count=len(self.scenes),
+        )
+
+    def __iter__(self) -> Iterator[Frame | LostFrame]:
+        """Draw the frames one by one."""
+        for index, scene in enumerate(self.scenes):
+            time_s = None if self.rate_hz is None else index / self.rate_hz
+            yield Frame(render(scene, self.camera, self.rng), index, time_s)
