@@ -1,0 +1,115 @@
+"""What the mechanism really receives: drives integrated sample by sample, in forms that are not the catalogue's.
+
+Every function takes the fine input u (mm, shape (n,)) of one run and gives the input that comes out of that part.
+"""
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+def late(time_s: Array, u_mm: Array, delay_s: float) -> Array:
+    """Transport delay, on the fine grid."""
+    return np.interp(time_s - delay_s, time_s, u_mm)
+
+
+def cyclic_error(u_mm: Array, amplitude_mm: float, period_mm: float, phase_rad: float) -> Array:
+    """A lead screw's error: the period and a small second harmonic, as real screws have it."""
+    angle = 2 * np.pi * u_mm / period_mm + phase_rad
+    return u_mm + amplitude_mm * (np.sin(angle) + 0.06 * np.sin(2 * angle + 0.7))
+
+
+def stopped(u_mm: Array, lower_mm: float | None, upper_mm: float | None) -> Array:
+    """An elastic stop: beyond it the stage creeps on by 1 % of the commanded way."""
+    give = 0.01
+    if upper_mm is not None:
+        u_mm = np.where(u_mm > upper_mm, upper_mm + give * (u_mm - upper_mm), u_mm)
+    if lower_mm is not None:
+        u_mm = np.where(u_mm < lower_mm, lower_mm + give * (u_mm - lower_mm), u_mm)
+    return u_mm
+
+
+@njit(cache=True)
+def _plays(u: Array, half: Array) -> Array:
+    place = np.full(half.size, u[0])
+    out = np.empty_like(u)
+    for i in range(u.size):
+        total = 0.0
+        for k in range(half.size):
+            if u[i] - place[k] > half[k]:
+                place[k] = u[i] - half[k]
+            elif place[k] - u[i] > half[k]:
+                place[k] = u[i] + half[k]
+            total += place[k]
+        out[i] = total / half.size
+    return out
+
+
+def backlash(u_mm: Array, play_mm: float) -> Array:
+    """Clearance whose flanks engage over 6 % of the play: the mean of five plays, each starting centred."""
+    return np.asarray(_plays(u_mm, 0.5 * play_mm * np.linspace(0.97, 1.03, 5)))
+
+
+@njit(cache=True)
+def _jumps(u: Array, jump: float, every: int) -> Array:
+    place = u[0]
+    out = np.empty_like(u)
+    for i in range(u.size):
+        if i % every == 0 and abs(u[i] - place) > jump:
+            place = u[i]
+        out[i] = place
+    return out
+
+
+def stick_slip(u_mm: Array, jump_mm: float, every: int) -> Array:
+    """Sticks until the strain exceeds the jump, then follows at once; looked at every so many fine steps.
+
+    Looked at between the frames as well, every jump would land elsewhere than the definition's, and the places would
+    drift apart along a run: that would be another effect, not another form of this one.
+    """
+    return np.asarray(_jumps(u_mm, jump_mm, every))
+
+
+@njit(cache=True)
+def _dahl(u: Array, reach: float, steepness: float) -> Array:
+    z = 0.0
+    out = np.empty_like(u)
+    out[0] = 0.0
+    for i in range(1, u.size):
+        du = u[i] - u[i - 1]
+        parts = 8
+        for _ in range(parts):
+            away = z / reach if du > 0 else -z / reach
+            factor = 1.0 - away
+            size = abs(factor) ** steepness
+            z += du / parts * (size if factor > 0 else -size)
+        out[i] = z
+    return out
+
+
+def dahl_friction(u_mm: Array, fraction: float, reach_mm: float) -> Array:
+    """Dahl's friction (1968): bristles that yield smoothly instead of eight sliders.
+
+    `reach_mm` is that of the catalogue's longest slider; its eight sliders level out at 9/16 of it on average.
+    """
+    return u_mm - fraction * np.asarray(_dahl(u_mm, 9 / 16 * reach_mm, 1.0))
+
+
+@njit(cache=True)
+def _sliders(u: Array, reach: Array, weight: Array) -> Array:
+    strain = np.zeros(reach.size)
+    out = np.zeros(u.size)
+    for i in range(1, u.size):
+        for k in range(reach.size):
+            strain[k] = min(max(strain[k] + u[i] - u[i - 1], -reach[k]), reach[k])
+            out[i] += weight[k] * strain[k]
+    return out
+
+
+def slider_friction(u_mm: Array, fraction: float, reach_mm: float) -> Array:
+    """Another spectrum of elastic sliders: thirteen, from 4 to 104 % of the reach, the long ones a little heavier."""
+    reach = reach_mm * np.linspace(0.04, 1.04, 13)
+    weight = np.linspace(0.9, 1.1, 13)
+    return u_mm - fraction * np.asarray(_sliders(u_mm, reach, weight / weight.sum()))

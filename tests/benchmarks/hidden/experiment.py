@@ -1,0 +1,235 @@
+"""One experiment with its truth: drawn from a seed, sized to a signal-to-noise ratio, written as the tool's files."""
+
+import json
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tests.benchmarks.hidden.design import Design, Kind, draw_design
+from tests.benchmarks.hidden.foreign import Foreign, draw_foreign
+from tests.benchmarks.hidden.gripper_table import draw_table
+from tests.benchmarks.hidden.noise import Noise, draw_noise, edge_errors, rounded
+from tests.benchmarks.hidden.plant import Hidden, Plant, Trace
+from tests.benchmarks.hidden.sizes import CLOCKED, NAMES, draw_hidden, scaled, within_bounds
+
+Array = NDArray[np.float64]
+TRIES = 200
+
+
+class NotDrawn(ValueError):
+    """No effect of the wanted size fits into its bounds on this gripper."""
+
+
+@dataclass(frozen=True, slots=True)
+class Row:
+    """What a row of the table asks for.
+
+    Parameters
+    ----------
+    name : str
+        As the table prints it.
+    kinds : tuple of str
+        Designs to draw from.
+    hidden : int
+        How many effects of the catalogue.
+    foreign : bool
+        Whether a thing from outside acts.
+    snr : tuple of float
+        Ratios to draw from; 0 means the everyday size as it falls.
+    """
+
+    name: str
+    kinds: tuple[Kind, ...]
+    hidden: int
+    foreign: bool
+    snr: tuple[float, ...]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Experiment:
+    """Everything about one table: the bench, the runs, the noise, and the seed of its noise."""
+
+    plant: Plant
+    design: Design
+    noise: Noise
+    snr: float
+    seed: int
+
+    def starts_s(self) -> list[float]:
+        """When each run begins, since the table's first frame."""
+        starts, now = [], 0.0
+        for motion in self.design.motions:
+            starts.append(now)
+            now += motion.duration_s + self.design.pause_s
+        return starts
+
+    def traces(self) -> list[Trace]:
+        """The runs without noise."""
+        return [
+            self.plant.trace(motion, self.design.rate_hz, start, k)
+            for k, (motion, start) in enumerate(zip(self.design.motions, self.starts_s(), strict=True))
+        ]
+
+
+def edges(traces: list[Trace]) -> Array:
+    """Left and right of all runs, shape (2, n), in mm."""
+    return np.array([np.concatenate([t.left_mm for t in traces]), np.concatenate([t.right_mm for t in traces])])
+
+
+def run_of(traces: list[Trace]) -> NDArray[np.int64]:
+    """Number of the run of each sample, shape (n,)."""
+    return np.repeat(np.arange(len(traces)), [len(t.input_mm) for t in traces])
+
+
+def remaining_rms_mm(signal: Array, run: NDArray[np.int64]) -> float:
+    """RMS over left and right of what remains after the midline's constant and the runs' offsets.
+
+    The offsets of the runs have no free mean (else no offset could ever be found): what is taken away per edge is each
+    run's departure from the mean of the runs.
+    """
+    gap, midline = signal[1] - signal[0], signal.mean(axis=0)
+    for channel, constant_is_free in ((gap, False), (midline, True)):
+        means = np.array([channel[run == k].mean() for k in range(run.max() + 1)])
+        channel -= (means - means.mean())[run]
+        if constant_is_free:
+            channel -= channel.mean()
+    return float(np.sqrt(np.mean(midline**2 + gap**2 / 4)))
+
+
+def _signal(plant: Plant, experiment: Experiment) -> Array:
+    bare = replace(experiment, plant=replace(plant, hidden=(), foreign=None))
+    with_it = replace(experiment, plant=plant)
+    if any(h.name == "hinge_stiffness_error" for h in plant.hidden):
+        return np.array(
+            [np.concatenate([a.force_n - b.force_n for a, b in zip(with_it.traces(), bare.traces(), strict=True)])] * 2
+        )
+    return edges(with_it.traces()) - edges(bare.traces())
+
+
+def ratio(plant: Plant, experiment: Experiment) -> float:
+    """Signal-to-noise ratio of what acts in the plant (for the force: over the noise of the force)."""
+    force = any(h.name == "hinge_stiffness_error" for h in plant.hidden)
+    signal = _signal(plant, experiment)
+    if force:
+        return float(np.sqrt(np.mean(signal**2)) / experiment.noise.force_n)
+    return remaining_rms_mm(signal, run_of(experiment.traces())) / experiment.noise.edge_mm
+
+
+def _sized(effect: Hidden, experiment: Experiment, snr: float) -> Hidden | None:
+    plant = experiment.plant
+    rate = experiment.design.rate_hz
+
+    def at(log_factor: float) -> tuple[float, Hidden]:
+        now = scaled(effect, float(np.exp(log_factor)), plant.inputs, plant.table)
+        return ratio(replace(plant, hidden=(now,), foreign=None), experiment), now
+
+    low, high = -6.0, 3.0
+    best = None
+    for _ in range(18):
+        middle = (low + high) / 2
+        reached, now = at(middle)
+        if reached > snr:
+            high = middle
+        else:
+            low = middle
+        if abs(reached / snr - 1) < 0.02:
+            best = now
+            break
+    if best is None or not within_bounds(best, plant.table, plant.inputs, rate):
+        return None
+    if best.name == "stick_slip":
+        seen = max(2 * experiment.noise.encoder_step_mm, 6 * np.sqrt(experiment.noise.input_variance_mm2))
+        if best.parameters["jump_mm"] < 1.3 * seen:
+            return None
+    return best
+
+
+def _sized_foreign(thing: Foreign, experiment: Experiment, snr: float) -> Foreign:
+    plant = replace(experiment.plant, hidden=(), foreign=thing)
+    return replace(thing, size_mm=thing.size_mm * snr / max(ratio(plant, experiment), 1e-9))
+
+
+def draw_experiment(seed: int, row: Row) -> Experiment:
+    """Draw one experiment of a row; the same seed gives the same experiment."""
+    rng = np.random.default_rng([seed, *row.name.encode()])
+    for _ in range(TRIES):
+        try:
+            return _draw(rng, row, seed)
+        except NotDrawn:
+            continue
+    raise NotDrawn(f"Row {row.name} must be drawn within {TRIES} tries, but seed {seed} was not; use another seed.")
+
+
+def _draw(rng: np.random.Generator, row: Row, seed: int) -> Experiment:
+    kind: Kind = row.kinds[rng.integers(len(row.kinds))]
+    snr = float(rng.choice(row.snr))
+    with_force = bool(rng.random() < 0.04)
+    table, inputs = draw_table(rng, with_force=with_force)
+    design = draw_design(rng, kind, inputs)
+    slope = float(np.mean(np.abs(table.slope(np.linspace(inputs.lower_mm, inputs.upper_mm, 21)))))
+    noise = draw_noise(rng, len(design.motions), slope, inputs.width_mm)
+    total_s = sum(m.duration_s + design.pause_s for m in design.motions)
+    experiment = Experiment(Plant(table, inputs, total_s=total_s), design, noise, snr, seed)
+    names = [n for n in NAMES if n != "hinge_stiffness_error" and not (design.time_restarts and n in CLOCKED)]
+    if with_force and row.hidden:
+        names = ["hinge_stiffness_error"]
+    if row.hidden > len(names):
+        raise NotDrawn("Force tables hide one effect.")
+    hidden = []
+    for name in rng.choice(names, row.hidden, replace=False):
+        effect: Hidden | None = draw_hidden(rng, str(name), table, inputs, design, total_s)
+        if snr > 0:
+            effect = _sized(draw_hidden(rng, str(name), table, inputs, design, total_s), experiment, snr)
+        if effect is None or not within_bounds(effect, table, inputs, design.rate_hz):
+            raise NotDrawn(f"{name} has no such size here.")
+        hidden.append(effect)
+    thing = _sized_foreign(draw_foreign(rng), experiment, snr) if row.foreign else None
+    plant = replace(experiment.plant, hidden=tuple(hidden), foreign=thing)
+    if snr == 0 and row.hidden and ratio(plant, experiment) < 3:
+        raise NotDrawn("An everyday size is at least three times the noise.")
+    return replace(experiment, plant=plant)
+
+
+def measured(experiment: Experiment, traces: list[Trace], rng: np.random.Generator) -> dict[str, list[Array]]:
+    """Columns of the measured table, one array a run."""
+    noise = experiment.noise
+    columns: dict[str, list[Array]] = {key: [] for key in ("time_s", "input_mm", "left_mm", "right_mm", "force_n")}
+    centre = rng.uniform(-0.3, 0.3)
+    for trace in traces:
+        errors = edge_errors(rng, noise, len(trace.input_mm))
+        u = rounded(trace.input_mm + noise.input_mm * rng.standard_normal(len(trace.input_mm)), noise.encoder_step_mm)
+        columns["time_s"].append(trace.run_time_s if experiment.design.time_restarts else trace.table_time_s)
+        columns["input_mm"].append(u)
+        columns["left_mm"].append(rounded(trace.left_mm + centre + errors[0], noise.pixel_mm))
+        columns["right_mm"].append(rounded(trace.right_mm + centre + errors[1], noise.pixel_mm))
+        columns["force_n"].append(trace.force_n + noise.force_n * rng.standard_normal(len(trace.input_mm)))
+    return columns
+
+
+def write(experiment: Experiment, folder: Path) -> None:
+    """Write measured.csv, simulation.csv and truth.json."""
+    folder.mkdir(parents=True, exist_ok=True)
+    columns = measured(experiment, experiment.traces(), np.random.default_rng([experiment.seed, 7]))
+    with_force = experiment.plant.table.force_n is not None
+    header = ["run", "time_s", "input_mm", "gap_mm", "left_mm", "right_mm"] + ["force_n"] * with_force
+    lines = [",".join(header)]
+    for k in range(len(columns["time_s"])):
+        left, right = columns["left_mm"][k], columns["right_mm"][k]
+        values = [columns["time_s"][k], columns["input_mm"][k], right - left, left, right]
+        values += [columns["force_n"][k]] * with_force
+        lines += [f"run{k + 1}," + ",".join(f"{v:.9g}" for v in row) for row in zip(*values, strict=True)]
+    (folder / "measured.csv").write_text("\n".join(lines) + "\n", encoding="utf-8")
+    experiment.plant.table.write(folder / "simulation.csv")
+    truth = {
+        "hidden": [asdict(h) for h in experiment.plant.hidden],
+        "foreign": asdict(experiment.plant.foreign) if experiment.plant.foreign else None,
+        "snr": experiment.snr,
+        "design": experiment.design.kind,
+        "runs": len(experiment.design.motions),
+        "rate_hz": experiment.design.rate_hz,
+        "time_restarts": experiment.design.time_restarts,
+        "noise": asdict(experiment.noise),
+    }
+    (folder / "truth.json").write_text(json.dumps(truth, indent=1), encoding="utf-8")

@@ -1,0 +1,146 @@
+"""Things from outside the catalogue: what a bench can do that no named effect describes."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class Foreign:
+    """One thing from outside.
+
+    Parameters
+    ----------
+    name : str
+        A key of `FOREIGN`.
+    size_mm : float
+        Its amplitude on the gap, or on one edge.
+    place, width : float
+        Where and how wide, as fractions of the range of time or input.
+    count : float
+        Periods over the range, for what repeats.
+    """
+
+    name: str
+    size_mm: float
+    place: float
+    width: float
+    count: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Moment:
+    """What a foreign thing may depend on; arrays of shape (n,) over one run's fine grid.
+
+    Parameters
+    ----------
+    clock : ndarray
+        Time over the whole table, from 0 to 1.
+    travel : ndarray
+        Input over the range, from 0 to 1.
+    moving : ndarray
+        Sign of the velocity, smoothed over a short way.
+    run : int
+        Number of the run.
+    """
+
+    clock: Array
+    travel: Array
+    moving: Array
+    run: int
+
+
+def _step_in_time(f: Foreign, m: Moment) -> tuple[Array, Array]:
+    up = (m.clock > f.place).astype(float)
+    return -0.5 * f.size_mm * up, 0.5 * f.size_mm * up
+
+
+def _step_of_one_edge(f: Foreign, m: Moment) -> tuple[Array, Array]:
+    up = (m.clock > f.place).astype(float)
+    return 0.0 * up, f.size_mm * up
+
+
+def _bump_in_input(f: Foreign, m: Moment) -> tuple[Array, Array]:
+    bump = np.exp(-0.5 * ((m.travel - f.place) / f.width) ** 2)
+    return -0.5 * f.size_mm * bump, 0.5 * f.size_mm * bump
+
+
+def _bump_of_one_edge(f: Foreign, m: Moment) -> tuple[Array, Array]:
+    bump = np.exp(-0.5 * ((m.travel - f.place) / f.width) ** 2)
+    return f.size_mm * bump, 0.0 * bump
+
+
+def _periodic_in_time(f: Foreign, m: Moment) -> tuple[Array, Array]:
+    wave = np.sin(2 * np.pi * f.count * m.clock + 6.0 * f.place)
+    return -0.5 * f.size_mm * wave, 0.5 * f.size_mm * wave
+
+
+def _one_edge_periodic_in_time(f: Foreign, m: Moment) -> tuple[Array, Array]:
+    wave = np.sin(2 * np.pi * f.count * m.clock + 6.0 * f.place)
+    return f.size_mm * wave, 0.0 * wave
+
+
+def _square_wave_in_time(f: Foreign, m: Moment) -> tuple[Array, Array]:
+    wave = np.sign(np.sin(2 * np.pi * f.count * m.clock + 6.0 * f.place))
+    return 0.5 * f.size_mm * wave, 0.5 * f.size_mm * wave
+
+
+def _kink(f: Foreign, m: Moment) -> tuple[Array, Array]:
+    kink = np.abs(m.travel - (0.35 + 0.3 * f.place))
+    return -0.5 * f.size_mm * kink, 0.5 * f.size_mm * kink
+
+
+def _notch_in_input(f: Foreign, m: Moment) -> tuple[Array, Array]:
+    far = (m.travel - f.place) / f.width
+    shape = -far * np.exp(0.5 * (1 - far**2))
+    return -0.5 * f.size_mm * shape, 0.5 * f.size_mm * shape
+
+
+def _midline_wave_in_input(f: Foreign, m: Moment) -> tuple[Array, Array]:
+    wave = np.sin(2 * np.pi * f.count / 4 * m.travel + 6.0 * f.place)
+    return 0.5 * f.size_mm * wave, 0.5 * f.size_mm * wave
+
+
+def _scale_by_direction(f: Foreign, m: Moment) -> tuple[Array, Array]:
+    wrong = m.moving * (m.travel - f.place) ** 2
+    return -0.5 * f.size_mm * wrong, 0.5 * f.size_mm * wrong
+
+
+def _slope_of_one_run(f: Foreign, m: Moment) -> tuple[Array, Array]:
+    wrong = (m.travel - 0.5) * (1.0 if m.run == 1 else 0.0)
+    return -0.5 * f.size_mm * wrong, 0.5 * f.size_mm * wrong
+
+
+def _ripple_that_grows(f: Foreign, m: Moment) -> tuple[Array, Array]:
+    wave = m.clock * np.sin(2 * np.pi * f.count * m.clock**2)
+    return -0.5 * f.size_mm * wave, 0.5 * f.size_mm * wave
+
+
+FOREIGN: dict[str, Callable[[Foreign, Moment], tuple[Array, Array]]] = {
+    function.__name__.lstrip("_"): function
+    for function in (
+        _step_in_time,
+        _step_of_one_edge,
+        _bump_in_input,
+        _bump_of_one_edge,
+        _periodic_in_time,
+        _one_edge_periodic_in_time,
+        _square_wave_in_time,
+        _kink,
+        _notch_in_input,
+        _midline_wave_in_input,
+        _scale_by_direction,
+        _slope_of_one_run,
+        _ripple_that_grows,
+    )
+}
+
+
+def draw_foreign(rng: np.random.Generator) -> Foreign:
+    """Any of them, at a place that the runs reach."""
+    name = str(rng.choice(list(FOREIGN)))
+    return Foreign(name, 1.0, rng.uniform(0.25, 0.75), rng.uniform(0.04, 0.12), rng.uniform(5.0, 23.0))
