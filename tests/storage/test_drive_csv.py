@@ -1,0 +1,61 @@
+"""drive.csv: read as written, and every bad table named by its line."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from fingervision.domain.errors import FingervisionError
+from fingervision.storage.drive_csv import read_drive
+
+
+def table(path: Path, text: str) -> Path:
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+def test_columns_may_stand_in_any_order_and_comments_are_left_out(tmp_path: Path) -> None:
+    drive = read_drive(
+        table(
+            tmp_path / "drive.csv",
+            "# bench 3\nrun,force_n,input_mm,time_s,note\na,0.5,1.25,0,x\n\n# pause\nb,1,-2,3.5,y\n",
+        )
+    )
+    np.testing.assert_array_equal(drive.time_s, [0.0, 3.5])
+    np.testing.assert_array_equal(drive.input_mm, [1.25, -2.0])
+    assert drive.run == ("a", "b")
+    assert drive.force_n is not None
+    np.testing.assert_array_equal(drive.force_n, [0.5, 1.0])
+
+
+def test_runs_and_force_may_be_missing(tmp_path: Path) -> None:
+    drive = read_drive(table(tmp_path / "drive.csv", "time_s,input_mm\n0,1\n"))
+    assert drive.run is None
+    assert drive.force_n is None
+
+
+@pytest.mark.parametrize(
+    ("text", "sentence"),
+    [
+        ("", "must have a header line time_s,input_mm"),
+        ("time_s,input\n0,1\n", "must have one column input_mm, but its header is time_s,input"),
+        ("time_s,input_mm\n", "must have at least one row below its header"),
+        ("time_s,input_mm\n0,1\n1\n", "Line 3 of .* must have 2 cells, but has 1"),
+        ("# c\ntime_s,input_mm\n0,one\n", "input_mm in line 3 of .* must be a number, but is 'one'"),
+        ("time_s,input_mm\n0,nan\n", "input_mm in line 2 of .* must be a number, but is 'nan'"),
+        ("time_s,input_mm\n0,\n", "input_mm in line 2 of .* must be a number, but is ''"),
+        ("time_s,input_mm\n0,1\n0,2\n", "time_s must increase from row to row, but in line 3 of .* it is 0 after 0"),
+        ("time_s,input_mm,run\n0,1,a\n1,1,b\n2,1,a\n", "but run a comes back in line 4"),
+    ],
+)
+def test_a_bad_table_is_refused_in_a_sentence(tmp_path: Path, text: str, sentence: str) -> None:
+    with pytest.raises(FingervisionError, match=sentence):
+        read_drive(table(tmp_path / "drive.csv", text))
+
+
+def test_what_is_no_table_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(FingervisionError, match="There is no drive table"):
+        read_drive(tmp_path / "drive.csv")
+    (tmp_path / "drive.csv").write_bytes(b"\xff\xfe\x00\x81" * 10)
+    with pytest.raises(FingervisionError, match="must be a CSV table in UTF-8"):
+        read_drive(tmp_path / "drive.csv")
