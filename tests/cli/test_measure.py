@@ -1,0 +1,293 @@
+"""`fingervision measure` as its user meets it: results, sentences, exit codes, and never a traceback."""
+
+import csv
+import json
+import os
+import re
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from fingervision.cli import main
+from fingervision.domain.frame import Frame
+from fingervision.rendering import Camera, render, two_fingers
+from fingervision.rendering.clip import H264, Ffv1, write_clip
+
+PX_PER_MM = 20.0
+SCALE = ("--px-per-mm", f"{PX_PER_MM:g}")
+# A gap at noise 1 and blur 0.9 px, lossless, is good to a few hundredths of a pixel.
+GAP_TOLERANCE_MM = 0.05 / PX_PER_MM
+REAL = Path(__file__).parents[3] / "shared" / "real"
+# A drop's separation follows the truth with this standard deviation (px): the bars of the project.
+LOSSLESS_PX, LOSSY_PX = 0.010, 0.020
+
+Run = Callable[..., tuple[int, str, str]]
+
+
+@pytest.fixture
+def run(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path) -> Run:
+    monkeypatch.chdir(tmp_path)
+
+    def command(*arguments: object) -> tuple[int, str, str]:
+        monkeypatch.setattr(sys, "argv", ["fingervision", "measure", *(str(argument) for argument in arguments)])
+        with pytest.raises(SystemExit) as ended:
+            main()
+        said = capsys.readouterr()
+        assert "Traceback" not in said.err
+        code = ended.value.code
+        return (0 if code is None else int(code)), said.out, said.err
+
+    return command
+
+
+def gaps_px(count: int) -> list[float]:
+    return [60.0 + 2.0 * k for k in range(count)]
+
+
+def frames(count: int) -> Iterator[Frame]:
+    rng = np.random.default_rng(0)
+    for k, gap_px in enumerate(gaps_px(count)):
+        scene = two_fingers(gap_px, below_tip_px=0.3 * PX_PER_MM, width_px=40.0, frame=(240, 200))
+        yield Frame(render(scene, Camera(blur_px=0.9, noise_grey=1.0), rng), k, 0.04 * k)
+
+
+@pytest.fixture(scope="module")
+def clip(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("clip") / "opening.mkv"
+    write_clip(path, frames(12), Ffv1())
+    return path
+
+
+def rows(path: Path) -> list[dict[str, str]]:
+    text = path.read_text(encoding="utf-8")
+    assert text.endswith("\n")
+    return list(csv.DictReader(text.splitlines()))
+
+
+def test_a_clip_gives_its_gaps(run: Run, clip: Path) -> None:
+    code, out, err = run(clip, *SCALE)
+    assert (code, err) == (0, "")
+    assert "12 of 12 frames measured." in out
+    table = rows(Path("measured/opening.mkv/gaps.csv"))
+    assert [float(row["gap_mm"]) for row in table] == pytest.approx(
+        [gap_px / PX_PER_MM for gap_px in gaps_px(12)], abs=GAP_TOLERANCE_MM
+    )
+    assert [float(row["time_s"]) for row in table] == pytest.approx([0.04 * k for k in range(12)])
+    assert {path.name for path in Path("measured/opening.mkv").iterdir()} == {"gaps.csv", "summary.json", "gap.png"}
+
+
+def test_json_is_the_summary(run: Run, clip: Path) -> None:
+    code, out, _ = run(clip, *SCALE, "--json", "--out", "results")
+    assert code == 0
+    printed = json.loads(out)
+    assert printed == json.loads(Path("results/summary.json").read_text())
+    assert printed["scale"]["px_per_mm"] == PX_PER_MM
+    assert printed["recording"]["lossy"] is False
+    assert printed["gap"]["median_u_gap_mm"] is None
+    assert re.fullmatch("[0-9a-f]{64}", printed["recording"]["sha256"])
+
+
+def test_a_lossy_clip_is_advised_to_be_lossless(run: Run, tmp_path: Path) -> None:
+    write_clip(tmp_path / "lossy.mp4", frames(2), H264())
+    code, out, _ = run(tmp_path / "lossy.mp4", *SCALE)
+    assert code == 0
+    assert "The recording is lossy (h264)" in out
+
+
+def test_images_without_times_leave_them_empty_and_a_rate_gives_them(run: Run, tmp_path: Path) -> None:
+    (tmp_path / "images").mkdir()
+    for frame in frames(3):
+        cv2.imwrite(str(tmp_path / "images" / f"{frame.index}.png"), frame.pixels)
+    assert run("images", *SCALE, "--out", "a")[0] == 0
+    assert [row["time_s"] for row in rows(Path("a/gaps.csv"))] == ["", "", ""]
+    assert run("images/*.png", *SCALE, "--rate-hz", "10", "--out", "b")[0] == 0
+    assert [row["time_s"] for row in rows(Path("b/gaps.csv"))] == ["0", "0.1", "0.2"]
+
+
+def test_the_drive_adds_its_columns(run: Run, clip: Path) -> None:
+    Path("drive.csv").write_text("time_s,input_mm,run\n0,0,slow\n0.2,1,slow\n")
+    assert run(clip, *SCALE, "--drive", "drive.csv", "--drive-offset-s", "0.04", "--out", "d")[0] == 0
+    table = rows(Path("d/gaps.csv"))
+    assert [(row["run"], row["input_mm"]) for row in table[:3]] == [("", ""), ("slow", "0"), ("slow", "0.2")]
+    assert table[-1]["input_mm"] == ""
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code", "sentence"),
+    [
+        (("CLIP",), 2, "The scale must be given, but is not: add --calibration FILE"),
+        (("CLIP", *SCALE, "--calibration", "c.json"), 2, "but both are there: leave one out"),
+        (("CLIP", "--px-per-mm", "0"), 2, "--px-per-mm must be positive, but is 0."),
+        (("CLIP", "--px-per-mm", "-3"), 2, "--px-per-mm must be positive, but is -3."),
+        (("CLIP", "--px-per-mm", "nan"), 2, "--px-per-mm must be positive, but is nan."),
+        (("CLIP", "--px-per-mm", "many"), 2, "is not a valid float"),
+        (("CLIP", *SCALE, "--tips", "sideways"), 2, "is not one of"),
+        (("CLIP", *SCALE, "--roi", "200,0,100,50"), 2, "--roi must lie inside the frame of 240x200 pixels"),
+        (("CLIP", *SCALE, "--roi", "1,2,3"), 2, "--roi must be four whole numbers X,Y,W,H in pixels, but is '1,2,3'."),
+        (("CLIP", *SCALE, "--below-tip-mm", "0"), 2, "--below-tip-mm must be positive, but is 0."),
+        (("CLIP", *SCALE, "--rate-hz", "25"), 2, "is a video with its own: leave it out."),
+        (("CLIP", *SCALE, "--steps", "-1"), 2, "--steps must be the number of a frame"),
+        (("CLIP", *SCALE, "--steps", "99"), 2, "--steps must be the number of a frame that can be read, 0 to 11"),
+        (("CLIP", *SCALE, "--drive", "none.csv"), 1, "There is no drive table none.csv."),
+        (("CLIP", "--calibration", "none.json"), 1, "There is no calibration file none.json"),
+        (("CLIP", *SCALE, "--out", "taken"), 1, "--out must be a folder, but taken is a file: name another."),
+        (("CLIP", *SCALE, "--out", "/proc/nowhere"), 1, "The folder /proc/nowhere cannot be written"),
+        (("none.mp4", *SCALE), 1, "There is no recording none.mp4: give a video file"),
+        (("empty", *SCALE), 1, "The folder empty must hold images"),
+        (("empty/*.png", *SCALE), 1, "The pattern empty/*.png must match images"),
+        (("text.mp4", *SCALE), 1, "text.mp4 must be a video, but cannot be read as one"),
+        (("nothing.mp4", *SCALE), 1, "nothing.mp4 must be a video, but the file is empty"),
+    ],
+)
+def test_bad_input_ends_in_a_sentence_and_its_code(
+    run: Run, clip: Path, arguments: tuple[str, ...], code: int, sentence: str
+) -> None:
+    Path("empty").mkdir()
+    Path("taken").touch()
+    Path("nothing.mp4").touch()
+    Path("text.mp4").write_text("This is a text.\n" * 50)
+    found, _, err = run(*(clip if argument == "CLIP" else argument for argument in arguments))
+    assert sentence in err
+    assert found == code
+
+
+def test_results_do_not_go_among_the_images(run: Run, tmp_path: Path) -> None:
+    (tmp_path / "images").mkdir()
+    for frame in frames(2):
+        cv2.imwrite(str(tmp_path / "images" / f"{frame.index}.png"), frame.pixels)
+    code, _, err = run("images", *SCALE, "--out", "images")
+    assert code == 2
+    assert "--out must not be the folder of the recording" in err
+
+
+def test_a_clip_cut_off_in_the_middle_is_measured_and_said_to_be_damaged(run: Run, clip: Path) -> None:
+    content = clip.read_bytes()
+    Path("cut.mkv").write_bytes(content[: len(content) // 2])
+    code, _, err = run("cut.mkv", *SCALE)
+    assert code == 3
+    table = rows(Path("measured/cut.mkv/gaps.csv"))
+    assert 3 <= sum(row["status"] == "ok" for row in table) < 12
+    first = next(row["frame"] for row in table if row["status"] == "damaged")
+    assert f"the first is frame {first}. The recording is cut off here" in err
+
+
+def test_an_mp4_without_its_end_cannot_be_opened(run: Run, tmp_path: Path) -> None:
+    write_clip(tmp_path / "whole.mp4", frames(4), H264())
+    content = (tmp_path / "whole.mp4").read_bytes()
+    (tmp_path / "cut.mp4").write_bytes(content[: len(content) // 2])
+    code, _, err = run("cut.mp4", *SCALE)
+    assert code == 1
+    assert "was cut off before its index was written" in err
+
+
+def test_flipped_bytes_leave_the_good_frames(run: Run, clip: Path) -> None:
+    content = bytearray(clip.read_bytes())
+    content[len(content) * 2 // 3] ^= 0xFF
+    Path("flipped.mkv").write_bytes(content)
+    code, _, err = run("flipped.mkv", *SCALE)
+    assert code == 3
+    assert "The recording is damaged" in err
+    table = rows(Path("measured/flipped.mkv/gaps.csv"))
+    assert len(table) == 12
+    for row, gap_px in zip(table, gaps_px(12), strict=True):
+        if row["status"] == "ok":
+            assert float(row["gap_mm"]) == pytest.approx(gap_px / PX_PER_MM, abs=GAP_TOLERANCE_MM)
+
+
+def test_images_that_change_size_are_damaged(run: Run, tmp_path: Path) -> None:
+    (tmp_path / "images").mkdir()
+    for frame in frames(3):
+        pixels = frame.pixels[:100] if frame.index == 1 else frame.pixels
+        cv2.imwrite(str(tmp_path / "images" / f"{frame.index}.png"), pixels)
+    code, _, err = run("images", *SCALE)
+    assert code == 3
+    assert "the first is frame 1. 1.png has 240x100 pixels, but the recording 240x200." in err
+    assert [row["status"] for row in rows(Path("measured/images/gaps.csv"))] == ["ok", "damaged", "ok"]
+
+
+def test_a_black_recording_has_a_table_and_no_number(run: Run, tmp_path: Path) -> None:
+    black = (Frame(np.zeros((100, 120), np.uint8), k, 0.04 * k) for k in range(3))
+    write_clip(tmp_path / "black.mkv", black, Ffv1())
+    code, _, err = run("black.mkv", *SCALE)
+    assert code == 1
+    assert "None of the 3 frames gave a number (3 low_contrast)." in err
+    assert [row["status"] for row in rows(Path("measured/black.mkv/gaps.csv"))] == ["low_contrast"] * 3
+
+
+def subprocess_of(*arguments: object) -> list[str]:
+    return [sys.executable, "-m", "fingervision", "measure", *(str(argument) for argument in arguments)]
+
+
+def test_ctrl_c_keeps_what_was_measured(tmp_path: Path) -> None:
+    (frame,) = frames(1)
+    path = tmp_path / "long.mkv"
+    write_clip(path, (Frame(frame.pixels, k, 0.04 * k) for k in range(3000)), Ffv1())
+    out = tmp_path / "out"
+    with subprocess.Popen(subprocess_of(path, *SCALE, "--out", out), stderr=subprocess.PIPE, text=True) as process:
+        patience_s = 60.0
+        while not (out / "gaps.csv").exists() and patience_s > 0.0:
+            time.sleep(0.02)
+            patience_s -= 0.02
+        time.sleep(0.3)
+        process.send_signal(signal.SIGINT)
+        _, err = process.communicate()
+    assert process.returncode == 1
+    assert re.search(r"Stopped by the user after \d+ frames; what was measured until then is in", err)
+    assert "Traceback" not in err
+    table = rows(out / "gaps.csv")
+    assert 0 < len(table) < 3000
+    assert all(row["status"] == "ok" for row in table)
+    assert json.loads((out / "summary.json").read_text())["complete"] is False
+
+
+def test_a_full_disk_is_said_and_leaves_whole_rows(tmp_path: Path) -> None:
+    disk = tmp_path / "disk"
+    disk.mkdir()
+    mounted = subprocess.run(
+        ["mount", "-t", "tmpfs", "-o", "size=16k", "tmpfs", str(disk)], capture_output=True, text=True, check=False
+    )
+    if mounted.returncode:
+        pytest.skip(f"a disk of 16 kB cannot be mounted here: {mounted.stderr.strip()}")
+    try:
+        (frame,) = frames(1)
+        write_clip(tmp_path / "clip.mkv", (Frame(frame.pixels, k, 0.04 * k) for k in range(200)), Ffv1())
+        done = subprocess.run(
+            subprocess_of(tmp_path / "clip.mkv", *SCALE, "--out", disk / "out"),
+            capture_output=True,
+            text=True,
+            check=False,
+            cwd=tmp_path,
+            env={**os.environ, "PYTHONPATH": str(Path(__file__).parents[2])},
+        )
+        assert done.returncode == 1
+        assert "No space left on device" in done.stderr
+        assert "make room" in done.stderr
+        assert "Traceback" not in done.stderr
+        table = rows(disk / "out" / "gaps.csv")
+        assert len(table) > 10
+        assert all(row["status"] == "ok" and row["right_mm"] for row in table)
+    finally:
+        subprocess.run(["umount", str(disk)], check=True)
+
+
+@pytest.mark.parametrize(("name", "bound_px"), [("drops.mkv", LOSSLESS_PX), ("drops.mp4", LOSSY_PX)])
+@pytest.mark.parametrize("tips", ["down", "auto"])
+def test_real_drops_are_followed(run: Run, name: str, bound_px: float, tips: str) -> None:
+    recording = REAL / "drops" / name
+    if not recording.exists():
+        pytest.skip(f"the real recording {recording} is not there")
+    code, _, _ = run(recording, "--tips", tips, "--px-per-mm", "75.2", "--out", "out")
+    assert code == 0
+    table = rows(Path("out/gaps.csv"))
+    truth = rows(REAL / "drops" / "truth.csv")
+    assert len(table) == len(truth) == 93
+    separation = np.array([float(row["right_x_px"]) - float(row["left_x_px"]) for row in table])
+    change = np.array([float(row["separation_change_px"]) for row in truth])
+    assert np.std(separation - change) <= bound_px
