@@ -14,6 +14,7 @@ from fingervision.domain.status import Status
 from fingervision.rendering.camera import Camera
 from fingervision.rendering.finger import axis_motion
 from fingervision.rendering.outline import Outline, Piece
+from fingervision.rendering.plane import SAME_POINT_PX
 from fingervision.rendering.scene import Scene
 
 # An extremum is bracketed by this many points on each piece before it is refined.
@@ -171,16 +172,22 @@ def _crossings(outline: Outline, direction: Direction, along_px: float) -> list[
     """Coordinates across at which the outline crosses a line across the fingers."""
     grid = np.linspace(0.0, 1.0, BRACKET_POINTS)
     crossings = []
-    for piece in outline.pieces:
-        if abs(_along(piece.start, direction) - along_px) > piece.length_px:
+    for piece, follower in zip(outline.pieces, outline.pieces[1:] + outline.pieces[:1], strict=True):
+        if abs(_along(piece.start, direction) - along_px) > piece.length_px + SAME_POINT_PX:
             continue
 
         def beyond_px(t: float, piece: Piece = piece) -> float:
             return float(_in_axes(piece, direction, t)[1] - along_px)
 
-        below = _in_axes(piece, direction, grid)[:, 1] < along_px
-        for k in np.flatnonzero(below[:-1] != below[1:]):
-            t = brentq(beyond_px, grid[k], grid[k + 1], xtol=1e-14)
+        beyond = _in_axes(piece, direction, grid)[:, 1] >= along_px
+        # A joint lies on the same side for both of its pieces, however their ends are rounded.
+        beyond[0] = _along(piece.start, direction) >= along_px
+        beyond[-1] = _along(follower.start, direction) >= along_px
+        for k in np.flatnonzero(beyond[:-1] != beyond[1:]):
+            low, high = float(grid[k]), float(grid[k + 1])
+            at_joint = (beyond_px(low) >= 0.0) == (beyond_px(high) >= 0.0)
+            nearer = min(low, high, key=lambda t: abs(beyond_px(t)))
+            t = nearer if at_joint else brentq(beyond_px, low, high, xtol=1e-14)
             crossings.append(float(_in_axes(piece, direction, t)[0]))
     return crossings
 

@@ -118,7 +118,13 @@ def _line_line(a: Line, b: Line) -> list[float]:
         return []
     wx, wy = b.x0_px - a.x0_px, b.y0_px - a.y0_px
     t, s = (wx * vy - wy * vx) / cross, (wx * uy - wy * ux) / cross
-    return [t] if 0.0 <= t <= 1.0 and 0.0 <= s <= 1.0 else []
+    return [min(max(t, 0.0), 1.0)] if _on(t, a) and _on(s, b) else []
+
+
+def _on(t: float, piece: Piece) -> bool:
+    """Whether a fraction belongs to a piece; its ends do, however rounded, or a crossing at a joint is lost."""
+    margin = SAME_POINT_PX / piece.length_px
+    return -margin <= t <= 1.0 + margin
 
 
 def _line_circle(line: Line, arc: Arc) -> list[tuple[float, float]]:
@@ -154,12 +160,15 @@ def _fraction(piece: Piece, point: tuple[float, float]) -> float | None:
     if isinstance(piece, Line):
         ux, uy = piece.x1_px - piece.x0_px, piece.y1_px - piece.y0_px
         t = ((x - piece.x0_px) * ux + (y - piece.y0_px) * uy) / (ux * ux + uy * uy)
-        return t if 0.0 <= t <= 1.0 else None
-    sense = 1.0 if piece.sweep_rad > 0.0 else -1.0
-    flip = pi if piece.radius_px < 0.0 else 0.0
-    turned = sense * (atan2(y - piece.y_px, x - piece.x_px) + flip - piece.start_rad) % (2 * pi)
-    t = turned / abs(piece.sweep_rad)
-    return t if t <= 1.0 else None
+    else:
+        sense = 1.0 if piece.sweep_rad > 0.0 else -1.0
+        flip = pi if piece.radius_px < 0.0 else 0.0
+        turned = sense * (atan2(y - piece.y_px, x - piece.x_px) + flip - piece.start_rad) % (2 * pi)
+        t = turned / abs(piece.sweep_rad)
+        before_start = (turned - 2 * pi) / abs(piece.sweep_rad)
+        if not _on(t, piece) and _on(before_start, piece):
+            t = before_start
+    return min(max(t, 0.0), 1.0) if _on(t, piece) else None
 
 
 def _chained(pieces: list[Piece]) -> tuple[Outline, ...]:

@@ -24,6 +24,7 @@ def perimeter_px(outline: Outline) -> float:
     return sum(piece.length_px for piece in outline.pieces)
 
 
+@settings(deadline=None)
 @given(by_px=st.floats(1e-3, 30.0), radius_px=st.floats(0.0, 8.0))
 def test_a_grown_convex_outline_gains_perimeter_and_a_disc(by_px: float, radius_px: float) -> None:
     """Steiner's formula: A + P d + pi d^2."""
@@ -32,6 +33,7 @@ def test_a_grown_convex_outline_gains_perimeter_and_a_disc(by_px: float, radius_
     assert shape.grown(by_px).area_px2 == pytest.approx(expected, abs=AREA_PX2)
 
 
+@settings(deadline=None)
 @given(by_px=st.floats(0.01, 5.0))
 def test_a_shrunk_polygon_loses_perimeter_less_its_corners(by_px: float) -> None:
     shape = polygon(CONVEX)
@@ -43,6 +45,7 @@ def test_a_shrunk_polygon_loses_perimeter_less_its_corners(by_px: float) -> None
     assert shape.grown(-by_px).area_px2 == pytest.approx(expected, abs=AREA_PX2)
 
 
+@settings(deadline=None)
 @given(radius_px=st.floats(0.0, 8.0), turn_deg=st.floats(0.0, 360.0), x=st.floats(-100.0, 100.0), mirror=st.booleans())
 def test_motions_keep_area_and_sense(radius_px: float, turn_deg: float, x: float, mirror: bool) -> None:
     shape = polygon(CONVEX, (radius_px,) * 5)

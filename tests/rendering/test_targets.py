@@ -3,7 +3,7 @@
 import cv2
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from fingervision.domain.errors import FingervisionError
@@ -18,6 +18,7 @@ EDGE_PX = 1e-3
 CORNER_PX = 0.05
 
 
+@settings(deadline=None)
 @given(size_px=st.floats(1.0, 600.0), turn_deg=st.floats(-90.0, 90.0))
 def test_a_bar_has_its_size_square_to_its_sides(size_px: float, turn_deg: float) -> None:
     (outline,) = bar(size_px, 700.0, x_px=320.0, y_px=240.0, turn_deg=turn_deg)

@@ -67,6 +67,7 @@ def test_two_fingers_have_the_gap_they_were_asked_for(
     assert sum(across) / 2 == pytest.approx(middle, abs=TRUTH_PX)
 
 
+@settings(deadline=None)
 @given(radius_px=st.floats(11.0, 51.0))
 def test_a_round_tip_stands_back_by_its_sagitta(radius_px: float) -> None:
     scene = two_fingers(100.0, radius_px=radius_px)
@@ -75,6 +76,15 @@ def test_a_round_tip_stands_back_by_its_sagitta(radius_px: float) -> None:
     assert straight_px == pytest.approx(100.0 - 2 * sagitta, abs=TRUTH_PX)
 
 
+@pytest.mark.parametrize("direction", Direction)
+def test_a_measuring_point_on_the_joint_of_arc_and_side_is_found(direction: Direction) -> None:
+    """Once, although rounding puts the joint on either side of the line; every place of the tip rounds anew."""
+    for tip_at_px in np.random.default_rng(4).uniform(100.0, 300.0, 40):
+        scene = two_fingers(103.0, radius_px=BELOW_TIP_PX, direction=direction, tip_at_px=float(tip_at_px))
+        assert true_gap(scene).gap_px == pytest.approx(103.0, abs=TRUTH_PX)
+
+
+@settings(deadline=None)
 @given(tilt_deg=st.floats(0.1, 10.0))
 def test_the_tip_of_a_tilted_sharp_finger_is_its_outermost_corner(tilt_deg: float) -> None:
     """Measured along the image axis, not the finger's: its inner corner rises, and the side falls back from it."""

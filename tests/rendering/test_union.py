@@ -17,6 +17,7 @@ from fingervision.rendering.union import union
 AREA_PX2 = 1e-7
 
 
+@settings(deadline=None)
 @given(distance_px=st.floats(3.1, 16.9), phase=st.floats(0.0, 6.28))
 def test_two_discs_lose_their_common_lens_once(distance_px: float, phase: float) -> None:
     r, s, d = 10.0, 7.0, distance_px
@@ -44,6 +45,20 @@ def test_a_point_is_inside_the_union_if_it_is_inside_any(seed: int) -> None:
     assert np.array_equal(sum(outline.winding(points) for outline in union(shapes)), inside)
 
 
+@settings(deadline=None)
+@given(turn=st.floats(0.0, 6.28), x=st.floats(-200.0, 200.0))
+def test_a_crossing_at_a_corner_is_not_lost(turn: float, x: float) -> None:
+    """The corner of one square lies on the side of the other, whichever way it is rounded."""
+    square = polygon(((-10.0, -10.0), (10.0, -10.0), (10.0, 10.0), (-10.0, 10.0)))
+    diamond = square.moved(Motion.turn(np.pi / 4)).moved(Motion(x_px=10.0, y_px=10.0 * np.sqrt(2.0)))
+    pair = tuple(shape.moved(Motion.turn(turn)).moved(Motion(x_px=x, y_px=-x)) for shape in (square, diamond))
+    # The diamond's upper corner is (10, 0) on the square's right side; its left upper side cuts the corner (10, 10).
+    common = 10.0**2 / 2
+    total = sum(outline.area_px2 for outline in union(pair))
+    assert total == pytest.approx(800.0 - common, abs=1e-5)
+
+
+@settings(deadline=None)
 @given(gap_px=st.floats(-40.0, 18.0), radius_px=st.floats(20.0, 51.0), tilt_deg=st.floats(-3.0, 3.0))
 def test_fingers_that_overlap_are_one_blob(gap_px: float, radius_px: float, tilt_deg: float) -> None:
     scene = two_fingers(gap_px, radius_px=radius_px, tilt_deg=(tilt_deg, -tilt_deg))
