@@ -1,4 +1,4 @@
-"""What a picture makes of a point: cameras whose forms are not quite the catalogue's. Points x in mm, origin at centre."""
+"""What a picture makes of a point x (mm from the centre): cameras whose forms are not quite the catalogue's."""
 
 import numpy as np
 from numpy.typing import NDArray

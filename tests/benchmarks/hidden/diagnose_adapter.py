@@ -36,10 +36,8 @@ def read_report(path: Path, seconds: float) -> Answer:
     report = json.loads(path.read_text(encoding="utf-8"))
     best = frozenset(effect["name"] for effect in report["effects"])
     sets = [frozenset(names) for names in report.get("alternatives") or []]
-    if report["verdict"] in ("named", "ambiguous"):
-        sets = [best, *[s for s in sets if s != best]]
-    else:
-        sets = []
+    answered = report["verdict"] in ("named", "ambiguous")
+    sets = [best, *[s for s in sets if s != best]] if answered else []
     return Answer(report["verdict"], tuple(sets), seconds, report)
 
 
@@ -49,11 +47,8 @@ def diagnose(folder: Path, seed: int = 1) -> Answer:
 
     out = folder / "diagnosis"
     begun = time.perf_counter()
-    done = CliRunner().invoke(
-        cli,
-        ["diagnose", str(folder / "measured.csv"), "--model", str(folder / "simulation.csv"), "--out", str(out)]
-        + ["--seed", str(seed)],
-    )
+    files = [str(folder / "measured.csv"), "--model", str(folder / "simulation.csv"), "--out", str(out)]
+    done = CliRunner().invoke(cli, ["diagnose", *files, "--seed", str(seed)])
     seconds = time.perf_counter() - begun
     if done.exit_code != 0 or not (out / "report.json").exists():
         said = done.output[-400:] + (repr(done.exception) if done.exception else "")

@@ -18,7 +18,7 @@ Array = NDArray[np.float64]
 TRIES = 200
 
 
-class NotDrawn(ValueError):
+class NotDrawnError(ValueError):
     """No effect of the wanted size fits into its bounds on this gripper."""
 
 
@@ -157,9 +157,9 @@ def draw_experiment(seed: int, row: Row) -> Experiment:
     for _ in range(TRIES):
         try:
             return _draw(rng, row, seed)
-        except NotDrawn:
+        except NotDrawnError:
             continue
-    raise NotDrawn(f"Row {row.name} must be drawn within {TRIES} tries, but seed {seed} was not; use another seed.")
+    raise NotDrawnError(f"Row {row.name} must be drawn within {TRIES} tries, but seed {seed} was not; use another.")
 
 
 def _draw(rng: np.random.Generator, row: Row, seed: int) -> Experiment:
@@ -176,19 +176,19 @@ def _draw(rng: np.random.Generator, row: Row, seed: int) -> Experiment:
     if with_force and row.hidden:
         names = ["hinge_stiffness_error"]
     if row.hidden > len(names):
-        raise NotDrawn("Force tables hide one effect.")
+        raise NotDrawnError("Force tables hide one effect.")
     hidden = []
     for name in rng.choice(names, row.hidden, replace=False):
         effect: Hidden | None = draw_hidden(rng, str(name), table, inputs, design, total_s)
         if snr > 0:
             effect = _sized(draw_hidden(rng, str(name), table, inputs, design, total_s), experiment, snr)
         if effect is None or not within_bounds(effect, table, inputs, design.rate_hz):
-            raise NotDrawn(f"{name} has no such size here.")
+            raise NotDrawnError(f"{name} has no such size here.")
         hidden.append(effect)
     thing = _sized_foreign(draw_foreign(rng), experiment, snr) if row.foreign else None
     plant = replace(experiment.plant, hidden=tuple(hidden), foreign=thing)
     if snr == 0 and row.hidden and ratio(plant, experiment) < 3:
-        raise NotDrawn("An everyday size is at least three times the noise.")
+        raise NotDrawnError("An everyday size is at least three times the noise.")
     return replace(experiment, plant=plant)
 
 

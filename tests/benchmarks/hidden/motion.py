@@ -1,6 +1,7 @@
 """Motions of a stage: triangle, staircase with holds, sine, hold, move; as its position on a fine grid of time."""
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -43,7 +44,7 @@ class Motion:
 def through(points_mm: list[float], speed_mm_s: float) -> Motion:
     """Straight from point to point at one speed."""
     times = [0.0]
-    for a, b in zip(points_mm[:-1], points_mm[1:], strict=True):
+    for a, b in pairwise(points_mm):
         times.append(times[-1] + max(abs(b - a) / speed_mm_s, 1e-3))
     return Motion(tuple(times), tuple(points_mm))
 

@@ -4,6 +4,8 @@ import json
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
+
 from tests.benchmarks.hidden.experiment import Experiment, Row, draw_experiment, write
 from tests.benchmarks.hidden.oracle import Judgement, judge
 
@@ -30,27 +32,40 @@ def fair(row: Row, judgement: Judgement) -> bool:
     return judgement.own <= max(20.0, FORM_SHARE * judgement.nothing)
 
 
+def _written(judgement: Judgement) -> str:
+    right = {
+        "must": [sorted(names) for names in judgement.must],
+        "may": [sorted(names) for names in judgement.may],
+        "nothing": judgement.nothing,
+        "own": judgement.own,
+        "effects": {name: values.tolist() for name, values in judgement.effects.items()},
+        "nearest": judgement.nearest,
+        "outside": judgement.outside,
+    }
+    return json.dumps(right, indent=1)
+
+
+def _read(text: str) -> Judgement:
+    right = json.loads(text)
+    right["must"] = tuple(frozenset(names) for names in right["must"])
+    right["may"] = tuple(frozenset(names) for names in right["may"])
+    right["effects"] = {name: np.array(values) for name, values in right["effects"].items()}
+    return Judgement(**right)
+
+
 def draw_table_of_row(row: Row, seed: int, index: int, folder: Path) -> JudgedTable:
     """Draw, judge and write one table; draws again where the question is not fair. The same seed, the same table."""
-    remembered = folder / "attempt.json"
-    first = json.loads(remembered.read_text())["attempt"] if remembered.exists() else 0
-    for attempt in range(first, TRIES):
-        experiment = draw_experiment((seed * 10_000 + index) * TRIES + attempt, row)
+    remembered, right = folder / "attempt.json", folder / "right.json"
+    base = (seed * 10_000 + index) * TRIES
+    if remembered.exists():
+        experiment = draw_experiment(base + json.loads(remembered.read_text())["attempt"], row)
+        return JudgedTable(experiment, _read(right.read_text()), folder)
+    for attempt in range(TRIES):
+        experiment = draw_experiment(base + attempt, row)
         judgement = judge(experiment)
         if fair(row, judgement):
             write(experiment, folder)
+            right.write_text(_written(judgement), encoding="utf-8")
             remembered.write_text(json.dumps({"attempt": attempt}), encoding="utf-8")
-            right = {
-                "must": [sorted(names) for names in judgement.must],
-                "may": [sorted(names) for names in judgement.may],
-                "nothing": judgement.nothing,
-                "own": judgement.own,
-                "outside": judgement.outside,
-                "parameters": {name: values.tolist() for name, values in judgement.effects.items()},
-                "nearest": judgement.nearest,
-            }
-            (folder / "right.json").write_text(json.dumps(right, indent=1), encoding="utf-8")
             return JudgedTable(experiment, judgement, folder)
-    raise ValueError(
-        f"Row {row.name} must give a fair table within {TRIES} draws, but seed {seed} index {index} did not."
-    )
+    raise ValueError(f"Row {row.name} must give a fair table in {TRIES} draws, but seed {seed} index {index} did not.")

@@ -1,0 +1,59 @@
+"""A proposed run as motions: the recipe file's kinds that move the stage, driven by the same plant."""
+
+import tomllib
+from pathlib import Path
+from typing import Any
+
+from tests.benchmarks.hidden.experiment import Experiment
+from tests.benchmarks.hidden.motion import Motion, hold, sine, staircase, through, triangle
+from tests.benchmarks.hidden.plant import Trace
+
+
+class NotDrivenError(ValueError):
+    """The recipe asks for something that this bench has no stand-in for."""
+
+
+def _motion(step: dict[str, Any], now_mm: float, closed_mm: float) -> Motion:
+    match step["kind"]:
+        case "triangle":
+            return triangle(step["from_mm"], step["to_mm"], step["speed_mm_s"], int(step["cycles"]))
+        case "staircase":
+            ends = step["from_mm"], step["to_mm"]
+            return staircase(*ends, int(step["steps"]), step["dwell_s"], step["speed_mm_s"])
+        case "sine":
+            return sine(step["mean_mm"], step["amplitude_mm"], step["frequency_hz"], step["cycles"])
+        case "hold":
+            return hold(step["at_mm"], step["seconds"])
+        case "move":
+            return through([now_mm, step["to_mm"]], step["speed_mm_s"])
+        case "close_until_contact":
+            return through([now_mm, closed_mm], step["speed_mm_s"])
+        case kind:
+            raise NotDrivenError(f"A step must move the stage here, but is {kind}.")
+
+
+def motions_of(path: Path, closed_mm: float) -> list[Motion]:
+    """One motion for each run of a recipe; `rezero` begins another run."""
+    recipe = tomllib.loads(path.read_text(encoding="utf-8"))
+    runs: list[Motion] = []
+    motion: Motion | None = None
+    for step in recipe["step"]:
+        if step["kind"] == "rezero":
+            runs += [motion] if motion else []
+            motion = None
+            continue
+        more = _motion(step, motion.position_mm[-1] if motion else 0.0, closed_mm)
+        motion = more if motion is None else motion.then(more)
+    return runs + ([motion] if motion else [])
+
+
+def drive_recipe(experiment: Experiment, path: Path) -> list[Trace]:
+    """The recipe's runs, after those of the table."""
+    design = experiment.design
+    started = 0.0 if design.time_restarts else experiment.starts_s()[-1] + design.motions[-1].duration_s + 30.0
+    traces = []
+    for k, motion in enumerate(motions_of(path, experiment.plant.inputs.lower_mm)):
+        begin = started if not design.time_restarts else 0.0
+        traces.append(experiment.plant.trace(motion, design.rate_hz, begin, len(design.motions) + k))
+        started += motion.duration_s + 30.0
+    return traces

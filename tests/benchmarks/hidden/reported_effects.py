@@ -1,0 +1,25 @@
+"""The effects of a report.json as the judge's own chain takes them."""
+
+from typing import Any
+
+import numpy as np
+
+from tests.benchmarks.hidden.candidates import Candidate
+from tests.benchmarks.hidden.catalogue_chain import Effects
+
+
+def reported_effects(report: dict[str, Any], known: list[Candidate]) -> Effects:
+    """Values in the order of effects.md; a side that an end stop does not give lies at its bound."""
+    by_name = {candidate.name: candidate for candidate in known}
+    found: Effects = {}
+    for effect in report["effects"]:
+        candidate = by_name[effect["name"]]
+        absent = dict(zip(candidate.names, np.zeros(len(candidate.names)), strict=True))
+        if effect["name"] == "end_stop":
+            absent = {"upper_mm": float(candidate.upper[0]), "lower_mm": float(candidate.lower[1])}
+        given = {key: p["value"] for key, p in effect["parameters"].items()}
+        unforeseen = set(given) - set(candidate.names)
+        if unforeseen:
+            raise ValueError(f"{effect['name']} must have the parameters {candidate.names}, but has {unforeseen} too.")
+        found[effect["name"]] = np.array([given.get(key, absent[key]) for key in candidate.names], dtype=float)
+    return found

@@ -1,0 +1,192 @@
+"""The hidden-effect benchmark: draw tables, ask every method, print the table of marks.
+
+    python -m tests.benchmarks.hidden.run --tables 40 --jobs 2 --seed 1 --rows null,single_1 --methods diagnose,bic
+
+Everything is kept under --out by seed, row and number, so that a run may be stopped and goes on; --again METHOD asks
+that method anew. Build with seeds below 1000, judge with seeds from 1000 on.
+"""
+
+import argparse
+import json
+import os
+import shutil
+import time
+import traceback
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+import numpy as np
+
+from tests.benchmarks.hidden.binomial import Rate
+from tests.benchmarks.hidden.diagnose_adapter import Answer, diagnose, read_report
+from tests.benchmarks.hidden.next_run_gain import Gain, gain_that_came
+from tests.benchmarks.hidden.oracle import known_effects, problem_of
+from tests.benchmarks.hidden.peer_bic import greedy_bic
+from tests.benchmarks.hidden.peer_sindy import e_sindy
+from tests.benchmarks.hidden.recipe import NotDrivenError
+from tests.benchmarks.hidden.reported_effects import reported_effects
+from tests.benchmarks.hidden.rows import ROWS
+from tests.benchmarks.hidden.score import Mark, intervals, mark, row_lines
+from tests.benchmarks.hidden.table_cache import JudgedTable, draw_table_of_row
+from tests.benchmarks.hidden.unseen_run import unseen_error_ratio
+
+METHODS = ("diagnose", "bic", "sindy", "gp")
+PEERS = {"bic": greedy_bic, "sindy": e_sindy}
+
+
+@dataclass(frozen=True, slots=True)
+class Task:
+    """One table for one method."""
+
+    row: str
+    index: int
+    seed: int
+    method: str
+    out: Path
+
+
+def _ask(table: JudgedTable, method: str) -> Answer:
+    kept = table.folder / f"{method}.json"
+    report = table.folder / "diagnosis" / "report.json"
+    if kept.exists():
+        held = json.loads(kept.read_text(encoding="utf-8"))
+        if method == "diagnose" and report.exists():
+            return read_report(report, held["seconds"])
+        return Answer(held["verdict"], tuple(frozenset(s) for s in held["sets"]), held["seconds"], held["report"])
+    answer = diagnose(table.folder) if method == "diagnose" else PEERS[method](table.folder)
+    held = {"verdict": answer.verdict, "sets": [sorted(s) for s in answer.sets], "seconds": answer.seconds}
+    held["report"] = answer.report if answer.verdict == "failed" else {}
+    kept.write_text(json.dumps(held, indent=1), encoding="utf-8")
+    return answer
+
+
+def work(task: Task) -> dict[str, object]:
+    """Draw, ask, mark; a plain dictionary, so that it can be kept."""
+    row = ROWS[task.row]
+    folder = task.out / f"seed{task.seed}" / task.row / f"{task.index:04d}"
+    table = draw_table_of_row(row, task.seed, task.index, folder)
+    hidden = frozenset(h.name for h in table.experiment.plant.hidden)
+    if task.method == "gp":
+        return {"unseen": unseen_error_ratio(table, None)} if row.hidden else {}
+    answer = _ask(table, task.method)
+    marked = mark(row, table.judgement, answer, hidden)
+    result: dict[str, object] = {"mark": asdict(marked), "verdict": answer.verdict, "seconds": answer.seconds}
+    result |= {"sets": ["+".join(sorted(s)) for s in answer.sets], "hidden": "+".join(sorted(hidden))}
+    result["folder"] = str(folder)
+    if task.method != "diagnose" or answer.verdict == "failed":
+        return result
+    known = known_effects(table.experiment, problem_of(table.experiment, table.experiment.traces(), known_input=False))
+    if marked.right and row.hidden and answer.sets:
+        names = {c.name: c.names for c in known}
+        covered = intervals(table.judgement, answer, names)
+        result["intervals"] = [asdict(c) for c in covered]
+        result["unseen"] = unseen_error_ratio(table, reported_effects(answer.report, known))
+    if row.hidden:
+        try:
+            gain = gain_that_came(table, answer)
+        except NotDrivenError as reason:
+            result["not_driven"] = str(reason)
+        else:
+            result["gain"] = asdict(gain) if gain else None
+    return result
+
+
+def guarded(task: Task) -> dict[str, object]:
+    """`work`, with a fault of a table told instead of the whole run stopped."""
+    try:
+        return work(task)
+    except Exception:
+        return {"fault": traceback.format_exc(limit=6)}
+
+
+def report_of(method: str, results: dict[str, list[dict[str, object]]]) -> list[str]:
+    """The printed table for one method."""
+    lines = [f"== {method}"]
+    for name, found in results.items():
+        marks = [Mark(**r["mark"]) for r in found if "mark" in r]  # type: ignore[arg-type]
+        lines += row_lines(ROWS[name], marks)
+        failed = sum(r.get("verdict") == "failed" for r in found)
+        faults = sum("fault" in r for r in found)
+        if failed or faults:
+            lines.append(f"{'':16s} no report: {failed}, faults of the benchmark: {faults}")
+    every = [r for found in results.values() for r in found]
+    near = [abs(c["deviation"]) <= 1.96 for r in every for c in r.get("intervals", [])]  # type: ignore[attr-defined]
+    if near:
+        lines.append(f"95 % intervals cover {Rate(sum(near), len(near))}")
+    unseen = np.array([r["unseen"] for r in every if "unseen" in r])
+    if len(unseen):
+        median, ninety = np.quantile(unseen, [0.5, 0.9])
+        lines.append(f"unseen run, error over the judge's: median {median:.3f}, 90th percentile {ninety:.3f}")
+    gains = [Gain(**r["gain"]) for r in every if r.get("gain")]  # type: ignore[arg-type]
+    large = [0.7 <= g.came / g.promised <= 1.3 for g in gains if g.promised >= 75]
+    small = [g.low <= g.came <= g.high for g in gains if g.promised < 75]
+    if gains:
+        lines.append(f"proposed run, promises of 75 and more: within 0.7-1.3 {Rate(sum(large), len(large))}")
+        lines.append(f"proposed run, smaller promises: interval holds {Rate(sum(small), len(small))}")
+    seconds = [float(r["seconds"]) for r in every if r.get("seconds")]  # type: ignore[arg-type]
+    if seconds:
+        lines.append(f"seconds a table: median {np.median(seconds):.1f}, largest {max(seconds):.1f}")
+    return lines
+
+
+def main() -> None:
+    """Read the options, work, print."""
+    options = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    options.add_argument("--tables", type=int, default=20, help="tables a row")
+    options.add_argument("--first", type=int, default=0, help="number of the first table")
+    options.add_argument("--jobs", type=int, default=2)
+    options.add_argument("--seed", type=int, default=1)
+    options.add_argument("--rows", default=",".join(ROWS))
+    options.add_argument("--methods", default="diagnose,bic,sindy,gp")
+    options.add_argument("--out", type=Path, default=Path("results/hidden"))
+    options.add_argument("--again", default="", help="method whose kept answers are thrown away")
+    options.add_argument("--misses", type=Path, help="folder that gets a copy of every table that diagnose missed")
+    chosen = options.parse_args()
+    rows, methods = chosen.rows.split(","), chosen.methods.split(",")
+    begun = time.perf_counter()
+    tasks = [
+        Task(row, index, chosen.seed, method, chosen.out)
+        for row in rows
+        for index in range(chosen.first, chosen.first + chosen.tables)
+        for method in methods
+    ]
+    for task in tasks:
+        if task.method == chosen.again:
+            folder = task.out / f"seed{task.seed}" / task.row / f"{task.index:04d}"
+            (folder / f"{task.method}.json").unlink(missing_ok=True)
+    os.environ.setdefault("OMP_NUM_THREADS", "1")
+    # All methods of one table stay in one process: the table is drawn once.
+    results: dict[str, dict[str, list[dict[str, object]]]] = {m: {r: [] for r in rows} for m in methods}
+    batches = [tasks[i : i + len(methods)] for i in range(0, len(tasks), len(methods))]
+    with ProcessPoolExecutor(chosen.jobs) as pool:
+        waiting = {pool.submit(_batch, batch): batch for batch in batches}
+        for done, future in enumerate(as_completed(waiting), 1):
+            for task, result in zip(waiting[future], future.result(), strict=True):
+                results[task.method][task.row].append(result)
+                _tell(task, result, chosen.misses)
+            if done % 10 == 0:
+                print(f"   {done} of {len(batches)} tables, {time.perf_counter() - begun:.0f} s", flush=True)
+    for method in methods:
+        print("\n".join(report_of(method, results[method])))
+    print(f"seed {chosen.seed}, {chosen.tables} tables a row, {time.perf_counter() - begun:.0f} s")
+
+
+def _batch(tasks: list[Task]) -> list[dict[str, object]]:
+    return [guarded(task) for task in tasks]
+
+
+def _tell(task: Task, result: dict[str, object], misses: Path | None) -> None:
+    if "fault" in result:
+        print(f"{task.row} {task.index} {task.method}: {result['fault']}", flush=True)
+    missed = task.method == "diagnose" and "mark" in result and not result["mark"]["right"]  # type: ignore[index]
+    if missed:
+        said, hidden = result["verdict"], result["hidden"]
+        print(f"   missed {task.row} {task.index}: hidden {hidden or '-'}, said {said} {result['sets']}", flush=True)
+        if misses is not None:
+            name = f"{task.row}_seed{task.seed}_{task.index:04d}"
+            shutil.copytree(str(result["folder"]), misses / name, dirs_exist_ok=True)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,43 @@
+"""A run that nobody has fitted: how far predictions miss it, over how far the judge's miss it."""
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tests.benchmarks.hidden.catalogue_chain import Effects, Samples, respond
+from tests.benchmarks.hidden.design import unseen_motion
+from tests.benchmarks.hidden.noise import edge_errors
+from tests.benchmarks.hidden.oracle import problem_of
+from tests.benchmarks.hidden.peer_gp import gp_prediction
+from tests.benchmarks.hidden.table_cache import JudgedTable
+
+Array = NDArray[np.float64]
+
+
+def unseen_error_ratio(table: JudgedTable, effects: Effects | None) -> float:
+    """RMS over left and right of a noisy unseen run less the prediction, over the same with the judge's effects.
+
+    `effects` None asks the Gaussian process instead. The midline's constant is free, as everywhere.
+    """
+    experiment = table.experiment
+    rate = experiment.design.rate_hz
+    start_s = 0.0 if experiment.design.time_restarts else experiment.starts_s()[-1] * 0.5
+    trace = experiment.plant.trace(
+        unseen_motion(experiment.plant.inputs), rate, start_s, len(experiment.design.motions)
+    )
+    at = Samples(trace.input_mm, trace.run_time_s, trace.table_time_s, np.array([0, len(trace.input_mm)]))
+    model = problem_of(experiment, [trace], known_input=True).model
+    clean = replace(experiment.noise, outlier_share=0.0, run_offset_mm=0.0)
+    errors = edge_errors(np.random.default_rng([experiment.seed, 11]), clean, len(trace.input_mm))
+    left, right = trace.left_mm + errors[0], trace.right_mm + errors[1]
+    gap, midline = right - left, (left + right) / 2
+
+    def error_mm(prediction: tuple[Array, Array]) -> float:
+        off = midline - prediction[1]
+        off = off - off.mean()
+        return float(np.sqrt(np.mean(off**2 + (gap - prediction[0]) ** 2 / 4)))
+
+    judge = respond(model, at, table.judgement.effects)
+    asked = gp_prediction(table.folder, at) if effects is None else respond(model, at, effects)[:2]
+    return error_mm((asked[0], asked[1])) / error_mm((judge[0], judge[1]))
