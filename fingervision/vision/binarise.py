@@ -61,7 +61,7 @@ def binarise_local(denoised: GreyImage) -> Binary:
 
 def _split(denoised: GreyImage, threshold: float, sample: GreyImage, light_sample: GreyImage) -> Binary:
     _, dark = cv2.threshold(denoised, threshold, 255, cv2.THRESH_BINARY_INV)
-    is_light = light_sample if light_sample.dtype == np.uint8 else (light_sample > 0).astype(np.uint8)
+    is_light = cv2.compare(light_sample, 0, cv2.CMP_GT)
     light_mean, light_deviation = cv2.meanStdDev(sample, mask=is_light)
     dark_mean, dark_deviation = cv2.meanStdDev(sample, mask=cv2.bitwise_not(is_light) if is_light.any() else None)
     contrast = float(light_mean[0, 0] - dark_mean[0, 0])

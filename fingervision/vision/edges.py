@@ -6,7 +6,7 @@ is the Cramer-Rao bound. What all rows share is the spread, one for the flanks a
 spreads a flank more than a tip). Nothing is resampled.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +15,7 @@ from scipy.special import ndtri
 from fingervision.vision.edge_filters import LARGEST_OFFSET_PX, EdgeFilters, blurred_step, edge_filters, reach_for
 from fingervision.vision.grey import GreyImage
 from fingervision.vision.profile_lines import INNER, IS_ROW, PLACES, ROWS, ProfileLines
+from fingervision.vision.stripes import NEAR_SIGMAS, fit_stripes
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int_]
@@ -82,7 +83,47 @@ def fit_edges(upright: GreyImage, lines: ProfileLines) -> EdgePoints:
     blur = _first_blur(upright, lines)
     filters = edge_filters(reach_for(blur))
     values = _gather(upright, lines, filters.reach_px)
-    return _fit(values, lines, np.full((2, 2), blur), filters, float(np.iinfo(upright.dtype).max))
+    edges = _fit(values, lines, np.full((2, 2), blur), filters, float(np.iinfo(upright.dtype).max))
+    return _with_stripes(upright, edges, filters.reach_px)
+
+
+def _with_stripes(upright: GreyImage, edges: EdgePoints, reach: int) -> EdgePoints:
+    """The same points, but where the fingers nearly touch both edges of a row are fitted as one stripe."""
+    lines = edges.lines
+    facing = _facing(lines, reach)
+    if facing is None:
+        return edges
+    left, right = facing
+    gap = edges.position[1, right] - edges.position[0, left]
+    tips = lines.weight[:, ROWS:] > 0
+    blur = float(edges.blur_px[:, 1].mean())
+    near = gap < NEAR_SIGMAS * blur
+    if not near.any() or not tips.any():
+        return edges
+    left, right = left[near], right[near]
+    contrast = float(np.median(edges.contrast[:, ROWS:][tips]))
+    slope = 0.5 * (lines.slope[0, left] - lines.slope[1, right])
+    sigma = np.sqrt(blur**2 * (1.0 + slope**2) + slope**2 / 12.0)
+    stripes = fit_stripes(
+        upright,
+        lines.fixed[0, left],
+        edges.position[0, left],
+        edges.position[1, right],
+        sigma,
+        contrast,
+        edges.noise,
+        reach,
+    )
+    position, u_position = edges.position.copy(), edges.u_position.copy()
+    position[0, left], position[1, right] = stripes.left, stripes.right
+    # What all rows share must not average out over them.
+    u_row = np.hypot(stripes.u_noise, stripes.u_shared * np.sqrt(len(left)))
+    u_position[0, left] = u_position[1, right] = u_row
+    contrasts = edges.contrast.copy()
+    contrasts[0, left] = contrasts[1, right] = contrast
+    blurs = edges.blur_px.copy()
+    blurs[:, 0] = blur
+    return replace(edges, position=position, u_position=u_position, contrast=contrasts, blur_px=blurs)
 
 
 def _gather(upright: GreyImage, lines: ProfileLines, reach: int) -> Floats:
@@ -207,10 +248,13 @@ def _without_the_other(
 
 
 def _clipped(values: Floats, position: Floats, sigma: Floats, reach: int, top_level: float) -> NDArray[np.bool_]:
-    """Whether the flank itself, within 0.7 sigma of the edge, touches the end of the scale."""
+    """Whether the flank itself, within 0.7 sigma and a pixel's breadth of the edge, touches the end of the scale.
+
+    Where the ground is far beyond the scale, what is left of a flank looks steep: sigma alone would look too near.
+    """
     if values.min() > 0 and values.max() < top_level:
         return np.zeros(position.shape, dtype=bool)
-    near = np.abs(np.arange(-reach, reach + 1) - position[..., None]) < 0.7 * sigma[..., None]
+    near = np.abs(np.arange(-reach, reach + 1) - position[..., None]) < np.maximum(0.7 * sigma, 0.8)[..., None]
     return np.asarray((((values <= 0) | (values >= top_level)) & near).any(axis=-1))
 
 

@@ -175,11 +175,14 @@ def _jacobian(at: _Place, s: _Sides, points: OutlinePoints, origin: Floats, is_i
     by_top = -at.to_top * s.top_y
     by_radius = np.where(at.on_fillet, at.to_flank + at.to_top - 1.0, 0.0)
     jacobian = np.empty((len(qx), PARAMETERS, qx.shape[1]))
-    for number, change in ((INNER_C, by_flank), (INNER_M, by_flank * qy), (INNER_R, by_radius)):
+    # A side that turns takes the centre of its fillet along, which lies a radius inside it.
+    turning = np.where(at.on_fillet, at.radius, 0.0)
+    by_slope = by_flank * qy - at.to_flank * turning * at.flank_x * at.flank_y
+    for number, change in ((INNER_C, by_flank), (INNER_M, by_slope), (INNER_R, by_radius)):
         np.multiply(change, is_inner, out=jacobian[:, number])
         np.subtract(change, jacobian[:, number], out=jacobian[:, number + 1])
     jacobian[:, TOP_C] = by_top
-    np.multiply(by_top, qx, out=jacobian[:, TOP_M])
+    jacobian[:, TOP_M] = by_top * qx - at.to_top * turning * s.top_x * s.top_y
     return jacobian
 
 
@@ -268,10 +271,9 @@ def _spread(residual: Floats, weight: Floats) -> Floats:
 
 
 def corner_tops(p: Floats, origin: Floats) -> tuple[Floats, Floats]:
-    """Outermost point of the inner and of the outer fillet along the axis, each shape (m,)."""
+    """Where the inner and the outer fillet are outermost along the axis, (x, y) each of shape (m, 2), inner first."""
     s = _sides(p, origin)
-    tops = s.centre_y - s.radius
-    return tops[:, 0], tops[:, 1]
+    return s.centre_x, s.centre_y - s.radius
 
 
 def inner_edge(p: Floats, origin: Floats, y: Floats) -> tuple[Floats, Floats]:

@@ -190,10 +190,14 @@ def _best_pair(
         if best is not None and score <= best.score:
             continue
         if prominence < below_tip_px + 1.0:
-            shallow = shallow or max(left.prominence_px, right.prominence_px) > 4.0 * below_tip_px
+            shallow = shallow or (prominence > 0.3 * below_tip_px and max(left.prominence_px, right.prominence_px) > 4.0 * below_tip_px)
+            continue
+        if not _stand_side_by_side(left, right, below_tip_px):
             continue
         pair = (_follow(left, 1, below_tip_px, reach_px), _follow(right, -1, below_tip_px, reach_px))
-        if pair[0] is not None and pair[1] is not None:
+        if pair[0] is None or pair[1] is None:
+            continue
+        if pair[0].outline[0, 0] <= pair[1].outline[0, 0]:  # the inner sides, in this order
             best = CoarseFingers(pair[0], pair[1], orientation, score, is_rooted)
     if best is not None:
         return best
@@ -204,6 +208,12 @@ def _best_pair(
     if len(in_view) == 1 and in_view[0].prominence_px > below_tip_px:
         return NoGap(Status.ONE_FINGER, "Only one finger is in view.")
     return NoGap(Status.NO_FINGERS, "Nothing in the picture looks like two fingers.")
+
+
+def _stand_side_by_side(left: Top, right: Top, below_tip_px: float) -> bool:
+    """Whether each is there at the other's measuring height: things one behind the other are no fingers."""
+    deepest = max(left.along_px, right.along_px) + below_tip_px
+    return deepest <= min(left.along_px + left.prominence_px, right.along_px + right.prominence_px)
 
 
 def _follow(top: Top, inner_sign: int, below_tip_px: float, reach_px: float) -> CoarseFinger | None:

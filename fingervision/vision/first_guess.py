@@ -24,6 +24,8 @@ Floats = NDArray[np.float64]
 FEWEST_POINTS = 4
 # Flanks that differ more in slope are not both flanks; a flank that is not in view is parallel to the other within this.
 MOST_TAPER, TAPER_PRIOR = 0.15, 0.03
+# A side's slope is not far from what its points say at first sight.
+SLOPE_PRIOR = 0.3
 # A flank that no point speaks of lies so far beyond the outermost column, give or take a pixel.
 BEYOND_BORDER_PX = 3.0
 # A fillet that is blurred into its corner has its radius from the corner alone, to so much (pixels).
@@ -49,7 +51,7 @@ def first_guess(points: OutlinePoints, below_tip_px: float) -> tuple[Floats, Flo
     """
     fingers = len(points.x)
     start, u_prior = np.zeros((fingers, PARAMETERS)), np.full((fingers, PARAMETERS), 1e3)
-    u_prior[:, [INNER_M, TOP_M, OUTER_M]] = 10.0
+    u_prior[:, [INNER_M, TOP_M, OUTER_M]] = SLOPE_PRIOR
     origin = np.full((fingers, 2), below_tip_px)
     for k in range(fingers):
         _guess(points, k, start[k], origin[k], u_prior[k])

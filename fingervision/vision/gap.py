@@ -29,6 +29,8 @@ BLUR_LIMIT_PX = 5.0
 SHARED_SLOPE, SHARED_FACTOR = 0.75, 1.25
 # A line and its scatter need so many points.
 FEWEST_ROWS = 4
+# A finger's end has eight parameters: it needs this many lines across its outline.
+FEWEST_LINES = 2 * PARAMETERS
 # A measuring point farther from every point of the outline would be extrapolated (pixels).
 FARTHEST_POINT_PX = 2.5
 # A local polynomial that is less sure than this (pixels) has not found a smooth outline.
@@ -49,6 +51,27 @@ BIWEIGHT_SPREAD = 0.828
 # A top whose two corners differ in height by less than so many sigma is level
 # (a corner that is not in view says nothing: never by more than this).
 LEVEL_IN_SIGMAS, LEVEL_LIMIT_PX = 2.0, 0.5
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class MeasuringPoints:
+    """Tips and inner edges of several fingers in their own axes.
+
+    Parameters
+    ----------
+    tip, apex : ndarray of float, shape (fingers,)
+        Height of the tip, and where across it lies.
+    edge, slope : ndarray of float, shape (fingers,)
+        Inner edge at the measuring height, and its change per pixel to the root.
+    covariance : ndarray of float, shape (fingers, 2, 2)
+        Of (tip, edge).
+    """
+
+    tip: Floats
+    apex: Floats
+    edge: Floats
+    slope: Floats
+    covariance: Floats
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -118,17 +141,23 @@ def measure_gap(
     if refusal is not None:
         return refusal
     points, origin = outline_points(fingers, edges)
+    if points.weight.sum(axis=1).min() < FEWEST_LINES:
+        return NoGap(Status.NO_FINGERS, "Too little of a finger's outline is in view to be measured.")
     ends = fit_finger_ends(points, *first_guess(points, below_tip_px))
     inflation = _inflation(points, ends, lossy)
-    tip, edge, slope, covariance = _evaluate(ends, below_tip_px)
+    fitted = _evaluate(ends, below_tip_px)
+    holds = [_shape_holds(points, ends, k, fitted.tip[k], fitted.edge[k], below_tip_px) for k in range(2)]
     measured: list[MeasuredFinger] = []
     for k in range(2):
-        if _shape_holds(points, ends, k, float(tip[k]), float(edge[k]), below_tip_px):
-            finger: MeasuredFinger | None = MeasuredFinger(
-                float(tip[k]), float(edge[k]), float(slope[k]), covariance[k] * inflation[k]
-            )
-        else:
+        finger = None
+        if not all(holds):  # both in the same way: what a method does to a shape, it does to either
             finger = _measure_locally(points, k, below_tip_px, lossy)
+        if finger is None and holds[k]:
+            if fitted.apex[k] < points.x[k][points.weight[k] > 0].min() - 1.0:
+                return NoGap(Status.TIP_OUT_OF_VIEW, "A finger's tip lies beyond the picture's border.")
+            finger = MeasuredFinger(
+                float(fitted.tip[k]), float(fitted.edge[k]), float(fitted.slope[k]), fitted.covariance[k] * inflation[k]
+            )
         if finger is None:
             return NoGap(Status.NO_FINGERS, "The outline near the measuring height is broken.")
         measured.append(finger)
@@ -154,17 +183,17 @@ def _refuse(edges: EdgePoints, full_scale: int, light_gap: bool) -> NoGap | None
     return None
 
 
-def _evaluate(ends: FingerEnds, below_tip_px: float) -> tuple[Floats, Floats, Floats, Floats]:
-    """Tip, edge, slope, and the covariance of (tip, edge) by the parameters' covariance.
+def _evaluate(ends: FingerEnds, below_tip_px: float) -> MeasuringPoints:
+    """Tips and inner edges of the fitted shapes, with their covariance by the parameters' own.
 
     The tip is the higher of the two corners. Where noise alone decides which that is, the higher of two would be too
     high on average: a top that is level within twice its uncertainty counts as level.
     """
     count = len(ends.parameters)
-    move = 1e-3 * np.concatenate((np.zeros((1, PARAMETERS)), np.eye(PARAMETERS), -np.eye(PARAMETERS)))
-    every = (ends.parameters[:, None, :] + move).reshape(-1, PARAMETERS)
-    origin = np.repeat(ends.origin, len(move), axis=0)
-    inner, outer = (a.reshape(count, -1) for a in corner_tops(every, origin))
+    every = (ends.parameters[:, None, :] + _MOVES).reshape(-1, PARAMETERS)
+    origin = np.repeat(ends.origin, len(_MOVES), axis=0)
+    corner_x, corner_y = corner_tops(every, origin)
+    inner, outer = corner_y.reshape(count, -1, 2).transpose(2, 0, 1)
     gradient = _gradient(outer - inner)
     u_lean = np.sqrt(np.einsum("ki,kij,kj->k", gradient, ends.covariance, gradient)) * ends.misfit
     lean = (outer - inner)[:, 0]
@@ -174,7 +203,12 @@ def _evaluate(ends: FingerEnds, below_tip_px: float) -> tuple[Floats, Floats, Fl
     edge, slope = (a.reshape(count, -1) for a in inner_edge(every, origin, (tip + below_tip_px).reshape(-1)))
     gradients = np.stack([_gradient(tip), _gradient(edge)], axis=1)
     covariance = gradients @ ends.covariance @ np.swapaxes(gradients, 1, 2)
-    return tip[:, 0], edge[:, 0], slope[:, 0], covariance
+    apex = corner_x.reshape(count, -1, 2)[np.arange(count), 0, (inner_share[:, 0] == 0.0).astype(int)]
+    return MeasuringPoints(tip[:, 0], apex, edge[:, 0], slope[:, 0], covariance)
+
+
+# The parameters as they are, and each moved up and down by a thousandth.
+_MOVES = 1e-3 * np.concatenate((np.zeros((1, PARAMETERS)), np.eye(PARAMETERS), -np.eye(PARAMETERS)))
 
 
 def _gradient(moved: Floats) -> Floats:

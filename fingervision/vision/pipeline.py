@@ -78,40 +78,38 @@ def _measure(grey: GreyImage, settings: Settings, lossy: bool) -> GapMeasurement
     binary = binarise(denoised)
     if binary.contrast < CONTRAST_FLOOR * scale or binary.separation < SEPARATION_FLOOR:
         return NoGap(Status.LOW_CONTRAST, "The picture is uniform: nothing in it differs from anything else.")
-    found: GapMeasurement | NoGap | None = None
+    reason: NoGap | None = None
     for candidate, light_gap in _candidates(denoised, binary, settings):
         if isinstance(candidate, NoGap):
-            found = found or candidate
-            continue
-        orientation = candidate.orientation
-        upright = orientation.view(grey)
-        edges = fit_edges(upright, profile_lines((candidate.left, candidate.right)))  # type: ignore[arg-type]
-        measured = measure_gap(candidate, edges, settings.below_tip_px, scale, light_gap, lossy)
+            measured: GapMeasurement | NoGap = candidate
+        else:
+            upright = candidate.orientation.view(grey)
+            edges = fit_edges(upright, profile_lines((candidate.left, candidate.right)))  # type: ignore[arg-type]
+            measured = measure_gap(candidate, edges, settings.below_tip_px, scale, light_gap, lossy)
         if isinstance(measured, GapMeasurement):
             return measured
-        if not isinstance(found, NoGap) or found.status in (Status.NO_FINGERS, Status.ONE_FINGER):
-            found = measured
-    return found or NoGap(Status.NO_FINGERS, "Nothing in the picture looks like two fingers.")
+        reason = reason or measured
+    return reason or NoGap(Status.NO_FINGERS, "Nothing in the picture looks like two fingers.")
 
 
 def _candidates(
     denoised: GreyImage, binary: Binary, settings: Settings
 ) -> Iterator[tuple[CoarseFingers | NoGap, bool]]:
-    """Where the fingers may be, the likelier first: by polarity, then against the picture's own light."""
+    """Where the fingers may be, the likeliest first: darker or lighter than the border, then against uneven light."""
     directions = tuple(Direction) if settings.direction is None else (settings.direction,)
     below = settings.below_tip_px
     reach = below + max(REACH_BELOW_PX, REACH_BELOW_HEIGHTS * below)
-    for split in (lambda: binary, lambda: binarise_local(denoised)):
-        black_and_white = split()
-        dark_first = _border_is_light(black_and_white)
-        found = []
+    for is_local in (False, True):
+        split = binarise_local(denoised) if is_local else binary
+        dark_first = _border_is_light(split)
+        unsure: list[tuple[CoarseFingers | NoGap, bool]] = []
         for light_gap in (dark_first, not dark_first):
-            mask = black_and_white.dark if light_gap else black_and_white.light
-            fingers = find_fingers(mask, directions, below, reach)
-            found.append((fingers, light_gap))
-            if isinstance(fingers, CoarseFingers) and fingers.is_rooted:
-                break
-        yield from sorted(found, key=lambda one: -one[0].score if isinstance(one[0], CoarseFingers) else 1.0)
+            fingers = find_fingers(split.dark if light_gap else split.light, directions, below, reach)
+            if isinstance(fingers, CoarseFingers) and not fingers.is_rooted:
+                unsure.append((fingers, light_gap))  # something may come in from the border in the other polarity
+            else:
+                yield fingers, light_gap
+        yield from unsure
 
 
 def _border_is_light(binary: Binary) -> bool:
