@@ -15,10 +15,12 @@ import cv2
 import numpy as np
 import pytest
 
+from calib.measured_scale import Calibration, Reference, ScalePart
 from fingervision.cli import main
 from fingervision.domain.frame import Frame
 from fingervision.rendering import Camera, render, two_fingers
 from fingervision.rendering.clip import H264, Ffv1, write_clip
+from fingervision.storage.calibration_json import write_calibration
 
 PX_PER_MM = 20.0
 SCALE = ("--px-per-mm", f"{PX_PER_MM:g}")
@@ -117,6 +119,41 @@ def test_the_drive_adds_its_columns(run: Run, clip: Path) -> None:
     table = rows(Path("d/gaps.csv"))
     assert [(row["run"], row["input_mm"]) for row in table[:3]] == [("", ""), ("slow", "0"), ("slow", "0.2")]
     assert table[-1]["input_mm"] == ""
+
+
+def calibration(path: Path, frame_size_px: tuple[int, int]) -> Path:
+    covariance = np.diag([0.002**2, 0.05**2])
+    scale = Calibration(
+        px_per_mm=PX_PER_MM,
+        edge_bias_px=0.5,
+        parts=(ScalePart("scale and edge bias", covariance),),
+        frame_size_px=frame_size_px,
+        references=(Reference("bar", 5.0, 0.001, "certificate 7", "2026-03-01"),),
+    )
+    write_calibration(scale, path)
+    return path
+
+
+def test_with_a_calibration_the_uncertainty_is_whole_and_its_artefact_is_named(run: Run, clip: Path) -> None:
+    file = calibration(Path("calibration.json"), (240, 200))
+    code, out, _ = run(clip, "--calibration", file, "--out", "c", "--json")
+    assert code == 0
+    for row, gap_px in zip(rows(Path("c/gaps.csv")), gaps_px(12), strict=True):
+        # A light gap between dark fingers, so the edge bias is added.
+        assert float(row["gap_mm"]) == pytest.approx((gap_px + 0.5) / PX_PER_MM, abs=GAP_TOLERANCE_MM)
+        assert float(row["u_gap_mm"]) > float(row["u_random_mm"]) > 0.0
+        across_mm = float(row["right_mm"]) - float(row["left_mm"])
+        assert across_mm == pytest.approx(float(row["gap_mm"]), abs=GAP_TOLERANCE_MM)
+    summary = json.loads(out)
+    assert summary["scale"]["reference"][0]["certificate"] == "certificate 7"
+    assert summary["gap"]["median_u_gap_mm"] > summary["gap"]["median_u_random_mm"]
+    assert summary["uncertainty"]["coverage_factor"] == 2
+
+
+def test_a_calibration_for_other_frames_is_refused(run: Run, clip: Path) -> None:
+    code, _, err = run(clip, "--calibration", calibration(Path("calibration.json"), (640, 480)))
+    assert code == 1
+    assert "The calibration was made on frames of 640x480 pixels, but these are 240x200: calibrate again" in err
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,189 @@
+"""Speed, memory and start-up of `measure`.
+
+    python tests/benchmarks/speed.py [--frames 500] [--runs 5] [--only rate|memory|start]
+
+Rate: frames per second of decoding alone and of measuring, in turn on the same file, medians; and milliseconds of one
+core for everything after decoding, beside the same steps written plainly with OpenCV and with scikit-image. Memory:
+peak of a 10-minute file against a 10-second one. Start-up: `fingervision --help`. Every figure is that of the machine
+it runs on; the clip is 640x480, H.264 of about 5 Mbit/s.
+"""
+
+import argparse
+import statistics
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable
+from itertools import islice
+from pathlib import Path
+
+import av
+import cv2
+import numpy as np
+from skimage import filters
+from skimage import measure as shapes
+
+from calib.calibration import BareScale
+from fingervision.domain.direction import Direction
+from fingervision.domain.frame import Frame, Pixels
+from fingervision.frames.source import open_source
+from fingervision.measuring.measure import Task, measure
+from fingervision.rendering import Camera, render, two_fingers
+from fingervision.rendering.clip import H264, write_clip
+from fingervision.vision.pipeline import Settings, measure_frame
+
+PX_PER_MM = 34.0
+BELOW_PX = 0.3 * PX_PER_MM
+# Noise of this size takes x264 to about 5 Mbit/s at this quality.
+NOISE_GREY, CRF = 4.0, 20.0
+RENDERED = 100
+
+
+def pictures() -> list[Pixels]:
+    """An opening and closing gripper; rendered once and repeated, because rendering is slow."""
+    rng = np.random.default_rng(0)
+    camera = Camera(blur_px=0.9, noise_grey=NOISE_GREY)
+    gaps = 120.0 + 80.0 * np.sin(np.linspace(0.0, 2.0 * np.pi, RENDERED, endpoint=False))
+    return [render(two_fingers(float(gap), radius_px=34.0), camera, rng) for gap in gaps]
+
+
+def write(path: Path, count: int, levels: list[Pixels]) -> None:
+    write_clip(path, (Frame(levels[k % len(levels)], k, k / 25.0) for k in range(count)), H264(CRF))
+
+
+def decode(path: Path) -> int:
+    with av.open(str(path)) as container:
+        return sum(1 for _ in container.decode(video=0))
+
+
+def run(path: Path, out: Path, direction: Direction | None) -> int:
+    task = Task(BareScale(PX_PER_MM), direction=direction)
+    return measure(open_source(str(path)), task, out).series.frames
+
+
+def seconds(work: Callable[[], object]) -> float:
+    start = time.perf_counter()
+    work()
+    return time.perf_counter() - start
+
+
+def plain_opencv(pixels: Pixels) -> float | None:
+    """The paper's steps, written plainly: Otsu, contours, tips, and the inner edges by parabola on the gradient."""
+    _, black = cv2.threshold(cv2.GaussianBlur(pixels, (5, 5), 0), 0, 255, cv2.THRESH_BINARY_INV + cv2.THRESH_OTSU)
+    outlines, _ = cv2.findContours(black, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
+    two = sorted(outlines, key=cv2.contourArea)[-2:]
+    if len(two) < 2:
+        return None
+    boxes = sorted(cv2.boundingRect(outline) for outline in two)
+    inner = [boxes[0][0] + boxes[0][2] - 1, boxes[1][0]]
+    row = round(max(box[1] for box in boxes) + BELOW_PX)
+    slope = np.abs(cv2.Sobel(pixels[row - 10 : row + 10], cv2.CV_32F, 1, 0)).mean(axis=0)
+    places = []
+    for at in inner:
+        low = max(at - 8, 1)
+        k = low + int(np.argmax(slope[low : at + 9]))
+        a, b, c = slope[k - 1 : k + 2]
+        places.append(k + 0.5 * (a - c) / (a - 2 * b + c))
+    return float(places[1] - places[0])
+
+
+def plain_skimage(pixels: Pixels) -> float | None:
+    """The same with scikit-image: Otsu, labels, and the half-level by `find_contours`."""
+    smooth = filters.gaussian(pixels, 1.0, preserve_range=True)
+    level = filters.threshold_otsu(smooth)
+    regions = sorted(shapes.regionprops(shapes.label(smooth < level)), key=lambda region: region.area)[-2:]
+    if len(regions) < 2:
+        return None
+    regions.sort(key=lambda region: region.bbox[1])
+    row = max(region.bbox[0] for region in regions) + BELOW_PX
+    lines = shapes.find_contours(pixels[round(row) - 10 : round(row) + 10].astype(float), level)
+    across = sorted(float(np.median(line[:, 1])) for line in lines if len(line) > 10)
+    return across[-2] - across[1] if len(across) >= 4 else None
+
+
+def rate(folder: Path, levels: list[Pixels], frames: int, runs: int) -> None:
+    path = folder / "clip.mp4"
+    write(path, frames, levels)
+    bits = path.stat().st_size * 8 / (frames / 25.0) / 1e6
+    print(f"\nRate, 640x480 H.264 of {bits:.1f} Mbit/s, {frames} frames, medians of {runs} runs in turn")
+    run(path, folder / "out", None)  # imports and tables that are made once
+    print(f"{'':34}{'frames/s':>10}{'of decoding':>13}")
+    alone: list[float] = []
+    by_tips: dict[str, list[float]] = {"measure --tips up": [], "measure --tips auto": []}
+    for _ in range(runs):
+        alone.append(frames / seconds(lambda: decode(path)))
+        for name, direction in (("measure --tips up", Direction.UP), ("measure --tips auto", None)):
+            by_tips[name].append(frames / seconds(lambda way=direction: run(path, folder / "out", way)))
+    reference = statistics.median(alone)
+    print(f"{'decoding alone':34}{reference:10.0f}{1.0:13.2f}")
+    for name, rates in by_tips.items():
+        print(f"{name:34}{statistics.median(rates):10.0f}{statistics.median(rates) / reference:13.2f}")
+
+    settings = {"up": Settings(BELOW_PX, Direction.UP), "auto": Settings(BELOW_PX)}
+    steps: dict[str, Callable[[Pixels], object]] = {
+        "fingervision, tips up": lambda p: measure_frame(Frame(p, 0, None, True), settings["up"]),
+        "fingervision, tips auto": lambda p: measure_frame(Frame(p, 0, None, True), settings["auto"]),
+        "plain OpenCV": plain_opencv,
+        "plain scikit-image": plain_skimage,
+    }
+    with av.open(str(path)) as container:
+        decoded = [picture.to_ndarray()[:480].copy() for picture in islice(container.decode(video=0), 100)]
+    print(f"\n{'After decoding, ms of one core':34}{'ms/frame':>10}")
+    for name, step in steps.items():
+        spent = []
+        for _ in range(runs):
+            start = time.process_time()
+            for pixels in decoded:
+                step(pixels)
+            spent.append(1e3 * (time.process_time() - start) / len(decoded))
+        print(f"{name:34}{statistics.median(spent):10.2f}")
+
+
+def peak_mb(path: Path, out: Path) -> float:
+    """Largest resident memory of a whole `measure`."""
+    command = [sys.executable, "-m", "fingervision", "measure", str(path), "--px-per-mm", "34", "--out", str(out)]
+    watched = (
+        "import resource,subprocess,sys\n"
+        "subprocess.run(sys.argv[1:], check=True, stdout=subprocess.DEVNULL)\n"
+        "print(resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss)"
+    )
+    done = subprocess.run([sys.executable, "-c", watched, *command], capture_output=True, text=True, check=True)
+    return int(done.stdout) / (1024.0 if sys.platform == "linux" else 1024.0**2)
+
+
+def memory(folder: Path, levels: list[Pixels]) -> None:
+    print(f"\n{'Peak memory of measure':34}{'MB':>10}{'of the first':>14}")
+    first = None
+    for words, count in (("10 seconds, 250 frames", 250), ("10 minutes, 15000 frames", 15_000)):
+        path = folder / f"{count}.mp4"
+        write(path, count, levels)
+        peak = peak_mb(path, folder / f"out{count}")
+        first = first or peak
+        print(f"{words:34}{peak:10.0f}{peak / first:14.2f}")
+
+
+def start_up(runs: int) -> None:
+    command = [sys.executable, "-m", "fingervision", "--help"]
+    spent = [seconds(lambda: subprocess.run(command, capture_output=True, check=True)) for _ in range(runs)]
+    print(f"\n{'Start-up, fingervision --help':34}{statistics.median(spent):10.2f} s")
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--frames", type=int, default=500)
+    parser.add_argument("--runs", type=int, default=5)
+    parser.add_argument("--only", choices=["rate", "memory", "start"])
+    asked = parser.parse_args()
+    with tempfile.TemporaryDirectory() as name:
+        folder, levels = Path(name), pictures() if asked.only != "start" else []
+        if asked.only in (None, "rate"):
+            rate(folder, levels, asked.frames, asked.runs)
+        if asked.only in (None, "start"):
+            start_up(asked.runs)
+        if asked.only in (None, "memory"):
+            memory(folder, levels)
+
+
+if __name__ == "__main__":
+    main()
