@@ -23,6 +23,8 @@ CLEARLY_LONGER = 1.3
 SAME_SCALE = 0.06
 # What a size is multiplied by where it was stated in another unit.
 WRONG_UNITS = {0.1: "ten", 10.0: "ten", 25.4: "25.4", 1.0 / 25.4: "25.4", 0.001: "a thousand", 1000.0: "a thousand"}
+# One combination is taken without asking where the next one disagrees by more than noise, and so much more.
+NOT_NOISE, CLEARLY_BETTER = 0.01, 0.3
 # With more pictures than this, combinations are not tried; the longer edges are taken.
 MOST_COMBINED = 12
 
@@ -171,7 +173,11 @@ def _settled(pictures: Sequence[KnownSize], choices: Sequence[Sequence[ParallelE
     if not agreeing:
         _refuse_unit(pictures, combinations, sizes)
         _refuse_sizes(pictures, min(combinations, key=lambda each: _disagreement(each, sizes)), sizes)
+    agreeing.sort(key=lambda each: _disagreement(each, sizes))
     if len(agreeing) == 1:
+        return agreeing[0]
+    best, next_best = (_disagreement(each, sizes) for each in agreeing[:2])
+    if next_best > NOT_NOISE and best < CLEARLY_BETTER * next_best:
         return agreeing[0]
     for picture, found in zip(pictures, choices, strict=True):
         if len(found) > 1 and found[0].length_px < CLEARLY_LONGER * found[1].length_px:
@@ -180,11 +186,7 @@ def _settled(pictures: Sequence[KnownSize], choices: Sequence[Sequence[ParallelE
                 f"{found[1].width_px:.1f} px the other, and either could be the {picture.size_mm:g} mm: give a region "
                 "with --roi that holds the two measured edges and leaves the other two out."
             )
-    return (
-        longer_edges
-        if any(each == longer_edges for each in agreeing)
-        else min(agreeing, key=lambda each: _disagreement(each, sizes))
-    )
+    return longer_edges if any(each == longer_edges for each in agreeing) else agreeing[0]
 
 
 def _disagreement(widths: Sequence[ParallelEdges], sizes: NDArray[np.float64]) -> float:

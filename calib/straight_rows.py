@@ -17,8 +17,9 @@ Ints = NDArray[np.int_]
 OUTLIER_SIGMAS = 4.0
 # The fewest rows that make a straight edge.
 FEWEST_ROWS = 10
-# An edge bent by more than this (pixels), and by more than this part of its length, is a curve: a drop, a disc.
-LARGEST_BEND_PX, LARGEST_BEND = 0.35, 0.004
+# An edge bent by more than this (pixels), and by more than this part of its length, is a curve: a drop, a disc. What a
+# finder of straight segments takes for one on a circle is bent by 0.02 to 0.05 of its length; a strong lens bends less.
+LARGEST_BEND_PX, LARGEST_BEND = 0.35, 0.01
 # The search for the rows that belong settles after two or three rounds.
 ROUNDS = 10
 

@@ -256,7 +256,7 @@ class _Reader:
         if not plane:
             return None
         homography = self._array(plane.get("homography"), "plane.homography", (3, 3))
-        if abs(np.linalg.det(homography)) < np.finfo(float).eps * np.abs(homography).max() ** 3:
+        if abs(np.linalg.det(homography)) <= np.finfo(float).eps * np.abs(homography).max() ** 3:
             self._refuse(f"plane.homography must be invertible, but is {homography.tolist()}")
         return Plane(homography)
 
