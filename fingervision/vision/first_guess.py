@@ -24,6 +24,8 @@ Floats = NDArray[np.float64]
 FEWEST_POINTS = 4
 # Flanks that differ more in slope are not both flanks; a flank that is not in view is parallel to the other within this.
 MOST_TAPER, TAPER_PRIOR = 0.15, 0.03
+# Where only one corner is in view, its sides are square to each other within this.
+SQUARE_PRIOR = 0.01
 # A side's slope is not far from what its points say at first sight.
 SLOPE_PRIOR = 0.3
 # A flank that no point speaks of lies so far beyond the outermost column, give or take a pixel.
@@ -73,6 +75,8 @@ def _guess(points: OutlinePoints, k: int, start: Floats, origin: Floats, u_prior
     if outer is None:  # cut off by the border: nothing speaks of the far corner
         outer_c, outer_m = float(x[real].min()) - BEYOND_BORDER_PX, 0.0
         u_prior[[OUTER_C, OUTER_M, OUTER_R]] = 1.0, 0.05, 1.0
+        # What is in view may be the inner fillet alone, which leaves the top's slope open: it is square to the flank.
+        top_m, u_prior[TOP_M] = -inner_m, SQUARE_PRIOR
     else:
         outer_c, outer_m = outer
         if abs(inner_m - outer_m) > MOST_TAPER:

@@ -22,7 +22,7 @@ EDGE, TIP, POINT, DISTANCE, WORDS, FAILURE, BACKING = (
 FRACTION_BITS = 4
 # A frame of this height is drawn with lines one pixel wide and letters of the usual size.
 USUAL_HEIGHT_PX = 480.0
-EDGE_LENGTH_PX, TIP_LENGTH_PX, POINT_PX = 40.0, 26.0, 6.0
+EDGE_LENGTH_PX, TIP_LENGTH_PX, POINT_PX = 30.0, 26.0, 6.0
 
 Canvas = NDArray[np.uint8]
 
@@ -73,8 +73,9 @@ def _draw_finger(canvas: Canvas, edge: FingerEdge, direction: Direction, size: f
     along, across = EDGE_LENGTH_PX * size / steepness * root, EDGE_LENGTH_PX * size / steepness * edge.slope
     vertical = direction.is_vertical
     step = (across, along) if vertical else (along, across)
-    start = (edge.x_px - 0.25 * step[0], edge.y_px - 0.25 * step[1])
-    _line(canvas, start, (edge.x_px + step[0], edge.y_px + step[1]), EDGE, size)
+    half_step = (0.5 * step[0], 0.5 * step[1])
+    start = (edge.x_px - half_step[0], edge.y_px - half_step[1])
+    _line(canvas, start, (edge.x_px + half_step[0], edge.y_px + half_step[1]), EDGE, size)
     half = TIP_LENGTH_PX * size
     if vertical:
         _line(canvas, (edge.x_px - half, edge.tip_px), (edge.x_px + half, edge.tip_px), TIP, size)
