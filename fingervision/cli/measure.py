@@ -149,8 +149,8 @@ def _region(words: str) -> "Region":
 def _default_out(recording: str) -> Path:
     """measured/<file or folder>; for a glob the folder that it looks in."""
     path = Path(recording)
-    name = path.name if path.exists() else path.parent.name
-    return Path("measured") / (name or path.resolve().name or "images")
+    name = path.resolve().name if path.exists() else path.parent.resolve().name
+    return Path("measured") / (name or "images")
 
 
 class _Bar:

@@ -16,6 +16,7 @@ IMAGE_SUFFIXES = LOSSY_SUFFIXES | {".png", ".bmp", ".tif", ".tiff"}
 
 PNG_SIGNATURE = b"\x89PNG\r\n\x1a\n"
 JPEG_START, JPEG_END = b"\xff\xd8", b"\xff\xd9"
+TIFF_STARTS = (b"II*\x00", b"MM\x00*", b"II+\x00", b"MM\x00+")
 
 
 class UnreadableImageError(Exception):
@@ -53,6 +54,8 @@ def read_image(file: Path) -> Pixels:
         _check_png(file.name, content)
     elif content.startswith(JPEG_START) and JPEG_END not in content[-4096:]:
         raise UnreadableImageError(f"{file.name} ends before its picture does.")
+    elif content.startswith(TIFF_STARTS) and cv2.imcount(str(file)) > 1:
+        raise UnreadableImageError(f"{file.name} holds several pictures: save each of them as a file of its own.")
     pixels = _decoded(content)
     if pixels is None:
         raise UnreadableImageError(f"{file.name} is damaged or no image.")

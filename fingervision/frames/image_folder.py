@@ -63,7 +63,7 @@ class ImageFolder:
                 "or remove that file."
             )
         height_px, width_px = _first_readable(self.name, files)
-        lossy = any(file.suffix.lower() in LOSSY_SUFFIXES for file in files)
+        coding = max((_coding(file) for file in files), key=lambda coding: coding is not Coding.LOSSLESS)
         object.__setattr__(self, "times_s", times_s)
         object.__setattr__(
             self,
@@ -72,7 +72,7 @@ class ImageFolder:
                 name=self.name,
                 kind="images",
                 codec=", ".join(sorted({file.suffix.lower().lstrip(".") for file in files})),
-                lossy=lossy,
+                coding=coding,
                 width_px=width_px,
                 height_px=height_px,
                 rate_hz=self.rate_hz,
@@ -98,7 +98,7 @@ class ImageFolder:
                 yield LostFrame(index, time_s, Status.DAMAGED, str(error))
                 continue
             if pixels.shape[:2] == size_px:
-                yield Frame(pixels, index, time_s, file.suffix.lower() in LOSSY_SUFFIXES)
+                yield Frame(pixels, index, time_s, _coding(file))
             else:
                 words = (
                     f"{file.name} has {pixels.shape[1]}x{pixels.shape[0]} pixels, but the recording "

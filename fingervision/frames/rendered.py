@@ -52,7 +52,7 @@ class RenderedFrames:
             name="rendered",
             kind="rendered scenes",
             codec="none",
-            lossy=False,
+            coding=Coding.LOSSLESS,
             width_px=first.width_px,
             height_px=first.height_px,
             rate_hz=self.rate_hz,

@@ -25,7 +25,7 @@ class Description:
         Video file, images, camera.
     codec : str
         How the pictures are stored.
-    lossy : bool
+    coding : Coding
         Whether that loses something: errors of neighbouring pixels are then correlated.
     width_px, height_px : int
         Size of every frame; a frame of another size counts as damaged.
@@ -44,7 +44,7 @@ class Description:
     name: str
     kind: str
     codec: str
-    lossy: bool
+    coding: Coding
     width_px: int
     height_px: int
     rate_hz: float | None
@@ -52,6 +52,11 @@ class Description:
     frame_count: int | None
     files: tuple[Path, ...] = ()
     notes: tuple[str, ...] = ()
+
+    @property
+    def lossy(self) -> bool:
+        """Whether anything of the picture is lost."""
+        return self.coding is not Coding.LOSSLESS
 
 
 class FrameSource(Protocol):

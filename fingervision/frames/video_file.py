@@ -9,20 +9,27 @@ from pathlib import Path
 import av
 
 from fingervision.domain.errors import FingervisionError, UsageError
-from fingervision.domain.frame import Frame, LostFrame
+from fingervision.domain.frame import Coding, Frame, LostFrame
 from fingervision.domain.status import Status
 from fingervision.frames.damage import DamageTrail
 from fingervision.frames.image_file import IMAGE_SUFFIXES
 from fingervision.frames.luma import luma
 from fingervision.frames.source import Description, Wish
 
-# FFmpeg's AV_CODEC_PROP_LOSSY. A codec that can do both (H.264) counts as lossy: the stream does not say.
-LOSSY_PROPERTY = 2
+# FFmpeg's AV_CODEC_PROP_INTRA_ONLY and AV_CODEC_PROP_LOSSY. A codec that can do both (H.264) counts as lossy: the stream
+# does not say.
+INTRA_PROPERTY, LOSSY_PROPERTY = 1, 2
 # These decoders fill in a damaged part from the picture before, and say so in FFmpeg's log alone: beginnings of lines.
 # Codecs without a checksum (H.264) can be damaged without anybody noticing; FFV1 has one for each slice.
 SPOKEN_DAMAGE = {"ffv1": ("",), "mjpeg": ("overread", "error ")}
 # A damaged slice is an error, not a guess from the picture before it; checksums are looked at where there are any.
 STRICT = {"err_detect": "crccheck+explode"}
+
+
+def _coding(properties: int) -> Coding:
+    if not properties & LOSSY_PROPERTY:
+        return Coding.LOSSLESS
+    return Coding.INTRAFRAME if properties & INTRA_PROPERTY else Coding.INTERFRAME
 
 
 def accepts(name: str) -> bool:
@@ -83,7 +90,7 @@ class VideoFile:
                     name=self.name,
                     kind=f"video file ({container.format.long_name})",
                     codec=codec.name,
-                    lossy=bool(codec.codec.properties & LOSSY_PROPERTY),
+                    coding=_coding(codec.codec.properties),
                     width_px=codec.width,
                     height_px=codec.height,
                     rate_hz=rate,
@@ -111,7 +118,7 @@ class VideoFile:
                 elif tick is not None and tick == last_tick:
                     yield LostFrame(index, time_s, Status.DUPLICATE, "It has the same time as the frame before.")
                 else:
-                    yield Frame(luma(found), index, time_s, self.description.lossy)
+                    yield Frame(luma(found), index, time_s, self.description.coding)
                 last_tick = tick
 
     def _opened(self) -> av.container.InputContainer:

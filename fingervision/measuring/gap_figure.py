@@ -52,13 +52,13 @@ def draw_gap(path: Path, series: GapSeries) -> None:
             color=FAILURE_COLOUR,
             markersize=5,
             transform=upper.get_xaxis_transform(),
-            label=f"no number ({where_not.size} frames: {_reasons(series)})",
+            label=f"no number: {_reasons(series)}",
             clip_on=False,
         )
         upper.legend(loc="best", framealpha=0.8, fontsize="small")
     upper.set_ylabel("gap (mm)")
     lower.set_ylabel("U, k = 2 (µm)")
-    lower.set_ylim(bottom=0.0)
+    lower.set_ylim(0.0, 1.15 * float(expanded_um.max()) if gap_mm.size else 1.0)
     lower.set_xlabel(label)
     for axes in (upper, lower):
         axes.grid(visible=True, alpha=0.3)

@@ -29,7 +29,7 @@ from fingervision.storage.summary_json import write_summary
 from fingervision.vision.pipeline import Settings, measure_frame
 
 # Rows are made for so many frames at once, or for what has come in so many seconds, and then handed to the table.
-FRAMES_AT_ONCE, SECONDS_AT_ONCE = 128, 0.5
+FRAMES_AT_ONCE, SECONDS_AT_ONCE = 128, 0.4
 
 
 @dataclass(frozen=True, slots=True)

@@ -111,6 +111,8 @@ def test_images_without_times_leave_them_empty_and_a_rate_gives_them(run: Run, t
     assert [row["time_s"] for row in rows(Path("a/gaps.csv"))] == ["", "", ""]
     assert run("images/*.png", *SCALE, "--rate-hz", "10", "--out", "b")[0] == 0
     assert [row["time_s"] for row in rows(Path("b/gaps.csv"))] == ["0", "0.1", "0.2"]
+    assert run("images/*.png", *SCALE)[0] == 0
+    assert Path("measured/images/gaps.csv").exists()
 
 
 def test_the_drive_adds_its_columns(run: Run, clip: Path) -> None:

@@ -146,6 +146,14 @@ def test_levels_that_are_no_whole_numbers_are_refused(tmp_path: Path) -> None:
     assert items[1].words == "1.tif must have levels of 8 or 16 bits, but they are float32."
 
 
+def test_a_stack_in_one_file_is_refused(tmp_path: Path) -> None:
+    save(tmp_path / "0.png", noise(0))
+    cv2.imwritemulti(str(tmp_path / "1.tif"), [noise(1), noise(2)])
+    items = frames_of(open_source(str(tmp_path)))
+    assert isinstance(items[1], LostFrame)
+    assert items[1].words == "1.tif holds several pictures: save each of them as a file of its own."
+
+
 def test_jpeg_is_lossy_and_png_is_not(tmp_path: Path) -> None:
     save(tmp_path / "0.png", noise(0))
     assert not open_source(str(tmp_path)).description.lossy
