@@ -5,15 +5,16 @@ from numpy.typing import NDArray
 from scipy.sparse.linalg import splu
 
 from fingervision.domain.errors import FingervisionError
-from fingervision.models.half_body import ON_MM, Equilibrium, HalfBody
+from fingervision.models.driven_body import DrivenBody, Equilibrium
 
 _NEWTON_STEPS = 15
 _SET_CHANGES = 12
-_RESIDUAL = 1e-8
+_RESIDUAL = 1e-7
+_ON_MM = 1e-7
 _STEP_MM = 0.25
 
 
-def large_equilibrium(half: HalfBody, input_mm: float, start: Equilibrium, *, contact: bool) -> Equilibrium:
+def large_equilibrium(body: DrivenBody, input_mm: float, start: Equilibrium, *, contact: bool) -> Equilibrium:
     """Find the equilibrium at one input.
 
     With contact, nodes that would pass the symmetry plane are held on it, and nodes that it would have to pull are let
@@ -21,7 +22,7 @@ def large_equilibrium(half: HalfBody, input_mm: float, start: Equilibrium, *, co
 
     Parameters
     ----------
-    half : HalfBody
+    body : DrivenBody
         The body.
     input_mm : float
         Displacement of the drive.
@@ -35,31 +36,30 @@ def large_equilibrium(half: HalfBody, input_mm: float, start: Equilibrium, *, co
     FingervisionError
         Where the iteration does not settle.
     """
-    moved = start.displacement_mm + (input_mm - start.input_mm) * half.unit_displacement_mm
+    moved = start.displacement_mm + (input_mm - start.input_mm) * body.unit_displacement_mm
     touching = start.contact_n > 0.0
     for _ in range(_SET_CHANGES):
-        moved, internal = _newton(half, input_mm, moved, touching)
-        reaction = np.where(touching, internal[half.plate.x_dofs[half.face]], 0.0)
-        wanted = (touching & (reaction > 0.0)) | (half.face_gap_mm(moved) < -ON_MM) & ~touching
+        moved, internal = _newton(body, input_mm, moved, touching)
+        reaction = np.where(touching, internal[body.face], 0.0)
+        wanted = (touching & (reaction > 0.0)) | (body.face_gap_mm(moved) < -_ON_MM) & ~touching
         if not contact or np.array_equal(wanted, touching):
-            return Equilibrium(input_mm, moved, 2.0 * float(internal[half.driven].sum()), reaction)
+            return Equilibrium(input_mm, moved, 2.0 * float(internal[body.driven].sum()), reaction)
         touching = wanted
     raise FingervisionError(f"The touching part of the fingers did not settle at an input of {input_mm:g} mm.")
 
 
 def _newton(
-    half: HalfBody, input_mm: float, moved: NDArray[np.float64], touching: NDArray[np.bool_]
+    body: DrivenBody, input_mm: float, moved: NDArray[np.float64], touching: NDArray[np.bool_]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    plate = half.plate
-    held = plate.x_dofs[half.face[touching]]
-    free = np.setdiff1d(half.free, held, assume_unique=True)
-    scale_n = float(np.abs(plate.stiffness_n_mm @ half.unit_displacement_mm).max()) * max(abs(input_mm), 0.1)
+    held = body.face[touching]
+    free = np.setdiff1d(body.free, held, assume_unique=True)
+    scale_n = float(np.abs(body.stiffness_n_mm @ body.unit_displacement_mm).max()) * max(abs(input_mm), 0.1)
     for _ in range(_NEWTON_STEPS):
         step = np.zeros_like(moved)
-        step[half.driven] = input_mm - moved[half.driven]
-        step[held] = -half.face_gap_mm(moved)[touching]
-        tangent, internal = plate.internal_force_n(moved)
-        if np.abs(internal[free]).max() < _RESIDUAL * scale_n and np.abs(step).max() < ON_MM:
+        step[body.driven] = input_mm - moved[body.driven]
+        step[held] = -body.face_gap_mm(moved)[touching]
+        tangent, internal = body.tangent(moved)
+        if np.abs(internal[free]).max() < _RESIDUAL * scale_n and np.abs(step).max() < _ON_MM:
             return moved, internal
         rhs = -(internal + tangent @ step)[free]
         step[free] = splu(tangent[free][:, free].tocsc()).solve(rhs)
@@ -70,10 +70,27 @@ def _newton(
     )
 
 
-def large_path(half: HalfBody, last_mm: float, *, contact: bool) -> list[Equilibrium]:
-    """Equilibria from rest to an input, in steps of about a quarter of a millimetre."""
-    steps = max(2, int(np.ceil(abs(last_mm) / _STEP_MM)))
-    path = [half.resting()]
+def large_path(
+    body: DrivenBody, last_mm: float, *, start: Equilibrium | None = None, contact: bool = False
+) -> list[Equilibrium]:
+    """Follow the equilibria from a first one, or from rest, to an input in steps of about a quarter of a millimetre."""
+    path = [start or body.at_rest()]
+    first_mm = path[0].input_mm
+    steps = max(3, int(np.ceil(abs(last_mm - first_mm) / _STEP_MM)))
     for step in range(1, steps + 1):
-        path.append(large_equilibrium(half, last_mm * step / steps, path[-1], contact=contact))
+        input_mm = first_mm + (last_mm - first_mm) * step / steps
+        path.append(large_equilibrium(body, input_mm, path[-1], contact=contact))
     return path
+
+
+def first_touch(body: DrivenBody, guess_mm: float) -> Equilibrium:
+    """Find the input at which the first point of the inner face meets the symmetry plane, by Newton's rule."""
+    state = large_equilibrium(body, guess_mm, body.at_rest(), contact=False)
+    for _ in range(_SET_CHANGES):
+        gaps_mm = body.face_gap_mm(state.displacement_mm)
+        place = int(np.argmin(gaps_mm))
+        if abs(gaps_mm[place]) < _ON_MM:
+            return state
+        slope = float(body.unit_displacement_mm[body.face[place]])
+        state = large_equilibrium(body, state.input_mm - float(gaps_mm[place]) / slope, state, contact=False)
+    raise FingervisionError(f"The input at which the fingers first touch was not found near {guess_mm:g} mm.")

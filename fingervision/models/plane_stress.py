@@ -77,7 +77,7 @@ class PlaneStressPlate:
         def work(u: Any, v: Any, _: Any) -> Any:
             return plate_mm * ddot(_stress(sym_grad(u), material), sym_grad(v))
 
-        return skfem.BilinearForm(work).assemble(self._basis)
+        return csr_matrix(skfem.BilinearForm(work).assemble(self._basis))
 
     @cached_property
     def mass_t(self) -> csr_matrix:
@@ -87,7 +87,7 @@ class PlaneStressPlate:
         def inertia(u: Any, v: Any, _: Any) -> Any:
             return weight * dot(u, v)
 
-        return skfem.BilinearForm(inertia).assemble(self._basis)
+        return csr_matrix(skfem.BilinearForm(inertia).assemble(self._basis))
 
     def internal_force_n(self, displacement_mm: Array) -> tuple[csr_matrix, Array]:
         """Tangent stiffness and nodal forces of the deformed plate (total Lagrangian, St. Venant-Kirchhoff).

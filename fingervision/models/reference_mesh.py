@@ -50,7 +50,7 @@ def working_size(gripper: Gripper) -> ElementSize:
 
 
 def mesh_of(gripper: Gripper) -> PlaneMesh:
-    """The packaged mesh where the outline is the reference's, else one made by gmsh.
+    """Take the packaged mesh where the outline is the reference's, else one made by gmsh.
 
     Raises
     ------

@@ -1,0 +1,63 @@
+"""Flexibility of a tree of members, by summing each member's compliance over the load paths that share it."""
+
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fingervision.models.skeleton import Member, Skeleton
+from fingervision.models.twist_transform import carried, turned
+
+Array = NDArray[np.float64]
+
+
+class ComplianceChain:
+    """The tree, clamped at its root and free everywhere else.
+
+    Parameters
+    ----------
+    skeleton : Skeleton
+        The members.
+    """
+
+    def __init__(self, skeleton: Skeleton) -> None:
+        self.skeleton = skeleton
+
+    @cached_property
+    def _global(self) -> list[Array]:
+        """Every member's compliance at its end in the ground's axes: equation (5)."""
+        turned_all = []
+        for member in self.skeleton.members:
+            angle = np.arctan2(member.end_mm[1] - member.start_mm[1], member.end_mm[0] - member.start_mm[0])
+            axes = turned(float(angle))
+            turned_all.append(axes @ member.compliance @ axes.T)
+        return turned_all
+
+    def path(self, member: int) -> list[int]:
+        """Members from the clamp to the end of one."""
+        path = []
+        while member >= 0:
+            path.append(member)
+            member = self.skeleton.members[member].parent
+        return path[::-1]
+
+    def flexibility(self, moved: int, loaded: int) -> Array:
+        """Motion of one member's end by a load at another's: the sum of (12) over the members that both paths share.
+
+        Returns
+        -------
+        ndarray of float, shape (6, 6)
+            Its transpose is the flexibility with both exchanged (Maxwell and Betti).
+        """
+        members = self.skeleton.members
+        shared = set(self.path(moved)) & set(self.path(loaded))
+        total = np.zeros((6, 6))
+        for place in shared:
+            to_moved = carried(_arm(members[place], members[moved]))
+            to_loaded = carried(_arm(members[place], members[loaded]))
+            total += to_moved @ self._global[place] @ to_loaded.T
+        return total
+
+
+def _arm(known: Member, wanted: Member) -> Array:
+    return np.array([wanted.end_mm[0] - known.end_mm[0], wanted.end_mm[1] - known.end_mm[1], 0.0])

@@ -1,0 +1,106 @@
+"""A plane frame of two-node elements that turn with the material: large rotations, small strains.
+
+Each element keeps a linear law between its lengthening and the rotations of its ends from its chord, and the
+forces that go with them; the chord may turn as far as it will. Source: Crisfield, Non-linear Finite Element Analysis of Solids and
+Structures, volume 1, section 7.3.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import coo_matrix, csr_matrix
+
+Array = NDArray[np.float64]
+Indices = NDArray[np.int64]
+
+
+@dataclass(frozen=True, eq=False)
+class CorotationalFrame:
+    """Nodes with x, y and rotation, and the elements between them.
+
+    Parameters
+    ----------
+    nodes_mm : ndarray of float, shape (n, 2)
+        Places at rest; unknowns are ordered x, y, rotation, node by node.
+    ends : ndarray of int, shape (m, 2)
+        Nodes of each element.
+    end_compliance : ndarray of float, shape (m, 3, 3)
+        Compliance of each element at its second node, the first fixed: along, across, rotation.
+    """
+
+    nodes_mm: Array
+    ends: Indices
+    end_compliance: Array
+
+    def __post_init__(self) -> None:
+        chord = self.nodes_mm[self.ends[:, 1]] - self.nodes_mm[self.ends[:, 0]]
+        length = np.hypot(chord[:, 0], chord[:, 1])
+        # Lengthening and end rotations from the chord, seen from the first node's own axes.
+        natural = np.zeros((len(length), 3, 3))
+        natural[:, 0, 0] = 1.0
+        natural[:, 1, 1] = -length
+        natural[:, 2, 1] = -1.0
+        natural[:, 2, 2] = 1.0
+        stiffness = np.linalg.inv(self.end_compliance)
+        dofs = (3 * self.ends[:, :, None] + np.arange(3)).reshape(-1, 6)
+        object.__setattr__(self, "_length", length)
+        object.__setattr__(self, "_direction", np.arctan2(chord[:, 1], chord[:, 0]))
+        object.__setattr__(self, "_natural", np.swapaxes(natural, 1, 2) @ stiffness @ natural)
+        object.__setattr__(self, "_dofs", dofs)
+
+    _length: Array = None  # type: ignore[assignment]
+    _direction: Array = None  # type: ignore[assignment]
+    _natural: Array = None  # type: ignore[assignment]
+    _dofs: Indices = None  # type: ignore[assignment]
+
+    @property
+    def unknowns(self) -> int:
+        """Three a node."""
+        return 3 * len(self.nodes_mm)
+
+    def internal_force_n(self, displacement: Array) -> tuple[csr_matrix, Array]:
+        """Tangent stiffness and nodal forces of the deformed frame.
+
+        Parameters
+        ----------
+        displacement : ndarray of float, shape (unknowns,)
+            Displacements in mm and rotations in rad.
+        """
+        local = displacement[self._dofs]
+        at_rest = self.nodes_mm[self.ends[:, 1]] - self.nodes_mm[self.ends[:, 0]]
+        drift = local[:, 3:5] - local[:, 0:2]
+        chord = at_rest + drift
+        length = np.hypot(chord[:, 0], chord[:, 1])
+        c, s = chord[:, 0] / length, chord[:, 1] / length
+        turned = np.arctan2(chord[:, 1], chord[:, 0]) - self._direction
+        natural = np.empty((len(length), 3))
+        # l - l0 by the difference of squares, which loses no digits in short steps.
+        natural[:, 0] = np.sum((2.0 * at_rest + drift) * drift, axis=1) / (length + self._length)
+        for column, rotation in ((1, local[:, 2]), (2, local[:, 5])):
+            natural[:, column] = (rotation - turned + np.pi) % (2.0 * np.pi) - np.pi
+        forces = np.einsum("mij,mj->mi", self._natural, natural)
+        zero = np.zeros_like(c)
+        r = np.stack([-c, -s, zero, c, s, zero], axis=1)
+        z = np.stack([s, -c, zero, -s, c, zero], axis=1)
+        B = np.stack([r, -z / length[:, None], -z / length[:, None]], axis=1)
+        B[:, 1, 2] += 1.0
+        B[:, 2, 5] += 1.0
+        element_force = np.einsum("mij,mi->mj", B, forces)
+        tangent = np.swapaxes(B, 1, 2) @ self._natural @ B
+        tangent += (forces[:, 0] / length)[:, None, None] * z[:, :, None] * z[:, None, :]
+        moment = (forces[:, 1] + forces[:, 2]) / length**2
+        tangent += moment[:, None, None] * (r[:, :, None] * z[:, None, :] + z[:, :, None] * r[:, None, :])
+        return self._assembled(tangent), np.asarray(
+            np.bincount(self._dofs.ravel(), element_force.ravel(), self.unknowns), dtype=np.float64
+        )
+
+    def stiffness_n_mm(self) -> csr_matrix:
+        """Linear stiffness at rest."""
+        return self.internal_force_n(np.zeros(self.unknowns))[0]
+
+    def _assembled(self, element: Array) -> csr_matrix:
+        rows = np.repeat(self._dofs, 6, axis=1)
+        columns = np.tile(self._dofs, (1, 6))
+        matrix = coo_matrix((element.ravel(), (rows.ravel(), columns.ravel())), shape=(self.unknowns, self.unknowns))
+        return csr_matrix(matrix)

@@ -1,0 +1,76 @@
+"""One half of the gripper as a frame: the tree's members become elements, their masses go to the nodes."""
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import csr_matrix, diags
+
+from fingervision.domain.gripper import Gripper
+from fingervision.models.corotational_frame import CorotationalFrame
+from fingervision.models.driven_body import DrivenBody
+from fingervision.models.hinge_compliance import bar_compliance
+from fingervision.models.skeleton import Skeleton
+
+Array = NDArray[np.float64]
+
+_PLANAR = np.ix_([0, 1, 5], [0, 1, 5])
+_STIFF_JOINT = 1e-3
+"""Compliance of a rigid joint relative to a square bar of its length: small, yet well conditioned."""
+
+
+def half_frame(gripper: Gripper, skeleton: Skeleton) -> DrivenBody:
+    """Support and drive the right half's frame.
+
+    The clamp is held, the drive point moves by the input along the axis, and can neither move across it nor turn.
+
+    Parameters
+    ----------
+    gripper : Gripper
+        The drawing.
+    skeleton : Skeleton
+        Its tree of members.
+    """
+    members = skeleton.members
+    nodes = np.array([members[0].start_mm, *(member.end_mm for member in members)])
+    ends = np.array([(member.parent + 1, place + 1) for place, member in enumerate(members)])
+    compliance = np.array([_end_compliance(gripper, nodes[b] - nodes[a], place, skeleton)
+                           for place, (a, b) in enumerate(ends.tolist())])  # fmt: skip
+    frame = CorotationalFrame(nodes, ends, compliance)
+    drive = 3 * (skeleton.drive + 1)
+    held = [0, 1, 2, drive, drive + 2]
+    driven = np.array([drive + 1])
+    face = np.array([3 * (skeleton.corner + 1), 3 * (skeleton.heel + 1)])
+    return DrivenBody(
+        stiffness_n_mm=frame.stiffness_n_mm(),
+        mass_t=_mass_t(nodes, ends, skeleton),
+        tangent=frame.internal_force_n,
+        driven=driven,
+        free=np.setdiff1d(np.arange(frame.unknowns), [*held, *driven]),
+        face=face,
+        face_rest_mm=np.array([gripper.tip_corner_mm[0], gripper.tip_heel_mm[0]]),
+        measured=np.array([3 * (skeleton.measured + 1)]),
+        weights=np.ones(1),
+        measured_rest_mm=gripper.measuring_point_mm[0],
+    )
+
+
+def _end_compliance(gripper: Gripper, axis_mm: Array, place: int, skeleton: Skeleton) -> Array:
+    compliance = skeleton.members[place].compliance[_PLANAR]
+    if compliance.any():
+        return compliance
+    length = float(np.hypot(*axis_mm))
+    return _STIFF_JOINT * bar_compliance(length, length, gripper.body.plate_mm, gripper.material)[_PLANAR]
+
+
+def _mass_t(nodes: Array, ends: NDArray[np.int64], skeleton: Skeleton) -> csr_matrix:
+    """Half of each member's mass at each end, with the rotational inertia that a uniform bar then lacks or exceeds.
+
+    The paper's mass matrix (2), m and I_z, node by node: I_z of a bar about its middle is m (l^2 + w^2) / 12.
+    """
+    mass, inertia = np.zeros(len(nodes)), np.zeros(len(nodes))
+    for member, (a, b) in zip(skeleton.members, ends.tolist(), strict=True):
+        length2 = float(np.sum((nodes[b] - nodes[a]) ** 2))
+        for node in (a, b):
+            mass[node] += 0.5 * member.mass_t
+            inertia[node] += 0.5 * member.mass_t * (length2 + member.width_mm**2) / 12.0
+    columns = np.stack([mass, mass, inertia], axis=1)
+    return csr_matrix(diags(columns.ravel()))

@@ -1,0 +1,83 @@
+"""The static answer of a driven body to a list of inputs: small or large displacements, with or without contact."""
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline
+
+from fingervision.domain.response import Response
+from fingervision.models.driven_body import DrivenBody, Equilibrium
+from fingervision.models.large_rotation import first_touch, large_path
+from fingervision.models.physics import Physics
+
+Array = NDArray[np.float64]
+
+_LEAST_MM = 1e-3
+_NEAR_TOUCH = 0.9
+_SAMPLES_BEYOND_TOUCH = 200
+
+
+def symmetric_response(body: DrivenBody, physics: Physics, input_mm: Array) -> Response:
+    """Answer statically at each input, both halves alike.
+
+    Parameters
+    ----------
+    body : DrivenBody
+        The right half.
+    physics : Physics
+        What goes beyond small displacements.
+    input_mm : ndarray of float, shape (n,)
+        Inputs.
+    """
+    right, force = _right_and_force(body, physics, np.asarray(input_mm, dtype=float))
+    return Response(left_mm=-right, right_mm=right, force_n=force)
+
+
+def gap_per_input(body: DrivenBody) -> float:
+    """Millimetres of gap per millimetre of input at rest."""
+    return 2.0 * (body.measured_mm(body.unit_displacement_mm) - body.measured_rest_mm)
+
+
+def _right_and_force(body: DrivenBody, physics: Physics, inputs: Array) -> tuple[Array, Array]:
+    touch_mm = body.first_touch_mm() if physics.contact else None
+    if physics.large_rotation:
+        return _large(body, inputs, touch_mm)
+    right = body.measured_rest_mm + 0.5 * gap_per_input(body) * inputs
+    force = body.equilibrium(1.0).force_n * inputs
+    if touch_mm is not None and np.any(inputs < touch_mm):
+        # Linear complementarity: the answer is made of straight pieces, bent where another point touches.
+        at = np.linspace(float(inputs.min()), touch_mm, _SAMPLES_BEYOND_TOUCH)
+        _, pressed, pull = _curve(body, [body.equilibrium(value, contact=True) for value in at.tolist()])
+        beyond = inputs < touch_mm
+        right[beyond] = np.interp(inputs[beyond], at, pressed)
+        force[beyond] = np.interp(inputs[beyond], at, pull)
+    return right, force
+
+
+def _large(body: DrivenBody, inputs: Array, touch_mm: float | None) -> tuple[Array, Array]:
+    """Equilibria along the path from rest, a cubic spline between them."""
+    lowest = min(float(inputs.min(initial=0.0)), -_LEAST_MM)
+    highest = max(float(inputs.max(initial=0.0)), _LEAST_MM)
+    touching: list[Equilibrium] = []
+    if touch_mm is not None and lowest < _NEAR_TOUCH * touch_mm:
+        first = first_touch(body, touch_mm)
+        if lowest < first.input_mm:
+            touching = large_path(body, lowest, start=first, contact=True)[1:]
+            lowest = first.input_mm
+    free = large_path(body, lowest)[:0:-1] + large_path(body, highest)
+    at, right, force = _curve(body, free)
+    answer = CubicSpline(at, right)(inputs), CubicSpline(at, force)(inputs)
+    if touching:
+        # Contact bends the curve sharply where the tip first touches; beyond, it is straight to a part in 1000.
+        beyond = inputs < at[0]
+        pressed = _curve(body, [*touching[::-1], free[0]])
+        for smooth, curve in zip(answer, pressed[1:], strict=True):
+            smooth[beyond] = np.interp(inputs[beyond], pressed[0], curve)
+    return answer
+
+
+def _curve(body: DrivenBody, states: list[Equilibrium]) -> tuple[Array, Array, Array]:
+    return (
+        np.array([state.input_mm for state in states]),
+        np.array([body.measured_mm(state.displacement_mm) for state in states]),
+        np.array([state.force_n for state in states]),
+    )

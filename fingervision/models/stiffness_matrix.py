@@ -1,0 +1,166 @@
+"""The gripper by its stiffness matrix: the paper's equations (5) to (15), in six dimensions and with defects mended.
+
+Departures from the paper, each with its reason:
+
+* (6) is a transform of six components and (3) a planar compliance of three; here all compliances are 6 by 6.
+* (10) gives 135.15 degrees and (13) 135 degrees for what one drawing must state once; the angles come from the drawing.
+* (12) uses T_12, which is never defined; it must carry the compliance from O1 to O2, as T_O2 does.
+* (14) has C_2A on both sides; the right-hand one must be C_12.
+* (15), K = 2 C^-1, holds for the entry along the drive only while the shuttle is kept from moving sideways and turning,
+  which the other half does: 2 (C^-1)_yy, and not 2 / C_yy of a shuttle that is free.
+
+The links yield too, as Timoshenko bars; `rigid_links` gives the paper's hinges alone, with 0.9 % more slope and some
+10 % more force for the reference gripper.
+"""
+
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fingervision.domain.errors import UsageError
+from fingervision.domain.gripper import Gripper
+from fingervision.domain.response import Response
+from fingervision.models.answer_figures import ModelFigures
+from fingervision.models.compliance_chain import ComplianceChain
+from fingervision.models.hinge_correction import HingeTheory
+from fingervision.models.physics import LINEAR, Physics
+from fingervision.models.skeleton import skeleton_of
+
+Array = NDArray[np.float64]
+
+KIND = "stiffness_matrix"
+
+_X, _Y, _Z, _ABOUT_X, _ABOUT_Y, _ABOUT_Z = range(6)
+_ALL = (_X, _Y, _Z, _ABOUT_X, _ABOUT_Y, _ABOUT_Z)
+_STANDARD_GRAVITY_MM_S2 = 9806.65
+
+
+class StiffnessMatrixGripper:
+    """Two halves in parallel, small displacements, in and out of the plane.
+
+    Parameters
+    ----------
+    gripper : Gripper
+        The drawing.
+    theory : HingeTheory
+        Of the hinges.
+    rigid_links : bool
+        Whether only the hinges yield.
+    """
+
+    name = KIND
+
+    def __init__(
+        self, gripper: Gripper, theory: HingeTheory = HingeTheory.CORRECTED, *, rigid_links: bool = False
+    ) -> None:
+        self.gripper = gripper
+        self.skeleton = skeleton_of(gripper, theory, 0, rigid_links=rigid_links)
+        self._chain = ComplianceChain(self.skeleton)
+
+    @property
+    def rest_gap_mm(self) -> float:
+        """The gap at input zero."""
+        return 2.0 * self.gripper.measuring_point_mm[0]
+
+    @cached_property
+    def drive_compliance(self) -> Array:
+        """Compliance C_2A of one half at O_A, equation (14), shape (6, 6)."""
+        return self._chain.flexibility(self.skeleton.drive, self.skeleton.drive)
+
+    @cached_property
+    def drive_stiffness(self) -> Array:
+        """Stiffness K_2A of both halves at O_A with every direction held, equation (15), shape (6, 6).
+
+        Entries that change sign in the mirror cancel between the halves.
+        """
+        mirror = np.diag([-1.0, 1.0, 1.0, 1.0, -1.0, -1.0])
+        half = np.linalg.inv(self.drive_compliance)
+        return np.asarray(half + mirror @ half @ mirror)
+
+    @cached_property
+    def _load_by_input(self) -> Array:
+        """Load of one half's drive point by 1 mm of input, sideways motion and rotation held."""
+        return np.asarray(np.linalg.inv(self.drive_compliance)[:, _Y])
+
+    @cached_property
+    def gap_per_input(self) -> float:
+        """Millimetres of gap per millimetre of input."""
+        flexibility = self._chain.flexibility(self.skeleton.measured, self.skeleton.drive)
+        return 2.0 * float((flexibility @ self._load_by_input)[_X])
+
+    @property
+    def input_stiffness_n_mm(self) -> float:
+        """Force at the drive per input, both halves."""
+        return float(self.drive_stiffness[_Y, _Y])
+
+    def _held_flexibility(self, moved: int, loaded: int, held: tuple[int, ...]) -> Array:
+        """Flexibility with some directions of the drive point held."""
+        drive, chain, rows = self.skeleton.drive, self._chain, list(held)
+        reaction = np.linalg.solve(self.drive_compliance[np.ix_(rows, rows)], chain.flexibility(drive, loaded)[rows])
+        return chain.flexibility(moved, loaded) - chain.flexibility(moved, drive)[:, rows] @ reaction
+
+    @cached_property
+    def finger_stiffness_n_mm(self) -> float:
+        """Stiffness of one finger at the tip's corner across the gap, drive held: how hard it grips per millimetre."""
+        corner = self.skeleton.corner
+        return 1.0 / float(self._held_flexibility(corner, corner, _ALL)[_X, _X])
+
+    def grip_force_n(self, input_mm: float, object_mm: float) -> float:
+        """Force of each finger on a rigid object of a given width between the tips; 0 where it is not touched."""
+        closed_mm = object_mm - (self.rest_gap_mm + self.gap_per_input * input_mm)
+        return max(0.0, 0.5 * closed_mm * self.finger_stiffness_n_mm)
+
+    def gravity_sag_mm(self, *, drive_held: bool = True) -> tuple[float, float]:
+        """Out-of-plane sag of the measuring point in a horizontal plate, and the tip's twist about the finger (y).
+
+        Parameters
+        ----------
+        drive_held : bool
+            Whether the actuator carries the drive point out of the plane.
+
+        Returns
+        -------
+        sag_mm, twist_rad : float
+            Both under one standard gravity.
+        """
+        held = _ALL if drive_held else tuple(direction for direction in _ALL if direction != _Z)
+        sag = np.zeros(6)
+        for place, member in enumerate(self.skeleton.members):
+            weight_n = member.mass_t * _STANDARD_GRAVITY_MM_S2
+            if weight_n > 0.0:
+                load = np.zeros(6)
+                load[_Z] = weight_n
+                # The weight acts at the member's middle, half its length short of its end.
+                load[_ABOUT_X] = -0.5 * (member.end_mm[1] - member.start_mm[1]) * weight_n
+                load[_ABOUT_Y] = 0.5 * (member.end_mm[0] - member.start_mm[0]) * weight_n
+                sag += self._held_flexibility(self.skeleton.measured, place, held) @ load
+        return float(sag[_Z]), float(sag[_ABOUT_Y])
+
+    def camera_scale_change(self, distance_mm: float) -> float:
+        """Relative change of the image scale by the tips' sag, for a camera at some distance above the plate."""
+        sag_mm, _ = self.gravity_sag_mm()
+        return -sag_mm / (distance_mm + sag_mm)
+
+    def respond(self, input_mm: Array) -> Response:
+        """Answer statically at each input."""
+        inputs = np.asarray(input_mm, dtype=float)
+        right = 0.5 * (self.rest_gap_mm + self.gap_per_input * inputs)
+        return Response(left_mm=-right, right_mm=right, force_n=self.input_stiffness_n_mm * inputs)
+
+    def first_touch_mm(self) -> float | None:
+        """Input at which the tip's corner meets the symmetry plane; None where it does not move."""
+        flexibility = self._chain.flexibility(self.skeleton.corner, self.skeleton.drive)
+        slope = float((flexibility @ self._load_by_input)[_X])
+        return -self.gripper.tip_corner_mm[0] / slope if slope > 0.0 else None
+
+    def figures(self) -> ModelFigures:
+        """Compute the model's row of the comparison."""
+        return ModelFigures(self.gap_per_input, self.input_stiffness_n_mm, contact_input_mm=self.first_touch_mm())
+
+
+def build(gripper: Gripper, physics: Physics, theory: HingeTheory) -> StiffnessMatrixGripper:
+    """Build the model; see `fingervision.models.kinds`."""
+    if physics != LINEAR:
+        raise UsageError("The stiffness matrix knows small displacements alone; take --kind lumped or finite_element.")
+    return StiffnessMatrixGripper(gripper, theory)

@@ -1,0 +1,48 @@
+"""Rigid-body transforms of compliance: equations (5) to (8) of the paper in their consistent six-dimensional form.
+
+The paper's (6), T = [[R, R P], [0, R]], is kept: R turns the axes, P is the cross-product matrix of (8) of the vector
+from the point where the motion is wanted to the point where it is known. Its (6) multiplies 6 by 6, while its (3) is
+planar, 3 by 3; here every compliance is 6 by 6.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+def rotation_about_z(angle_rad: float) -> Array:
+    """Equation (7): from axes turned by the angle to the ground's."""
+    c, s = np.cos(angle_rad), np.sin(angle_rad)
+    return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+
+
+def cross_matrix(arm_mm: Array) -> Array:
+    """Equation (8): P with P v = p x v."""
+    x, y, z = arm_mm
+    return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+
+
+def carried(arm_mm: Array) -> Array:
+    """Motion of a rigid body at one point from its motion at another.
+
+    Parameters
+    ----------
+    arm_mm : ndarray of float, shape (3,)
+        From the point where the motion is known to the one where it is wanted.
+
+    Returns
+    -------
+    ndarray of float, shape (6, 6)
+        u_wanted = u_known + theta x arm; its transpose carries loads the other way.
+    """
+    matrix = np.eye(6)
+    matrix[:3, 3:] = -cross_matrix(arm_mm)
+    return matrix
+
+
+def turned(angle_rad: float) -> Array:
+    """Displacements and rotations from a member's axes to the ground's, shape (6, 6)."""
+    matrix = np.zeros((6, 6))
+    matrix[:3, :3] = matrix[3:, 3:] = rotation_about_z(angle_rad)
+    return matrix
