@@ -1,8 +1,8 @@
 """A plane frame of two-node elements that turn with the material: large rotations, small strains.
 
-Each element keeps a linear law between its lengthening and the rotations of its ends from its chord, and the
-forces that go with them; the chord may turn as far as it will. Source: Crisfield, Non-linear Finite Element Analysis of Solids and
-Structures, volume 1, section 7.3.
+Each element keeps a linear law between its lengthening and the rotations of its ends from its chord, and the forces
+that go with them; the chord may turn as far as it will. Source: Crisfield, Non-linear Finite Element Analysis of
+Solids and Structures, volume 1, section 7.3.
 """
 
 from dataclasses import dataclass

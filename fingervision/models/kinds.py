@@ -74,5 +74,5 @@ def build_model(kind: str, gripper: Gripper, physics: Physics, theory: HingeTheo
     """
     if kind not in kinds():
         raise UsageError(f"The kind of model must be one of {', '.join(kinds())}, but is {kind}.")
-    module: Kind = importlib.import_module(f"fingervision.models.{kind}")  # type: ignore[assignment]
+    module: Kind = importlib.import_module(f"fingervision.models.{kind}")
     return module.build(gripper, physics, theory)
