@@ -49,6 +49,12 @@ def working_size(gripper: Gripper) -> ElementSize:
     )
 
 
+def is_reference(gripper: Gripper) -> bool:
+    """Whether a drawing's outline is that of the paper's sample; material and plate thickness may differ."""
+    outline = (replace(gripper.hinge, web_mm=REFERENCE_HINGE.web_mm), gripper.lever, gripper.links)
+    return outline == (REFERENCE_HINGE, REFERENCE_LEVER, REFERENCE_LINKS)
+
+
 def mesh_of(gripper: Gripper) -> PlaneMesh:
     """Take the packaged mesh where the outline is the reference's, else one made by gmsh.
 
@@ -57,8 +63,7 @@ def mesh_of(gripper: Gripper) -> PlaneMesh:
     FingervisionError
         Where gmsh is needed and not installed, or the outline is no single body.
     """
-    outline = (replace(gripper.hinge, web_mm=REFERENCE_HINGE.web_mm), gripper.lever, gripper.links)
-    if outline != (REFERENCE_HINGE, REFERENCE_LEVER, REFERENCE_LINKS):
+    if not is_reference(gripper):
         return mesh_outline(gripper, working_size(gripper))
     path = resources.files("fingervision.models").joinpath("reference_mesh.npz")
     with path.open("rb") as file, np.load(file) as stored:
