@@ -12,6 +12,7 @@ from fingervision.domain.response import Response
 
 Values = Mapping[str, float]
 Array = NDArray[np.float64]
+Flags = NDArray[np.bool_]
 
 
 class Stage(StrEnum):

@@ -28,6 +28,13 @@ class Parameter:
         linear in.
     logarithmic : bool
         Whether the starting values are spaced by a ratio.
+    reciprocal : bool
+        Whether their reciprocals are evenly spaced (periods).
+    rugged : bool
+        Whether the answer jumps as it changes, so that a search has to scan it.
+    typical : float or None
+        Physical prior: the size that a well-run bench would not exceed often. It only decides which of several
+        explanations that the data cannot tell apart is named first.
     """
 
     name: str
@@ -38,6 +45,9 @@ class Parameter:
     neutral: float | None = 0.0
     starts: int = 1
     logarithmic: bool = False
+    reciprocal: bool = False
+    rugged: bool = False
+    typical: float | None = None
 
     def starting_values(self) -> NDArray[np.float64]:
         """Values from which a search sets out, inside the bounds.
@@ -52,6 +62,10 @@ class Parameter:
             step = 0.01 * ((self.upper - neutral) if self.upper > neutral else (self.lower - neutral))
             return np.array([neutral + step])
         inside = (np.arange(self.starts) + 0.5) / self.starts
+        if self.reciprocal:
+            return np.asarray(
+                1.0 / (1.0 / self.upper + (1.0 / self.lower - 1.0 / self.upper) * inside), dtype=np.float64
+            )
         if self.logarithmic:
             lower = max(self.lower, 1e-3 * self.upper)
             return np.asarray(lower * (self.upper / lower) ** inside, dtype=np.float64)

@@ -18,6 +18,6 @@ EFFECT = PointEffect(
     formula="g + offset_mm",
     source="definition",
     residual="a constant in the gap",
-    parameters=(Parameter("offset_mm", "mm", -0.1, 0.1, "offset of the measured gap"),),
+    parameters=(Parameter("offset_mm", "mm", -0.1, 0.1, "offset of the measured gap", typical=0.03),),
     act=act,
 )

@@ -21,8 +21,10 @@ def narrow(history: History) -> tuple[Parameter, ...] | str:
     shortest_mm = 4.0 * float(np.median(moving)) if moving.size else np.inf
     if shortest_mm >= 0.5 * history.input_span_mm:
         return "the input's steps are too wide to resolve a period within half its range"
+    # Neighbouring starts differ by half a cycle over the range, so that none is missed.
+    starts = int(np.clip(2.0 * history.input_span_mm / shortest_mm, 8, 300))
     amplitude, period, phase = EFFECT.parameters
-    return amplitude, replace(period, lower=shortest_mm, upper=0.5 * history.input_span_mm), phase
+    return amplitude, replace(period, lower=shortest_mm, upper=0.5 * history.input_span_mm, starts=starts), phase
 
 
 EFFECT = DriveEffect(
@@ -35,8 +37,8 @@ EFFECT = DriveEffect(
     residual="a sinusoid over the input, the same in every run",
     parameters=(
         Parameter("amplitude_mm", "mm", 0.0, 0.2, "amplitude"),
-        Parameter("period_mm", "mm", 0.0001, 10.0, "period of the scale", neutral=None, starts=24, logarithmic=True),
-        Parameter("phase_rad", "rad", -3.15, 3.15, "phase", neutral=None, starts=2),
+        Parameter("period_mm", "mm", 0.0001, 10.0, "period of the scale", neutral=None, starts=24, reciprocal=True),
+        Parameter("phase_rad", "rad", -3.15, 3.15, "phase", neutral=None, starts=4),
     ),
     narrow=narrow,
     act=act,

@@ -35,7 +35,7 @@ EFFECT = DriveEffect(
     source="Iwan 1966; Maxwell slip",
     residual="a lens-shaped loop that closes at the reversals",
     parameters=(
-        Parameter("fraction", "", 0.0, 0.9, "share of the drive that the sliders hold back", starts=3),
+        Parameter("fraction", "", 0.0, 0.9, "share of the drive that the sliders hold back"),
         Parameter(
             "reach_mm",
             "mm",

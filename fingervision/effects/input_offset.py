@@ -17,6 +17,6 @@ EFFECT = DriveEffect(
     formula="u + offset_mm",
     source="definition",
     residual="nearly a constant; follows the slope of a curved model",
-    parameters=(Parameter("offset_mm", "mm", -0.5, 0.5, "offset of the input"),),
+    parameters=(Parameter("offset_mm", "mm", -0.5, 0.5, "offset of the input", typical=0.05),),
     act=act,
 )

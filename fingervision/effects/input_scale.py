@@ -17,6 +17,6 @@ EFFECT = DriveEffect(
     formula="(1 + ratio) u",
     source="definition",
     residual="proportional to the input",
-    parameters=(Parameter("ratio", "", -0.3, 0.3, "relative error of the unit"),),
+    parameters=(Parameter("ratio", "", -0.3, 0.3, "relative error of the unit", typical=0.02),),
     act=act,
 )

@@ -24,6 +24,6 @@ EFFECT = PointEffect(
     formula="x (1 + k_per_mm2 x^2)",
     source="Brown 1966, first radial term",
     residual="the cube of the coordinate",
-    parameters=(Parameter("k_per_mm2", "1/mm2", -0.005, 0.005, "first radial coefficient"),),
+    parameters=(Parameter("k_per_mm2", "1/mm2", -0.005, 0.005, "first radial coefficient", typical=0.0005),),
     act=act,
 )

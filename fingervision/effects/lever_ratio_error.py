@@ -19,6 +19,6 @@ EFFECT = PointEffect(
     formula="o (1 + ratio)",
     source="definition",
     residual="proportional to the opening",
-    parameters=(Parameter("ratio", "", -0.3, 0.3, "relative error of the lever ratio"),),
+    parameters=(Parameter("ratio", "", -0.3, 0.3, "relative error of the lever ratio", typical=0.1),),
     act=act,
 )

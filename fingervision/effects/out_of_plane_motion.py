@@ -24,6 +24,8 @@ EFFECT = PointEffect(
     formula="x / (1 - relative_per_mm (g - g0))",
     source="central projection",
     residual="the gap times the opening: curved",
-    parameters=(Parameter("relative_per_mm", "1/mm", -0.02, 0.02, "relative change of the distance per opening"),),
+    parameters=(
+        Parameter("relative_per_mm", "1/mm", -0.02, 0.02, "relative change of the distance per opening", typical=0.002),
+    ),
     act=act,
 )

@@ -18,6 +18,6 @@ EFFECT = PointEffect(
     formula="g + offset_mm, symmetric",
     source="definition",
     residual="a constant in the gap, in all runs alike",
-    parameters=(Parameter("offset_mm", "mm", -2.0, 2.0, "offset of the gap at rest"),),
+    parameters=(Parameter("offset_mm", "mm", -2.0, 2.0, "offset of the gap at rest", typical=0.5),),
     act=act,
 )

@@ -24,6 +24,6 @@ EFFECT = PointEffect(
     formula="x (1 + ratio)",
     source="definition",
     residual="proportional to the gap",
-    parameters=(Parameter("ratio", "", -0.2, 0.2, "relative error of the scale"),),
+    parameters=(Parameter("ratio", "", -0.2, 0.2, "relative error of the scale", typical=0.02),),
     act=act,
 )

@@ -1,0 +1,93 @@
+"""`fingervision diagnose`: which effect is missing, added to the model, with the disagreement before and after."""
+
+from pathlib import Path
+
+import click
+
+from fingervision.domain.errors import UsageError
+
+EXAMPLES = """
+\b
+Examples:
+  fingervision diagnose samples.csv --model comsol.csv --out results
+  fingervision diagnose samples.csv --model results/model.toml --out again
+  fingervision diagnose samples.csv --model comsol.csv --without lens_distortion --json
+
+\b
+Files written to --out:
+  report.html   the answer on one page       report.json   the same for programs
+  model.toml    the corrected model          next_run.toml the run that would settle what is open
+"""
+
+
+@click.command(epilog=EXAMPLES)
+@click.argument("measured", type=click.Path(path_type=Path))
+@click.option(
+    "--model", "model_path", required=True, type=click.Path(path_type=Path), help="Simulation .csv, model.toml."
+)
+@click.option("--out", type=click.Path(path_type=Path, file_okay=False), default=Path("diagnosis"), show_default=True)
+@click.option("--with", "forced", multiple=True, metavar="EFFECT", help="Insist on this effect.")
+@click.option("--without", multiple=True, metavar="EFFECT", help="Rule this effect out.")
+@click.option("--seed", default=1, show_default=True, help="Of the bootstrap: the same seed gives the same report.")
+@click.option("--kind", default="lumped", show_default=True, help="Model of a gripper.toml.")
+@click.option("--json", "as_json", is_flag=True, help="Print report.json.")
+def command(
+    measured: Path,
+    model_path: Path,
+    out: Path,
+    forced: tuple[str, ...],
+    without: tuple[str, ...],
+    seed: int,
+    kind: str,
+    as_json: bool,
+) -> None:
+    """Name the effect that a model lacks beside a measured table."""
+    import json
+    import sys
+    from difflib import get_close_matches
+
+    from fingervision.diagnosis.diagnose import diagnose
+    from fingervision.diagnosis.report_page import report_page
+    from fingervision.effects import catalogue
+    from fingervision.storage.measured_table import read_measured_table
+    from fingervision.storage.model_toml import read_model, write_model
+    from fingervision.storage.recipe_toml import write_recipe
+    from fingervision.storage.report_json import report_document, write_report
+
+    del kind
+    for name in (*forced, *without):
+        if name not in catalogue():
+            near = get_close_matches(name, catalogue(), n=1)
+            hint = f"did you mean {near[0]}?" if near else "`fingervision effects` lists them."
+            raise UsageError(f"An effect must be one of the catalogue, but is {name}: {hint}")
+    if set(forced) & set(without):
+        raise UsageError(f"An effect must be forced or left out, but {', '.join(set(forced) & set(without))} is both.")
+    table, model = read_measured_table(measured), read_model(model_path)
+    with click.progressbar(length=1000, label="diagnosing", file=sys.stderr, hidden=not sys.stderr.isatty()) as bar:
+        done = diagnose(
+            table,
+            model,
+            seed=seed,
+            forced=frozenset(forced),
+            without=frozenset(without),
+            progress=lambda share: bar.update(max(0, int(1000 * share) - bar.pos)),
+        )
+    report = done.report
+    out.mkdir(parents=True, exist_ok=True)
+    effects = {name: dict(values) for name, values in model.effects.items()}
+    effects |= {effect.name: dict(effect.parameters) for effect in report.effects}
+    write_model(out / "model.toml", Path(model.base_path), effects)
+    if report.next_run is not None:
+        write_recipe(out / "next_run.toml", report.next_run.name, report.next_run.steps)
+    document = report_document(report, "model.toml", "next_run.toml" if report.next_run else None)
+    write_report(out / "report.json", document)
+    (out / "report.html").write_text(report_page(done), encoding="utf-8")
+    if as_json:
+        click.echo(json.dumps(document, indent=2))
+        return
+    click.echo(f"{report.verdict}: {report.sentence}")
+    for words in (*report.outliers, *report.notes):
+        click.echo(f"  note: {words}")
+    if report.next_run is not None:
+        click.echo(f"  next: {report.next_run.words}")
+    click.echo(f"  {out / 'report.html'}")

@@ -1,0 +1,59 @@
+"""`fingervision effects`: the catalogue, one line each, or one effect explained with its picture."""
+
+from pathlib import Path
+
+import click
+
+from fingervision.domain.errors import UsageError
+
+EXAMPLES = """
+\b
+Examples:
+  fingervision effects
+  fingervision effects backlash
+  fingervision effects backlash --figure backlash.png
+"""
+
+
+@click.command(epilog=EXAMPLES)
+@click.argument("name", required=False)
+@click.option("--figure", type=click.Path(path_type=Path, dir_okay=False), help="Draw how it looks in a residual.")
+def command(name: str | None, figure: Path | None) -> None:
+    """List the physical effects, or explain one."""
+    from difflib import get_close_matches
+
+    from fingervision.effects import catalogue
+
+    if name is None:
+        if figure is not None:
+            raise UsageError("--figure must come with the name of an effect, but none is given: add one.")
+        for effect in catalogue().values():
+            click.echo(f"{effect.name:22} {effect.stage!s:10} {effect.words}")
+        return
+    if name not in catalogue():
+        near = get_close_matches(name, catalogue(), n=1)
+        hint = f"did you mean {near[0]}?" if near else "`fingervision effects` lists them."
+        raise UsageError(f"An effect must be one of the catalogue, but is {name}: {hint}")
+    effect = catalogue()[name]
+    needs = [
+        words
+        for needed, words in (
+            (effect.needs_times, "times"),
+            (effect.needs_shared_clock, "a clock shared by all runs"),
+            (effect.needs_edges, "left and right"),
+            (effect.needs_force, "a force"),
+        )
+        if needed
+    ]
+    click.echo(f"{effect.name} ({effect.stage}): {effect.words}\n")
+    click.echo(f"  law       {effect.formula}\n  source    {effect.source}\n  residual  {effect.residual}")
+    click.echo(
+        f"  needs     {', '.join(needs) or 'input and gap'}{'; starts each run at rest' if effect.memory else ''}"
+    )
+    for p in effect.parameters:
+        click.echo(f"  {p.name} ({p.unit or 'ratio'}): {p.words}, {p.lower:g} to {p.upper:g}, narrowed by the data")
+    if figure is not None:
+        from fingervision.diagnosis.effect_figure import effect_figure
+
+        figure.write_bytes(effect_figure(name))
+        click.echo(f"  picture   {figure}")

@@ -1,0 +1,172 @@
+"""The measurement made ready to be explained: smoothed input, outliers set aside, noise known, whitened."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from fingervision.diagnosis.distrusted_rows import distrusted_rows
+from fingervision.diagnosis.explanation import Problem
+from fingervision.diagnosis.measuring_chain import MeasuringChain, admissible
+from fingervision.diagnosis.noise import Noise, estimate_noise, gate
+from fingervision.diagnosis.smooth_input import input_sigma, smoothed
+from fingervision.diagnosis.whitening import RunOffsets, Whitener
+from fingervision.domain.effect import Array, Effect, Flags, History
+from fingervision.domain.errors import FingervisionError
+from fingervision.domain.measured_table import MeasuredTable
+from fingervision.domain.response import Response
+from fingervision.models.corrected import CorrectedModel
+
+HELD_SAMPLES = 15
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class BenchData:
+    """A measured table beside a model.
+
+    Parameters
+    ----------
+    table, model
+        As they were read.
+    chain : MeasuringChain
+        The model over the smoothed input.
+    stacked_mm : ndarray of float, shape (m,)
+        Measured gap, then midline where there is one.
+    input_error_mm : ndarray of float, shape (n,)
+        What the input's remaining error does to the gap.
+    input_samples : float
+        Samples over which that error is correlated.
+    effects : dict
+        Effects that the data can show.
+    excluded : dict
+        The others, with the reason.
+    distrusted : ndarray of bool, shape (n,)
+        Rows that say nothing about the gripper: set instead of measured, or beside a fault of the simulation.
+    notes : tuple of str
+        What a reader must know.
+    """
+
+    table: MeasuredTable
+    model: CorrectedModel
+    chain: MeasuringChain
+    stacked_mm: Array
+    input_error_mm: Array
+    input_samples: float
+    effects: dict[str, Effect]
+    excluded: dict[str, str]
+    distrusted: Flags
+    notes: tuple[str, ...]
+
+    @property
+    def channels(self) -> tuple[str, ...]:
+        """Names of the stacked channels."""
+        return ("gap", "midline") if self.chain.history.both_edges else ("gap",)
+
+    def problem(self, residual_mm: Array, degrees: int) -> Problem:
+        """Estimate outliers and noise from a residual and whiten the measurement with them."""
+        history = self.chain.history
+        n, timed = history.input_mm.size, history.time_s is not None
+        rate = 1.0 / history.sample_time_s if timed else None
+        floor = 0.0 if self.table.u_random_mm is None else float(np.median(self.table.u_random_mm))
+        noises: list[Noise] = []
+        aside: list[Flags] = []
+        for channel in range(len(self.channels)):
+            part = residual_mm[channel * n : (channel + 1) * n]
+            out = gate(part, history.runs, timed) | self.distrusted
+            aside.append(out)
+            share = floor if channel == 0 else 0.5 * floor
+            noises.append(estimate_noise(part, history.runs, rate, out, share, degrees))
+        if len(aside) == 2:
+            aside = [aside[0] | aside[1]] * 2
+        error = self.input_error_mm
+        if np.median(error) < 0.1 * noises[0].total_mm / np.sqrt(max(self.input_samples, 1.0)) and not np.any(
+            error > 0.3 * noises[0].total_mm
+        ):
+            error = np.zeros_like(error)
+        whitener = Whitener(history, tuple(noises), np.concatenate(aside), error, self.input_samples)
+        return Problem(self.chain, whitener.one(self.stacked_mm), whitener, RunOffsets.of(whitener), self.effects)
+
+
+def prepare(table: MeasuredTable, model: CorrectedModel, without: frozenset[str] = frozenset()) -> BenchData:
+    """Put a measured table beside a model.
+
+    Raises
+    ------
+    FingervisionError
+        The model does not cover the inputs, or the inputs are in another unit.
+    """
+    low, high = model.input_range_mm
+    u = table.input_mm
+    ratio = float(np.ptp(u)) / (high - low)
+    for factor, unit in ((1e3, "micrometres"), (1e-3, "metres")):
+        if 0.1 < ratio / factor < 3.0:
+            raise FingervisionError(
+                f"input_mm must be in millimetres within the model's {low:g} to {high:g}, but runs from {u.min():g} to "
+                f"{u.max():g}, as if in {unit}: convert the column."
+            )
+    slack = 1e-9 * (high - low)
+    if u.min() < low - slack or u.max() > high + slack:
+        raise FingervisionError(
+            f"input_mm must lie within the model's {low:g} to {high:g} mm, but runs from {u.min():g} to {u.max():g}: "
+            "simulate the missing inputs, or leave those rows out."
+        )
+    notes = list(table.notes)
+    sigma, step = (0.0, 0.0) if table.time_s is None else input_sigma(u, table.runs)
+    if table.midline_mm is None:
+        notes.append("only the gap was measured: what moves both fingers together cannot show.")
+    smooth, leverage = u, np.zeros_like(u)
+    if sigma > 0.0 and table.time_s is not None:
+        smooth, leverage = smoothed(u, table.time_s, table.runs, sigma)
+        if _is_motion(table, model, u, smooth):
+            notes.append("the input's unrest shows in the gap as well: it is real motion and was not smoothed.")
+            smooth, leverage, sigma, step = u, np.zeros_like(u), 0.0, 0.0
+    zero = model.base.respond(np.zeros(1)).gap_mm[0]
+    opening = model.base.respond(u).gap_mm - zero
+    history = History(
+        input_mm=smooth,
+        time_s=table.time_s,
+        runs=table.runs,
+        rest_gap_mm=float(zero),
+        opening_mm=float(np.max(np.abs(opening))),
+        closing_mm=float(max(0.0, -np.min(opening))),
+        shared_clock=table.shared_clock,
+        input_sigma_mm=sigma,
+        input_step_mm=step,
+        both_edges=table.midline_mm is not None,
+        force=table.force_n is not None,
+    )
+    fixed = {name: {key: e.value for key, e in values.items()} for name, values in model.effects.items()}
+    chain = MeasuringChain(model.base, history, fixed)
+    stacked = table.gap_mm
+    if table.midline_mm is not None:
+        bare: Response = chain.respond({})
+        chain = replace(chain, midline_mm=float(np.median(table.midline_mm - bare.midline_mm)))
+        stacked = np.concatenate([table.gap_mm, table.midline_mm])
+    reach = 1e-3 * (high - low)
+    slope = np.abs(model.base.respond(smooth + reach).gap_mm - model.base.respond(smooth - reach).gap_mm) / (
+        2.0 * reach
+    )
+    held = np.zeros(u.size, dtype=bool)
+    if step > 0.0:
+        for run in table.runs:
+            if run.stop - run.start > HELD_SAMPLES:
+                padded = np.pad(u[run], HELD_SAMPLES // 2, mode="edge")
+                held[run] = np.ptp(np.lib.stride_tricks.sliding_window_view(padded, HELD_SAMPLES), axis=1) < 1.01 * step
+    samples = 1.0 / float(np.median(leverage)) if np.median(leverage) > 0.0 else 1.0
+    # A stage that stands between two encoder steps keeps its error: averaging does not help there.
+    error = slope * sigma * np.sqrt(np.where(held, 1.0, leverage))
+    able, excluded = admissible(history, without)
+    distrusted, reasons = distrusted_rows(table, model.base, float(zero))
+    notes += reasons
+    return BenchData(table, model, chain, stacked, error, max(samples, 1.0), able, excluded, distrusted, tuple(notes))
+
+
+def _is_motion(table: MeasuredTable, model: CorrectedModel, u: Array, smooth: Array) -> bool:
+    """Whether the gap follows the input's unrest: the regression's slope is then one, otherwise zero."""
+    expected = model.base.respond(u).gap_mm - model.base.respond(smooth).gap_mm
+    residual = table.gap_mm - model.base.respond(smooth).gap_mm
+    a = np.concatenate([np.diff(expected[run]) for run in table.runs])
+    b = np.concatenate([np.diff(residual[run]) for run in table.runs])
+    typical = 5.0 * np.median(np.abs(b)) + 1e-12
+    kept = np.abs(b) < typical
+    power = float(a[kept] @ a[kept])
+    return power > 0.0 and float(a[kept] @ b[kept]) > 0.5 * power

@@ -1,0 +1,44 @@
+"""Rows that say nothing about the gripper: a zero that was set, not measured; a simulation off its own line."""
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import theilslopes
+
+from fingervision.domain.measured_table import MeasuredTable
+from fingervision.domain.model import Model
+from fingervision.models.table import TableModel
+
+SET_SHARE = 1e-5
+"""Nobody measures a gap to a hundred-thousandth of itself: such a row at input zero was set."""
+OFF_LINE = 0.01
+"""Share of the simulated range; a table straight within half of it has a fault where it is off by more."""
+
+
+def distrusted_rows(table: MeasuredTable, model: Model, rest_gap_mm: float) -> tuple[NDArray[np.bool_], list[str]]:
+    """Mark the rows, shape (n,), and say why in sentences. Only tables without times are that small and hand-made."""
+    out = np.zeros(table.input_mm.size, dtype=bool)
+    notes: list[str] = []
+    if table.time_s is not None:
+        return out, notes
+    put = (table.input_mm == 0.0) & (np.abs(table.gap_mm - rest_gap_mm) <= SET_SHARE * rest_gap_mm)
+    if put.any() and put.sum() < 0.2 * put.size:
+        out |= put
+        notes.append(
+            f"the row at input 0 agrees with the simulated rest gap of {rest_gap_mm:.4g} mm to its last digit: "
+            "it was probably set and not measured, and was set aside in the fit."
+        )
+    if isinstance(model, TableModel) and model.input_mm.size >= 8:
+        gap = model.right_mm - model.left_mm
+        slope = theilslopes(gap, model.input_mm)[0]
+        intercept = np.median(gap - slope * model.input_mm)
+        off = np.abs(gap - intercept - slope * model.input_mm)
+        faulty = off > OFF_LINE * np.ptp(gap)
+        faulty[[0, -1]] = False
+        if 0 < faulty.sum() <= gap.size // 4 and np.median(off) < 0.5 * OFF_LINE * np.ptp(gap):
+            places = model.input_mm[faulty]
+            out |= np.isin(table.input_mm, places)
+            notes.append(
+                f"the simulation lies off its own straight line at input {', '.join(f'{x:g}' for x in places)} mm: "
+                "check those rows of the model; measured rows there were set aside in the fit."
+            )
+    return out, notes

@@ -1,0 +1,78 @@
+"""The measuring chain: recorded input, drive effects, the gripper, mechanism effects, camera effects."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from fingervision.domain.effect import Array, DriveEffect, Effect, History, PointEffect, Values
+from fingervision.domain.model import Model, PhysicalModel
+from fingervision.domain.response import Response
+from fingervision.effects import catalogue
+
+Settings = Mapping[str, Values]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class MeasuringChain:
+    """A model with its history; effects switched on act in the catalogue's order.
+
+    Parameters
+    ----------
+    model : Model
+        The gripper.
+    history : History
+        Input, times and runs.
+    fixed : mapping
+        Effects that are part of the model (a corrected model).
+    midline_mm : float
+        Where the fingers' middle stands in the picture: camera effects act about the image centre.
+    """
+
+    model: Model
+    history: History
+    fixed: Settings
+    midline_mm: float = 0.0
+
+    def respond(self, settings: Settings) -> Response:
+        """Run the chain; an effect named in `settings` replaces a fixed one of the same name."""
+        acting = {**self.fixed, **settings}
+        order = [effect for name, effect in catalogue().items() if name in acting]
+        input_mm, model = self.history.input_mm, self.model
+        points: list[PointEffect] = []
+        for effect in order:
+            if isinstance(effect, DriveEffect):
+                input_mm = effect.act(input_mm, self.history, acting[effect.name])
+            elif isinstance(model, PhysicalModel) and effect.name in model.physics:
+                model = model.with_physics(effect.name, acting[effect.name])
+            elif isinstance(effect, PointEffect):
+                points.append(effect)
+        response = model.respond(input_mm)
+        camera = False
+        for effect in points:
+            if effect.stage == "camera" and not camera:
+                response, camera = response.shifted(self.midline_mm), True
+            response = effect.act(response, self.history, acting[effect.name])
+        return response if camera else response.shifted(self.midline_mm)
+
+    def stacked(self, settings: Settings) -> Array:
+        """Gap, and midline where it was measured, one after the other; shape (channels * n,)."""
+        response = self.respond(settings)
+        return np.concatenate([response.gap_mm, response.midline_mm]) if self.history.both_edges else response.gap_mm
+
+
+def admissible(history: History, without: frozenset[str]) -> tuple[dict[str, Effect], dict[str, str]]:
+    """Effects that these data can show, and the reasons for leaving out the others."""
+    able: dict[str, Effect] = {}
+    excluded: dict[str, str] = {}
+    for name, effect in catalogue().items():
+        searched = effect.search(history)
+        if name in without:
+            excluded[name] = "left out by request"
+        elif isinstance(searched, str):
+            excluded[name] = searched
+        elif name == "hinge_stiffness_error":
+            excluded[name] = "the force is compared by `compare` only; gap and midline do not show it"
+        else:
+            able[name] = effect
+    return able, excluded

@@ -1,0 +1,119 @@
+"""Noise of one channel: white plus a first-order autoregression, estimated where slow structure cannot reach it."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import minimize
+
+from fingervision.domain.effect import Array, Flags
+
+OUTLIER_SIGMAS = 4.5
+LINE = 9.0
+"""A periodogram value this many times its expectation is a line, not noise."""
+
+
+@dataclass(frozen=True, slots=True)
+class Noise:
+    """Standard deviations of the white and the correlated part, and the correlation of neighbouring samples."""
+
+    white_mm: float
+    correlated_mm: float
+    correlation: float
+
+    @property
+    def total_mm(self) -> float:
+        """Standard deviation of one sample."""
+        return float(np.hypot(self.white_mm, self.correlated_mm))
+
+
+def gate(residual: Array, runs: tuple[slice, ...], ordered: bool) -> Flags:
+    """Mark outliers against a running median; shape (n,), True where a value is to be set aside.
+
+    Without an order (no times) the median of all stands for the running one.
+    """
+    out = np.zeros(residual.size, dtype=bool)
+    rest = residual.copy()
+    for run in runs:
+        values = residual[run]
+        if ordered and values.size >= 9:
+            padded = np.pad(values, 3, mode="reflect")
+            windows = np.lib.stride_tricks.sliding_window_view(padded, 7)
+            rest[run] = values - np.median(windows, axis=1)
+        else:
+            rest[run] = values - np.median(values)
+    sigma = 1.4826 * float(np.median(np.abs(rest)))
+    if sigma > 0.0:
+        # A real reversal moves neighbours too; an outlier stands alone or in pairs.
+        out = np.abs(rest) > OUTLIER_SIGMAS * sigma
+        for i in range(2, residual.size - 2):
+            if ordered and out[i - 2 : i + 3].sum() >= 4:
+                out[i - 2 : i + 3] = False
+    return out
+
+
+def estimate_noise(
+    residual: Array, runs: tuple[slice, ...], rate_hz: float | None, aside: Flags, floor_mm: float, degrees: int
+) -> Noise:
+    """Fit the noise to a residual by Whittle's likelihood (Whittle 1953), above 1 Hz or a 25th of the sample rate.
+
+    Parameters
+    ----------
+    residual : ndarray of float, shape (n,)
+        Measured minus predicted.
+    runs : tuple of slice
+        Samples of each run.
+    rate_hz : float or None
+        Sample rate; None without times: the noise is then white.
+    aside : ndarray of bool, shape (n,)
+        Outliers.
+    floor_mm : float
+        The measurement's own random part.
+    degrees : int
+        Parameters that were fitted.
+    """
+    kept = residual[~aside]
+    if rate_hz is None or max(run.stop - run.start for run in runs) < 24:
+        spread = float(np.sqrt(np.sum((kept - np.median(kept)) ** 2) / max(1, kept.size - 1 - degrees)))
+        return Noise(max(spread, floor_mm, 1e-9), 0.0, 0.0)
+    angles, powers = [], []
+    for run in runs:
+        values, bad = residual[run].copy(), aside[run]
+        count = values.size
+        if count < 24 or bad.all():
+            continue
+        good = np.flatnonzero(~bad)
+        values[bad] = np.interp(np.flatnonzero(bad), good, values[good])
+        line = np.polynomial.Polynomial.fit(np.arange(count), values, 1)
+        taper = np.hanning(count + 2)[1:-1]
+        power = np.abs(np.fft.rfft((values - line(np.arange(count))) * taper)) ** 2 / np.sum(taper**2)
+        frequency = np.fft.rfftfreq(count)
+        used = frequency > max(min(1.0 / rate_hz, 0.1), 0.04, 2.5 / count)
+        angles.append(2.0 * np.pi * frequency[used])
+        powers.append(power[used])
+    angle, power = np.concatenate(angles), np.concatenate(powers)
+    start = float(np.median(power) / 0.6931)
+    use = np.ones(power.size, dtype=bool)
+
+    def spectrum(p: Array) -> Array:
+        phi = 0.97 / (1.0 + np.exp(-p[2]))
+        shock = np.exp(p[1]) * (1.0 - phi**2)
+        return np.asarray(np.exp(p[0]) + shock / (1.0 + phi**2 - 2.0 * phi * np.cos(angle)), dtype=np.float64)
+
+    def cost(p: Array) -> float:
+        expected = spectrum(p)[use]
+        # A weak pull of the correlation towards the middle keeps short records from running to a limit.
+        return float(np.sum(np.log(expected) + power[use] / expected) + 0.05 * p[2] ** 2 + 0.01 * (p[0] - p[1]) ** 2)
+
+    best = None
+    for _ in range(3):
+        begin = np.log([0.7 * start, 0.3 * start, np.e**0.5]) if best is None else best
+        best = minimize(cost, begin, method="Nelder-Mead", options={"maxiter": 150, "xatol": 0.02, "fatol": 0.05}).x
+        keep = power < LINE * spectrum(best)
+        if np.array_equal(keep, use):
+            break
+        use = keep
+    assert best is not None  # noqa: S101 - the loop runs
+    white, correlated = float(np.exp(0.5 * best[0])), float(np.exp(0.5 * best[1]))
+    phi = 0.97 / (1.0 + float(np.exp(-best[2])))
+    scale = max(1.0, floor_mm / max(1e-12, float(np.hypot(white, correlated))))
+    return Noise(max(scale * white, 1e-9), scale * correlated, phi)

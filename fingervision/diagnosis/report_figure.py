@@ -1,0 +1,55 @@
+"""Figures of a diagnosis: residuals before and after over input and time; as bytes of a PNG."""
+
+import io
+
+import matplotlib as mpl
+import numpy as np
+from matplotlib.figure import Figure
+
+from fingervision.domain.effect import Array, History
+
+BEFORE, AFTER = "#c0392b", "#1f618d"
+NAMES = {
+    "force": "force, N, in place of mm",
+    "gap": "gap",
+    "left": "left finger",
+    "right": "right finger",
+    "midline": "midline",
+}
+
+
+def residual_figure(before: dict[str, Array], after: dict[str, Array] | None, history: History) -> bytes:
+    """Draw measured minus predicted, a row a channel, over the input and (where there are times) over time.
+
+    Parameters
+    ----------
+    before, after : dict of ndarray of float, shape (n,)
+        By channel, in mm; `after` is None where nothing was added.
+    history : History
+        Input and times.
+    """
+    timed = history.time_s is not None
+    with mpl.rc_context({"font.size": 9, "axes.spines.top": False, "axes.spines.right": False}):
+        figure = Figure(figsize=(10.0, 1.0 + 2.1 * len(before)), layout="constrained")
+        grid = figure.subplots(len(before), 2 if timed else 1, squeeze=False, sharey="row")
+        for row, channel in enumerate(before):
+            panels = [(history.input_mm, "recorded input, mm")]
+            if timed:
+                clock = history.clock_s if history.shared_clock else np.arange(history.input_mm.size, dtype=np.float64)
+                panels.append((clock, "time, s" if history.shared_clock else "sample"))
+            for column, (x, label) in enumerate(panels):
+                axes = grid[row][column]
+                size = 9 if x.size < 60 else 3
+                axes.axhline(0.0, color="0.6", linewidth=0.8)
+                axes.plot(x, before[channel], ".", color=BEFORE, markersize=size, label="before")
+                if after is not None:
+                    axes.plot(x, after[channel], ".", color=AFTER, markersize=size, label="after")
+                if row == len(before) - 1:
+                    axes.set_xlabel(label)
+                if column == 0:
+                    axes.set_ylabel(f"{NAMES[channel]}\nmeasured - model, mm")
+        if after is not None:
+            grid[0][0].legend(frameon=False, ncols=2, loc="best")
+        buffer = io.BytesIO()
+        figure.savefig(buffer, format="png", dpi=110)
+    return buffer.getvalue()

@@ -1,0 +1,317 @@
+"""Which effects: singles, pairs and triples, refitted in the chain; thresholds from a bootstrap of the null."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from fingervision.diagnosis.explanation import Explanation, Problem, fit
+from fingervision.diagnosis.probes import probes
+from fingervision.diagnosis.signatures import Signatures, signatures
+from fingervision.domain.effect import Array
+from fingervision.domain.report import Verdict
+
+Progress = Callable[[float], None]
+DRAWS = 300
+QUANTILE = 0.985
+INDISTINGUISHABLE = 9.0
+BARE_MENTION = 3.0
+"""Below this difference of BIC simplicity is no evidence (Kass & Raftery 1995): tables of a score of rows."""
+ADMISSIBLE = 21.0
+"""Chi-square by which a true explanation 9 away can come out worse, at 95 %: 9 + 1.96 * 2 * sqrt(9)."""
+SMALL_SHARE = 0.05
+"""What the catalogue's form leaves over of the truth's is a few per cent of what was explained, no second name."""
+TRIPLE_SHARE = 0.15
+"""A third effect needs evidence of its own: three effects bend to almost anything."""
+PAIRS_REFITTED = 60
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Findings:
+    """What the search found; explanations sorted best first."""
+
+    verdict: Verdict
+    best: Explanation
+    alternatives: tuple[Explanation, ...]
+    nothing: Explanation
+    singles: tuple[Explanation, ...]
+    unknown: str | None
+    left_over: str | None
+    threshold: float
+    smallest: dict[str, dict[str, object]]
+    distances: dict[tuple[str, ...], float]
+    problem: Problem
+
+
+def _null_maximum(problem: Problem, columns: Array, sigma: tuple[float, ...], rng: np.random.Generator) -> float:
+    """Largest gain that any column takes from noise alone, at the quantile of the family."""
+    offsets, metric = problem.offsets, problem.offsets.metric(sigma)
+    kept = columns if columns.shape[0] <= 6000 else columns[:: columns.shape[0] // 4000]
+    noise = rng.standard_normal((kept.shape[0], DRAWS))
+    if kept.shape[0] == columns.shape[0]:
+        shared = offsets.design.T @ columns
+        prior = np.array([sigma[c] for c in range(offsets.channels) for _ in range(offsets.runs)])
+        noise += offsets.design[:, : prior.size] @ (prior[:, None] * rng.standard_normal((prior.size, DRAWS)))
+        noise -= offsets.design @ (metric @ (offsets.design.T @ noise))
+        norm = np.einsum("ij,ij->j", columns, columns) - np.einsum("ij,ij->j", shared, metric @ shared)
+    else:
+        norm = np.einsum("ij,ij->j", kept, kept)
+    usable = norm > 1e-9
+    gains = (kept.T[usable] @ noise) ** 2 / norm[usable, None]
+    quantile = float(np.quantile(gains.max(axis=0), QUANTILE))
+    # The noise itself is estimated, from as many samples as there are.
+    return quantile * (1.0 + 4.0 * float(np.sqrt(2.0 / columns.shape[0]))) + 3.0
+
+
+def _singles(problem: Problem, atoms: Signatures, iterations: int) -> list[Explanation]:
+    nothing = problem.nothing()
+    gain, coefficient = atoms.gains(nothing.residual, problem.offsets, problem.offsets.metric(nothing.sigma_mm))
+    owner = np.array(atoms.names)
+    found = []
+    for name in problem.effects:
+        mine = np.flatnonzero(owner == name)
+        if not mine.size:
+            continue
+        mine = mine[np.argsort(-gain[mine])]
+        tries = [fit(problem, (name,), {name: atoms.begin(k, coefficient[k])}, iterations=5) for k in mine[:4]]
+        best = min(tries, key=lambda explanation: explanation.score)
+        found.append(fit(problem, (name,), best.values, iterations=iterations))
+    return sorted(found, key=lambda explanation: explanation.score)
+
+
+def _tangents(problem: Problem, explanation: Explanation) -> Array:
+    base = problem.chain.stacked(explanation.values)
+    columns = []
+    for name, parameter in problem.parameters(explanation.names):
+        value = explanation.values[name][parameter.name]
+        step = 1e-3 * max(abs(value), 1e-3 * min(parameter.upper - parameter.lower, 1.0))
+        step = step if value + step <= parameter.upper else -step
+        moved = {**explanation.values, name: {**explanation.values[name], parameter.name: value + step}}
+        columns.append((problem.chain.stacked(moved) - base) / step)
+    return problem.whitener.columns(np.stack(columns, axis=1))[0]
+
+
+def _extended(
+    problem: Problem, atoms: Signatures, bases: list[Explanation], most: int, progress: Progress
+) -> list[Explanation]:
+    """Add each effect to each base: starts from signatures on what the base leaves, then joint refits."""
+    owner = np.array(atoms.names)
+    planned: list[tuple[float, Explanation, str, dict[str, float]]] = []
+    for base in bases:
+        metric = problem.offsets.metric(base.sigma_mm)
+        gain, coefficient = atoms.gains(base.residual, problem.offsets, metric, _tangents(problem, base))
+        for name in problem.effects:
+            mine = np.flatnonzero(owner == name)
+            if name in base.names or not mine.size:
+                continue
+            k = int(mine[np.argmax(gain[mine])])
+            if gain[k] > 4.0:
+                planned.append((base.score - float(gain[k]), base, name, atoms.begin(k, float(coefficient[k]))))
+    planned.sort(key=lambda plan: plan[0])
+    found: dict[tuple[str, ...], Explanation] = {}
+    for index, (_, base, name, start) in enumerate(planned[:most]):
+        explanation = fit(problem, (*base.names, name), {**base.values, name: start}, iterations=7)
+        old = found.get(explanation.names)
+        if old is None or explanation.score < old.score:
+            found[explanation.names] = explanation
+        progress((index + 1) / most)
+    ranked = sorted(found.values(), key=lambda explanation: explanation.score)
+    return sorted(
+        [fit(problem, e.names, e.values, iterations=20) for e in ranked[:8]] + ranked[8:], key=lambda e: e.score
+    )
+
+
+def _distance(problem: Problem, truth: Explanation, other: Explanation, sigma_mm: tuple[float, ...]) -> float:
+    """D_jk: squared whitened distance of one explanation's prediction to another, over the other's parameters.
+
+    Both directions count run offsets with the best explanation's spread: a worse one would hide its fault in them.
+    """
+    target = problem.whitened(truth.values)
+    return fit(problem, other.names, other.values, target=target, sigma_mm=sigma_mm, iterations=12).score
+
+
+def _choose(candidates: list[Explanation], samples: int) -> Explanation:
+    return min(candidates, key=lambda explanation: explanation.bic(samples))
+
+
+def search(
+    bench_problem: Callable[[Explanation | None], Problem],
+    rng: np.random.Generator,
+    forced: frozenset[str],
+    progress: Progress,
+) -> Findings:
+    """Find the explanation, the others that cannot be told apart from it, and what remains.
+
+    Parameters
+    ----------
+    bench_problem : callable
+        Gives the problem with the noise estimated on an explanation's residual.
+    rng : numpy Generator
+        For the bootstrap of the null.
+    forced : frozenset of str
+        Effects that the user insists on.
+    progress : callable
+        Told the share that is done.
+    """
+    problem = bench_problem(None)
+    atoms = signatures(problem)
+    rough = _singles(problem, atoms, 4)
+    pairs = _extended(problem, atoms, rough[:3], 16, lambda _: None)
+    first = [*rough[:1], *pairs[:1]]
+    progress(0.15)
+    if first:
+        problem = bench_problem(min(first, key=lambda e: e.bic(problem.measured.size)))
+        atoms = signatures(problem)
+    nothing = problem.nothing()
+    samples = max(2, int(problem.measured.size))
+    singles = _singles(problem, atoms, 20)
+    threshold = _null_maximum(problem, atoms.columns, nothing.sigma_mm, rng)
+    progress(0.3)
+    best, peers = nothing, [nothing]
+    pairs = []
+    if singles and (nothing.score - singles[0].score > threshold or forced):
+        best, peers = _choose(singles[:6], samples), singles
+        bases = singles[:14]
+        pairs = _extended(problem, atoms, bases, PAIRS_REFITTED, lambda share: progress(0.3 + 0.4 * share))
+        if pairs:
+            gained, explained = best.score - pairs[0].score, nothing.score - pairs[0].score
+            if gained > threshold and gained > SMALL_SHARE**2 * explained:
+                best, peers = _choose(pairs[:6], samples), pairs
+                triples = _extended(problem, atoms, pairs[:3], 24, lambda share: progress(0.7 + 0.1 * share))
+                if triples:
+                    gained, explained = best.score - triples[0].score, nothing.score - triples[0].score
+                    if gained > threshold and gained > TRIPLE_SHARE**2 * explained:
+                        best, peers = _choose(triples[:6], samples), triples
+    if forced and not forced <= set(best.names):
+        names = tuple(name for name in problem.effects if name in forced | set(best.names))
+        begin = {p: dict(v) for p, v in best.values.items()}
+        for name in names:
+            if name not in begin:
+                begin[name] = next((dict(s.values[name]) for s in singles if s.names == (name,)), {})
+        begin = {name: values for name, values in begin.items() if values}
+        best = fit(problem, tuple(begin), begin, iterations=20)
+        peers = [best]
+    progress(0.82)
+    words, left = _gate(problem, best, nothing, rng)
+    progress(0.9)
+    alternatives, distances = ([best], {}) if not best.names else _set(problem, best, peers, singles, pairs)
+    best = min(alternatives, key=lambda e: e.bic(samples) + _surprise(problem, e)) if best.names else best
+    alternatives.sort(key=lambda e: e is not best)
+    verdict = Verdict.AGREES if not best.names else Verdict.NAMED if len(alternatives) == 1 else Verdict.AMBIGUOUS
+    if words is not None:
+        verdict = Verdict.UNKNOWN
+        if nothing.score - best.score < 9.0 * max(0.0, best.score - samples):
+            best = nothing
+        alternatives = [best] if best.names else []
+    return Findings(
+        verdict,
+        best,
+        tuple(alternatives),
+        nothing,
+        tuple(singles),
+        words,
+        left,
+        threshold,
+        _smallest(problem, atoms, nothing, threshold),
+        distances,
+        problem,
+    )
+
+
+def _gate(
+    problem: Problem, best: Explanation, nothing: Explanation, rng: np.random.Generator
+) -> tuple[str | None, str | None]:
+    """Test the largest of many probes; returns what is unknown, or what is left over but small."""
+    samples = problem.chain.history.input_mm.size
+    shapes = probes(problem.chain.history, problem.whitener, 2400 if samples <= 4000 else 800)
+    offsets, metric = problem.offsets, problem.offsets.metric(best.sigma_mm)
+    moved = shapes.columns - offsets.design @ (metric @ (offsets.design.T @ shapes.columns))
+    dot = moved.T @ best.residual
+    norm = np.einsum("ij,ij->j", shapes.columns, moved)
+    if best.names:
+        tangents = _tangents(problem, best)
+        bent = tangents - offsets.design @ (metric @ (offsets.design.T @ tangents))
+        cross = bent.T @ shapes.columns
+        inverse = np.linalg.pinv(tangents.T @ bent)
+        dot = dot - cross.T @ (inverse @ (bent.T @ best.residual))
+        norm = norm - np.einsum("ij,ij->j", cross, inverse @ cross)
+    usable = norm > 1e-3 * np.maximum(np.einsum("ij,ij->j", shapes.columns, shapes.columns), 1e-12)
+    gain = np.where(usable, dot**2 / np.where(usable, norm, 1.0), 0.0)
+    threshold = _null_maximum(problem, shapes.columns[:, usable], best.sigma_mm, rng)
+    top = int(np.argmax(gain))
+    if gain[top] <= threshold:
+        return None, None
+    words = f"{shapes.words[top]} ({np.sqrt(gain[top]):.1f} sigma)"
+    explained = nothing.score - best.score
+    if best.names and gain[top] < SMALL_SHARE**2 * explained:
+        return None, words
+    return words, None
+
+
+def _set(
+    problem: Problem, best: Explanation, peers: list[Explanation], singles: list[Explanation], pairs: list[Explanation]
+) -> tuple[list[Explanation], dict[tuple[str, ...], float]]:
+    """Collect every minimal explanation that cannot be told apart from the best."""
+    members, distances = [best], {}
+    target = problem.whitened(best.values)
+    metric = problem.offsets.metric(best.sigma_mm)
+    rows = max(2, int(problem.measured.size - problem.whitener.aside.sum()))
+    pool = [*singles, *peers] if len(best.names) > 1 else list(singles)
+    if len(best.names) == 1:
+        odds = best.bic(rows) + _surprise(problem, best) + BARE_MENTION
+        pool += [pair for pair in pairs if pair.bic(rows) + _surprise(problem, pair) < odds]
+    for other in pool:
+        if other.names == best.names or any(set(m.names) <= set(other.names) for m in members):
+            continue
+        gap = target - problem.whitened(other.values)
+        shared = problem.offsets.design.T @ gap
+        near = float(gap @ gap - shared @ metric @ shared)
+        if near > 400.0 and other.score - best.score > 200.0:
+            continue
+        distance = near if near < INDISTINGUISHABLE else _distance(problem, best, other, best.sigma_mm)
+        if distance >= INDISTINGUISHABLE and other.score - best.score < ADMISSIBLE:
+            distance = min(distance, _distance(problem, other, best, best.sigma_mm))
+        distances[other.names] = distance
+        # A richer form at its limit is the simpler name: friction of vanishing reach is backlash.
+        same_count = len(other.names) == len(best.names)
+        limiting = same_count and other.free > best.free and best.score - other.score < 1.0
+        if distance < INDISTINGUISHABLE and not limiting:
+            members.append(other)
+    return [m for m in members if not any(set(o.names) < set(m.names) for o in members)], distances
+
+
+def _surprise(problem: Problem, explanation: Explanation) -> float:
+    """Sum the squares of the parameters over their physical priors."""
+    return sum(
+        ((explanation.values[name][p.name] - (p.neutral or 0.0)) / p.typical) ** 2
+        for name, p in problem.parameters(explanation.names)
+        if p.typical is not None
+    )
+
+
+def _smallest(
+    problem: Problem, atoms: Signatures, nothing: Explanation, threshold: float
+) -> dict[str, dict[str, object]]:
+    """State the size of each effect that this data would have shown."""
+    metric = problem.offsets.metric(nothing.sigma_mm)
+    shared = problem.offsets.design.T @ atoms.columns
+    norm = np.einsum("ij,ij->j", atoms.columns, atoms.columns) - np.einsum("ij,ij->j", shared, metric @ shared)
+    out: dict[str, dict[str, object]] = {}
+    needed = float(np.sqrt(threshold)) + 1.645
+    for name in problem.effects:
+        amplitudes = {p.name: p for _, p in problem.parameters((name,)) if p.neutral is not None}
+        sizes: list[tuple[float, str]] = []
+        for k in (k for k, owner in enumerate(atoms.names) if owner == name and norm[k] > 0.0):
+            grow = atoms.grows[k]
+            if grow is not None:
+                sizes.append((abs(grow[2]) * needed / float(np.sqrt(norm[k])), grow[0]))
+            elif norm[k] > needed**2:
+                sizes += [
+                    (abs(atoms.starts[k][p.name] - (p.neutral or 0.0)), p.name)
+                    for p in amplitudes.values()
+                    if atoms.starts[k][p.name] != p.neutral
+                ]
+        if sizes:
+            size, parameter = min(sizes)
+            out[name] = {"parameter": parameter, "size": size, "unit": amplitudes[parameter].unit}
+    return out

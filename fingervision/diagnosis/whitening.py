@@ -1,0 +1,178 @@
+"""Whitening: correlated, unequal noise turned into unit white noise by a Kalman filter's innovations (Kalman 1960)."""
+
+from dataclasses import dataclass
+
+import numba
+import numpy as np
+
+from fingervision.diagnosis.noise import Noise
+from fingervision.domain.effect import Array, Flags, History
+
+MIDLINE_FREE_MM = 1e3
+"""Prior spread of the midline's constant: large enough to be free."""
+
+
+@numba.njit(cache=True)
+def _innovations(columns, time, white, p1, lag1, h, p2, lag2):  # type: ignore[no-untyped-def]
+    # States: the edge's correlated noise and the smoothed input's error, both Ornstein-Uhlenbeck.
+    n, k = columns.shape
+    out = np.zeros((n, k))
+    a = np.zeros((2, k))
+    c11, c12, c22 = p1, 0.0, p2
+    logdet = 0.0
+    for i in range(n):
+        if i > 0:
+            f1 = np.exp(-(time[i] - time[i - 1]) * lag1)
+            f2 = np.exp(-(time[i] - time[i - 1]) * lag2)
+            c11 = f1 * f1 * c11 + p1 * (1.0 - f1 * f1)
+            c12 = f1 * f2 * c12
+            c22 = f2 * f2 * c22 + p2 * (1.0 - f2 * f2)
+            for j in range(k):
+                a[0, j] *= f1
+                a[1, j] *= f2
+        if white[i] < 0.0:
+            continue
+        g1, g2 = c11 + c12 * h[i], c12 + c22 * h[i]
+        s = g1 + h[i] * g2 + white[i]
+        root = np.sqrt(s)
+        logdet += np.log(s)
+        for j in range(k):
+            e = columns[i, j] - a[0, j] - h[i] * a[1, j]
+            out[i, j] = e / root
+            a[0, j] += g1 / s * e
+            a[1, j] += g2 / s * e
+        c11 -= g1 * g1 / s
+        c12 -= g1 * g2 / s
+        c22 -= g2 * g2 / s
+    return out, logdet
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Whitener:
+    """The observation model's covariance, ready to be divided out; channels are stacked gap, midline.
+
+    Parameters
+    ----------
+    history : History
+        Runs and times.
+    noises : tuple of Noise
+        One a channel.
+    aside : ndarray of bool, shape (channels * n,)
+        Outliers: they count as not measured.
+    input_mm : ndarray of float, shape (n,)
+        Standard deviation that the input's remaining error gives the gap; 0 where it is known.
+    input_samples : float
+        Samples over which that error is correlated.
+    """
+
+    history: History
+    noises: tuple[Noise, ...]
+    aside: Flags
+    input_mm: Array
+    input_samples: float
+
+    def columns(self, columns: Array) -> tuple[Array, float]:
+        """Whiten columns of shape (channels * n, k); also the logarithm of the covariance's determinant."""
+        n = self.history.input_mm.size
+        clock = self.history.time_s
+        step = 1.0 if clock is None else max(self.history.sample_time_s, 1e-9)
+        time = np.arange(n, dtype=np.float64) if clock is None else clock / step
+        out, total = np.empty_like(columns), 0.0
+        for channel, noise in enumerate(self.noises):
+            white = np.full(n, noise.white_mm**2)
+            part = slice(channel * n, (channel + 1) * n)
+            white[self.aside[part]] = -1.0
+            lag1 = -np.log(max(noise.correlation, 1e-6))
+            share = self.input_mm if channel == 0 else np.zeros(n)
+            lag2 = 50.0 if self.input_samples <= 1.0 else 2.0 / self.input_samples
+            for run in self.history.runs:
+                rows = slice(part.start + run.start, part.start + run.stop)
+                out[rows], logdet = _innovations(
+                    np.ascontiguousarray(columns[rows]),
+                    time[run],
+                    white[run],
+                    noise.correlated_mm**2,
+                    lag1,
+                    share[run],
+                    1.0,
+                    lag2,
+                )
+                total += logdet
+        return out, total
+
+    def one(self, column: Array) -> Array:
+        """Whiten one column of shape (channels * n,)."""
+        return self.columns(column[:, None])[0][:, 0]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class RunOffsets:
+    """Re-zeroing between runs, a zero-mean random effect per channel, and the midline's free constant.
+
+    Parameters
+    ----------
+    design : ndarray of float, shape (m, columns)
+        Whitened indicator columns: one a run and channel, and the midline's constant last.
+    channels : int
+        1 (gap) or 2 (gap and midline).
+    runs : int
+        Number of runs.
+    """
+
+    design: Array
+    gram: Array
+    channels: int
+    runs: int
+    scales_mm: tuple[float, ...]
+
+    @classmethod
+    def of(cls, whitener: Whitener) -> "RunOffsets":
+        """Build the columns for a whitener."""
+        history, channels = whitener.history, len(whitener.noises)
+        n, runs = history.input_mm.size, len(history.runs)
+        columns = np.zeros((channels * n, channels * runs + (channels - 1)))
+        for channel in range(channels):
+            for index, run in enumerate(history.runs):
+                columns[channel * n + run.start : channel * n + run.stop, channel * runs + index] = 1.0
+        if channels == 2:
+            columns[n:, -1] = 1.0
+        design = whitener.columns(columns)[0]
+        return cls(design, design.T @ design, channels, runs, tuple(noise.total_mm for noise in whitener.noises))
+
+    def metric(self, sigma_mm: tuple[float, ...]) -> Array:
+        """Return G with r^T r - (Z^T r)^T G (Z^T r) the squared length once offsets of these spreads are allowed."""
+        prior = [max(sigma_mm[channel], 1e-9) for channel in range(self.channels) for _ in range(self.runs)]
+        prior += [MIDLINE_FREE_MM] * (self.channels - 1)
+        return np.asarray(np.linalg.inv(self.gram + np.diag(1.0 / np.array(prior) ** 2)), dtype=np.float64)
+
+    def spread(self, residual: Array) -> tuple[tuple[float, ...], float]:
+        """Estimate the spreads from a whitened residual by marginal likelihood.
+
+        A half-Cauchy prior of one edge noise's scale (Gelman 2006) keeps two runs from turning every common offset
+        into scatter. With one run the spread is zero.
+
+        Returns
+        -------
+        sigma_mm : tuple of float
+            One a channel.
+        penalty : float
+            -2 log of determinant and prior, to be added to chi-square.
+        """
+        if self.runs == 1:
+            return (0.0,) * self.channels, 0.0
+        shares = self.design.T @ residual
+        out, total = [], 0.0
+        for channel in range(self.channels):
+            z = np.maximum(np.diag(self.gram)[channel * self.runs : (channel + 1) * self.runs], 1e-12)
+            mean = shares[channel * self.runs : (channel + 1) * self.runs] / z
+            if channel == 1:
+                mean = mean - np.sum(mean * z) / np.sum(z)
+            scale = self.scales_mm[channel]
+            sigma = np.concatenate([[0.0], scale * np.geomspace(0.01, 1e4, 121)])
+            spread = sigma[:, None] ** 2 * z
+            extra = np.sum(np.log1p(spread) - mean**2 * z * spread / (1.0 + spread), axis=1)
+            prior = 2.0 * np.log1p((sigma / scale) ** 2)
+            best = int(np.argmin(extra + prior))
+            out.append(float(sigma[best]))
+            total += float(np.sum(np.log1p(spread[best])) + prior[best])
+        return tuple(out), total

@@ -1,0 +1,55 @@
+"""report.json of a diagnosis, as the design lays it down."""
+
+import json
+from dataclasses import asdict
+from pathlib import Path
+
+from fingervision.domain.report import DiagnosisReport
+
+
+def report_document(report: DiagnosisReport, model_path: str | None, recipe_path: str | None) -> dict[str, object]:
+    """Lay the report out for programs; paths are relative to the report."""
+    run = report.next_run
+    return {
+        "schema": 1,
+        "verdict": str(report.verdict),
+        "sentence": report.sentence,
+        "effects": [asdict(effect) for effect in report.effects],
+        "alternatives": [list(names) for names in report.alternatives],
+        "where": [
+            {
+                "channel": place.channel,
+                "variable": place.variable,
+                "from": place.start,
+                "to": place.end,
+                "size": place.size,
+                "unit": place.unit,
+                "sigma": place.sigma,
+                "words": place.words,
+            }
+            for place in report.where
+        ],
+        "disagreement": asdict(report.disagreement),
+        "smallest_seen": report.smallest_seen,
+        "unknown": report.unknown,
+        "remaining": report.remaining,
+        "next_run": None
+        if run is None
+        else {
+            "recipe": recipe_path,
+            "promised": {"gain": run.gain, "from": run.gain_interval[0], "to": run.gain_interval[1]},
+            "separates": list(run.separates),
+            "words": run.words,
+        },
+        "excluded": list(report.excluded),
+        "outliers": list(report.outliers),
+        "runners_up": list(report.runners_up),
+        "notes": list(report.notes),
+        "model": model_path,
+        "seconds": report.seconds,
+    }
+
+
+def write_report(path: Path, document: dict[str, object]) -> None:
+    """Write the document; no NaN ever stands in it."""
+    path.write_text(json.dumps(document, indent=2, allow_nan=False) + "\n", encoding="utf-8")
