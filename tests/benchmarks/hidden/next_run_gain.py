@@ -8,8 +8,8 @@ import numpy as np
 from tests.benchmarks.hidden.catalogue_chain import Samples
 from tests.benchmarks.hidden.diagnose_adapter import Answer
 from tests.benchmarks.hidden.experiment import edges, measured
+from tests.benchmarks.hidden.explanations import known_effects, problem_of
 from tests.benchmarks.hidden.fit import Curve, Problem, fit
-from tests.benchmarks.hidden.oracle import known_effects, problem_of
 from tests.benchmarks.hidden.plant import Trace
 from tests.benchmarks.hidden.recipe import drive_recipe
 from tests.benchmarks.hidden.reported_effects import reported_effects

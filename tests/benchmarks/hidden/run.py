@@ -20,8 +20,9 @@ import numpy as np
 
 from tests.benchmarks.hidden.binomial import Rate
 from tests.benchmarks.hidden.diagnose_adapter import Answer, diagnose, read_report
+from tests.benchmarks.hidden.explanations import known_effects, problem_of
+from tests.benchmarks.hidden.ideal import ideal
 from tests.benchmarks.hidden.next_run_gain import Gain, gain_that_came
-from tests.benchmarks.hidden.oracle import known_effects, problem_of
 from tests.benchmarks.hidden.peer_bic import greedy_bic
 from tests.benchmarks.hidden.peer_sindy import e_sindy
 from tests.benchmarks.hidden.recipe import NotDrivenError
@@ -31,7 +32,7 @@ from tests.benchmarks.hidden.score import Mark, intervals, mark, row_lines
 from tests.benchmarks.hidden.table_cache import JudgedTable, draw_table_of_row
 from tests.benchmarks.hidden.unseen_run import unseen_error_ratio
 
-METHODS = ("diagnose", "bic", "sindy", "gp")
+METHODS = ("diagnose", "ideal", "bic", "sindy", "gp")
 PEERS = {"bic": greedy_bic, "sindy": e_sindy}
 
 
@@ -54,7 +55,10 @@ def _ask(table: JudgedTable, method: str) -> Answer:
         if method == "diagnose" and report.exists():
             return read_report(report, held["seconds"])
         return Answer(held["verdict"], tuple(frozenset(s) for s in held["sets"]), held["seconds"], held["report"])
-    answer = diagnose(table.folder) if method == "diagnose" else PEERS[method](table.folder)
+    if method == "diagnose":
+        answer = diagnose(table.folder)
+    else:
+        answer = ideal(table) if method == "ideal" else PEERS[method](table.folder)
     held = {"verdict": answer.verdict, "sets": [sorted(s) for s in answer.sets], "seconds": answer.seconds}
     held["report"] = answer.report if answer.verdict == "failed" else {}
     kept.write_text(json.dumps(held, indent=1), encoding="utf-8")
@@ -138,7 +142,7 @@ def main() -> None:
     options.add_argument("--jobs", type=int, default=2)
     options.add_argument("--seed", type=int, default=1)
     options.add_argument("--rows", default=",".join(ROWS))
-    options.add_argument("--methods", default="diagnose,bic,sindy,gp")
+    options.add_argument("--methods", default=",".join(METHODS))
     options.add_argument("--out", type=Path, default=Path("results/hidden"))
     options.add_argument("--again", default="", help="method whose kept answers are thrown away")
     options.add_argument("--misses", type=Path, help="folder that gets a copy of every table that diagnose missed")
@@ -179,11 +183,14 @@ def _batch(tasks: list[Task]) -> list[dict[str, object]]:
 def _tell(task: Task, result: dict[str, object], misses: Path | None) -> None:
     if "fault" in result:
         print(f"{task.row} {task.index} {task.method}: {result['fault']}", flush=True)
-    missed = task.method == "diagnose" and "mark" in result and not result["mark"]["right"]  # type: ignore[index]
+    missed = task.method in ("diagnose", "ideal") and "mark" in result and not result["mark"]["right"]  # type: ignore[index]
     if missed:
         said, hidden = result["verdict"], result["hidden"]
-        print(f"   missed {task.row} {task.index}: hidden {hidden or '-'}, said {said} {result['sets']}", flush=True)
-        if misses is not None:
+        print(
+            f"   {task.method} missed {task.row} {task.index}: hidden {hidden or '-'}, said {said} {result['sets']}",
+            flush=True,
+        )
+        if misses is not None and task.method == "diagnose":
             name = f"{task.row}_seed{task.seed}_{task.index:04d}"
             shutil.copytree(str(result["folder"]), misses / name, dirs_exist_ok=True)
 

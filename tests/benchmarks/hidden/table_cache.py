@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from tests.benchmarks.hidden.experiment import Experiment, Row, draw_experiment, write
-from tests.benchmarks.hidden.oracle import Judgement, judge
+from tests.benchmarks.hidden.oracle import NEAR, Judgement, judge
 
 FORM_SHARE = 0.003
 """The catalogue's form leaves at most this share of the hidden chi-square (5 % of the amplitude), or 20."""
@@ -27,7 +27,9 @@ def fair(row: Row, judgement: Judgement) -> bool:
     """Whether the table asks what its row asks: near the catalogue, or truly outside, or truly two effects."""
     if row.foreign:
         return judgement.outside
-    if row.hidden == 2 and all(len(names) < 2 for names in judgement.must):
+    if row.hidden == 2 and any(len(names) < 2 for names in judgement.must + judgement.may):
+        return False
+    if row.hidden and judgement.rival < -NEAR:
         return False
     return judgement.own <= max(20.0, FORM_SHARE * judgement.nothing)
 
@@ -41,6 +43,7 @@ def _written(judgement: Judgement) -> str:
         "effects": {name: values.tolist() for name, values in judgement.effects.items()},
         "nearest": judgement.nearest,
         "outside": judgement.outside,
+        "rival": judgement.rival,
     }
     return json.dumps(right, indent=1)
 

@@ -7,8 +7,8 @@ from numpy.typing import NDArray
 
 from tests.benchmarks.hidden.catalogue_chain import Effects, Samples, respond
 from tests.benchmarks.hidden.design import unseen_motion
+from tests.benchmarks.hidden.explanations import problem_of
 from tests.benchmarks.hidden.noise import edge_errors
-from tests.benchmarks.hidden.oracle import problem_of
 from tests.benchmarks.hidden.peer_gp import gp_prediction
 from tests.benchmarks.hidden.table_cache import JudgedTable
 

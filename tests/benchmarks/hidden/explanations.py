@@ -1,0 +1,133 @@
+"""Fits of single effects and pairs to an experiment's curve, first linear, then in the chain."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tests.benchmarks.hidden.candidates import Candidate, candidates
+from tests.benchmarks.hidden.catalogue_chain import Effects, Samples, extended, respond
+from tests.benchmarks.hidden.experiment import Experiment, edges
+from tests.benchmarks.hidden.fit import Curve, Fit, Library, Problem, fit
+from tests.benchmarks.hidden.plant import Trace
+from tests.benchmarks.hidden.weights import Weights
+
+Array = NDArray[np.float64]
+REFINED = 20
+"""Pairs of the smallest linear rest that are refitted in the chain."""
+
+
+def problem_of(experiment: Experiment, traces: list[Trace], *, known_input: bool) -> Problem:
+    """The judge's problem for an experiment's runs."""
+    table, noise = experiment.plant.table, experiment.noise
+    counts = [len(t.input_mm) for t in traces]
+    starts = np.concatenate([[0], np.cumsum(counts)]).astype(np.int64)
+    at = Samples(
+        np.concatenate([t.input_mm for t in traces]),
+        np.concatenate([t.run_time_s for t in traces]),
+        np.concatenate([t.table_time_s for t in traces]),
+        starts,
+    )
+    shaken = 0.0 if known_input else noise.input_variance_mm2
+    gap_sd = np.sqrt(2 * noise.edge_variance_mm2 + table.slope(at.input_mm) ** 2 * shaken)
+    midline_sd = np.full_like(gap_sd, np.sqrt(noise.edge_variance_mm2 / 2))
+    offset = noise.run_offset_mm if len(traces) > 1 else 0.0
+    force = None if table.force_n is None else noise.force_n
+    weights = Weights(gap_sd, midline_sd, noise.correlation, offset, starts, force)
+    return Problem(extended(table.input_mm, table.gap_mm, table.midline_mm, table.force_n), at, weights)
+
+
+def curve_of(traces: list[Trace]) -> Curve:
+    """Gap, midline and force without noise."""
+    left, right = edges(traces)
+    return right - left, (left + right) / 2, np.concatenate([t.force_n for t in traces])
+
+
+def known_effects(experiment: Experiment, problem: Problem) -> list[Candidate]:
+    """The candidates on this experiment."""
+    return candidates(
+        problem.model,
+        problem.at,
+        experiment.noise,
+        time_restarts=experiment.design.time_restarts,
+        has_force=experiment.plant.table.force_n is not None,
+    )
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Search:
+    """Fits of many explanations to one curve; `sure` is the problem with the input known exactly."""
+
+    problem: Problem
+    sure: Problem
+    known: list[Candidate]
+    library: Library
+    bare: Curve
+
+    def signal(self, target: Curve) -> Array:
+        return self.problem.weights.apply(*(t - b for t, b in zip(target, self.bare, strict=True)))
+
+    def singles(self, target: Curve) -> list[Fit]:
+        signal = self.signal(target)
+        found = []
+        for _, (group,) in self.library.left_over(signal, 1):
+            candidate = self.known[self.library.owner[group]]
+            tries = [self.library.begin(self.known, (group,), signal)[0], *_more(candidate)]
+            fits = [fit(self.problem, target, [candidate], [start], 40) for start in tries]
+            found.append(min(fits, key=lambda f: f.distance))
+        return sorted(found, key=lambda f: f.distance)
+
+    def pairs(self, target: Curve, without: set[str], limit: float) -> tuple[list[Fit], float]:
+        """Pairs refitted, and the smallest linear rest of those that were not."""
+        signal = self.signal(target)
+        found, skipped = [], np.inf
+        for rest, groups in self.library.left_over(signal, 2):
+            chosen = [self.known[self.library.owner[g]] for g in groups]
+            if without & {c.name for c in chosen}:
+                continue
+            if len(found) >= REFINED or rest > limit:
+                skipped = min(skipped, rest)
+                break
+            found.append(fit(self.problem, target, chosen, self.library.begin(self.known, groups, signal), 50))
+        return sorted(found, key=lambda f: f.distance), skipped
+
+    def exchanged(self, form: Curve, own: Fit) -> list[Fit]:
+        """Pairs that keep one of two hidden effects and exchange the other for its likeliest look-alikes."""
+        found = []
+        for kept in own.names if len(own.names) == 2 else ():
+            alone = respond(self.problem.model, self.problem.at, {kept: own.effects[kept]})
+            rest = self.problem.weights.apply(*(f - a for f, a in zip(form, alone, strict=True)))
+            for _, (group,) in self.library.left_over(rest, 1)[:8]:
+                other = self.known[self.library.owner[group]]
+                if other.name in own.names:
+                    continue
+                begin = self.library.begin(self.known, (group,), rest)[0]
+                chosen = [c for c in self.known if c.name in (kept, other.name)]
+                starts = [own.effects[kept] if c.name == kept else begin for c in chosen]
+                found.append(fit(self.problem, form, chosen, starts, 50))
+        return found
+
+    def cautious(self, target: Curve, effects: Effects) -> float:
+        answer = respond(self.problem.model, self.problem.at, effects)
+        difference = [a - b for a, b in zip(answer, target, strict=True)]
+        r = self.problem.weights.apply(*difference)
+        return self.problem.weights.cautious(float(r @ r), difference[0])
+
+
+def _more(candidate: Candidate) -> list[Array]:
+    """Further beginnings where a search stands still easily: what has no amplitude."""
+    if candidate.name in ("backlash", "stick_slip", "structural_resonance"):
+        picked = np.linspace(0, len(candidate.starts) - 1, 4).astype(int)
+        return [candidate.starts[k] for k in picked]
+    if candidate.name == "large_deflection":
+        return [np.array([3 * candidate.lower[0], c]) for c in (-0.7, 0.7)]
+    return []
+
+
+def search_of(experiment: Experiment, traces: list[Trace], *, known_input: bool) -> tuple[Search, Curve]:
+    """A search on an experiment's runs, and their curve without noise."""
+    problem = problem_of(experiment, traces, known_input=known_input)
+    known = known_effects(experiment, problem)
+    bare = respond(problem.model, problem.at, {})
+    sure = problem_of(experiment, traces, known_input=True)
+    return Search(problem, sure, known, Library.of(problem, known), bare), curve_of(traces)
