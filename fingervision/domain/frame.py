@@ -1,6 +1,7 @@
 """One picture of a recording, or the hole where one should be."""
 
 from dataclasses import dataclass
+from enum import StrEnum
 
 import numpy as np
 from numpy.typing import NDArray
@@ -8,6 +9,18 @@ from numpy.typing import NDArray
 from fingervision.domain.status import Status
 
 Pixels = NDArray[np.uint8] | NDArray[np.uint16]
+
+
+class Coding(StrEnum):
+    """What stood between the sensor and the pixels, by how far its errors are shared.
+
+    A lossy codec that treats every picture by itself (JPEG) leaves errors that are shared over a few pixels; one that
+    predicts a picture from its neighbours (H.264) moves whole blocks.
+    """
+
+    LOSSLESS = "lossless"
+    INTRAFRAME = "intraframe"
+    INTERFRAME = "interframe"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -22,14 +35,19 @@ class Frame:
         Place in the source, from 0.
     time_s : float or None
         Presentation time of the source; None where the source has no times.
-    lossy : bool
+    coding : Coding
         Whether a lossy codec stood between the sensor and these pixels: their errors are then correlated.
     """
 
     pixels: Pixels
     index: int
     time_s: float | None = None
-    lossy: bool = False
+    coding: Coding = Coding.LOSSLESS
+
+    @property
+    def lossy(self) -> bool:
+        """Whether the pixels differ from what the sensor saw."""
+        return self.coding is not Coding.LOSSLESS
 
     @property
     def height_px(self) -> int:

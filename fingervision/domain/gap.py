@@ -73,7 +73,6 @@ class GapMeasurement:
         """Distance between the two measuring points; slanted where the tips are at different heights."""
         return hypot(self.right.x_px - self.left.x_px, self.right.y_px - self.left.y_px)
 
-
     def shifted(self, x_px: float, y_px: float) -> "GapMeasurement":
         """The same measurement in a picture whose origin lies so far to the left and above."""
         along_px = y_px if self.direction.is_vertical else x_px

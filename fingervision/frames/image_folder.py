@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from fingervision.domain.errors import FingervisionError, UsageError
-from fingervision.domain.frame import Frame, LostFrame
+from fingervision.domain.frame import Coding, Frame, LostFrame
 from fingervision.domain.status import Status
 from fingervision.frames.image_file import IMAGE_SUFFIXES, LOSSY_SUFFIXES, UnreadableImageError, read_image
 from fingervision.frames.image_times import TIMES_FILE, times_of
@@ -110,6 +110,10 @@ class ImageFolder:
         if self.times_s is not None:
             return self.times_s[index]
         return None if self.rate_hz is None else index / self.rate_hz
+
+
+def _coding(file: Path) -> Coding:
+    return Coding.INTRAFRAME if file.suffix.lower() in LOSSY_SUFFIXES else Coding.LOSSLESS
 
 
 def _files(name: str) -> tuple[Path, ...]:

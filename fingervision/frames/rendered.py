@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fingervision.domain.errors import FingervisionError
-from fingervision.domain.frame import Frame, LostFrame
+from fingervision.domain.frame import Coding, Frame, LostFrame
 from fingervision.frames.source import Description
 from fingervision.rendering import Camera, Scene, render
 

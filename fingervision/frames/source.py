@@ -10,7 +10,7 @@ from typing import Protocol
 
 import fingervision.frames
 from fingervision.domain.errors import FingervisionError
-from fingervision.domain.frame import Frame, LostFrame
+from fingervision.domain.frame import Coding, Frame, LostFrame
 
 
 @dataclass(frozen=True, slots=True)

@@ -16,8 +16,8 @@ from fingervision.frames.image_file import IMAGE_SUFFIXES
 from fingervision.frames.luma import luma
 from fingervision.frames.source import Description, Wish
 
-# FFmpeg's AV_CODEC_PROP_INTRA_ONLY and AV_CODEC_PROP_LOSSY. A codec that can do both (H.264) counts as lossy: the stream
-# does not say.
+# FFmpeg's AV_CODEC_PROP_INTRA_ONLY and AV_CODEC_PROP_LOSSY. A codec that can do both (H.264) counts as lossy, because
+# the stream does not say.
 INTRA_PROPERTY, LOSSY_PROPERTY = 1, 2
 # These decoders fill in a damaged part from the picture before, and say so in FFmpeg's log alone: beginnings of lines.
 # Codecs without a checksum (H.264) can be damaged without anybody noticing; FFV1 has one for each slice.

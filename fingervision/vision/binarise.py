@@ -1,12 +1,16 @@
 """Step 3, black and white: which pixels are dark. The binary image finds; it measures nothing."""
 
 from dataclasses import dataclass
+from typing import Any
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from fingervision.vision.grey import GreyImage
+from fingervision.vision.grey import GreyImage, full_scale
+
+# Otsu's threshold looks at every so many rows and columns.
+THINNING = 3
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -39,19 +43,17 @@ class Binary:
 def binarise(denoised: GreyImage) -> Binary:
     """Split the picture in two by Otsu's threshold (IEEE Trans. SMC 9(1), 1979, 62-66).
 
-    The threshold is taken from every second row and column: it moves by far less than the contrast, and costs a
-    quarter.
+    The threshold is taken from every third row and column: it moves by far less than the contrast, and costs a ninth.
     """
-    sample = np.ascontiguousarray(denoised[::2, ::2])
-    threshold, light_sample = cv2.threshold(sample, 0, np.iinfo(sample.dtype).max, cv2.THRESH_BINARY | cv2.THRESH_OTSU)
-    return _split(denoised, float(threshold), sample, light_sample)
+    sample = cv2.resize(denoised, None, fx=1 / THINNING, fy=1 / THINNING, interpolation=cv2.INTER_NEAREST)
+    threshold, _ = cv2.threshold(sample, 0, full_scale(denoised), cv2.THRESH_BINARY | cv2.THRESH_OTSU)
+    return _split(denoised, threshold, np.asarray(sample))
 
 
 def binarise_local(denoised: GreyImage) -> Binary:
     """Split the picture against its own light, for light so uneven that no single threshold serves.
 
-    The light is the mean over an eighth of the picture's longer side; what differs from it by half of Otsu's contrast is
-    told apart by the sign.
+    The light is the mean over an eighth of the picture's longer side to every side; what is left is split as before.
     """
     side = max(denoised.shape) // 8
     light = cv2.blur(denoised.astype(np.float32), (2 * side + 1, 2 * side + 1), borderType=cv2.BORDER_REPLICATE)
@@ -59,11 +61,12 @@ def binarise_local(denoised: GreyImage) -> Binary:
     return binarise(flat)
 
 
-def _split(denoised: GreyImage, threshold: float, sample: GreyImage, light_sample: GreyImage) -> Binary:
+def _split(denoised: GreyImage, threshold: float, sample: NDArray[Any]) -> Binary:
     _, dark = cv2.threshold(denoised, threshold, 255, cv2.THRESH_BINARY_INV)
-    is_light = cv2.compare(light_sample, 0, cv2.CMP_GT)
-    light_mean, light_deviation = cv2.meanStdDev(sample, mask=is_light)
-    dark_mean, dark_deviation = cv2.meanStdDev(sample, mask=cv2.bitwise_not(is_light) if is_light.any() else None)
-    contrast = float(light_mean[0, 0] - dark_mean[0, 0])
-    within = float(np.hypot(light_deviation[0, 0], dark_deviation[0, 0])) / np.sqrt(2.0)
-    return Binary(dark.astype(np.uint8, copy=False), threshold, contrast, contrast / max(within, 1e-3))
+    is_light = sample > threshold
+    light, dim = sample[is_light], sample[~is_light]
+    if not len(light) or not len(dim):
+        return Binary(np.asarray(dark, dtype=np.uint8), threshold, 0.0, 0.0)
+    contrast = float(light.mean() - dim.mean())
+    within = float(np.hypot(light.std(), dim.std())) / np.sqrt(2.0)
+    return Binary(np.asarray(dark, dtype=np.uint8), threshold, contrast, contrast / max(within, 1e-3))

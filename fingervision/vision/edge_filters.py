@@ -1,8 +1,8 @@
 """The maximum-likelihood position of a blurred edge as linear filters, one for every blur and sub-pixel offset.
 
 Near a known offset the best estimates of an edge's shift, contrast and blur under white noise are linear in the grey
-levels: rows of the pseudo-inverse of the edge model (Kay, Estimation Theory, 1993, section 8.9). They depend on nothing but
-the blur, the offset and the length of the window, so they are made once; a Gauss-Newton step of a whole outline is
+levels: rows of the pseudo-inverse of the edge model (Kay, Estimation Theory, 1993, section 8.9). They depend on nothing
+but the blur, the offset and the length of the window, so they are made once; a Gauss-Newton step of a whole outline is
 then a table look-up and a scalar product.
 """
 
@@ -40,7 +40,7 @@ class EdgeFilters:
     offsets_px : ndarray of float, shape (offsets,)
         Where the edge lies, from the window's middle outwards.
     contrast, shift, blur : ndarray of float
-        Scalar product with the grey levels gives the contrast, contrast times shift, and contrast times change of sigma.
+        Scalar product with the grey levels gives the contrast, contrast times shift, contrast times change of sigma.
     step : ndarray of float
         The edge itself, from 0 inside to 1 outside, its mean removed.
     shift_gain : ndarray of float, shape (blurs, offsets)
@@ -59,12 +59,12 @@ class EdgeFilters:
     def rows(self, sigma_px: Floats) -> Ints:
         """Index of the nearest blur."""
         nearest = np.rint(np.log(sigma_px / SMALLEST_SIGMA_PX) / np.log(SIGMA_RATIO))
-        return np.clip(nearest, 0, len(self.sigmas_px) - 1).astype(np.intp)
+        return np.asarray(np.clip(nearest, 0, len(self.sigmas_px) - 1), dtype=np.intp)
 
     def columns(self, offset_px: Floats) -> Ints:
         """Index of the nearest offset."""
         nearest = np.rint((offset_px + LARGEST_OFFSET_PX) / OFFSET_STEP_PX)
-        return np.clip(nearest, 0, len(self.offsets_px) - 1).astype(np.intp)
+        return np.asarray(np.clip(nearest, 0, len(self.offsets_px) - 1), dtype=np.intp)
 
 
 def reach_for(sigma_px: float) -> int:
@@ -100,7 +100,7 @@ def edge_filters(reach_px: int) -> EdgeFilters:
     """Filters for a window of `2 reach_px + 1` pixels, for every blur that fits it."""
     largest = (reach_px - REACH_EXTRA_PX) / REACH_SIGMAS * np.sqrt(2.0) + 1.0  # a slanted edge is wider along the line
     count = int(np.ceil(np.log(largest / SMALLEST_SIGMA_PX) / np.log(SIGMA_RATIO))) + 1
-    sigmas = SMALLEST_SIGMA_PX * SIGMA_RATIO ** np.arange(count)
+    sigmas = np.asarray(SMALLEST_SIGMA_PX * SIGMA_RATIO ** np.arange(count), dtype=np.float64)
     offsets = np.arange(-LARGEST_OFFSET_PX, LARGEST_OFFSET_PX + 1e-9, OFFSET_STEP_PX)
     borders = np.arange(-reach_px - 0.5, reach_px + 1.0) - offsets[None, :, None]
     model = np.stack(
@@ -112,5 +112,7 @@ def edge_filters(reach_px: int) -> EdgeFilters:
     step, shift = model[..., 0, :], model[..., 1, :]
     ss, st, tt = (step**2).sum(-1), (step * shift).sum(-1), (shift**2).sum(-1)
     gain = np.sqrt(np.maximum(tt - st**2 / np.maximum(ss, 1e-12), 1e-12))
-    parts = (np.ascontiguousarray(filters[..., k, :]) for k in range(3))
-    return EdgeFilters(reach_px, sigmas, offsets, *parts, np.ascontiguousarray(step), gain)
+    contrast_filter, shift_filter, blur_filter = (np.ascontiguousarray(filters[..., k, :]) for k in range(3))
+    return EdgeFilters(
+        reach_px, sigmas, offsets, contrast_filter, shift_filter, blur_filter, np.ascontiguousarray(step), gain
+    )

@@ -2,8 +2,8 @@
 
 Each row across a flank, and each column across a tip, holds one edge: a step between two levels of its own, spread by
 a Gaussian and integrated over the pixel. The position is the maximum-likelihood one under white noise, so its variance
-is the Cramer-Rao bound. What all rows share is the spread, one for the flanks and one for the tip of each finger (motion
-spreads a flank more than a tip). Nothing is resampled.
+is the Cramer-Rao bound. What all rows share is the spread, one for the flanks and one for the tip of each finger
+(motion spreads a flank more than a tip). Nothing is resampled.
 """
 
 from dataclasses import dataclass, replace
@@ -20,8 +20,8 @@ from fingervision.vision.stripes import NEAR_SIGMAS, fit_stripes
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int_]
 
-# Half-length of the first look at an edge (pixels), enough for the strongest blur that is still measured; at one line in
-# so many.
+# Half-length of the first look at an edge (pixels), enough for the strongest blur that is still measured; at one line
+# in so many.
 FIRST_REACH_PX, FIRST_LOOK = 20, 6
 # Blur of an edge is looked for within these limits (pixels); `blurred` begins at 5.
 SMALLEST_BLUR_PX, LARGEST_BLUR_PX = 0.2, 8.0

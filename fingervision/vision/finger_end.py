@@ -125,8 +125,8 @@ def _sides(p: Floats, origin: Floats) -> _Sides:
 class _Place:
     """Where the points lie on the shape; arrays of shape (fingers, n).
 
-    `alpha` and `beta` are the coordinates, from the centre of the point's own fillet, in the basis of the flank's and the
-    top's normal; `to_flank` and `to_top` are what a shift of those sides moves the distance by.
+    `alpha` and `beta` are the coordinates, from the centre of the point's own fillet, in the basis of the flank's and
+    the top's normal; `to_flank` and `to_top` are what a shift of those sides moves the distance by.
     """
 
     distance: Floats
@@ -166,8 +166,8 @@ def _place(s: _Sides, points: OutlinePoints, half: NDArray[np.intp]) -> _Place:
 def _jacobian(at: _Place, s: _Sides, points: OutlinePoints, origin: Floats, is_inner: Floats) -> Floats:
     """Change of the distance with every parameter, shape (fingers, 8, n).
 
-    A fillet's centre follows the two sides that it touches: the distance of a point on it changes as if both sides, seen
-    from the centre, moved along their normals.
+    A fillet's centre follows the two sides that it touches: the distance of a point on it changes as if both sides,
+    seen from the centre, moved along their normals.
     """
     qx = np.where(at.on_fillet, points.x - at.from_centre_x, points.x) - origin[:, :1]
     qy = np.where(at.on_fillet, points.y - at.from_centre_y, points.y) - origin[:, 1:]

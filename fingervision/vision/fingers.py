@@ -1,4 +1,4 @@
-"""Step 4, the boundary of the fingers: which two of everything in view are they, and where do they point?
+"""Step 4, the boundary of the fingers: which two of everything in view they are, and where they point.
 
 A finger is a place where the outline, followed from the tips' side of the picture, begins: a local top that goes on
 downwards for some way before it ends or meets another (topographic prominence). Two fingers that touch are one blob
@@ -26,6 +26,9 @@ Outline = NDArray[np.int_]
 SMALLEST_PROMINENCE_PX = 5.0
 # An outline that comes back up by more than this has passed the bottom of a notch.
 SMALLEST_NOTCH_PX = 3
+# Two tops with a notch between them are touching fingers where the notch has so much of the measuring height, and the
+# fingers so many times of it.
+SMALLEST_NOTCH_SHARE, LEAST_LENGTH_SHARE = 0.3, 4.0
 # Tops beyond this number are texture; the fingers are among the most prominent.
 MOST_TOPS = 8
 # Fingers come in from the picture's border; things that lie in view are less likely to be fingers.
@@ -109,7 +112,9 @@ class CoarseFingers:
 def find_outlines(mask: NDArray[np.uint8]) -> list[Outline]:
     """Outlines (x, y) of everything set in a mask, holes included, but for specks."""
     outlines, _ = cv2.findContours(mask, cv2.RETR_LIST, cv2.CHAIN_APPROX_NONE)
-    return [outline[:, 0, :] for outline in outlines if len(outline) > 4 * SMALLEST_PROMINENCE_PX]
+    return [
+        np.asarray(outline[:, 0, :], dtype=np.int_) for outline in outlines if len(outline) > 4 * SMALLEST_PROMINENCE_PX
+    ]
 
 
 def find_fingers(
@@ -190,7 +195,9 @@ def _best_pair(
         if best is not None and score <= best.score:
             continue
         if prominence < below_tip_px + 1.0:
-            shallow = shallow or (prominence > 0.3 * below_tip_px and max(left.prominence_px, right.prominence_px) > 4.0 * below_tip_px)
+            deeper = max(left.prominence_px, right.prominence_px)
+            is_notch = prominence > SMALLEST_NOTCH_SHARE * below_tip_px and deeper > LEAST_LENGTH_SHARE * below_tip_px
+            shallow = shallow or is_notch
             continue
         if not _stand_side_by_side(left, right, below_tip_px):
             continue
@@ -203,7 +210,7 @@ def _best_pair(
         return best
     if shallow:
         return NoGap(Status.TOUCHING, "The fingers touch above the measuring height.")
-    if sum(top.along_px == 0 for top in tops) >= 1 and len(tops) >= 2:  # noqa: PLR2004
+    if sum(top.along_px == 0 for top in tops) >= 1 and len(tops) >= 2:
         return NoGap(Status.TIP_OUT_OF_VIEW, "A finger's tip lies beyond the picture's border.")
     if len(in_view) == 1 and in_view[0].prominence_px > below_tip_px:
         return NoGap(Status.ONE_FINGER, "Only one finger is in view.")

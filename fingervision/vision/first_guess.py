@@ -22,7 +22,7 @@ Floats = NDArray[np.float64]
 
 # A line needs so many points.
 FEWEST_POINTS = 4
-# Flanks that differ more in slope are not both flanks; a flank that is not in view is parallel to the other within this.
+# Flanks that differ more in slope are not both flanks; one that is not in view is parallel to the other within this.
 MOST_TAPER, TAPER_PRIOR = 0.15, 0.03
 # Where only one corner is in view, its sides are square to each other within this.
 SQUARE_PRIOR = 0.01
@@ -122,9 +122,9 @@ def _radius(inside_flank: Floats, inside_top: Floats, blur: float) -> float:
     """Fillet radius from the points that lie inside both sides of a corner.
 
     A fillet of radius r in a right angle passes through every point whose distances a and b from the two sides
-    satisfy (r - a)^2 + (r - b)^2 = r^2; the median over the points does not mind dust. Blur moves the half-level further
-    in: on the bisector by sigma^2 / 2r on a large fillet, by 0.77 sigma in a sharp corner (where the product of two
-    error functions is one half), and the root of the two in between is within 0.02 sigma of the exact contour.
+    satisfy (r - a)^2 + (r - b)^2 = r^2; the median over the points does not mind dust. Blur moves the half-level
+    further in: on the bisector by sigma^2 / 2r on a large fillet, by 0.77 sigma in a sharp corner (where the product of
+    two error functions is one half); in between, the two are joined smoothly.
     """
     on_fillet = np.minimum(inside_flank, inside_top) > INSIDE_CORNER_PX
     a, b = inside_flank[on_fillet], inside_top[on_fillet]

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from fingervision.domain.frame import Coding
 from fingervision.domain.gap import FingerEdge, GapMeasurement, NoGap
 from fingervision.domain.status import Status
 from fingervision.vision.edges import PIXEL_VARIANCE, EdgePoints, outline_blur
@@ -45,7 +46,9 @@ SHAPE_LIMIT, MISFIT_LIMIT = 3.5, 2.5
 SHAPE_REACH_PX = 8.0
 # Neighbouring points share what the model leaves unexplained, and a codec's blocks, over so many of them.
 LAGS = 8
-CODING_BLOCK_PX = 12.0
+# Points over which a codec shares its errors: measured on clips of a moving gripper at 1 to 8 Mbit/s and on JPEG of
+# quality 70 to 95 (`tests/benchmarks/accuracy.py --only jpeg h264`).
+SHARED_POINTS = {Coding.LOSSLESS: 1.0, Coding.INTRAFRAME: 2.5, Coding.INTERFRAME: 12.0}
 # Mean of w r^2 over mean of w for normal residuals under the biweight: the weights shrink the spread by this.
 BIWEIGHT_SPREAD = 0.828
 # A top whose two corners differ in height by less than so many sigma is level
@@ -113,7 +116,7 @@ def outline_points(fingers: CoarseFingers, edges: EdgePoints) -> tuple[OutlinePo
 
 
 def measure_gap(
-    fingers: CoarseFingers, edges: EdgePoints, below_tip_px: float, full_scale: int, light_gap: bool, lossy: bool
+    fingers: CoarseFingers, edges: EdgePoints, below_tip_px: float, full_scale: int, light_gap: bool, coding: Coding
 ) -> GapMeasurement | NoGap:
     """Measure the gap from the edge points of both fingers.
 
@@ -129,8 +132,8 @@ def measure_gap(
         Largest grey level.
     light_gap : bool
         Whether the fingers are dark.
-    lossy : bool
-        Whether a lossy codec was at work.
+    coding : Coding
+        How far errors are shared.
 
     Returns
     -------
@@ -144,14 +147,14 @@ def measure_gap(
     if points.weight.sum(axis=1).min() < FEWEST_LINES:
         return NoGap(Status.NO_FINGERS, "Too little of a finger's outline is in view to be measured.")
     ends = fit_finger_ends(points, *first_guess(points, below_tip_px))
-    inflation = _inflation(points, ends, lossy)
+    inflation = _inflation(points, ends, coding)
     fitted = _evaluate(ends, below_tip_px)
     holds = [_shape_holds(points, ends, k, fitted.tip[k], fitted.edge[k], below_tip_px) for k in range(2)]
     measured: list[MeasuredFinger] = []
     for k in range(2):
         finger = None
         if not all(holds):  # both in the same way: what a method does to a shape, it does to either
-            finger = _measure_locally(points, k, below_tip_px, lossy)
+            finger = _measure_locally(points, k, below_tip_px, coding)
         if finger is None and holds[k]:
             if fitted.apex[k] < points.x[k][points.weight[k] > 0].min() - 1.0:
                 return NoGap(Status.TIP_OUT_OF_VIEW, "A finger's tip lies beyond the picture's border.")
@@ -175,7 +178,7 @@ def _refuse(edges: EdgePoints, full_scale: int, light_gap: bool) -> NoGap | None
     contrast = float(np.median(edges.contrast[inner])) * (1.0 if light_gap else -1.0)
     if contrast < CONTRAST_TO_NOISE * edges.noise or contrast < 0.02 * full_scale:
         return NoGap(Status.LOW_CONTRAST, "The fingers hardly differ from their ground.")
-    if edges.is_clipped[inner].mean() > 0.5:  # noqa: PLR2004 - more than half of the rows
+    if edges.is_clipped[inner].mean() > 0.5:
         return NoGap(Status.SATURATED, "The flank of the edges is cut off at the end of the grey scale.")
     blur = float(np.sqrt(edges.blur_px[:, 0].max() ** 2 + PIXEL_VARIANCE))
     if blur > BLUR_LIMIT_PX:
@@ -216,7 +219,7 @@ def _gradient(moved: Floats) -> Floats:
     return np.asarray((moved[:, 1 : PARAMETERS + 1] - moved[:, PARAMETERS + 1 :]) / 2e-3)
 
 
-def _inflation(points: OutlinePoints, ends: FingerEnds, lossy: bool) -> Floats:
+def _inflation(points: OutlinePoints, ends: FingerEnds, coding: Coding) -> Floats:
     """What multiplies the variances: the residuals' own spread, and how far neighbours share them (Newey-West)."""
     weight = ends.robust * points.weight
     spread = (weight * ends.residual**2).sum(axis=1) / np.maximum(weight.sum(axis=1) - PARAMETERS, 1.0)
@@ -227,7 +230,7 @@ def _inflation(points: OutlinePoints, ends: FingerEnds, lossy: bool) -> Floats:
     power = np.maximum((sequence**2).sum(axis=1), 1e-12)
     shared = (moving**2).sum(axis=1) / ((LAGS + 1.0) * power)
     # What a codec does to a whole block the fit takes for shape: the residuals do not show it, the block's side does.
-    return np.maximum(spread / BIWEIGHT_SPREAD, 0.5) * max(float(shared.mean()), CODING_BLOCK_PX if lossy else 1.0)
+    return np.asarray(np.maximum(spread / BIWEIGHT_SPREAD, 0.5)) * max(float(shared.mean()), SHARED_POINTS[coding])
 
 
 def _shape_holds(points: OutlinePoints, ends: FingerEnds, k: int, tip: float, edge: float, below_tip_px: float) -> bool:
@@ -246,7 +249,7 @@ def _shape_holds(points: OutlinePoints, ends: FingerEnds, k: int, tip: float, ed
     roughness = 1.4826 * float(np.median(np.abs(np.diff(ends.residual[k][counted])))) / np.sqrt(2.0)
     for near in (near_edge, near_tip):
         total = float((weight * near).sum())
-        if total < 3.0:  # noqa: PLR2004 - a sharp corner has no points of its own: the two sides speak for it
+        if total < 3.0:
             continue
         mean = float((weight * near * ends.residual[k]).sum()) / total
         if abs(mean) * np.sqrt(total) > SHAPE_LIMIT * max(roughness, 1.0):
@@ -259,7 +262,7 @@ def _is_on_outline(x: Floats, y: Floats, edge: float, height: float) -> bool:
     return bool(len(x)) and float(np.hypot(x - edge, y - height).min()) < FARTHEST_POINT_PX
 
 
-def _measure_locally(points: OutlinePoints, k: int, below_tip_px: float, lossy: bool) -> MeasuredFinger | None:
+def _measure_locally(points: OutlinePoints, k: int, below_tip_px: float, coding: Coding) -> MeasuredFinger | None:
     """Tip and edge of a finger of any smooth shape."""
     real = points.weight[k] > 0
     own = FingerPoints(
@@ -282,9 +285,9 @@ def _measure_locally(points: OutlinePoints, k: int, below_tip_px: float, lossy: 
     edge, slope = found
     if not _is_on_outline(own.x, own.y, edge.x, height):
         return None
-    lossy_factor = np.sqrt(CODING_BLOCK_PX) if lossy else 1.0
-    var_tip = (lossy_factor * tip.u_normal) ** 2
-    var_edge = (lossy_factor * edge.u_normal / abs(edge.nx)) ** 2
+    shared = np.sqrt(SHARED_POINTS[coding])
+    var_tip = (shared * tip.u_normal) ** 2
+    var_edge = (shared * edge.u_normal / abs(edge.nx)) ** 2
     if var_edge + slope**2 * var_tip > LOCAL_LIMIT_PX**2:
         return None
     covariance = np.array([[var_tip, slope * var_tip], [slope * var_tip, var_edge + slope**2 * var_tip]])
@@ -293,7 +296,7 @@ def _measure_locally(points: OutlinePoints, k: int, below_tip_px: float, lossy: 
 
 def _slope_near(points: FingerPoints, inner: NDArray[np.bool_], height: float) -> float:
     near = inner & (np.abs(points.y - height) < SHAPE_REACH_PX)
-    if near.sum() < 3:  # noqa: PLR2004
+    if near.sum() < 3:
         return 0.0
     return float(np.clip(line(points.y[near] - height, points.x[near])[1], -3.0, 3.0))
 

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fingervision.domain.direction import Direction
+from fingervision.vision.grey import GreyImage
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,7 +44,7 @@ class Orientation:
     def _is_flipped(self) -> bool:
         return self.direction in (Direction.DOWN, Direction.RIGHT)
 
-    def view(self, image: NDArray[np.generic]) -> NDArray[np.generic]:
+    def view(self, image: GreyImage) -> GreyImage:
         """The picture as if the tips pointed up: rows run along the fingers, columns across them."""
         upright = image if self.direction.is_vertical else image.T
         return upright[::-1] if self._is_flipped else upright

@@ -5,8 +5,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fingervision.domain.direction import Direction
-from fingervision.domain.frame import Frame
+from fingervision.domain.frame import Frame, Pixels
 from fingervision.domain.gap import FingerEdge, GapMeasurement, NoGap
+from fingervision.vision.edges import EdgePoints
+from fingervision.vision.fingers import CoarseFingers
+from fingervision.vision.orientation import Orientation
+from fingervision.vision.profile_lines import IS_ROW
 
 # Red, green, blue.
 EDGE, TIP, POINT, DISTANCE, WORDS, FAILURE, BACKING = (
@@ -57,10 +61,44 @@ def draw_overlay(frame: Frame, outcome: GapMeasurement | NoGap, words: str) -> C
     return canvas
 
 
+def draw_boundary(frame: Frame, fingers: CoarseFingers | None) -> Canvas:
+    """Draw the outlines of the two fingers as the binary picture gives them; nothing where none were found."""
+    canvas = _as_colour(frame)
+    if fingers is None:
+        return canvas
+    for finger in (fingers.left, fingers.right):
+        _polyline(canvas, finger.outline.astype(np.float64), fingers.orientation)
+    return canvas
+
+
+def draw_edge_points(frame: Frame, fingers: CoarseFingers | None, edges: EdgePoints | None) -> Canvas:
+    """Draw every sub-pixel edge point as a dot; nothing where no edges were measured."""
+    canvas = _as_colour(frame)
+    if fingers is None or edges is None:
+        return canvas
+    lines = edges.lines
+    across, along = np.where(IS_ROW, edges.position, lines.fixed), np.where(IS_ROW, lines.fixed, edges.position)
+    fraction = 1 << FRACTION_BITS
+    for a, r in zip(across[lines.weight > 0], along[lines.weight > 0], strict=True):
+        x, y = fingers.orientation.to_pixels(float(a), float(r))
+        cv2.circle(canvas, (round(x * fraction), round(y * fraction)), fraction, EDGE, -1, cv2.LINE_AA, FRACTION_BITS)
+    return canvas
+
+
+def in_eight_bits(grey: Pixels) -> Canvas:
+    """Grey levels for a screen."""
+    return np.ascontiguousarray((grey >> 8).astype(np.uint8) if grey.dtype == np.uint16 else grey)
+
+
+def _polyline(canvas: Canvas, outline: NDArray[np.float64], orientation: Orientation) -> None:
+    points = [orientation.to_pixels(float(a), float(r)) for a, r in outline]
+    cv2.polylines(canvas, [np.rint(points).astype(np.int32)], False, EDGE, 1, cv2.LINE_AA)
+
+
 def _as_colour(frame: Frame) -> Canvas:
     """Eight bits, three colours, memory of its own."""
     pixels = frame.pixels
-    levels = (pixels >> 8).astype(np.uint8) if pixels.dtype == np.uint16 else pixels
+    levels = in_eight_bits(pixels)
     if levels.ndim == 3:
         return np.array(levels, dtype=np.uint8)
     return cv2.cvtColor(np.ascontiguousarray(levels), cv2.COLOR_GRAY2RGB)  # type: ignore[return-value]

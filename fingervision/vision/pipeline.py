@@ -6,16 +6,17 @@ from dataclasses import dataclass
 import numpy as np
 
 from fingervision.domain.direction import Direction
-from fingervision.domain.frame import Frame
+from fingervision.domain.frame import Coding, Frame, Pixels
 from fingervision.domain.gap import GapMeasurement, NoGap
 from fingervision.domain.region import Region
 from fingervision.domain.status import Status
 from fingervision.vision.binarise import Binary, binarise, binarise_local
 from fingervision.vision.denoise import denoise
-from fingervision.vision.edges import fit_edges
+from fingervision.vision.edges import EdgePoints, fit_edges
 from fingervision.vision.fingers import CoarseFingers, find_fingers
 from fingervision.vision.gap import measure_gap
 from fingervision.vision.grey import GreyImage, full_scale, to_grey
+from fingervision.vision.overlay import draw_boundary, draw_edge_points, draw_overlay, in_eight_bits
 from fingervision.vision.profile_lines import profile_lines
 
 # A picture whose two classes differ by less (share of full scale, and in units of the spread within) shows nothing.
@@ -60,7 +61,38 @@ def measure_frame(frame: Frame, settings: Settings) -> GapMeasurement | NoGap:
         The number with its uncertainty, or why there is none.
     """
     grey = _part(to_grey(frame.pixels), settings.region)
-    return _shifted(_measure(grey, settings, frame.lossy), settings.region)
+    return _shifted(_measure(grey, settings, frame.coding).outcome, settings.region)
+
+
+def steps(frame: Frame, settings: Settings) -> list[tuple[str, Pixels]]:
+    """Picture of every step of one frame, in order, each as large as what is looked at.
+
+    Parameters
+    ----------
+    frame : Frame
+        The picture.
+    settings : Settings
+        What the user chose.
+
+    Returns
+    -------
+    list of (str, ndarray of uint8)
+        Name and picture: grey, denoised, binary, boundary, edges, and the measured gap.
+    """
+    grey = _part(to_grey(frame.pixels), settings.region)
+    denoised = denoise(grey)
+    attempt = _measure(grey, settings, frame.coding)
+    own = Frame(in_eight_bits(grey), frame.index)
+    outcome = attempt.outcome
+    words = f"gap {outcome.gap_px:.3f} px" if isinstance(outcome, GapMeasurement) else outcome.words
+    return [
+        ("grey", in_eight_bits(grey)),
+        ("denoised", in_eight_bits(denoised)),
+        ("binary", attempt.binary.dark if attempt.binary is not None else binarise(denoised).dark),
+        ("boundary", draw_boundary(own, attempt.fingers)),
+        ("edges", draw_edge_points(own, attempt.fingers, attempt.edges)),
+        ("gap", draw_overlay(own, outcome, words)),
+    ]
 
 
 def _part(grey: GreyImage, region: Region | None) -> GreyImage:
@@ -70,31 +102,43 @@ def _part(grey: GreyImage, region: Region | None) -> GreyImage:
     return grey[rows, region.x_px : region.x_px + region.width_px]
 
 
-def _measure(grey: GreyImage, settings: Settings, lossy: bool) -> GapMeasurement | NoGap:
+@dataclass(frozen=True, slots=True, eq=False)
+class _Attempt:
+    """How far a frame was understood: the binary picture, the fingers in it, their edges, and what came out."""
+
+    outcome: GapMeasurement | NoGap
+    binary: Binary | None = None
+    fingers: CoarseFingers | None = None
+    edges: EdgePoints | None = None
+
+
+def _measure(grey: GreyImage, settings: Settings, coding: Coding) -> _Attempt:
     scale = full_scale(grey)
     if np.count_nonzero(grey == scale) > SATURATED_SHARE * grey.size:
-        return NoGap(Status.SATURATED, "The picture is white: nearly every pixel is at full scale.")
+        return _Attempt(NoGap(Status.SATURATED, "The picture is white: nearly every pixel is at full scale."))
     denoised = denoise(grey)
     binary = binarise(denoised)
     if binary.contrast < CONTRAST_FLOOR * scale or binary.separation < SEPARATION_FLOOR:
-        return NoGap(Status.LOW_CONTRAST, "The picture is uniform: nothing in it differs from anything else.")
-    reason: NoGap | None = None
-    for candidate, light_gap in _candidates(denoised, binary, settings):
-        if isinstance(candidate, NoGap):
-            measured: GapMeasurement | NoGap = candidate
+        words = "The picture is uniform: nothing in it differs from anything else."
+        return _Attempt(NoGap(Status.LOW_CONTRAST, words), binary)
+    first: _Attempt | None = None
+    for split, fingers, light_gap in _candidates(denoised, binary, settings):
+        if isinstance(fingers, NoGap):
+            attempt = _Attempt(fingers, split)
         else:
-            upright = candidate.orientation.view(grey)
-            edges = fit_edges(upright, profile_lines((candidate.left, candidate.right)))  # type: ignore[arg-type]
-            measured = measure_gap(candidate, edges, settings.below_tip_px, scale, light_gap, lossy)
-        if isinstance(measured, GapMeasurement):
-            return measured
-        reason = reason or measured
-    return reason or NoGap(Status.NO_FINGERS, "Nothing in the picture looks like two fingers.")
+            upright = fingers.orientation.view(grey)
+            edges = fit_edges(upright, profile_lines((fingers.left, fingers.right)))
+            outcome = measure_gap(fingers, edges, settings.below_tip_px, scale, light_gap, coding)
+            attempt = _Attempt(outcome, split, fingers, edges)
+        if isinstance(attempt.outcome, GapMeasurement):
+            return attempt
+        first = first or attempt
+    return first or _Attempt(NoGap(Status.NO_FINGERS, "Nothing in the picture looks like two fingers."), binary)
 
 
 def _candidates(
     denoised: GreyImage, binary: Binary, settings: Settings
-) -> Iterator[tuple[CoarseFingers | NoGap, bool]]:
+) -> Iterator[tuple[Binary, CoarseFingers | NoGap, bool]]:
     """Where the fingers may be, the likeliest first: darker or lighter than the border, then against uneven light."""
     directions = tuple(Direction) if settings.direction is None else (settings.direction,)
     below = settings.below_tip_px
@@ -102,13 +146,15 @@ def _candidates(
     for is_local in (False, True):
         split = binarise_local(denoised) if is_local else binary
         dark_first = _border_is_light(split)
-        unsure: list[tuple[CoarseFingers | NoGap, bool]] = []
+        unsure: list[tuple[Binary, CoarseFingers | NoGap, bool]] = []
         for light_gap in (dark_first, not dark_first):
             fingers = find_fingers(split.dark if light_gap else split.light, directions, below, reach)
             if isinstance(fingers, CoarseFingers) and not fingers.is_rooted:
-                unsure.append((fingers, light_gap))  # something may come in from the border in the other polarity
+                unsure.append(
+                    (split, fingers, light_gap)
+                )  # something may come in from the border in the other polarity
             else:
-                yield fingers, light_gap
+                yield split, fingers, light_gap
         yield from unsure
 
 

@@ -1,7 +1,7 @@
 """The ground between two near edges: a stripe narrower than the blur never reaches the ground's own level.
 
-Its contrast cannot be told from its width in the row itself, so the contrast is taken from the tips, where the same ground
-lies open, and both edges of a row are fitted together.
+Its contrast cannot be told from its width in the row itself, so the contrast is taken from the tips, where the same
+ground lies open, and both edges of a row are fitted together.
 """
 
 from dataclasses import dataclass
@@ -43,7 +43,14 @@ class StripeEdges:
 
 
 def fit_stripes(
-    upright: GreyImage, row: Ints, left: Floats, right: Floats, sigma: Floats, contrast: float, noise: float, margin: int
+    upright: GreyImage,
+    row: Ints,
+    left: Floats,
+    right: Floats,
+    sigma: Floats,
+    contrast: float,
+    noise: float,
+    margin: int,
 ) -> StripeEdges:
     """Fit a blurred stripe of known contrast to each row.
 

@@ -18,7 +18,7 @@ import cv2
 import numpy as np
 
 from fingervision.domain.direction import Direction
-from fingervision.domain.frame import Frame, Pixels
+from fingervision.domain.frame import Coding, Frame, Pixels
 from fingervision.domain.gap import GapMeasurement
 from fingervision.rendering import Camera, Light, Scene, SquareTip, render, truth, two_fingers
 from fingervision.vision.pipeline import Settings, measure_frame
@@ -33,7 +33,7 @@ class Case:
 
     pixels: Pixels
     gap_px: float
-    lossy: bool = False
+    coding: Coding = Coding.LOSSLESS
 
 
 def gap_of(scene: Scene, camera: Camera) -> float:
@@ -144,7 +144,7 @@ def jpeg(rng: np.random.Generator) -> Case:
     camera = Camera(blur_px=rng.uniform(0.7, 1.5), noise_grey=rng.uniform(1, 4))
     case = one(rng, camera, radius_px=rng.uniform(0.3, 1.4) * PX_PER_MM)
     _, coded = cv2.imencode(".jpg", case.pixels, [cv2.IMWRITE_JPEG_QUALITY, int(rng.integers(70, 96))])
-    return Case(cv2.imdecode(coded, cv2.IMREAD_GRAYSCALE), case.gap_px, lossy=True)
+    return Case(cv2.imdecode(coded, cv2.IMREAD_GRAYSCALE), case.gap_px, Coding.INTRAFRAME)
 
 
 def h264_clips(rng: np.random.Generator) -> Iterator[Case]:
@@ -169,7 +169,7 @@ def h264_clips(rng: np.random.Generator) -> Iterator[Case]:
         for picture, gap in zip(av.open(buffer).decode(video=0), gaps, strict=True):
             luma = picture.to_ndarray()[: picture.height, : picture.width]
             if gap is not None:
-                yield Case(np.ascontiguousarray(luma), gap, lossy=True)
+                yield Case(np.ascontiguousarray(luma), gap, Coding.INTERFRAME)
 
 
 SINGLE: dict[str, Callable[[np.random.Generator], Case]] = {
@@ -196,14 +196,13 @@ def run(name: str, frames: int, seed: int) -> tuple[str, np.ndarray, np.ndarray]
         case = next(source)
         settings = Settings(BELOW_PX, None if name == "turned" else Direction.UP)
         start = time.perf_counter()
-        found = measure_frame(Frame(case.pixels, number, lossy=case.lossy), settings)
+        found = measure_frame(Frame(case.pixels, number, coding=case.coding), settings)
         seconds += time.perf_counter() - start
         if isinstance(found, GapMeasurement):
             errors.append(found.gap_px - case.gap_px)
             stated.append(found.u_gap_px)
             if abs(errors[-1]) > max(0.25, 5 * stated[-1]) and sample is None:
                 sample = case.pixels
-                cv2.imwrite(f"/tmp/bad_{name}.png", case.pixels)
         else:
             lost[str(found.status)] = lost.get(str(found.status), 0) + 1
     e, u = np.array(errors), np.array(stated)
