@@ -24,8 +24,8 @@ FIRST_REACH_PX = 20
 REACH_SIGMAS, REACH_EXTRA_PX = 4.0, 4.0
 # Blur of an edge is looked for within these limits (pixels).
 SMALLEST_BLUR_PX, LARGEST_BLUR_PX = 0.15, 8.0
-# Gauss-Newton steps; from half a pixel away four are enough, and the rest cost little.
-STEPS = 12
+# Gauss-Newton steps; they end when nearly all rows have settled. A row without an edge never does.
+STEPS, SETTLED_PX, SETTLED_ROWS = 12, 1e-6, 0.9
 # Parameters of a row's own: two levels and the position.
 OWN_PARAMETERS = 3
 # A clipped flank bends the spread: (2 t50 - t10 - t90) / (t90 - t10) is 0 for a Gaussian, and 0.09 where the sensor
@@ -140,15 +140,18 @@ def fit_edge(grey: Floats, rows: Ints, coarse: CoarseEdge, room_px: float, known
         step = step if known is None else 0.0
         new_sigma = float(np.clip(sigma_px + step, sigma_px / 1.5, sigma_px * 1.5))
         new_sigma = float(np.clip(new_sigma, SMALLEST_BLUR_PX, LARGEST_BLUR_PX))
-        x_px = x_px + np.clip(solved[:, 2, 0] - solved[:, 2, 1] * (new_sigma - sigma_px), -1.0, 1.0)
-        x_px = np.clip(x_px, middle - reach / 2, middle + reach / 2)
+        change = np.clip(solved[:, 2, 0] - solved[:, 2, 1] * (new_sigma - sigma_px), -1.0, 1.0)
+        x_px = np.clip(x_px + change, middle - reach / 2, middle + reach / 2)
+        settled = abs(new_sigma - sigma_px) < SETTLED_PX and np.quantile(np.abs(change), SETTLED_ROWS) < SETTLED_PX
         sigma_px = new_sigma
+        if settled:
+            break
     jacobian, _, left, contrast = _linearised(levels, window - x_px[:, None], cosine, sigma_px)
     normal = np.einsum("nwi,nwj->nij", jacobian, jacobian)
     normal[:, 2, 2] += np.finfo(float).eps
     row_variance = np.sum(left**2, axis=1) / (window.shape[1] - OWN_PARAMETERS)
     # 8-bit rounding alone leaves 1/12 of a grey level squared.
-    variance = max(float(np.median(row_variance)), 1.0 / 12.0 / 255.0)
+    variance = max(float(np.median(row_variance)), 1.0 / 12.0)
     return EdgeRows(
         rows=rows,
         x_px=x_px,
