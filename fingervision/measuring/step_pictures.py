@@ -7,7 +7,7 @@ import cv2
 
 from fingervision.domain.errors import FingervisionError
 from fingervision.domain.frame import Frame
-from fingervision.vision.pipeline import Settings
+from fingervision.vision.pipeline import Settings, steps
 
 
 def write_steps(frame: Frame, settings: Settings, folder: Path) -> tuple[Path, ...]:
@@ -32,8 +32,6 @@ def write_steps(frame: Frame, settings: Settings, folder: Path) -> tuple[Path, .
     FingervisionError
         A picture cannot be written.
     """
-    from fingervision.vision.pipeline import steps
-
     written = []
     try:
         folder.mkdir(parents=True, exist_ok=True)

@@ -26,7 +26,7 @@ from skimage import measure as shapes
 
 from calib.calibration import BareScale
 from fingervision.domain.direction import Direction
-from fingervision.domain.frame import Frame, Pixels
+from fingervision.domain.frame import Coding, Frame, Pixels
 from fingervision.frames.source import open_source
 from fingervision.measuring.measure import Task, measure
 from fingervision.rendering import Camera, render, two_fingers
@@ -122,8 +122,8 @@ def rate(folder: Path, levels: list[Pixels], frames: int, runs: int) -> None:
 
     settings = {"up": Settings(BELOW_PX, Direction.UP), "auto": Settings(BELOW_PX)}
     steps: dict[str, Callable[[Pixels], object]] = {
-        "fingervision, tips up": lambda p: measure_frame(Frame(p, 0, None, True), settings["up"]),
-        "fingervision, tips auto": lambda p: measure_frame(Frame(p, 0, None, True), settings["auto"]),
+        "fingervision, tips up": lambda p: measure_frame(Frame(p, 0, None, Coding.INTERFRAME), settings["up"]),
+        "fingervision, tips auto": lambda p: measure_frame(Frame(p, 0, None, Coding.INTERFRAME), settings["auto"]),
         "plain OpenCV": plain_opencv,
         "plain scikit-image": plain_skimage,
     }

@@ -96,6 +96,15 @@ def test_json_is_the_summary(run: Run, clip: Path) -> None:
     assert re.fullmatch("[0-9a-f]{64}", printed["recording"]["sha256"])
 
 
+def test_every_step_of_a_frame_is_a_numbered_picture(run: Run, clip: Path) -> None:
+    assert run(clip, *SCALE, "--steps", "3", "--out", "s")[0] == 0
+    pictures = sorted(Path("s/steps").iterdir())
+    assert [path.name[:3] for path in pictures] == [f"{number:02d}_" for number in range(1, len(pictures) + 1)]
+    assert len(pictures) >= 6
+    for path in pictures:
+        assert cv2.imread(str(path), cv2.IMREAD_UNCHANGED).shape[:2] == (200, 240), path.name
+
+
 def test_a_lossy_clip_is_advised_to_be_lossless(run: Run, tmp_path: Path) -> None:
     write_clip(tmp_path / "lossy.mp4", frames(2), H264())
     code, out, _ = run(tmp_path / "lossy.mp4", *SCALE)

@@ -10,7 +10,7 @@ import pytest
 from numpy.typing import NDArray
 
 from fingervision.domain.errors import FingervisionError, UsageError
-from fingervision.domain.frame import Frame, LostFrame
+from fingervision.domain.frame import Coding, Frame, LostFrame
 from fingervision.domain.status import Status
 from fingervision.frames.source import Wish, open_source
 from fingervision.rendering.clip import H264, Ffv1, Mjpeg, write_clip
@@ -121,12 +121,14 @@ def test_packed_luma_of_a_usb_camera(tmp_path: Path) -> None:
     np.testing.assert_array_equal(item.pixels, packed[:, ::2])
 
 
-@pytest.mark.parametrize(("codec", "lossy"), [(Ffv1(), False), (Mjpeg(), True), (H264(), True)])
-def test_the_codec_says_whether_something_was_lost(tmp_path: Path, codec: Ffv1 | Mjpeg | H264, lossy: bool) -> None:
+@pytest.mark.parametrize(
+    ("codec", "coding"), [(Ffv1(), Coding.LOSSLESS), (Mjpeg(), Coding.INTRAFRAME), (H264(), Coding.INTERFRAME)]
+)
+def test_the_codec_says_what_was_lost(tmp_path: Path, codec: Ffv1 | Mjpeg | H264, coding: Coding) -> None:
     write_clip(tmp_path / "clip.mkv", timed(smooth_pictures(2)), codec)
     source = open_source(str(tmp_path / "clip.mkv"))
-    assert source.description.lossy is lossy
-    assert all(isinstance(item, Frame) and item.lossy is lossy for item in source)
+    assert source.description.coding is coding
+    assert all(isinstance(item, Frame) and item.coding is coding for item in source)
 
 
 def mux_mjpeg(path: Path, sizes: list[tuple[int, int]], ticks: list[int]) -> None:

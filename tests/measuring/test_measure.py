@@ -17,7 +17,7 @@ from calib.calibration import BareScale
 from fingervision.domain.direction import Direction
 from fingervision.domain.drive import DriveHistory
 from fingervision.domain.errors import ExitCode, FingervisionError, UsageError
-from fingervision.domain.frame import Frame, LostFrame
+from fingervision.domain.frame import Coding, Frame, LostFrame
 from fingervision.domain.region import Region
 from fingervision.domain.status import Status
 from fingervision.frames.rendered import RenderedFrames
@@ -92,7 +92,9 @@ class Items:
 
     @property
     def description(self) -> Description:
-        return Description("list", "list", "none", False, self.width_px, self.height_px, None, True, len(self.items))
+        return Description(
+            "list", "list", "none", Coding.LOSSLESS, self.width_px, self.height_px, None, True, len(self.items)
+        )
 
     def __iter__(self) -> Iterator[Frame | LostFrame]:
         yield from self.items
