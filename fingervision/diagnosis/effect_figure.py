@@ -21,17 +21,13 @@ def effect_figure(name: str) -> bytes:
     up, hold = np.linspace(-0.5, 1.5, 200), np.full(100, 1.5)
     u = np.concatenate([up, hold, up[::-1], np.full(100, -0.5), up[:120], up[120:60:-1]])
     history = History(
-        u,
-        0.05 * np.arange(u.size),
-        (slice(0, u.size),),
-        4.0,
-        float(np.max(np.abs(7.7 * u))),
-        3.85,
-        True,
-        0.0,
-        0.0,
-        True,
-        True,
+        input_mm=u,
+        time_s=np.arange(u.size, dtype=np.float64) * np.float64(0.05),
+        runs=(slice(0, u.size),),
+        rest_gap_mm=4.0,
+        opening_mm=float(np.max(np.abs(7.7 * u))),
+        closing_mm=3.85,
+        force=True,
     )
     searched = effect.search(history)
     values = {}

@@ -10,7 +10,6 @@ from fingervision.domain.effect import Array, History
 
 BEFORE, AFTER = "#c0392b", "#1f618d"
 NAMES = {
-    "force": "force, N, in place of mm",
     "gap": "gap",
     "left": "left finger",
     "right": "right finger",
@@ -30,7 +29,7 @@ def residual_figure(before: dict[str, Array], after: dict[str, Array] | None, hi
     """
     timed = history.time_s is not None
     with mpl.rc_context({"font.size": 9, "axes.spines.top": False, "axes.spines.right": False}):
-        figure = Figure(figsize=(10.0, 1.0 + 2.1 * len(before)), layout="constrained")
+        figure = Figure(figsize=(10.0, 1.2 + 2.1 * len(before)), layout="constrained")
         grid = figure.subplots(len(before), 2 if timed else 1, squeeze=False, sharey="row")
         for row, channel in enumerate(before):
             panels = [(history.input_mm, "recorded input, mm")]
@@ -47,7 +46,7 @@ def residual_figure(before: dict[str, Array], after: dict[str, Array] | None, hi
                 if row == len(before) - 1:
                     axes.set_xlabel(label)
                 if column == 0:
-                    axes.set_ylabel(f"{NAMES[channel]}\nmeasured - model, mm")
+                    axes.set_ylabel(f"{NAMES.get(channel, channel)}\nmeasured - model, mm")
         if after is not None:
             grid[0][0].legend(frameon=False, ncols=2, loc="best")
         buffer = io.BytesIO()

@@ -130,6 +130,12 @@ def _distance(problem: Problem, truth: Explanation, other: Explanation, sigma_mm
     return fit(problem, other.names, other.values, target=target, sigma_mm=sigma_mm, iterations=12).score
 
 
+def _added(problem: Problem, smaller: Explanation, larger: Explanation) -> float:
+    """Size of what the larger explanation adds, as a share of all that it changes in the prediction, in mm."""
+    bare, before, after = (problem.chain.stacked(values) for values in ({}, smaller.values, larger.values))
+    return float(np.linalg.norm(after - before) / max(1e-12, float(np.linalg.norm(after - bare))))
+
+
 def _choose(candidates: list[Explanation], samples: int) -> Explanation:
     return min(candidates, key=lambda explanation: explanation.bic(samples))
 
@@ -174,13 +180,12 @@ def search(
         bases = singles[:14]
         pairs = _extended(problem, atoms, bases, PAIRS_REFITTED, lambda share: progress(0.3 + 0.4 * share))
         if pairs:
-            gained, explained = best.score - pairs[0].score, nothing.score - pairs[0].score
-            if gained > threshold and gained > SMALL_SHARE**2 * explained:
+            if best.score - pairs[0].score > threshold and _added(problem, best, pairs[0]) > SMALL_SHARE:
                 best, peers = _choose(pairs[:6], samples), pairs
                 triples = _extended(problem, atoms, pairs[:3], 24, lambda share: progress(0.7 + 0.1 * share))
                 if triples:
-                    gained, explained = best.score - triples[0].score, nothing.score - triples[0].score
-                    if gained > threshold and gained > TRIPLE_SHARE**2 * explained:
+                    gained = best.score - triples[0].score
+                    if gained > threshold and _added(problem, best, triples[0]) > TRIPLE_SHARE:
                         best, peers = _choose(triples[:6], samples), triples
     if forced and not forced <= set(best.names):
         names = tuple(name for name in problem.effects if name in forced | set(best.names))
@@ -192,7 +197,7 @@ def search(
         best = fit(problem, tuple(begin), begin, iterations=20)
         peers = [best]
     progress(0.82)
-    words, left = _gate(problem, best, nothing, rng)
+    words, left = _gate(problem, best, rng)
     progress(0.9)
     alternatives, distances = ([best], {}) if not best.names else _set(problem, best, peers, singles, pairs)
     best = min(alternatives, key=lambda e: e.bic(samples) + _surprise(problem, e)) if best.names else best
@@ -218,9 +223,7 @@ def search(
     )
 
 
-def _gate(
-    problem: Problem, best: Explanation, nothing: Explanation, rng: np.random.Generator
-) -> tuple[str | None, str | None]:
+def _gate(problem: Problem, best: Explanation, rng: np.random.Generator) -> tuple[str | None, str | None]:
     """Test the largest of many probes; returns what is unknown, or what is left over but small."""
     samples = problem.chain.history.input_mm.size
     shapes = probes(problem.chain.history, problem.whitener, 2400 if samples <= 4000 else 800)
@@ -242,7 +245,8 @@ def _gate(
     if gain[top] <= threshold:
         return None, None
     words = f"{shapes.words[top]} ({np.sqrt(gain[top]):.1f} sigma)"
-    explained = nothing.score - best.score
+    changed = problem.whitened(best.values) - problem.whitened({})
+    explained = float(changed @ changed)
     if best.names and gain[top] < SMALL_SHARE**2 * explained:
         return None, words
     return words, None

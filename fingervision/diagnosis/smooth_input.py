@@ -5,7 +5,7 @@ import numpy as np
 
 from fingervision.domain.effect import Array
 
-WINDOWS = (61, 41, 27, 19, 13, 9, 7, 5)
+WINDOWS = (241, 121, 61, 41, 27, 19, 13, 9, 7, 5)
 
 
 def input_sigma(input_mm: Array, runs: tuple[slice, ...]) -> tuple[float, float]:

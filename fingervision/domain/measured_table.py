@@ -1,6 +1,7 @@
 """What was measured at the bench: gap and fingers against the recorded input."""
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -46,4 +47,4 @@ class MeasuredTable:
         if self.time_s is None:
             return False
         spans = sorted((self.time_s[run][0], self.time_s[run][-1]) for run in self.runs)
-        return all(before[1] < after[0] for before, after in zip(spans, spans[1:], strict=False))
+        return all(before[1] < after[0] for before, after in pairwise(spans))

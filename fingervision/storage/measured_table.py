@@ -1,4 +1,4 @@
-"""A measured table: any CSV with `input_mm,gap_mm`, and what else the bench recorded; `gaps.csv` with a drive is one."""
+"""A measured table: any CSV with `input_mm,gap_mm`, and what else the bench recorded (`gaps.csv` is one)."""
 
 from pathlib import Path
 
