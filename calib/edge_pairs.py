@@ -22,6 +22,8 @@ BETWEEN = 0.3
 LEAST_OF_STRONGEST = 0.4
 # Pairs that are found twice agree to this (pixels).
 SAME_PAIR_PX = 3.0
+# An edge across a pair joins it where it reaches from one to the other, to this part of their distance.
+ACROSS = 0.15
 # The longest edges are looked at; what is shorter than the hundredth is texture.
 MOST_EDGES = 100
 
@@ -41,13 +43,7 @@ def find_edge_pairs(grey: Grey, region: tuple[int, int, int, int] | None = None)
     list of ParallelEdges
         In coordinates of the full picture.
     """
-    x, y, width, height = region if region is not None else (0, 0, grey.shape[1], grey.shape[0])
-    if x < 0 or y < 0 or width < 1 or height < 1 or x + width > grey.shape[1] or y + height > grey.shape[0]:
-        raise CalibrationError(
-            f"The region must lie within the picture of {grey.shape[1]}x{grey.shape[0]} pixels, but is "
-            f"{x},{y},{width},{height}: give X,Y,WIDTH,HEIGHT."
-        )
-    part = grey[y : y + height, x : x + width]
+    part, x, y = _part(grey, region)
     levels = part.astype(np.float64)
     for side_px in FINDING_SIDES_PX:
         pairs = _measured(levels, _facing(find_straight_edges(part, side_px)[:MOST_EDGES]))
@@ -56,9 +52,40 @@ def find_edge_pairs(grey: Grey, region: tuple[int, int, int, int] | None = None)
     return []
 
 
-def straight_edges_in_view(grey: Grey) -> int:
+def straight_edges_in_view(grey: Grey, region: tuple[int, int, int, int] | None) -> int:
     """Count straight edges, for saying what is missing where there is no pair."""
-    return len(find_straight_edges(grey, FINDING_SIDES_PX[0]))
+    return len(find_straight_edges(_part(grey, region)[0], FINDING_SIDES_PX[0]))
+
+
+def has_square_end(grey: Grey, region: tuple[int, int, int, int] | None, pair: ParallelEdges) -> bool:
+    """Whether a straight edge across the pair joins its two edges at one end: the third side of a rectangle.
+
+    Parameters
+    ----------
+    grey, region
+        As for `find_edge_pairs`.
+    pair : ParallelEdges
+        Two edges found there.
+    """
+    part, x, y = _part(grey, region)
+    across = (pair.points_px[1] - pair.points_px[0]) / pair.width_px
+    for edge in find_straight_edges(part, FINDING_SIDES_PX[0]):
+        reach = np.sort((edge.ends + np.array([x, y]) - pair.points_px[0]) @ across) / pair.width_px
+        is_across = abs(float(edge.direction @ across)) > np.cos(np.radians(PARALLEL_DEG))
+        if is_across and reach[0] > -ACROSS and reach[1] < 1.0 + ACROSS and reach[1] - reach[0] > 1.0 - 2.0 * ACROSS:
+            return True
+    return False
+
+
+def _part(grey: Grey, region: tuple[int, int, int, int] | None) -> tuple[Grey, int, int]:
+    """Return the region of a picture and where it begins."""
+    x, y, width, height = region if region is not None else (0, 0, grey.shape[1], grey.shape[0])
+    if x < 0 or y < 0 or width < 1 or height < 1 or x + width > grey.shape[1] or y + height > grey.shape[0]:
+        raise CalibrationError(
+            f"The region must lie within the picture of {grey.shape[1]}x{grey.shape[0]} pixels, but is "
+            f"{x},{y},{width},{height}: give X,Y,WIDTH,HEIGHT."
+        )
+    return grey[y : y + height, x : x + width], x, y
 
 
 def _facing(edges: Sequence[StraightEdge]) -> list[tuple[StraightEdge, StraightEdge, bool]]:

@@ -8,7 +8,7 @@ from math import isfinite
 import numpy as np
 from numpy.typing import NDArray
 
-from calib.edge_pairs import find_edge_pairs, straight_edges_in_view
+from calib.edge_pairs import find_edge_pairs, has_square_end, straight_edges_in_view
 from calib.errors import CalibrationError
 from calib.parallel_edges import ParallelEdges
 
@@ -86,6 +86,8 @@ def find_widths(
     """
     choices = [_choices(picture, find_edge_pairs(picture.grey, region), region) for picture in pictures]
     widths = _settled(pictures, choices) if px_per_mm is None else _expected(pictures, choices, px_per_mm)
+    if px_per_mm is None and len(pictures) == 1 and len(choices[0]) == 1:
+        _refuse_cut(pictures[0], widths[0], region)
     for picture, width in zip(pictures, widths, strict=True):
         if width.clipped:
             raise CalibrationError(
@@ -101,7 +103,7 @@ def _choices(
     """List the widths of the one object: one, or two where a rectangle is seen whole; longer edges first."""
     where = "the region" if region is not None else "the picture"
     if not pairs:
-        edges = straight_edges_in_view(picture.grey)
+        edges = straight_edges_in_view(picture.grey, region)
         if edges:
             raise CalibrationError(
                 f"{picture.name} must show two parallel straight edges, but only {edges} straight edge"
@@ -147,6 +149,16 @@ def _one_object(pair: ParallelEdges, other: ParallelEdges) -> bool:
     across, other_across = (np.diff(each.points_px, axis=0)[0] / each.width_px for each in (pair, other))
     apart = float(np.linalg.norm(pair.middle_px - other.middle_px))
     return bool(abs(across @ other_across) < 0.3) and apart < 0.25 * max(pair.width_px, other.width_px)
+
+
+def _refuse_cut(picture: KnownSize, width: ParallelEdges, region: tuple[int, int, int, int] | None) -> None:
+    """Refuse a rectangle of which three sides are seen: the fourth, beyond the border, may be the one meant."""
+    if width.length_px < width.width_px and has_square_end(picture.grey, region, width):
+        raise CalibrationError(
+            f"{picture.name} shows three sides of a rectangle, and the border may cut off an edge of the "
+            f"{picture.size_mm:g} mm: bring the whole width into view, or, if it is the {width.width_px:.1f} px "
+            "between the two parallel sides, give a region with --roi that leaves the third side out."
+        )
 
 
 def _expected(
@@ -203,10 +215,12 @@ def _refuse_unit(
             other = sizes.copy()
             other[index] *= factor
             if any(_disagreement(each, other) < SAME_SCALE for each in combinations):
+                # Of two pictures either may be the wrong one.
+                others = "" if len(pictures) > 2 else f" (or {pictures[1 - index].name} is wrong the other way)"
                 raise CalibrationError(
                     f"All pictures must have one scale, but {picture.name} would have to be {other[index]:.4g} mm "
-                    f"instead of {picture.size_mm:g} mm, a factor of {words}, to agree with the others: state every "
-                    "size in millimetres."
+                    f"instead of {picture.size_mm:g} mm, a factor of {words}, to agree with the others"
+                    f"{others}: state every size in millimetres."
                 )
 
 

@@ -2,7 +2,7 @@
 
 Every trial draws a camera (scale, blooming, lens), references with certificates that are a little wrong, and a gripper
 that is a little out of their plane and tilted; calibrates on the rendered references at another temperature, measures
-the rendered gap, and asks whether value +- 1.96 u holds the true gap. The imperfections are drawn twice over: from normal
+the rendered gap, and asks whether value +- 1.96 u holds the true gap. Imperfections are drawn twice over: from normal
 distributions with the budget's standard uncertainties, and evenly between the stated limits (where an interval of
 1.96 u is too long as soon as one source dominates: a uniform error never leaves its limits).
 

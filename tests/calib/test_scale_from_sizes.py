@@ -192,6 +192,19 @@ def test_nothing_and_half_an_object_are_refused() -> None:
         find_widths([KnownSize("cut.png", "bar", 14.0, 0.001, np.ascontiguousarray(cut))])
 
 
+def test_a_rectangle_cut_by_the_border_is_not_taken_for_its_other_side() -> None:
+    scene = Scene(light=Light(200.0), behind=(Patch(bar(476.0, 300.0, x_px=500.0, y_px=240.0), 40.0),))
+    grey = render(scene, Camera(noise_grey=1.0), np.random.default_rng(1))
+    with pytest.raises(ValueError, match=r"shows three sides of a rectangle, .* the border may cut off an edge"):
+        find_widths([KnownSize("cut.png", "bar", 14.0, 0.001, grey)])
+    # The same two sides, where the user says that they are meant; and a pin that is clearly longer than it is wide.
+    (meant,) = find_widths([KnownSize("cut.png", "bar", 9.0, 0.001, grey)], region=(300, 0, 340, 480))
+    assert meant.width_px == pytest.approx(300.0, abs=0.02)
+    scene = Scene(light=Light(200.0), behind=(Patch(bar(100.0, 500.0, x_px=300.0, y_px=50.0), 40.0),))
+    pin = render(scene, Camera(noise_grey=1.0), np.random.default_rng(1))
+    assert find_widths([KnownSize("pin.png", "bar", 3.0, 0.001, pin)])[0].width_px == pytest.approx(100.0, abs=0.02)
+
+
 def test_a_saturated_flank_is_refused() -> None:
     scene = Scene(
         light=Light(ground=250.0, exposure=1.4), behind=(Patch(bar(170.0, 640.0, x_px=320.0, y_px=240.0), 40.0),)
