@@ -153,7 +153,7 @@ def _one_object(pair: ParallelEdges, other: ParallelEdges) -> bool:
 
 def _refuse_cut(picture: KnownSize, width: ParallelEdges, region: tuple[int, int, int, int] | None) -> None:
     """Refuse a rectangle of which three sides are seen: the fourth, beyond the border, may be the one meant."""
-    if width.length_px < width.width_px and has_square_end(picture.grey, region, width):
+    if width.length_px < CLEARLY_LONGER * width.width_px and has_square_end(picture.grey, region, width):
         raise CalibrationError(
             f"{picture.name} shows three sides of a rectangle, and the border may cut off an edge of the "
             f"{picture.size_mm:g} mm: bring the whole width into view, or, if it is the {width.width_px:.1f} px "
