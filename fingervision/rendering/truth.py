@@ -154,14 +154,14 @@ def _tip(outline: Outline, direction: Direction) -> _Tip:
         points = _in_axes(piece, direction, grid)
         place = int(np.argmin(points[:, 1]))
         found.append(points)
-        if 0 < place < BRACKET_POINTS - 1:
 
-            def height_px(t: float, piece: Piece = piece) -> float:
-                return float(_in_axes(piece, direction, t)[1])
+        def height_px(t: float, piece: Piece = piece) -> float:
+            return float(_in_axes(piece, direction, t)[1])
 
-            bounds = (float(grid[place - 1]), float(grid[place + 1]))
-            best = float(minimize_scalar(height_px, bounds=bounds, options={"xatol": 1e-10}).x)
-            found.append(_in_axes(piece, direction, [best]))
+        # The outermost point may lie between the last two places of the grid, so an end is a bracket like any other.
+        bounds = (float(grid[max(place - 1, 0)]), float(grid[min(place + 1, BRACKET_POINTS - 1)]))
+        best = float(minimize_scalar(height_px, bounds=bounds, options={"xatol": 1e-10}).x)
+        found.append(_in_axes(piece, direction, [best]))
     everything = np.concatenate(found)
     along_px = float(everything[:, 1].min())
     across = everything[everything[:, 1] <= along_px + FLAT_PX, 0]

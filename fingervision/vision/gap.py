@@ -1,6 +1,6 @@
 """Step 7, the gap: the two points below the tips, the distance between them, and how surely it is known."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,7 +10,10 @@ from fingervision.domain.gap import FingerEdge, GapMeasurement, NoGap
 from fingervision.domain.status import Status
 from fingervision.vision.edges import PIXEL_VARIANCE, EdgePoints, outline_blur
 from fingervision.vision.finger_end import (
+    INNER_M,
+    OUTER_M,
     PARAMETERS,
+    TOP_M,
     FingerEnds,
     OutlinePoints,
     corner_tops,
@@ -51,6 +54,8 @@ LAGS = 8
 SHARED_POINTS = {Coding.LOSSLESS: 1.0, Coding.INTRAFRAME: 2.5, Coding.INTERFRAME: 12.0}
 # Mean of w r^2 over mean of w for normal residuals under the biweight: the weights shrink the spread by this.
 BIWEIGHT_SPREAD = 0.828
+# A top is square to its flanks where it is so within this many sigma; it then is to this (slope).
+SQUARE_IN_SIGMAS, U_SQUARE = 2.5, 3e-4
 # A top whose two corners differ in height by less than so many sigma is level
 # (a corner that is not in view says nothing: never by more than this).
 LEVEL_IN_SIGMAS, LEVEL_LIMIT_PX = 2.0, 0.5
@@ -148,7 +153,7 @@ def measure_gap(
         return NoGap(Status.NO_FINGERS, "Too little of a finger's outline is in view to be measured.")
     ends = fit_finger_ends(points, *first_guess(points, below_tip_px))
     inflation = _inflation(points, ends, coding)
-    fitted = _evaluate(ends, below_tip_px)
+    fitted = _evaluate(_squared(ends), below_tip_px)
     holds = [_shape_holds(points, ends, k, fitted.tip[k], fitted.edge[k], below_tip_px) for k in range(2)]
     measured: list[MeasuredFinger] = []
     for k in range(2):
@@ -184,6 +189,31 @@ def _refuse(edges: EdgePoints, full_scale: int, light_gap: bool) -> NoGap | None
     if blur > BLUR_LIMIT_PX:
         return NoGap(Status.BLURRED, f"The edges are spread over {blur:.1f} px (standard deviation).")
     return None
+
+
+def _squared(ends: FingerEnds) -> FingerEnds:
+    """The same ends, their tops square to their flanks wherever the points do not speak against it.
+
+    A finger that is cut straight has its top square to its flanks, which are long and know the tilt far better than a
+    short top does. Where the two agree within their uncertainty they are joined (a Kalman update); a slanted tip stays
+    slanted.
+    """
+    p, covariance = ends.parameters, ends.covariance
+    off_square = p @ _SQUARENESS
+    toward = covariance @ _SQUARENESS
+    variance = (toward @ _SQUARENESS) * ends.misfit**2
+    is_square = off_square**2 < (SQUARE_IN_SIGMAS**2) * variance
+    gain = toward * (is_square * ends.misfit**2 / (variance + U_SQUARE**2))[:, None]
+    return replace(
+        ends,
+        parameters=p - gain * off_square[:, None],
+        covariance=covariance - gain[:, :, None] * toward[:, None, :],
+    )
+
+
+# Slope of the top plus the mean slope of the flanks is zero where they are square.
+_SQUARENESS = np.zeros(PARAMETERS)
+_SQUARENESS[[TOP_M, INNER_M, OUTER_M]] = 1.0, 0.5, 0.5
 
 
 def _evaluate(ends: FingerEnds, below_tip_px: float) -> MeasuringPoints:

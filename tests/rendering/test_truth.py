@@ -209,3 +209,20 @@ def test_refusals_say_what_must_be() -> None:
         two_fingers(20.0, width_px=40.0, radius_px=21.0)
     with pytest.raises(FingervisionError, match=r"height must lie between 0 and the finger's length, but is 0 px"):
         two_fingers(20.0, tip=EllipticTip(0.0))
+
+
+@settings(deadline=None)
+@given(
+    tilt_deg=st.floats(-10.0, 10.0),
+    radius_px=st.floats(11.0, 50.0),
+    direction=st.sampled_from(list(Direction)),
+)
+def test_no_point_of_the_outline_lies_beyond_the_tip(tilt_deg: float, radius_px: float, direction: Direction) -> None:
+    """A dense sampling of the outline, for every small tilt: the outermost point may lie near the end of an arc."""
+    scene = two_fingers(gap_px=200.0, tilt_deg=tilt_deg, radius_px=radius_px, direction=direction)
+    found = true_gap(scene)
+    axis = 1 if direction.is_vertical else 0
+    outward = -1.0 if direction in (Direction.UP, Direction.LEFT) else 1.0
+    for finger, edge in zip(scene.fingers, (found.left, found.right), strict=True):
+        places = np.concatenate([np.asarray(piece.points(np.linspace(0, 1, 4001))) for piece in finger.outline.pieces])
+        assert np.max(outward * places[:, axis]) == pytest.approx(outward * edge.tip_px, abs=1e-4)
