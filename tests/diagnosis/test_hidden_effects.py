@@ -1,7 +1,7 @@
 """Effects hidden by a bench that shares no code with the catalogue: the small part of tests/benchmarks/hidden.
 
-The figures of the whole benchmark come from `python -m tests.benchmarks.hidden.run`; here a few tables of each kind hold
-what a change must not break. Seeds are other than those used while building.
+The figures of the whole benchmark come from `python -m tests.benchmarks.hidden.run`; here a few tables of each kind
+hold what a change must not break. Seeds are other than those used while building.
 """
 
 import ast

@@ -41,12 +41,13 @@ class Samples:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Simulated:
-    """The simulation table, one far row added at each end so that the line goes on."""
+    """The simulation table, with a far row at each end so that the line goes on, and its place in the picture."""
 
     input_mm: Array
     gap_mm: Array
     midline_mm: Array
     force_n: Array | None
+    placement_mm: float = 0.0
 
     @property
     def rest_gap_mm(self) -> float:
@@ -54,7 +55,9 @@ class Simulated:
         return float(np.interp(0.0, self.input_mm, self.gap_mm))
 
 
-def extended(input_mm: Array, gap_mm: Array, midline_mm: Array, force_n: Array | None) -> Simulated:
+def extended(
+    input_mm: Array, gap_mm: Array, midline_mm: Array, force_n: Array | None, placement_mm: float = 0.0
+) -> Simulated:
     """Add the far rows: slope of a line through the last quarter of the rows there."""
     quarter = max(2, len(input_mm) // 4)
     far = 10.0 * np.ptp(input_mm)
@@ -65,7 +68,7 @@ def extended(input_mm: Array, gap_mm: Array, midline_mm: Array, force_n: Array |
         return np.concatenate([[values[0] - first * far], values, [values[-1] + last * far]])
 
     u = np.concatenate([[input_mm[0] - far], input_mm, [input_mm[-1] + far]])
-    return Simulated(u, grown(gap_mm), grown(midline_mm), None if force_n is None else grown(force_n))
+    return Simulated(u, grown(gap_mm), grown(midline_mm), None if force_n is None else grown(force_n), placement_mm)
 
 
 @njit(cache=True)
@@ -176,7 +179,7 @@ def respond(model: Simulated, at: Samples, acting: Effects) -> tuple[Array, Arra
         u = sliders(u, at.starts, *acting["friction_hysteresis"])
     rest = model.rest_gap_mm
     o = (np.interp(u, model.input_mm, model.gap_mm) - rest) * (1 + acting.get("lever_ratio_error", zero)[0])
-    midline = np.interp(u, model.input_mm, model.midline_mm)
+    midline = model.placement_mm + np.interp(u, model.input_mm, model.midline_mm)
     if "large_deflection" in acting:
         reach, cross = acting["large_deflection"]
         o = reach * np.sin(o / reach) + cross * reach * (1 - np.cos(o / reach))

@@ -171,7 +171,9 @@ def _draw(rng: np.random.Generator, row: Row, seed: int) -> Experiment:
     slope = float(np.mean(np.abs(table.slope(np.linspace(inputs.lower_mm, inputs.upper_mm, 21)))))
     noise = draw_noise(rng, len(design.motions), slope, inputs.width_mm)
     total_s = sum(m.duration_s + design.pause_s for m in design.motions)
-    experiment = Experiment(Plant(table, inputs, total_s=total_s), design, noise, snr, seed)
+    placement = rng.uniform(-0.3, 0.3) if rng.random() < 0.5 else 0.0
+    bare = Plant(table, inputs, total_s=total_s, placement_mm=placement)
+    experiment = Experiment(bare, design, noise, snr, seed)
     names = [n for n in NAMES if n != "hinge_stiffness_error" and not (design.time_restarts and n in CLOCKED)]
     if with_force and row.hidden:
         names = ["hinge_stiffness_error"]
@@ -185,7 +187,11 @@ def _draw(rng: np.random.Generator, row: Row, seed: int) -> Experiment:
         if effect is None or not within_bounds(effect, table, inputs, design.rate_hz):
             raise NotDrawnError(f"{name} has no such size here.")
         hidden.append(effect)
-    thing = _sized_foreign(draw_foreign(rng), experiment, snr) if row.foreign else None
+    thing = None
+    if row.foreign:
+        begins = zip(experiment.starts_s(), design.motions, strict=True)
+        within = [(start / total_s, (start + motion.duration_s) / total_s) for start, motion in begins]
+        thing = _sized_foreign(draw_foreign(rng, within), experiment, snr)
     plant = replace(experiment.plant, hidden=tuple(hidden), foreign=thing)
     if snr == 0 and row.hidden and ratio(plant, experiment) < 3:
         raise NotDrawnError("An everyday size is at least three times the noise.")
@@ -196,14 +202,13 @@ def measured(experiment: Experiment, traces: list[Trace], rng: np.random.Generat
     """Columns of the measured table, one array a run."""
     noise = experiment.noise
     columns: dict[str, list[Array]] = {key: [] for key in ("time_s", "input_mm", "left_mm", "right_mm", "force_n")}
-    centre = rng.uniform(-0.3, 0.3)
     for trace in traces:
         errors = edge_errors(rng, noise, len(trace.input_mm))
         u = rounded(trace.input_mm + noise.input_mm * rng.standard_normal(len(trace.input_mm)), noise.encoder_step_mm)
         columns["time_s"].append(trace.run_time_s if experiment.design.time_restarts else trace.table_time_s)
         columns["input_mm"].append(u)
-        columns["left_mm"].append(rounded(trace.left_mm + centre + errors[0], noise.pixel_mm))
-        columns["right_mm"].append(rounded(trace.right_mm + centre + errors[1], noise.pixel_mm))
+        columns["left_mm"].append(rounded(trace.left_mm + errors[0], noise.pixel_mm))
+        columns["right_mm"].append(rounded(trace.right_mm + errors[1], noise.pixel_mm))
         columns["force_n"].append(trace.force_n + noise.force_n * rng.standard_normal(len(trace.input_mm)))
     return columns
 

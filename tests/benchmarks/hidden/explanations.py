@@ -34,7 +34,9 @@ def problem_of(experiment: Experiment, traces: list[Trace], *, known_input: bool
     offset = noise.run_offset_mm if len(traces) > 1 else 0.0
     force = None if table.force_n is None else noise.force_n
     weights = Weights(gap_sd, midline_sd, noise.correlation, offset, starts, force)
-    return Problem(extended(table.input_mm, table.gap_mm, table.midline_mm, table.force_n), at, weights)
+    placement = experiment.plant.placement_mm
+    model = extended(table.input_mm, table.gap_mm, table.midline_mm, table.force_n, placement)
+    return Problem(model, at, weights)
 
 
 def curve_of(traces: list[Trace]) -> Curve:
@@ -111,7 +113,7 @@ class Search:
         answer = respond(self.problem.model, self.problem.at, effects)
         difference = [a - b for a, b in zip(answer, target, strict=True)]
         r = self.problem.weights.apply(*difference)
-        return self.problem.weights.cautious(float(r @ r), difference[0])
+        return self.problem.weights.cautious(float(r @ r), difference[0], difference[1])
 
 
 def _more(candidate: Candidate) -> list[Array]:

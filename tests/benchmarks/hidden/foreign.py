@@ -140,7 +140,15 @@ FOREIGN: dict[str, Callable[[Foreign, Moment], tuple[Array, Array]]] = {
 }
 
 
-def draw_foreign(rng: np.random.Generator) -> Foreign:
-    """Any of them, at a place that the runs reach."""
+def draw_foreign(rng: np.random.Generator, within_runs: list[tuple[float, float]]) -> Foreign:
+    """Any of them, at a place that the runs reach.
+
+    `within_runs` are beginning and end of each run on the clock from 0 to 1: a step happens well inside a run that is
+    neither the first nor the last, for between two runs it would be nothing but an offset of runs.
+    """
     name = str(rng.choice(list(FOREIGN)))
-    return Foreign(name, 1.0, rng.uniform(0.25, 0.75), rng.uniform(0.04, 0.12), rng.uniform(5.0, 23.0))
+    place = rng.uniform(0.25, 0.75)
+    if name.startswith("step"):
+        start, end = within_runs[int(rng.integers(1, max(len(within_runs) - 1, 2)))]
+        place = start + rng.uniform(0.3, 0.7) * (end - start)
+    return Foreign(name, 1.0, place, rng.uniform(0.04, 0.12), rng.uniform(5.0, 23.0))

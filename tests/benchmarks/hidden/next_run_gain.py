@@ -7,7 +7,7 @@ import numpy as np
 
 from tests.benchmarks.hidden.catalogue_chain import Samples
 from tests.benchmarks.hidden.diagnose_adapter import Answer
-from tests.benchmarks.hidden.experiment import edges, measured
+from tests.benchmarks.hidden.experiment import measured
 from tests.benchmarks.hidden.explanations import known_effects, problem_of
 from tests.benchmarks.hidden.fit import Curve, Problem, fit
 from tests.benchmarks.hidden.plant import Trace
@@ -69,13 +69,6 @@ def _joined(table: JudgedTable, runs: list[tuple[Trace, int]]) -> tuple[Problem,
         columns = measured(experiment, [trace], np.random.default_rng([experiment.seed, 13, seed]))
         parts.append((columns["left_mm"][0], columns["right_mm"][0], columns["input_mm"][0], columns["force_n"][0]))
     left, right, recorded, force = (np.concatenate(p) for p in zip(*parts, strict=True))
-    # One camera looks at all runs: the constant that each call of `measured` drew is no noise.
-    truth = edges(traces)
-    for r, (a, b) in enumerate(zip(problem.at.starts[:-1], problem.at.starts[1:], strict=True)):
-        del r
-        shift = np.median((left + right - truth.sum(axis=0))[a:b]) / 2
-        left[a:b] -= shift
-        right[a:b] -= shift
     at = Samples(recorded, problem.at.run_time_s, problem.at.table_time_s, problem.at.starts)
     return Problem(problem.model, at, problem.weights), (right - left, (left + right) / 2, force)
 

@@ -1,6 +1,6 @@
 """What the naming peers work on: whitened residuals and linear signatures of every effect, from the files alone."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -32,6 +32,8 @@ def _spread(values: Array) -> float:
 def whiten(folder: Path) -> Whitened:
     """Noise from differences within runs (white part and AR(1) from lags one to three), then every signature."""
     table, model = read_measured(folder / "measured.csv"), read_simulation(folder / "simulation.csv")
+    bare = respond(model, table.at, {})
+    model = replace(model, placement_mm=float(np.median(table.midline_mm - bare[1])))
     bare = respond(model, table.at, {})
     gap, midline = table.gap_mm - bare[0], table.midline_mm - bare[1]
     inside = np.ones(len(gap) - 3, dtype=bool)

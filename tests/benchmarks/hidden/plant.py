@@ -61,6 +61,8 @@ class Plant:
         A thing from outside the catalogue.
     total_s : float
         Length of the whole experiment.
+    placement_mm : float
+        Where the gripper stands in the picture, off the image's centre: cameras act on that place.
     """
 
     table: GripperTable
@@ -68,6 +70,7 @@ class Plant:
     hidden: tuple[Hidden, ...] = ()
     foreign: Foreign | None = None
     total_s: float = 1.0
+    placement_mm: float = 0.0
     _by_name: dict[str, dict[str, float]] = field(init=False)
 
     def __post_init__(self) -> None:
@@ -81,7 +84,7 @@ class Plant:
         u = motion.at(time_s)
         driven = self._drive(time_s, u)
         gap, midline = self._mechanism(driven, dt, started_s + time_s)
-        left, right = midline - gap / 2, midline + gap / 2
+        left, right = self.placement_mm + midline - gap / 2, self.placement_mm + midline + gap / 2
         if self.foreign is not None:
             way = np.gradient(u, dt)
             moment = Moment(

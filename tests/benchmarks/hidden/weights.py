@@ -63,14 +63,17 @@ class Weights:
             parts.append(force / self.force_sd_n)
         return np.concatenate(parts)
 
-    def between_runs(self, gap: Array) -> float:
-        """Chi-square of a gap difference that lies in the means of the runs."""
-        return float(self._whitened(gap, self.gap_sd_mm, np.sqrt(2) * self.run_offset_mm)[1].sum())
-
-    def cautious(self, chi_square: float, gap: Array) -> float:
+    def cautious(self, chi_square: float, gap: Array, midline: Array) -> float:
         """Chi-square where the variance between runs is not known but profiled: R log(1 + q / R) for their part."""
         runs = len(self.starts) - 1
         if runs < 2:
             return chi_square
-        between = min(self.between_runs(gap), chi_square)
-        return chi_square - between + runs * float(np.log1p(between / runs))
+        middle = midline - midline.mean()
+        rest = chi_square
+        for values, sd, offset in (
+            (gap, self.gap_sd_mm, np.sqrt(2) * self.run_offset_mm),
+            (middle, self.midline_sd_mm, self.run_offset_mm / np.sqrt(2)),
+        ):
+            between = min(float(self._whitened(values, sd, offset)[1].sum()), rest)
+            rest += runs * float(np.log1p(between / runs)) - between
+        return rest
