@@ -45,12 +45,10 @@ class CorotationalFrame:
         stiffness = np.linalg.inv(self.end_compliance)
         dofs = (3 * self.ends[:, :, None] + np.arange(3)).reshape(-1, 6)
         object.__setattr__(self, "_length", length)
-        object.__setattr__(self, "_direction", np.arctan2(chord[:, 1], chord[:, 0]))
         object.__setattr__(self, "_natural", np.swapaxes(natural, 1, 2) @ stiffness @ natural)
         object.__setattr__(self, "_dofs", dofs)
 
     _length: Array = None  # type: ignore[assignment]
-    _direction: Array = None  # type: ignore[assignment]
     _natural: Array = None  # type: ignore[assignment]
     _dofs: Indices = None  # type: ignore[assignment]
 
@@ -73,12 +71,15 @@ class CorotationalFrame:
         chord = at_rest + drift
         length = np.hypot(chord[:, 0], chord[:, 1])
         c, s = chord[:, 0] / length, chord[:, 1] / length
-        turned = np.arctan2(chord[:, 1], chord[:, 0]) - self._direction
+        # The chord's turn from its own rest direction, and below its lengthening by a difference of squares, so that
+        # small motions lose no digits.
+        across = at_rest[:, 0] * drift[:, 1] - at_rest[:, 1] * drift[:, 0]
+        turned = np.arctan2(across, np.sum(at_rest * chord, axis=1))
         natural = np.empty((len(length), 3))
-        # l - l0 by the difference of squares, which loses no digits in short steps.
         natural[:, 0] = np.sum((2.0 * at_rest + drift) * drift, axis=1) / (length + self._length)
         for column, rotation in ((1, local[:, 2]), (2, local[:, 5])):
-            natural[:, column] = (rotation - turned + np.pi) % (2.0 * np.pi) - np.pi
+            apart = rotation - turned
+            natural[:, column] = apart - 2.0 * np.pi * np.round(apart / (2.0 * np.pi))
         forces = np.einsum("mij,mj->mi", self._natural, natural)
         zero = np.zeros_like(c)
         r = np.stack([-c, -s, zero, c, s, zero], axis=1)

@@ -17,7 +17,7 @@ from fingervision.domain.errors import FingervisionError
 Array = NDArray[np.float64]
 
 _ITERATIONS = 25
-_SETTLED = 1e-9
+_SETTLED = 1e-8
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -16,7 +16,7 @@ from fingervision.models.notch import Notch
 
 Array = NDArray[np.float64]
 
-_POINTS = 60
+_POINTS = 160
 _SHEAR = 6.0 / 5.0
 """Shear factor of a rectangle: Timoshenko, Strength of Materials, part 1."""
 

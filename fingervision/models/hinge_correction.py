@@ -110,4 +110,4 @@ def hinge_compliance(notch: Notch, material: Material, theory: HingeTheory) -> A
 
 def _scaled(compliance: Array, ratio: Array) -> Array:
     root = np.sqrt(ratio)
-    return np.asarray(root[:, None] * compliance * root)
+    return np.asarray(np.outer(root, root) * compliance)

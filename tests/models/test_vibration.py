@@ -1,0 +1,123 @@
+import numpy as np
+import pytest
+from scipy.sparse import csr_matrix
+
+from fingervision.domain.drive import DriveHistory
+from fingervision.domain.errors import FingervisionError
+from fingervision.models.damping import LossFactor, ModalDamping, PaperDamping, RayleighDamping, paper_rate
+from fingervision.models.driven_body import DrivenBody
+from fingervision.models.generalized_alpha import integrate
+from fingervision.models.lumped import LumpedGripper
+from fingervision.models.modal_response import modal_gap_mm
+from fingervision.models.physics import Physics
+from fingervision.models.stepped_response import stepped_gap_mm
+
+# Damping ratio of equation (4) by dimensionless frequency, printed with two or three digits.
+PAPER_RATIOS = {1.0: 0.045, 2.0: 0.376, 5.0: 1.13, 10.0: 2.0, 100.0: 7.7, 1e3: 24.8, 6e3: 61.0, 1e5: 248.0}
+
+
+@pytest.mark.parametrize("w", PAPER_RATIOS)
+def test_equation_4_by_mode(w: float) -> None:
+    assert paper_rate(w) / (2.0 * w) == pytest.approx(PAPER_RATIOS[w], rel=0.02)
+
+
+def test_equation_4_damps_negatively_below_one() -> None:
+    assert paper_rate(0.5) == pytest.approx(-19.5, rel=0.01)
+    with pytest.raises(FingervisionError, match="damps negatively below its reference frequency, 300 rad/s, but the"):
+        PaperDamping(300.0).ratios(np.array([280.0, 2000.0]))
+
+
+def test_overdamped_modes_are_refused() -> None:
+    with pytest.raises(FingervisionError, match=r"must lie between 0 and 0\.3, but one is"):
+        PaperDamping(280.0, 1.0).ratios(np.array([280.0, 28000.0]))
+    assert PaperDamping(280.0, 0.5).ratios(np.array([280.0])) == pytest.approx(0.0225, rel=0.02)
+
+
+def test_rayleigh_and_loss_factor() -> None:
+    low, high = 2 * np.pi * 45.0, 2 * np.pi * 360.0
+    rayleigh = RayleighDamping(0.025, low, high)
+    assert rayleigh.ratios(np.array([low, high])) == pytest.approx([0.025, 0.025])
+    assert rayleigh.mass_factor_per_s == pytest.approx(12.6, abs=0.05)
+    assert rayleigh.stiffness_factor_s == pytest.approx(1.96e-5, rel=0.005)
+    assert LossFactor(0.06).ratios(np.array([1.0])) == pytest.approx(0.03)
+
+
+def oscillator(steps: int, radius: float = 0.8, ratio: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
+    """One period of a unit mass on a unit spring, released from 1."""
+    one = csr_matrix(np.eye(1))
+    step_s = 2.0 * np.pi / steps
+    motion = integrate(
+        one,
+        2.0 * ratio * one,
+        lambda u: (one, u),
+        (np.ones(1), np.zeros(1)),
+        (np.array([], dtype=np.int64), np.zeros(steps + 1)),
+        np.array([0]),
+        step_s,
+        high_frequency_radius=radius,
+    )
+    return motion.displacement[:, 0], motion.velocity[:, 0]
+
+
+def test_generalised_alpha_is_of_second_order() -> None:
+    errors = [abs(oscillator(steps)[0][-1] - 1.0) + abs(oscillator(steps)[1][-1]) for steps in (50, 100, 200)]
+    orders = np.log2(np.array(errors[:-1]) / errors[1:])
+    assert orders == pytest.approx([2.0, 2.0], abs=0.1)
+
+
+def test_energy_dies_away_and_never_grows() -> None:
+    u, v = oscillator(100, ratio=0.025)
+    energy = 0.5 * (u**2 + v**2)
+    assert np.all(np.diff(energy) < 1e-12)
+    assert energy[-1] / energy[0] == pytest.approx(np.exp(-4.0 * np.pi * 0.025), rel=0.01)
+
+
+def test_stepped_frame_and_modes_vibrate_alike(lumped: LumpedGripper) -> None:
+    """A ramp of 4 ms, then free vibration of the held body: modes against time steps in the deformed shape."""
+    half = lumped.half
+    step_s, rise_s = 5e-5, 4e-3
+    time_s = np.arange(241) * step_s
+    history = 0.01 * np.minimum(time_s / rise_s, 1.0)
+    drive = DriveHistory(time_s, history)
+    modal = modal_gap_mm(half, drive, ModalDamping(1e-6), modes=8)
+    motion = integrate(
+        half.mass_t,
+        csr_matrix(half.mass_t.shape),
+        half.tangent,
+        (np.zeros(half.unknowns), np.zeros(half.unknowns)),
+        (half.driven, history),
+        half.free,
+        step_s,
+        high_frequency_radius=0.5,
+    )
+    stepped = np.array([2.0 * half.measured_mm(row) for row in motion.displacement])
+    # The kinks excite modes beyond the eighth and beyond the step; they are small.
+    assert np.abs(stepped - modal).max() < 0.05 * np.abs(modal - 4.0).max()
+
+
+def test_slow_drive_is_answered_statically(lumped: LumpedGripper) -> None:
+    time_s = np.linspace(0.0, 60.0, 1501)
+    inputs = np.interp(time_s, [0.0, 20.0, 40.0, 60.0], [0.0, 1.5, -0.4, 1.0])
+    gap = modal_gap_mm(lumped.half, DriveHistory(time_s, inputs))
+    assert gap == pytest.approx(lumped.respond(inputs).gap_mm, abs=1e-3)
+
+
+def test_struck_gripper_rings_down_at_its_damping(lumped: LumpedGripper) -> None:
+    half: DrivenBody = lumped.half
+    frequency = lumped.modes_hz(drive_held=True)[0]
+    time_s = np.concatenate([[0.0, 1e-3], 1e-3 + np.arange(1, 41) / frequency / np.sqrt(1 - 0.025**2)])
+    inputs = np.minimum(time_s / 1e-3, 1.0) * 0.1
+    ring = modal_gap_mm(half, DriveHistory(time_s, inputs), ModalDamping(0.025), modes=1)[2:] - 4.0
+    ring -= lumped.respond(np.array([0.1])).gap_mm[0] - 4.0
+    assert np.log(ring[:-1] / ring[1:]) == pytest.approx(2 * np.pi * 0.025 / np.sqrt(1 - 0.025**2), rel=1e-3)
+
+
+def test_fingers_driven_together_do_not_pass_through(lumped: LumpedGripper) -> None:
+    half = lumped.half
+    drive = DriveHistory(np.array([0.0, 0.02, 0.06]), np.array([0.0, -0.57, -0.57]))
+    damping = RayleighDamping(0.1, 2 * np.pi * 100.0, 2 * np.pi * 2000.0)
+    _, gap = stepped_gap_mm(half, drive, Physics(large_rotation=True, contact=True), damping, 2e-4)
+    _, through = stepped_gap_mm(half, drive, Physics(large_rotation=True), damping, 2e-4)
+    # The penalty lets each finger sink in by its grip, 0.5 N, over 50 N/mm.
+    assert gap.min() > -0.03
+    assert through[-1] == pytest.approx(4.0 - 0.57 * 7.73, abs=0.05)

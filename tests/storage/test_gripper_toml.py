@@ -1,0 +1,80 @@
+import copy
+import tomllib
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from fingervision.domain.errors import FingervisionError
+from fingervision.storage.gripper_toml import gripper_from_tables, read_gripper
+
+ROOT = Path(__file__).parents[2]
+REFERENCE = ROOT / "sample_frames" / "paper" / "gripper.toml"
+
+
+def tables(**changes: Any) -> dict[str, Any]:
+    given = copy.deepcopy(tomllib.loads(REFERENCE.read_text()))
+    for name, value in changes.items():
+        section, key = name.split("__")
+        given[section][key] = value
+    return given
+
+
+@pytest.mark.parametrize("path", [REFERENCE, ROOT / "fingervision" / "models" / "micro_gripper.toml"])
+def test_both_drawings_are_read(path: Path) -> None:
+    assert read_gripper(path).measuring_point_mm[0] == pytest.approx(read_gripper(path).body.rest_gap_mm / 2.0)
+
+
+def test_an_uncertainty_may_stand_beside_a_number() -> None:
+    gripper = gripper_from_tables(tables(hinge__thickness_mm={"value": 1.0, "u": 0.1}), "g")
+    assert gripper.hinge.thickness_mm == 1.0
+    assert dict(gripper.uncertainties) == {"hinge.thickness_mm": 0.1}
+
+
+@pytest.mark.parametrize(
+    ("changes", "sentence"),
+    [
+        ({"hinge__thickness_mm": 10.0}, "must be smaller than the web that the notches cut, 9 mm, but is 10"),
+        ({"hinge__radius_mm": 5.0}, "which cuts the body in two; reduce hinge.radius_mm"),
+        ({"material__youngs_modulus_mpa": -1.0}, "material.youngs_modulus_mpa in g must be positive, but is -1."),
+        ({"material__poisson_ratio": 0.5}, "must be below 0.5, but is 0.5"),
+        ({"lever__l2_mm": 18.0}, "lever.hinge2_mm in g must lie at hinge 1 less (l2, l1) = (17.5, 30), but lies at"),
+        ({"lever__drive_mm": [1.0, 10.57]}, "mm away: the links do not meet"),
+        ({"hinge__thicknes_mm": 1.0}, "unknown key in [hinge], thicknes_mm; did you mean thickness_mm?"),
+        ({"material__yield_mpa": "48"}, "material.yield_mpa in g must be a finite number, but is '48'."),
+        ({"material__yield_mpa": True}, "must be a finite number, but is True."),
+        ({"material__yield_mpa": float("nan")}, "must be a finite number, but is nan."),
+        ({"links__finger_mm": [1.0, 2.0]}, "links.finger_mm in g must be a list of 4 numbers, but is [1.0, 2.0]."),
+        ({"body__rest_gap_mm": 5.0}, "must lie at half of body.rest_gap_mm, 2.5 mm, but lies at 2 mm"),
+        ({"body__height_mm": 0.1}, "but is 0.1; are its lengths in metres?"),
+        ({"hinge__radius_mm": {"value": 4.0}}, "must be a number or {value = ..., u = ...}, but has the keys value."),
+        ({"hinge__radius_mm": {"value": 4.0, "u": -1.0}}, "must not be negative, but is -1"),
+    ],
+)
+def test_what_cannot_be_a_gripper_is_refused_in_a_sentence(changes: dict[str, Any], sentence: str) -> None:
+    with pytest.raises(FingervisionError) as refused:
+        gripper_from_tables(tables(**changes), "g")
+    assert sentence in str(refused.value)
+
+
+def test_missing_parts_are_named() -> None:
+    whole = tables()
+    del whole["material"]
+    with pytest.raises(FingervisionError, match=r"must have a section \[material\], but has none"):
+        gripper_from_tables(whole, "g")
+    whole = tables()
+    del whole["body"]["plate_mm"]
+    with pytest.raises(FingervisionError, match=r"must state body\.plate_mm, but does not"):
+        gripper_from_tables(whole, "g")
+    whole = tables()
+    whole["hinges"] = {}
+    with pytest.raises(FingervisionError, match="unknown section, hinges; did you mean hinge"):
+        gripper_from_tables(whole, "g")
+
+
+def test_files_that_cannot_be_read(tmp_path: Path) -> None:
+    with pytest.raises(FingervisionError, match="There is no gripper"):
+        read_gripper(tmp_path / "none.toml")
+    (tmp_path / "bad.toml").write_text("[hinge")
+    with pytest.raises(FingervisionError, match="must be TOML, but is not"):
+        read_gripper(tmp_path / "bad.toml")
