@@ -154,7 +154,9 @@ def _charuco(grey: NDArray[np.uint8], board: Board) -> tuple[Floats, Ints] | Non
                 margin = MARKER_MARGIN_PART * (1.0 - board.marker_mm / board.square_mm) / 2.0
                 spacing_px = _spacing_px(coarse)
                 best = _refined(grey, coarse, min(WINDOW_PART, margin) * spacing_px), cells
-    return best
+        if best is not None:
+            return best
+    return None
 
 
 def _is_one_board(points_px: NDArray[np.float32], cells: Ints) -> bool:
