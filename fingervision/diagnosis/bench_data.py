@@ -59,7 +59,8 @@ class BenchData:
     @property
     def channels(self) -> tuple[str, ...]:
         """Names of the stacked channels."""
-        return ("gap", "midline") if self.chain.history.both_edges else ("gap",)
+        history = self.chain.history
+        return ("gap", *(["midline"] if history.both_edges else []), *(["force"] if history.force else []))
 
     def problem(self, residual_mm: Array, degrees: int) -> Problem:
         """Estimate outliers and noise from a residual and whiten the measurement with them."""
@@ -73,10 +74,10 @@ class BenchData:
             part = residual_mm[channel * n : (channel + 1) * n]
             out = gate(part, history.runs, timed) | self.distrusted
             aside.append(out)
-            share = floor if channel == 0 else 0.5 * floor
+            share = (floor, 0.5 * floor, 0.0)[("gap", "midline", "force").index(self.channels[channel])]
             noises.append(estimate_noise(part, history.runs, rate, out, share, degrees))
-        if len(aside) == 2:
-            aside = [aside[0] | aside[1]] * 2
+        if history.both_edges:
+            aside[0] = aside[1] = aside[0] | aside[1]
         error = self.input_error_mm
         if np.median(error) < 0.1 * noises[0].total_mm / np.sqrt(max(self.input_samples, 1.0)) and not np.any(
             error > 0.3 * noises[0].total_mm
@@ -121,6 +122,7 @@ def prepare(table: MeasuredTable, model: CorrectedModel, without: frozenset[str]
             smooth, leverage, sigma, step = u, np.zeros_like(u), 0.0, 0.0
     zero = model.base.respond(np.zeros(1)).gap_mm[0]
     opening = model.base.respond(u).gap_mm - zero
+    bare_force = model.base.respond(np.zeros(1)).force_n
     history = History(
         input_mm=smooth,
         time_s=table.time_s,
@@ -132,7 +134,7 @@ def prepare(table: MeasuredTable, model: CorrectedModel, without: frozenset[str]
         input_sigma_mm=sigma,
         input_step_mm=step,
         both_edges=table.midline_mm is not None,
-        force=table.force_n is not None,
+        force=table.force_n is not None and bare_force is not None,
     )
     fixed = {name: {key: e.value for key, e in values.items()} for name, values in model.effects.items()}
     chain = MeasuringChain(model.base, history, fixed)
@@ -141,6 +143,8 @@ def prepare(table: MeasuredTable, model: CorrectedModel, without: frozenset[str]
         bare: Response = chain.respond({})
         chain = replace(chain, midline_mm=float(np.median(table.midline_mm - bare.midline_mm)))
         stacked = np.concatenate([table.gap_mm, table.midline_mm])
+    if history.force and table.force_n is not None:
+        stacked = np.concatenate([stacked, table.force_n])
     reach = 1e-3 * (high - low)
     slope = np.abs(model.base.respond(smooth + reach).gap_mm - model.base.respond(smooth - reach).gap_mm) / (
         2.0 * reach

@@ -64,7 +64,6 @@ def compare(table: MeasuredTable, model: CorrectedModel, *, seed: int = 1) -> Co
     residual = bench.stacked_mm - bench.chain.stacked({})
     problem = bench.problem(residual, 0)
     found = places(bench, problem, residual, np.random.default_rng(seed))
-    n = bench.chain.history.input_mm.size
-    return Comparison(
-        bench, by_channel(bench, residual), found, rms_mm(residual, n), problem.whitener.noises[0].total_mm
-    )
+    history = bench.chain.history
+    rms = rms_mm(residual, history.input_mm.size, history.both_edges)
+    return Comparison(bench, by_channel(bench, residual), found, rms, problem.whitener.noises[0].total_mm)

@@ -46,10 +46,13 @@ def by_channel(bench: BenchData, stacked: Array) -> dict[str, Array]:
     """Split a stacked residual into gap and, where they were measured, left, right and midline."""
     n = bench.chain.history.input_mm.size
     gap = stacked[:n]
-    if stacked.size == n:
-        return {"gap": gap}
-    midline = stacked[n:] - np.median(stacked[n:])
-    return {"gap": gap, "left": midline - 0.5 * gap, "right": midline + 0.5 * gap, "midline": midline}
+    out = {"gap": gap}
+    if bench.chain.history.both_edges:
+        midline = stacked[n : 2 * n] - np.median(stacked[n : 2 * n])
+        out |= {"left": midline - 0.5 * gap, "right": midline + 0.5 * gap, "midline": midline}
+    if bench.chain.history.force:
+        out["force"] = stacked[-n:]
+    return out
 
 
 def places(bench: BenchData, problem: Problem, residual: Array, rng: np.random.Generator) -> tuple[Place, ...]:
@@ -103,12 +106,16 @@ def diagnose(
     after = bench.stacked_mm - bench.chain.stacked(best.values)
     unseen = unseen_rms_mm(bench, found.problem, best)
     noises = [noise.total_mm for noise in found.problem.whitener.noises]
-    noise_rms = noises[0] if len(noises) == 1 else float(np.sqrt(0.25 * noises[0] ** 2 + noises[1] ** 2))
+    edges = history.both_edges
+    noise_rms = float(np.sqrt(0.25 * noises[0] ** 2 + noises[1] ** 2)) if edges else noises[0]
     channels = {
-        name: {"before_rms_mm": float(np.sqrt(np.mean(a**2))), "after_rms_mm": float(np.sqrt(np.mean(b**2)))}
+        name: {
+            f"before_rms_{_unit(name)}": float(np.sqrt(np.mean(a**2))),
+            f"after_rms_{_unit(name)}": float(np.sqrt(np.mean(b**2))),
+        }
         for (name, a), b in zip(by_channel(bench, before).items(), by_channel(bench, after).values(), strict=True)
     }
-    disagreement = Disagreement(rms_mm(before, n), rms_mm(after, n), noise_rms, *unseen, channels)
+    disagreement = Disagreement(rms_mm(before, n, edges), rms_mm(after, n, edges), noise_rms, *unseen, channels)
     effects = _named(found)
     proposal = next_run(bench, found.problem, best, [e for e in found.alternatives if e is not best])
     report = DiagnosisReport(
@@ -138,6 +145,10 @@ def diagnose(
     )
     progress(1.0)
     return Diagnosis(report, bench, before, after)
+
+
+def _unit(channel: str) -> str:
+    return "n" if channel == "force" else "mm"
 
 
 def _named(found: Findings) -> tuple[NamedEffect, ...]:

@@ -56,9 +56,14 @@ class MeasuringChain:
         return response if camera else response.shifted(self.midline_mm)
 
     def stacked(self, settings: Settings) -> Array:
-        """Gap, and midline where it was measured, one after the other; shape (channels * n,)."""
+        """Gap, and where they were measured midline and force, one after the other; shape (channels * n,)."""
         response = self.respond(settings)
-        return np.concatenate([response.gap_mm, response.midline_mm]) if self.history.both_edges else response.gap_mm
+        parts = [response.gap_mm]
+        if self.history.both_edges:
+            parts.append(response.midline_mm)
+        if self.history.force and response.force_n is not None:
+            parts.append(response.force_n)
+        return np.concatenate(parts)
 
 
 def admissible(history: History, without: frozenset[str]) -> tuple[dict[str, Effect], dict[str, str]]:
@@ -71,8 +76,6 @@ def admissible(history: History, without: frozenset[str]) -> tuple[dict[str, Eff
             excluded[name] = "left out by request"
         elif isinstance(searched, str):
             excluded[name] = searched
-        elif name == "hinge_stiffness_error":
-            excluded[name] = "the force is compared by `compare` only; gap and midline do not show it"
         else:
             able[name] = effect
     return able, excluded

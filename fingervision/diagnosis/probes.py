@@ -73,18 +73,20 @@ def probes(history: History, whitener: Whitener, most: int) -> Probes:
             mask[run] = u[run] - np.mean(u[run])
             shapes.append((f"another slope in run {index + 1}", mask))
     shapes += [(f"curvature of order {k} over the input", ((u - low) / span) ** k) for k in (2, 3, 4)]
-    channels: tuple[tuple[float, float, str], ...] = (
-        (1.0, 0.0, "the gap"),
-        (0.0, 1.0, "the midline"),
-        (-1.0, 0.5, "the left edge"),
-        (1.0, 0.5, "the right edge"),
-    )
-    if not history.both_edges:
-        channels = channels[:1]
+    channels = [(1.0, 0.0, 0.0, "the gap")]
+    if history.both_edges:
+        channels += [
+            (0.0, 1.0, 0.0, "the midline"),
+            (-1.0, 0.5, 0.0, "the left edge"),
+            (1.0, 0.5, 0.0, "the right edge"),
+        ]
+    if history.force:
+        channels.append((0.0, 0.0, 1.0, "the force"))
     shapes = shapes[:: max(1, len(shapes) * len(channels) // most)]
     words, columns = [], []
-    for gap, midline, channel in channels:
+    for gap, midline, force, channel in channels:
         for label, shape in shapes:
-            columns.append(np.concatenate([gap * shape, midline * shape]) if history.both_edges else shape)
+            parts = [gap * shape, midline * shape] if history.both_edges else [gap * shape]
+            columns.append(np.concatenate([*parts, *([force * shape] if history.force else [])]))
             words.append(f"{label} in {channel}")
     return Probes(tuple(words), whitener.columns(np.stack(columns, axis=1))[0])

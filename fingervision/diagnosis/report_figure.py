@@ -46,7 +46,9 @@ def residual_figure(before: dict[str, Array], after: dict[str, Array] | None, hi
                 if row == len(before) - 1:
                     axes.set_xlabel(label)
                 if column == 0:
-                    axes.set_ylabel(f"{NAMES.get(channel, channel)}\nmeasured - model, mm")
+                    axes.set_ylabel(
+                        f"{NAMES.get(channel, channel)}\nmeasured - model, {'N' if channel == 'force' else 'mm'}"
+                    )
         if after is not None:
             grid[0][0].legend(frameon=False, ncols=2, loc="best")
         buffer = io.BytesIO()

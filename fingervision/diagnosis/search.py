@@ -179,14 +179,13 @@ def search(
         best, peers = _choose(singles[:6], samples), singles
         bases = singles[:14]
         pairs = _extended(problem, atoms, bases, PAIRS_REFITTED, lambda share: progress(0.3 + 0.4 * share))
-        if pairs:
-            if best.score - pairs[0].score > threshold and _added(problem, best, pairs[0]) > SMALL_SHARE:
-                best, peers = _choose(pairs[:6], samples), pairs
-                triples = _extended(problem, atoms, pairs[:3], 24, lambda share: progress(0.7 + 0.1 * share))
-                if triples:
-                    gained = best.score - triples[0].score
-                    if gained > threshold and _added(problem, best, triples[0]) > TRIPLE_SHARE:
-                        best, peers = _choose(triples[:6], samples), triples
+        gained = best.score - pairs[0].score if pairs else 0.0
+        if gained > threshold and _added(problem, best, pairs[0]) > SMALL_SHARE:
+            best, peers = _choose(pairs[:6], samples), pairs
+            triples = _extended(problem, atoms, pairs[:3], 24, lambda share: progress(0.7 + 0.1 * share))
+            gained = best.score - triples[0].score if triples else 0.0
+            if gained > threshold and _added(problem, best, triples[0]) > TRIPLE_SHARE:
+                best, peers = _choose(triples[:6], samples), triples
     if forced and not forced <= set(best.names):
         names = tuple(name for name in problem.effects if name in forced | set(best.names))
         begin = {p: dict(v) for p, v in best.values.items()}
@@ -199,7 +198,11 @@ def search(
     progress(0.82)
     words, left = _gate(problem, best, rng)
     progress(0.9)
-    alternatives, distances = ([best], {}) if not best.names else _set(problem, best, peers, singles, pairs)
+    alternatives, distances = (
+        ([best], {})
+        if not best.names
+        else _set(problem, best, nothing, [*singles, *peers] if len(best.names) > 1 else singles, pairs)
+    )
     best = min(alternatives, key=lambda e: e.bic(samples) + _surprise(problem, e)) if best.names else best
     alternatives.sort(key=lambda e: e is not best)
     verdict = Verdict.AGREES if not best.names else Verdict.NAMED if len(alternatives) == 1 else Verdict.AMBIGUOUS
@@ -253,14 +256,14 @@ def _gate(problem: Problem, best: Explanation, rng: np.random.Generator) -> tupl
 
 
 def _set(
-    problem: Problem, best: Explanation, peers: list[Explanation], singles: list[Explanation], pairs: list[Explanation]
+    problem: Problem, best: Explanation, nothing: Explanation, pool: list[Explanation], pairs: list[Explanation]
 ) -> tuple[list[Explanation], dict[tuple[str, ...], float]]:
     """Collect every minimal explanation that cannot be told apart from the best."""
     members, distances = [best], {}
     target = problem.whitened(best.values)
     metric = problem.offsets.metric(best.sigma_mm)
     rows = max(2, int(problem.measured.size - problem.whitener.aside.sum()))
-    pool = [*singles, *peers] if len(best.names) > 1 else list(singles)
+    pool = list(pool)
     if len(best.names) == 1:
         odds = best.bic(rows) + _surprise(problem, best) + BARE_MENTION
         pool += [pair for pair in pairs if pair.bic(rows) + _surprise(problem, pair) < odds]
@@ -279,7 +282,9 @@ def _set(
         # A richer form at its limit is the simpler name: friction of vanishing reach is backlash.
         same_count = len(other.names) == len(best.names)
         limiting = same_count and other.free > best.free and best.score - other.score < 1.0
-        if distance < INDISTINGUISHABLE and not limiting:
+        # One that leaves the data nearly as badly off as no effect at all explains nothing: the runs' scatter hides it.
+        idle = nothing.score - other.score < 0.3 * (nothing.score - best.score)
+        if distance < INDISTINGUISHABLE and not limiting and not idle and other.score - best.score < ADMISSIBLE:
             members.append(other)
     return [m for m in members if not any(set(o.names) < set(m.names) for o in members)], distances
 

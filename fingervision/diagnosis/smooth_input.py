@@ -38,39 +38,47 @@ def _lines(time_s: Array, input_mm: Array, sigma: float, windows: Array) -> tupl
     smooth, leverage = input_mm.copy(), np.ones(count)
     for i in range(count):
         for width in windows:
-            half = int(width) // 2
-            low, high = max(0, i - half), min(count, i + half + 1)
-            m = high - low
-            if m < 5:
-                continue
-            t0 = 0.0
-            u0 = 0.0
-            for j in range(low, high):
-                t0 += time_s[j]
-                u0 += input_mm[j]
-            t0 /= m
-            u0 /= m
-            stt = 0.0
-            stu = 0.0
-            for j in range(low, high):
-                stt += (time_s[j] - t0) ** 2
-                stu += (time_s[j] - t0) * input_mm[j]
-            slope = stu / stt
-            chi = 0.0
-            bend = 0.0
-            norm = 0.0
-            reach = (time_s[high - 1] - time_s[low]) / 2.0
-            for j in range(low, high):
-                e = input_mm[j] - u0 - slope * (time_s[j] - t0)
-                x = (time_s[j] - t0) / reach
-                chi += e * e
-                bend += e * (x * x - 1.0 / 3.0)
-                norm += (x * x - 1.0 / 3.0) ** 2
-            dof = m - 2
-            if chi / sigma**2 <= dof + 3.0 * np.sqrt(2.0 * dof) and abs(bend) <= 2.5 * sigma * np.sqrt(norm):
-                smooth[i] = u0 + slope * (time_s[i] - t0)
-                leverage[i] = 1.0 / m + (time_s[i] - t0) ** 2 / stt
-                break
+            # A window that ends at the sample reaches up to a reversal without rounding it.
+            for place in range(5):
+                m = int(width)
+                low = i - (place * (m - 1)) // 4
+                high = low + m
+                if low < 0 or high > count:
+                    continue
+                t0 = 0.0
+                u0 = 0.0
+                for j in range(low, high):
+                    t0 += time_s[j]
+                    u0 += input_mm[j]
+                t0 /= m
+                u0 /= m
+                stt = 0.0
+                stu = 0.0
+                for j in range(low, high):
+                    stt += (time_s[j] - t0) ** 2
+                    stu += (time_s[j] - t0) * input_mm[j]
+                weight = 1.0 / m + (time_s[i] - t0) ** 2 / stt
+                if weight >= leverage[i]:
+                    continue
+                slope = stu / stt
+                reach = 0.5 * (time_s[high - 1] - time_s[low])
+                chi = 0.0
+                bend = 0.0
+                norm = 0.0
+                ends = 0.0
+                for j in range(low, high):
+                    e = input_mm[j] - u0 - slope * (time_s[j] - t0)
+                    x = (time_s[j] - t0) / reach
+                    chi += e * e
+                    bend += e * (x * x - 1.0 / 3.0)
+                    norm += (x * x - 1.0 / 3.0) ** 2
+                    if j < low + 3 or j >= high - 3:
+                        ends = max(ends, abs(e))
+                dof = m - 2
+                fits = chi / sigma**2 <= dof + 2.5 * np.sqrt(2.0 * dof) and ends <= 3.0 * sigma
+                if fits and abs(bend) <= 2.0 * sigma * np.sqrt(norm):
+                    smooth[i] = u0 + slope * (time_s[i] - t0)
+                    leverage[i] = weight
     return smooth, leverage
 
 

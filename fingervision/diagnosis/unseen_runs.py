@@ -10,7 +10,7 @@ from fingervision.diagnosis.whitening import RunOffsets
 from fingervision.domain.effect import Array
 
 
-def rms_mm(residual_mm: Array, samples: int) -> float:
+def rms_mm(residual_mm: Array, samples: int, edges: bool) -> float:
     """RMS over left and right where both exist, else over the gap; the midline's constant removed.
 
     Parameters
@@ -19,11 +19,14 @@ def rms_mm(residual_mm: Array, samples: int) -> float:
         Gap, then midline.
     samples : int
         Rows of one channel.
+    edges : bool
+        Whether the second channel is the midline.
     """
     gap = residual_mm[:samples]
-    if residual_mm.size == samples:
+    if not edges:
         return float(np.sqrt(np.mean(gap**2)))
-    midline = residual_mm[samples:] - np.mean(residual_mm[samples:])
+    midline = residual_mm[samples : 2 * samples]
+    midline = midline - np.mean(midline)
     return float(np.sqrt(np.mean(0.25 * gap**2 + midline**2)))
 
 
@@ -50,4 +53,4 @@ def unseen_rms_mm(bench: BenchData, problem: Problem, best: Explanation) -> tupl
         for channel in range(channels):
             rows = slice(channel * n + run.start, channel * n + run.stop)
             after[rows] = residual[rows]
-    return rms_mm(before, n), rms_mm(after, n)
+    return rms_mm(before, n, history.both_edges), rms_mm(after, n, history.both_edges)

@@ -75,12 +75,13 @@ def where(
             start, end = float(values[inside].min()), float(values[inside].max())
             runs = sum(bool(np.intersect1d(inside, np.arange(n)[run]).size) for run in history.runs)
             span = "everywhere" if last - first + 1 == len(parts) else f"between {start:.3g} and {end:.3g} {unit}"
+            measure = "N" if channel == "force" else "mm"
             what = "larger" if size > 0.0 else "smaller"
             if channel in ("left", "right", "midline"):
                 what = "farther right" if size > 0.0 else "farther left"
             words = (
-                f"over the {variable}, {span}, the {channel} is {abs(size):.3g} mm {what} than simulated, "
+                f"over the {variable}, {span}, the {channel} is {abs(size):.3g} {measure} {what} than simulated, "
                 f"{sigma:.0f} sigma, in {'all' if runs == len(history.runs) else runs} run{'s' if runs != 1 else ''}"
             )
-            places.append(Place(channel, variable, start, end, size, "mm", sigma, words))
+            places.append(Place(channel, variable, start, end, size, measure, sigma, words))
     return tuple(sorted(places, key=lambda place: -place.sigma))

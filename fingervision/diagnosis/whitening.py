@@ -49,7 +49,7 @@ def _innovations(columns, time, white, p1, lag1, h, p2, lag2):  # type: ignore[n
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Whitener:
-    """The observation model's covariance, ready to be divided out; channels are stacked gap, midline.
+    """The observation model's covariance, ready to be divided out; channels are stacked gap, midline, force.
 
     Parameters
     ----------
@@ -114,15 +114,20 @@ class RunOffsets:
     design : ndarray of float, shape (m, columns)
         Whitened indicator columns: one a run and channel, and the midline's constant last.
     channels : int
-        1 (gap) or 2 (gap and midline).
+        Gap, then midline and force where they were measured.
     runs : int
         Number of runs.
+    midline : bool
+        Whether the second channel is the midline, whose constant is free.
+    scales_mm : tuple of float
+        Noise of each channel.
     """
 
     design: Array
     gram: Array
     channels: int
     runs: int
+    midline: bool
     scales_mm: tuple[float, ...]
 
     @classmethod
@@ -130,19 +135,21 @@ class RunOffsets:
         """Build the columns for a whitener."""
         history, channels = whitener.history, len(whitener.noises)
         n, runs = history.input_mm.size, len(history.runs)
-        columns = np.zeros((channels * n, channels * runs + (channels - 1)))
+        free = int(history.both_edges)
+        columns = np.zeros((channels * n, channels * runs + free))
         for channel in range(channels):
             for index, run in enumerate(history.runs):
                 columns[channel * n + run.start : channel * n + run.stop, channel * runs + index] = 1.0
-        if channels == 2:
-            columns[n:, -1] = 1.0
+        if free:
+            columns[n : 2 * n, -1] = 1.0
         design = whitener.columns(columns)[0]
-        return cls(design, design.T @ design, channels, runs, tuple(noise.total_mm for noise in whitener.noises))
+        scales = tuple(noise.total_mm for noise in whitener.noises)
+        return cls(design, design.T @ design, channels, runs, bool(free), scales)
 
     def metric(self, sigma_mm: tuple[float, ...]) -> Array:
         """Return G with r^T r - (Z^T r)^T G (Z^T r) the squared length once offsets of these spreads are allowed."""
         prior = [max(sigma_mm[channel], 1e-9) for channel in range(self.channels) for _ in range(self.runs)]
-        prior += [MIDLINE_FREE_MM] * (self.channels - 1)
+        prior += [MIDLINE_FREE_MM] * int(self.midline)
         return np.asarray(np.linalg.inv(self.gram + np.diag(1.0 / np.array(prior) ** 2)), dtype=np.float64)
 
     def spread(self, residual: Array) -> tuple[tuple[float, ...], float]:
@@ -165,7 +172,7 @@ class RunOffsets:
         for channel in range(self.channels):
             z = np.maximum(np.diag(self.gram)[channel * self.runs : (channel + 1) * self.runs], 1e-12)
             mean = shares[channel * self.runs : (channel + 1) * self.runs] / z
-            if channel == 1:
+            if channel == 1 and self.midline:
                 mean = mean - np.sum(mean * z) / np.sum(z)
             scale = self.scales_mm[channel]
             sigma = np.concatenate([[0.0], scale * np.geomspace(0.01, 1e4, 121)])
