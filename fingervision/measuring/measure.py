@@ -3,6 +3,7 @@
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, closing
 from dataclasses import dataclass, field
+from itertools import islice
 from pathlib import Path
 from time import monotonic
 from typing import Any
@@ -26,8 +27,10 @@ from fingervision.measuring.step_pictures import write_steps
 from fingervision.measuring.summary import summarise
 from fingervision.storage.gaps_csv import GapsCsv
 from fingervision.storage.summary_json import write_summary
-from fingervision.vision.pipeline import Settings, measure_frame
+from fingervision.vision.pipeline import Settings, measure_frames
 
+# So many frames are measured together: more gain nothing, and each must be held in memory.
+FRAMES_TOGETHER = 8
 # Rows are made for so many frames at once, or for what has come in so many seconds, and then handed to the table.
 FRAMES_AT_ONCE, SECONDS_AT_ONCE = 128, 0.4
 
@@ -201,10 +204,12 @@ def _outcomes(
     source: FrameSource, task: Task
 ) -> Iterator[tuple[Frame | LostFrame, GapMeasurement | NoGap | LostFrame]]:
     """Every frame with what it says; the decoder runs ahead and is stopped when this is."""
-    settings = task.settings
     with closing(decoded_ahead(source)) as frames:
-        for item in frames:
-            yield item, (item if isinstance(item, LostFrame) else measure_frame(item, settings))
+        while together := list(islice(frames, FRAMES_TOGETHER)):
+            whole = [item for item in together if isinstance(item, Frame)]
+            measured = iter(measure_frames(whole, task.settings))
+            for item in together:
+                yield item, (next(measured) if isinstance(item, Frame) else item)
 
 
 def _check(task: Task, description: Description) -> None:
