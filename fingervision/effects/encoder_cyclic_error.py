@@ -10,6 +10,8 @@ from fingervision.domain.parameter import Parameter
 
 def act(input_mm: Array, history: History, values: Values) -> Array:
     """Apply the effect: an error that repeats with the scale's period."""
+    if values["amplitude_mm"] == 0.0:
+        return input_mm
     phase = 2.0 * np.pi * input_mm / values["period_mm"] + values["phase_rad"]
     return input_mm + values["amplitude_mm"] * np.sin(phase)
 

@@ -11,6 +11,8 @@ from fingervision.domain.response import Response
 
 def act(response: Response, history: History, values: Values) -> Response:
     """Apply the effect: the rotation of the links is not small."""
+    if values["reach_mm"] == 0.0:  # no arc given
+        return response
     reach_mm, opening_mm = values["reach_mm"], response.gap_mm - history.rest_gap_mm
     angle = opening_mm / reach_mm
     bent_mm = reach_mm * np.sin(angle) + values["cross"] * reach_mm * (1.0 - np.cos(angle))

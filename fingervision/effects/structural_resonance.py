@@ -35,6 +35,8 @@ def ring(signal: Array, time_s: Array, frequency_hz: float, damping_ratio: float
 
 def act(response: Response, history: History, values: Values) -> Response:
     """Apply the effect: rings after fast moves."""
+    if values["frequency_hz"] == 0.0:  # no resonance given
+        return response
     opening_mm = response.gap_mm - history.rest_gap_mm
     out_mm = np.empty_like(opening_mm)
     for run in history.runs:

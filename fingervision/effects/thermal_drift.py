@@ -9,6 +9,8 @@ from fingervision.domain.response import Response
 
 def act(response: Response, history: History, values: Values) -> Response:
     """Apply the effect: a slow symmetric change, whatever the input."""
+    if values["amplitude_mm"] == 0.0:
+        return response
     return response.with_gap(response.gap_mm - values["amplitude_mm"] * np.expm1(-history.clock_s / values["tau_s"]))
 
 

@@ -32,7 +32,7 @@ def read_columns(path: Path, required: tuple[str, ...], known: tuple[str, ...]) 
     header = [cell.strip() for cell in rows[0][1]]
     for name in required:
         if name not in header:
-            near = difflib.get_close_matches(name, header, n=1, cutoff=0.5)
+            near = difflib.get_close_matches(name, [h for h in header if h not in (*required, *known)], n=1, cutoff=0.5)
             hint = f"rename {near[0]}, in the unit of the name" if near else "add it"
             raise FingervisionError(f"{path} must have a column {name}, but has {','.join(header)}: {hint}.")
     for name in known:

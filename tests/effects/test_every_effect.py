@@ -1,0 +1,159 @@
+"""What holds for every effect there is: nothing at zero, rest at the start, mirror, order, stated needs."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from fingervision.diagnosis.measuring_chain import MeasuringChain
+from fingervision.domain.effect import Effect, History
+from fingervision.effects import catalogue
+from fingervision.models.table import TableModel
+
+ROUNDING_MM = 1e-9
+"""A few operations on numbers of some millimetres."""
+NAMES = [
+    "drive_lag",
+    "input_offset",
+    "input_scale",
+    "encoder_cyclic_error",
+    "end_stop",
+    "backlash",
+    "stick_slip",
+    "friction_hysteresis",
+    "lever_ratio_error",
+    "large_deflection",
+    "viscoelastic_creep",
+    "structural_resonance",
+    "rest_gap_error",
+    "assembly_asymmetry",
+    "finger_contact",
+    "thermal_drift",
+    "hinge_stiffness_error",
+    "camera_drift",
+    "camera_scale_drift",
+    "out_of_plane_motion",
+    "scale_error",
+    "lens_distortion",
+    "camera_tilt",
+    "edge_bias",
+    "camera_latency",
+]
+INPUT = np.array([-0.6, 1.6])
+GAP = 4.0 + 7.7 * INPUT
+MODEL = TableModel("straight", INPUT, -0.5 * GAP, 0.5 * GAP, 2.0 * INPUT)
+
+
+def bench() -> History:
+    up = np.linspace(-0.4, 1.4, 120)
+    run = np.concatenate([up, np.full(40, 1.4), up[::-1]])
+    return History(
+        input_mm=np.concatenate([run, run[::-1]]),
+        time_s=0.04 * np.arange(2.0 * run.size),
+        runs=(slice(0, run.size), slice(run.size, 2 * run.size)),
+        rest_gap_mm=4.0,
+        opening_mm=7.7 * 1.4,
+        closing_mm=7.7 * 0.4,
+        force=True,
+    )
+
+
+def values(effect: Effect, history: History, *, neutral: bool) -> dict[str, float]:
+    searched = effect.search(history)
+    assert not isinstance(searched, str)
+    out = {}
+    for p in searched:
+        if p.neutral is None:
+            out[p.name] = float(p.starting_values()[0])
+        else:
+            out[p.name] = p.neutral if neutral else float(0.7 * p.neutral + 0.3 * p.upper)
+            if p.name == "upper_mm" and not neutral:
+                out[p.name] = 0.9 * p.upper
+    if neutral and effect.name in ("large_deflection", "structural_resonance"):
+        out = dict.fromkeys(out, 0.0)
+    return out
+
+
+def test_the_catalogue_is_complete_and_in_order() -> None:
+    assert list(catalogue()) == NAMES
+    stages = [effect.stage for effect in catalogue().values()]
+    assert sorted(stages, key=["drive", "mechanism", "camera"].index) == stages
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_zero_parameters_change_nothing(name: str) -> None:
+    chain = MeasuringChain(MODEL, bench(), {}, midline_mm=0.3)
+    bare, zero = chain.respond({}), chain.respond({name: values(catalogue()[name], bench(), neutral=True)})
+    np.testing.assert_allclose(zero.left_mm, bare.left_mm, atol=ROUNDING_MM)
+    np.testing.assert_allclose(zero.right_mm, bare.right_mm, atol=ROUNDING_MM)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_an_effect_shows_where_it_should(name: str) -> None:
+    chain = MeasuringChain(MODEL, bench(), {}, midline_mm=0.3)
+    bare, moved = chain.respond({}), chain.respond({name: values(catalogue()[name], bench(), neutral=False)})
+    assert moved.force_n is not None
+    assert bare.force_n is not None
+    changed = max(np.ptp(moved.gap_mm - bare.gap_mm), np.max(np.abs(moved.gap_mm - bare.gap_mm)))
+    changed = max(changed, float(np.max(np.abs(moved.midline_mm - bare.midline_mm))))
+    changed = max(changed, float(np.max(np.abs(moved.force_n - bare.force_n))))
+    assert changed > 1e-3
+
+
+@pytest.mark.parametrize("name", [name for name in NAMES if catalogue()[name].memory])
+def test_memory_starts_each_run_at_rest(name: str) -> None:
+    chain = MeasuringChain(MODEL, bench(), {})
+    bare, moved = chain.respond({}), chain.respond({name: values(catalogue()[name], bench(), neutral=False)})
+    for run in bench().runs:
+        assert moved.gap_mm[run][0] == pytest.approx(bare.gap_mm[run][0], abs=ROUNDING_MM)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_mirrored_picture_mirrors_the_answer(name: str) -> None:
+    setting = values(catalogue()[name], bench(), neutral=False)
+    seen = MeasuringChain(MODEL, bench(), {}, midline_mm=0.3).respond({name: setting})
+    for odd in ("share", "rate_mm_per_s", "k_per_mm"):
+        if odd in setting:
+            setting = {**setting, odd: -setting[odd]}
+    mirrored = MeasuringChain(MODEL, bench(), {}, midline_mm=-0.3).respond({name: setting})
+    np.testing.assert_allclose(mirrored.left_mm, -seen.right_mm, atol=ROUNDING_MM)
+    np.testing.assert_allclose(mirrored.right_mm, -seen.left_mm, atol=ROUNDING_MM)
+
+
+@pytest.mark.parametrize("name", [name for name in NAMES if catalogue()[name].needs_times])
+def test_without_times_it_is_excluded_with_the_reason(name: str) -> None:
+    assert "no time_s" in str(catalogue()[name].search(replace(bench(), time_s=None)))
+
+
+def test_play_is_its_full_width_between_the_branches() -> None:
+    chain = MeasuringChain(MODEL, bench(), {})
+    gap = chain.respond({"backlash": {"play_mm": 0.04}}).gap_mm
+    bare = chain.respond({}).gap_mm
+    assert gap[100] - bare[100] == pytest.approx(-0.02 * 7.7, abs=ROUNDING_MM)
+    assert gap[200] - bare[200] == pytest.approx(0.02 * 7.7, abs=ROUNDING_MM)
+
+
+def test_creep_reaches_the_simulation_under_a_held_input() -> None:
+    time = np.arange(0.0, 40.0, 0.04)
+    u = np.where(time > 0.02, 1.0, 0.0)
+    history = replace(bench(), input_mm=u, time_s=time, runs=(slice(0, u.size),))
+    settings = {"fraction_1s": 0.2, "fraction_4s": 0.0, "fraction_16s": 0.0, "fraction_64s": 0.0}
+    gap = MeasuringChain(MODEL, history, {}).respond({"viscoelastic_creep": settings}).gap_mm
+    # The step is a ramp over one sample, whose low-pass lags by half of it.
+    expected = 11.7 - 0.2 * 7.7 * np.exp(-(time[1:] - 0.02) / 1.0)
+    np.testing.assert_allclose(gap[1:], expected, atol=1e-3)
+
+
+def test_resonance_rings_at_its_frequency_and_dies_with_its_damping() -> None:
+    time = np.arange(0.0, 4.0, 0.01)
+    u = np.where(time > 0.005, 1.0, 0.0)
+    history = replace(bench(), input_mm=u, time_s=time, runs=(slice(0, u.size),))
+    gap = (
+        MeasuringChain(MODEL, history, {})
+        .respond({"structural_resonance": {"frequency_hz": 2.0, "damping_ratio": 0.05}})
+        .gap_mm
+    )
+    peaks = [i for i in range(1, gap.size - 1) if gap[i - 1] < gap[i] > gap[i + 1]]
+    assert np.mean(np.diff(time[peaks])) == pytest.approx(0.5 / np.sqrt(1.0 - 0.05**2), abs=0.01)
+    over = gap[peaks] - 11.7
+    assert over[1] / over[0] == pytest.approx(np.exp(-2.0 * np.pi * 0.05 / np.sqrt(1.0 - 0.05**2)), rel=0.01)
