@@ -49,14 +49,12 @@ def _names(spoken: Any) -> frozenset[str]:
     return frozenset(spoken)
 
 
-def separated_pair(answer: Answer) -> tuple[frozenset[str], frozenset[str]] | None:
-    """The two explanations that the proposed run is meant to separate."""
+def separated(answer: Answer) -> list[frozenset[str]]:
+    """The explanations that the proposed run is meant to separate from one another."""
     spoken = (answer.report.get("next_run") or {}).get("separates") or []
-    if len(spoken) == 2 and not any(isinstance(s, list) and s and isinstance(s[0], list) for s in spoken):
-        return _names(spoken[0]), _names(spoken[1])
-    if spoken and isinstance(spoken[0], list) and len(spoken[0]) == 2:
-        return _names(spoken[0][0]), _names(spoken[0][1])
-    return (answer.sets[0], answer.sets[1]) if len(answer.sets) > 1 else None
+    if spoken and isinstance(spoken[0], list) and spoken[0] and isinstance(spoken[0][0], list):
+        spoken = spoken[0]
+    return [_names(s) for s in spoken] or list(answer.sets)
 
 
 def _joined(table: JudgedTable, runs: list[tuple[Trace, int]]) -> tuple[Problem, Curve]:
@@ -78,29 +76,36 @@ def gain_that_came(table: JudgedTable, answer: Answer) -> Gain | None:
 
     None where nothing was promised, nothing was to be separated, or the recipe asks for more than motion.
     """
-    promise, pair = promise_of(answer.report), separated_pair(answer)
-    if promise is None or pair is None:
-        return None
+    promise, apart = promise_of(answer.report), separated(answer)
     own = frozenset(h.name for h in table.experiment.plant.hidden)
-    if own not in pair:
+    if promise is None or own not in apart or len(apart) < 2:
         return None
-    rival = pair[0] if pair[1] == own else pair[1]
+    rivals = [names for names in apart if names != own]
     path = table.folder / "diagnosis" / answer.report["next_run"]["recipe"]
     old = [(trace, k) for k, trace in enumerate(table.experiment.traces())]
     new = [(trace, 100 + k) for k, trace in enumerate(drive_recipe(table.experiment, path))]
-    between = []
-    for runs in (old, old + new):
-        problem, target = _joined(table, runs)
-        known = known_effects(table.experiment, problem)
-        distances = []
-        for names in (own, rival):
-            chosen = [c for c in known if c.name in names]
-            begins = [[c.starts[len(c.starts) // 2] for c in chosen]]
-            if names == own:
-                begins.append([table.judgement.effects[c.name] for c in chosen])
-            if names == frozenset(e["name"] for e in answer.report["effects"]):
-                values = reported_effects(answer.report, known)
-                begins.append([values[c.name] for c in chosen])
-            distances.append(min(fit(problem, target, chosen, begin, 80).distance for begin in begins))
-        between.append(distances[1] - distances[0])
-    return Gain(*promise, between[1] - between[0])
+    before = _advantage(table, answer, own, rivals, old)
+    after = _advantage(table, answer, own, rivals, old + new)
+    return Gain(*promise, min(b - a for a, b in zip(before, after, strict=True)))
+
+
+def _advantage(
+    table: JudgedTable,
+    answer: Answer,
+    own: frozenset[str],
+    rivals: list[frozenset[str]],
+    runs: list[tuple[Trace, int]],
+) -> list[float]:
+    """Chi-square by which what is hidden fits noisy runs better than each rival."""
+    problem, target = _joined(table, runs)
+    known = known_effects(table.experiment, problem)
+    reported = reported_effects(answer.report, known)
+    distances = []
+    for names in (own, *rivals):
+        chosen = [c for c in known if c.name in names]
+        begins = [[c.starts[k * (len(c.starts) - 1) // 3] for c in chosen] for k in range(4)]
+        for values in (table.judgement.effects, reported):
+            if names == frozenset(values):
+                begins.append([values[c.name] for c in chosen])  # noqa: PERF401 - reads as the loop it is
+        distances.append(min(fit(problem, target, chosen, begin, 80).distance for begin in begins))
+    return [rival - distances[0] for rival in distances[1:]]

@@ -33,18 +33,13 @@ def _motion(step: dict[str, Any], now_mm: float, closed_mm: float) -> Motion:
 
 
 def motions_of(path: Path, closed_mm: float) -> list[Motion]:
-    """One motion for each run of a recipe; `rezero` begins another run."""
+    """The runs of a recipe: one, for what would begin another (`rezero`) has no stand-in."""
     recipe = tomllib.loads(path.read_text(encoding="utf-8"))
-    runs: list[Motion] = []
     motion: Motion | None = None
     for step in recipe["step"]:
-        if step["kind"] == "rezero":
-            runs += [motion] if motion else []
-            motion = None
-            continue
         more = _motion(step, motion.position_mm[-1] if motion else 0.0, closed_mm)
         motion = more if motion is None else motion.then(more)
-    return runs + ([motion] if motion else [])
+    return [motion] if motion else []
 
 
 def drive_recipe(experiment: Experiment, path: Path) -> list[Trace]:

@@ -128,6 +128,9 @@ def report_of(method: str, results: dict[str, list[dict[str, object]]]) -> list[
     if gains:
         lines.append(f"proposed run, promises of 75 and more: within 0.7-1.3 {Rate(sum(large), len(large))}")
         lines.append(f"proposed run, smaller promises: interval holds {Rate(sum(small), len(small))}")
+    apart = sum("not_driven" in r for r in every)
+    if apart:
+        lines.append(f"proposed run, recipes without a stand-in here: {apart}")
     seconds = [float(r["seconds"]) for r in every if r.get("seconds")]  # type: ignore[arg-type]
     if seconds:
         lines.append(f"seconds a table: median {np.median(seconds):.1f}, largest {max(seconds):.1f}")
