@@ -41,7 +41,7 @@ def half_frame(gripper: Gripper, skeleton: Skeleton) -> DrivenBody:
     face = np.array([3 * (skeleton.corner + 1), 3 * (skeleton.heel + 1)])
     return DrivenBody(
         stiffness_n_mm=frame.stiffness_n_mm(),
-        mass_t=_mass_t(nodes, ends, skeleton),
+        assemble_mass=lambda: _mass_t(nodes, ends, skeleton),
         tangent=frame.internal_force_n,
         driven=driven,
         free=np.setdiff1d(np.arange(frame.unknowns), [*held, *driven]),

@@ -48,7 +48,7 @@ def half_plate(gripper: Gripper, plate: PlaneStressPlate) -> DrivenBody:
     nodes, weights = _measuring_point(gripper, plate, edges)
     return DrivenBody(
         stiffness_n_mm=plate.stiffness_n_mm,
-        mass_t=plate.mass_t,
+        assemble_mass=lambda: plate.mass_t,
         tangent=plate.internal_force_n,
         driven=moved,
         free=np.setdiff1d(np.arange(plate.unknowns), np.concatenate([held, moved])),

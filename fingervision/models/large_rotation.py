@@ -2,10 +2,9 @@
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse.linalg import splu
 
 from fingervision.domain.errors import FingervisionError
-from fingervision.models.driven_body import DrivenBody, Equilibrium
+from fingervision.models.driven_body import DrivenBody, Equilibrium, factorised
 
 _NEWTON_STEPS = 15
 _SET_CHANGES = 12
@@ -62,7 +61,7 @@ def _newton(
         if np.abs(internal[free]).max() < _RESIDUAL * scale_n and np.abs(step).max() < _ON_MM:
             return moved, internal
         rhs = -(internal + tangent @ step)[free]
-        step[free] = splu(tangent[free][:, free].tocsc()).solve(rhs)
+        step[free] = factorised(tangent[free][:, free]).solve(rhs)
         moved = moved + step
     raise FingervisionError(
         f"The large-rotation equilibrium at an input of {input_mm:g} mm was not found in {_NEWTON_STEPS} steps; "

@@ -119,3 +119,35 @@ def test_cantilever_modes() -> None:
     expected = (beta / length) ** 2 * np.sqrt(1000.0 * height**2 / (12.0 * STEEL.density_t_mm3))
     # Slender: shear and rotational inertia lower the third by 0.1 %.
     assert np.sqrt(squared) == pytest.approx(expected, rel=2e-3)
+
+
+def test_elliptic_membrane() -> None:
+    """NAFEMS LE1 (Standard Benchmarks, R0015, 1990): 92.7 MPa at the inner ellipse's end.
+
+    Geometry, load and value as given by Altair OptiStruct's verification OS-V: 0010 and femorph-solver's gallery, both
+    public. The edge at that point is free, so that the von Mises stress is the stress along it.
+    """
+    material, thickness = Material("steel", 210e3, 0.3, 7800.0, 1.0), 0.1
+    grid = rectangle(1.0, 1.0, 72, 72)
+    s, t = grid.nodes_mm[0], grid.nodes_mm[1] * np.pi / 2
+    place = np.stack([(2.0 + 1.25 * s) * np.cos(t), (1.0 + 1.75 * s) * np.sin(t)])
+    plate = PlaneStressPlate(PlaneMesh(place, grid.triangles), material, thickness)
+    x, y = plate.nodes_mm
+    load = np.zeros(plate.unknowns)
+    outer = (x / 3.25) ** 2 + (y / 2.75) ** 2 > 1.0 - 1e-6
+    edges = plate.outline_edges
+    points, weights = np.polynomial.legendre.leggauss(3)
+    for edge in edges[:, np.all(outer[edges], axis=0)].T:
+        for q, weight in zip(points, weights, strict=True):
+            shape = np.array([q * (q - 1) / 2, q * (q + 1) / 2, 1 - q * q])
+            slope = np.array([q - 0.5, q + 0.5, -2 * q])
+            normal = np.array([slope @ y[edge], -(slope @ x[edge])])
+            normal *= np.sign(normal @ [shape @ x[edge], shape @ y[edge]])
+            load[plate.x_dofs[edge]] += 10.0 * thickness * weight * shape * normal[0]
+            load[plate.y_dofs[edge]] += 10.0 * thickness * weight * shape * normal[1]
+    held = np.concatenate([plate.x_dofs[x < 1e-9], plate.y_dofs[y < 1e-9]])
+    stress = plate.von_mises_mpa(solve(plate, held, np.zeros(held.size), load))
+    corners = plate.at_corners(stress)
+    at_d = np.argmin(np.hypot(x[: corners.size] - 2.0, y[: corners.size]))
+    # The value is printed with three digits.
+    assert corners[at_d] == pytest.approx(92.7, rel=3e-3)
