@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from fingervision.domain.gripper import Gripper
 from fingervision.domain.response import Response
 from fingervision.models.answer_figures import ModelFigures, PeakStress
+from fingervision.models.covered_inputs import covered_inputs_mm
 from fingervision.models.half_plate import half_plate
 from fingervision.models.hinge_correction import HingeTheory
 from fingervision.models.mesh_outline import PlaneMesh, notch_centres_mm
@@ -51,6 +52,11 @@ class FiniteElementGripper:
         self.physics = physics
         self.plate = PlaneStressPlate(mesh or mesh_of(gripper), gripper.material, gripper.body.plate_mm)
         self.half = half_plate(gripper, self.plate)
+
+    @property
+    def input_range_mm(self) -> tuple[float, float]:
+        """Smallest and largest input that the model is meant for."""
+        return covered_inputs_mm(self.gripper, self.half.first_touch_mm())
 
     @property
     def rest_gap_mm(self) -> float:

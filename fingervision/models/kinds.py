@@ -22,6 +22,11 @@ class GripperModel(Model, Protocol):
         ...
 
     @property
+    def input_range_mm(self) -> tuple[float, float]:
+        """Smallest and largest input that the model is meant for."""
+        ...
+
+    @property
     def rest_gap_mm(self) -> float:
         """The gap at input zero."""
         ...

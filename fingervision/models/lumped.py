@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from fingervision.domain.gripper import Gripper
 from fingervision.domain.response import Response
 from fingervision.models.answer_figures import ModelFigures
+from fingervision.models.covered_inputs import covered_inputs_mm
 from fingervision.models.half_frame import half_frame
 from fingervision.models.hinge_correction import HingeTheory
 from fingervision.models.physics import LINEAR, Physics
@@ -49,6 +50,11 @@ class LumpedGripper:
         self.gripper = gripper
         self.physics = physics
         self.half = half_frame(gripper, skeleton_of(gripper, theory, segments))
+
+    @property
+    def input_range_mm(self) -> tuple[float, float]:
+        """Smallest and largest input that the model is meant for."""
+        return covered_inputs_mm(self.gripper, self.half.first_touch_mm())
 
     @property
     def rest_gap_mm(self) -> float:

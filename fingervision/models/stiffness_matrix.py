@@ -23,6 +23,7 @@ from fingervision.domain.gripper import Gripper
 from fingervision.domain.response import Response
 from fingervision.models.answer_figures import ModelFigures
 from fingervision.models.compliance_chain import ComplianceChain
+from fingervision.models.covered_inputs import covered_inputs_mm
 from fingervision.models.hinge_correction import HingeTheory
 from fingervision.models.physics import LINEAR, Physics
 from fingervision.models.skeleton import skeleton_of
@@ -57,6 +58,11 @@ class StiffnessMatrixGripper:
         self.gripper = gripper
         self.skeleton = skeleton_of(gripper, theory, 0, rigid_links=rigid_links)
         self._chain = ComplianceChain(self.skeleton)
+
+    @property
+    def input_range_mm(self) -> tuple[float, float]:
+        """Smallest and largest input that the model is meant for."""
+        return covered_inputs_mm(self.gripper, self.first_touch_mm())
 
     @property
     def rest_gap_mm(self) -> float:

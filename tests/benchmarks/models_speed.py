@@ -19,7 +19,7 @@ REPEATS = 5
 
 
 def main() -> None:
-    """Print the median of five runs of each: seconds on the clock, and of the processor (on a machine that others use)."""
+    """Print the median of five runs of each: seconds on the clock, and of the processor (if others use it too)."""
     gripper = read_gripper(GRIPPER)
     time_s = np.arange(0.0, 60.0, 0.04)
     inputs = np.interp(time_s, [0.0, 20.0, 40.0, 60.0], [0.0, 1.5, -0.4, 1.0])
