@@ -8,6 +8,8 @@ from scipy.optimize import minimize
 from fingervision.domain.effect import Array, Flags
 
 OUTLIER_SIGMAS = 4.5
+SLOW = 0.04
+"""Cycles per sample below which structure of the gripper may hide."""
 LINE = 9.0
 """A periodogram value this many times its expectation is a line, not noise."""
 
@@ -41,7 +43,9 @@ def gate(residual: Array, runs: tuple[slice, ...], ordered: bool) -> Flags:
             rest[run] = values - np.median(windows, axis=1)
         else:
             rest[run] = values - np.median(values)
-    sigma = 1.4826 * float(np.median(np.abs(rest)))
+    # Whole pixels leave many residuals at exactly zero: the 90 % point sees what the median then misses.
+    middle, far = np.quantile(np.abs(rest), (0.5, 0.9))
+    sigma = max(1.4826 * float(middle), float(far) / 1.645)
     if sigma > 0.0:
         # A real reversal moves neighbours too; an outlier stands alone or in pairs.
         out = np.abs(rest) > OUTLIER_SIGMAS * sigma
@@ -87,7 +91,7 @@ def estimate_noise(
         taper = np.hanning(count + 2)[1:-1]
         power = np.abs(np.fft.rfft((values - line(np.arange(count))) * taper)) ** 2 / np.sum(taper**2)
         frequency = np.fft.rfftfreq(count)
-        used = frequency > max(min(1.0 / rate_hz, 0.1), 0.04, 2.5 / count)
+        used = frequency > max(min(1.0 / rate_hz, SLOW), 2.5 / count)
         angles.append(2.0 * np.pi * frequency[used])
         powers.append(power[used])
     angle, power = np.concatenate(angles), np.concatenate(powers)
@@ -106,8 +110,12 @@ def estimate_noise(
 
     best = None
     for _ in range(3):
-        begin = np.log([0.7 * start, 0.3 * start, np.e**0.5]) if best is None else best
-        best = minimize(cost, begin, method="Nelder-Mead", options={"maxiter": 150, "xatol": 0.02, "fatol": 0.05}).x
+        first = [np.array([np.log(0.6 * start), np.log(0.6 * start), p]) for p in (-1.0, 1.5)]
+        tries = [
+            minimize(cost, begin, method="Nelder-Mead", options={"maxiter": 200, "xatol": 0.02, "fatol": 0.02})
+            for begin in (first if best is None else [best])
+        ]
+        best = min(tries, key=lambda found: float(found.fun)).x
         keep = power < LINE * spectrum(best)
         if np.array_equal(keep, use):
             break

@@ -60,7 +60,7 @@ def _null_maximum(problem: Problem, columns: Array, sigma: tuple[float, ...], rn
     gains = (kept.T[usable] @ noise) ** 2 / norm[usable, None]
     quantile = float(np.quantile(gains.max(axis=0), QUANTILE))
     # The noise itself is estimated, from as many samples as there are.
-    return quantile * (1.0 + 4.0 * float(np.sqrt(2.0 / columns.shape[0]))) + 3.0
+    return quantile * (1.0 + 3.0 * float(np.sqrt(2.0 / columns.shape[0]))) + 1.5
 
 
 def _singles(problem: Problem, atoms: Signatures, iterations: int) -> list[Explanation]:
