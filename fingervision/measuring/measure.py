@@ -205,13 +205,19 @@ def _outcomes(
 ) -> Iterator[tuple[Frame | LostFrame, GapMeasurement | NoGap | LostFrame]]:
     """Every frame with what it says; the decoder runs ahead and is stopped when this is."""
     with closing(decoded_ahead(source)) as frames:
-        while together := list(islice(frames, FRAMES_TOGETHER)):
-            whole = [item for item in together if isinstance(item, Frame)]
-            measured = iter(measure_frames(whole, task.settings))
+        interruption: KeyboardInterrupt | None = None
+        while interruption is None:
+            together: list[Frame | LostFrame] = []
+            try:
+                together.extend(islice(frames, FRAMES_TOGETHER))
+                if not together:
+                    return
+            except KeyboardInterrupt as error:  # what has come is measured first
+                interruption = error
+            measured = iter(measure_frames([item for item in together if isinstance(item, Frame)], task.settings))
             for item in together:
                 yield item, (next(measured) if isinstance(item, Frame) else item)
-
-
+        raise interruption
 def _check(task: Task, description: Description) -> None:
     """Refuse what cannot be meant for these frames."""
     width_px, height_px = description.width_px, description.height_px

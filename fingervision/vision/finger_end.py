@@ -27,6 +27,8 @@ BIWEIGHT_REACH = 4.685
 # How often the outline is looked at anew, and how many times the biweight's own reach a residual may have in the steps
 # of each look: the first forgive what the first guess got wrong, only the last tell dust from shape.
 PASSES = ((100.0,), (10.0, 10.0), (1.5, 1.0), (1.0, 1.0))
+# A shape whose residuals spread over more than so many sigma is no shape.
+WORST_MISFIT = 1e3
 # Fillets below so many sigma are sharp corners in the picture, which say nothing within so many sigma.
 SHARP_IN_BLURS, SHARP_REACH = 1.5, 2.0
 
@@ -245,7 +247,7 @@ def fit_finger_ends(points: OutlinePoints, start: Floats, origin: Floats, u_prio
         move = np.zeros_like(p)
         for patience in patiences:
             residual = distance + (turned @ move[..., None])[..., 0]
-            misfit = np.maximum(_spread(residual, counted), 1.0)
+            misfit = np.clip(_spread(residual, counted), 1.0, WORST_MISFIT)
             cut = residual * (1.0 / (BIWEIGHT_REACH * patience * misfit))[:, None]
             robust = counted * np.maximum(1.0 - cut * cut, 0.0) ** 2
             scaled = jacobian * robust[:, None, :]
