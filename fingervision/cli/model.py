@@ -62,7 +62,7 @@ def command(
     wanted = kinds() if kind == "all" else (kind,)
     physics = Physics(large_rotation=large_rotation, contact=contact)
     given = None if drive is None else _inputs_mm(drive, gripper)
-    out.mkdir(parents=True, exist_ok=True)
+    _make_folder(out)
     rows: dict[str, dict[str, Any]] = {}
     answers: dict[str, Response] = {}
     inputs = given
@@ -85,6 +85,17 @@ def command(
         _draw_models(gripper, inputs, answers, out / "models.png")
     _write_table(rows, out / "models.csv")
     _print_table(rows, as_json=as_json)
+
+
+def _make_folder(out: Path) -> None:
+    from fingervision.domain.errors import FingervisionError
+
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise FingervisionError(
+            f"--out must be a folder that can be written, but {out} is not: {error.strerror}."
+        ) from error
 
 
 def _inputs_mm(drive: Path, gripper: "Gripper") -> "NDArray[np.float64]":

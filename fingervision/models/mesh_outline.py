@@ -96,6 +96,13 @@ def mesh_outline(gripper: Gripper, size: ElementSize) -> PlaneMesh:
         gmsh.model.mesh.generate(2)
         gmsh.model.mesh.setOrder(2)
         return _read(gmsh.model.mesh)
+    except FingervisionError:
+        raise
+    except Exception as error:
+        # gmsh raises the bare class, with a sentence of its own.
+        raise FingervisionError(
+            f"gmsh could not mesh the right half: {error}; check the links."
+        ) from error
     finally:
         gmsh.finalize()
 

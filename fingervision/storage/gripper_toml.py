@@ -148,11 +148,42 @@ def _check(gripper: Gripper, origin: str) -> None:
     drawn = (lever.hinge2_mm[0] - lever.l4_mm, lever.hinge2_mm[1] - lever.l3_mm)
     _must_meet("lever.drive_mm", lever.drive_mm, "hinge 2 less (l4, l3)", drawn, origin)
     _must_meet("links.shuttle_from_mm", links.shuttle_from_mm, "lever.drive_mm", lever.drive_mm, origin)
+    _check_links(gripper, origin)
     inner_mm = gripper.tip_corner_mm[0]
     if abs(2.0 * inner_mm - body.rest_gap_mm) > _MEET_MM:
         raise FingervisionError(
             f"The tip's inner face in {origin} must lie at half of body.rest_gap_mm, {body.rest_gap_mm / 2.0:g} mm, "
             f"but lies at {inner_mm:g} mm."
+        )
+
+
+def _check_links(gripper: Gripper, origin: str) -> None:
+    """Refuse links without extent, from which no model can be made."""
+    links = gripper.links
+    for name in ("pillar_and_root_mm", "drive_block_mm"):
+        x0, x1, y0, y1 = getattr(links, name)
+        if not (x1 > x0 and y1 > y0):
+            raise FingervisionError(
+                f"links.{name} in {origin} must be x from, x to, y from, y to, both growing, "
+                f"but is [{x0:g}, {x1:g}, {y0:g}, {y1:g}]."
+            )
+    shuttle = (*links.shuttle_from_mm, *links.shuttle_to_mm)
+    for name, (x0, y0, x1, y1) in (("shuttle_to_mm", shuttle), ("finger_mm", links.finger_mm)):
+        if x0 == x1 or not y1 > y0:
+            raise FingervisionError(
+                f"links.{name} in {origin} must end beside and above the bar's beginning at ({x0:g}, {y0:g}), "
+                f"but ends at ({x1:g}, {y1:g})."
+            )
+    if links.cross_bar_mm[0] == links.cross_bar_mm[2]:
+        raise FingervisionError(f"links.cross_bar_mm in {origin} must reach across, but begins and ends at one x.")
+    if len(set(links.tip_polygon_mm)) < len(links.tip_polygon_mm):
+        raise FingervisionError(
+            f"links.tip_polygon_mm in {origin} must be different points, but one stands there twice."
+        )
+    if not gripper.tip_corner_mm[1] > gripper.tip_heel_mm[1]:
+        raise FingervisionError(
+            f"links.tip_polygon_mm in {origin} must have an upright inner face, but its smallest x, "
+            f"{gripper.tip_corner_mm[0]:g} mm, is that of a single point."
         )
 
 

@@ -65,6 +65,14 @@ def test_the_stiffness_matrix_knows_small_displacements_alone(tmp_path: Path) ->
         run(GRIPPER, "--kind", "stiffness_matrix", "--large-rotation", "--out", tmp_path)
 
 
+def test_a_file_where_the_folder_should_be(tmp_path: Path) -> None:
+    (tmp_path / "o").write_text("")
+    with pytest.raises(
+        FingervisionError, match=r"--out must be a folder that can be written, but .* is not: File exists"
+    ):
+        run(GRIPPER, "--kind", "lumped", "--out", tmp_path / "o")
+
+
 def test_a_missing_gripper_is_one_sentence(tmp_path: Path) -> None:
     with pytest.raises(FingervisionError, match="There is no gripper"):
         run(tmp_path / "none.toml")

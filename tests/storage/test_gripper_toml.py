@@ -47,6 +47,13 @@ def test_an_uncertainty_may_stand_beside_a_number() -> None:
         ({"links__finger_mm": [1.0, 2.0]}, "links.finger_mm in g must be a list of 4 numbers, but is [1.0, 2.0]."),
         ({"body__rest_gap_mm": 5.0}, "must lie at half of body.rest_gap_mm, 2.5 mm, but lies at 2 mm"),
         ({"body__height_mm": 0.1}, "but is 0.1; are its lengths in metres?"),
+        (
+            {"links__shuttle_to_mm": [0.0, 10.57]},
+            "must end beside and above the bar's beginning at (0, 10.57), but ends",
+        ),
+        ({"links__drive_block_mm": [7.0, 0.0, 2.57, 18.57]}, "both growing, but is [7, 0, 2.57, 18.57]."),
+        ({"links__tip_polygon_mm": [[2.0, 100.0]] * 3}, "must be different points, but one stands there twice"),
+        ({"links__tip_polygon_mm": [[2.0, 100.0], [6.0, 80.0], [9.0, 100.0]]}, "must have an upright inner face"),
         ({"hinge__radius_mm": {"value": 4.0}}, "must be a number or {value = ..., u = ...}, but has the keys value."),
         ({"hinge__radius_mm": {"value": 4.0, "u": -1.0}}, "must not be negative, but is -1"),
     ],
