@@ -5,14 +5,17 @@ hold what a change must not break. Seeds are other than those used while buildin
 """
 
 import ast
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from tests.benchmarks.hidden.diagnose_adapter import diagnose
 from tests.benchmarks.hidden.experiment import Experiment, Row, draw_experiment, edges, remaining_rms_mm, run_of
 from tests.benchmarks.hidden.oracle import judge
 from tests.benchmarks.hidden.rows import ROWS
+from tests.benchmarks.hidden.score import mark
 from tests.benchmarks.hidden.table_cache import draw_table_of_row
 
 SEED = 5001
@@ -45,8 +48,6 @@ def test_the_imported_command_is_the_only_door() -> None:
 
 
 def _signal_ratio(experiment: Experiment) -> float:
-    from dataclasses import replace
-
     bare = replace(experiment, plant=replace(experiment.plant, hidden=(), foreign=None))
     traces = experiment.traces()
     return remaining_rms_mm(edges(traces) - edges(bare.traces()), run_of(traces)) / experiment.noise.edge_mm
@@ -89,3 +90,17 @@ def test_the_same_seed_gives_the_same_files(tmp_path: Path) -> None:
         draw_table_of_row(ROWS["poor"], SEED, 1, tmp_path / folder)
     for name in ("measured.csv", "simulation.csv", "truth.json", "right.json"):
         assert (tmp_path / "a" / name).read_bytes() == (tmp_path / "b" / name).read_bytes()
+
+
+# Poor runs are left to the benchmark: there the answer is a set whose edge moves with the noise.
+QUESTIONS = [("null", 1), ("null", 2), ("single_3", 1), ("single_3", 2), ("outside", 1),
+             ("outside", 2), ("pair_3", 1)]  # fmt: skip
+
+
+@pytest.mark.parametrize(("row", "number"), QUESTIONS)
+def test_diagnose_answers_as_the_judge_does(row: str, number: int, tmp_path: Path) -> None:
+    table = draw_table_of_row(ROWS[row], SEED, number, tmp_path)
+    hidden = frozenset(h.name for h in table.experiment.plant.hidden)
+    answer = diagnose(table.folder)
+    marked = mark(ROWS[row], table.judgement, answer, hidden)
+    assert marked.right, f"hidden {sorted(hidden)}, said {answer.verdict} {answer.sets}, right {table.judgement}"
