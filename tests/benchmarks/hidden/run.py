@@ -151,6 +151,12 @@ def main() -> None:
     options.add_argument("--misses", type=Path, help="folder that gets a copy of every table that diagnose missed")
     chosen = options.parse_args()
     rows, methods = chosen.rows.split(","), chosen.methods.split(",")
+    for what, asked, there in (("rows", rows, ROWS), ("methods", methods, METHODS)):
+        unknown = [name for name in asked if name not in there]
+        if unknown:
+            options.error(f"--{what} must be of {', '.join(there)}, but has {', '.join(unknown)}.")
+    if chosen.tables < 1 or chosen.jobs < 1:
+        options.error(f"--tables and --jobs must be at least 1, but are {chosen.tables} and {chosen.jobs}.")
     begun = time.perf_counter()
     tasks = [
         Task(row, index, chosen.seed, method, chosen.out)
