@@ -100,9 +100,7 @@ def mesh_outline(gripper: Gripper, size: ElementSize) -> PlaneMesh:
         raise
     except Exception as error:
         # gmsh raises the bare class, with a sentence of its own.
-        raise FingervisionError(
-            f"gmsh could not mesh the right half: {error}; check the links."
-        ) from error
+        raise FingervisionError(f"gmsh could not mesh the right half: {error}; check the links.") from error
     finally:
         gmsh.finalize()
 
