@@ -24,6 +24,7 @@ SHOWN_FRAME = 75
 
 
 def main() -> None:
+    """Measure the clip and draw."""
     frames = [item for item in islice(VideoFile(str(CASE / "opening.mp4")), 300) if isinstance(item, Frame)]
     outcomes = measure_frames(frames, Settings(below_tip_px=0.3 * PX_PER_MM))
     ok = [(f, m) for f, m in zip(frames, outcomes, strict=True) if isinstance(m, GapMeasurement)]
