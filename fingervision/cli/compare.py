@@ -33,8 +33,7 @@ def command(measured: Path, model_path: Path, out: Path, seed: int, kind: str, a
     from fingervision.storage.measured_table import read_measured_table
     from fingervision.storage.model_toml import read_model
 
-    del kind
-    found = compare(read_measured_table(measured), read_model(model_path), seed=seed)
+    found = compare(read_measured_table(measured), read_model(model_path, kind), seed=seed)
     out.mkdir(parents=True, exist_ok=True)
     document = found.document()
     (out / "compare.json").write_text(json.dumps(document, indent=2, allow_nan=False) + "\n", encoding="utf-8")

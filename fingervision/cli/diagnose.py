@@ -54,7 +54,6 @@ def command(
     from fingervision.storage.recipe_toml import write_recipe
     from fingervision.storage.report_json import report_document, write_report
 
-    del kind
     for name in (*forced, *without):
         if name not in catalogue():
             near = get_close_matches(name, catalogue(), n=1)
@@ -62,7 +61,7 @@ def command(
             raise UsageError(f"An effect must be one of the catalogue, but is {name}: {hint}")
     if set(forced) & set(without):
         raise UsageError(f"An effect must be forced or left out, but {', '.join(set(forced) & set(without))} is both.")
-    table, model = read_measured_table(measured), read_model(model_path)
+    table, model = read_measured_table(measured), read_model(model_path, kind)
     with click.progressbar(length=1000, label="diagnosing", file=sys.stderr, hidden=not sys.stderr.isatty()) as bar:
         done = diagnose(
             table,
@@ -76,7 +75,7 @@ def command(
     out.mkdir(parents=True, exist_ok=True)
     effects = {name: dict(values) for name, values in model.effects.items()}
     effects |= {effect.name: dict(effect.parameters) for effect in report.effects}
-    write_model(out / "model.toml", Path(model.base_path), effects)
+    write_model(out / "model.toml", Path(model.base_path), effects, model.kind)
     if report.next_run is not None:
         write_recipe(out / "next_run.toml", report.next_run.name, report.next_run.steps)
     document = report_document(report, "model.toml", "next_run.toml" if report.next_run else None)

@@ -17,6 +17,10 @@ from fingervision.domain.response import Response
 from fingervision.models.corrected import CorrectedModel
 
 HELD_SAMPLES = 15
+SHORT = 100
+"""Samples below which nothing is set aside before something was explained."""
+OUTLIER_SIGMAS, RAW_SIGMAS = 4.5, 7.0
+"""Limits on the residual of the best explanation, and on the raw one, where effects still stand out themselves."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -62,17 +66,18 @@ class BenchData:
         history = self.chain.history
         return ("gap", *(["midline"] if history.both_edges else []), *(["force"] if history.force else []))
 
-    def problem(self, residual_mm: Array, degrees: int) -> Problem:
+    def problem(self, residual_mm: Array, degrees: int, *, explained: bool) -> Problem:
         """Estimate outliers and noise from a residual and whiten the measurement with them."""
         history = self.chain.history
         n, timed = history.input_mm.size, history.time_s is not None
+        sigmas = OUTLIER_SIGMAS if explained else None if timed and n < SHORT else RAW_SIGMAS
         rate = 1.0 / history.sample_time_s if timed else None
         floor = 0.0 if self.table.u_random_mm is None else float(np.median(self.table.u_random_mm))
         noises: list[Noise] = []
         aside: list[Flags] = []
         for channel in range(len(self.channels)):
             part = residual_mm[channel * n : (channel + 1) * n]
-            out = gate(part, history.runs, timed) | self.distrusted
+            out = gate(part, history.runs, timed, sigmas) | self.distrusted
             aside.append(out)
             share = (floor, 0.5 * floor, 0.0)[("gap", "midline", "force").index(self.channels[channel])]
             noises.append(estimate_noise(part, history.runs, rate, out, share, degrees))

@@ -62,7 +62,7 @@ def compare(table: MeasuredTable, model: CorrectedModel, *, seed: int = 1) -> Co
     """Find where a measured table and a model disagree beyond the noise."""
     bench = prepare(table, model)
     residual = bench.stacked_mm - bench.chain.stacked({})
-    problem = bench.problem(residual, 0)
+    problem = bench.problem(residual, 0, explained=False)
     found = places(bench, problem, residual, np.random.default_rng(seed))
     history = bench.chain.history
     rms = rms_mm(residual, history.input_mm.size, history.both_edges)

@@ -97,7 +97,7 @@ def diagnose(
     def problem(explanation: Explanation | None) -> Problem:
         values = {} if explanation is None else explanation.values
         free = 0 if explanation is None else explanation.free
-        return bench.problem(bench.stacked_mm - bench.chain.stacked(values), free)
+        return bench.problem(bench.stacked_mm - bench.chain.stacked(values), free, explained=explanation is not None)
 
     found = search(problem, rng, forced, progress)
     best, history = found.best, bench.chain.history

@@ -14,6 +14,10 @@ Step = dict[str, object]
 SETTLE_MIN = 0.5
 """Minutes that any run costs beside its motion: starting, saving."""
 MOST_SAMPLES = 1500
+WORTH = 9.0
+"""Gain in chi-square above which two explanations count as separated."""
+ENOUGH = 50.0
+"""Separating a pair more surely than this is worth no further minute."""
 
 
 def _motion(step: Step, start: float, step_s: float) -> Array:
@@ -136,6 +140,12 @@ def _reference(best: Explanation, others: list[Explanation], sigma_mm: float) ->
     return None
 
 
+def _between(problem: Problem, best: Explanation, other: Explanation) -> float:
+    """Distance of the best explanation's prediction to another, over the other's parameters."""
+    target = problem.whitened(best.values)
+    return fit(problem, other.names, other.values, target=target, sigma_mm=best.sigma_mm, iterations=6).score
+
+
 def next_run(bench: BenchData, problem: Problem, best: Explanation, others: list[Explanation]) -> NextRun | None:
     """Choose the run that separates the worst open pair best, per minute of the rig's time.
 
@@ -164,8 +174,9 @@ def next_run(bench: BenchData, problem: Problem, best: Explanation, others: list
         spread = float(np.hypot(sigma / np.sqrt(10.0), max(best.sigma_mm[0], 1e-6)))
         gain = (difference / spread) ** 2
         steps = [*steps, *run] if steps[0]["kind"] == "rezero" else steps
-        found.append((gain / 1.5, gain, name, steps, names))
+        found.append((min(gain, ENOUGH) / 1.5, gain, name, steps, names))
     if bench.chain.history.time_s is not None:
+        already = [_between(problem, best, other) for other in others[:6]]
         step_s = bench.chain.history.sample_time_s
         for name, steps in protocols(low, high):
             at, parts = float(str(steps[0].get("from_mm", low))), []
@@ -177,21 +188,13 @@ def next_run(bench: BenchData, problem: Problem, best: Explanation, others: list
             if inputs.size > 4 * MOST_SAMPLES:
                 continue
             joined = _joined(bench, problem, inputs)
-            target = joined.whitened(best.values)
-            gains = [
-                fit(joined, other.names, other.values, target=target, sigma_mm=best.sigma_mm, iterations=5).score
-                for other in others[:4]
-            ]
-            separated = tuple("+".join(other.names) for other, gain in zip(others, gains, strict=False) if gain > 9.0)
-            found.append(
-                (
-                    min(gains) / minutes if min(gains) > 9.0 else 0.01 * max(gains) / minutes,
-                    max(gains),
-                    name,
-                    steps,
-                    ("+".join(best.names), *separated),
-                )
-            )
+            gains = [_between(joined, best, other) - known for other, known in zip(others[:6], already, strict=False)]
+            apart = [(o, gain) for o, gain in zip(others, gains, strict=False) if gain > WORTH]
+            if apart:
+                separated = tuple("+".join(other.names) for other, _ in apart)
+                worth = sum(min(gain, ENOUGH) for _, gain in apart) / minutes
+                least = min(gain for _, gain in apart)
+                found.append((worth, least, name, steps, ("+".join(best.names), *separated)))
     if not found:
         return None
     _, gain, name, steps, separates = max(found, key=lambda item: item[0])

@@ -7,7 +7,6 @@ from scipy.optimize import minimize
 
 from fingervision.domain.effect import Array, Flags
 
-OUTLIER_SIGMAS = 4.5
 SLOW = 0.04
 """Cycles per sample below which structure of the gripper may hide."""
 LINE = 9.0
@@ -28,12 +27,15 @@ class Noise:
         return float(np.hypot(self.white_mm, self.correlated_mm))
 
 
-def gate(residual: Array, runs: tuple[slice, ...], ordered: bool) -> Flags:
+def gate(residual: Array, runs: tuple[slice, ...], ordered: bool, sigmas: float | None) -> Flags:
     """Mark outliers against a running median; shape (n,), True where a value is to be set aside.
 
-    Without an order (no times) the median of all stands for the running one.
+    Without an order (no times) the median of all stands for the running one. `sigmas` is the limit; None sets nothing
+    aside: in a short record an effect that acts on a few samples looks like outliers until it is explained.
     """
     out = np.zeros(residual.size, dtype=bool)
+    if sigmas is None:
+        return out
     rest = residual.copy()
     for run in runs:
         values = residual[run]
@@ -48,7 +50,7 @@ def gate(residual: Array, runs: tuple[slice, ...], ordered: bool) -> Flags:
     sigma = max(1.4826 * float(middle), float(far) / 1.645)
     if sigma > 0.0:
         # A real reversal moves neighbours too; an outlier stands alone or in pairs.
-        out = np.abs(rest) > OUTLIER_SIGMAS * sigma
+        out = np.abs(rest) > sigmas * sigma
         for i in range(2, residual.size - 2):
             if ordered and out[i - 2 : i + 3].sum() >= 4:
                 out[i - 2 : i + 3] = False

@@ -24,6 +24,8 @@ SMALL_SHARE = 0.05
 TRIPLE_SHARE = 0.15
 """A third effect needs evidence of its own: three effects bend to almost anything."""
 PAIRS_REFITTED = 60
+SHORT = 100
+"""Samples below which the noise is estimated beside single effects only."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -162,7 +164,9 @@ def search(
     problem = bench_problem(None)
     atoms = signatures(problem)
     rough = _singles(problem, atoms, 4)
-    pairs = _extended(problem, atoms, rough[:3], 16, lambda _: None)
+    # A pair fitted to a few samples takes their noise with it, which would then be estimated too small.
+    many = problem.chain.history.input_mm.size >= SHORT
+    pairs = _extended(problem, atoms, rough[:3], 16, lambda _: None) if many else []
     first = [*rough[:1], *pairs[:1]]
     progress(0.15)
     if first:

@@ -23,6 +23,8 @@ class CorrectedModel:
         Inputs that the base covers.
     effects : mapping of str to mapping of str to Estimate
         Parameters of each effect.
+    kind : str or None
+        Kind of gripper model that the base was tabulated from; None for a simulation table.
     """
 
     name: str
@@ -30,3 +32,4 @@ class CorrectedModel:
     base_path: str
     input_range_mm: tuple[float, float]
     effects: Mapping[str, Mapping[str, Estimate]]
+    kind: str | None = None

@@ -5,14 +5,24 @@ import tomllib
 from collections.abc import Mapping
 from pathlib import Path
 
+import numpy as np
+
 from fingervision.domain.errors import FingervisionError
 from fingervision.domain.parameter import Estimate
 from fingervision.models.corrected import CorrectedModel
+from fingervision.models.hinge_correction import HingeTheory
+from fingervision.models.kinds import build_model, kinds
+from fingervision.models.physics import LINEAR
+from fingervision.models.table import TableModel
+from fingervision.storage.gripper_toml import read_gripper
 from fingervision.storage.simulation_table import read_simulation_table
 
+ROWS = 401
+"""Rows that a gripper is tabulated with; the linear models are straight lines, the others smooth."""
 
-def read_model(path: Path) -> CorrectedModel:
-    """Read a simulation table (without effects) or a corrected model.
+
+def read_model(path: Path, kind: str = "lumped") -> CorrectedModel:
+    """Read a simulation table or a gripper (without effects), or a corrected model.
 
     Raises
     ------
@@ -29,11 +39,8 @@ def read_model(path: Path) -> CorrectedModel:
     except (tomllib.TOMLDecodeError, UnicodeDecodeError, OSError) as error:
         raise FingervisionError(f"{path} must be a TOML file, but could not be read: {error}.") from error
     if "base" not in document:
-        raise FingervisionError(
-            f"{path} must be a corrected model with a key base, but has {', '.join(document) or 'nothing'}: "
-            "give a simulation table (.csv) or a model.toml."
-        )
-    base = read_model(path.parent / str(document["base"]))
+        return _gripper(path, kind)
+    base = read_model(path.parent / str(document["base"]), str(document.get("kind", kind)))
     effects: dict[str, Mapping[str, Estimate]] = dict(base.effects)
     for entry in document.get("effect", []):
         try:
@@ -46,13 +53,27 @@ def read_model(path: Path) -> CorrectedModel:
                 f"An effect in {path} must have a name and parameters like play_mm = {{ value = 0.01, u = 0.001 }}, "
                 f"but is {entry}: mend it."
             ) from error
-    return CorrectedModel(base.name, base.base, base.base_path, base.input_range_mm, effects)
+    return CorrectedModel(base.name, base.base, base.base_path, base.input_range_mm, effects, base.kind)
 
 
-def write_model(path: Path, base_path: Path, effects: Mapping[str, Mapping[str, Estimate]]) -> None:
+def _gripper(path: Path, kind: str) -> CorrectedModel:
+    """Tabulate a gripper's static answer once: the diagnosis asks for it thousands of times."""
+    if kind not in kinds():
+        raise FingervisionError(f"--kind must be one of {', '.join(kinds())}, but is {kind}: choose one.")
+    gripper = build_model(kind, read_gripper(path), LINEAR, HingeTheory.CORRECTED)
+    low, high = gripper.input_range_mm
+    inputs = np.linspace(low, high, ROWS)
+    answer = gripper.respond(inputs)
+    table = TableModel(f"{path.name} ({kind})", inputs, answer.left_mm, answer.right_mm, answer.force_n)
+    return CorrectedModel(table.name, table, str(path), (low, high), {}, kind)
+
+
+def write_model(
+    path: Path, base_path: Path, effects: Mapping[str, Mapping[str, Estimate]], kind: str | None = None
+) -> None:
     """Write a corrected model; the base is named relative to the file."""
     base = Path(os.path.relpath(base_path.resolve(), path.parent.resolve())).as_posix()
-    lines = ["schema = 1", f'base = "{base}"']
+    lines = ["schema = 1", f'base = "{base}"', *([f'kind = "{kind}"'] if kind else [])]
     for name, parameters in effects.items():
         lines += ["", "[[effect]]", f'name = "{name}"', "[effect.parameters]"]
         for key, estimate in parameters.items():
