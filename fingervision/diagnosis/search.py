@@ -190,21 +190,14 @@ def search(
             gained = best.score - triples[0].score if triples else 0.0
             if gained > threshold and _added(problem, best, triples[0]) > TRIPLE_SHARE:
                 best, peers = _choose(triples[:6], samples), triples
-    if forced and not forced <= set(best.names):
-        names = tuple(name for name in problem.effects if name in forced | set(best.names))
-        begin = {p: dict(v) for p, v in best.values.items()}
-        for name in names:
-            if name not in begin:
-                begin[name] = next((dict(s.values[name]) for s in singles if s.names == (name,)), {})
-        begin = {name: values for name, values in begin.items() if values}
-        best = fit(problem, tuple(begin), begin, iterations=20)
-        peers = [best]
+    if forced:
+        best = _insisted(problem, forced, [*singles, *pairs], singles, samples)
     progress(0.82)
     words, left = _gate(problem, best, rng)
     progress(0.9)
     alternatives, distances = (
         ([best], {})
-        if not best.names
+        if forced or not best.names
         else _set(problem, best, nothing, [*singles, *peers] if len(best.names) > 1 else singles, pairs)
     )
     best = min(alternatives, key=lambda e: e.bic(samples) + _surprise(problem, e)) if best.names else best
@@ -257,6 +250,18 @@ def _gate(problem: Problem, best: Explanation, rng: np.random.Generator) -> tupl
     if best.names and gain[top] < SMALL_SHARE**2 * explained:
         return None, words
     return words, None
+
+
+def _insisted(
+    problem: Problem, forced: frozenset[str], found: list[Explanation], singles: list[Explanation], samples: int
+) -> Explanation:
+    """Choose the best explanation that holds every effect on which the user insists."""
+    able = forced & set(problem.effects)
+    holding = [explanation for explanation in found if able <= set(explanation.names)]
+    if holding or not able:
+        return _choose(holding, samples) if able else problem.nothing()
+    begin = {e.names[0]: e.values[e.names[0]] for e in singles if e.names[0] in able}
+    return fit(problem, tuple(begin), begin, iterations=20)
 
 
 def _set(
