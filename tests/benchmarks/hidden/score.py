@@ -21,7 +21,7 @@ class Mark:
     contains_truth : bool
         What is hidden is in the set (or need not be).
     wrong : bool
-        It names, and no explanation that it gives is right.
+        It names, and no explanation that it gives is right; where nothing is hidden, any claim, `unknown` too.
     named : bool
         It names anything.
     size, oracle_size : int
@@ -51,7 +51,7 @@ def mark(row: Row, judgement: Judgement, answer: Answer, hidden: frozenset[str])
     contains = hidden in given or (answer.verdict == "agrees" and right)
     wrong = named and not given & (must | may | {hidden})
     if row.hidden == 0:
-        wrong = named
+        wrong = named or answer.verdict == "unknown"
     return Mark(right, contains, wrong, named, len(given), len(must))
 
 
