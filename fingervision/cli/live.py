@@ -1,0 +1,149 @@
+"""`fingervision live`: the camera's picture with the measured points, the gap and its history."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from fingervision.domain.errors import UsageError
+
+if TYPE_CHECKING:
+    from fingervision.domain.region import Region
+    from fingervision.live.choices import Choices
+
+EXAMPLES = """
+\b
+Examples:
+  fingervision live simulated                          see it work, without a camera
+  fingervision live --list                             the cameras of this machine
+  fingervision live 0 --calibration calibration.json
+  fingervision live /dev/video2 --size 1280x720 --rate-hz 30
+  fingervision live http://192.168.1.20/video.mjpg --px-per-mm 34 --tips down
+  fingervision live rtsp://camera/stream --calibration calibration.json --out runs
+  fingervision live 0 --px-per-mm 34 --no-page         gap, status and rate in the terminal
+  fingervision live 0 --px-per-mm 34 --no-page --json  one line of JSON a frame
+  fingervision live 0 --px-per-mm 34 --no-page --out runs   also records, from the first frame
+
+\b
+The page is served to this machine alone, at the address that is printed; the address holds a token.
+A run that is recorded is a folder in --out: video.mp4 (lossless, or the camera's own packets), gaps.csv,
+events.jsonl, run.json. `fingervision measure RUN/video.mp4` gives the same numbers again.
+"""
+USUAL_OUT, USUAL_PORT = Path("live"), 8025
+
+
+@click.command(epilog=EXAMPLES)
+@click.argument("source", required=False)
+@click.option("--list", "list_cameras", is_flag=True, help="List the cameras of this machine.")
+@click.option("--out", type=click.Path(path_type=Path), help="Folder for runs and snapshots.  [default: live]")
+@click.option("--no-page", is_flag=True, help="No page: gap, status and rate in the terminal.")
+@click.option("--json", "as_json", is_flag=True, help="Print one line of JSON a frame, with the columns of gaps.csv.")
+@click.option("--host", default="127.0.0.1", show_default=True, help="Address that the page is served at.")
+@click.option("--port", type=click.IntRange(0, 65535), default=USUAL_PORT, show_default=True, help="0: any free one.")
+@click.option("--size", metavar="WxH", help="Size that the camera is asked for.")
+@click.option("--rate-hz", type=float, help="Frames in a second that the camera is asked for.")
+@click.option("--calibration", type=click.Path(path_type=Path), help="calibration.json: the scale, with uncertainty.")
+@click.option("--px-per-mm", type=float, help="The scale alone.")
+@click.option("--below-tip-mm", type=float, default=0.3, show_default=True, help="Height of measuring below each tip.")
+@click.option(
+    "--tips",
+    type=click.Choice(["auto", "up", "down", "left", "right"]),
+    default="auto",
+    show_default=True,
+    help="Where the fingers point in the picture.",
+)
+@click.option("--roi", metavar="X,Y,W,H", help="Region of interest: first column, first row, width, height in pixels.")
+def command(
+    source: str | None,
+    list_cameras: bool,
+    out: Path | None,
+    no_page: bool,
+    as_json: bool,
+    host: str,
+    port: int,
+    size: str | None,
+    rate_hz: float | None,
+    calibration: Path | None,
+    px_per_mm: float | None,
+    below_tip_mm: float,
+    tips: str,
+    roi: str | None,
+) -> None:
+    """Show SOURCE live: a camera's number, a /dev path, an rtsp:// or http:// stream, a file, or the word simulated.
+
+    Every frame is measured. The page shows the picture with the measured points, the gap with its uncertainty, and its
+    history; it records, calibrates and saves.
+    """
+    if list_cameras:
+        _list()
+        return
+    if source is None:
+        raise UsageError("The source must be given, but is not: name a camera, stream or file, or use `simulated`.")
+    from fingervision.frames.source import Wish
+    from fingervision.live.opening import opened
+    from fingervision.live.running import Showing, run
+
+    choices = _choices(source, calibration, px_per_mm, below_tip_mm, tips, roi)
+    if no_page and choices.scale is None:
+        raise UsageError(
+            "Without a page the scale must be given, but is not: add --calibration FILE (made by `fingervision "
+            "calibrate`) or --px-per-mm S."
+        )
+    capture = opened(source, Wish(rate_hz=rate_hz, size_px=None if size is None else _size(size)))
+    showing = Showing(page=not no_page, json_lines=as_json, host=host, port=port, record=no_page and out is not None)
+    run(capture, choices, out or USUAL_OUT, showing)
+
+
+def _list() -> None:
+    from fingervision.frames.camera import found_cameras
+
+    cameras = found_cameras()
+    for name, words in cameras:
+        click.echo(f"{name}  {words}")
+    if not cameras:
+        click.echo("No camera was found. The source `simulated` works without one.")
+
+
+def _choices(
+    source: str, calibration: Path | None, px_per_mm: float | None, below_tip_mm: float, tips: str, roi: str | None
+) -> "Choices":
+    from calib.calibration import BareScale
+    from fingervision.domain.direction import Direction
+    from fingervision.frames import simulated
+    from fingervision.live.choices import Choices
+    from fingervision.storage.calibration_json import read_calibration
+
+    if calibration is not None and px_per_mm is not None:
+        raise UsageError("Either --calibration or --px-per-mm gives the scale, but both are there: leave one out.")
+    own = simulated.PX_PER_MM if simulated.accepts(source) else None
+    stated = own if px_per_mm is None else px_per_mm
+    if stated is not None and not 0.0 < stated < float("inf"):
+        raise UsageError(f"--px-per-mm must be positive, but is {stated:g}.")
+    scale = None if calibration is None else read_calibration(calibration)
+    return Choices(
+        scale=scale or (None if stated is None else BareScale(stated)),
+        scale_file=calibration,
+        below_tip_mm=below_tip_mm,
+        direction=None if tips == "auto" else Direction(tips),
+        region=None if roi is None else _region(roi),
+    )
+
+
+def _region(words: str) -> "Region":
+    from fingervision.domain.region import Region
+
+    try:
+        x_px, y_px, width_px, height_px = (int(part) for part in words.split(","))
+    except ValueError:
+        raise UsageError(f"--roi must be four whole numbers X,Y,W,H in pixels, but is '{words}'.") from None
+    return Region(x_px, y_px, width_px, height_px)
+
+
+def _size(words: str) -> tuple[int, int]:
+    try:
+        width_px, height_px = (int(part) for part in words.lower().split("x"))
+    except ValueError:
+        raise UsageError(f"--size must be WxH in pixels, such as 640x480, but is '{words}'.") from None
+    if min(width_px, height_px) < 1:
+        raise UsageError(f"--size must be positive, but is {words}.")
+    return width_px, height_px

@@ -1,0 +1,194 @@
+"""Network cameras: rtsp:// and http:// streams through PyAV, with the camera's own packets kept."""
+
+from collections.abc import Iterator
+from itertools import count
+from threading import Event
+from time import monotonic
+from typing import Any
+
+import av
+
+from fingervision.domain.errors import FingervisionError, UsageError
+from fingervision.domain.frame import Coding, Frame, LostFrame
+from fingervision.domain.status import Status
+from fingervision.frames.damage import DamageTrail
+from fingervision.frames.luma import luma
+from fingervision.frames.received import OwnPacket, Received
+from fingervision.frames.source import Description, Wish
+from fingervision.frames.video_file import SPOKEN_DAMAGE, STRICT
+
+STARTS = ("rtsp://", "http://", "https://")
+# A camera that answers no sooner is not there; one that has been silent for so long is cut off.
+OPEN_TIMEOUT_S, READ_TIMEOUT_S = 5.0, 2.0
+# Little is looked at before the first frame, and none is kept back.
+OPTIONS = {"rtsp_transport": "tcp", "fflags": "nobuffer", "flags": "low_delay", "probesize": "1000000"}
+# These codecs code every picture by itself.
+INTRAFRAME_CODECS = frozenset({"mjpeg", "png"})
+LOSSLESS_CODECS = frozenset({"png", "rawvideo", "ffv1"})
+
+
+def accepts(name: str) -> bool:
+    """Whether this is the address of a stream."""
+    return name.startswith(STARTS)
+
+
+def open_frames(name: str, wish: Wish) -> "NetworkStream":
+    """Connect to a stream.
+
+    Raises
+    ------
+    FingervisionError
+        Nobody answers, or the answer is no video.
+    UsageError
+        A size or rate is wished, which the camera alone decides.
+    """
+    if wish.rate_hz is not None or wish.size_px is not None:
+        raise UsageError(
+            f"--size and --rate-hz are for cameras of this machine, but {name} decides itself: set them there."
+        )
+    return NetworkStream(name)
+
+
+class NetworkStream:
+    """A connected stream; after a cut another one is made by opening it again.
+
+    Times are those of the stream (RTSP), or the host's on arrival where it has none: pictures in a row over HTTP carry
+    no times, and times counted from a stated rate would be made up.
+
+    Parameters
+    ----------
+    name : str
+        Its address.
+
+    Raises
+    ------
+    FingervisionError
+        Nobody answers, or the answer is no video.
+    """
+
+    def __init__(self, name: str) -> None:
+        self.name = name
+        try:
+            self._container = av.open(name, options=dict(OPTIONS), timeout=(OPEN_TIMEOUT_S, READ_TIMEOUT_S))
+        except (av.FFmpegError, OSError, ValueError) as error:
+            raise FingervisionError(
+                f"The stream {name} must answer with a video, but does not ({_reason(error)}): check the address and "
+                "that the camera is on and nobody else has it."
+            ) from error
+        if not self._container.streams.video or self._container.streams.video[0].codec_context is None:
+            self._container.close()
+            raise FingervisionError(f"The stream {name} must hold a video that can be decoded, but has none.")
+        self.template: av.VideoStream | None = self._container.streams.video[0]
+        self._stream = self._container.streams.video[0]
+        codec = self._stream.codec_context
+        codec.options = STRICT
+        codec.thread_count = 1  # threads of frames would each keep one back
+        if codec.width < 1 or codec.height < 1:
+            self._container.close()
+            raise FingervisionError(f"The stream {name} must say how large its pictures are, but does not.")
+        self.has_own_clock = name.startswith("rtsp://")
+        self._closed = Event()
+        coding = Coding.INTRAFRAME if codec.name in INTRAFRAME_CODECS else Coding.INTERFRAME
+        rate = self._stream.average_rate
+        self.description = Description(
+            name=name,
+            kind="network stream",
+            codec=codec.name,
+            coding=Coding.LOSSLESS if codec.name in LOSSLESS_CODECS else coding,
+            width_px=codec.width,
+            height_px=codec.height,
+            # Over HTTP the rate is FFmpeg's guess.
+            rate_hz=float(rate) if rate and self.has_own_clock else None,
+            has_times=True,
+            frame_count=None,
+        )
+
+    def __iter__(self) -> Iterator[Frame | LostFrame]:
+        """Frames as they come; ends with an error when the stream is cut off."""
+        for received in self.received():
+            yield received.item
+
+    def received(self) -> Iterator[Received]:
+        """Frames with the packets that they came in."""
+        numbers, trail = count(), DamageTrail()
+        last_s: float | None = None
+        waiting: list[OwnPacket] = []
+        level = av.logging.get_level()
+        av.logging.set_level(av.logging.ERROR)
+        try:
+            with av.logging.Capture(local=False) as log:
+                for packet, arrived_s in self._packets():
+                    waiting.append(self._own(packet, arrived_s))
+                    trail.enters(packet)
+                    for tick, found in self._decoded(packet, trail, log):
+                        time_s = self._time_s(tick, arrived_s)
+                        item = self._item(next(numbers), time_s, found, last_s)
+                        last_s = time_s
+                        yield Received(item, arrived_s, tuple(waiting))
+                        waiting.clear()
+        finally:
+            av.logging.set_level(level)
+            self._container.close()
+
+    def close(self) -> None:
+        """End the iteration with the next packet, or when it has been waited for in vain."""
+        self._closed.set()
+
+    def _packets(self) -> Iterator[tuple[Any, float]]:
+        demuxed = self._container.demux(self._stream)
+        while not self._closed.is_set():
+            try:
+                packet = next(demuxed, None)
+            except (av.FFmpegError, OSError) as error:
+                raise FingervisionError(self._cut(_reason(error))) from error
+            if packet is None or not packet.size:
+                raise FingervisionError(self._cut("the camera ended it"))
+            yield packet, monotonic()
+
+    def _cut(self, why: str) -> str:
+        return f"The stream {self.name} is cut off ({why})."
+
+    def _decoded(
+        self, packet: "av.Packet[av.VideoStream]", trail: DamageTrail, log: list[tuple[int, str, str]]
+    ) -> Iterator[tuple[int | None, av.VideoFrame | str]]:
+        log.clear()
+        try:
+            pictures = packet.decode()
+        except av.FFmpegError as error:
+            trail.breaks(f"It could not be decoded ({error.strerror}).")
+            if self.description.coding is not Coding.INTERFRAME:
+                yield packet.pts, f"It could not be decoded ({error.strerror})."
+            return
+        codec = self._stream.codec_context.name
+        said = [
+            words for _, speaker, words in log if speaker == codec and words.startswith(SPOKEN_DAMAGE.get(codec, ()))
+        ]
+        if said:
+            trail.breaks(f"It arrived damaged ({said[0].strip()}).")
+        for picture in pictures:
+            yield from trail.leaves(picture)
+
+    def _item(self, index: int, time_s: float, found: av.VideoFrame | str, last_s: float | None) -> Frame | LostFrame:
+        size_px = (self.description.width_px, self.description.height_px)
+        if isinstance(found, str):
+            return LostFrame(index, time_s, Status.DAMAGED, found)
+        if (found.width, found.height) != size_px:
+            words = f"It has {found.width}x{found.height} pixels, but the stream {size_px[0]}x{size_px[1]}."
+            return LostFrame(index, time_s, Status.DAMAGED, words)
+        if time_s == last_s:
+            return LostFrame(index, time_s, Status.DUPLICATE, "It has the same time as the frame before.")
+        return Frame(luma(found), index, time_s, self.description.coding)
+
+    def _own(self, packet: "av.Packet[av.VideoStream]", arrived_s: float) -> OwnPacket:
+        shown_s = self._time_s(packet.pts, arrived_s)
+        decode_s = shown_s if packet.dts is None else self._time_s(packet.dts, arrived_s)
+        return OwnPacket(packet, shown_s, decode_s, packet.is_keyframe)
+
+    def _time_s(self, tick: int | None, arrived_s: float) -> float:
+        if not self.has_own_clock or tick is None or self._stream.time_base is None:
+            return arrived_s
+        return float(tick * self._stream.time_base)
+
+
+def _reason(error: Exception) -> str:
+    return getattr(error, "strerror", None) or str(error) or type(error).__name__

@@ -1,0 +1,82 @@
+"""What a live source hands over: a frame, and the camera's own packets that it came in."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Protocol
+
+import av
+
+from fingervision.domain.frame import Frame, LostFrame
+from fingervision.frames.source import Description
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class OwnPacket:
+    """A packet as the camera coded it.
+
+    Parameters
+    ----------
+    packet : av.Packet
+        The bytes.
+    time_s, decode_s : float
+        When it is shown and when it is decoded, on the source's clock.
+    is_key : bool
+        Whether its picture hangs on no other.
+    """
+
+    packet: "av.Packet[av.VideoStream]"
+    time_s: float
+    decode_s: float
+    is_key: bool
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Received:
+    """A frame of a live source.
+
+    Parameters
+    ----------
+    item : Frame or LostFrame
+        `time_s` is on the source's clock.
+    arrived_s : float
+        When the host had all of it, on the host's monotonic clock.
+    packets : tuple of OwnPacket
+        What came in since the frame before; empty where the source codes nothing.
+    """
+
+    item: Frame | LostFrame
+    arrived_s: float
+    packets: tuple[OwnPacket, ...] = ()
+
+
+class LiveSource(Protocol):
+    """A source that goes on by itself and may be cut and opened again."""
+
+    @property
+    def description(self) -> Description:
+        """What is known before the frames are read."""
+        ...
+
+    @property
+    def has_own_clock(self) -> bool:
+        """Whether times are the source's; otherwise they are the host's monotonic clock on arrival."""
+        ...
+
+    @property
+    def template(self) -> av.VideoStream | None:
+        """The coded stream that packets belong to, where there is one."""
+        ...
+
+    def received(self) -> Iterator[Received]:
+        """Frames as they come; ends where a recording ends.
+
+        Raises
+        ------
+        FingervisionError
+            The source is cut off.
+        """
+        ...
+
+    def close(self) -> None:
+        """Let go of the camera or connection; the iteration then ends."""
+        ...

@@ -1,0 +1,119 @@
+"""A gripper that opens and closes for ever, drawn with known truth: for whoever has no camera at hand."""
+
+from collections.abc import Iterator
+from itertools import count
+from math import cos, pi
+from threading import Event
+from time import monotonic
+
+import av
+import numpy as np
+
+from fingervision.domain.errors import UsageError
+from fingervision.domain.frame import Coding, Frame, LostFrame, Pixels
+from fingervision.frames.received import Received
+from fingervision.frames.source import Description, Wish
+from fingervision.rendering import Camera, render, two_fingers
+
+NAME = "simulated"
+# The paper's scale, and the paper's gripper between nearly closed and open (mm).
+PX_PER_MM = 34.0
+CLOSED_MM, OPEN_MM = 1.0, 4.0
+# A cycle is drawn once and then repeated, with its noise: drawing takes longer than measuring.
+CYCLE_FRAMES = 100
+USUAL_SIZE_PX, USUAL_RATE_HZ = (640, 480), 25.0
+BELOW_TIP_MM = 0.3
+SEED = 1
+
+
+def accepts(name: str) -> bool:
+    """Whether this is the word simulated."""
+    return name == NAME
+
+
+def open_frames(name: str, wish: Wish) -> "SimulatedGripper":
+    """Start the simulated gripper at the wished size and rate.
+
+    Raises
+    ------
+    UsageError
+        A rate or size that no camera has.
+    """
+    return SimulatedGripper(wish.size_px or USUAL_SIZE_PX, wish.rate_hz or USUAL_RATE_HZ)
+
+
+def true_gap_mm(index: int) -> float:
+    """Gap that is drawn in a frame, before it is rounded to pixels' levels."""
+    return CLOSED_MM + (OPEN_MM - CLOSED_MM) * 0.5 * (1.0 - cos(2.0 * pi * (index % CYCLE_FRAMES) / CYCLE_FRAMES))
+
+
+class SimulatedGripper:
+    """A simulated camera; frames come at its rate, with exact times.
+
+    Parameters
+    ----------
+    size_px : (int, int)
+        Width and height.
+    rate_hz : float
+        Frames in a second.
+    """
+
+    has_own_clock = True
+    template: av.VideoStream | None = None
+    px_per_mm = PX_PER_MM
+
+    def __init__(self, size_px: tuple[int, int], rate_hz: float) -> None:
+        if not 1.0 <= rate_hz <= 1000.0:
+            raise UsageError(f"--rate-hz must be between 1 and 1000, but is {rate_hz:g}.")
+        if not (320 <= size_px[0] <= 4096 and 240 <= size_px[1] <= 4096):
+            raise UsageError(
+                f"--size of the simulated camera must be 320x240 to 4096x4096, but is {size_px[0]}x{size_px[1]}."
+            )
+        self._size_px, self._rate_hz = size_px, rate_hz
+        self._closed = Event()
+        self.description = Description(
+            name=NAME,
+            kind="simulated camera",
+            codec="none",
+            coding=Coding.LOSSLESS,
+            width_px=size_px[0],
+            height_px=size_px[1],
+            rate_hz=rate_hz,
+            has_times=True,
+            frame_count=None,
+        )
+
+    def __iter__(self) -> Iterator[Frame | LostFrame]:
+        """Frames at their own pace."""
+        for received in self.received():
+            yield received.item
+
+    def received(self) -> Iterator[Received]:
+        """Frames at their own pace, until closed."""
+        rng = np.random.default_rng(SEED)
+        drawn: dict[int, Pixels] = {}
+        started_s = monotonic()
+        for index in count():
+            place = index % CYCLE_FRAMES
+            if place not in drawn:
+                drawn[place] = self._drawn(place, rng)
+            time_s = index / self._rate_hz
+            if self._closed.wait(max(0.0, started_s + time_s - monotonic())):
+                return
+            yield Received(Frame(drawn[place], index, time_s), monotonic())
+
+    def close(self) -> None:
+        """End the iteration."""
+        self._closed.set()
+
+    def _drawn(self, place: int, rng: np.random.Generator) -> Pixels:
+        # A wide picture shows the same gripper, a narrow one a smaller opening.
+        share = min(1.0, self._size_px[0] / 640)
+        scene = two_fingers(
+            gap_px=share * true_gap_mm(place) * PX_PER_MM,
+            below_tip_px=BELOW_TIP_MM * PX_PER_MM,
+            radius_px=20.0,
+            tilt_deg=(1.0, -1.0),
+            frame=self._size_px,
+        )
+        return render(scene, Camera(blur_px=0.9, noise_grey=2.0), rng)

@@ -1,0 +1,1 @@
+"""The live view: a source that goes on, measured frame by frame, shown in a browser or a terminal, recorded."""

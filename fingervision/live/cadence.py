@@ -1,0 +1,75 @@
+"""How regularly frames come: rate, jitter, and frames that are missing between two others."""
+
+from collections import deque
+from itertools import pairwise
+from statistics import median, pstdev
+
+# Rate and jitter are those of so many frames.
+FRAMES_LOOKED_AT = 100
+# Late frames are missing frames only if those after them are late too: a network holds frames up and then hurries.
+FRAMES_UNTIL_SURE = 5
+# Later than this share of a period, for good, and a frame is missing.
+LATE_SHARE = 0.75
+FRAMES_TO_KNOW_THE_PERIOD = 10
+
+
+class Cadence:
+    """Watches the times of frames."""
+
+    def __init__(self) -> None:
+        self.missing = 0
+        self._times_s: deque[float] = deque(maxlen=FRAMES_LOOKED_AT)
+        self._lateness_s: deque[float] = deque(maxlen=FRAMES_UNTIL_SURE)
+        self._due_s: float | None = None
+
+    def restart(self) -> None:
+        """Forget the times before a cut, which is no drop."""
+        self._times_s.clear()
+        self._lateness_s.clear()
+        self._due_s = None
+
+    def add(self, time_s: float) -> None:
+        """Take in a frame's time."""
+        self._times_s.append(time_s)
+        if len(self._times_s) < FRAMES_TO_KNOW_THE_PERIOD:
+            return
+        period_s = self.period_s
+        if period_s is None:
+            return
+        self._due_s = time_s if self._due_s is None else self._due_s + period_s
+        if time_s < self._due_s:
+            self._due_s = time_s
+            self._lateness_s.clear()
+        self._lateness_s.append(time_s - self._due_s)
+        if len(self._lateness_s) < FRAMES_UNTIL_SURE:
+            return
+        late_s = min(self._lateness_s)
+        if late_s > LATE_SHARE * period_s:
+            missing = round(late_s / period_s)
+            self.missing += missing
+            self._due_s += missing * period_s
+            self._lateness_s.clear()
+
+    @property
+    def period_s(self) -> float | None:
+        """Usual time from frame to frame; None as long as it is not known."""
+        steps = [after - before for before, after in pairwise(self._times_s)]
+        usual_s = median(steps) if steps else 0.0
+        if usual_s <= 0.0:
+            return None
+        # The mean of the usual steps: held-up and hurried frames make up for each other, missing ones are left out.
+        near = [step for step in steps if step < 1.6 * usual_s]
+        return sum(near) / len(near)
+
+    @property
+    def rate_hz(self) -> float | None:
+        """Frames in a second, over the last hundred."""
+        if len(self._times_s) < 2 or self._times_s[-1] <= self._times_s[0]:
+            return None
+        return (len(self._times_s) - 1) / (self._times_s[-1] - self._times_s[0])
+
+    @property
+    def jitter_s(self) -> float | None:
+        """Standard deviation of the time from frame to frame, over the last hundred."""
+        steps = [after - before for before, after in pairwise(self._times_s)]
+        return pstdev(steps) if len(steps) > 1 else None

@@ -1,0 +1,164 @@
+"""Frames from the source to the measurement: every one of them, and the source opened again when it is cut off."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from queue import Empty, Full, Queue
+from threading import Event, Thread
+from time import monotonic
+
+from fingervision.domain.errors import FingervisionError
+from fingervision.domain.frame import Frame, LostFrame
+from fingervision.frames.received import LiveSource, OwnPacket, Received
+from fingervision.live.timeline import Timeline
+
+# Frames that may wait while something else holds the processor up: four seconds at 25 frames a second. What comes on
+# top is lost and counted.
+FRAMES_WAITING = 100
+# How long to wait before a source that was cut off is opened again.
+AGAIN_AFTER_S = 0.3
+
+Open = Callable[[], LiveSource]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Arrival:
+    """A frame on the live view's own time.
+
+    Parameters
+    ----------
+    item : Frame or LostFrame
+        `time_s` since the start, `index` counted over all cuts.
+    arrived_s : float
+        On the host's monotonic clock.
+    packets : tuple of OwnPacket
+        The camera's own, on the same time.
+    """
+
+    item: Frame | LostFrame
+    arrived_s: float
+    packets: tuple[OwnPacket, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Happening:
+    """Something that the user shall know: its name, and a sentence."""
+
+    name: str
+    words: str
+
+
+@dataclass(frozen=True, slots=True)
+class Ended:
+    """After the last frame of a recording."""
+
+
+class Capture:
+    """Reads a source in a thread of its own.
+
+    Parameters
+    ----------
+    first : LiveSource
+        The open source.
+    again : callable, optional
+        Opens it again after a cut; None where an end is an end (a file).
+    """
+
+    def __init__(self, first: LiveSource, again: Open | None) -> None:
+        self.source = first
+        self.overflowed = 0
+        self.waiting: Queue[Arrival | Happening | Ended] = Queue(FRAMES_WAITING)
+        self._again = again
+        self._stopped = Event()
+        self._index = 0
+        self._timeline = Timeline(monotonic())
+        self._thread = Thread(target=self._read, name="capture", daemon=True)
+
+    def start(self) -> None:
+        """Begin to read."""
+        self._thread.start()
+
+    def stop(self) -> None:
+        """End reading; what is waiting stays."""
+        self._stopped.set()
+        self.source.close()
+
+    def next(self, timeout_s: float) -> Arrival | Happening | Ended | None:
+        """Next frame or event; None if nothing comes in time."""
+        try:
+            return self.waiting.get(timeout=timeout_s)
+        except Empty:
+            return None
+
+    def _read(self) -> None:
+        while not self._stopped.is_set():
+            try:
+                for received in self.source.received():
+                    self._hand_over(received)
+                    if self._stopped.is_set():
+                        return
+                if self._stopped.is_set():
+                    return
+                if self._again is None:
+                    self._put(Ended())
+                    return
+                why = "The source ended."
+            except FingervisionError as error:
+                why = str(error)
+            except Exception as error:  # a driver's fault must not end the live view silently
+                why = f"The source failed ({type(error).__name__}: {error})."
+            if self._again is None:
+                self._put(Happening("failed", why))
+                self._put(Ended())
+                return
+            self._put(Happening("interrupted", f"{why} Waiting for it to come back."))
+            if not self._reopened():
+                return
+            self._timeline.cut()
+            self._put(Happening("resumed", "The source is back; the gap in the data is a gap."))
+
+    def _reopened(self) -> bool:
+        assert self._again is not None  # noqa: S101 - only called where it can be opened again
+        size_px = (self.source.description.width_px, self.source.description.height_px)
+        said = ""
+        while not self._stopped.wait(AGAIN_AFTER_S):
+            try:
+                source = self._again()
+            except FingervisionError:
+                continue
+            found = (source.description.width_px, source.description.height_px)
+            if found == size_px:
+                self.source = source
+                return True
+            source.close()
+            words = (
+                f"The source came back with {found[0]}x{found[1]} pixels, but had {size_px[0]}x{size_px[1]}: "
+                "set it as before, or start again."
+            )
+            if words != said:
+                said = words
+                self._put(Happening("changed", words))
+        return False
+
+    def _hand_over(self, received: Received) -> None:
+        item = received.item
+        if item.time_s is not None:
+            time_s, jump_s = self._timeline.at(item.time_s, received.arrived_s)
+            if jump_s:
+                self._put(
+                    Happening("time_jumped", f"The source's clock jumped by {jump_s:+.3f} s; the host's joins it.")
+                )
+        else:
+            time_s = None
+        item = replace(item, index=self._index, time_s=time_s)
+        self._index += 1
+        packets = tuple(
+            replace(own, time_s=self._timeline.on_this(own.time_s), decode_s=self._timeline.on_this(own.decode_s))
+            for own in received.packets
+        )
+        self._put(Arrival(item, received.arrived_s, packets))
+
+    def _put(self, what: Arrival | Happening | Ended) -> None:
+        try:
+            self.waiting.put(what, timeout=0.0 if isinstance(what, Arrival) else 5.0)
+        except Full:
+            self.overflowed += 1

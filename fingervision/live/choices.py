@@ -1,0 +1,108 @@
+"""What the user chose for a live view, and may change while it runs."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from fingervision.domain.direction import Direction
+from fingervision.domain.errors import FingervisionError, UsageError
+from fingervision.domain.region import Region
+from fingervision.frames.source import Description
+from fingervision.measuring.measure import Task
+from fingervision.measuring.scale import Scale
+
+
+@dataclass(frozen=True, slots=True)
+class Choices:
+    """Scale, height, direction and region of measuring; zero and tolerance of showing.
+
+    Parameters
+    ----------
+    scale : Scale or None
+        None as long as nobody has said; the picture is then shown and nothing measured.
+    scale_file : Path or None
+        The calibration that the scale was read from.
+    below_tip_mm : float
+        Height of measuring.
+    direction : Direction or None
+        Where the tips point; None finds out.
+    region : Region or None
+        The part of the frame that is looked at.
+    zero_mm : float
+        What is taken off the gap where it is shown; never in a file.
+    least_mm, greatest_mm : float or None
+        Tolerance limits.
+    """
+
+    scale: Scale | None = None
+    scale_file: Path | None = None
+    below_tip_mm: float = 0.3
+    direction: Direction | None = None
+    region: Region | None = None
+    zero_mm: float = 0.0
+    least_mm: float | None = None
+    greatest_mm: float | None = None
+
+    @property
+    def task(self) -> Task | None:
+        """The task of measuring, once the scale is known."""
+        if self.scale is None:
+            return None
+        return Task(self.scale, self.scale_file, self.below_tip_mm, self.direction, self.region)
+
+    def check(self, description: Description) -> None:
+        """Refuse what cannot be meant for these frames.
+
+        Raises
+        ------
+        UsageError
+            The region lies outside the frame, or the height is not positive.
+        FingervisionError
+            The scale is for other frames.
+        """
+        width_px, height_px = description.width_px, description.height_px
+        if not 0.0 < self.below_tip_mm < float("inf"):
+            raise UsageError(f"--below-tip-mm must be positive, but is {self.below_tip_mm:g}.")
+        box = self.region
+        if box is not None and not (
+            min(box.x_px, box.y_px) >= 0
+            and min(box.width_px, box.height_px) > 0
+            and box.x_px + box.width_px <= width_px
+            and box.y_px + box.height_px <= height_px
+        ):
+            raise UsageError(
+                f"The region must lie inside the frame of {width_px}x{height_px} pixels, but is "
+                f"{box.x_px},{box.y_px},{box.width_px},{box.height_px} (first column, row, width, height)."
+            )
+        if self.scale is not None:
+            try:
+                self.scale.check_frame_size(width_px, height_px)
+            except ValueError as error:
+                raise FingervisionError(str(error)) from error
+        limits = (self.least_mm, self.greatest_mm)
+        if None not in limits and self.least_mm >= self.greatest_mm:  # type: ignore[operator]
+            raise UsageError(
+                f"The lower limit must be below the upper one, but they are {self.least_mm:g} and "
+                f"{self.greatest_mm:g} mm."
+            )
+
+    def verdict(self, gap_mm: float | None, u_mm: float | None) -> str:
+        """Whether a gap is within the limits, as surely as it is known (ISO 14253-1).
+
+        Parameters
+        ----------
+        gap_mm, u_mm : float or None
+            The gap and its standard uncertainty; the expanded one, with k = 2, guards the limits.
+
+        Returns
+        -------
+        str
+            "pass", "fail", "unsure" near a limit, or "" without limits or gap.
+        """
+        if gap_mm is None or (self.least_mm is None and self.greatest_mm is None):
+            return ""
+        guard_mm = 2.0 * (u_mm or 0.0)
+        low = -float("inf") if self.least_mm is None else self.least_mm
+        high = float("inf") if self.greatest_mm is None else self.greatest_mm
+        if gap_mm + guard_mm < low or gap_mm - guard_mm > high:
+            return "fail"
+        return "pass" if low <= gap_mm - guard_mm and gap_mm + guard_mm <= high else "unsure"

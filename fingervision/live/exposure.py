@@ -1,0 +1,42 @@
+"""Whether the light is fit for measuring: at full scale, too dark, changing."""
+
+from collections import deque
+from typing import Any
+
+import numpy as np
+
+from fingervision.domain.frame import Frame
+from fingervision.vision.grey import full_scale, to_grey
+
+# Every so manieth pixel along both axes tells enough.
+STEP_PX = 8
+# A white background is the usual set-up; a picture of which so much is white shows no fingers.
+WHITE_SHARE = 0.99
+# Below this share of full scale the brightest pixels leave little contrast.
+DARK_SHARE, BRIGHTEST_PERCENT = 0.25, 99.0
+# The brightest parts are the ground: it must not change by more over so many frames.
+CHANGE_SHARE, FRAMES_LOOKED_AT = 0.05, 50
+
+
+class Exposure:
+    """Watches the light from frame to frame."""
+
+    def __init__(self) -> None:
+        self._ground: deque[float] = deque(maxlen=FRAMES_LOOKED_AT)
+        self.words = ""
+
+    def add(self, frame: Frame) -> None:
+        """Take in a frame; `words` is then what is wrong, or empty."""
+        sparse: Any = np.ascontiguousarray(frame.pixels[::STEP_PX, ::STEP_PX])
+        grey = to_grey(sparse)
+        scale = full_scale(grey)
+        ground = float(np.percentile(grey, BRIGHTEST_PERCENT)) / scale
+        self._ground.append(ground)
+        if np.count_nonzero(grey == scale) > WHITE_SHARE * grey.size:
+            self.words = "The picture is saturated: lower the exposure or the light."
+        elif ground < DARK_SHARE:
+            self.words = "The picture is too dark: raise the exposure or the light."
+        elif max(self._ground) - min(self._ground) > CHANGE_SHARE:
+            self.words = "The light is changing: switch off automatic exposure, or shield the bench."
+        else:
+            self.words = ""

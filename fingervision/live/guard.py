@@ -1,0 +1,110 @@
+"""Who may talk to the page's server: this machine's own pages, with the token, under the name that was bound."""
+
+import hmac
+import ipaddress
+import socket
+from collections.abc import Mapping
+from urllib.parse import parse_qs
+
+from starlette.datastructures import Headers
+from starlette.responses import PlainTextResponse
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
+from starlette.websockets import WebSocketClose
+
+LOOPBACK_NAMES = frozenset({"127.0.0.1", "localhost", "::1"})
+EVERYWHERE = frozenset({"0.0.0.0", "::"})
+# The page itself, its script, style and sockets come from here; nothing else is loaded, sent to, or framed.
+POLICY = (
+    "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' blob:; connect-src 'self'; "
+    "base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
+)
+HEADERS: Mapping[str, str] = {
+    "Content-Security-Policy": POLICY,
+    "X-Content-Type-Options": "nosniff",
+    "X-Frame-Options": "DENY",
+    "Referrer-Policy": "no-referrer",
+    "Cross-Origin-Opener-Policy": "same-origin",
+    "Cross-Origin-Resource-Policy": "same-origin",
+    "Cache-Control": "no-store",
+}
+# Script, style and licence are the program's own and the same for everybody.
+PUBLIC_PATH = "/page/"
+POLICY_VIOLATION = 1008
+
+
+class Guard:
+    """Lets through what may be let through, and adds the headers that keep the page to itself.
+
+    The Host must be a name of this server (a foreign site cannot point its own name here), the Origin must be the same
+    (no other page may open a socket), and the token must be in the address.
+
+    Parameters
+    ----------
+    app : ASGI application
+        What is guarded.
+    host : str
+        Address that was bound.
+    port : int
+        Its port.
+    token : str
+        What every address must hold.
+    """
+
+    def __init__(self, app: ASGIApp, host: str, port: int, token: str) -> None:
+        self._app, self._host, self._port, self._token = app, host, port, token
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Serve one request, or refuse it."""
+        if scope["type"] == "lifespan":
+            await self._app(scope, receive, send)
+            return
+        refused = self._refusal(scope)
+        if refused is None:
+            await self._app(scope, receive, _with_headers(send))
+        elif scope["type"] == "websocket":
+            await WebSocketClose(POLICY_VIOLATION, refused[1])(scope, receive, send)
+        else:
+            await PlainTextResponse(refused[1], refused[0])(scope, receive, _with_headers(send))
+
+    def _refusal(self, scope: Scope) -> tuple[int, str] | None:
+        headers = Headers(scope=scope)
+        if not self._is_ours(headers.get("host", "")):
+            return 400, "The Host must be the address of this live view."
+        origin = headers.get("origin")
+        if origin is None and scope["type"] == "websocket":
+            return 403, "The Origin must be this live view's page, but is missing."
+        if origin is not None and origin != f"http://{headers.get('host', '')}":
+            return 403, "The Origin must be this live view's page."
+        if scope["type"] == "http" and scope["path"].startswith(PUBLIC_PATH):
+            return None
+        given = parse_qs(scope["query_string"].decode("latin-1")).get("token", [""])[0]
+        if not hmac.compare_digest(given.encode(), self._token.encode()):
+            return 403, "The address must hold the token: open the one that the terminal shows."
+        return None
+
+    def _is_ours(self, stated: str) -> bool:
+        name, _, port = stated.rpartition(":")
+        if not name or port != str(self._port):
+            return False
+        name = name.strip("[]").lower()
+        if name in LOOPBACK_NAMES | {self._host.lower()}:
+            return True
+        return self._host in EVERYWHERE and (_is_address(name) or name == socket.gethostname().lower())
+
+
+def _is_address(name: str) -> bool:
+    try:
+        ipaddress.ip_address(name)
+    except ValueError:
+        return False
+    return True
+
+
+def _with_headers(send: Send) -> Send:
+    async def sending(message: Message) -> None:
+        if message["type"] == "http.response.start":
+            added = [(name.lower().encode(), words.encode()) for name, words in HEADERS.items()]
+            message = {**message, "headers": [*message.get("headers", []), *added]}
+        await send(message)
+
+    return sending

@@ -1,0 +1,46 @@
+"""The last minutes of the gap, in memory that never grows."""
+
+from collections.abc import Iterator
+from dataclasses import astuple
+from typing import Any
+
+import numpy as np
+
+from fingervision.domain.status import Status
+from fingervision.storage.gaps_csv import GapRow
+
+# Ten minutes at 25 frames a second.
+ROWS_KEPT = 15_000
+STATUSES = tuple(Status)
+# frame, time_s, status and thirteen numbers; the drive's columns are not live.
+COLUMNS_KEPT = 16
+
+
+class History:
+    """A ring of rows.
+
+    Parameters
+    ----------
+    kept : int
+        Rows that are kept.
+    """
+
+    def __init__(self, kept: int = ROWS_KEPT) -> None:
+        # Filled, so that its memory is taken now and not while it fills. NaN is an empty cell, in memory alone.
+        self._cells = np.full((kept, COLUMNS_KEPT), np.nan)
+        self.count = 0
+
+    def add(self, row: GapRow) -> None:
+        """Take in a row; the oldest leaves."""
+        cells = list(astuple(row)[:COLUMNS_KEPT])
+        cells[2] = STATUSES.index(row.status)
+        self._cells[self.count % len(self._cells)] = [np.nan if cell is None else cell for cell in cells]
+        self.count += 1
+
+    def rows(self, after: int = 0) -> Iterator[GapRow]:
+        """Rows from the number `after` on, counted from the first ever, as far as they are kept."""
+        count = self.count
+        for number in range(max(after, count - len(self._cells)), count):
+            frame, time_s, status, *numbers = self._cells[number % len(self._cells)].tolist()
+            cells: list[Any] = [None if cell != cell else cell for cell in (time_s, *numbers)]
+            yield GapRow(int(frame), cells[0], STATUSES[int(status)], *cells[1:])

@@ -1,0 +1,49 @@
+"""A recording at its own pace, as if it came from a camera."""
+
+from collections.abc import Iterator
+from threading import Event
+from time import monotonic
+
+import av
+
+from fingervision.frames.received import Received
+from fingervision.frames.source import Description, FrameSource
+
+
+class PacedRecording:
+    """Hands over each frame when its time has come; frames without times come as fast as they are measured.
+
+    Parameters
+    ----------
+    source : FrameSource
+        The recording.
+    """
+
+    has_own_clock = True
+    template: av.VideoStream | None = None
+
+    def __init__(self, source: FrameSource) -> None:
+        self._source = source
+        self._closed = Event()
+
+    @property
+    def description(self) -> Description:
+        """What is known of the recording."""
+        return self._source.description
+
+    def received(self) -> Iterator[Received]:
+        """Frames at their times, from the first to the last."""
+        started_s = monotonic()
+        first_s: float | None = None
+        for item in self._source:
+            if item.time_s is not None:
+                first_s = item.time_s if first_s is None else first_s
+                if self._closed.wait(max(0.0, started_s + item.time_s - first_s - monotonic())):
+                    return
+            if self._closed.is_set():
+                return
+            yield Received(item, monotonic())
+
+    def close(self) -> None:
+        """End the iteration."""
+        self._closed.set()

@@ -1,0 +1,40 @@
+"""The token in the page's address: kept in the output folder, so that a page finds the server again after a restart."""
+
+import os
+import re
+import secrets
+from contextlib import suppress
+from pathlib import Path
+
+from fingervision.domain.errors import FingervisionError
+
+FILE = ".live_token"
+BYTES = 18
+
+
+def kept_token(out: Path) -> str:
+    """Read the folder's token, or make one that only this user can read.
+
+    Raises
+    ------
+    FingervisionError
+        The folder cannot be written.
+    """
+    path = out / FILE
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+        with suppress(FileNotFoundError, UnicodeDecodeError):
+            found = path.read_text(encoding="ascii").strip()
+            if re.fullmatch(r"[A-Za-z0-9_-]{24,}", found) and path.stat().st_mode & 0o077 == 0:
+                return found
+        path.unlink(missing_ok=True)
+        token = secrets.token_urlsafe(BYTES)
+        with os.fdopen(os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600), "w", encoding="ascii") as file:
+            file.write(token + "\n")
+    except FileExistsError:
+        raise FingervisionError(f"--out must be a folder, but {out} is a file: name another.") from None
+    except OSError as error:
+        raise FingervisionError(
+            f"The folder {out} cannot be written ({error.strerror}): name another with --out."
+        ) from error
+    return token

@@ -1,0 +1,124 @@
+"""The recording's video: the camera's own packets, or FFV1, at true times, whole whenever it ends."""
+
+from fractions import Fraction
+from pathlib import Path
+from typing import Any
+
+import av
+import numpy as np
+
+from fingervision.domain.errors import FingervisionError
+from fingervision.domain.frame import Frame, LostFrame
+from fingervision.frames.received import OwnPacket
+from fingervision.live.timeline import TICKS_PER_S
+from fingervision.vision.grey import to_grey
+
+TIME_BASE = Fraction(1, TICKS_PER_S)
+# Matroska keeps milliseconds alone; MP4 in fragments keeps every tick, and each frame stands for itself.
+CONTAINER = {"movflags": "frag_every_frame+empty_moov+default_base_moof", "flush_packets": "1"}
+# Version 3 has a checksum for each slice.
+FFV1 = {"level": "3", "slices": "4", "slicecrc": "1", "g": "1"}
+GREY_FORMATS = {"uint8": "gray", "uint16": "gray16le"}
+
+
+class RecordedVideo:
+    """Writes frames as they were measured.
+
+    Frames are numbered and timed from the recording's first, which is the first whose picture hangs on no other.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    template : av.VideoStream or None
+        The camera's coded stream, whose packets are kept as they are; None stores the grey levels with FFV1.
+    """
+
+    def __init__(self, path: Path, template: av.VideoStream | None) -> None:
+        self._path = path
+        self._template = template
+        self._stream: Any = None
+        self._first_s: float | None = None
+        self._last_tick = -1
+        try:
+            self._container = av.open(str(path), "w", format="mp4", options=dict(CONTAINER))
+        except (av.FFmpegError, OSError) as error:
+            raise self._failed(error) from error
+
+    def add(self, item: Frame | LostFrame, packets: tuple[OwnPacket, ...]) -> float | None:
+        """Write one frame.
+
+        Returns
+        -------
+        float or None
+            Its time in the recording, exactly as the file holds it; None if the recording begins after it.
+
+        Raises
+        ------
+        FingervisionError
+            The file cannot be written.
+        """
+        if item.time_s is None:
+            return None
+        if self._first_s is None:
+            if not (any(own.is_key for own in packets) if self._template is not None else isinstance(item, Frame)):
+                return None
+            self._first_s = item.time_s
+        tick = round((item.time_s - self._first_s) * TICKS_PER_S)
+        try:
+            if self._template is not None:
+                self._copy(packets)
+            elif isinstance(item, Frame) and tick > self._last_tick:
+                self._encode(item, tick)
+            else:
+                return None
+        except (av.FFmpegError, OSError, ValueError) as error:
+            raise self._failed(error) from error
+        return tick / TICKS_PER_S
+
+    def close(self) -> None:
+        """Write what is held back and close."""
+        try:
+            if self._stream is not None and self._template is None:
+                self._container.mux(self._stream.encode(None))
+            self._container.close()
+        except (av.FFmpegError, OSError) as error:
+            raise self._failed(error) from error
+
+    def _copy(self, packets: tuple[OwnPacket, ...]) -> None:
+        assert self._first_s is not None  # noqa: S101 - set by the caller
+        if self._stream is None and self._template is not None:
+            self._stream = self._container.add_stream_from_template(self._template)
+            self._stream.time_base = TIME_BASE
+        for own in packets:
+            packet = own.packet
+            shown, decoded = (round((time_s - self._first_s) * TICKS_PER_S) for time_s in (own.time_s, own.decode_s))
+            if self._last_tick < 0 and not own.is_key:
+                continue
+            # Times of decoding must grow; a jump of the source's clock is bridged by a tick.
+            decoded = max(decoded, self._last_tick + 1)
+            self._last_tick = decoded
+            packet.stream, packet.time_base = self._stream, TIME_BASE
+            packet.pts, packet.dts = max(shown, decoded), decoded
+            packet.duration = 0
+            self._container.mux(packet)
+
+    def _encode(self, frame: Frame, tick: int) -> None:
+        grey: Any = np.ascontiguousarray(to_grey(frame.pixels))
+        if self._stream is None:
+            self._stream = self._container.add_stream("ffv1", options=FFV1)
+            self._stream.width, self._stream.height = grey.shape[1], grey.shape[0]
+            self._stream.pix_fmt = GREY_FORMATS[str(grey.dtype)]
+            self._stream.codec_context.time_base = self._stream.time_base = TIME_BASE
+            self._stream.codec_context.thread_count = 1  # threads of frames would each hold one back
+        picture = av.VideoFrame.from_ndarray(grey, format=GREY_FORMATS[str(grey.dtype)])
+        picture.pts, picture.time_base = tick, TIME_BASE
+        self._last_tick = tick
+        self._container.mux(self._stream.encode(picture))
+
+    def _failed(self, error: Exception) -> FingervisionError:
+        why = getattr(error, "strerror", None) or str(error)
+        return FingervisionError(
+            f"{self._path} could not be written any further ({why}); what was recorded until then is in it: make room, "
+            "or name another --out."
+        )

@@ -1,0 +1,85 @@
+"""Recording beside measuring: a thread of its own, so that a slow disk costs no measured frame."""
+
+from queue import Empty, Full, Queue
+from threading import Thread
+
+from fingervision.domain.errors import FingervisionError
+from fingervision.live.run_folder import RecordedFrame, RunFolder
+
+# Frames that may wait for the disk: ten seconds at 25 frames a second. The recording ends rather than wait for more.
+FRAMES_WAITING = 250
+# From here on the preview gives way.
+FRAMES_UNTIL_HURRY = 12
+# How long the disk may take for what waits when the recording is stopped.
+PATIENCE_S = 30.0
+
+
+class Recorder:
+    """Hands frames to a run folder.
+
+    Parameters
+    ----------
+    run : RunFolder
+        An open run.
+    """
+
+    def __init__(self, run: RunFolder) -> None:
+        self.run = run
+        self.failure = ""
+        self._waiting: Queue[RecordedFrame | tuple[str, str] | None] = Queue(FRAMES_WAITING)
+        self._why = "Recording was stopped."
+        self._thread = Thread(target=self._write, name="recorder", daemon=True)
+        self._thread.start()
+
+    @property
+    def in_a_hurry(self) -> bool:
+        """Whether the disk lags behind."""
+        return self._waiting.qsize() > FRAMES_UNTIL_HURRY
+
+    def add(self, what: RecordedFrame | tuple[str, str]) -> None:
+        """Hand over a frame, or an event (its name and words)."""
+        if self.failure:
+            return
+        try:
+            self._waiting.put_nowait(what)
+        except Full:
+            self.failure = (
+                f"The disk of {self.run.path} is too slow for this camera, so recording ended; what was recorded until "
+                "then is valid: name a folder on another disk with --out."
+            )
+
+    def stop(self) -> None:
+        """End the recording and wait for the disk.
+
+        Raises
+        ------
+        FingervisionError
+            The run could not be written to its end.
+        """
+        if not self.failure:
+            self._waiting.put(None, timeout=PATIENCE_S)
+        self._thread.join(PATIENCE_S)
+        if self.failure:
+            raise FingervisionError(self.failure)
+
+    def _write(self) -> None:
+        try:
+            while True:
+                try:
+                    what = self._waiting.get(timeout=0.5)
+                except Empty:
+                    if self.failure:
+                        break
+                    continue
+                if what is None:
+                    break
+                if isinstance(what, RecordedFrame):
+                    self.run.add(what)
+                else:
+                    self.run.event(*what)
+        except FingervisionError as error:
+            self.failure = str(error)
+        try:
+            self.run.close(self.failure or self._why)
+        except FingervisionError as error:
+            self.failure = self.failure or str(error)

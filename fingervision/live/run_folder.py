@@ -1,0 +1,172 @@
+"""A run: the video, the gaps, the events and what they were measured with, in a folder that survives any end."""
+
+import hashlib
+import json
+from contextlib import suppress
+from dataclasses import asdict, dataclass, replace
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+from calib.measured_scale import Calibration
+from fingervision import __version__
+from fingervision.domain.errors import FingervisionError
+from fingervision.domain.frame import Frame, LostFrame
+from fingervision.frames.received import OwnPacket
+from fingervision.frames.source import Description
+from fingervision.live.recorded_video import RecordedVideo
+from fingervision.measuring.measure import Task
+from fingervision.storage.calibration_json import write_calibration
+from fingervision.storage.gaps_csv import GapRow, GapsCsv
+
+RUN, VIDEO, GAPS, EVENTS, CALIBRATION = "run.json", "video.mp4", "gaps.csv", "events.jsonl", "calibration.json"
+SCHEMA = 1
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class RecordedFrame:
+    """What the recording takes of one frame: its picture, its packets, and the row as it was measured."""
+
+    item: Frame | LostFrame
+    packets: tuple[OwnPacket, ...]
+    row: GapRow
+
+
+class RunFolder:
+    """Writes a run while it happens.
+
+    Every frame reaches the files when it is written, rows of the table within a second, so that a process that is
+    killed loses a second at most.
+
+    Parameters
+    ----------
+    out : Path
+        Folder that runs lie in; the run's own is named by its beginning.
+    description : Description
+        The source.
+    task : Task
+        What is measured, and how.
+    template : av.VideoStream or None
+        See `RecordedVideo`.
+
+    Raises
+    ------
+    FingervisionError
+        The folder cannot be written.
+    """
+
+    def __init__(self, out: Path, description: Description, task: Task, template: Any) -> None:
+        self.path = _new_folder(out)
+        self.frames = 0
+        self._began = datetime.now(UTC)
+        self._about = _about(description, task, self._began)
+        try:
+            self._write_about(complete=False)
+            if isinstance(task.scale, Calibration):
+                write_calibration(task.scale, self.path / CALIBRATION)
+            self._events = (self.path / EVENTS).open("a", encoding="utf-8", buffering=1)
+        except OSError as error:
+            raise self._failed(error) from error
+        self._gaps = GapsCsv(self.path / GAPS)
+        self._video = RecordedVideo(self.path / VIDEO, template)
+        self._last_s = 0.0
+        self.event("recording", "Recording began.")
+
+    def add(self, frame: RecordedFrame) -> None:
+        """Write one frame: first its picture, then its row."""
+        time_s = self._video.add(frame.item, frame.packets)
+        if time_s is None:
+            return
+        self._last_s = time_s
+        self._gaps.add((replace(frame.row, frame=self.frames, time_s=time_s),))
+        self.frames += 1
+
+    def event(self, name: str, words: str) -> None:
+        """Append an event at the time of the last frame."""
+        line = {"time_s": round(self._last_s, 6), "event": name, "words": words}
+        try:
+            self._events.write(json.dumps(line, ensure_ascii=False) + "\n")
+        except OSError as error:
+            raise self._failed(error) from error
+
+    def close(self, why: str) -> None:
+        """End the run; every file is closed even where one fails, and the first failure is raised."""
+        failure: FingervisionError | None = None
+        with suppress(FingervisionError):
+            self.event("stopped", why)
+        for end in (self._video.close, self._gaps.close, self._events.close, self._finish):
+            try:
+                end()
+            except FingervisionError as error:
+                failure = failure or error
+            except OSError as error:
+                failure = failure or self._failed(error)
+        if failure is not None:
+            raise failure
+
+    def _finish(self) -> None:
+        with (self.path / VIDEO).open("rb") as video:
+            self._about["sha256"] = {VIDEO: hashlib.file_digest(video, "sha256").hexdigest()}
+        self._about["frames"] = self.frames
+        self._write_about(complete=True)
+
+    def _write_about(self, *, complete: bool) -> None:
+        part = self.path / f".{RUN}.part"
+        part.write_text(json.dumps({**self._about, "complete": complete}, indent=2) + "\n", encoding="utf-8")
+        part.replace(self.path / RUN)
+
+    def _failed(self, error: OSError) -> FingervisionError:
+        return FingervisionError(
+            f"The run {self.path} could not be written any further ({error.strerror}); what was recorded until then is "
+            "in it: make room, or name another --out."
+        )
+
+
+def _new_folder(out: Path) -> Path:
+    """Make a folder that nobody has."""
+    name = datetime.now(UTC).strftime("%Y-%m-%dT%H-%M-%SZ")
+    for number in range(1, 1000):
+        path = out / (name if number == 1 else f"{name}-{number}")
+        try:
+            path.mkdir(parents=True)
+        except FileExistsError:
+            if not path.is_dir():
+                raise FingervisionError(f"--out must be a folder, but {out} is a file: name another.") from None
+            continue
+        except OSError as error:
+            raise FingervisionError(
+                f"The folder {out} cannot be written ({error.strerror}): name another with --out."
+            ) from error
+        return path
+    raise FingervisionError(f"The folder {out} is full of runs of this second: name another with --out.")
+
+
+def _about(description: Description, task: Task, began: datetime) -> dict[str, Any]:
+    region = task.region
+    return {
+        "schema": SCHEMA,
+        "software": {"name": "fingervision", "version": __version__},
+        "began_at": began.isoformat(timespec="milliseconds"),
+        "recipe": None,
+        "device": {
+            "source": description.name,
+            "kind": description.kind,
+            "codec": description.codec,
+            "width_px": description.width_px,
+            "height_px": description.height_px,
+            "rate_hz": description.rate_hz,
+            "notes": list(description.notes),
+        },
+        "settings": {
+            "below_tip_mm": task.below_tip_mm,
+            "tips": "auto" if task.direction is None else task.direction.value,
+            "roi": None if region is None else list(asdict(region).values()),
+        },
+        "scale": {
+            "px_per_mm": task.scale.px_per_mm,
+            "calibration": CALIBRATION if isinstance(task.scale, Calibration) else None,
+        },
+        "video": VIDEO,
+        "gaps": GAPS,
+        "events": EVENTS,
+    }

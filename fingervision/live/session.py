@@ -1,0 +1,250 @@
+"""The live measurement: every frame measured as it comes, what is known of it kept for whoever looks."""
+
+from collections import Counter, deque
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+from threading import Event, Lock, Thread
+from time import monotonic
+from typing import Any
+
+from fingervision.domain.errors import FingervisionError
+from fingervision.domain.frame import Frame, LostFrame
+from fingervision.domain.gap import GapMeasurement, NoGap
+from fingervision.domain.status import Status
+from fingervision.live.cadence import Cadence
+from fingervision.live.capture import Arrival, Capture, Ended, Happening
+from fingervision.live.choices import Choices
+from fingervision.live.exposure import Exposure
+from fingervision.live.history import History
+from fingervision.live.recorder import Recorder
+from fingervision.live.run_folder import RecordedFrame, RunFolder
+from fingervision.measuring.rows import Result, RowMaker
+from fingervision.storage.gaps_csv import GapRow
+from fingervision.vision.pipeline import measure_frame
+
+# Without a frame for so long, or for so many periods, the source is silent.
+SILENT_S, SILENT_PERIODS = 0.5, 5.0
+MESSAGES_KEPT = 50
+# Frames waiting for the measurement from which on the preview gives way.
+FRAMES_UNTIL_HURRY = 4
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Seen:
+    """The newest frame and what it says.
+
+    Parameters
+    ----------
+    frame : Frame
+        The picture.
+    outcome : GapMeasurement, NoGap or None
+        None as long as there is no scale.
+    row : GapRow or None
+        As in gaps.csv.
+    """
+
+    frame: Frame
+    outcome: GapMeasurement | NoGap | None
+    row: GapRow | None
+
+
+@dataclass(frozen=True, slots=True)
+class Message:
+    """A sentence for the user, numbered from 1."""
+
+    number: int
+    name: str
+    words: str
+
+
+RowListener = Callable[[GapRow, float], None]
+MessageListener = Callable[[Message], None]
+
+
+class Session:
+    """Measures in a thread of its own.
+
+    Parameters
+    ----------
+    capture : Capture
+        Not yet started.
+    choices : Choices
+        What the user chose.
+    out : Path
+        Folder for runs and snapshots.
+    """
+
+    def __init__(self, capture: Capture, choices: Choices, out: Path) -> None:
+        self.capture, self.out = capture, out
+        self.description = capture.source.description
+        choices.check(self.description)
+        self.choices = choices
+        self.history = History()
+        self.cadence, self.exposure = Cadence(), Exposure()
+        self.counts: Counter[Status] = Counter()
+        self.seen: Seen | None = None
+        self.messages: deque[Message] = deque(maxlen=MESSAGES_KEPT)
+        self.ended = Event()
+        self.on_row: list[RowListener] = []
+        self.on_message: list[MessageListener] = []
+        self._said = 0
+        self._frame_at_s = monotonic()
+        self._interrupted = False
+        self._recorder: Recorder | None = None
+        self._lock = Lock()
+        self._stopped = Event()
+        self._thread = Thread(target=self._measure, name="measuring", daemon=True)
+        for note in self.description.notes:
+            self.say("camera", note)
+
+    def start(self) -> None:
+        """Begin to measure."""
+        self._frame_at_s = monotonic()
+        self.capture.start()
+        self._thread.start()
+
+    def stop(self) -> None:
+        """End measuring; what is recording is ended properly."""
+        self.capture.stop()
+        self._stopped.set()
+        self._thread.join()
+        if self._recorder is not None:
+            self.stop_recording()
+
+    def say(self, name: str, words: str) -> None:
+        """Tell everybody who looks, and the recording."""
+        self._said += 1
+        message = Message(self._said, name, words)
+        self.messages.append(message)
+        recorder = self._recorder
+        if recorder is not None:
+            recorder.add((name, words))
+        for listener in self.on_message:
+            listener(message)
+
+    def choose(self, **changes: Any) -> None:
+        """Change what is measured or shown.
+
+        Raises
+        ------
+        FingervisionError
+            It cannot be meant for these frames, or would change a recording under way.
+        """
+        with self._lock:
+            measured = {"scale", "below_tip_mm", "direction", "region"} & set(changes)
+            if measured and self._recorder is not None:
+                raise FingervisionError("While a run is recorded the measurement stays as it is: stop recording first.")
+            chosen = replace(self.choices, **changes)
+            chosen.check(self.description)
+            self.choices = chosen
+
+    def record(self) -> Path:
+        """Begin a recording.
+
+        Raises
+        ------
+        FingervisionError
+            There is one already, the scale is not known, or the folder cannot be written.
+        """
+        with self._lock:
+            task = self.choices.task
+            if self._recorder is not None:
+                raise FingervisionError(f"A run is being recorded already, in {self._recorder.run.path}.")
+            if task is None:
+                raise FingervisionError("The scale is not known: give it before recording, so that the run has gaps.")
+            if not self.description.has_times:
+                raise FingervisionError("These images have no times, which a recording needs: give --rate-hz.")
+            run = RunFolder(self.out, self.description, task, self.capture.source.template)
+            self._recorder = Recorder(run)
+        self.say("recording", f"Recording to {run.path}.")
+        return run.path
+
+    def stop_recording(self) -> Path:
+        """End the recording; returns its folder.
+
+        Raises
+        ------
+        FingervisionError
+            There is none, or it could not be written to its end.
+        """
+        with self._lock:
+            recorder, self._recorder = self._recorder, None
+        if recorder is None:
+            raise FingervisionError("Nothing is being recorded.")
+        recorder.stop()
+        self.say("stopped", f"Recorded {recorder.run.frames} frames to {recorder.run.path}.")
+        return recorder.run.path
+
+    @property
+    def recording(self) -> Recorder | None:
+        """The recording under way."""
+        return self._recorder
+
+    @property
+    def silent_s(self) -> float:
+        """How long there has been no frame; 0 while they come as usual."""
+        if self.ended.is_set():
+            return 0.0
+        since_s = monotonic() - self._frame_at_s
+        usual_s = max(SILENT_S, SILENT_PERIODS * (self.cadence.period_s or 0.0))
+        return since_s if self._interrupted or since_s > usual_s else 0.0
+
+    @property
+    def in_a_hurry(self) -> bool:
+        """Whether measuring or the disk lags, so that nobody should draw previews."""
+        recorder = self._recorder
+        lags = self.capture.waiting.qsize() > FRAMES_UNTIL_HURRY
+        return lags or (recorder is not None and recorder.in_a_hurry)
+
+    def _measure(self) -> None:
+        while not self._stopped.is_set():
+            what = self.capture.next(0.1)
+            if isinstance(what, Arrival):
+                self._take(what)
+            elif isinstance(what, Happening):
+                self._interrupted = what.name in ("interrupted", "changed")
+                if what.name in ("interrupted", "time_jumped"):
+                    self.cadence.restart()
+                self.say(what.name, what.words)
+            elif isinstance(what, Ended):
+                self._interrupted = False
+                self.say("ended", "The source has ended.")
+                self.ended.set()
+                return
+
+    def _take(self, arrival: Arrival) -> None:
+        with self._lock:
+            self._frame_at_s = monotonic()
+            self._interrupted = False
+            item, choices = arrival.item, self.choices
+            outcome, row = self._row(item, choices)
+            if isinstance(item, Frame):
+                if item.time_s is not None:
+                    self.cadence.add(item.time_s)
+                self.exposure.add(item)
+                self.seen = Seen(item, None if isinstance(outcome, LostFrame) else outcome, row)
+            if row is None:
+                return
+            self.history.add(row)
+            self.counts[row.status] += 1
+            recorder = self._recorder
+            if recorder is not None:
+                recorder.add(RecordedFrame(item, arrival.packets, row))
+                if recorder.failure:
+                    self._recorder = None
+        if recorder is not None and recorder.failure:
+            self.say("recording_failed", recorder.failure)
+        for listener in self.on_row:
+            listener(row, arrival.arrived_s)
+
+    def _row(
+        self, item: Frame | LostFrame, choices: Choices
+    ) -> tuple[GapMeasurement | NoGap | LostFrame | None, GapRow | None]:
+        task = choices.task
+        if task is None:
+            return None, None
+        outcome = item if isinstance(item, LostFrame) else measure_frame(item, task.settings)
+        rows = RowMaker(task.scale, (self.description.width_px, self.description.height_px))
+        (row,) = rows.rows((Result(item.index, item.time_s, outcome),))
+        return outcome, row

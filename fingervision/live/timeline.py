@@ -1,0 +1,60 @@
+"""One time for everything live: the source's own steps, joined across cuts and jumps by the host's clock."""
+
+# A source whose clock runs ahead of the host's by so much in one step has jumped.
+JUMP_S = 1.0
+# What a time in the recording is a multiple of.
+TICKS_PER_S = 1_000_000
+
+
+class Timeline:
+    """Turns the times of a source into times since the start of the live view.
+
+    Parameters
+    ----------
+    started_s : float
+        The host's monotonic clock at the start.
+    """
+
+    def __init__(self, started_s: float) -> None:
+        self._started_s = started_s
+        self._offset_s: float | None = None
+        self._last: tuple[float, float, float] | None = None  # on the source's clock, on the host's, as given
+
+    def cut(self) -> None:
+        """Note that the source was cut off: its clock may start anew."""
+        self._offset_s = None
+
+    def at(self, source_s: float, arrived_s: float) -> tuple[float, float]:
+        """Place a frame.
+
+        Parameters
+        ----------
+        source_s : float
+            On the source's clock.
+        arrived_s : float
+            On the host's.
+
+        Returns
+        -------
+        time_s, jump_s : float
+            Time since the start, a whole number of microseconds; how far the source's clock jumped, 0 as a rule.
+        """
+        jump_s = 0.0
+        if self._last is not None and self._offset_s is not None:
+            step_s, host_step_s = source_s - self._last[0], arrived_s - self._last[1]
+            if step_s < 0.0 or step_s - host_step_s > JUMP_S:
+                jump_s = step_s - host_step_s
+                self._offset_s = None
+        if self._offset_s is None:
+            begins_s = arrived_s - self._started_s
+            if self._last is not None:
+                # Never back: after a jump the host's clock says how much time has passed.
+                begins_s = max(begins_s, self._last[2] + 1.0 / TICKS_PER_S)
+            self._offset_s = begins_s - source_s
+        time_s = round((source_s + self._offset_s) * TICKS_PER_S) / TICKS_PER_S
+        self._last = (source_s, arrived_s, time_s)
+        return time_s, jump_s
+
+    def on_this(self, source_s: float) -> float:
+        """Place another time of the source, that of a packet, beside the frames."""
+        return source_s + (self._offset_s or 0.0)
