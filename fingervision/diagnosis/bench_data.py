@@ -17,6 +17,8 @@ from fingervision.domain.response import Response
 from fingervision.models.corrected import CorrectedModel
 
 HELD_SAMPLES = 15
+STAIRCASE = 0.1
+"""Share of an encoder step's variance that is left after smoothing."""
 SHORT = 100
 """Samples below which nothing is set aside before something was explained."""
 OUTLIER_SIGMAS, RAW_SIGMAS = 4.5, 7.0
@@ -162,7 +164,11 @@ def prepare(table: MeasuredTable, model: CorrectedModel, without: frozenset[str]
                 held[run] = np.ptp(np.lib.stride_tricks.sliding_window_view(padded, HELD_SAMPLES), axis=1) < 1.01 * step
     samples = 1.0 / float(np.median(leverage)) if np.median(leverage) > 0.0 else 1.0
     # A stage that stands between two encoder steps keeps its error: averaging does not help there.
-    error = slope * sigma * np.sqrt(np.where(held, 1.0, leverage))
+    left = np.where(held, 1.0, leverage)
+    if step > 0.0:
+        # The staircase of an encoder is no white noise: a line averages it out less well than its leverage says.
+        left, samples = np.maximum(left, STAIRCASE), max(samples, HELD_SAMPLES)
+    error = slope * sigma * np.sqrt(left)
     able, excluded = admissible(history, without)
     distrusted, reasons = distrusted_rows(table, model.base, float(zero))
     notes += reasons

@@ -10,10 +10,11 @@ from fingervision.domain.effect import Array, History
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Probes:
-    """Whitened unit shapes and what each would be called; columns of shape (m, k)."""
+    """Whitened unit shapes and what each would be called; columns of shape (m, k), RMS before whitening."""
 
     words: tuple[str, ...]
     columns: Array
+    rms: Array
 
 
 def probes(history: History, whitener: Whitener, most: int) -> Probes:
@@ -89,4 +90,5 @@ def probes(history: History, whitener: Whitener, most: int) -> Probes:
             parts = [gap * shape, midline * shape] if history.both_edges else [gap * shape]
             columns.append(np.concatenate([*parts, *([force * shape] if history.force else [])]))
             words.append(f"{label} in {channel}")
-    return Probes(tuple(words), whitener.columns(np.stack(columns, axis=1))[0])
+    raw = np.stack(columns, axis=1)
+    return Probes(tuple(words), whitener.columns(raw)[0], np.sqrt(np.mean(raw**2, axis=0)))

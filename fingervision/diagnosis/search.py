@@ -24,6 +24,8 @@ SMALL_SHARE = 0.05
 TRIPLE_SHARE = 0.15
 """A third effect needs evidence of its own: three effects bend to almost anything."""
 PAIRS_REFITTED = 60
+STAIRCASE_SHARE = 0.5
+"""What is smaller than half an encoder step's own error is not told from it: the staircase is no random noise."""
 SHORT = 100
 """Samples below which the noise is estimated beside single effects only."""
 
@@ -132,9 +134,18 @@ def _distance(problem: Problem, truth: Explanation, other: Explanation, sigma_mm
     return fit(problem, other.names, other.values, target=target, sigma_mm=sigma_mm, iterations=12).score
 
 
+def _staircase_mm(problem: Problem) -> float:
+    """Standard deviation that the steps of the input's encoder give the gap; 0 where none show."""
+    history = problem.chain.history
+    gap = problem.chain.stacked({})[: history.input_mm.size]
+    return float(np.ptp(gap)) / history.input_span_mm * history.input_step_mm / float(np.sqrt(12.0))
+
+
 def _added(problem: Problem, smaller: Explanation, larger: Explanation) -> float:
     """Size of what the larger explanation adds, as a share of all that it changes in the prediction, in mm."""
     bare, before, after = (problem.chain.stacked(values) for values in ({}, smaller.values, larger.values))
+    if np.sqrt(np.mean((after - before) ** 2)) < STAIRCASE_SHARE * _staircase_mm(problem):
+        return 0.0
     return float(np.linalg.norm(after - before) / max(1e-12, float(np.linalg.norm(after - bare))))
 
 
@@ -247,6 +258,9 @@ def _gate(problem: Problem, best: Explanation, rng: np.random.Generator) -> tupl
     words = f"{shapes.words[top]} ({np.sqrt(gain[top]):.1f} sigma)"
     changed = problem.whitened(best.values) - problem.whitened({})
     explained = float(changed @ changed)
+    size_mm = abs(float(dot[top])) / float(norm[top]) * shapes.rms[top]
+    if size_mm < STAIRCASE_SHARE * _staircase_mm(problem):
+        return None, words
     if best.names and gain[top] < SMALL_SHARE**2 * explained:
         return None, words
     return words, None
