@@ -180,7 +180,7 @@ def fit(
             break
     for i, (_, parameter) in enumerate(listed):
         if parameter.rugged:
-            for width in (0.05, 0.01, 0.002):
+            for width in (0.012, 0.003):
                 around = np.clip(x[i] * (1.0 + width * np.linspace(-1.0, 1.0, 13)), lower[i], upper[i])
                 for value in around:
                     trial = x.copy()
