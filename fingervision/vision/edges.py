@@ -83,6 +83,10 @@ def fit_edges(upright: GreyImage, lines: ProfileLines) -> EdgePoints:
     blur = _first_blur(upright, lines)
     filters = edge_filters(reach_for(blur))
     values = _gather(upright, lines, filters.reach_px)
+    # Where the coarse outline lies a pixel off, the window follows the edge: what finds must not sway what measures.
+    off = np.floor(_first_position(values)).astype(np.intp)
+    lines = replace(lines, coarse=lines.coarse + lines.outward * off)
+    values = _gather(upright, lines, filters.reach_px)
     edges = _fit(values, lines, np.full((2, 2), blur), filters, float(np.iinfo(upright.dtype).max))
     return _with_stripes(upright, edges, filters.reach_px)
 

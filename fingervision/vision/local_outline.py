@@ -17,10 +17,10 @@ Floats = NDArray[np.float64]
 
 DEGREE = 4
 # Half-lengths tried, in pixels and in units of the blur.
-REACHES_PX = (12.0, 18.0, 27.0, 40.0)
+REACHES_PX = (18.0, 27.0, 40.0)
 SHORTEST_IN_BLURS = 6.0
 # A longer window must not leave more than this times the spread of the shortest one.
-SPREAD_LIMIT = 1.15
+SPREAD_LIMIT = 1.5
 FEWEST_POINTS = 12
 
 

@@ -72,7 +72,9 @@ def profile_lines(fingers: Sequence[CoarseFinger]) -> ProfileLines:
             (ROWS, TIP, across, along, -1, SLOPE_OF_A_TIP),
         )
         for first, places, lines, values, sense, steepest in sides:
-            at, edge, change = _side(lines, values, sense, steepest, places)
+            # A tip is thinned out from its inner side, so that a mirrored finger has the mirrored lines.
+            from_end = first == ROWS and sign > 0
+            at, edge, change = _side(lines, values, sense, steepest, places, -1 if from_end else 1)
             own = slice(first, first + len(at))
             fixed[k, own], coarse[k, own], slope[k, own], weight[k, own] = at, edge, change, 1.0
     return ProfileLines(fixed, coarse, slope, weight, outward)
@@ -82,7 +84,7 @@ def profile_lines(fingers: Sequence[CoarseFinger]) -> ProfileLines:
 SLOPE_OF_A_TIP = 0.999
 
 
-def _side(lines: Ints, values: Ints, sense: int, steepest: float, places: int) -> tuple[Ints, Ints, Floats]:
+def _side(lines: Ints, values: Ints, sense: int, steepest: float, places: int, order: int) -> tuple[Ints, Ints, Floats]:
     """The outermost pixel on every line that meets the outline steeply enough, its slope, thinned to the places."""
     first = int(lines.min())
     count = int(lines.max()) - first + 1
@@ -92,5 +94,5 @@ def _side(lines: Ints, values: Ints, sense: int, steepest: float, places: int) -
     low, high = np.maximum(index - SLOPE_REACH_PX, 0), np.minimum(index + SLOPE_REACH_PX, count - 1)
     slope = sense * (reach[high] - reach[low]) / np.maximum(high - low, 1)
     keep = np.flatnonzero(np.abs(slope) <= steepest)
-    keep = keep[:: -(-len(keep) // places) or 1]
+    keep = keep[::order][:: -(-len(keep) // places) or 1]
     return keep + first, sense * reach[keep], slope[keep]
