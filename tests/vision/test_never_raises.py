@@ -1,7 +1,6 @@
 """Whatever the pixels are, a frame gives a number with its uncertainty or a reason."""
 
 import numpy as np
-import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
@@ -14,8 +13,6 @@ from fingervision.domain.status import Status
 from fingervision.vision.pipeline import Settings, measure_frame
 
 directions = st.none() | st.sampled_from(Direction)
-# A known defect, not yet mended; other pictures are held by the test of structured junk.
-TINY = "a picture with a side of one or a few pixels raises where its sample is taken"
 heights = st.floats(0.5, 60.0)
 
 
@@ -32,7 +29,6 @@ def _is_sound(pixels: Pixels, settings_: Settings, coding: Coding = Coding.LOSSL
         assert found.status is not Status.OK
 
 
-@pytest.mark.xfail(reason=TINY, strict=False)
 @given(
     pixels=st.sampled_from([np.uint8, np.uint16]).flatmap(
         lambda t: arrays(t, st.tuples(st.integers(1, 30), st.integers(1, 30)))
@@ -72,7 +68,6 @@ def test_structured_junk(
     _is_sound(np.dstack([pixels] * 3) if colour else pixels, Settings(below, direction), coding)
 
 
-@pytest.mark.xfail(reason=TINY, strict=False)
 @given(seed=st.integers(0, 10**6), x=st.integers(0, 90), y=st.integers(0, 90))
 def test_any_region_inside_the_frame(seed: int, x: int, y: int) -> None:
     rng = np.random.default_rng(seed)

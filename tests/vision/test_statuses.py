@@ -128,11 +128,7 @@ CLUTTER: dict[str, Callable[[np.random.Generator], Pixels]] = {
 
 
 # Known defects, not yet mended; each is still run, so that the day it passes shows in the report.
-TINY = "a picture with a side of one pixel raises where its sample is taken"
 DEFECTS = {
-    "one_pixel": TINY,
-    "one_row": TINY,
-    "one_column": TINY,
     "one_finger_a_disc_and_a_bar": "a bar that stands free is taken for the second finger",
     "blobs": "two round blobs side by side are taken for fingers",
     "text": "strokes of letters are taken for fingers in some of the pages",
