@@ -1,0 +1,146 @@
+"""Workers of an existing Dask cluster, with all files on a path that every machine sees."""
+
+import logging
+import os
+from collections.abc import Generator, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import replace
+from itertools import islice
+from pathlib import Path
+from typing import Any
+
+from fingervision.batch.task import Outcome, Perform, Task, failure
+from fingervision.batch.versions import difference, versions
+from fingervision.batch.work import work
+from fingervision.domain.errors import FingervisionError, UsageError
+
+PATIENCE_S = 10
+"""How long a scheduler may take to answer, and a worker to be there."""
+WINDOW = 4
+"""Tasks that a thread of a worker has waiting: it never idles, and the scheduler holds few of ten thousand."""
+
+
+@contextmanager
+def connected(scheduler: str, patience_s: float = PATIENCE_S) -> Iterator[Any]:
+    """Connect to a cluster and check that its workers run what runs here.
+
+    Parameters
+    ----------
+    scheduler : str
+        `tcp://HOST:PORT`.
+    patience_s : float
+        Time to wait for an answer.
+
+    Yields
+    ------
+    distributed.Client
+        Its `get_executor()` is a `concurrent.futures.Executor`.
+
+    Raises
+    ------
+    UsageError
+        The address cannot be one.
+    FingervisionError
+        Dask is not installed, nothing answers, there are no workers, or they run other versions.
+    """
+    try:
+        from distributed import Client
+    except ImportError:
+        raise FingervisionError(
+            "--scheduler needs Dask, which is not installed here: pip install 'fingervision[cluster]'."
+        ) from None
+    if not scheduler.startswith(("tcp://", "tls://")) or not scheduler.rpartition(":")[2].isdigit():
+        raise UsageError(f"--scheduler must be like tcp://host:8786, but is {scheduler}.")
+    logging.getLogger("distributed").setLevel(logging.CRITICAL)  # what matters is said in a sentence
+    try:
+        client = Client(scheduler, timeout=patience_s, set_as_default=False)
+    except (OSError, ValueError, RuntimeError) as error:
+        raise FingervisionError(
+            f"The scheduler must answer within {patience_s:g} s, but {scheduler} does not: start `dask "
+            "scheduler` there, or check address and firewall."
+        ) from error
+    try:
+        _check_workers(client, scheduler, patience_s)
+        yield client
+    finally:
+        client.close(timeout=patience_s)
+
+
+def _check_workers(client: Any, scheduler: str, patience_s: float) -> None:
+    try:
+        client.wait_for_workers(1, timeout=patience_s)
+    except TimeoutError:
+        raise FingervisionError(
+            f"The cluster must have workers, but {scheduler} has none after {patience_s:g} s: "
+            f"start `dask worker {scheduler} --nthreads 1` on its machines."
+        ) from None
+    here = versions()
+    found = client.run(versions, on_error="return")
+    for address, there in found.items():
+        words = difference(here, there) if isinstance(there, dict) else f"no fingervision ({there})"
+        if words:
+            raise FingervisionError(
+                f"Every worker must run what runs here, but {address} has {words}: install the same there "
+                "and restart it."
+            )
+
+
+def outcomes_of(client: Any, tasks: Sequence[Task], perform: Perform) -> Generator[tuple[int, Outcome], None, None]:
+    """Work on tasks on a cluster, and give each outcome as it comes, with its task's number.
+
+    The scheduler hands the task of a dead worker to another one; it may be done twice, which does no harm.
+
+    Raises
+    ------
+    FingervisionError
+        The scheduler is gone.
+    """
+    from distributed import KilledWorker, as_completed
+
+    here = versions()
+    threads = sum(worker["nthreads"] for worker in client.scheduler_info(n_workers=-1)["workers"].values())
+    numbers = iter(range(len(tasks)))
+    waiting: dict[Any, int] = {}
+
+    def submitted(number: int) -> Any:
+        future = client.submit(_work_there, _absolute(tasks[number]), perform, here, pure=False)
+        waiting[future] = number
+        return future
+
+    running = as_completed([submitted(number) for number in islice(numbers, WINDOW * max(1, threads))])
+    try:
+        for future in running:
+            number = waiting.pop(future)
+            try:
+                outcome = future.result()
+                outcome = replace(outcome, input=tasks[number].input)
+            except KilledWorker as error:
+                words = (
+                    f"{tasks[number].input} ended {error.allowed_failures + 1} workers: work on it alone to see why."
+                )
+                outcome = failure(tasks[number], words)
+            except Exception as error:
+                if client.status != "running" or future.status in ("cancelled", "lost"):
+                    raise FingervisionError(
+                        "The scheduler went away; what is done is kept: start it again, and call again."
+                    ) from error
+                outcome = failure(tasks[number], f"{tasks[number].input} could not be done on its worker ({error}).")
+            following = next(numbers, None)
+            if following is not None:
+                running.add(submitted(following))
+            yield number, outcome
+    finally:
+        client.cancel(list(waiting))
+
+
+def _absolute(task: Task) -> Task:
+    """Name files so that a process with another working directory finds them."""
+    return replace(task, input=os.path.abspath(task.input), folder=Path(os.path.abspath(task.folder)))  # noqa: PTH100
+
+
+def _work_there(task: Task, perform: Perform, wanted: dict[str, str]) -> Outcome:
+    """Work on a worker; one that joined after the check is checked here."""
+    words = difference(wanted, versions())
+    if words:
+        return failure(task, f"A worker joined that has {words}: install the same there and restart it.")
+    return work(task, perform)

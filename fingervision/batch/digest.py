@@ -1,0 +1,43 @@
+"""What the overview keeps of one result: a line of a table and a small picture."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Cell = str | float | int | None
+CURVE_POINTS = 48
+"""Points of a small picture: its width is about 150 px, and ten thousand of them shall make a page of a few MB."""
+
+
+@dataclass(frozen=True, slots=True)
+class Digest:
+    """One result in short.
+
+    Parameters
+    ----------
+    cells : mapping of str to text, number or None
+        Its line of the table, by column.
+    curve : tuple of float or None
+        At most `CURVE_POINTS` values, evenly spaced; None is a hole.
+    caption : str
+        A few words below the picture.
+    """
+
+    cells: Mapping[str, Cell]
+    curve: tuple[float | None, ...]
+    caption: str
+
+
+def thinned(values: NDArray[np.float64]) -> tuple[float | None, ...]:
+    """Give the values at evenly spaced places, to five figures.
+
+    Parameters
+    ----------
+    values : ndarray of float, shape (n,)
+        Not a number where there is a hole.
+    """
+    if values.size > CURVE_POINTS:
+        values = values[np.linspace(0, values.size - 1, CURVE_POINTS).round().astype(np.int64)]
+    return tuple(float(f"{value:.5g}") if np.isfinite(value) else None for value in values.tolist())

@@ -1,0 +1,67 @@
+"""Whether an input is still what it was: a stamp that is quick to take, and the hash of its content."""
+
+import hashlib
+from pathlib import Path
+from time import time_ns
+
+BYTES_AT_ONCE = 1 << 20
+SETTLED_NS = 3_000_000_000
+"""A file that changed so shortly ago may change again within the same tick of a coarse file system's clock (2 s)."""
+
+
+def files_of(path: Path) -> list[Path]:
+    """Files that an input is made of: itself, or what lies in the folder, hidden files left out."""
+    if not path.is_dir():
+        return [path]
+    return sorted(file for file in path.iterdir() if not file.name.startswith(".") and file.is_file())
+
+
+def stamp_of(path: Path) -> str:
+    """Sizes and times of change; while they are the same, so is the content of what has settled.
+
+    Raises
+    ------
+    OSError
+        It cannot be read.
+    """
+    found = hashlib.sha256()
+    for file in files_of(path):
+        state = file.stat()
+        found.update(f"{file.name}\0{state.st_size}\0{state.st_mtime_ns}\n".encode("utf-8", "surrogateescape"))
+    return found.hexdigest()
+
+
+def is_settled(path: Path) -> bool:
+    """Whether the last change is so long ago that a later one has another time.
+
+    Raises
+    ------
+    OSError
+        It cannot be read.
+    """
+    return all(time_ns() - file.stat().st_mtime_ns > SETTLED_NS for file in files_of(path))
+
+
+def content_hash(path: Path) -> str:
+    """SHA-256 of the bytes of a file; of a folder, of its files' names and hashes.
+
+    Raises
+    ------
+    OSError
+        It cannot be read.
+    """
+    files = files_of(path)
+    if files == [path]:
+        return _hash_of(path)
+    together = hashlib.sha256()
+    for file in files:
+        together.update(f"{_hash_of(file)}  {file.name}\n".encode("utf-8", "surrogateescape"))
+    return together.hexdigest()
+
+
+def _hash_of(file: Path) -> str:
+    found = hashlib.sha256()
+    with file.open("rb") as content:
+        while block := content.read(BYTES_AT_ONCE):
+            found.update(block)
+    return found.hexdigest()

@@ -1,0 +1,63 @@
+"""The recordings or tables that a user names: paths, and patterns in quotes."""
+
+import glob
+import mimetypes
+import os
+import re
+from pathlib import Path
+
+from fingervision.domain.errors import FingervisionError
+
+
+def inputs_of(names: tuple[str, ...], out: Path) -> tuple[str, ...]:
+    """List every input once, in natural order within each name (run2 before run10).
+
+    A folder is an input by itself (of images), and then what lies in it is not. Nothing inside `out` is an input: the
+    videos that an earlier call wrote match the pattern as well. A path that is not there is kept, so that it is listed
+    with its sentence; a pattern that matches nothing too, as long as others match.
+
+    Raises
+    ------
+    FingervisionError
+        Nothing matches at all.
+    """
+    found: dict[str, str] = {}
+    matched = False
+    results = _absolute(out)
+    for name in names:
+        is_pattern = glob.has_magic(name) and not Path(name).exists()
+        # Path.glob knows no absolute patterns.
+        matches = sorted(glob.iglob(name, recursive=True), key=_natural) if is_pattern else [name]  # noqa: PTH207
+        matches = [
+            match
+            for match in matches
+            if not (_absolute(match) + os.sep).startswith(results + os.sep)
+            and not (is_pattern and Path(match).is_dir() and not _holds_images(match))
+        ]
+        matched = matched or any(Path(match).exists() for match in matches)
+        for match in matches or [name]:
+            found.setdefault(_absolute(match), match)
+    if not matched:
+        words = ", ".join(names)
+        raise FingervisionError(
+            f"There must be something to work on, but nothing matches {words}: check the path, and put patterns "
+            "in quotes ('recordings/**/*.mp4')."
+        )
+    folders = {path for path in found if Path(path).is_dir()}
+    return tuple(
+        name for path, name in found.items() if not any(str(parent) in folders for parent in Path(path).parents)
+    )
+
+
+def _absolute(path: str | Path) -> str:
+    return os.path.abspath(path)  # noqa: PTH100 - without following links: a link's own name is what the user gave
+
+
+def _holds_images(folder: str) -> bool:
+    with os.scandir(folder) as entries:
+        return any((mimetypes.guess_type(entry.name)[0] or "").startswith("image/") for entry in entries)
+
+
+def _natural(name: str) -> list[tuple[int, int, str]]:
+    parts = re.split(r"(\d+)", name)
+    return [(1, int(part), "") if number % 2 else (0, 0, part) for number, part in enumerate(parts)]

@@ -1,0 +1,42 @@
+"""How result folders are called: by the full file name, with as much of the path as tells two of them apart."""
+
+import hashlib
+from collections import Counter
+from collections.abc import Collection, Sequence
+from pathlib import Path
+
+BETWEEN = "__"
+LONGEST = 200
+"""Characters; file systems take 255 bytes, and a part's name is longer than its folder's."""
+
+
+def folder_names(inputs: Sequence[Path], taken: Collection[str]) -> tuple[str, ...]:
+    """Name a folder for each input; no two are the same, also where capitals do not count.
+
+    Parameters
+    ----------
+    inputs : sequence of Path
+        Absolute, all different.
+    taken : collection of str
+        Names that belong to something else.
+    """
+    parts = [path.parts[1:] or path.parts for path in inputs]
+    depth = [1] * len(inputs)
+    reserved = {name.casefold() for name in taken}
+    while True:
+        names = [BETWEEN.join(part[-deep:]) for part, deep in zip(parts, depth, strict=True)]
+        count = Counter(name.casefold() for name in names)
+        clashing = [
+            number for number, name in enumerate(names) if count[name.casefold()] > 1 or name.casefold() in reserved
+        ]
+        longer = [number for number in clashing if depth[number] < len(parts[number])]
+        if not longer:
+            break
+        for number in longer:
+            depth[number] += 1
+    # What the path cannot tell apart (a name that itself holds the separator), or is too long: a piece of its hash.
+    for number, name in enumerate(names):
+        if number in set(clashing) or len(name) > LONGEST:
+            code = hashlib.sha256(str(inputs[number]).encode("utf-8", "surrogateescape")).hexdigest()[:12]
+            names[number] = f"{name[-LONGEST:]}{BETWEEN}{code}"
+    return tuple(names)

@@ -1,0 +1,116 @@
+"""All results together: a table, a figure, and a page with a small picture of each."""
+
+import csv
+import hashlib
+import html
+import io
+from collections.abc import Sequence
+from pathlib import Path
+from urllib.parse import quote
+
+from fingervision.batch.digest import Cell
+from fingervision.batch.reduction import Reduction, reduction_of
+from fingervision.batch.result_folder import replace_text
+from fingervision.batch.small_picture import small_picture
+from fingervision.batch.task import Outcome
+
+TABLE, FIGURE, PAGE = "batch.csv", "batch.png", "index.html"
+FIRST_COLUMNS = ("input", "result", "exit_code", "words")
+SIZE_INCHES, DOTS_PER_INCH = (10.0, 6.0), 110
+STYLE = """
+body{font:15px/1.4 system-ui,sans-serif;margin:1.5em;color:#222}img{max-width:100%}
+.all{display:flex;flex-wrap:wrap;gap:10px}
+.one{border:1px solid #ccc;border-radius:4px;padding:6px;width:170px;overflow-wrap:anywhere;font-size:12px;
+content-visibility:auto;contain-intrinsic-size:170px 130px}
+.bad{border-color:#c0392b}.bad p{color:#c0392b}.one p{margin:2px 0}a{color:#11507a}svg{display:block}
+"""
+
+
+def write_overview(out: Path, command: str, outcomes: Sequence[Outcome]) -> None:
+    """Write batch.csv, batch.png and index.html, unless they are there and say the same.
+
+    Raises
+    ------
+    OSError
+        They cannot be written; older ones stay.
+    """
+    reduction = reduction_of(command)
+    table = table_text(out, reduction, outcomes)
+    stamp = f"<!-- {hashlib.sha256(table.encode('utf-8', 'surrogateescape')).hexdigest()} -->\n"
+    if _begins_with(out / PAGE, stamp) and (out / TABLE).is_file() and (out / FIGURE).is_file():
+        return
+    replace_text(out / TABLE, table)
+    _draw(out / FIGURE, reduction, outcomes)
+    replace_text(out / PAGE, stamp + _page(out, command, outcomes))  # last: its stamp says that all three are whole
+
+
+def table_text(out: Path, reduction: Reduction, outcomes: Sequence[Outcome]) -> str:
+    """Write one line an input; an empty cell where there is no value."""
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow((*FIRST_COLUMNS, *reduction.COLUMNS, "seconds"))
+    for outcome in outcomes:
+        cells = outcome.digest.cells if outcome.digest is not None else {}
+        result = "" if outcome.folder is None else outcome.folder.name
+        line: list[Cell] = [outcome.input, result, outcome.exit_code, outcome.words]
+        line += [_shown(cells.get(name)) for name in reduction.COLUMNS]
+        writer.writerow([*line, f"{outcome.seconds:.3f}" if outcome.folder is not None else ""])
+    return text.getvalue()
+
+
+def _shown(cell: Cell) -> Cell:
+    return f"{cell:.9g}" if isinstance(cell, float) else ("" if cell is None else cell)
+
+
+def _draw(path: Path, reduction: Reduction, outcomes: Sequence[Outcome]) -> None:
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=SIZE_INCHES, layout="constrained")
+    reduction.draw(figure, outcomes)
+    part = path.with_name(f".{path.name}.part")
+    try:
+        figure.savefig(part, dpi=DOTS_PER_INCH, format="png")
+        part.replace(path)
+    finally:
+        part.unlink(missing_ok=True)
+
+
+def _page(out: Path, command: str, outcomes: Sequence[Outcome]) -> str:
+    from base64 import b64encode
+
+    bad = sum(outcome.exit_code != 0 for outcome in outcomes)
+    said = (
+        f"{len(outcomes)} inputs, {bad} of them with a sentence to read" if bad else f"{len(outcomes)} inputs, all done"
+    )
+    picture = b64encode((out / FIGURE).read_bytes()).decode()
+    return (
+        '<!DOCTYPE html>\n<html lang="en"><head><meta charset="utf-8"><meta name="viewport" '
+        f'content="width=device-width"><title>batch {command}: {html.escape(out.resolve().name)}</title>'
+        f"<style>{STYLE}</style></head><body>\n<h1>batch {command}: {html.escape(out.resolve().name)}</h1>\n"
+        f'<p>{said}. The table: <a href="{TABLE}">{TABLE}</a>.</p>\n'
+        f'<img alt="all results" src="data:image/png;base64,{picture}">\n<div class="all">\n'
+        + "".join(_tile(command, outcome) for outcome in sorted(outcomes, key=lambda one: one.exit_code == 0))
+        + "</div></body></html>\n"
+    )
+
+
+def _tile(command: str, outcome: Outcome) -> str:
+    name = html.escape(outcome.folder.name if outcome.folder else Path(outcome.input).name)
+    title = html.escape(outcome.input, quote=True)
+    if outcome.folder is not None:
+        target = "report.html" if command == "diagnose" else "gap.png"
+        name = f'<a href="{quote(outcome.folder.name, errors="surrogateescape")}/{target}">{name}</a>'
+    lines = [f'<div class="one{" bad" if outcome.exit_code else ""}" title="{title}"><p>{name}</p>']
+    if outcome.digest is not None:
+        lines += [small_picture(outcome.digest.curve), f"<p>{html.escape(outcome.digest.caption)}</p>"]
+    if outcome.words:
+        lines.append(f"<p>{html.escape(outcome.words)}</p>")
+    return "".join(lines) + "</div>\n"
+
+
+def _begins_with(path: Path, text: str) -> bool:
+    try:
+        with path.open("rb") as file:
+            return file.read(len(text.encode())) == text.encode()
+    except OSError:
+        return False

@@ -1,0 +1,174 @@
+"""The folder of one result: written beside its place, renamed into it when whole, with a record of what it is of."""
+
+import json
+import os
+import re
+import shutil
+import socket
+from collections.abc import Mapping
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+from uuid import uuid4
+
+from fingervision.batch.digest import Digest
+
+RECORD = "record.json"
+SCHEMA = 1
+PART = re.compile(r"\.(?P<name>.+)\.part~(?P<host>[^~]+)~(?P<pid>\d+)~[0-9a-f]{8}")
+
+
+@dataclass(frozen=True, slots=True)
+class Record:
+    """What a result was made of, and what came out.
+
+    Parameters
+    ----------
+    input : str
+        Absolute path of the input.
+    stamp : str or None
+        See `fingerprint.stamp_of`.
+    content : str
+        Hash of the input's content.
+    options_key : str
+        Hash of options, the files that they name, and version.
+    exit_code : int
+        How the command ended.
+    words : str
+        Its sentence.
+    seconds : float
+        Time that it took.
+    digest : Digest
+        Its line of the table and its small picture.
+    """
+
+    input: str
+    stamp: str | None
+    content: str
+    options_key: str
+    exit_code: int
+    words: str
+    seconds: float
+    digest: Digest
+
+
+def read_record(folder: Path) -> Record | None:
+    """Read the record of a result; None where there is none that can be read."""
+    try:
+        held: Mapping[str, object] = json.loads((folder / RECORD).read_bytes())
+        if held.pop("schema") != SCHEMA:  # type: ignore[attr-defined]
+            return None
+        digest = held.pop("digest")  # type: ignore[attr-defined]
+        # Relative to the results, so that both may move together.
+        held["input"] = os.path.normpath(folder.parent / str(held["input"]))  # type: ignore[index]
+        curve = tuple(digest["curve"])
+        return Record(digest=Digest(digest["cells"], curve, digest["caption"]), **held)  # type: ignore[arg-type]
+    except (OSError, ValueError, TypeError, KeyError):
+        return None
+
+
+def write_record(folder: Path, place: Path, record: Record) -> None:
+    """Write the record of a result into `folder`, which is or will be at `place`.
+
+    Raises
+    ------
+    OSError
+        It cannot be written.
+    """
+    held = {
+        "schema": SCHEMA,
+        "input": os.path.relpath(record.input, place.parent),
+        "stamp": record.stamp,
+        "content": record.content,
+        "options_key": record.options_key,
+        "exit_code": record.exit_code,
+        "words": record.words,
+        "seconds": record.seconds,
+        "digest": {
+            "cells": dict(record.digest.cells),
+            "curve": record.digest.curve,
+            "caption": record.digest.caption,
+        },
+    }
+    replace_text(folder / RECORD, json.dumps(held, allow_nan=False) + "\n")
+
+
+def replace_text(path: Path, text: str) -> None:
+    """Write a text file; an older one stays whole until the new one is.
+
+    Raises
+    ------
+    OSError
+        It cannot be written; the older one is still there.
+    """
+    part = path.with_name(f".{path.name}.{uuid4().hex[:8]}")
+    try:
+        part.write_text(text, encoding="utf-8", errors="surrogateescape")
+        part.replace(path)
+    except OSError:
+        with suppress(OSError):
+            part.unlink(missing_ok=True)
+        raise
+
+
+def new_part(folder: Path) -> Path:
+    """Name a folder beside the result's own, that no other worker uses; it tells whose it is."""
+    return folder.with_name(f".{folder.name}.part~{_host()}~{os.getpid()}~{uuid4().hex[:8]}")
+
+
+def publish(part: Path, folder: Path, record: Record) -> None:
+    """Rename a whole result into its place; an older one is moved aside first and then removed.
+
+    Where another worker was quicker with the same (a scheduler may hand out a task twice), its result stays.
+
+    Raises
+    ------
+    OSError
+        It cannot be renamed; the part is still there.
+    """
+    for _ in range(3):
+        with suppress(OSError):
+            part.rename(folder)
+            return
+        there = read_record(folder)
+        if there is not None and is_same(there, record):
+            shutil.rmtree(part, ignore_errors=True)
+            return
+        if there is None and folder.exists():
+            break
+        old = new_part(folder)
+        with suppress(FileNotFoundError):  # another worker moved it
+            folder.rename(old)
+            with suppress(OSError):
+                part.rename(folder)
+                shutil.rmtree(old, ignore_errors=True)
+                return
+            old.rename(folder)
+    part.rename(folder)
+
+
+def is_same(there: Record, wanted: Record) -> bool:
+    """Whether a result is of the same content with the same options."""
+    return (there.content, there.options_key) == (wanted.content, wanted.options_key)
+
+
+def remove_left_parts(out: Path) -> None:
+    """Remove what workers of this machine left that are no more; parts of living ones and of other machines stay."""
+    for entry in out.iterdir():
+        found = PART.fullmatch(entry.name)
+        if found is not None and found["host"] == _host() and not _lives(int(found["pid"])):
+            shutil.rmtree(entry, ignore_errors=True)
+
+
+def _host() -> str:
+    return re.sub(r"[^A-Za-z0-9.-]", "_", socket.gethostname()) or "host"
+
+
+def _lives(pid: int) -> bool:
+    try:
+        os.kill(pid, 0)
+    except ProcessLookupError:
+        return False
+    except PermissionError:
+        return True
+    return True

@@ -1,0 +1,245 @@
+"""A batch from start to finish: what is to be done, doing it, and the overview of all of it."""
+
+import json
+import os
+from collections.abc import Callable, Generator, Sequence
+from contextlib import closing
+from dataclasses import dataclass
+from pathlib import Path
+
+from fingervision.batch.fingerprint import stamp_of
+from fingervision.batch.inputs import inputs_of
+from fingervision.batch.naming import folder_names
+from fingervision.batch.overview import write_overview
+from fingervision.batch.result_folder import Record, read_record, remove_left_parts, replace_text
+from fingervision.batch.task import Outcome, Task, failure
+from fingervision.batch.work import outcome_of
+from fingervision.domain.errors import ExitCode, FingervisionError
+
+MARK = "batch.json"
+SCHEMA = 1
+OWN_FILES = (MARK, "batch.csv", "batch.png", "index.html")
+
+
+@dataclass(frozen=True, slots=True)
+class Job:
+    """What the user wants: one command, with the same options, on many inputs.
+
+    Parameters
+    ----------
+    command : str
+        `measure` or `diagnose`.
+    inputs : tuple of str
+        Paths and patterns.
+    arguments : tuple of str
+        The command's options, without --out.
+    options_key : str
+        Hash of the options, the files that they name, and the version.
+    out : Path
+        Folder of all results.
+    """
+
+    command: str
+    inputs: tuple[str, ...]
+    arguments: tuple[str, ...]
+    options_key: str
+    out: Path
+
+
+@dataclass(frozen=True, slots=True)
+class Plan:
+    """What is there already and what is to be done.
+
+    Parameters
+    ----------
+    job : Job
+        What the user wants.
+    tasks : tuple of Task
+        One for each input.
+    done : dict of int to Outcome
+        Those that have their result, by their place in `tasks`.
+    """
+
+    job: Job
+    tasks: tuple[Task, ...]
+    done: dict[int, Outcome]
+
+    @property
+    def to_do(self) -> tuple[int, ...]:
+        """Places of the tasks that remain."""
+        return tuple(number for number in range(len(self.tasks)) if number not in self.done)
+
+
+@dataclass(frozen=True, slots=True)
+class Batch:
+    """What became of a job.
+
+    Parameters
+    ----------
+    out : Path
+        Folder of all results.
+    outcomes : tuple of Outcome
+        One for each input, in their order.
+    fresh : int
+        How many of them were worked on by this call.
+    stopped : str
+        Why it stopped before its end; empty where it did not.
+    """
+
+    out: Path
+    outcomes: tuple[Outcome, ...]
+    fresh: int
+    stopped: str
+
+    @property
+    def bad(self) -> tuple[Outcome, ...]:
+        """Outcomes with a sentence to read."""
+        return tuple(outcome for outcome in self.outcomes if outcome.exit_code)
+
+    @property
+    def exit_code(self) -> ExitCode:
+        """0 all done; 3 done, but some inputs were bad; 1 stopped or none done; 2 none for the same wrong usage."""
+        codes = {outcome.exit_code for outcome in self.outcomes}
+        if self.stopped:
+            return ExitCode.COULD_NOT
+        if codes == {ExitCode.WRONG_USAGE}:
+            return ExitCode.WRONG_USAGE
+        if codes <= {ExitCode.COULD_NOT, ExitCode.WRONG_USAGE}:
+            return ExitCode.COULD_NOT
+        return ExitCode.DAMAGED_INPUT if codes != {ExitCode.DONE} else ExitCode.DONE
+
+
+Crew = Callable[[Sequence[Task]], Generator[tuple[int, Outcome], None, None]]
+Progress = Callable[[int, int], None]
+
+
+def planned(job: Job) -> Plan:
+    """Find the inputs, and which of them have their result.
+
+    An input keeps the folder that it has; others get the shortest name that is free.
+
+    Raises
+    ------
+    FingervisionError
+        Nothing matches, or the folder for the results holds something else or cannot be made.
+    """
+    names = inputs_of(job.inputs, job.out)
+    _claim(job)
+    paths = [os.path.abspath(name) for name in names]  # noqa: PTH100 - links keep their own names
+    wanted = set(paths)
+    home: dict[str, tuple[Path, Record]] = {}
+    taken: list[str] = list(OWN_FILES)
+    for folder in _folders(job.out):
+        record = read_record(folder)
+        if record is not None and record.input in wanted:
+            home[record.input] = (folder, record)
+        taken.append(folder.name)
+    new = [path for path in paths if path not in home]
+    fresh = dict(zip(new, folder_names([Path(path) for path in new], taken), strict=True))
+    tasks: list[Task] = []
+    done: dict[int, Outcome] = {}
+    for number, (name, path) in enumerate(zip(names, paths, strict=True)):
+        folder, record = home[path] if path in home else (job.out / fresh[path], None)
+        tasks.append(Task(job.command, name, job.arguments, folder, job.options_key))
+        if record is not None and record.options_key == job.options_key and _is_untouched(record, path):
+            done[number] = outcome_of(name, folder, record)
+    return Plan(job, tuple(tasks), done)
+
+
+def run(plan: Plan, crew: Crew, on_progress: Progress | None = None) -> Batch:
+    """Have a crew do what remains, and write the overview of all of it.
+
+    A full disk and Ctrl-C stop it; what is done is kept, and another call goes on.
+
+    Parameters
+    ----------
+    plan : Plan
+        See `planned`.
+    crew : callable
+        Works on tasks and gives each outcome with its task's place, as they come.
+    on_progress : callable, optional
+        Called with the tasks done and all tasks of this call.
+
+    Raises
+    ------
+    FingervisionError
+        The overview cannot be written, or the crew is gone.
+    """
+    numbers = plan.to_do
+    outcomes = dict(plan.done)
+    fresh, stopped = 0, ""
+    try:
+        with closing(crew([plan.tasks[number] for number in numbers])) as coming:
+            for place, outcome in coming:
+                outcomes[numbers[place]] = outcome
+                fresh += not outcome.kept
+                if on_progress is not None:
+                    on_progress(len(outcomes) - len(plan.done), len(numbers))
+                if outcome.disk_full:
+                    stopped = f"The disk of {plan.job.out} is full"
+                    break
+    except KeyboardInterrupt:
+        stopped = "Stopped by the user"
+    finally:
+        remove_left_parts(plan.job.out)
+    if stopped:
+        kept = sum(outcome.folder is not None for outcome in outcomes.values())
+        advice = "make room and " if "full" in stopped else ""
+        stopped += f"; {kept} of {len(plan.tasks)} are done and kept: {advice}call again, and it goes on from there."
+    every = tuple(
+        outcomes.get(number, failure(task, "It was not reached: call again.")) for number, task in enumerate(plan.tasks)
+    )
+    batch = Batch(plan.job.out, every, fresh, stopped)
+    try:
+        write_overview(plan.job.out, plan.job.command, every)
+    except OSError as error:
+        raise FingervisionError(
+            f"{stopped or 'All results are there'} The overview in {plan.job.out} could not be written "
+            f"({error.strerror}): make room and call again."
+        ) from error
+    return batch
+
+
+def _claim(job: Job) -> None:
+    """Make the folder for the results, or refuse one that is something else."""
+    mark = job.out / MARK
+    try:
+        job.out.mkdir(parents=True, exist_ok=True)
+        entries = [entry.name for entry in os.scandir(job.out) if not entry.name.startswith(".")]
+        if not entries:
+            replace_text(mark, json.dumps({"schema": SCHEMA, "command": job.command}) + "\n")
+        elif MARK not in entries:
+            raise FingervisionError(
+                f"--out must be a new folder or one of an earlier batch, but {job.out} holds something else "
+                f"({min(entries)}): name another."
+            )
+        elif (command := _command_of(mark)) != job.command:
+            raise FingervisionError(
+                f"--out must be a folder of batch {job.command}, but {job.out} is one of batch {command}: name another."
+            )
+        remove_left_parts(job.out)
+    except FileExistsError:
+        raise FingervisionError(f"--out must be a folder, but {job.out} is a file: name another.") from None
+    except OSError as error:
+        raise FingervisionError(
+            f"The folder {job.out} cannot be written ({error.strerror}): make room or name another with --out."
+        ) from error
+
+
+def _command_of(mark: Path) -> str:
+    try:
+        return str(json.loads(mark.read_bytes())["command"])
+    except (ValueError, TypeError, KeyError):
+        return "something else"
+
+
+def _folders(out: Path) -> list[Path]:
+    with os.scandir(out) as entries:
+        return [Path(entry.path) for entry in entries if not entry.name.startswith(".") and entry.is_dir()]
+
+
+def _is_untouched(record: Record, path: str) -> bool:
+    try:
+        return record.stamp is not None and record.stamp == stamp_of(Path(path))
+    except OSError:
+        return False

@@ -1,0 +1,42 @@
+"""What a worker runs: the versions on which its numbers depend, and a hash of our own source."""
+
+import hashlib
+import platform
+from functools import cache
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+
+import calib
+import fingervision
+
+LIBRARIES = ("numpy", "scipy", "opencv-python-headless", "scikit-image", "av", "numba", "matplotlib")
+
+
+@cache
+def versions() -> dict[str, str]:
+    """Name what is installed here, by what it is called."""
+    found = {"Python": ".".join(platform.python_version_tuple()[:2]), "fingervision": fingervision.__version__}
+    for library in LIBRARIES:
+        try:
+            found[library] = version(library)
+        except PackageNotFoundError:
+            found[library] = "not installed"
+    return {**found, "source of fingervision": _source()}
+
+
+def difference(here: dict[str, str], there: dict[str, str]) -> str:
+    """Say what differs, in words; empty where nothing does."""
+    return ", ".join(
+        f"{name} {there.get(name, 'unknown')} instead of {here[name]}" for name in here if there.get(name) != here[name]
+    )
+
+
+def _source() -> str:
+    """Hash of every module of both packages: two copies of one version may still differ."""
+    found = hashlib.sha256()
+    for package in (fingervision, calib):
+        top = Path(str(package.__file__)).parent
+        for file in sorted(top.rglob("*.py")):
+            found.update(f"{file.relative_to(top).as_posix()}\0".encode())
+            found.update(file.read_bytes())
+    return found.hexdigest()[:12]

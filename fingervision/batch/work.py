@@ -1,0 +1,83 @@
+"""One input from start to finish, in a worker; doing it twice does no harm."""
+
+import errno
+import os
+import shutil
+from dataclasses import replace
+from pathlib import Path
+from time import perf_counter
+
+from fingervision.batch.fingerprint import content_hash, is_settled, stamp_of
+from fingervision.batch.reduction import reduction_of
+from fingervision.batch.result_folder import Record, new_part, publish, read_record, write_record
+from fingervision.batch.task import Outcome, Perform, Task, failure
+
+NO_ROOM = (errno.ENOSPC, errno.EDQUOT)
+
+
+def work(task: Task, perform: Perform) -> Outcome:
+    """Bring the result of one input into its folder, unless it is there.
+
+    Every failure is an outcome with a sentence. The folder appears whole, by a rename; an older result stays until
+    then, and stays where the new one fails.
+
+    Parameters
+    ----------
+    task : Task
+        What shall be done.
+    perform : callable
+        Runs a command: its name and arguments in, how it ended out.
+    """
+    started = perf_counter()
+    part = new_part(task.folder)
+    try:
+        return _brought(task, perform, part, started)
+    except OSError as error:
+        where = error.filename or task.folder
+        return failure(
+            task,
+            f"{task.input} could not be done, because {where} could not be read or written ({error.strerror}): check "
+            "the disk and its permissions, and call again.",
+            perf_counter() - started,
+            disk_full=error.errno in NO_ROOM,
+        )
+    finally:
+        shutil.rmtree(part, ignore_errors=True)
+
+
+def outcome_of(name: str, folder: Path, record: Record) -> Outcome:
+    """Give the outcome that a record tells of."""
+    return Outcome(name, folder, record.exit_code, record.words, record.digest, record.seconds, kept=True)
+
+
+def _brought(task: Task, perform: Perform, part: Path, started: float) -> Outcome:
+    source = Path(task.input)
+    exists = source.exists()  # for what does not, the command has the sentence
+    settled = exists and is_settled(source)
+    stamp, content = (stamp_of(source), content_hash(source)) if exists else ("", "")
+    there = read_record(task.folder)
+    if exists and there is not None and (there.content, there.options_key) == (content, task.options_key):
+        touched = replace(there, stamp=stamp if settled else None)
+        write_record(task.folder, task.folder, touched)
+        return outcome_of(task.input, task.folder, touched)
+    ended = perform(task.command, (*task.arguments, "--out", str(part), "--", task.input))
+    words = ended.words.replace(str(part), str(task.folder))
+    seconds = round(perf_counter() - started, 3)
+    if not ended.finished or not exists:
+        return failure(task, words, seconds, ended.exit_code, disk_full=ended.disk_full)
+    if stamp_of(source) != stamp or (not settled and content_hash(source) != content):
+        return failure(task, f"{task.input} was changed while it was worked on: call again when it is whole.", seconds)
+    digest = reduction_of(task.command).digest_of(part)
+    record = Record(
+        input=os.path.abspath(source),  # noqa: PTH100 - links keep their own names
+        stamp=stamp if settled or is_settled(source) else None,
+        content=content,
+        options_key=task.options_key,
+        exit_code=ended.exit_code,
+        words=words,
+        seconds=seconds,
+        digest=digest,
+    )
+    write_record(part, task.folder, record)
+    publish(part, task.folder, record)
+    return replace(outcome_of(task.input, task.folder, record), kept=False)

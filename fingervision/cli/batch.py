@@ -1,0 +1,247 @@
+"""`fingervision batch`: measure or diagnose many inputs, on every core of this machine or on a Dask cluster."""
+
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from fingervision.cli import cli
+from fingervision.domain.errors import FingervisionError
+
+if TYPE_CHECKING:
+    from fingervision.batch.run import Batch, Plan
+
+EXAMPLES = """
+\b
+Examples:
+  fingervision batch measure 'recordings/**/*.mp4' --calibration c.json --out results
+  fingervision batch measure day1/*.mkv day2/*.mkv --px-per-mm 34 --jobs 4 --out results
+  fingervision batch measure '/lab/**/*.mkv' --calibration /lab/c.json --scheduler tcp://head:8786 --out /lab/results
+  fingervision batch diagnose 'runs/*/samples.csv' --model comsol.csv --out diagnoses
+
+\b
+Put patterns in quotes; ** stands for any folders. The same call again does what is not done, has changed, or failed:
+after a crash or Ctrl-C it goes on. Each worker uses one core. All machines of a cluster must see the files on one path.
+
+\b
+Files written to --out:
+  <input's name>/  the command's own files, and record.json: what they were made of
+  batch.csv        one row an input: result, exit code, sentence, figures
+  batch.png        all of them in one figure
+  index.html       a small picture of each, on one page that needs nothing else
+
+\b
+Exit codes: 0 all done; 1 none could be done, or stopped; 2 wrong usage; 3 done, but some inputs were damaged or could
+not be done: each is listed with its sentence.
+"""
+OWN = ("inputs", "out", "scheduler", "jobs", "as_json")
+BAD_SHOWN = 10
+
+
+@click.group(epilog=EXAMPLES)
+def command() -> None:
+    """Run one command on many inputs, each into its own folder, with an overview of all of them."""
+
+
+def _batch_of(name: str) -> click.Command:
+    """Give a command for many inputs: the single one's options, and those of a batch."""
+    single = cli.get_command(click.Context(cli), name)
+    assert single is not None  # noqa: S101 - named below
+    options = [
+        option for option in single.params if isinstance(option, click.Option) and option.name not in ("out", "as_json")
+    ]
+
+    def callback(**chosen: Any) -> None:
+        context = click.get_current_context()
+        given = {
+            option: chosen[str(option.name)]
+            for option in options
+            if context.get_parameter_source(str(option.name)) is not click.core.ParameterSource.DEFAULT
+        }
+        _run(name, given, **{key: chosen[key] for key in OWN})
+
+    return click.Command(
+        name,
+        callback=callback,
+        params=[
+            click.Argument(["inputs"], nargs=-1, required=True, metavar="INPUT..."),
+            *options,
+            click.Option(["--scheduler"], metavar="tcp://HOST:PORT", help="Work on this Dask cluster."),
+            click.Option(["--jobs"], type=click.IntRange(min=1), help="Processes on this machine; one a core."),
+            click.Option(["--out"], type=click.Path(path_type=Path), required=True, help="Folder of all results."),
+            click.Option(["--json", "as_json"], is_flag=True, help="Print the outcomes as JSON."),
+        ],
+        help=f"Run `fingervision {name}` on every INPUT: paths, and patterns in quotes.",
+        epilog=EXAMPLES,
+    )
+
+
+def _run(
+    name: str,
+    given: Mapping[click.Option, Any],
+    inputs: tuple[str, ...],
+    out: Path,
+    scheduler: str | None,
+    jobs: int | None,
+    as_json: bool,
+) -> None:
+    from contextlib import ExitStack
+    from functools import partial
+
+    from fingervision.batch import cluster, local_processes
+    from fingervision.batch.run import Crew, Job, planned, run
+    from fingervision.cli._unattended import perform
+
+    if scheduler is not None and jobs is not None:
+        from fingervision.domain.errors import UsageError
+
+        raise UsageError("--jobs is for this machine and --scheduler for others, but both are there: leave one out.")
+    arguments = tuple(_arguments(given, absolute=scheduler is not None))
+    plan = planned(Job(name, inputs, arguments, _options_key(name, given), out))
+    with ExitStack() as stack:
+        crew: Crew = partial(local_processes.outcomes_of, perform=perform, workers=jobs)
+        if plan.to_do:
+            _check_options(name, arguments)
+            if scheduler is not None:
+                crew = partial(cluster.outcomes_of, stack.enter_context(cluster.connected(scheduler)), perform=perform)
+        show = stack.enter_context(_Bar(name, len(plan.to_do)))
+        batch = run(plan, crew, show)
+    _report(plan, batch, as_json)
+    raise SystemExit(int(batch.exit_code))
+
+
+def _arguments(given: Mapping[click.Option, Any], *, absolute: bool) -> list[str]:
+    """Write options as on a command line; files by their whole path for other machines."""
+    words: list[str] = []
+    for option, value in given.items():
+        flag = option.opts[0]
+        if option.is_flag:
+            words += [flag] if value else []
+            continue
+        for one in value if option.multiple else (value,):
+            words += [flag, str(Path(one).absolute() if absolute and isinstance(one, Path) else one)]
+    return words
+
+
+def _options_key(name: str, given: Mapping[click.Option, Any]) -> str:
+    """Hash what decides the results besides the input: options, the content of files that they name, the version."""
+    import hashlib
+    import json
+
+    from fingervision import __version__
+
+    held: dict[str, Any] = {}
+    for option, value in given.items():
+        several = value if option.multiple else (value,)
+        if several and value != option.default and value is not None:
+            held[str(option.name)] = sorted(_content(one) if isinstance(one, Path) else str(one) for one in several)
+    return hashlib.sha256(json.dumps([name, __version__, held], sort_keys=True).encode()).hexdigest()
+
+
+def _content(path: Path) -> str:
+    """Hash of a file, and of the files that a corrected model rests on."""
+    import hashlib
+    import tomllib
+
+    from fingervision.batch.fingerprint import content_hash
+
+    try:
+        found = content_hash(path)
+        base = tomllib.loads(path.read_text(encoding="utf-8")).get("base") if path.suffix.lower() == ".toml" else None
+    except FileNotFoundError:
+        raise FingervisionError(f"There is no file {path}: check the options.") from None
+    except (OSError, ValueError) as error:
+        raise FingervisionError(f"{path} could not be read ({error}): check the options.") from error
+    if base is None or path.parent / str(base) == path:
+        return found
+    return hashlib.sha256(f"{found}\n{_content(path.parent / str(base))}".encode()).hexdigest()
+
+
+def _check_options(name: str, arguments: tuple[str, ...]) -> None:
+    """Refuse options that cannot be meant, once and before any work.
+
+    The command is asked for an input that does not exist: it must complain of that and of nothing else.
+    """
+    from tempfile import TemporaryDirectory
+
+    from fingervision.cli._unattended import perform
+    from fingervision.domain.errors import ExitCode, UsageError
+
+    with TemporaryDirectory() as nowhere:
+        ended = perform(name, (*arguments, "--out", str(Path(nowhere) / "out"), "--", str(Path(nowhere) / "nothing")))
+    if nowhere not in ended.words:
+        kind = UsageError if ended.exit_code == ExitCode.WRONG_USAGE else FingervisionError
+        raise kind(ended.words)
+
+
+class _Bar:
+    """Progress with rate and time left, on a terminal only."""
+
+    def __init__(self, name: str, total: int) -> None:
+        import sys
+        from time import monotonic
+
+        self._clock: Callable[[], float] = monotonic
+        self._bar = click.progressbar(
+            length=total,
+            label=f"batch {name}",
+            file=sys.stderr,
+            show_pos=True,
+            show_eta=True,
+            hidden=not (total and sys.stderr.isatty()),
+            item_show_func=lambda rate: rate,
+        )
+
+    def __enter__(self) -> Callable[[int, int], None]:
+        self._started_s = self._clock()
+        self._bar.__enter__()
+        return self._show
+
+    def __exit__(self, *ended: Any) -> None:
+        self._bar.__exit__(*ended)
+
+    def _show(self, done: int, _of: int) -> None:
+        rate = done / max(1e-9, self._clock() - self._started_s)
+        words = f"{rate:.1f} a second" if rate >= 1.0 else f"{60.0 * rate:.1f} a minute"
+        self._bar.update(done - self._bar.pos, words)
+
+
+def _report(plan: "Plan", batch: "Batch", as_json: bool) -> None:
+    """Say what came out, and what went wrong on the error stream."""
+    import json
+
+    if as_json:
+        document = {
+            "schema": 1,
+            "command": plan.job.command,
+            "inputs": len(batch.outcomes),
+            "fresh": batch.fresh,
+            "stopped": batch.stopped or None,
+            "outcomes": [
+                {
+                    "input": one.input,
+                    "result": None if one.folder is None else str(one.folder),
+                    "exit_code": one.exit_code,
+                    "words": one.words,
+                    **(one.digest.cells if one.digest is not None else {}),
+                }
+                for one in batch.outcomes
+            ],
+        }
+        click.echo(json.dumps(document, indent=2, allow_nan=False))
+    else:
+        there = sum(one.folder is not None for one in batch.outcomes)
+        what = "nothing to do" if not plan.to_do else f"{batch.fresh} worked on by this call"
+        click.echo(f"{there} of {len(batch.outcomes)} inputs have their result ({what}).")
+        click.echo(f"Written: {batch.out / 'batch.csv'}, {batch.out / 'batch.png'}, {batch.out / 'index.html'}")
+    for one in batch.bad[:BAD_SHOWN] if not batch.stopped else ():
+        click.echo(f"fingervision: {one.input}: {one.words}", err=True)
+    if len(batch.bad) > BAD_SHOWN and not batch.stopped:
+        click.echo(f"fingervision: {len(batch.bad) - BAD_SHOWN} more are in {batch.out / 'batch.csv'}.", err=True)
+    if batch.stopped:
+        click.echo(f"fingervision: {batch.stopped}", err=True)
+
+
+for _name in ("measure", "diagnose"):
+    command.add_command(_batch_of(_name))
