@@ -140,7 +140,8 @@ class NetworkStream:
             try:
                 packet = next(demuxed, None)
             except (av.FFmpegError, OSError) as error:
-                raise FingervisionError(self._cut(_reason(error))) from error
+                why = "it broke off" if isinstance(error, av.InvalidDataError) else _reason(error)
+                raise FingervisionError(self._cut(why)) from error
             if packet is None or not packet.size:
                 raise FingervisionError(self._cut("the camera ended it"))
             yield packet, monotonic()

@@ -11,6 +11,8 @@ FRAMES_UNTIL_SURE = 5
 # Later than this share of a period, for good, and a frame is missing.
 LATE_SHARE = 0.75
 FRAMES_TO_KNOW_THE_PERIOD = 10
+# A step that differs from the median by less is a usual one.
+USUAL_SHARE = 0.55
 
 
 class Cadence:
@@ -57,8 +59,8 @@ class Cadence:
         usual_s = median(steps) if steps else 0.0
         if usual_s <= 0.0:
             return None
-        # The mean of the usual steps: held-up and hurried frames make up for each other, missing ones are left out.
-        near = [step for step in steps if step < 1.6 * usual_s]
+        # The mean of the usual steps: held-up and hurried frames are left out, and so are holes.
+        near = [step for step in steps if abs(step - usual_s) < USUAL_SHARE * usual_s]
         return sum(near) / len(near)
 
     @property

@@ -50,6 +50,7 @@ def bound(host: str, port: int) -> socket.socket:
     listening.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
     try:
         listening.bind(address)
+        listening.listen()  # the address is told before the server is quite up: who comes early waits
     except OSError as error:
         listening.close()
         raise FingervisionError(

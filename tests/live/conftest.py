@@ -1,0 +1,167 @@
+"""Live views as processes, a network camera that ffmpeg plays, and a browser."""
+
+import csv
+import json
+import os
+import re
+import shutil
+import signal
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from math import cos, pi
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+import pytest
+
+from fingervision.rendering import Camera, render, two_fingers
+
+# Starting Python with its libraries takes seconds where two cores are shared by many.
+START_S = 60.0
+CYCLE = 50
+PX_PER_MM = 34.0
+
+
+@dataclass
+class Live:
+    """A running `fingervision live`."""
+
+    process: subprocess.Popen[str]
+    out: Path
+    stdout: Path
+    stderr: Path
+
+    def text(self) -> str:
+        return self.stdout.read_text() + self.stderr.read_text()
+
+    def lines(self) -> list[dict[str, Any]]:
+        whole = self.stdout.read_text().rpartition("\n")[0]
+        return [json.loads(line) for line in whole.splitlines() if line.startswith("{")]
+
+    def until(self, found: Callable[["Live"], Any], within_s: float = START_S) -> Any:
+        end_s = time.monotonic() + within_s
+        while time.monotonic() < end_s:
+            if value := found(self):
+                return value
+            assert self.process.poll() is None, self.text()
+            time.sleep(0.05)
+        raise AssertionError(f"not within {within_s} s: {self.text()[-2000:]}")
+
+    @property
+    def address(self) -> str:
+        found = self.until(lambda live: re.search(r"http://\S+token=\S+", live.text()))
+        return str(found[0])
+
+    def stop(self, how: signal.Signals = signal.SIGINT) -> int:
+        if self.process.poll() is None:
+            self.process.send_signal(how)
+        return self.process.wait(30)
+
+    def runs(self) -> list[Path]:
+        return sorted(path.parent for path in self.out.glob("*/gaps.csv"))
+
+
+@dataclass
+class NetworkCamera:
+    """ffmpeg that serves MJPEG over HTTP to one client at a time."""
+
+    pictures: Path
+    port: int
+    rate_hz: int = 25
+    process: subprocess.Popen[bytes] | None = field(default=None)
+
+    @property
+    def address(self) -> str:
+        return f"http://127.0.0.1:{self.port}/feed.mjpg"
+
+    def start(self) -> None:
+        command = ["ffmpeg", "-loglevel", "quiet", "-re", "-stream_loop", "-1", "-framerate", str(self.rate_hz)]
+        command += ["-i", str(self.pictures), "-c", "copy", "-f", "mpjpeg", "-listen", "1", self.address]
+        self.process = subprocess.Popen(command)
+
+    def stop(self) -> None:
+        if self.process is not None:
+            self.process.kill()
+            self.process.wait()
+
+
+def free_port() -> int:
+    with socket.socket() as listening:
+        listening.bind(("127.0.0.1", 0))
+        return int(listening.getsockname()[1])
+
+
+@pytest.fixture
+def live(tmp_path: Path) -> Iterator[Callable[..., Live]]:
+    """Start live views; all are ended afterwards."""
+    started: list[Live] = []
+
+    def start(*arguments: str | Path, out: Path | None = None) -> Live:
+        number = len(started)
+        folder = out or tmp_path / f"out{number}"
+        stdout, stderr = tmp_path / f"stdout{number}", tmp_path / f"stderr{number}"
+        command = [sys.executable, "-m", "fingervision", "live", *map(str, arguments), "--out", str(folder)]
+        environment = {**os.environ, "OMP_NUM_THREADS": "1", "PYTHONPATH": str(Path(__file__).parents[2])}
+        with stdout.open("w") as first, stderr.open("w") as second:
+            process = subprocess.Popen(command, stdout=first, stderr=second, text=True, env=environment, cwd=tmp_path)
+        started.append(Live(process, folder, stdout, stderr))
+        return started[-1]
+
+    yield start
+    for each in started:
+        if each.process.poll() is None:
+            each.process.kill()
+            each.process.wait()
+
+
+@pytest.fixture(scope="session")
+def pictures(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """JPEG pictures of a moving gripper, one after the other."""
+    path = tmp_path_factory.mktemp("camera") / "gripper.mjpeg"
+    rng = np.random.default_rng(3)
+    with path.open("wb") as file:
+        for index in range(CYCLE):
+            scene = two_fingers(PX_PER_MM * (2.5 - 1.5 * cos(2 * pi * index / CYCLE)), radius_px=20.0)
+            picture = render(scene, Camera(blur_px=0.9, noise_grey=2.0), rng)
+            file.write(cv2.imencode(".jpg", picture, [cv2.IMWRITE_JPEG_QUALITY, 92])[1].tobytes())
+    return path
+
+
+@pytest.fixture
+def camera(pictures: Path) -> Iterator[NetworkCamera]:
+    if shutil.which("ffmpeg") is None:
+        pytest.skip("ffmpeg is not installed: it plays the network camera.")
+    found = NetworkCamera(pictures, free_port())
+    found.start()
+    yield found
+    found.stop()
+
+
+@pytest.fixture
+def rows() -> Callable[[Path], list[dict[str, str]]]:
+    def read(path: Path) -> list[dict[str, str]]:
+        with path.open(newline="") as file:
+            return list(csv.DictReader(file))
+
+    return read
+
+
+@pytest.fixture
+def measured(tmp_path: Path) -> Callable[..., str]:
+    """Measure a recording afterwards; gives its gaps.csv as text."""
+
+    def measure(video: Path, *options: str | Path) -> str:
+        out = tmp_path / f"measured_{video.parent.name}"
+        command = [sys.executable, "-m", "fingervision", "measure", str(video), *map(str, options), "--out", str(out)]
+        environment = {**os.environ, "OMP_NUM_THREADS": "1", "PYTHONPATH": str(Path(__file__).parents[2])}
+        done = subprocess.run(command, capture_output=True, text=True, env=environment, check=False)
+        assert (out / "gaps.csv").exists(), done.stderr
+        return (out / "gaps.csv").read_text()
+
+    return measure

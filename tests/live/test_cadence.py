@@ -1,0 +1,42 @@
+"""Drops are counted where frames are missing, and not where a network holds them up."""
+
+import numpy as np
+import pytest
+
+from fingervision.live.cadence import Cadence
+
+PERIOD_S = 0.04
+
+
+def watched(times_s: np.ndarray) -> Cadence:
+    cadence = Cadence()
+    for time_s in times_s:
+        cadence.add(float(time_s))
+    return cadence
+
+
+@pytest.mark.parametrize("lost", [[], [50], [50, 51, 52], [30, 60, 61, 150]])
+def test_missing_frames_are_counted(lost: list[int]) -> None:
+    times = np.delete(np.arange(200) * PERIOD_S, lost)
+    assert watched(times).missing == len(lost)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_jitter_alone_is_no_drop(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    times = np.arange(2000) * PERIOD_S + rng.uniform(0.0, 0.5 * PERIOD_S, 2000)
+    assert watched(times).missing == 0
+
+
+def test_a_burst_after_a_hold_up_is_no_drop() -> None:
+    times = np.arange(200) * PERIOD_S
+    times[100:103] = times[103] - [0.003, 0.002, 0.001]
+    assert watched(times).missing == 0
+
+
+def test_rate_and_jitter_are_those_of_the_times() -> None:
+    rng = np.random.default_rng(1)
+    cadence = watched(np.arange(100) * PERIOD_S + rng.normal(0.0, 0.001, 100))
+    assert cadence.rate_hz == pytest.approx(25.0, rel=0.01)
+    assert cadence.jitter_s == pytest.approx(0.001 * np.sqrt(2.0), rel=0.25)
+    assert cadence.period_s == pytest.approx(PERIOD_S, rel=0.01)

@@ -1,0 +1,20 @@
+"""The history gives back the newest rows as they were, in memory that does not grow."""
+
+from fingervision.domain.status import Status
+from fingervision.live.history import History
+from fingervision.storage.gaps_csv import GapRow
+
+
+def row(index: int) -> GapRow:
+    if index % 3 == 0:
+        return GapRow(index, index / 25, Status.NO_FINGERS)
+    return GapRow(index, None if index % 5 == 0 else index / 25, Status.OK, 1.0 + index, None, 0.001, 34.0, 0.02)
+
+
+def test_rows_come_back_as_they_were_and_the_oldest_leave() -> None:
+    history = History(kept=10)
+    for index in range(25):
+        history.add(row(index))
+    assert list(history.rows()) == [row(index) for index in range(15, 25)]
+    assert list(history.rows(after=22)) == [row(index) for index in range(22, 25)]
+    assert list(history.rows(after=25)) == []

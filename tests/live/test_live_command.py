@@ -1,0 +1,78 @@
+"""`fingervision live`: bad input is a sentence each, before anything runs."""
+
+import socket
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner
+
+from calib.measured_scale import Calibration
+from fingervision.cli import cli
+from fingervision.domain.errors import ExitCode, FingervisionError
+from fingervision.storage.calibration_json import write_calibration
+
+
+def refused(*arguments: str | Path) -> FingervisionError:
+    result = CliRunner().invoke(cli, ["live", *map(str, arguments)])
+    assert isinstance(result.exception, FingervisionError), (result.output, result.exception)
+    return result.exception
+
+
+@pytest.mark.parametrize(
+    ("arguments", "beginning"),
+    [
+        ((), "The source must be given, but is not"),
+        (("nothing.mp4",), "There is no recording nothing.mp4"),
+        (
+            ("http://127.0.0.1:9/feed", "--px-per-mm", "34"),
+            "The stream http://127.0.0.1:9/feed must answer",
+        ),
+        (("http://127.0.0.1:9/feed", "--size", "640x480"), "--size and --rate-hz are for cameras of this machine"),
+        (("simulated", "--size", "wide"), "--size must be WxH in pixels, such as 640x480, but is 'wide'."),
+        (("simulated", "--size", "10x10"), "--size of the simulated camera must be 320x240 to 4096x4096"),
+        (("simulated", "--rate-hz", "0.1"), "--rate-hz must be between 1 and 1000, but is 0.1."),
+        (("simulated", "--roi", "1,2"), "--roi must be four whole numbers X,Y,W,H in pixels"),
+        (("simulated", "--roi", "600,0,100,100"), "The region must lie inside the frame of 640x480 pixels"),
+        (("simulated", "--px-per-mm", "-3"), "--px-per-mm must be positive, but is -3."),
+        (("simulated", "--below-tip-mm", "0"), "--below-tip-mm must be positive, but is 0."),
+        (("simulated", "--host", "nowhere.invalid"), "--host must be an address of this machine"),
+    ],
+)
+def test_bad_input_is_one_sentence(
+    arguments: tuple[str, ...], beginning: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert str(refused(*arguments)).startswith(beginning)
+
+
+@pytest.mark.skipif(not Path("/sys").is_dir() or Path("/dev/video7").exists(), reason="needs Linux without this camera")
+def test_a_camera_that_is_not_there_is_named_with_those_that_are() -> None:
+    assert str(refused("7", "--px-per-mm", "34")).startswith("There is no camera 7 (/dev/video7 does not exist; ")
+
+
+def test_a_source_without_a_scale_needs_the_page(tmp_path: Path) -> None:
+    error = refused("7", "--no-page")
+    assert error.exit_code == ExitCode.WRONG_USAGE
+    assert "Without a page the scale must be given" in str(error)
+
+
+def test_a_port_in_use_is_said(tmp_path: Path) -> None:
+    with socket.socket() as taken:
+        taken.bind(("127.0.0.1", 0))
+        taken.listen()
+        port = taken.getsockname()[1]
+        words = str(refused("simulated", "--port", str(port), "--out", tmp_path))
+    assert words.startswith(f"The page cannot be served at 127.0.0.1 port {port} (Address already in use)")
+
+
+def test_a_calibration_of_another_frame_size_is_refused(tmp_path: Path) -> None:
+    write_calibration(Calibration(34.0, 0.0, (), (1280, 720)), tmp_path / "calibration.json")
+    words = str(refused("simulated", "--calibration", tmp_path / "calibration.json"))
+    assert "1280" in words
+    assert "640" in words
+
+
+def test_the_list_says_where_to_begin_without_a_camera() -> None:
+    result = CliRunner().invoke(cli, ["live", "--list"])
+    assert result.exit_code == 0
+    assert "/dev/video" in result.output or "`simulated`" in result.output

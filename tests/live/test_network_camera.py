@@ -1,0 +1,46 @@
+"""A network camera on loopback: every frame measured, cut and restored, for a minute."""
+
+import time
+from collections.abc import Callable
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+SCALE = ("--px-per-mm", "34")
+MINUTE_S = 60.0
+CUT_S = 3.0
+
+
+def test_every_frame_of_a_minute_is_measured_and_a_cut_is_a_gap(
+    live: Callable[..., Any],
+    camera: Any,
+    measured: Callable[..., str],
+    rows: Callable[[Path], list[dict[str, str]]],
+) -> None:
+    view = live(camera.address, *SCALE, "--no-page", "--json")
+    view.until(lambda seen: len(seen.lines()) > 10)
+    first_s, began_s = view.lines()[0]["time_s"], time.monotonic()
+    view.until(lambda seen: time.monotonic() - began_s > MINUTE_S, within_s=2 * MINUTE_S)
+    camera.stop()
+    before = len(view.lines())
+    view.until(lambda seen: "cut off" in seen.text())
+    time.sleep(CUT_S)
+    camera.start()
+    view.until(lambda seen: len(seen.lines()) > before + 25)
+    assert view.stop() == 0
+
+    lines = view.lines()
+    assert [line["frame"] for line in lines] == list(range(len(lines)))
+    assert {line["status"] for line in lines[: before - 1]} == {"ok"}
+    # ffmpeg's clock and ours agree: as many frames as the time holds.
+    assert before == pytest.approx(25.0 * (lines[before - 1]["time_s"] - first_s), abs=4)
+    longest_s = max(after["time_s"] - line["time_s"] for line, after in pairwise(lines))
+    assert longest_s > CUT_S
+    assert "The source is back" in view.text()
+
+    (run,) = view.runs()
+    table = (run / "gaps.csv").read_text()
+    assert len(rows(run / "gaps.csv")) == len(lines)
+    assert measured(run / "video.mp4", *SCALE) == table

@@ -1,0 +1,269 @@
+"""The page in a real browser: Debian's Chromium, driven by Playwright."""
+
+import csv
+import io
+import json
+import os
+import re
+import shutil
+import time
+from collections import deque
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+from urllib.error import HTTPError
+from urllib.request import Request, urlopen
+
+import cv2
+import numpy as np
+import pytest
+
+playwright_api = pytest.importorskip("playwright.sync_api", reason="playwright is not installed.")
+CHROMIUM = shutil.which("chromium")
+pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="Chromium is not installed: the page is tested in it.")
+# Screenshots stay where the environment says, for whoever looks at a failure in CI.
+SCREENSHOTS = os.environ.get("FINGERVISION_SCREENSHOTS")
+QUIET = [
+    "--headless",
+    "--no-sandbox",
+    "--disable-gpu",
+    "--disable-quic",
+    "--no-first-run",
+    "--disable-background-networking",
+    "--disable-component-update",
+    "--disable-sync",
+]
+PATIENCE_MS = 30_000
+# What the page shows has four decimals, the table seven.
+SHOWN_MM = 0.00005
+BAR_PX, BAR_MM = 136, 4.0
+SAID_WITHIN_S = 1.0
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Any]:
+    with playwright_api.sync_playwright() as playwright:
+        found = playwright.chromium.launch(executable_path=CHROMIUM, args=QUIET)
+        yield found
+        found.close()
+
+
+@pytest.fixture
+def opened(browser: Any, tmp_path: Path, request: pytest.FixtureRequest) -> Iterator[Callable[..., Any]]:
+    """Open pages; their requests and errors are noted, a screenshot is kept, and nothing may leave the machine."""
+    contexts, requests, errors = [], [], []
+
+    def open_page(address: str, **context: Any) -> Any:
+        contexts.append(browser.new_context(**context))
+        page = contexts[-1].new_page()
+        page.set_default_timeout(PATIENCE_MS)
+        page.on("request", lambda each: requests.append(each.url))
+        page.on("websocket", lambda each: requests.append(each.url))
+        page.on("pageerror", lambda each: errors.append(str(each)))
+        page.goto(address)
+        return page
+
+    yield open_page
+    folder = Path(SCREENSHOTS) if SCREENSHOTS else tmp_path
+    folder.mkdir(parents=True, exist_ok=True)
+    for number, context in enumerate(contexts):
+        for page in context.pages:
+            page.screenshot(path=folder / f"{request.node.name}_{number}.png", full_page=True)
+        context.close()
+    assert errors == []
+    assert requests
+    assert all(re.match(r"(http|ws|blob:http)://127\.0\.0\.1:\d+/", url) for url in requests), requests
+
+
+def shown(page: Any, words: str) -> None:
+    """Wait until an expression is true; asked from outside, because the page's policy lets no text be run in it."""
+    end_s = time.monotonic() + PATIENCE_MS / 1e3
+    while not page.evaluate(words):
+        assert time.monotonic() < end_s, f"not true in time: {words}"
+        page.wait_for_timeout(50)
+
+
+def says(page: Any, words: str) -> None:
+    page.locator("#log li", has_text=words).first.wait_for()
+
+
+def drag(page: Any, box: tuple[int, int, int, int]) -> None:
+    """Drag over a part of the picture, in its own pixels."""
+    page.locator("#picture").scroll_into_view_if_needed()
+    frame = page.locator("#picture").bounding_box()
+    width, height = page.evaluate(
+        "[document.querySelector('#picture').width, document.querySelector('#picture').height]"
+    )
+    x, y = frame["width"] / width, frame["height"] / height
+    page.mouse.move(frame["x"] + box[0] * x, frame["y"] + box[1] * y)
+    page.mouse.down()
+    page.mouse.move(frame["x"] + (box[0] + box[2] / 2) * x, frame["y"] + (box[1] + box[3] / 2) * y)
+    page.mouse.move(frame["x"] + (box[0] + box[2]) * x, frame["y"] + (box[1] + box[3]) * y)
+    page.mouse.up()
+
+
+def test_the_page_shows_records_and_saves(
+    live: Callable[..., Any], opened: Callable[..., Any], measured: Callable[..., str]
+) -> None:
+    view = live("simulated", "--port", "0")
+    page = opened(view.address)
+    shown(page, "Number(document.querySelector('#picture').dataset.shown) > 10")
+    first = page.inner_text("#gap_mm")
+    shown(page, f"document.querySelector('#gap_mm').textContent !== '{first}'")
+    assert page.inner_text("#status") == "ok"
+
+    # What is shown is what the table holds.
+    page.click("#pause")
+    gap_mm, frame = float(page.inner_text("#gap_mm")), int(page.get_attribute("#gap_mm", "data-frame"))
+    with page.expect_download() as saved:
+        page.click("#save_csv")
+    table = {int(row["frame"]): row for row in csv.DictReader(io.StringIO(Path(saved.value.path()).read_text()))}
+    assert float(table[frame]["gap_mm"]) == pytest.approx(gap_mm, abs=SHOWN_MM)
+    page.click("#pause")
+
+    with page.expect_download() as plot:
+        page.click("#save_plot")
+    assert cv2.imread(str(plot.value.path())).std() > 1.0
+
+    # Keyboard: record, and stop again.
+    page.locator("body").press("r")
+    shown(page, "document.querySelector('#record').textContent === 'Stop'")
+    page.fill("#below_tip", "0.4")
+    page.press("#below_tip", "Enter")
+    says(page, "While a run is recorded the measurement stays as it is")
+    shown(page, "/Recording: [3-9][0-9] frames/.test(document.querySelector('#recording').textContent)")
+    page.locator("body").press("r")
+    says(page, " frames to ")
+    (run,) = view.runs()
+    assert measured(run / "video.mp4", "--px-per-mm", "34") == (run / "gaps.csv").read_text()
+
+    page.click("#snapshot")
+    says(page, "Snapshot of frame")
+    (snapshot,) = view.out.glob("snapshot_*.png")
+    assert cv2.imread(str(snapshot), cv2.IMREAD_UNCHANGED).shape == (480, 640)
+
+    page.click("#steps")
+    page.locator("#step_pictures img").nth(5).wait_for()
+    shown(page, "[...document.querySelectorAll('#step_pictures img')].every(i => i.naturalWidth === 640)")
+    names = page.locator("#step_pictures figcaption").all_inner_texts()
+    assert names[:3] == ["grey", "denoised", "binary"]
+
+    page.fill("#least", "0.5")
+    page.fill("#greatest", "5")
+    page.press("#greatest", "Enter")
+    page.locator("#verdict", has_text="pass").wait_for()
+    page.click("#zero")
+    page.locator("#unzero").wait_for()
+    page.click("#unzero")
+
+    # A region by mouse: one finger alone is no gap; the whole picture is one again.
+    page.click("#drag_region")
+    drag(page, (60, 60, 180, 400))
+    shown(page, "document.querySelector('#status').textContent !== 'ok'")
+    page.click("#whole")
+    shown(page, "document.querySelector('#status').textContent === 'ok'")
+
+
+def test_a_scale_is_asked_for_and_found_on_a_reference(
+    live: Callable[..., Any], opened: Callable[..., Any], tmp_path: Path
+) -> None:
+    picture = np.full((480, 640), 200, np.uint8)
+    picture[60:420, 250 : 250 + BAR_PX] = 40
+    folder = tmp_path / "bar"
+    folder.mkdir()
+    blurred = cv2.GaussianBlur(picture, (0, 0), 1.2).astype(float)
+    rng = np.random.default_rng(5)
+    for index in range(200):
+        noisy = np.clip(blurred + rng.normal(0.0, 2.0, picture.shape), 0, 255).astype(np.uint8)
+        cv2.imwrite(str(folder / f"{index:03d}.png"), noisy)
+    view = live(folder, "--rate-hz", "10", "--port", "0")
+    page = opened(view.address)
+    page.locator("#alarm", has_text="The scale is not known").wait_for()
+    page.locator("body").press("r")
+    says(page, "The scale is not known: give it before recording")
+    shown(page, "Number(document.querySelector('#picture').dataset.shown) > 2")
+    page.click("#drag_reference")
+    drag(page, (200, 100, 240, 280))
+    page.fill("#size_mm", str(BAR_MM))
+    page.press("#size_mm", "Enter")
+    says(page, "Calibrated: ")
+    found = json.loads((view.out / "calibration.json").read_text())
+    # A hundredth of a pixel over the bar's width, as the edges can be found.
+    assert found["px_per_mm"] == pytest.approx(BAR_PX / BAR_MM, abs=0.02)
+    shown(page, "document.querySelector('#scale').textContent.includes('±')")
+
+
+def test_the_page_fits_a_phone_and_comes_back_after_a_restart(
+    live: Callable[..., Any], opened: Callable[..., Any], tmp_path: Path
+) -> None:
+    out = tmp_path / "kept"
+    view = live("simulated", "--port", "0", out=out)
+    address = view.address
+    page = opened(address, viewport={"width": 390, "height": 844}, color_scheme="dark")
+    shown(page, "Number(document.querySelector('#picture').dataset.shown) > 5")
+    assert page.evaluate("document.documentElement.scrollWidth") <= 390
+    ground = page.evaluate("getComputedStyle(document.body).backgroundColor")
+    assert max(int(level) for level in re.findall(r"\d+", ground)) < 64
+    assert view.stop() == 0
+    page.locator("#connection", has_text="does not answer").wait_for()
+    again = live("simulated", "--port", re.search(r":(\d+)/", address)[1], out=out)
+    assert again.address == address
+    page.locator("#connection", has_text="connected").wait_for()
+    before = int(page.get_attribute("#picture", "data-shown"))
+    shown(page, f"Number(document.querySelector('#picture').dataset.shown) > {before + 5}")
+
+
+def test_a_cut_is_said_within_a_second_and_measuring_resumes(
+    live: Callable[..., Any], opened: Callable[..., Any], camera: Any
+) -> None:
+    view = live(camera.address, "--px-per-mm", "34", "--port", "0")
+    page = opened(view.address)
+    shown(page, "document.querySelector('#status').textContent === 'ok'")
+    shown(page, "document.querySelector('#alarm').hidden")
+    camera.stop()
+    cut_s = time.monotonic()
+    page.locator("#alarm", has_text="No picture for").wait_for()
+    assert time.monotonic() - cut_s < SAID_WITHIN_S
+    camera.start()
+    says(page, "The source is back")
+    shown(page, "document.querySelector('#alarm').hidden && Number(document.querySelector('#gap_mm').textContent) > 0")
+
+
+def test_strangers_are_refused(live: Callable[..., Any], browser: Any) -> None:
+    view = live("simulated", "--port", "0")
+    address = view.address
+    origin, token = re.match(r"(http://[^/]+)/\?token=(.*)", address).groups()
+
+    def status(path: str, **headers: str) -> int:
+        try:
+            with urlopen(Request(origin + path, headers=headers)) as answer:
+                return int(answer.status)
+        except HTTPError as error:
+            return error.code
+
+    assert status(f"/?token={token}") == 200
+    assert [status(path) for path in ("/", "/?token=wrong", "/gaps.csv", "/steps/0.png")] == [403] * 4
+    assert status(f"/?token={token}", Host="evil.example") == 400
+    assert status(f"/?token={token}", Origin="http://evil.example") == 403
+    assert status(f"/page/..%2f..%2fsession.py?token={token}") == 404
+    with urlopen(address) as answer:
+        assert "default-src 'none'" in answer.headers["Content-Security-Policy"]
+        assert "Access-Control-Allow-Origin" not in answer.headers
+
+    from websockets.exceptions import ConnectionClosed, InvalidStatus
+    from websockets.sync.client import connect
+
+    socket = origin.replace("http", "ws") + "/socket"
+    with_token = f"{socket}?token={token}"
+    for target, own in ((socket, origin), (with_token, "http://evil.example"), (with_token, None)):
+        with pytest.raises(InvalidStatus) as refused:
+            connect(target, origin=own)
+        assert refused.value.response.status_code == 403
+    with connect(with_token, origin=origin) as page:
+        page.send('{"do": "read", "path": "/etc/passwd"}')
+        answers = (page.recv() for _ in range(20))
+        refusal = next(json.loads(each) for each in answers if isinstance(each, str))
+        assert refusal["refused"].startswith("The page may ask for calibrate, height,")
+        page.send("x" * 10_000)
+        with pytest.raises(ConnectionClosed):
+            deque(iter(page.recv, None), maxlen=0)
