@@ -131,6 +131,7 @@ def test_the_page_shows_records_and_saves(
     page.fill("#below_tip", "0.4")
     page.press("#below_tip", "Enter")
     says(page, "While a run is recorded the measurement stays as it is")
+    page.press("#below_tip", "Escape")
     shown(page, "/Recording: [3-9][0-9] frames/.test(document.querySelector('#recording').textContent)")
     page.locator("body").press("r")
     says(page, " frames to ")

@@ -274,6 +274,7 @@
     at("hint").textContent = "";
   });
   document.addEventListener("keydown", (event) => {
+    if (event.key === "Escape" && document.activeElement) document.activeElement.blur(); // back to the single keys
     if (event.ctrlKey || event.metaKey || event.altKey || /^(INPUT|SELECT|TEXTAREA)$/.test(event.target.tagName)) return;
     const press = { p: "pause", r: "record", s: "snapshot", z: "zero", i: "steps", f: "follow" }[event.key];
     if (press) at(press).click();
