@@ -27,6 +27,8 @@ FIRST_REACH_PX, FIRST_LOOK = 20, 6
 SMALLEST_BLUR_PX, LARGEST_BLUR_PX = 0.2, 8.0
 # The passes of Gauss-Newton, and whether each also refines the blur. It converges quadratically from the first look.
 BLUR_PASSES = (True, True, False)
+# A notch whose sides close in at this slope is left out where it is narrower than so many sigma.
+CLOSING_SLOPE, NOTCH_SIGMAS = 0.1, 3.0
 # Variance of rounding to whole grey levels, and of a pixel's own width: no noise and no blur is smaller.
 ROUNDING = PIXEL_VARIANCE = 1.0 / 12.0
 
@@ -125,9 +127,25 @@ def _with_stripes(upright: GreyImage, edges: EdgePoints, reach: int) -> EdgePoin
     u_position[0, left] = u_position[1, right] = u_row
     contrasts = edges.contrast.copy()
     contrasts[0, left] = contrasts[1, right] = contrast
+    gain = edges.curvature_gain.copy()
+    reach_sigmas = (reach + 0.5 * gap[near]) / sigma
+    gain[0, left] = gain[1, right] = 1.0 + slope**2 * _skew(reach_sigmas)
+    # Where a notch closes, the fingers overlap just below: what blur brings up from there belongs to neither edge.
+    weight = lines.weight.copy()
+    closes = (slope > CLOSING_SLOPE) & (stripes.right - stripes.left < NOTCH_SIGMAS * sigma)
+    weight[0, left[closes]] = weight[1, right[closes]] = 0.0
+    lines = replace(lines, weight=weight)
     blurs = edges.blur_px.copy()
     blurs[:, 0] = blur
-    return replace(edges, position=position, u_position=u_position, contrast=contrasts, blur_px=blurs)
+    return replace(
+        edges,
+        lines=lines,
+        position=position,
+        u_position=u_position,
+        contrast=contrasts,
+        blur_px=blurs,
+        curvature_gain=gain,
+    )
 
 
 def _gather(upright: GreyImage, lines: ProfileLines, reach: int) -> Floats:

@@ -33,6 +33,8 @@ SMALLEST_NOTCH_SHARE, LEAST_LENGTH_SHARE = 0.3, 4.0
 MOST_TOPS = 8
 # Fingers come in from the picture's border; things that lie in view are less likely to be fingers.
 ROOTED_BONUS = 2.0
+# A lone finger that comes in from the border for so many times the measuring height makes everything else a thing.
+ROOTED_HEIGHTS = 2.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -140,15 +142,20 @@ def find_fingers(
     """
     outlines = find_outlines(mask)
     best: CoarseFingers | None = None
+    alone: NoGap | None = None
     worst_reason = NoGap(Status.NO_FINGERS, "Nothing in the picture looks like a finger.")
     for direction in directions:
         orientation = Orientation(direction, *mask.shape)
         found = _best_pair(mask, outlines, orientation, below_tip_px, reach_px)
         if isinstance(found, NoGap):
+            if found.status is Status.ONE_FINGER:
+                alone = found
             if _SEVERITY.index(found.status) > _SEVERITY.index(worst_reason.status):
                 worst_reason = found
         elif best is None or found.score > best.score:
             best = found
+    if best is not None and not best.is_rooted and alone is not None:
+        return alone
     return best or worst_reason
 
 
@@ -190,7 +197,9 @@ def _best_pair(
     for first, second in combinations(in_view, 2):
         left, right = sorted((first, second), key=lambda top: top.across_px)
         prominence = min(left.prominence_px, right.prominence_px)
-        is_rooted = left.is_rooted and right.is_rooted
+        is_rooted = left.is_rooted or right.is_rooted
+        if left.is_rooted != right.is_rooted and left.outline is not right.outline:
+            continue  # one comes in from the border and one lies in view: a finger and a thing
         score = prominence * (ROOTED_BONUS if is_rooted else 1.0)
         if best is not None and score <= best.score:
             continue
@@ -206,13 +215,14 @@ def _best_pair(
             continue
         if pair[0].outline[0, 0] <= pair[1].outline[0, 0]:  # the inner sides, in this order
             best = CoarseFingers(pair[0], pair[1], orientation, score, is_rooted)
-    if best is not None:
+    standing = sum(top.is_rooted and top.prominence_px > ROOTED_HEIGHTS * below_tip_px for top in in_view)
+    if best is not None and (best.is_rooted or standing != 1):
         return best
     if shallow:
         return NoGap(Status.TOUCHING, "The fingers touch above the measuring height.")
     if sum(top.along_px == 0 for top in tops) >= 1 and len(tops) >= 2:
         return NoGap(Status.TIP_OUT_OF_VIEW, "A finger's tip lies beyond the picture's border.")
-    if len(in_view) == 1 and in_view[0].prominence_px > below_tip_px:
+    if standing == 1 or (len(in_view) == 1 and in_view[0].prominence_px > below_tip_px):
         return NoGap(Status.ONE_FINGER, "Only one finger is in view.")
     return NoGap(Status.NO_FINGERS, "Nothing in the picture looks like two fingers.")
 

@@ -343,7 +343,11 @@ def _shape_holds(points: OutlinePoints, ends: FingerEnds, k: int, tip: float, ed
 
 def _is_on_outline(x: Floats, y: Floats, edge: float, height: float) -> bool:
     """Whether a measuring point has points of the outline beside it: nothing is ever extrapolated."""
-    return bool(len(x)) and float(np.hypot(x - edge, y - height).min()) < FARTHEST_POINT_PX
+    if not len(x):
+        return False
+    # A large finger's outline is thinned out: its points stand farther apart.
+    spacing = (np.ptp(x) + np.ptp(y)) / len(x)
+    return float(np.hypot(x - edge, y - height).min()) < FARTHEST_POINT_PX * max(1.0, spacing)
 
 
 def _measure_locally(points: OutlinePoints, k: int, below_tip_px: float, coding: Coding) -> MeasuredFinger | None:

@@ -22,6 +22,8 @@ SHORTEST_IN_BLURS = 6.0
 # A longer window must not leave more than this times the spread of the shortest one.
 SPREAD_LIMIT = 1.5
 FEWEST_POINTS = 12
+# Spread (in units of the points' uncertainties) below which a residual is never an outlier.
+LEAST_SPREAD = 0.7
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -80,12 +82,17 @@ def _polynomial(
         residual = (n - powers @ coefficients) / u
         spread = float(1.4826 * np.median(np.abs(residual)))
         if iteration < 3:
-            robust = np.clip(1.0 - (residual / (BIWEIGHT_REACH * max(spread, 0.1))) ** 2, 0.0, None) ** 2
+            robust = np.clip(1.0 - (residual / (BIWEIGHT_REACH * max(spread, LEAST_SPREAD))) ** 2, 0.0, None) ** 2
             weight = taper * robust / u**2
     inverse = np.linalg.pinv(normal_matrix)
     influence = inverse @ scaled.T
-    spread = float(np.sqrt(np.sum(weight * (n - powers @ coefficients) ** 2) / max(weight.sum(), 1e-12) * 1.0))
+    spread = float(np.sqrt(np.sum(weight * (n - powers @ coefficients) ** 2) / max(weight.sum(), 1e-12)))
     spread /= float(np.sqrt(np.sum(weight * u**2) / max(weight.sum(), 1e-12)))
+    effective = float(weight.sum() ** 2 / np.sum(weight**2))
+    if effective <= DEGREE + 2:
+        return None
+    # As many points as the polynomial has coefficients tell nothing of the spread.
+    spread *= float(np.sqrt(effective / (effective - DEGREE - 1.0)))
     variance = float(np.sum((influence[0] * u) ** 2))
     return coefficients / reach ** np.arange(DEGREE + 1), variance, spread
 

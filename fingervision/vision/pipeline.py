@@ -23,6 +23,10 @@ from fingervision.vision.profile_lines import profile_lines
 # A picture whose two classes differ by less (share of full scale, and in units of the spread within) shows nothing.
 CONTRAST_FLOOR, SEPARATION_FLOOR = 0.03, 3.0
 SATURATED_SHARE = 0.99
+# Two fingers and the edges between them need so many pixels.
+SMALLEST_SIDE_PX = 16
+# Where fingers were found and this was wrong with them, nothing else in the picture is taken for fingers.
+FINAL = (Status.SATURATED, Status.BLURRED)
 # The outline is followed so far below the measuring height (pixels, or in units of that height).
 REACH_BELOW_PX, REACH_BELOW_HEIGHTS = 45.0, 1.5
 
@@ -151,6 +155,8 @@ def _together(running: list[_Measuring], below_tip_px: float) -> list[_Attempt]:
 
 
 def _measuring(grey: GreyImage, settings: Settings, coding: Coding) -> _Measuring:
+    if min(grey.shape) < SMALLEST_SIDE_PX:
+        return _Attempt(NoGap(Status.NO_FINGERS, "The picture is too small to hold two fingers."))
     scale = full_scale(grey)
     if np.count_nonzero(grey == scale) > SATURATED_SHARE * grey.size:
         return _Attempt(NoGap(Status.SATURATED, "The picture is white: nearly every pixel is at full scale."))
@@ -168,7 +174,7 @@ def _measuring(grey: GreyImage, settings: Settings, coding: Coding) -> _Measurin
             edges = fit_edges(upright, profile_lines((fingers.left, fingers.right)))
             outcome = yield from measuring_gap(fingers, edges, settings.below_tip_px, scale, light_gap, coding)
             attempt = _Attempt(outcome, split, fingers, edges)
-        if isinstance(attempt.outcome, GapMeasurement):
+        if isinstance(attempt.outcome, GapMeasurement) or attempt.outcome.status in FINAL:
             return attempt
         first = first or attempt
     return first or _Attempt(NoGap(Status.NO_FINGERS, "Nothing in the picture looks like two fingers."), binary)

@@ -48,7 +48,6 @@ def test_too_few_points_are_no_outline() -> None:
     assert local_tip(cut, 0.0, -40.0, 0.5) is None
 
 
-@pytest.mark.xfail(reason="a known defect: the stated uncertainty is 1.45 times too small", strict=False)
 def test_the_stated_uncertainty_of_a_tip_is_its_scatter() -> None:
     rng = np.random.default_rng(74)
     found = []

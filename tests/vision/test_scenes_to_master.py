@@ -61,10 +61,9 @@ SCENES: dict[str, dict] = {
 # Known defects, not yet mended; each is still run, so that the day it passes shows in the report.
 DEFECTS = {
     "bright_rim": "a rim of 2.5 px on a light ground pulls the gap by 0.2 px, four times its stated uncertainty",
-    "4k": "the outline of a finger 600 px wide is thinned out so far that its measuring point has no neighbour",
 }
 CASES = [
-    pytest.param(name, marks=pytest.mark.xfail(reason=DEFECTS[name], strict=False) if name in DEFECTS else ())
+    pytest.param(name, marks=pytest.mark.xfail(reason=DEFECTS[name], strict=True) if name in DEFECTS else ())
     for name in SCENES
 ]
 

@@ -129,7 +129,6 @@ CLUTTER: dict[str, Callable[[np.random.Generator], Pixels]] = {
 
 # Known defects, not yet mended; each is still run, so that the day it passes shows in the report.
 DEFECTS = {
-    "one_finger_a_disc_and_a_bar": "a bar that stands free is taken for the second finger",
     "blobs": "two round blobs side by side are taken for fingers",
     "text": "strokes of letters are taken for fingers in some of the pages",
     "vignette": "a border between light and shade is called touching fingers",
