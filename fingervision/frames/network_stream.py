@@ -24,6 +24,8 @@ OPEN_TIMEOUT_S, READ_TIMEOUT_S = 5.0, 2.0
 OPTIONS = {"rtsp_transport": "tcp", "fflags": "nobuffer", "flags": "low_delay", "probesize": "1000000"}
 # These codecs code every picture by itself.
 INTRAFRAME_CODECS = frozenset({"mjpeg", "png"})
+# In these formats pictures follow one another without times.
+WITHOUT_TIMES = frozenset({"mpjpeg", "mjpeg", "jpeg_pipe", "image2pipe", "h264", "hevc"})
 LOSSLESS_CODECS = frozenset({"png", "rawvideo", "ffv1"})
 
 
@@ -52,8 +54,8 @@ def open_frames(name: str, wish: Wish) -> "NetworkStream":
 class NetworkStream:
     """A connected stream; after a cut another one is made by opening it again.
 
-    Times are those of the stream (RTSP), or the host's on arrival where it has none: pictures in a row over HTTP carry
-    no times, and times counted from a stated rate would be made up.
+    Times are those of the stream (RTSP, MPEG-TS), or the host's on arrival where it has none: pictures in a row over
+    HTTP carry no times, and times counted from a stated rate would be made up.
 
     Parameters
     ----------
@@ -86,7 +88,7 @@ class NetworkStream:
         if codec.width < 1 or codec.height < 1:
             self._container.close()
             raise FingervisionError(f"The stream {name} must say how large its pictures are, but does not.")
-        self.has_own_clock = name.startswith("rtsp://")
+        self.has_own_clock = self._container.format.name not in WITHOUT_TIMES
         self._closed = Event()
         coding = Coding.INTRAFRAME if codec.name in INTRAFRAME_CODECS else Coding.INTERFRAME
         rate = self._stream.average_rate
@@ -97,7 +99,7 @@ class NetworkStream:
             coding=Coding.LOSSLESS if codec.name in LOSSLESS_CODECS else coding,
             width_px=codec.width,
             height_px=codec.height,
-            # Over HTTP the rate is FFmpeg's guess.
+            # Without times the rate is FFmpeg's guess.
             rate_hz=float(rate) if rate and self.has_own_clock else None,
             has_times=True,
             frame_count=None,

@@ -21,7 +21,7 @@ from fingervision.storage.gaps_csv import GapsCsv
 from fingervision.vision.overlay import in_eight_bits
 from fingervision.vision.pipeline import steps
 
-SAVED_GAPS, SAVED_CALIBRATION = "live_gaps.csv", "calibration.json"
+SAVED_GAPS = "live_gaps.csv"
 TIPS = ("auto", *(direction.value for direction in Direction))
 
 
@@ -146,7 +146,8 @@ def _calibrate(session: Session, request: Request) -> Answer:
     )
     made_at = datetime.now(UTC).isoformat(timespec="seconds")
     found = replace(found, made_at=made_at, software=f"fingervision {__version__}")
-    path = session.out / SAVED_CALIBRATION
+    # A name of its own: a calibration that lies there is somebody's.
+    path = session.out / f"calibration_{made_at.replace(':', '-').removesuffix('+00-00')}Z.json"
     session.choose(scale=found, scale_file=path)
     write_calibration(found, path)
     u = found.covariance[0, 0] ** 0.5

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from dataclasses import astuple
+from threading import Lock
 from typing import Any
 
 import numpy as np
@@ -29,18 +30,21 @@ class History:
         # Filled, so that its memory is taken now and not while it fills. NaN is an empty cell, in memory alone.
         self._cells = np.full((kept, COLUMNS_KEPT), np.nan)
         self.count = 0
+        self._lock = Lock()
 
     def add(self, row: GapRow) -> None:
         """Take in a row; the oldest leaves."""
         cells = list(astuple(row)[:COLUMNS_KEPT])
         cells[2] = STATUSES.index(row.status)
-        self._cells[self.count % len(self._cells)] = [np.nan if cell is None else cell for cell in cells]
-        self.count += 1
+        with self._lock:
+            self._cells[self.count % len(self._cells)] = [np.nan if cell is None else cell for cell in cells]
+            self.count += 1
 
     def rows(self, after: int = 0) -> Iterator[GapRow]:
         """Rows from the number `after` on, counted from the first ever, as far as they are kept."""
-        count = self.count
-        for number in range(max(after, count - len(self._cells)), count):
-            frame, time_s, status, *numbers = self._cells[number % len(self._cells)].tolist()
+        with self._lock:
+            asked = np.arange(max(after, self.count - len(self._cells)), self.count)
+            kept = self._cells[asked % len(self._cells)].tolist()
+        for frame, time_s, status, *numbers in kept:
             cells: list[Any] = [None if cell != cell else cell for cell in (time_s, *numbers)]
             yield GapRow(int(frame), cells[0], STATUSES[int(status)], *cells[1:])

@@ -61,13 +61,15 @@ class RecordedVideo:
         if item.time_s is None:
             return None
         if self._first_s is None:
-            if not (any(own.is_key for own in packets) if self._template is not None else isinstance(item, Frame)):
+            self._first_s = self._begins_s(item, packets)
+            if self._first_s is None:
                 return None
-            self._first_s = item.time_s
         tick = round((item.time_s - self._first_s) * TICKS_PER_S)
         try:
             if self._template is not None:
                 self._copy(packets)
+                if tick < 0:  # a picture that was decoded late, from before the recording
+                    return None
             elif isinstance(item, Frame) and tick > self._last_tick:
                 self._encode(item, tick)
             else:
@@ -84,6 +86,11 @@ class RecordedVideo:
             self._container.close()
         except (av.FFmpegError, OSError) as error:
             raise self._failed(error) from error
+
+    def _begins_s(self, item: Frame | LostFrame, packets: tuple[OwnPacket, ...]) -> float | None:
+        if self._template is not None:
+            return next((own.time_s for own in packets if own.is_key), None)
+        return item.time_s if isinstance(item, Frame) else None
 
     def _copy(self, packets: tuple[OwnPacket, ...]) -> None:
         assert self._first_s is not None  # noqa: S101 - set by the caller

@@ -57,4 +57,4 @@ class Timeline:
 
     def on_this(self, source_s: float) -> float:
         """Place another time of the source, that of a packet, beside the frames."""
-        return source_s + (self._offset_s or 0.0)
+        return round((source_s + (self._offset_s or 0.0)) * TICKS_PER_S) / TICKS_PER_S

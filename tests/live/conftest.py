@@ -74,6 +74,7 @@ class NetworkCamera:
     pictures: Path
     port: int
     rate_hz: int = 25
+    coding: tuple[str, ...] = ("-c", "copy", "-f", "mpjpeg")
     process: subprocess.Popen[bytes] | None = field(default=None)
 
     @property
@@ -82,7 +83,7 @@ class NetworkCamera:
 
     def start(self) -> None:
         command = ["ffmpeg", "-loglevel", "quiet", "-re", "-stream_loop", "-1", "-framerate", str(self.rate_hz)]
-        command += ["-i", str(self.pictures), "-c", "copy", "-f", "mpjpeg", "-listen", "1", self.address]
+        command += ["-i", str(self.pictures), *self.coding, "-listen", "1", self.address]
         self.process = subprocess.Popen(command)
 
     def stop(self) -> None:

@@ -11,6 +11,8 @@ import pytest
 SCALE = ("--px-per-mm", "34")
 MINUTE_S = 60.0
 CUT_S = 3.0
+# MPEG's clock has 90 000 ticks a second; each end of a step is rounded to microseconds too.
+CLOCK_TICK_S = 1.5e-5
 
 
 def test_every_frame_of_a_minute_is_measured_and_a_cut_is_a_gap(
@@ -44,3 +46,35 @@ def test_every_frame_of_a_minute_is_measured_and_a_cut_is_a_gap(
     table = (run / "gaps.csv").read_text()
     assert len(rows(run / "gaps.csv")) == len(lines)
     assert measured(run / "video.mp4", *SCALE) == table
+
+
+def test_a_stream_of_h264_keeps_its_own_times_and_begins_with_a_whole_picture(
+    live: Callable[..., Any], camera: Any, measured: Callable[..., str], rows: Callable[[Path], list[dict[str, str]]]
+) -> None:
+    camera.stop()
+    coding = "-vf format=yuv420p -c:v libx264 -preset ultrafast -tune zerolatency -g 10 -f mpegts"
+    camera.coding = tuple(coding.split(" "))
+        [
+            "-vf",
+            "format=yuv420p",
+            "-c:v",
+            "libx264",
+            "-preset",
+            "ultrafast",
+            "-tune",
+            "zerolatency",
+            "-g",
+            "10",
+            "-f",
+            "mpegts",
+        ]
+    )
+    camera.start()
+    view = live(camera.address, *SCALE, "--no-page", "--json")
+    view.until(lambda seen: len(seen.lines()) > 40)
+    assert view.stop() == 0
+    (run,) = view.runs()
+    times = [float(row["time_s"]) for row in rows(run / "gaps.csv")]
+    steps = [after - before for before, after in pairwise(times)]
+    assert steps == pytest.approx([0.04] * len(steps), abs=CLOCK_TICK_S)
+    assert measured(run / "video.mp4", *SCALE) == (run / "gaps.csv").read_text()

@@ -188,7 +188,8 @@ def test_a_scale_is_asked_for_and_found_on_a_reference(
     page.fill("#size_mm", str(BAR_MM))
     page.press("#size_mm", "Enter")
     says(page, "Calibrated: ")
-    found = json.loads((view.out / "calibration.json").read_text())
+    (calibration,) = view.out.glob("calibration_*.json")
+    found = json.loads(calibration.read_text())
     # A hundredth of a pixel over the bar's width, as the edges can be found.
     assert found["px_per_mm"] == pytest.approx(BAR_PX / BAR_MM, abs=0.02)
     shown(page, "document.querySelector('#scale').textContent.includes('±')")

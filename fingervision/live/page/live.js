@@ -130,9 +130,10 @@
       data[2].push(gap === null ? null : gap - 2 * u); data[3].push(gap === null ? null : gap + 2 * u);
     }
     // Where frames are missing no line is drawn.
+    const hole_s = state.rate_hz ? Math.max(0.15, 4 / state.rate_hz) : 0.25;
     const from = Math.max(1, data[0].length - fresh.length);
     for (let i = data[0].length - 1; i >= from; i -= 1) {
-      if (data[0][i] - data[0][i - 1] > 0.5) {
+      if (data[0][i] - data[0][i - 1] > hole_s) {
         data[0].splice(i, 0, (data[0][i] + data[0][i - 1]) / 2);
         for (const column of [1, 2, 3]) data[column].splice(i, 0, null);
       }
