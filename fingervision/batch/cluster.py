@@ -107,7 +107,8 @@ def outcomes_of(client: Any, tasks: Sequence[Task], perform: Perform) -> Generat
         waiting[future] = number
         return future
 
-    running = as_completed([submitted(number) for number in islice(numbers, WINDOW * max(1, threads))])
+    first = [submitted(number) for number in islice(numbers, WINDOW * max(1, threads))]
+    running = as_completed(first, loop=client.loop)
     try:
         for future in running:
             number = waiting.pop(future)

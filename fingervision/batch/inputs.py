@@ -6,7 +6,7 @@ import os
 import re
 from pathlib import Path
 
-from fingervision.domain.errors import FingervisionError
+from fingervision.domain.errors import FingervisionError, UsageError
 
 
 def inputs_of(names: tuple[str, ...], out: Path) -> tuple[str, ...]:
@@ -20,23 +20,25 @@ def inputs_of(names: tuple[str, ...], out: Path) -> tuple[str, ...]:
     ------
     FingervisionError
         Nothing matches at all.
+    UsageError
+        All that matches lies in `out`.
     """
     found: dict[str, str] = {}
-    matched = False
+    matched = inside = False
     results = _absolute(out)
     for name in names:
         is_pattern = glob.has_magic(name) and not Path(name).exists()
         # Path.glob knows no absolute patterns.
         matches = sorted(glob.iglob(name, recursive=True), key=_natural) if is_pattern else [name]  # noqa: PTH207
-        matches = [
-            match
-            for match in matches
-            if not (_absolute(match) + os.sep).startswith(results + os.sep)
-            and not (is_pattern and Path(match).is_dir() and not _holds_images(match))
-        ]
+        matches = [m for m in matches if not (is_pattern and Path(m).is_dir() and not _holds_images(m))]
+        outside = [match for match in matches if not (_absolute(match) + os.sep).startswith(results + os.sep)]
+        inside = inside or len(outside) < len(matches)
+        matches = outside
         matched = matched or any(Path(match).exists() for match in matches)
         for match in matches or [name]:
             found.setdefault(_absolute(match), match)
+    if not matched and inside:
+        raise UsageError(f"--out must lie apart from the inputs, but they are in {out}: name another folder.")
     if not matched:
         words = ", ".join(names)
         raise FingervisionError(

@@ -60,7 +60,7 @@ def read_record(folder: Path) -> Record | None:
             return None
         digest = held.pop("digest")  # type: ignore[attr-defined]
         # Relative to the results, so that both may move together.
-        held["input"] = os.path.normpath(folder.parent / str(held["input"]))  # type: ignore[index]
+        held["input"] = os.path.abspath(folder.parent / str(held["input"]))  # type: ignore[index]  # noqa: PTH100
         curve = tuple(digest["curve"])
         return Record(digest=Digest(digest["cells"], curve, digest["caption"]), **held)  # type: ignore[arg-type]
     except (OSError, ValueError, TypeError, KeyError):

@@ -121,10 +121,10 @@ def planned(job: Job) -> Plan:
     Raises
     ------
     FingervisionError
-        Nothing matches, or the folder for the results holds something else or cannot be made.
+        Nothing matches, or the folder for the results holds something else. Nothing is written yet.
     """
     names = inputs_of(job.inputs, job.out)
-    _claim(job)
+    _check_folder(job)
     paths = [os.path.abspath(name) for name in names]  # noqa: PTH100 - links keep their own names
     wanted = set(paths)
     home: dict[str, tuple[Path, Record]] = {}
@@ -163,8 +163,9 @@ def run(plan: Plan, crew: Crew, on_progress: Progress | None = None) -> Batch:
     Raises
     ------
     FingervisionError
-        The overview cannot be written, or the crew is gone.
+        The folder for the results cannot be made, the overview cannot be written, or the crew is gone.
     """
+    _claim(plan.job)
     numbers = plan.to_do
     outcomes = dict(plan.done)
     fresh, stopped = 0, ""
@@ -200,26 +201,35 @@ def run(plan: Plan, crew: Crew, on_progress: Progress | None = None) -> Batch:
     return batch
 
 
+def _check_folder(job: Job) -> None:
+    """Refuse a folder for the results that is something else."""
+    try:
+        entries = [entry.name for entry in os.scandir(job.out) if not entry.name.startswith(".")]
+    except FileNotFoundError:
+        return
+    except NotADirectoryError:
+        raise FingervisionError(f"--out must be a folder, but {job.out} is a file: name another.") from None
+    except OSError as error:
+        raise FingervisionError(f"The folder {job.out} cannot be read ({error.strerror}): name another.") from error
+    if entries and MARK not in entries:
+        raise FingervisionError(
+            f"--out must be a new folder or one of an earlier batch, but {job.out} holds something else "
+            f"({min(entries)}): name another."
+        )
+    if entries and (command := _command_of(job.out / MARK)) != job.command:
+        raise FingervisionError(
+            f"--out must be a folder of batch {job.command}, but {job.out} is one of batch {command}: name another."
+        )
+
+
 def _claim(job: Job) -> None:
-    """Make the folder for the results, or refuse one that is something else."""
+    """Make the folder for the results, and mark it as ours."""
     mark = job.out / MARK
     try:
         job.out.mkdir(parents=True, exist_ok=True)
-        entries = [entry.name for entry in os.scandir(job.out) if not entry.name.startswith(".")]
-        if not entries:
+        if not mark.exists():
             replace_text(mark, json.dumps({"schema": SCHEMA, "command": job.command}) + "\n")
-        elif MARK not in entries:
-            raise FingervisionError(
-                f"--out must be a new folder or one of an earlier batch, but {job.out} holds something else "
-                f"({min(entries)}): name another."
-            )
-        elif (command := _command_of(mark)) != job.command:
-            raise FingervisionError(
-                f"--out must be a folder of batch {job.command}, but {job.out} is one of batch {command}: name another."
-            )
         remove_left_parts(job.out)
-    except FileExistsError:
-        raise FingervisionError(f"--out must be a folder, but {job.out} is a file: name another.") from None
     except OSError as error:
         raise FingervisionError(
             f"The folder {job.out} cannot be written ({error.strerror}): make room or name another with --out."
@@ -234,6 +244,8 @@ def _command_of(mark: Path) -> str:
 
 
 def _folders(out: Path) -> list[Path]:
+    if not out.exists():
+        return []
     with os.scandir(out) as entries:
         return [Path(entry.path) for entry in entries if not entry.name.startswith(".") and entry.is_dir()]
 

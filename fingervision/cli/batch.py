@@ -232,7 +232,7 @@ def _report(plan: "Plan", batch: "Batch", as_json: bool) -> None:
         click.echo(json.dumps(document, indent=2, allow_nan=False))
     else:
         there = sum(one.folder is not None for one in batch.outcomes)
-        what = "nothing to do" if not plan.to_do else f"{batch.fresh} worked on by this call"
+        what = "nothing to do" if not batch.fresh else f"{batch.fresh} worked on by this call"
         click.echo(f"{there} of {len(batch.outcomes)} inputs have their result ({what}).")
         click.echo(f"Written: {batch.out / 'batch.csv'}, {batch.out / 'batch.png'}, {batch.out / 'index.html'}")
     for one in batch.bad[:BAD_SHOWN] if not batch.stopped else ():

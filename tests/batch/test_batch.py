@@ -1,0 +1,273 @@
+"""`fingervision batch` as its user meets it: results, what is done again and what is not, sentences, exit codes."""
+
+import csv
+import json
+import os
+import re
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+
+from fingervision.cli import main
+
+SCALE = ("--px-per-mm", "20")
+# One process starts sooner than two; what two give is held by the first test.
+ALONE = (*SCALE, "--jobs", "1")
+# Starting Python and our imports on a busy machine; nothing is measured by it.
+PATIENCE_S = 90.0
+TIMED = re.compile(r'"made_at": ".*?"')
+
+Run = Callable[..., tuple[int, str, str]]
+
+
+@pytest.fixture
+def run(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path) -> Run:
+    monkeypatch.chdir(tmp_path)
+
+    def command(*arguments: object) -> tuple[int, str, str]:
+        monkeypatch.setattr(sys, "argv", ["fingervision", *(str(argument) for argument in arguments)])
+        with pytest.raises(SystemExit) as ended:
+            main()
+        said = capsys.readouterr()
+        assert "Traceback" not in said.err
+        code = ended.value.code
+        return (0 if code is None else int(code)), said.out, said.err
+
+    return command
+
+
+@pytest.fixture
+def copy(recordings: Path, tmp_path: Path) -> Path:
+    return Path(shutil.copytree(recordings, tmp_path / "rec"))
+
+
+def lines(out: Path) -> list[dict[str, str]]:
+    return list(csv.DictReader((out / "batch.csv").read_text(encoding="utf-8").splitlines()))
+
+
+def numbers_of(folder: Path) -> dict[str, str | bytes]:
+    """All that a measurement wrote but the time of day."""
+    summary = TIMED.sub("", (folder / "summary.json").read_text(encoding="utf-8"))
+    return {"summary": summary, **{name: (folder / name).read_bytes() for name in ("gaps.csv", "gap.png")}}
+
+
+def made(out: Path) -> dict[str, int]:
+    """When each result was written."""
+    whole = (path for path in out.glob("*/gaps.csv") if not path.parent.name.startswith("."))
+    return {path.parent.name: path.stat().st_mtime_ns for path in whole}
+
+
+def test_one_two_and_by_hand_are_the_same_and_a_broken_one_is_listed(run: Run, copy: Path, tmp_path: Path) -> None:
+    code, out, err = run("batch", "measure", "rec/**/*.mkv", *SCALE, "--out", "two", "--jobs", 2)
+    assert code == 3
+    assert "4 of 5 inputs have their result (5 worked on by this call)." in out
+    assert err.startswith("fingervision: rec/b/broken.mkv: rec/b/broken.mkv must be a video")
+    assert run("batch", "measure", "rec/**/*.mkv", *SCALE, "--out", "one", "--jobs", 1)[0] == 3
+    table = lines(Path("two"))
+    assert [(line["input"], line["result"], line["exit_code"]) for line in table] == [
+        ("rec/a/good.mkv", "a__good.mkv", "0"),
+        ("rec/b/broken.mkv", "", "1"),
+        ("rec/b/good.mkv", "b__good.mkv", "0"),
+        ("rec/b/good_too.mkv", "good_too.mkv", "0"),
+        ("rec/c/good_last.mkv", "good_last.mkv", "0"),
+    ]
+    for line in table:
+        if line["result"]:
+            assert run("measure", line["input"], *SCALE, "--out", f"hand/{line['result']}")[0] == 0
+            by_hand = numbers_of(Path("hand") / line["result"])
+            assert numbers_of(Path("two") / line["result"]) == by_hand == numbers_of(Path("one") / line["result"])
+            assert float(line["median_mm"]) == pytest.approx(
+                json.loads((Path("hand") / line["result"] / "summary.json").read_text())["gap"]["median_mm"], rel=1e-8
+            )
+    page = Path("two/index.html").read_text(encoding="utf-8")
+    assert page.count("<svg") == 4
+    assert 'href="a__good.mkv/gap.png"' in page
+    assert not re.search(r'(src|href)="(https?:)?//', page)
+    assert not list(Path("two").glob(".*"))
+
+
+def test_what_is_done_stays_and_what_changed_is_done_again(run: Run, copy: Path) -> None:
+    arguments = ("batch", "measure", "rec/*/good*.mkv", "--out", "out", *ALONE)
+    assert run(*arguments)[0] == 0
+    first = made(Path("out"))
+    assert len(first) == 4
+    page = Path("out/index.html").stat().st_mtime_ns
+    code, out, _ = run(*arguments)
+    assert (code, made(Path("out"))) == (0, first)
+    assert "nothing to do" in out
+    assert Path("out/index.html").stat().st_mtime_ns == page
+    # Another time of change with the same content is nothing new, another content is.
+    os.utime("rec/a/good.mkv", ns=(1, 1))
+    os.utime("rec/c/good_last.mkv", ns=(1, 1))
+    shutil.copy("rec/b/good_too.mkv", "rec/b/good.mkv")
+    run(*arguments)
+    second = made(Path("out"))
+    assert {name for name in second if second[name] != first[name]} == {"b__good.mkv"}
+    assert Path("out/b__good.mkv/gaps.csv").read_bytes() == Path("out/good_too.mkv/gaps.csv").read_bytes()
+    # Other options are other results; a default that is written out is none.
+    assert "nothing to do" in run(*arguments, "--below-tip-mm", 0.3)[1]
+    assert "4 worked on" in run(*arguments, "--below-tip-mm", 0.4)[1]
+
+
+def test_the_content_of_a_calibration_counts_and_not_its_name(run: Run, copy: Path) -> None:
+    sample = Path(__file__).parents[2] / "sample_frames" / "opening"
+    document = json.loads((sample / "calibration.json").read_text(encoding="utf-8"))
+    document |= {"frame_width": 240, "frame_height": 200}
+    Path("c.json").write_text(json.dumps(document), encoding="utf-8")
+    arguments = ("batch", "measure", "rec/a/good.mkv", "--jobs", 1, "--out", "out")
+    code, out, err = run(*arguments, "--calibration", "c.json")
+    if code != 0:
+        pytest.fail(err + out)
+    Path("c.json").rename("d.json")
+    assert "nothing to do" in run(*arguments, "--calibration", "d.json")[1]
+    document["made_at"] = "2026-01-01T00:00:00+00:00"
+    Path("d.json").write_text(json.dumps(document), encoding="utf-8")
+    assert "1 worked on" in run(*arguments, "--calibration", "d.json")[1]
+
+
+def test_a_recording_of_a_taken_name_gets_a_longer_one(run: Run, copy: Path) -> None:
+    run("batch", "measure", "rec/a/good.mkv", *ALONE, "--out", "out")
+    before = made(Path("out"))
+    assert run("batch", "measure", "rec/b/good.mkv", *ALONE, "--out", "out")[0] == 0
+    assert set(made(Path("out"))) == {"good.mkv", "b__good.mkv"}
+    assert made(Path("out"))["good.mkv"] == before["good.mkv"]
+    code, out, _ = run("batch", "measure", "rec/?/good.mkv", *ALONE, "--out", "out")
+    assert code == 0
+    assert "nothing to do" in out
+    assert [line["result"] for line in lines(Path("out"))] == ["good.mkv", "b__good.mkv"]
+
+
+def test_results_and_recordings_may_move_together(run: Run, copy: Path, tmp_path: Path) -> None:
+    (tmp_path / "lab").mkdir()
+    shutil.move("rec", "lab/rec")
+    run("batch", "measure", "lab/rec/a/*.mkv", *ALONE, "--out", "lab/out")
+    Path("lab").rename("archive")
+    assert "nothing to do" in run("batch", "measure", "archive/rec/a/*.mkv", *ALONE, "--out", "archive/out")[1]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code", "sentence"),
+    [
+        (("rec/nothing*.mkv", *ALONE), 1, "nothing matches rec/nothing*.mkv: check the path"),
+        (("rec/a/good.mkv",), 2, "The scale must be given, but is not"),
+        (("rec/a/good.mkv", *ALONE, "--roi", "1,2"), 2, "--roi must be four whole numbers"),
+        (("rec/a/good.mkv", "--calibration", "nix.json"), 1, "There is no file nix.json"),
+        (("rec/a/good.mkv", *SCALE, "--scheduler", "tcp://h:1", "--jobs", "2"), 2, "leave one out"),
+        (("rec/b/broken.mkv", *ALONE), 1, "rec/b/broken.mkv must be a video"),
+        (("rec/a/good.mkv", *ALONE, "--roi", "0,0,9999,9"), 2, "--roi must lie inside the frame"),
+    ],
+)
+def test_bad_requests_are_a_sentence(
+    run: Run, copy: Path, arguments: tuple[str, ...], code: int, sentence: str
+) -> None:
+    ended, _, err = run("batch", "measure", *arguments, "--out", "out")
+    assert ended == code
+    assert sentence in err
+
+
+def test_an_output_folder_of_something_else_is_left_alone(run: Run, copy: Path) -> None:
+    Path("mine").mkdir()
+    Path("mine/thesis.txt").write_text("years of work", encoding="utf-8")
+    code, _, err = run("batch", "measure", "rec/a/good.mkv", *ALONE, "--out", "mine")
+    assert code == 1
+    assert "--out must be a new folder or one of an earlier batch, but mine holds something else (thesis.txt)" in err
+    assert [path.name for path in Path("mine").iterdir()] == ["thesis.txt"]
+    code, _, err = run("batch", "measure", "rec/a/good.mkv", *ALONE, "--out", "mine/thesis.txt")
+    assert (code, "is a file: name another" in err) == (1, True)
+    code, _, err = run("batch", "measure", "rec/**/*.mkv", *ALONE, "--out", "rec")
+    assert (code, "--out must lie apart from the inputs" in err) == (2, True)
+
+
+def test_an_unreadable_file_is_listed(run: Run, copy: Path) -> None:
+    # A link to itself cannot be read by anybody, not even by root.
+    Path("rec/a/loop.mkv").symlink_to("loop.mkv")
+    code, _, err = run("batch", "measure", "rec/a/good.mkv", "rec/a/loop.mkv", "rec/gone.mkv", *ALONE, "--out", "out")
+    assert code == 3
+    assert [line["exit_code"] for line in lines(Path("out"))] == ["0", "1", "1"]
+    assert "rec/gone.mkv" in err
+
+
+def test_tables_are_diagnosed_together(run: Run, tmp_path: Path) -> None:
+    sample = Path(__file__).parents[2] / "sample_frames" / "opening"
+    Path("good.csv").write_bytes((sample / "expected_gaps.csv").read_bytes())
+    header = (sample / "expected_gaps.csv").read_text(encoding="utf-8").splitlines()[0]
+    if "input_mm" not in header:
+        pytest.skip("the sample's table has no input_mm")
+    Path("bad.csv").write_text("a,b\n1,2\n", encoding="utf-8")
+    options = ("--model", sample / "simulation.csv", "--without", "lens_distortion", "--out", "out")
+    code, _, err = run("batch", "diagnose", "*.csv", *options)
+    assert code == 3
+    assert "bad.csv must have a column input_mm" in err
+    bad, good = lines(Path("out"))
+    assert (bad["verdict"], good["verdict"]) == ("", "named")
+    assert "backlash" in good["effects"]
+    # The model is found from the folder's last place, not from that where it was written.
+    assert run("diagnose", "good.csv", "--model", "out/good.csv/model.toml", "--out", "again")[0] == 0
+
+
+@pytest.fixture
+def long_batch(recordings: Path, tmp_path: Path) -> Iterator["subprocess.Popen[str]"]:
+    """A batch in the middle of its work: one result is there, others are not."""
+    program = [sys.executable, "-m", "fingervision", "batch", "measure", f"{recordings}/*/good*.mkv", *ALONE]
+    process = subprocess.Popen(
+        [*program, "--out", "out"],
+        cwd=tmp_path,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+    )
+    until = time.monotonic() + PATIENCE_S
+    while not made(tmp_path / "out") and process.poll() is None and time.monotonic() < until:
+        time.sleep(0.005)
+    yield process
+    process.kill()
+    process.wait()
+
+
+@pytest.mark.parametrize("blow", [signal.SIGINT, signal.SIGKILL])
+def test_a_batch_that_was_stopped_goes_on(
+    run: Run, recordings: Path, tmp_path: Path, long_batch: "subprocess.Popen[str]", blow: signal.Signals
+) -> None:
+    os.killpg(long_batch.pid, blow)
+    _, err = long_batch.communicate(timeout=PATIENCE_S)
+    kept = made(tmp_path / "out")
+    assert "Traceback" not in err
+    if blow is signal.SIGINT and long_batch.returncode != 0:
+        assert long_batch.returncode == 1
+        assert "Stopped by the user" in err
+        assert "goes on from there" in err
+    code, out, _ = run("batch", "measure", f"{recordings}/*/good*.mkv", *ALONE, "--out", "out")
+    assert code == 0
+    assert (f"{4 - len(kept)} worked on" if len(kept) < 4 else "nothing to do") in out
+    assert {name: made(tmp_path / "out")[name] for name in kept} == kept
+    assert not list((tmp_path / "out").glob(".*.part*"))
+
+
+def test_a_full_disk_stops_it_and_loses_nothing(run: Run, copy: Path, tmp_path: Path) -> None:
+    disk = tmp_path / "disk"
+    disk.mkdir()
+    mounted = subprocess.run(
+        ["mount", "-t", "tmpfs", "-o", "size=160k", "tmpfs", str(disk)], capture_output=True, text=True, check=False
+    )
+    if mounted.returncode != 0:
+        pytest.skip("a small disk cannot be mounted here")
+    try:
+        arguments = ("batch", "measure", "rec/*/good*.mkv", *ALONE)
+        code, _, err = run(*arguments, "--out", disk / "out")
+        assert code == 1
+        assert "full" in err or "No space left" in err
+        kept = made(disk / "out")
+        assert len(kept) < 4
+        subprocess.run(["mount", "-o", "remount,size=20m", str(disk)], check=True)
+        assert run(*arguments, "--out", disk / "out")[0] == 0
+        assert {name: made(disk / "out")[name] for name in kept} == kept
+        assert len(made(disk / "out")) == 4
+    finally:
+        subprocess.run(["umount", str(disk)], check=True)

@@ -1,0 +1,142 @@
+"""A real Dask scheduler with real workers on loopback: the same results, also when a worker is killed."""
+
+import csv
+import os
+import signal
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+pytest.importorskip("distributed", reason="Dask is not installed: pip install -e '.[cluster]'")
+
+ROOT = Path(__file__).parents[2]
+# Starting Python, Dask and our imports on a busy machine; nothing is measured by it.
+PATIENCE_S = 90.0
+SCALE = ("--px-per-mm", "20")
+ENVIRONMENT = {
+    **os.environ,
+    "PYTHONPATH": os.pathsep.join([str(ROOT), os.environ.get("PYTHONPATH", "")]),
+    # Workers are called dead soon enough for a test.
+    "DASK_DISTRIBUTED__DEPLOY__LOST_WORKER_TIMEOUT": "1s",
+}
+
+
+def free_port() -> int:
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return int(probe.getsockname()[1])
+
+
+def started(folder: Path, *arguments: str) -> "subprocess.Popen[bytes]":
+    program = [sys.executable, "-m", "distributed.cli." + arguments[0], *arguments[1:]]
+    return subprocess.Popen(program, cwd=folder, env=ENVIRONMENT, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+
+
+@pytest.fixture
+def cluster(tmp_path: Path) -> Iterator[tuple[str, "list[subprocess.Popen[bytes]]"]]:
+    address = f"tcp://127.0.0.1:{free_port()}"
+    host, port = "127.0.0.1", address.rpartition(":")[2]
+    scheduler = started(tmp_path, "dask_scheduler", "--host", host, "--port", port, "--no-dashboard")
+    options = ("--host", host, "--nthreads", "1", "--no-dashboard", "--no-nanny", "--local-directory", str(tmp_path))
+    workers = [started(tmp_path, "dask_worker", address, *options) for _ in range(2)]
+    try:
+        yield address, workers
+    finally:
+        for process in (*workers, scheduler):
+            process.kill()
+            process.wait()
+
+
+def batch(folder: Path, *arguments: object) -> "subprocess.CompletedProcess[str]":
+    program = [sys.executable, "-m", "fingervision", "batch", "measure", *map(str, arguments)]
+    return subprocess.run(program, cwd=folder, env=ENVIRONMENT, capture_output=True, text=True, check=False)
+
+
+def lines(out: Path) -> list[dict[str, str]]:
+    return list(csv.DictReader((out / "batch.csv").read_text(encoding="utf-8").splitlines()))
+
+
+def wait_for_workers(address: str, count: int) -> None:
+    from distributed import Client
+
+    with Client(address, timeout=PATIENCE_S, set_as_default=False) as client:
+        client.wait_for_workers(count, timeout=PATIENCE_S)
+
+
+def test_a_cluster_gives_the_same_and_survives_a_dead_worker(
+    cluster: tuple[str, "list[subprocess.Popen[bytes]]"], recordings: Path, tmp_path: Path
+) -> None:
+    address, workers = cluster
+    wait_for_workers(address, 2)
+    here, there = tmp_path / "here", tmp_path / "there"
+    assert batch(tmp_path, f"{recordings}/**/*.mkv", *SCALE, "--out", here).returncode == 3
+    program = [sys.executable, "-m", "fingervision", "batch", "measure", f"{recordings}/**/*.mkv", *SCALE]
+    running = subprocess.Popen(
+        [*program, "--out", str(there), "--scheduler", address], cwd=tmp_path, env=ENVIRONMENT, stderr=subprocess.PIPE
+    )
+    # The first part that appears says that a worker is in the middle of a recording.
+    until = time.monotonic() + PATIENCE_S
+    victim = None
+    while victim is None and time.monotonic() < until and running.poll() is None:
+        owners = {int(part.name.split("~")[2]) for part in there.glob(".*.part~*")} if there.exists() else set()
+        victim = next((worker for worker in workers if worker.pid in owners), None)
+        time.sleep(0.002)
+    assert victim is not None, running.communicate()
+    victim.send_signal(signal.SIGKILL)
+    victim.wait()
+    _, err = running.communicate(timeout=PATIENCE_S)
+    assert running.returncode == 3, err.decode()
+    assert [line["input"] for line in lines(there)] == [line["input"] for line in lines(here)]
+    assert len({line["input"] for line in lines(there)}) == len(lines(there))
+    for line in lines(here):
+        for name in ("gaps.csv", "gap.png") if line["result"] else ():
+            assert (there / line["result"] / name).read_bytes() == (here / line["result"] / name).read_bytes()
+    assert not list(there.glob(".*"))
+    again = batch(tmp_path, f"{recordings}/**/good*.mkv", *SCALE, "--out", there, "--scheduler", address)
+    assert again.returncode == 0, again.stderr
+    assert "(0 worked on by this call)" in again.stdout or "nothing to do" in again.stdout
+
+
+def test_a_scheduler_that_does_not_answer_is_said(recordings: Path, tmp_path: Path) -> None:
+    address = f"tcp://127.0.0.1:{free_port()}"
+    done = batch(tmp_path, f"{recordings}/**/*.mkv", *SCALE, "--out", tmp_path / "out", "--scheduler", address)
+    assert done.returncode == 1
+    assert f"The scheduler must answer within 10 s, but {address} does not" in done.stderr
+    assert "Traceback" not in done.stderr
+    assert len(done.stderr.strip().splitlines()) == 1
+
+
+def test_workers_of_another_version_are_refused(
+    cluster: tuple[str, "list[subprocess.Popen[bytes]]"], recordings: Path, tmp_path: Path
+) -> None:
+    address, _ = cluster
+    wait_for_workers(address, 2)
+    # The same code but for one comment: a copy of which the workers know nothing.
+    copy = tmp_path / "copy"
+    for package in ("fingervision", "calib"):
+        for file in (ROOT / package).rglob("*"):
+            if file.is_file() and file.suffix != ".pyc":
+                target = copy / file.relative_to(ROOT)
+                target.parent.mkdir(parents=True, exist_ok=True)
+                target.write_bytes(file.read_bytes())
+    with (copy / "calib" / "limits.py").open("a", encoding="utf-8") as file:
+        file.write("# Changed.\n")
+    program = [sys.executable, "-m", "fingervision", "batch", "measure", f"{recordings}/**/*.mkv", *SCALE]
+    done = subprocess.run(
+        [*program, "--out", str(tmp_path / "out"), "--scheduler", address],
+        cwd=copy,
+        env={**ENVIRONMENT, "PYTHONPATH": os.pathsep.join([str(copy), ENVIRONMENT["PYTHONPATH"]])},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 1
+    assert "Every worker must run what runs here, but tcp://127.0.0.1:" in done.stderr
+    assert "source of fingervision" in done.stderr
+    assert "Traceback" not in done.stderr
+    assert not (tmp_path / "out").exists()
