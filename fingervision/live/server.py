@@ -2,6 +2,7 @@
 
 import asyncio
 import contextlib
+import errno
 import json
 import socket
 from collections import deque
@@ -53,6 +54,8 @@ def bound(host: str, port: int) -> socket.socket:
         listening.listen()  # the address is told before the server is quite up: who comes early waits
     except OSError as error:
         listening.close()
+        if error.errno == errno.EADDRNOTAVAIL:
+            raise UsageError(f"--host must be an address of this machine, but is {host}.") from error
         raise FingervisionError(
             f"The page cannot be served at {host} port {port} ({error.strerror}): another live view may run there; end "
             "it, or choose another port with --port (0 takes any free one)."

@@ -35,6 +35,10 @@ def refused(*arguments: str | Path) -> FingervisionError:
         (("simulated", "--roi", "600,0,100,100"), "The region must lie inside the frame of 640x480 pixels"),
         (("simulated", "--px-per-mm", "-3"), "--px-per-mm must be positive, but is -3."),
         (("simulated", "--below-tip-mm", "0"), "--below-tip-mm must be positive, but is 0."),
+        (
+            ("simulated", "--host", "192.0.2.1", "--port", "0"),
+            "--host must be an address of this machine, but is 192.0.2.1.",
+        ),
         (("simulated", "--host", "nowhere.invalid"), "--host must be an address of this machine"),
     ],
 )

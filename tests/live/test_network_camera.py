@@ -54,21 +54,6 @@ def test_a_stream_of_h264_keeps_its_own_times_and_begins_with_a_whole_picture(
     camera.stop()
     coding = "-vf format=yuv420p -c:v libx264 -preset ultrafast -tune zerolatency -g 10 -f mpegts"
     camera.coding = tuple(coding.split(" "))
-        [
-            "-vf",
-            "format=yuv420p",
-            "-c:v",
-            "libx264",
-            "-preset",
-            "ultrafast",
-            "-tune",
-            "zerolatency",
-            "-g",
-            "10",
-            "-f",
-            "mpegts",
-        ]
-    )
     camera.start()
     view = live(camera.address, *SCALE, "--no-page", "--json")
     view.until(lambda seen: len(seen.lines()) > 40)
