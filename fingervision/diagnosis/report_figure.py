@@ -50,7 +50,7 @@ def residual_figure(before: dict[str, Array], after: dict[str, Array] | None, hi
                         f"{NAMES.get(channel, channel)}\nmeasured - model, {'N' if channel == 'force' else 'mm'}"
                     )
         if after is not None:
-            grid[0][0].legend(frameon=False, ncols=2, loc="best")
+            grid[0][0].legend(frameon=False, ncols=2, loc="lower left", bbox_to_anchor=(0.0, 1.0), borderaxespad=0.1)
         buffer = io.BytesIO()
         figure.savefig(buffer, format="png", dpi=110)
     return buffer.getvalue()

@@ -1,6 +1,7 @@
 """report.html: the whole answer on one self-contained page."""
 
 import base64
+from collections.abc import Sequence
 from html import escape
 
 from fingervision.diagnosis.diagnose import Diagnosis, by_channel
@@ -16,6 +17,13 @@ def _table(head: list[str], rows: list[list[str]]) -> str:
     top = "".join(f"<th>{escape(cell)}</th>" for cell in head)
     body = "".join("<tr>" + "".join(f"<td>{escape(cell)}</td>" for cell in row) + "</tr>" for row in rows)
     return f"<table><tr>{top}</tr>{body}</table>"
+
+
+def _apart(alternatives: Sequence[Sequence[str]]) -> str:
+    """The explanations that stand beside each other; one alone is told apart from all others."""
+    if len(alternatives) < 2:
+        return "<p>Nothing: no other explanation of the catalogue comes near.</p>"
+    return _list([" + ".join(names) for names in alternatives])
 
 
 def _list(items: list[str]) -> str:
@@ -68,7 +76,7 @@ def report_page(diagnosis: Diagnosis) -> str:
         ("Residuals", f'<img alt="residuals before and after" src="data:image/png;base64,{image}">'),
         ("How much", numbers),
         ("Parameters, with 95 % intervals", _table(["effect", "parameter", "value", "interval"], parameters)),
-        ("What cannot be told apart", _list([" + ".join(names) for names in report.alternatives])),
+        ("What cannot be told apart", _apart(report.alternatives)),
         ("The next run", f"<p>{escape(report.next_run.words if report.next_run else 'Nothing is open.')}</p>"),
         ("Runners-up", _table(["explanation", "chi-square behind", "distance"], near)),
         ("What remains", f"<p>{escape(report.remaining)}</p>"),
