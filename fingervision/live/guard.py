@@ -83,7 +83,9 @@ class Guard:
         return None
 
     def _is_ours(self, stated: str) -> bool:
-        name, _, port = stated.rpartition(":")
+        # Browsers leave out the port of http, 80.
+        full = f"{stated}:80" if self._port == 80 and not stated.endswith(":80") else stated
+        name, _, port = full.rpartition(":")
         if not name or port != str(self._port):
             return False
         name = name.strip("[]").lower()

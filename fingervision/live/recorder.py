@@ -43,10 +43,7 @@ class Recorder:
         try:
             self._waiting.put_nowait(what)
         except Full:
-            self.failure = (
-                f"The disk of {self.run.path} is too slow for this camera, so recording ended; what was recorded until "
-                "then is valid: name a folder on another disk with --out."
-            )
+            self.failure = self._too_slow()
 
     def stop(self) -> None:
         """End the recording and wait for the disk.
@@ -57,10 +54,19 @@ class Recorder:
             The run could not be written to its end.
         """
         if not self.failure:
-            self._waiting.put(None, timeout=PATIENCE_S)
+            try:
+                self._waiting.put(None, timeout=PATIENCE_S)
+            except Full:
+                self.failure = self._too_slow()
         self._thread.join(PATIENCE_S)
         if self.failure:
             raise FingervisionError(self.failure)
+
+    def _too_slow(self) -> str:
+        return (
+            f"The disk of {self.run.path} is too slow for this camera, so recording ended; what was recorded until "
+            "then is valid: name a folder on another disk with --out."
+        )
 
     def _write(self) -> None:
         try:

@@ -20,7 +20,7 @@ from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from fingervision.domain.errors import FingervisionError, UsageError
 from fingervision.live.commands import Answer, obey, save_gaps
-from fingervision.live.guard import POLICY_VIOLATION, Guard
+from fingervision.live.guard import EVERYWHERE, POLICY_VIOLATION, Guard
 from fingervision.live.page_token import kept_token
 from fingervision.live.preview import message
 from fingervision.live.session import Seen, Session
@@ -83,7 +83,8 @@ class Page:
         self._ending = False
         port = listening.getsockname()[1]
         token = kept_token(session.out)
-        shown = f"[{host}]" if ":" in host else host
+        named = socket.gethostname() if host in EVERYWHERE else host
+        shown = f"[{named}]" if ":" in named else named
         self.address = f"http://{shown}:{port}/?token={token}"
         app = Starlette(
             routes=[

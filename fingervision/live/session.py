@@ -198,6 +198,15 @@ class Session:
         return lags or (recorder is not None and recorder.in_a_hurry)
 
     def _measure(self) -> None:
+        try:
+            self._measure_all()
+        except Exception as error:
+            # A fault of ours must be seen by whoever looks, not end in a picture that stands still.
+            self.say("failed", f"Measuring failed ({type(error).__name__}: {error}): start the live view again.")
+            self.ended.set()
+            raise
+
+    def _measure_all(self) -> None:
         while not self._stopped.is_set():
             what = self.capture.next(0.1)
             if isinstance(what, Arrival):
