@@ -3,7 +3,8 @@
     python -m tests.benchmarks.hidden.run --tables 40 --jobs 2 --seed 1 --rows null,single_1 --methods diagnose,bic
 
 Everything is kept under --out by seed, row and number, so that a run may be stopped and goes on; --again METHOD asks
-that method anew. Build with seeds below 1000, judge with seeds from 1000 on.
+that method anew. --scheduler tcp://HOST:PORT works on a Dask cluster whose workers were started at the top of the
+repository. Build with seeds below 1000, judge with seeds from 1000 on.
 """
 
 import argparse
@@ -12,7 +13,7 @@ import os
 import shutil
 import time
 import traceback
-from concurrent.futures import ProcessPoolExecutor, as_completed
+from concurrent.futures import as_completed
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
@@ -31,6 +32,7 @@ from tests.benchmarks.hidden.rows import ROWS
 from tests.benchmarks.hidden.score import Mark, intervals, mark, row_lines
 from tests.benchmarks.hidden.table_cache import JudgedTable, draw_table_of_row
 from tests.benchmarks.hidden.unseen_run import unseen_error_ratio
+from tests.benchmarks.workers import workers
 
 METHODS = ("diagnose", "ideal", "bic", "sindy", "gp")
 PEERS = {"bic": greedy_bic, "sindy": e_sindy}
@@ -143,6 +145,7 @@ def main() -> None:
     options.add_argument("--tables", type=int, default=20, help="tables a row")
     options.add_argument("--first", type=int, default=0, help="number of the first table")
     options.add_argument("--jobs", type=int, default=2)
+    options.add_argument("--scheduler", help="Dask cluster, tcp://HOST:PORT; --out on a path that its workers see")
     options.add_argument("--seed", type=int, default=1)
     options.add_argument("--rows", default=",".join(ROWS))
     options.add_argument("--methods", default=",".join(METHODS))
@@ -159,7 +162,7 @@ def main() -> None:
         options.error(f"--tables and --jobs must be at least 1, but are {chosen.tables} and {chosen.jobs}.")
     begun = time.perf_counter()
     tasks = [
-        Task(row, index, chosen.seed, method, chosen.out)
+        Task(row, index, chosen.seed, method, chosen.out.absolute())
         for row in rows
         for index in range(chosen.first, chosen.first + chosen.tables)
         for method in methods
@@ -172,7 +175,7 @@ def main() -> None:
     # All methods of one table stay in one process: the table is drawn once.
     results: dict[str, dict[str, list[dict[str, object]]]] = {m: {r: [] for r in rows} for m in methods}
     batches = [tasks[i : i + len(methods)] for i in range(0, len(tasks), len(methods))]
-    with ProcessPoolExecutor(chosen.jobs) as pool:
+    with workers(chosen.scheduler, chosen.jobs) as pool:
         waiting = {pool.submit(_batch, batch): batch for batch in batches}
         for done, future in enumerate(as_completed(waiting), 1):
             for task, result in zip(waiting[future], future.result(), strict=True):
