@@ -11,6 +11,8 @@ FRAMES_UNTIL_SURE = 5
 # Later than this share of a period, for good, and a frame is missing.
 LATE_SHARE = 0.75
 FRAMES_TO_KNOW_THE_PERIOD = 10
+# Frames that follow sooner than this share of a period were held up and hurry; nothing is judged by them.
+HURRY_SHARE = 0.5
 # A step that differs from the median by less is a usual one.
 USUAL_SHARE = 0.55
 
@@ -40,7 +42,11 @@ class Cadence:
             return
         self._due_s = time_s if self._due_s is None else self._due_s + period_s
         if time_s < self._due_s:
+            # Earlier than it could be: frames that were counted as missing were only held up.
+            self.missing = max(0, self.missing - round((self._due_s - time_s) / period_s))
             self._due_s = time_s
+            self._lateness_s.clear()
+        elif self._times_s[-1] - self._times_s[-2] < HURRY_SHARE * period_s:
             self._lateness_s.clear()
         self._lateness_s.append(time_s - self._due_s)
         if len(self._lateness_s) < FRAMES_UNTIL_SURE:

@@ -28,9 +28,10 @@ def test_jitter_alone_is_no_drop(seed: int) -> None:
     assert watched(times).missing == 0
 
 
-def test_a_burst_after_a_hold_up_is_no_drop() -> None:
+@pytest.mark.parametrize("held_up", [2, 3, 6, 11, 40])
+def test_a_burst_after_a_hold_up_is_no_drop(held_up: int) -> None:
     times = np.arange(200) * PERIOD_S
-    times[100:103] = times[103] - [0.003, 0.002, 0.001]
+    times[100 : 100 + held_up] = times[100 + held_up] - 0.001 * np.arange(held_up, 0, -1)
     assert watched(times).missing == 0
 
 
