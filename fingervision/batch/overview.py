@@ -7,6 +7,7 @@ import io
 from collections.abc import Sequence
 from pathlib import Path
 from urllib.parse import quote
+from uuid import uuid4
 
 from fingervision.batch.digest import Cell
 from fingervision.batch.reduction import Reduction, reduction_of
@@ -67,7 +68,7 @@ def _draw(path: Path, reduction: Reduction, outcomes: Sequence[Outcome]) -> None
 
     figure = Figure(figsize=SIZE_INCHES, layout="constrained")
     reduction.draw(figure, outcomes)
-    part = path.with_name(f".{path.name}.part")
+    part = path.with_name(f".{path.name}.{uuid4().hex[:8]}")
     try:
         figure.savefig(part, dpi=DOTS_PER_INCH, format="png")
         part.replace(path)

@@ -1,5 +1,6 @@
 """The folder of one result: written beside its place, renamed into it when whole, with a record of what it is of."""
 
+import errno
 import json
 import os
 import re
@@ -134,8 +135,8 @@ def publish(part: Path, folder: Path, record: Record) -> None:
         if there is not None and is_same(there, record):
             shutil.rmtree(part, ignore_errors=True)
             return
-        if there is None and folder.exists():
-            break
+        if (there is None and folder.exists()) or (there is not None and there.input != record.input):
+            raise FileExistsError(errno.EEXIST, "it holds something else by now", str(folder))
         old = new_part(folder)
         with suppress(FileNotFoundError):  # another worker moved it
             folder.rename(old)
@@ -148,8 +149,8 @@ def publish(part: Path, folder: Path, record: Record) -> None:
 
 
 def is_same(there: Record, wanted: Record) -> bool:
-    """Whether a result is of the same content with the same options."""
-    return (there.content, there.options_key) == (wanted.content, wanted.options_key)
+    """Whether a result is of the same input, with the same content and options."""
+    return (there.input, there.content, there.options_key) == (wanted.input, wanted.content, wanted.options_key)
 
 
 def remove_left_parts(out: Path) -> None:

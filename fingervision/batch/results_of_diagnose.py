@@ -18,6 +18,8 @@ RMS = ("before_rms_mm", "after_rms_mm", "noise_rms_mm", "unseen_before_rms_mm", 
 COLUMNS = ("verdict", "effects", "alternatives", "parameters", *RMS)
 COLOURS = {"agrees": "#5b8c5a", "named": "#11507a", "ambiguous": "#d99a2b", "unknown": "#c0392b"}
 MOST_ANSWERS = 20
+FEWEST_PLACES = 6
+"""Room for so many bars at least: a single one would fill the figure."""
 
 
 def digest_of(folder: Path) -> Digest:
@@ -58,6 +60,8 @@ def draw(figure: "Figure", outcomes: Sequence[Outcome]) -> None:
     )
     left.tick_params(axis="y", labelsize="small")
     left.set_xlabel("tables")
+    left.xaxis.get_major_locator().set_params(integer=True)
+    left.set_ylim(len(shown) - 0.4 - max(FEWEST_PLACES, len(shown)), len(shown) - 0.4)
     for verdict, colour in COLOURS.items():
         chosen = [cells for cells in done if cells["verdict"] == verdict]
         before, after = (

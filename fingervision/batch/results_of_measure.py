@@ -43,7 +43,7 @@ def draw(figure: "Figure", outcomes: Sequence[Outcome]) -> None:
     """Draw each recording's range of the gap with its median, and the uncertainty of a single frame."""
     upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=(3, 1))
     number = np.arange(1, len(outcomes) + 1)
-    least, median, greatest, u_um = (
+    least, median, greatest, u_mm = (
         np.array([_cell(outcome, name) for outcome in outcomes])
         for name in ("least_mm", "median_mm", "greatest_mm", "median_u_gap_mm")
     )
@@ -60,12 +60,13 @@ def draw(figure: "Figure", outcomes: Sequence[Outcome]) -> None:
             transform=upper.get_xaxis_transform(),
             label=f"no number: {without.size} of {number.size}",
         )
-    upper.legend(loc="best", fontsize="small")
+    upper.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=2, fontsize="small", frameon=False)
     upper.set_ylabel("gap (mm)")
-    has_budget = bool(np.isfinite(u_um).any())
-    lower.plot(number, 2e3 * (u_um if has_budget else random), ".", color="#11507a")
+    has_budget = bool(np.isfinite(u_mm).any())
+    expanded_um = 2e3 * (u_mm if has_budget else random)
+    lower.plot(number, expanded_um, ".", color="#11507a")
     lower.set_ylabel("U, k = 2 (µm)" if has_budget else "2 u random (µm)")
-    lower.set_ylim(bottom=0.0)
+    lower.set_ylim(0.0, 1.2 * float(np.nanmax(expanded_um)) if np.isfinite(expanded_um).any() else 1.0)
     lower.set_xlim(0.4, number.size + 0.6)
     if number.size <= MOST_NAMES:
         names = [outcome.folder.name if outcome.folder else Path(outcome.input).name for outcome in outcomes]
@@ -78,5 +79,5 @@ def draw(figure: "Figure", outcomes: Sequence[Outcome]) -> None:
 
 
 def _cell(outcome: Outcome, name: str) -> float:
-    value = outcome.digest.cells[name] if outcome.digest is not None else None
+    value = outcome.digest.cells.get(name) if outcome.digest is not None else None
     return float(value) if isinstance(value, int | float) else float("nan")

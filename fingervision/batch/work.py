@@ -55,10 +55,13 @@ def _brought(task: Task, perform: Perform, part: Path, started: float) -> Outcom
     exists = source.exists()  # for what does not, the command has the sentence
     settled = exists and is_settled(source)
     stamp, content = (stamp_of(source), content_hash(source)) if exists else ("", "")
+    name = os.path.abspath(source)  # noqa: PTH100 - links keep their own names
     there = read_record(task.folder)
-    if exists and there is not None and (there.content, there.options_key) == (content, task.options_key):
+    key = (name, content, task.options_key)
+    if exists and there is not None and (there.input, there.content, there.options_key) == key:
         touched = replace(there, stamp=stamp if settled else None)
-        write_record(task.folder, task.folder, touched)
+        if touched != there:
+            write_record(task.folder, task.folder, touched)
         return outcome_of(task.input, task.folder, touched)
     ended = perform(task.command, (*task.arguments, "--out", str(part), "--", task.input))
     words = ended.words.replace(str(part), str(task.folder))
@@ -69,7 +72,7 @@ def _brought(task: Task, perform: Perform, part: Path, started: float) -> Outcom
         return failure(task, f"{task.input} was changed while it was worked on: call again when it is whole.", seconds)
     digest = reduction_of(task.command).digest_of(part)
     record = Record(
-        input=os.path.abspath(source),  # noqa: PTH100 - links keep their own names
+        input=name,
         stamp=stamp if settled or is_settled(source) else None,
         content=content,
         options_key=task.options_key,

@@ -271,3 +271,19 @@ def test_a_full_disk_stops_it_and_loses_nothing(run: Run, copy: Path, tmp_path: 
         assert len(made(disk / "out")) == 4
     finally:
         subprocess.run(["umount", str(disk)], check=True)
+
+
+def test_a_worker_that_is_killed_costs_nothing(recordings: Path, tmp_path: Path) -> None:
+    program = [sys.executable, "-m", "fingervision", "batch", "measure", f"{recordings}/*/good*.mkv", *ALONE]
+    running = subprocess.Popen([*program, "--out", "out"], cwd=tmp_path, stderr=subprocess.PIPE, text=True)
+    owner = None
+    until = time.monotonic() + PATIENCE_S
+    while owner is None and time.monotonic() < until and running.poll() is None:
+        owner = next((int(part.name.split("~")[2]) for part in tmp_path.glob("out/.*.part~*")), None)
+        time.sleep(0.001)
+    assert owner is not None
+    os.kill(owner, signal.SIGKILL)
+    _, err = running.communicate(timeout=PATIENCE_S)
+    assert (running.returncode, err) == (0, "")
+    assert len(made(tmp_path / "out")) == len(lines(tmp_path / "out")) == 4
+    assert not list((tmp_path / "out").glob(".*.part*"))
