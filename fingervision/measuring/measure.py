@@ -218,6 +218,8 @@ def _outcomes(
             for item in together:
                 yield item, (next(measured) if isinstance(item, Frame) else item)
         raise interruption
+
+
 def _check(task: Task, description: Description) -> None:
     """Refuse what cannot be meant for these frames."""
     width_px, height_px = description.width_px, description.height_px
