@@ -10,6 +10,7 @@ from fingervision.domain.frame import Frame, LostFrame
 from fingervision.domain.gap import GapMeasurement, NoGap
 from fingervision.measuring.drive_at import drive_at
 from fingervision.measuring.scale import Scale
+from fingervision.measuring.tip_bias import u_tip_bias_mm
 from fingervision.storage.gaps_csv import GapRow
 
 
@@ -80,7 +81,11 @@ class RowMaker:
         for axis, chosen in ((0, vertical), (1, ~vertical)):
             if chosen.any():
                 across[chosen] = self.scale.positions_mm(points[chosen], axis, light_gap[chosen], self.frame_size_px)
-        u_mm = [None] * len(measured) if distances.u_mm is None else distances.u_mm.tolist()
+        u_mm: list[float | None] = [None] * len(measured)
+        if distances.u_mm is not None:
+            u_mm = np.hypot(
+                distances.u_mm, u_tip_bias_mm(measured, self.scale.edge_bias_px, self.scale.px_per_mm)
+            ).tolist()
         return list(
             zip(
                 distances.value_mm.tolist(),

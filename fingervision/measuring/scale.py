@@ -18,6 +18,11 @@ class Scale(Protocol):
         """Pixels to the millimetre."""
         ...
 
+    @property
+    def edge_bias_px(self) -> float:
+        """The calibration's b: what a light gap between straight dark edges lacks in the picture."""
+        ...
+
     def distances(self, points_px: Floats, u_random_px: Floats, light_gap: NDArray[np.bool_]) -> Distances:
         """Distances between pairs of points."""
         ...

@@ -154,7 +154,7 @@ def window_of(outlines: Sequence[Outline], blur_px: float, width_px: int, height
 
 def _gaussian_step(t: NDArray[np.float64], sigma: float) -> NDArray[np.float64]:
     """Integral of the Gaussian."""
-    return 0.5 * (1.0 + erf(t / (sigma * sqrt(2.0))))
+    return np.asarray(0.5 * (1.0 + erf(t / (sigma * sqrt(2.0)))))
 
 
 def _gaussian_ramp(t: NDArray[np.float64], sigma: float) -> NDArray[np.float64]:

@@ -1,0 +1,32 @@
+"""What an edge bias does to a gap below round tips: less than to the straight edges that it was calibrated on.
+
+Light that blooms over an outline moves all of it inwards by half of the edge bias b, the tip as well. The measuring
+point is counted from the tip and goes down with it: at an edge of slope m (movement into the gap per pixel to the root)
+it moves by (b / 2) (sqrt(1 + m^2) - m) and not by b / 2. The value stays what the calibration's formula gives; what the
+formula takes too much belongs to its uncertainty.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fingervision.domain.gap import GapMeasurement
+
+
+def u_tip_bias_mm(measured: Sequence[GapMeasurement], edge_bias_px: float, px_per_mm: float) -> NDArray[np.float64]:
+    """Standard uncertainty of each gap for the share of the edge bias that its tips take back, shape (n,).
+
+    Parameters
+    ----------
+    measured : sequence of GapMeasurement
+        With the slopes of both edges.
+    edge_bias_px : float
+        b of the calibration.
+    px_per_mm : float
+        Its scale.
+    """
+    # Slopes are given across the picture: the left finger grows into the gap to the right, the right one to the left.
+    slopes = np.array([(m.left.slope, -m.right.slope) for m in measured], dtype=float)
+    share = (np.sqrt(1.0 + slopes**2) - slopes).mean(axis=1)
+    return np.asarray(np.abs((1.0 - share) * edge_bias_px) / px_per_mm)
