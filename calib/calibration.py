@@ -33,6 +33,11 @@ class BareScale:
         if not (isfinite(self.px_per_mm) and self.px_per_mm > 0.0):
             raise ValueError(f"px_per_mm must be positive, but is {self.px_per_mm}.")
 
+    @property
+    def edge_bias_px(self) -> float:
+        """Nothing is known of the edges: 0."""
+        return 0.0
+
     def distances(self, points_px: Floats, u_random_px: Floats, light_gap: NDArray[np.bool_]) -> Distances:
         """Distances between pairs of points; nothing is known of the scale's own uncertainty.
 
