@@ -1,16 +1,30 @@
 """report.html: the whole answer on one self-contained page."""
 
 import base64
+import math
 from collections.abc import Sequence
 from html import escape
 
 from fingervision.diagnosis.diagnose import Diagnosis, by_channel
 from fingervision.diagnosis.report_figure import residual_figure
+from fingervision.domain.parameter import Estimate
+from fingervision.domain.report import Verdict
+
+COVERAGE_FACTOR = 1.96
+"""Standard uncertainties in half a 95 % interval."""
 
 STYLE = """body{font:16px/1.5 system-ui,sans-serif;max-width:62rem;margin:2rem auto;padding:0 1rem;color:#222}
 h1{font-size:1.5rem}h2{font-size:1.1rem;margin-top:2rem}table{border-collapse:collapse}
 td,th{padding:.25rem .8rem;border-bottom:1px solid #ddd;text-align:left;vertical-align:top}td.n{text-align:right}
 img{max-width:100%}.verdict{font-size:1.15rem;background:#f2f5f8;padding:1rem;border-left:4px solid #1f618d}"""
+
+
+HEADINGS = {
+    Verdict.AGREES: "Measurement and model agree",
+    Verdict.NAMED: "What the model lacks has a name",
+    Verdict.AMBIGUOUS: "More than one explanation fits",
+    Verdict.UNKNOWN: "Something that the catalogue does not hold",
+}
 
 
 def _table(head: list[str], rows: list[list[str]]) -> str:
@@ -30,6 +44,15 @@ def _list(items: list[str]) -> str:
     return "<ul>" + "".join(f"<li>{escape(item)}</li>" for item in items) + "</ul>" if items else "<p>Nothing.</p>"
 
 
+def _interval(e: Estimate) -> list[str]:
+    """Value and 95 % interval, to a tenth of the standard uncertainty."""
+    if e.u is None:
+        return [f"{e.value:.5g} {e.unit}", "at a bound"]
+    places = max(0, 1 - math.floor(math.log10(e.u))) if e.u > 0.0 else 6
+    low, high = e.value - COVERAGE_FACTOR * e.u, e.value + COVERAGE_FACTOR * e.u
+    return [f"{e.value:.{places}f} {e.unit}", f"{low:.{places}f} to {high:.{places}f} {e.unit}"]
+
+
 def _mm(value: float | None) -> str:
     return "-" if value is None else f"{value:.4g} mm"
 
@@ -42,14 +65,7 @@ def report_page(diagnosis: Diagnosis) -> str:
     figure = residual_figure(before, after if report.effects else None, diagnosis.bench.chain.history)
     image = base64.b64encode(figure).decode()
     parameters = [
-        [
-            effect.name,
-            name,
-            f"{e.value:.5g} {e.unit}",
-            "at a bound" if e.u is None else f"{e.value - 1.96 * e.u:.5g} to {e.value + 1.96 * e.u:.5g} {e.unit}",
-        ]
-        for effect in report.effects
-        for name, e in effect.parameters.items()
+        [effect.name, name, *_interval(e)] for effect in report.effects for name, e in effect.parameters.items()
     ]
     numbers = _table(
         ["disagreement (RMS)", "before", "after"],
@@ -63,7 +79,7 @@ def report_page(diagnosis: Diagnosis) -> str:
         [
             " + ".join(str(name) for name in runner["effects"]),  # type: ignore[attr-defined]
             f"{runner['chi_square_more_than_best']:.1f}",
-            "-" if runner["distance"] is None else f"{runner['distance']:.1f}",
+            "far" if runner["distance"] is None else f"{runner['distance']:.1f}",
         ]
         for runner in report.runners_up
     ]
@@ -78,7 +94,7 @@ def report_page(diagnosis: Diagnosis) -> str:
         ("Parameters, with 95 % intervals", _table(["effect", "parameter", "value", "interval"], parameters)),
         ("What cannot be told apart", _apart(report.alternatives)),
         ("The next run", f"<p>{escape(report.next_run.words if report.next_run else 'Nothing is open.')}</p>"),
-        ("Runners-up", _table(["explanation", "chi-square behind", "distance"], near)),
+        ("Runners-up", _table(["explanation", "chi-square behind", "distance to the answer"], near)),
         ("What remains", f"<p>{escape(report.remaining)}</p>"),
         ("Set aside", _list(list(report.outliers))),
         ("Smallest size that this data would have shown", _table(["effect", "parameter", "size"], smallest)),
@@ -88,6 +104,6 @@ def report_page(diagnosis: Diagnosis) -> str:
     body = "".join(f"<h2>{escape(title)}</h2>{content}" for title, content in sections)
     return (
         f'<!doctype html><html lang="en"><meta charset="utf-8"><title>fingervision: {report.verdict}</title>'
-        f"<style>{STYLE}</style><h1>{escape(str(report.verdict))}</h1>"
+        f"<style>{STYLE}</style><h1>{escape(HEADINGS[report.verdict])}</h1>"
         f'<p class="verdict">{escape(report.sentence)}</p>{body}</html>\n'
     )
