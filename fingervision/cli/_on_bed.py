@@ -1,0 +1,24 @@
+"""Options of every command that uses the bed."""
+
+from collections.abc import Callable
+from typing import Any
+
+import click
+
+Command = Callable[..., Any]
+
+
+def bed_option(command: Command) -> Command:
+    """Add `--bed`: the word simulated, or the file that says what the bed is made of."""
+    return click.option(
+        "--bed", "bed_name", default="simulated", show_default=True, metavar="simulated|CONFIG.toml",
+        help="The bed: simulated, or a file that says what it is made of (see fingervision/testbed/README.md).",
+    )(command)  # fmt: skip
+
+
+def hide_option(command: Command) -> Command:
+    """Add `--hide`: effects that act in the simulated parts."""
+    return click.option(
+        "--hide", multiple=True, metavar="EFFECT[:PARAMETER=VALUE,...]|SEALED.toml",
+        help="Hide an effect of the catalogue in the simulated parts; may be given more than once.",
+    )(command)  # fmt: skip

@@ -1,0 +1,41 @@
+"""`fingervision bed`: the test bed; every file `_bed_NAME.py` beside this one is the subcommand NAME."""
+
+import importlib
+import pkgutil
+
+import click
+
+import fingervision.cli
+
+PREFIX = "_bed_"
+
+
+class BedCommands(click.Group):
+    """Subcommands found by their files' names, each imported when it is called."""
+
+    def list_commands(self, ctx: click.Context) -> list[str]:
+        """Names of the subcommands, sorted."""
+        modules = pkgutil.iter_modules(fingervision.cli.__path__)
+        return sorted(module.name.removeprefix(PREFIX) for module in modules if module.name.startswith(PREFIX))
+
+    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
+        """Import the subcommand's module, and only that."""
+        if cmd_name not in self.list_commands(ctx):
+            return None
+        command = importlib.import_module(f"{fingervision.cli.__name__}.{PREFIX}{cmd_name}").command
+        assert isinstance(command, click.Command)  # noqa: S101 - a file without a command is a fault of ours
+        return command
+
+
+EPILOG = """
+\b
+Examples:
+  fingervision bed run recipe.toml --out run
+  fingervision bed run recipe.toml --hide backlash:play_mm=0.2 --out run
+  fingervision bed run next_run.toml --bed lab.toml --out second
+"""
+
+
+@click.group(cls=BedCommands, epilog=EPILOG)
+def command() -> None:
+    """Run the test bed: actuator, force sensor, camera and gripper, each real or simulated."""

@@ -1,0 +1,170 @@
+"""A table of a TOML file, read key by key, with the file, the line and the key in every sentence."""
+
+import difflib
+import re
+import tomllib
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from math import isfinite
+from pathlib import Path
+from typing import Any, NoReturn
+
+from fingervision.domain.errors import FingervisionError
+
+
+def read_document(path: Path, what: str) -> tuple[dict[str, Any], str]:
+    """Read a TOML file.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    what : str
+        What it is to be, for the sentence: `recipe`, `bed`.
+
+    Returns
+    -------
+    dict, str
+        Its tables, and its text (for line numbers).
+
+    Raises
+    ------
+    FingervisionError
+        There is no such file, or it is not TOML.
+    """
+    try:
+        text = path.read_text(encoding="utf-8-sig")
+        return tomllib.loads(text), text
+    except FileNotFoundError:
+        raise FingervisionError(f"There is no {what} {path}.") from None
+    except OSError as error:
+        raise FingervisionError(f"The {what} {path} could not be read ({error.strerror}).") from error
+    except UnicodeDecodeError as error:
+        raise FingervisionError(f"{path} must be TOML in UTF-8, but is not: {error.reason}.") from error
+    except tomllib.TOMLDecodeError as error:
+        raise FingervisionError(f"{path} must be TOML, but is not: {error}.") from error
+
+
+def line_of(text: str, header: str, place: int = 0, key: str | None = None) -> int:
+    """Line, from 1, of the nth `[header]` or `[[header]]` of a file, or of a key below it.
+
+    tomllib tells no lines; headers are looked for as they are usually written, and 1 is said where none is found.
+    """
+    lines = text.splitlines()
+    pattern = re.compile(rf"^\s*\[\[?\s*{re.escape(header)}\s*\]\]?")
+    found = [number for number, line in enumerate(lines) if pattern.match(line)]
+    if header and place >= len(found):
+        return 1
+    begin = found[place] + 1 if header else 0
+    if key is not None:
+        of_key = re.compile(rf'^\s*"?{re.escape(key)}"?\s*[.=]')
+        for number in range(begin, len(lines)):
+            if lines[number].lstrip().startswith("["):
+                break
+            if of_key.match(lines[number]):
+                return number + 1
+    return max(begin, 1)
+
+
+@dataclass(frozen=True, slots=True)
+class Section:
+    """One table of a file.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    text : str
+        Its text.
+    header : str
+        Name of the table as in its header; empty for the top of the file.
+    values : mapping
+        Its keys.
+    place : int
+        Which of the tables of that header, from 0.
+    """
+
+    path: Path
+    text: str
+    header: str
+    values: Mapping[str, Any]
+    place: int = 0
+
+    def at(self, key: str | None = None) -> str:
+        """Say where a key stands: `line 12 of recipe.toml`."""
+        return f"line {line_of(self.text, self.header, self.place, key)} of {self.path}"
+
+    def refuse(self, key: str | None, words: str) -> NoReturn:
+        """Raise a sentence that begins with the key and says where it stands."""
+        name = key if key is not None else self.header
+        raise FingervisionError(f"{name} in {self.at(key)} {words}")
+
+    def only(self, keys: Iterable[str]) -> None:
+        """Refuse keys other than these, with the nearest."""
+        known = list(keys)
+        for key in self.values:
+            if key not in known:
+                near = difflib.get_close_matches(key, known, n=1)
+                hint = f"did you mean {near[0]}?" if near else f"there are {', '.join(known)}."
+                self.refuse(key, f"is not known: {hint}")
+
+    def number(
+        self, key: str, default: float | None = None, *, low: float = -float("inf"), high: float = float("inf"),
+        above: float | None = None,
+    ) -> float:  # fmt: skip
+        """Read a finite number between limits (`above`: greater than); without a default it must be there."""
+        value = self.values.get(key, default)
+        if value is None:
+            self.refuse(None, f"must state {key}, but does not: add it.")
+        if isinstance(value, bool) or not isinstance(value, int | float) or not isfinite(value):
+            self.refuse(key, f"must be a number, but is {value!r}.")
+        if above is not None and not value > above:
+            self.refuse(key, f"must be greater than {above:g}, but is {value:g}.")
+        if not low <= value <= high:
+            limits = f"between {low:g} and {high:g}" if high < float("inf") else f"at least {low:g}"
+            if low == -float("inf"):
+                limits = f"at most {high:g}"
+            self.refuse(key, f"must be {limits}, but is {value:g}.")
+        return float(value)
+
+    def whole(self, key: str, default: int | None = None, *, low: int, high: int = 1_000_000) -> int:
+        """Read a whole number between limits."""
+        value = self.number(key, default, low=low, high=high)
+        if value != int(value):
+            self.refuse(key, f"must be a whole number, but is {value:g}.")
+        return int(value)
+
+    def word(self, key: str, default: str | None = None, *, of: Iterable[str] | None = None) -> str:
+        """Read a text, one of some where `of` is given."""
+        value = self.values.get(key, default)
+        if value is None:
+            self.refuse(None, f"must state {key}, but does not: add it.")
+        if not isinstance(value, str):
+            self.refuse(key, f"must be a text, but is {value!r}.")
+        if of is not None and value not in (known := list(of)):
+            near = difflib.get_close_matches(value, known, n=1)
+            hint = f"did you mean {near[0]}?" if near else ""
+            self.refuse(key, f"must be one of {', '.join(known)}, but is {value!r}. {hint}".rstrip())
+        return value
+
+    def flag(self, key: str, default: bool = False) -> bool:
+        """Read true or false."""
+        value = self.values.get(key, default)
+        if not isinstance(value, bool):
+            self.refuse(key, f"must be true or false, but is {value!r}.")
+        return value
+
+    def table(self, key: str) -> "Section":
+        """Read a table below this one; an empty one where there is none."""
+        value = self.values.get(key, {})
+        if not isinstance(value, dict):
+            self.refuse(key, f"must be a table [{key}], but is {value!r}.")
+        return Section(self.path, self.text, f"{self.header}.{key}" if self.header else key, value)
+
+    def tables(self, key: str) -> tuple["Section", ...]:
+        """Read the tables `[[key]]`, in order."""
+        value = self.values.get(key, [])
+        if not isinstance(value, list) or not all(isinstance(each, dict) for each in value):
+            self.refuse(key, f"must be tables [[{key}]], but is {value!r}.")
+        header = f"{self.header}.{key}" if self.header else key
+        return tuple(Section(self.path, self.text, header, each, place) for place, each in enumerate(value))

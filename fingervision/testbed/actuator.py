@@ -1,0 +1,98 @@
+"""What every actuator does: the simulated one, that behind the Arduino, a hand screw, any later one."""
+
+from dataclasses import dataclass
+from typing import Protocol
+
+from fingervision.testbed.reading import Reading
+
+
+@dataclass(frozen=True, slots=True)
+class StageLimits:
+    """What an actuator can do; nothing beyond is ever asked of it.
+
+    Parameters
+    ----------
+    lower_mm, upper_mm : float
+        Positions that it can reach; positive opens the gripper.
+    speed_mm_s : float
+        Highest speed.
+    force_n : float
+        Highest force.
+    accuracy_mm : float
+        It comes to a stand within +- this of where it was sent; its encoder says where.
+    """
+
+    lower_mm: float
+    upper_mm: float
+    speed_mm_s: float
+    force_n: float
+    accuracy_mm: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class Alarm:
+    """Why an actuator refuses to move: its own code, and a sentence."""
+
+    code: str
+    words: str
+
+
+class Actuator(Protocol):
+    """A linear stage. Motions begin at once and end by themselves; `busy` says whether one is under way.
+
+    Every method raises `FingervisionError` with a sentence if the connection is lost or the motion was refused (beyond
+    the limits, alarm, still busy); a refused motion has not begun.
+    """
+
+    @property
+    def name(self) -> str:
+        """What it is, for run.json: kind, port, firmware."""
+        ...
+
+    @property
+    def limits(self) -> StageLimits:
+        """What it can do."""
+        ...
+
+    @property
+    def busy(self) -> bool:
+        """Whether it moves."""
+        ...
+
+    @property
+    def alarm(self) -> Alarm | None:
+        """Why it refuses to move; None if it does not."""
+        ...
+
+    @property
+    def has_steps(self) -> bool:
+        """Whether `run_step` is possible."""
+        ...
+
+    def home(self) -> None:
+        """Go to the reference and make it position 0."""
+        ...
+
+    def move(self, to_mm: float, speed_mm_s: float) -> None:
+        """Begin to move to a position at a positive speed."""
+        ...
+
+    def jog(self, speed_mm_s: float) -> None:
+        """Begin to move until stopped or at a limit; positive speeds open the gripper."""
+        ...
+
+    def run_step(self, number: int) -> None:
+        """Begin one of the step data blocks, 1 to 15."""
+        ...
+
+    def stop(self) -> None:
+        """Stop at once, from any thread, whatever else is under way; never raises while the connection stands."""
+        ...
+
+    def readings(self) -> tuple[Reading, ...]:
+        """Positions in mm since the last call, oldest first, the newest as of now: at least one."""
+        ...
+
+    def close(self) -> None:
+        """Stop and let go of the hardware; closing twice is allowed."""
+        ...

@@ -1,0 +1,65 @@
+"""The bed: its parts, put together."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from fingervision.domain.model import Model
+from fingervision.measuring.scale import Scale
+from fingervision.testbed.actuator import Actuator
+from fingervision.testbed.camera import BedCamera
+from fingervision.testbed.clock import Clock
+from fingervision.testbed.force_sensor import ForceSensor
+from fingervision.testbed.operator import Operator
+from fingervision.testbed.soft_limits import SoftLimits
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Bed:
+    """One experiment's parts; any may be real while the rest is simulated.
+
+    Parameters
+    ----------
+    clock : Clock
+        The time that all parts share.
+    actuator : Actuator
+        Moves the drive point.
+    limits : SoftLimits
+        What nobody may ask for.
+    operator : Operator
+        Does what no motor does: turns the part, shifts the picture, puts in a slot.
+    force_sensor : ForceSensor or None
+        Force at the drive.
+    camera : BedCamera or None
+        Looks at the fingers.
+    scale : Scale or None
+        From the camera's pixels to millimetres.
+    below_tip_mm : float
+        Height of measuring below each finger's tip.
+    model : Model or None
+        What the gripper should do: its drawing or table, without what is hidden.
+    replays : bool
+        Whether the same commands give the same answers, so that a run may be brought back to where it broke off.
+    about : mapping
+        For run.json.
+    """
+
+    clock: Clock
+    actuator: Actuator
+    limits: SoftLimits
+    operator: Operator
+    force_sensor: ForceSensor | None = None
+    camera: BedCamera | None = None
+    scale: Scale | None = None
+    below_tip_mm: float = 0.3
+    model: Model | None = None
+    replays: bool = False
+    about: Mapping[str, Any] = field(default_factory=dict)
+
+    def close(self) -> None:
+        """Stop the motor first, then let go of everything."""
+        self.actuator.close()
+        if self.force_sensor is not None:
+            self.force_sensor.close()
+        if self.camera is not None:
+            self.camera.close()

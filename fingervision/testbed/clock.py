@@ -1,0 +1,59 @@
+"""The time that the bed lives in: the host's, or one that goes as fast as the simulation does."""
+
+from time import monotonic, sleep
+from typing import Protocol
+
+
+class Clock(Protocol):
+    """The bed's time; every `asked_s`, `got_s` and `arrived_s` is on it."""
+
+    def now_s(self) -> float:
+        """Seconds since some fixed instant."""
+        ...
+
+    def wait_until(self, time_s: float) -> None:
+        """Return at that time, or at once if it is past."""
+        ...
+
+
+class HostClock:
+    """The host's monotonic clock: of any bed with a real part."""
+
+    def now_s(self) -> float:
+        """Seconds on the host's monotonic clock."""
+        return monotonic()
+
+    def wait_until(self, time_s: float) -> None:
+        """Sleep until then."""
+        left_s = time_s - monotonic()
+        if left_s > 0.0:
+            sleep(left_s)
+
+
+class VirtualClock:
+    """Time of a bed without any real part: it passes only while somebody waits.
+
+    Parameters
+    ----------
+    pace : float
+        Seconds of the bed in a second of the host: 1 is real time, 0 as fast as it goes.
+    """
+
+    def __init__(self, pace: float = 0.0) -> None:
+        self._now_s = 0.0
+        self._pace = pace
+        self._host_began_s: float | None = None
+
+    def now_s(self) -> float:
+        """Seconds since the bed began."""
+        return self._now_s
+
+    def wait_until(self, time_s: float) -> None:
+        """Let time pass until then; with a pace, no faster than that."""
+        self._now_s = max(self._now_s, time_s)
+        if self._pace > 0.0:
+            if self._host_began_s is None:
+                self._host_began_s = monotonic() - self._now_s / self._pace
+            left_s = self._host_began_s + self._now_s / self._pace - monotonic()
+            if left_s > 0.0:
+                sleep(left_s)

@@ -1,0 +1,30 @@
+"""What every force sensor does."""
+
+from typing import Protocol
+
+from fingervision.testbed.reading import Reading
+
+
+class ForceSensor(Protocol):
+    """Force at the drive.
+
+    Every method raises `FingervisionError` with a sentence if the connection is lost.
+    """
+
+    @property
+    def name(self) -> str:
+        """What it is, for run.json."""
+        ...
+
+    @property
+    def full_scale_n(self) -> float:
+        """Largest force that it can tell."""
+        ...
+
+    def readings(self) -> tuple[Reading, ...]:
+        """Forces in newton since the last call, oldest first, the newest as of now: at least one."""
+        ...
+
+    def close(self) -> None:
+        """Let go of the hardware; closing twice is allowed."""
+        ...

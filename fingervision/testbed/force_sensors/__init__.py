@@ -1,0 +1,1 @@
+"""Force sensors, one a file: a module with `KEYS` and `build(section, workshop)` is a kind."""

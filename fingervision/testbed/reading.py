@@ -1,0 +1,25 @@
+"""One value of an instrument, at a time of its own clock, between two times of the host's."""
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True, slots=True)
+class Reading:
+    """What an instrument said when it was asked.
+
+    Parameters
+    ----------
+    device_s : float
+        When the value was taken, on the instrument's own clock.
+    asked_s, got_s : float
+        When the host asked and when the answer was there, on the bed's clock (`Clock.now_s`); the value was taken in
+        between. An instrument that streams states for `asked_s` the earliest time that is possible (that of the
+        answer before), and one without a clock of its own gives the middle as `device_s`.
+    value : float
+        Position in mm, or force in N.
+    """
+
+    device_s: float
+    asked_s: float
+    got_s: float
+    value: float
