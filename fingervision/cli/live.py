@@ -17,7 +17,7 @@ Examples:
   fingervision live simulated                          see it work, without a camera
   fingervision live --list                             the cameras of this machine
   fingervision live 0 --calibration calibration.json
-  fingervision live /dev/video2 --size 1280x720 --rate-hz 30
+  fingervision live /dev/video2 --size 1280x720 --rate-hz 30 --exposure-ms 8 --gain 0 --focus 30
   fingervision live http://192.168.1.20/video.mjpg --px-per-mm 34 --tips down
   fingervision live rtsp://camera/stream --calibration calibration.json --out runs
   fingervision live 0 --px-per-mm 34 --no-page         gap, status and rate in the terminal
@@ -28,6 +28,10 @@ Examples:
 The page is served to this machine alone, at the address that is printed; the address holds a token.
 A run that is recorded is a folder in --out: video.mp4 (lossless, or the camera's own packets), gaps.csv,
 events.jsonl, run.json. `fingervision measure RUN/video.mp4` gives the same numbers again.
+
+\b
+What a camera is asked for is read back; where it does otherwise, it is said. Its exposure, focus and white balance are
+asked not to change by themselves.
 """
 USUAL_OUT, USUAL_PORT = Path("live"), 8025
 
@@ -42,6 +46,11 @@ USUAL_OUT, USUAL_PORT = Path("live"), 8025
 @click.option("--port", type=click.IntRange(0, 65535), default=USUAL_PORT, show_default=True, help="0: any free one.")
 @click.option("--size", metavar="WxH", help="Size that the camera is asked for.")
 @click.option("--rate-hz", type=float, help="Frames in a second that the camera is asked for.")
+@click.option("--format", "pixel_format", metavar="FOUR", help="Format, such as YUYV (raw) or MJPG.  [default: raw]")
+@click.option("--exposure-ms", type=float, help="Time that the sensor gathers light.")
+@click.option("--gain", type=float, help="Amplification, in the camera's own units.")
+@click.option("--focus", type=float, help="Focus, in the camera's own units.")
+@click.option("--white-balance-k", type=float, help="Colour temperature.")
 @click.option("--calibration", type=click.Path(path_type=Path), help="calibration.json: the scale, with uncertainty.")
 @click.option("--px-per-mm", type=float, help="The scale alone.")
 @click.option("--below-tip-mm", type=float, default=0.3, show_default=True, help="Height of measuring below each tip.")
@@ -63,6 +72,11 @@ def command(
     port: int,
     size: str | None,
     rate_hz: float | None,
+    pixel_format: str | None,
+    exposure_ms: float | None,
+    gain: float | None,
+    focus: float | None,
+    white_balance_k: float | None,
     calibration: Path | None,
     px_per_mm: float | None,
     below_tip_mm: float,
@@ -79,7 +93,7 @@ def command(
         return
     if source is None:
         raise UsageError("The source must be given, but is not: name a camera, stream or file, or use `simulated`.")
-    from fingervision.frames.source import Wish
+    from fingervision.frames.source import CameraWish, Wish
     from fingervision.live.opening import opened
     from fingervision.live.running import Showing, run
 
@@ -89,7 +103,8 @@ def command(
             "Without a page the scale must be given, but is not: add --calibration FILE (made by `fingervision "
             "calibrate`) or --px-per-mm S."
         )
-    capture = opened(source, Wish(rate_hz=rate_hz, size_px=None if size is None else _size(size)))
+    camera = CameraWish(pixel_format, exposure_ms, gain, focus, white_balance_k)
+    capture = opened(source, Wish(rate_hz, None if size is None else _size(size), camera))
     showing = Showing(page=not no_page, json_lines=as_json, host=host, port=port, record=no_page and out is not None)
     run(capture, choices, out or USUAL_OUT, showing)
 

@@ -14,6 +14,7 @@ import cv2
 
 from fingervision.domain.errors import FingervisionError
 from fingervision.domain.frame import Coding, Frame, LostFrame, Pixels
+from fingervision.frames.camera_settings import READ, requests, settled
 from fingervision.frames.received import Received
 from fingervision.frames.source import Description, Wish
 
@@ -23,13 +24,6 @@ DEVICES = Path("/sys/class/video4linux")
 NUMBERS_TRIED = 6
 # So many reads may fail before the camera counts as gone.
 FAILED_READS = 3
-# These would change scale, light or time between frames: they are asked to be off, and read back.
-AUTOMATICS = (
-    ("auto-focus", cv2.CAP_PROP_AUTOFOCUS, 0.0),
-    ("automatic white balance", cv2.CAP_PROP_AUTO_WB, 0.0),
-    # V4L2's exposure menu: 1 is manual.
-    ("auto-exposure", cv2.CAP_PROP_AUTO_EXPOSURE, 1.0),
-)
 
 
 def accepts(name: str) -> bool:
@@ -73,7 +67,7 @@ class CameraFrames:
     name : str
         Number or device.
     wish : Wish
-        Size and rate that are asked for.
+        What the camera is asked for.
     """
 
     has_own_clock = False
@@ -97,23 +91,10 @@ class CameraFrames:
             self._capture.release()
             raise FingervisionError(
                 f"The camera {name} is open but gives no picture: another program may use it, or it does not have the "
-                "size and rate asked for; leave out --size and --rate-hz."
+                "format, size and rate asked for; leave out --format, --size and --rate-hz."
             )
         self._closed = Event()
-        height_px, width_px = pixels.shape[:2]
-        rate_hz = self._capture.get(cv2.CAP_PROP_FPS)
-        self.description = Description(
-            name=name,
-            kind=f"camera ({self._capture.getBackendName()})",
-            codec=_four_letters(self._capture.get(cv2.CAP_PROP_FOURCC)),
-            coding=Coding.LOSSLESS,
-            width_px=width_px,
-            height_px=height_px,
-            rate_hz=rate_hz if rate_hz > 0.0 else None,
-            has_times=True,
-            frame_count=None,
-            notes=self._notes(wish, (width_px, height_px), rate_hz),
-        )
+        self.description = self._described(wish, (pixels.shape[1], pixels.shape[0]))
 
     def __iter__(self) -> Iterator[Frame | LostFrame]:
         """Frames as they come."""
@@ -144,41 +125,38 @@ class CameraFrames:
         self._closed.set()
 
     def _ask(self, wish: Wish) -> None:
-        """Ask for raw pictures, size, rate and that nothing changes by itself; cameras take what they like."""
-        self._capture.set(cv2.CAP_PROP_FOURCC, cv2.VideoWriter.fourcc(*"YUYV"))
-        if wish.size_px is not None:
-            self._capture.set(cv2.CAP_PROP_FRAME_WIDTH, wish.size_px[0])
-            self._capture.set(cv2.CAP_PROP_FRAME_HEIGHT, wish.size_px[1])
-        if wish.rate_hz is not None:
-            self._capture.set(cv2.CAP_PROP_FPS, wish.rate_hz)
-        self._capture.set(cv2.CAP_PROP_BUFFERSIZE, 2)
-        for _, what, value in AUTOMATICS:
-            self._capture.set(what, value)
+        """Ask for pictures as they are wished and that nothing changes by itself; cameras take what they like."""
+        with _quiet():
+            for what, value in requests(self._capture.getBackendName(), wish, self._read()):
+                self._capture.set(what, value)
 
-    def _notes(self, wish: Wish, size_px: tuple[int, int], rate_hz: float) -> tuple[str, ...]:
-        """Sentences on what the camera does otherwise."""
-        notes = []
+    def _read(self) -> dict[int, float]:
+        return {what: self._capture.get(what) for what in READ}
+
+    def _described(self, wish: Wish, size_px: tuple[int, int]) -> Description:
+        """Describe the camera as it is now, with a sentence for each thing in which it does otherwise."""
+        backend = self._capture.getBackendName()
+        with _quiet():
+            read = self._read()
+        found = settled(backend, wish, read)
+        notes = found.notes
         if wish.size_px is not None and wish.size_px != size_px:
-            notes.append(
-                f"The camera was asked for {wish.size_px[0]}x{wish.size_px[1]} pixels and gives "
-                f"{size_px[0]}x{size_px[1]}."
-            )
-        if wish.rate_hz is not None and abs(rate_hz - wish.rate_hz) > 0.01 * wish.rate_hz:
-            notes.append(f"The camera was asked for {wish.rate_hz:g} frames a second and states {rate_hz:g}.")
-        codec = _four_letters(self._capture.get(cv2.CAP_PROP_FOURCC))
-        if codec == "MJPG":
-            notes.append(
-                "The camera compresses its pictures (MJPG) before they arrive here: what that adds to the error is not "
-                "in the uncertainty; choose a size or rate that it delivers raw."
-            )
-        for words, what, value in AUTOMATICS:
-            stays = self._capture.get(what)
-            if stays not in (value, -1.0, 0.0):
-                notes.append(f"The camera's {words} could not be switched off (it reads back {stays:g}).")
-        exposure, gain = self._capture.get(cv2.CAP_PROP_EXPOSURE), self._capture.get(cv2.CAP_PROP_GAIN)
-        focus = self._capture.get(cv2.CAP_PROP_FOCUS)
-        notes.append(f"The camera reads back: format {codec}, exposure {exposure:g}, gain {gain:g}, focus {focus:g}.")
-        return tuple(notes)
+            asked, given = (f"{width_px}x{height_px}" for width_px, height_px in (wish.size_px, size_px))
+            notes = (f"The camera was asked for {asked} pixels and gives {given}.", *notes)
+        rate_hz = read[cv2.CAP_PROP_FPS]
+        return Description(
+            name=self.name,
+            kind=f"camera ({backend})",
+            codec=found.settings["format"],
+            coding=Coding.LOSSLESS,
+            width_px=size_px[0],
+            height_px=size_px[1],
+            rate_hz=rate_hz if rate_hz > 0.0 else None,
+            has_times=True,
+            frame_count=None,
+            notes=notes,
+            camera=found.settings,
+        )
 
 
 def _check_device(name: str) -> None:
@@ -204,11 +182,6 @@ def _luma(pixels: Any) -> Pixels:
     # ITU-R BT.601, as `measure` makes grey of colours.
     grey: Pixels = cv2.cvtColor(pixels, cv2.COLOR_BGR2GRAY)
     return grey
-
-
-def _four_letters(number: float) -> str:
-    letters = "".join(chr((int(number) >> shift) & 0xFF) for shift in (0, 8, 16, 24))
-    return letters if letters.isprintable() and letters.strip() else "unknown"
 
 
 def _first_line(file: Path) -> str:

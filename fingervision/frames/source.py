@@ -2,14 +2,15 @@
 
 import importlib
 import pkgutil
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from math import isfinite
 from pathlib import Path
 from types import ModuleType
 from typing import Protocol
 
 import fingervision.frames
-from fingervision.domain.errors import FingervisionError
+from fingervision.domain.errors import FingervisionError, UsageError
 from fingervision.domain.frame import Coding, Frame, LostFrame
 
 
@@ -39,6 +40,8 @@ class Description:
         What the recording is made of, in order; empty for a live source.
     notes : tuple of str
         What the user should know of the recording, one sentence each.
+    camera : mapping of str to str
+        Settings that a camera states, with their units.
     """
 
     name: str
@@ -52,6 +55,7 @@ class Description:
     frame_count: int | None
     files: tuple[Path, ...] = ()
     notes: tuple[str, ...] = ()
+    camera: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def lossy(self) -> bool:
@@ -73,6 +77,44 @@ class FrameSource(Protocol):
 
 
 @dataclass(frozen=True, slots=True)
+class CameraWish:
+    """What the user asks of a camera of this machine; None leaves a setting as it is.
+
+    Parameters
+    ----------
+    format : str or None
+        Four letters, such as YUYV or MJPG.
+    exposure_ms : float or None
+        Time that the sensor gathers light.
+    gain, focus : float or None
+        In the camera's own units.
+    white_balance_k : float or None
+        Colour temperature.
+
+    Raises
+    ------
+    UsageError
+        No camera has such a value.
+    """
+
+    format: str | None = None
+    exposure_ms: float | None = None
+    gain: float | None = None
+    focus: float | None = None
+    white_balance_k: float | None = None
+
+    def __post_init__(self) -> None:
+        if self.format is not None and not (len(self.format) == 4 and self.format.isascii() and self.format.isalnum()):
+            raise UsageError(f"--format must be four letters, such as YUYV or MJPG, but is '{self.format}'.")
+        for option, value in (("--exposure-ms", self.exposure_ms), ("--white-balance-k", self.white_balance_k)):
+            if value is not None and not 0.0 < value < float("inf"):
+                raise UsageError(f"{option} must be positive, but is {value:g}.")
+        for option, value in (("--gain", self.gain), ("--focus", self.focus)):
+            if value is not None and not isfinite(value):
+                raise UsageError(f"{option} must be a number, but is {value:g}.")
+
+
+@dataclass(frozen=True, slots=True)
 class Wish:
     """What the user asks of a source.
 
@@ -82,10 +124,13 @@ class Wish:
         Frame rate of images without times, or of a camera.
     size_px : (int, int) or None
         Width and height that a camera shall deliver.
+    camera : CameraWish
+        What else a camera shall be set to.
     """
 
     rate_hz: float | None = None
     size_px: tuple[int, int] | None = None
+    camera: CameraWish = CameraWish()
 
 
 def open_source(name: str, wish: Wish | None = None) -> FrameSource:

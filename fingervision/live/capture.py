@@ -127,6 +127,8 @@ class Capture:
                 continue
             found = (source.description.width_px, source.description.height_px)
             if found == size_px:
+                if source.description.camera != self.source.description.camera:
+                    self._put(Happening("camera", f"The camera is set otherwise now. {source.description.notes[-1]}"))
                 self.source = source
                 return True
             source.close()

@@ -145,7 +145,8 @@ def _calibrate(session: Session, request: Request) -> Answer:
         _seen(session).frame, _box(request), str(kind), _number(request, "size_mm"), _number(request, "u_size_mm")
     )
     made_at = datetime.now(UTC).isoformat(timespec="seconds")
-    found = replace(found, made_at=made_at, software=f"fingervision {__version__}")
+    camera = dict(session.description.camera)
+    found = replace(found, camera=camera, made_at=made_at, software=f"fingervision {__version__}")
     # A name of its own: a calibration that lies there is somebody's.
     path = session.out / f"calibration_{made_at.replace(':', '-').removesuffix('+00-00')}Z.json"
     session.choose(scale=found, scale_file=path)

@@ -2,8 +2,10 @@
 
 from typing import cast
 
+from fingervision.domain.errors import UsageError
+from fingervision.frames import camera
 from fingervision.frames.received import LiveSource
-from fingervision.frames.source import Wish, open_source
+from fingervision.frames.source import CameraWish, Wish, open_source
 from fingervision.live.capture import Capture
 from fingervision.live.paced import PacedRecording
 
@@ -15,8 +17,17 @@ def opened(name: str, wish: Wish) -> Capture:
     ------
     FingervisionError
         It cannot be opened.
+    UsageError
+        It is asked for what only a camera of this machine can do.
     """
+    if wish.camera != CameraWish() and not camera.accepts(name):
+        raise UsageError(
+            "--format, --exposure-ms, --gain, --focus and --white-balance-k are for cameras of this machine, but "
+            f"{name} is none: leave them out."
+        )
     source = open_source(name, wish)
     if not hasattr(source, "received"):
+        if wish.size_px is not None:
+            raise UsageError(f"--size is for cameras, but {name} is a recording: leave it out.")
         return Capture(PacedRecording(source), again=None)
     return Capture(cast("LiveSource", source), again=lambda: cast("LiveSource", open_source(name, wish)))

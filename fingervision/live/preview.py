@@ -95,6 +95,7 @@ def _state(session: Session) -> dict[str, Any]:
         "width_px": description.width_px,
         "height_px": description.height_px,
         "rate_hz": cadence.rate_hz,
+        "camera": ", ".join(f"{name} {value}" for name, value in session.capture.source.description.camera.items()),
         "jitter_ms": None if cadence.jitter_s is None else 1e3 * cadence.jitter_s,
         "dropped": cadence.missing + session.capture.overflowed,
         "duplicates": session.counts[Status.DUPLICATE],

@@ -155,6 +155,7 @@ def _about(description: Description, task: Task, began: datetime) -> dict[str, A
             "width_px": description.width_px,
             "height_px": description.height_px,
             "rate_hz": description.rate_hz,
+            "camera": dict(description.camera),
             "notes": list(description.notes),
         },
         "settings": {

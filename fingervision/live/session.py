@@ -19,6 +19,7 @@ from fingervision.live.exposure import Exposure
 from fingervision.live.history import History
 from fingervision.live.recorder import Recorder
 from fingervision.live.run_folder import RecordedFrame, RunFolder
+from fingervision.measuring.other_camera import other_camera
 from fingervision.measuring.rows import Result, RowMaker
 from fingervision.storage.gaps_csv import GapRow
 from fingervision.vision.pipeline import measure_frame
@@ -95,8 +96,9 @@ class Session:
         self._lock = Lock()
         self._stopped = Event()
         self._thread = Thread(target=self._measure, name="measuring", daemon=True)
-        for note in self.description.notes:
-            self.say("camera", note)
+        for note in (*self.description.notes, other_camera(choices.scale, self.description.camera)):
+            if note:
+                self.say("camera", note)
 
     def start(self) -> None:
         """Begin to measure."""

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, closing
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import islice
 from pathlib import Path
 from time import monotonic
@@ -18,6 +18,7 @@ from fingervision.domain.status import Status
 from fingervision.frames.ahead import decoded_ahead
 from fingervision.frames.source import Description, FrameSource
 from fingervision.measuring.gap_figure import draw_gap
+from fingervision.measuring.other_camera import other_camera
 from fingervision.measuring.output_folder import OutputFolder, claimed
 from fingervision.measuring.overlay_video import OverlayVideo
 from fingervision.measuring.rows import Result, RowMaker
@@ -26,6 +27,7 @@ from fingervision.measuring.series import GapSeries
 from fingervision.measuring.step_pictures import write_steps
 from fingervision.measuring.summary import summarise
 from fingervision.storage.gaps_csv import GapsCsv
+from fingervision.storage.recorded_camera import recorded_camera
 from fingervision.storage.summary_json import write_summary
 from fingervision.vision.pipeline import Settings, measure_frames
 
@@ -152,6 +154,8 @@ def measure(source: FrameSource, task: Task, out: Path, on_progress: Progress | 
     """
     description = source.description
     _check(task, description)
+    if words := other_camera(task.scale, recorded_camera(description.files)):
+        description = replace(description, notes=(words, *description.notes))
     folder = claimed(out, description.files)
     frame_size_px = (description.width_px, description.height_px)
     row_maker = RowMaker(task.scale, frame_size_px, task.drive, task.drive_offset_s)

@@ -30,6 +30,12 @@ def refused(*arguments: str | Path) -> FingervisionError:
         (("http://127.0.0.1:9/feed", "--size", "640x480"), "--size and --rate-hz are for cameras of this machine"),
         (("simulated", "--size", "wide"), "--size must be WxH in pixels, such as 640x480, but is 'wide'."),
         (("simulated", "--size", "10x10"), "--size of the simulated camera must be 320x240 to 4096x4096"),
+        (
+            ("simulated", "--exposure-ms", "8"),
+            "--format, --exposure-ms, --gain, --focus and --white-balance-k are for cam",
+        ),
+        (("simulated", "--exposure-ms", "-8"), "--exposure-ms must be positive, but is -8."),
+        (("simulated", "--format", "raw"), "--format must be four letters, such as YUYV or MJPG, but is 'raw'."),
         (("simulated", "--rate-hz", "0.1"), "--rate-hz must be between 1 and 1000, but is 0.1."),
         (("simulated", "--roi", "1,2"), "--roi must be four whole numbers X,Y,W,H in pixels"),
         (("simulated", "--roi", "600,0,100,100"), "The region must lie inside the frame of 640x480 pixels"),

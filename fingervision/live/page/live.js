@@ -82,6 +82,8 @@
     at("jitter").textContent = now.jitter_ms === null ? "–" : now.jitter_ms.toFixed(2);
     for (const id of ["dropped", "duplicates", "damaged"]) at(id).textContent = now[id];
     at("frame_size").textContent = `${now.width_px}×${now.height_px}`;
+    at("camera").hidden = !now.camera;
+    at("camera").textContent = `Camera: ${now.camera}`;
     at("exposure").hidden = !now.exposure;
     at("exposure").textContent = now.exposure;
     const recording = now.recording !== null;

@@ -1,0 +1,209 @@
+"""What a camera is asked for and what it says it does, without a camera: OpenCV's properties and their quirks.
+
+The properties mean something else behind each of OpenCV's backends (modules/videoio/src/cap_v4l.cpp, cap_msmf.cpp and
+cap_avfoundation_mac.mm of OpenCV 4 and 5):
+
+* V4L2 reads -1 for what a camera does not have. Its exposure counts 0.1 ms (V4L2_CID_EXPOSURE_ABSOLUTE); its automatic
+  exposure is a menu in which 1 is manual and 3 is the usual automatic. Where the environment asks for normalised values
+  the menu reads 0.25 and 0.75 and everything else is a share of an unknown range; mode 0 switches that off.
+* Media Foundation's exposure is the logarithm to base 2 of seconds. Writing to an automatic writes its value too (the
+  focus would run to 0), and reading one back says nothing; writing a value makes it manual, so that writing back what
+  was read holds it.
+* AVFoundation has size and rate alone.
+"""
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from math import isclose, log2
+
+import cv2
+
+from fingervision.frames.source import Wish
+
+V4L2, MSMF = "V4L2", "MSMF"
+UNSUPPORTED = -1.0
+# Grey levels as the sensor gave them, which every camera of the USB video class has at some size.
+RAW_FORMAT = "YUYV"
+# One picture is filled while the other is read; more would only be older.
+BUFFERED_PICTURES = 2
+V4L2_MANUAL_EXPOSURE, V4L2_MANUAL_NORMALISED = 1.0, 0.25
+# A camera takes the nearest of its steps; what lies nearer than this is what was asked for.
+SAME_SHARE = 0.01
+
+
+@dataclass(frozen=True, slots=True)
+class Control:
+    """A number that a camera can be set to.
+
+    Parameters
+    ----------
+    name : str
+        In words.
+    what : int
+        OpenCV's property.
+    unit : str
+        Of the number as it is shown; empty where only the camera's maker knows it.
+    wished : callable
+        What the user asked for, None if nothing.
+    """
+
+    name: str
+    what: int
+    unit: str
+    wished: Callable[[Wish], float | None]
+
+
+EXPOSURE = Control("exposure", cv2.CAP_PROP_EXPOSURE, "ms", lambda wish: wish.camera.exposure_ms)
+GAIN = Control("gain", cv2.CAP_PROP_GAIN, "", lambda wish: wish.camera.gain)
+FOCUS = Control("focus", cv2.CAP_PROP_FOCUS, "", lambda wish: wish.camera.focus)
+# Also V4L2's WB_TEMPERATURE; Media Foundation knows it by this name alone.
+WHITE_BALANCE = Control("white balance", cv2.CAP_PROP_TEMPERATURE, "K", lambda wish: wish.camera.white_balance_k)
+ZOOM = Control("zoom", cv2.CAP_PROP_ZOOM, "", lambda wish: None)
+CONTROLS = (EXPOSURE, GAIN, FOCUS, WHITE_BALANCE, ZOOM)
+# What would change by itself from frame to frame, by V4L2's properties, and what that does to the measurement.
+AUTOMATICS: Mapping[str, tuple[int, str]] = {
+    EXPOSURE.name: (cv2.CAP_PROP_AUTO_EXPOSURE, "the edges move with the light"),
+    FOCUS.name: (cv2.CAP_PROP_AUTOFOCUS, "the scale moves with it"),
+    WHITE_BALANCE.name: (cv2.CAP_PROP_AUTO_WB, "grey levels move with it"),
+}
+READ = (
+    cv2.CAP_PROP_FOURCC,
+    cv2.CAP_PROP_FPS,
+    *(control.what for control in CONTROLS),
+    *(what for what, _ in AUTOMATICS.values()),
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Settled:
+    """What a camera does in the end.
+
+    Parameters
+    ----------
+    settings : dict of str to str
+        Each setting that it has, with its unit.
+    notes : tuple of str
+        A sentence for each in which it does otherwise than it was asked.
+    """
+
+    settings: dict[str, str]
+    notes: tuple[str, ...]
+
+
+def requests(backend: str, wish: Wish, found: Mapping[int, float]) -> Iterator[tuple[int, float]]:
+    """Properties and values to set, in the order in which a camera must be asked.
+
+    Parameters
+    ----------
+    backend : str
+        OpenCV's name for it.
+    wish : Wish
+        What the user asks for; what nobody asks for stays, except that nothing shall change by itself.
+    found : mapping of int to float
+        What was read before, by property.
+    """
+    if backend == V4L2:
+        yield cv2.CAP_PROP_MODE, 0.0
+    # The format first: sizes and rates hang on it. Elsewhere than in V4L2 it names what OpenCV makes of the picture.
+    wanted = wish.camera.format or (RAW_FORMAT if backend == V4L2 else None)
+    if wanted is not None:
+        yield cv2.CAP_PROP_FOURCC, float(cv2.VideoWriter.fourcc(*wanted))
+    if wish.size_px is not None:
+        yield cv2.CAP_PROP_FRAME_WIDTH, float(wish.size_px[0])
+        yield cv2.CAP_PROP_FRAME_HEIGHT, float(wish.size_px[1])
+    if wish.rate_hz is not None:
+        yield cv2.CAP_PROP_FPS, wish.rate_hz
+    if backend == V4L2:
+        yield cv2.CAP_PROP_BUFFERSIZE, float(BUFFERED_PICTURES)
+        for name, (what, _) in AUTOMATICS.items():
+            yield what, V4L2_MANUAL_EXPOSURE if name == EXPOSURE.name else 0.0
+    for control in CONTROLS:
+        value = control.wished(wish)
+        if value is not None and backend in (V4L2, MSMF):
+            yield control.what, _of_camera(backend, control, value)
+        elif backend == MSMF and control.name in AUTOMATICS and _has(found, control.what):
+            yield control.what, found[control.what]
+
+
+def settled(backend: str, wish: Wish, read: Mapping[int, float]) -> Settled:
+    """Compare what a camera reads back with what it was asked for.
+
+    Parameters
+    ----------
+    backend : str
+        OpenCV's name for it.
+    wish : Wish
+        What the user asked for.
+    read : mapping of int to float
+        What was read after it was asked, by property.
+    """
+    settings, notes = {"format": four_letters(read.get(cv2.CAP_PROP_FOURCC, UNSUPPORTED))}, []
+    if wish.camera.format is not None and settings["format"] != wish.camera.format:
+        notes.append(f"The camera was asked for the format {wish.camera.format} and gives {settings['format']}.")
+    if settings["format"] == "MJPG":
+        notes.append(
+            "The camera compresses its pictures (MJPG) before they arrive here: what that adds to the error is not in "
+            "the uncertainty; choose a size or rate that it delivers raw (--format YUYV)."
+        )
+    rate_hz = read.get(cv2.CAP_PROP_FPS, UNSUPPORTED)
+    if wish.rate_hz is not None and not isclose(rate_hz, wish.rate_hz, rel_tol=SAME_SHARE):
+        states = f"states {rate_hz:g}" if rate_hz > 0.0 else "states no rate"
+        notes.append(f"The camera was asked for {wish.rate_hz:g} frames a second and {states}.")
+    for control in CONTROLS:
+        asked = control.wished(wish)
+        if not _has(read, control.what) or backend not in (V4L2, MSMF):
+            if asked is not None:
+                notes.append(_cannot(backend, control, asked))
+            continue
+        value = _of_user(backend, control, read[control.what])
+        settings[control.name] = _words(control, value)
+        if asked is not None and not isclose(value, asked, rel_tol=SAME_SHARE):
+            notes.append(
+                f"The camera was asked for {control.name} {_words(control, asked)} and takes {_words(control, value)}."
+            )
+    for name, (what, harm) in AUTOMATICS.items() if backend == V4L2 else ():
+        if _has(read, what) and not _is_manual(name, read[what]):
+            settings[name] = "automatic"
+            notes.append(
+                f"The camera's automatic {name} could not be switched off (it reads back {read[what]:g}): {harm}."
+            )
+    listed = ", ".join(f"{name} {value}" for name, value in settings.items())
+    notes.append(f"The camera reads back: {listed}.")
+    return Settled(settings, tuple(notes))
+
+
+def four_letters(number: float) -> str:
+    """Name of a format; "unknown" where there is none."""
+    letters = "".join(chr((int(number) >> shift) & 0xFF) for shift in (0, 8, 16, 24)) if number > 0.0 else ""
+    return letters.strip() if letters.isascii() and letters.isprintable() and letters.strip() else "unknown"
+
+
+def _has(read: Mapping[int, float], what: int) -> bool:
+    return read.get(what, UNSUPPORTED) != UNSUPPORTED
+
+
+def _is_manual(name: str, value: float) -> bool:
+    return value in (V4L2_MANUAL_EXPOSURE, V4L2_MANUAL_NORMALISED) if name == EXPOSURE.name else value == 0.0
+
+
+def _of_camera(backend: str, control: Control, value: float) -> float:
+    if control is not EXPOSURE:
+        return value
+    return float(round(log2(1e-3 * value))) if backend == MSMF else float(max(1, round(10.0 * value)))
+
+
+def _of_user(backend: str, control: Control, value: float) -> float:
+    if control is not EXPOSURE:
+        return value
+    return float(1e3 * 2.0**value) if backend == MSMF else 0.1 * value
+
+
+def _words(control: Control, value: float) -> str:
+    return f"{value:.4g} {control.unit}".strip()
+
+
+def _cannot(backend: str, control: Control, asked: float) -> str:
+    words = f"The camera was asked for {control.name} {_words(control, asked)}"
+    if backend in (V4L2, MSMF):
+        return f"{words}, but has no such setting."
+    return f"{words}, but {backend} lets no program set it: set it in the camera's own program."

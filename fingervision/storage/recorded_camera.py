@@ -1,0 +1,30 @@
+"""The camera's settings of a recorded run, from the run.json beside its video."""
+
+import json
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+RUN = "run.json"
+
+
+def recorded_camera(files: Sequence[Path]) -> Mapping[str, str]:
+    """Read how the camera was set when a recording was made.
+
+    Parameters
+    ----------
+    files : sequence of Path
+        What the recording is made of.
+
+    Returns
+    -------
+    mapping of str to str
+        Empty where no run.json speaks of this recording.
+    """
+    if len(files) != 1:
+        return {}
+    try:
+        run = json.loads((files[0].parent / RUN).read_text(encoding="utf-8"))
+        camera = run["device"]["camera"] if run["video"] == files[0].name else {}
+    except (OSError, ValueError, LookupError, TypeError):
+        return {}  # there is none, or it is something else's
+    return {str(name): str(value) for name, value in camera.items()} if isinstance(camera, dict) else {}
