@@ -110,7 +110,7 @@ const __FlashStringHelper *obey(char kind, uint8_t &at, bool &fine) {
         case 'R':  // run a step: code, longest time (ms)
             return move(at, fine);
         case 'X':  // release the drive line
-            lines::write(lines::DRIVE, false);
+            tick::release();
             return nullptr;
         case 'Z':  // stop
             ATOMIC_BLOCK(ATOMIC_RESTORESTATE) { tick::drop(tick::HOST); }
@@ -134,7 +134,7 @@ void handle(uint32_t time_us) {
     if (!fine || at >= wire::length) return;
     char kind = wire::line[at];
     at += 2;
-    tick::silent_ms = 0;
+    tick::heard();
     if (kind == 'I') return identify(number);
     uint16_t crc = wire::crc_of(wire::line, wire::length);
     if (number != last_number || crc != last_crc) {

@@ -25,10 +25,7 @@ bool is_output(uint8_t role) { return role < BUSY; }
 
 // All pins to inputs, no line known: what the board is after a reset.
 void unmap() {
-    for (uint8_t pin = FIRST_PIN; pin <= LAST_PIN; pin++) {
-        digitalWrite(pin, LOW);
-        pinMode(pin, INPUT);
-    }
+    for (uint8_t pin = FIRST_PIN; pin <= LAST_PIN; pin++) pinMode(pin, INPUT);
     for (Line &line : map) line.pin = NO_PIN;
 }
 

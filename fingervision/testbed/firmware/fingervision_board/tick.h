@@ -126,6 +126,17 @@ void move(uint8_t code, uint16_t at_most_ms) {
     }
 }
 
+void release() {
+    ATOMIC_BLOCK(ATOMIC_RESTORESTATE) {
+        settling = false;
+        lines::write(lines::DRIVE, false);
+    }
+}
+
+void heard() {
+    ATOMIC_BLOCK(ATOMIC_RESTORESTATE) { silent_ms = 0; }
+}
+
 }  // namespace tick
 
 ISR(TIMER1_COMPA_vect) {
