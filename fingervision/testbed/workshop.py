@@ -4,13 +4,16 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from fingervision.measuring.scale import Scale
 from fingervision.testbed.clock import Clock
 from fingervision.testbed.hidden import Hidden
+from fingervision.testbed.simulation.gripper import Motion, SimulatedGripper
+from fingervision.testbed.soft_limits import SoftLimits
 
 
 @dataclass(slots=True)
 class Workshop:
-    """The bed while it is being put together; builders may put into `shared` what another part needs.
+    """The bed while it is being put together: actuator first, then gripper, force sensor and camera.
 
     Parameters
     ----------
@@ -22,12 +25,30 @@ class Workshop:
         Of everything random in simulated parts.
     hidden : Hidden
         Effects that act in simulated parts without the rest knowing.
+    limits : SoftLimits
+        Of the bed.
+    scale : Scale or None
+        Of the camera, as the configuration states it.
+    below_tip_mm : float
+        Height of measuring.
+    motion : Motion or None
+        What a simulated gripper is driven by; a simulated actuator puts it here.
+    play_mm : float
+        Play of a simulated drive.
+    gripper : SimulatedGripper or None
+        The simulated gripper, for the parts that look at it or push it.
     shared : dict
-        Things that several parts are made from, by name: a board behind a port, the simulated stage and gripper.
+        Things that several parts are made from, by name: a board behind a port.
     """
 
     clock: Clock
     folder: Path
     seed: int
     hidden: Hidden
+    limits: SoftLimits
+    scale: Scale | None
+    below_tip_mm: float
+    motion: Motion | None = None
+    play_mm: float = 0.0
+    gripper: SimulatedGripper | None = None
     shared: dict[str, Any] = field(default_factory=dict)

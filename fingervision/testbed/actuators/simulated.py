@@ -1,0 +1,165 @@
+"""A simulated actuator: the paper's, with its encoder, its accuracy and its play."""
+
+import numpy as np
+
+from fingervision.domain.errors import FingervisionError
+from fingervision.storage.toml_section import Section
+from fingervision.testbed.actuator import Alarm, StageLimits
+from fingervision.testbed.clock import Clock
+from fingervision.testbed.reading import Reading
+from fingervision.testbed.simulation.gripper import Motion
+from fingervision.testbed.simulation.own_clock import OwnClock
+from fingervision.testbed.simulation.stage import SimulatedStage
+from fingervision.testbed.workshop import Workshop
+
+KEYS = ("lower_mm", "upper_mm", "speed_mm_s", "force_n", "encoder_step_mm", "accuracy_mm", "play_mm")
+SIMULATED = True
+# Section 3 of the paper: stroke 10 mm, 400 mm/s, encoder 30 um, accuracy +-90 um, 5.5 N. The gripper rests at 0.
+LOWER_MM, UPPER_MM = -2.0, 8.0
+SPEED_MM_S, FORCE_N, ENCODER_STEP_MM, ACCURACY_MM = 400.0, 5.5, 0.03, 0.09
+# The board reads the encoder so often by itself; an answer takes between the two times (serial at 115200 baud, median
+# 1.2 ms measured with an ATmega328P).
+RATE_HZ = 200.0
+ANSWER_S, SLOW_ANSWER_S = 0.001, 0.0005
+HOMING_MM_S = 5.0
+STAGE = "simulated stage"
+
+
+class SimulatedActuator:
+    """The stage behind a board with its own clock.
+
+    Parameters
+    ----------
+    clock : Clock
+        The bed's.
+    stage : SimulatedStage
+        What moves.
+    limits : StageLimits
+        What it can do.
+    encoder_step_mm : float
+        Positions are read in multiples of it; 0 reads them as they are.
+    rng : numpy.random.Generator
+        Of clock and answering times.
+    """
+
+    name = "simulated actuator"
+    has_steps = False
+
+    def __init__(
+        self, clock: Clock, stage: SimulatedStage, limits: StageLimits, encoder_step_mm: float, rng: np.random.Generator
+    ) -> None:
+        self.limits = limits
+        self._clock, self._stage, self._step_mm, self._rng = clock, stage, encoder_step_mm, rng
+        self._board = OwnClock.drawn(rng)
+        self._read_until = int(np.ceil(self._board.shows_s(clock.now_s()) * RATE_HZ))
+        self._answered_s = clock.now_s()
+        self._alarm: Alarm | None = None
+
+    @property
+    def busy(self) -> bool:
+        """Whether it moves."""
+        return self._clock.now_s() < self._stage.planned_until_s
+
+    @property
+    def alarm(self) -> Alarm | None:
+        """Why it refuses to move."""
+        return self._alarm
+
+    def raise_alarm(self, alarm: Alarm | None) -> None:
+        """Let it fail as a controller does, or clear that: it stops and refuses to move."""
+        self._alarm = alarm
+        if alarm is not None:
+            self.stop()
+
+    def home(self) -> None:
+        """Go to the reference and make it position 0."""
+        self._ready()
+        self._stage.home(self._clock.now_s(), HOMING_MM_S)
+
+    def move(self, to_mm: float, speed_mm_s: float) -> None:
+        """Begin to move."""
+        if not self.limits.lower_mm <= to_mm <= self.limits.upper_mm:
+            raise FingervisionError(
+                f"The target must lie between {self.limits.lower_mm:g} and {self.limits.upper_mm:g} mm, but is "
+                f"{to_mm:g} mm: nothing was moved."
+            )
+        self._within_speed(speed_mm_s)
+        if speed_mm_s == 0.0:
+            raise FingervisionError("The speed must be positive, but is 0 mm/s: nothing was moved.")
+        self._ready()
+        self._stage.go(self._clock.now_s(), to_mm, speed_mm_s)
+
+    def jog(self, speed_mm_s: float) -> None:
+        """Begin to move until stopped or at a limit."""
+        self._within_speed(abs(speed_mm_s))
+        self._ready()
+        if speed_mm_s != 0.0:
+            end_mm = self.limits.upper_mm if speed_mm_s > 0.0 else self.limits.lower_mm
+            self._stage.go(self._clock.now_s(), end_mm, abs(speed_mm_s))
+
+    def run_step(self, number: int) -> None:
+        """Refuse: step data live in a motor controller."""
+        raise FingervisionError(
+            f"Step {number} must be kept by a motor controller, but the simulated actuator has none: use move."
+        )
+
+    def stop(self) -> None:
+        """Stop at once."""
+        self._stage.halt(self._clock.now_s())
+
+    def readings(self) -> tuple[Reading, ...]:
+        """Positions since the last call, at the board's own rate, then as of now."""
+        asked_s = self._clock.now_s()
+        answer_s = ANSWER_S + SLOW_ANSWER_S * float(self._rng.random())
+        self._clock.wait_until(asked_s + answer_s)
+        got_s = self._clock.now_s()
+        now_s = self._board.shows_s(asked_s + 0.5 * answer_s)
+        ticks = np.arange(self._read_until, int(np.floor(now_s * RATE_HZ)) + 1)
+        device_s = np.append(ticks / RATE_HZ, now_s)
+        true_mm = self._stage.at_mm(np.array([self._board.bed_s(at) for at in device_s.tolist()]))
+        if self._step_mm > 0.0:
+            true_mm = np.round(np.rint(true_mm / self._step_mm) * self._step_mm, 9)
+        earliest_s, self._answered_s, self._read_until = self._answered_s, got_s, int(np.floor(now_s * RATE_HZ)) + 1
+        since = [Reading(at, earliest_s, got_s, mm) for at, mm in zip(device_s.tolist(), true_mm.tolist(), strict=True)]
+        return (*since[:-1], Reading(since[-1].device_s, asked_s, got_s, since[-1].value))
+
+    def close(self) -> None:
+        """Stop."""
+        self.stop()
+
+    def _ready(self) -> None:
+        if self._alarm is not None:
+            raise FingervisionError(
+                f"The actuator must have no alarm, but has {self._alarm.code} ({self._alarm.words}): clear it."
+            )
+        if self.busy:
+            raise FingervisionError("The actuator must stand before it moves again, but is busy: stop it first.")
+
+    def _within_speed(self, speed_mm_s: float) -> None:
+        if not 0.0 <= speed_mm_s <= self.limits.speed_mm_s:
+            raise FingervisionError(
+                f"The speed must be at most {self.limits.speed_mm_s:g} mm/s, but is {speed_mm_s:g} mm/s: "
+                "nothing was moved."
+            )
+
+
+def build(section: Section, workshop: Workshop) -> SimulatedActuator:
+    """Build it from its section of the configuration."""
+    lower_mm = section.number("lower_mm", LOWER_MM)
+    limits = StageLimits(
+        lower_mm=lower_mm,
+        upper_mm=section.number("upper_mm", UPPER_MM, above=lower_mm),
+        speed_mm_s=section.number("speed_mm_s", SPEED_MM_S, above=0.0),
+        force_n=section.number("force_n", FORCE_N, above=0.0),
+        accuracy_mm=section.number("accuracy_mm", ACCURACY_MM, low=0.0),
+    )
+    rng = np.random.default_rng([workshop.seed, 1])
+    # A controller knows the bed's limits as its own: not even its inaccuracy takes the stage beyond them.
+    ends_mm = max(limits.lower_mm, workshop.limits.lower_mm), min(limits.upper_mm, workshop.limits.upper_mm)
+    stage = SimulatedStage(*ends_mm, limits.accuracy_mm, rng)
+    workshop.motion = Motion(
+        stage.at_mm, lambda: stage.planned_until_s, lambda: stage.version, lambda: list(stage.homed_s)
+    )
+    workshop.play_mm = section.number("play_mm", 0.0, low=0.0)
+    step_mm = section.number("encoder_step_mm", ENCODER_STEP_MM, low=0.0)
+    return SimulatedActuator(workshop.clock, stage, limits, step_mm, rng)

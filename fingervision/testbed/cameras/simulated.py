@@ -1,0 +1,194 @@
+"""A simulated camera: it draws the fingers as they truly stand at the time of the exposure."""
+
+from dataclasses import dataclass
+from math import hypot
+
+import numpy as np
+
+from fingervision.domain.direction import Direction
+from fingervision.domain.errors import FingervisionError
+from fingervision.domain.frame import Coding, Frame
+from fingervision.frames.source import Description
+from fingervision.rendering import EVEN_LIGHT, Camera, Patch, Scene, render, two_fingers
+from fingervision.rendering.targets import slot
+from fingervision.storage.toml_section import Section
+from fingervision.testbed.camera import Latency
+from fingervision.testbed.clock import Clock
+from fingervision.testbed.simulation.gripper import SimulatedGripper
+from fingervision.testbed.simulation.optics import Optics, hidden_in
+from fingervision.testbed.simulation.own_clock import OwnClock
+from fingervision.testbed.workshop import Workshop
+
+KEYS = ("width_px", "height_px", "rate_hz", "px_per_mm", "blur_px", "noise_grey", "latency_s", "jitter_s", "fingers_mm",
+        "tip_radius_mm", "off_centre_mm")  # fmt: skip
+SIMULATED = True
+# Section 3 of the paper: 640 columns, 34 px/mm, 25 frames a second. The rows about the tips alone are read out.
+WIDTH_PX, HEIGHT_PX, RATE_HZ, PX_PER_MM = 640, 160, 25.0, 34.0
+BLUR_PX, NOISE_GREY = 0.9, 2.0
+# From exposure to arrival: read-out and transfer, never less, often a little more.
+LATENCY_S, JITTER_S, U_LATENCY_S = 0.008, 0.002, 0.0005
+FINGERS_MM, TIP_RADIUS_MM = 3.0, 0.9
+# Where the operator shifts the picture to.
+SHIFT_MM = 0.5
+
+
+@dataclass(frozen=True, slots=True)
+class Placed:
+    """How the part lies before the camera: turned, shifted, or a slot in its place."""
+
+    turned: bool = False
+    shift_mm: float = 0.0
+    slot_mm: float | None = None
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SimulatedShot:
+    """A frame that is drawn when it is asked for, as it was seen."""
+
+    index: int
+    device_s: float
+    arrived_s: float
+    exposed_s: float
+    placed: Placed
+    camera: "SimulatedCamera"
+
+    def item(self) -> Frame:
+        """Draw the picture."""
+        return Frame(self.camera.draw(self), self.index, self.device_s)
+
+
+class SimulatedCamera:
+    """A camera before the simulated gripper, with a clock of its own.
+
+    Parameters
+    ----------
+    clock : Clock
+        The bed's.
+    gripper : SimulatedGripper
+        What it looks at.
+    optics : Optics
+        Scale, lens, blur, noise and what is hidden in them.
+    size_px : (int, int)
+        Width and height.
+    rate_hz : float
+        Frames in a second.
+    arrival_s : (float, float)
+        Least time from exposure to arrival, and the mean of what comes on top.
+    fingers_mm : (float, float, float, float)
+        Width of the fingers, radius of their tips, how far off the picture's middle they stand, measuring height.
+    seed : int
+        Of clock, arrivals and noise.
+    """
+
+    def __init__(
+        self,
+        clock: Clock,
+        gripper: SimulatedGripper,
+        optics: Optics,
+        size_px: tuple[int, int],
+        rate_hz: float,
+        arrival_s: tuple[float, float],
+        fingers_mm: tuple[float, float, float, float],
+        seed: int,
+    ) -> None:
+        self.placed = Placed()
+        self.latency = Latency(arrival_s[0], U_LATENCY_S)
+        self.description = Description(
+            name="simulated", kind="simulated camera", codec="none", coding=Coding.LOSSLESS, width_px=size_px[0],
+            height_px=size_px[1], rate_hz=rate_hz, has_times=True, frame_count=None,
+        )  # fmt: skip
+        self._clock, self._gripper, self._optics, self._rate_hz = clock, gripper, optics, rate_hz
+        self._jitter_s, self._fingers_mm, self._seed = arrival_s[1], fingers_mm, seed
+        self._own = OwnClock.drawn(np.random.default_rng([seed, 3]))
+        self._exposure, self._index = int(np.ceil(self._own.shows_s(clock.now_s()) * rate_hz)), 0
+
+    def next(self) -> SimulatedShot:
+        """Wait for the next frame; those that nobody waited for are gone."""
+        while True:
+            device_s = self._exposure / self._rate_hz
+            exposed_s = self._own.bed_s(device_s)
+            rng = np.random.default_rng([self._seed, 4, abs(self._exposure)])
+            arrived_s = exposed_s + self.latency.least_s + self._jitter_s * float(rng.standard_exponential())
+            self._exposure += 1
+            if arrived_s >= self._clock.now_s():
+                break
+        self._clock.wait_until(arrived_s)
+        self._index += 1
+        return SimulatedShot(self._index - 1, device_s, arrived_s, exposed_s, self.placed, self)
+
+    def place(self, placed: Placed) -> None:
+        """Lay the part otherwise."""
+        self.placed = placed
+
+    def close(self) -> None:
+        """Nothing to let go of."""
+
+    def draw(self, shot: SimulatedShot) -> np.ndarray[tuple[int, ...], np.dtype[np.uint8]]:
+        """Draw what the shot saw."""
+        optics, placed = self._optics, shot.placed
+        if placed.slot_mm is not None:
+            scene = self._slot(placed.slot_mm)
+        else:
+            scene = self._scene(shot.exposed_s - optics.late_s, placed)
+        rng = np.random.default_rng([self._seed, 5, shot.index])
+        return np.asarray(render(scene, optics.camera, rng), dtype=np.uint8)
+
+    def _slot(self, size_mm: float) -> Scene:
+        width_px, height_px = self.description.width_px, self.description.height_px
+        hole = slot(
+            size_mm * self._optics.px_per_mm,
+            0.7 * height_px,
+            x_px=(width_px - 1) / 2,
+            y_px=(height_px - 1) / 2,
+            frame=(width_px, height_px),
+        )
+        return Scene((), width_px, height_px, behind=(Patch(hole, EVEN_LIGHT.fingers),))
+
+    def _scene(self, at_s: float, placed: Placed) -> Scene:
+        width_mm, radius_mm, off_mm, below_mm = self._fingers_mm
+        scale = self._optics.px_per_mm
+        seen = self._gripper.at(at_s)
+        middle_mm = float(seen.midline_mm[0]) * (-1.0 if placed.turned else 1.0) + off_mm + placed.shift_mm
+        # The measuring height lies in the picture's middle, where a lens does nothing along the fingers.
+        below_px, middle_px = below_mm * scale, (self.description.height_px - 1) / 2
+        return two_fingers(
+            float(seen.gap_mm[0]) * scale,
+            below_tip_px=below_px,
+            direction=Direction.DOWN if placed.turned else Direction.UP,
+            width_px=width_mm * scale,
+            radius_px=radius_mm * scale,
+            tip_at_px=middle_px + below_px if placed.turned else middle_px - below_px,
+            centre_px=middle_mm * scale,
+            frame=(self.description.width_px, self.description.height_px),
+        )
+
+
+def build(section: Section, workshop: Workshop) -> SimulatedCamera:
+    """Build it from its section of the configuration."""
+    if workshop.gripper is None:
+        raise FingervisionError(
+            f"A simulated camera ({section.at('kind')}) must have a simulated gripper, but the bed has none: "
+            "add a [gripper]."
+        )
+    width_px = section.whole("width_px", WIDTH_PX, low=160, high=4096)
+    height_px = section.whole("height_px", HEIGHT_PX, low=120, high=4096)
+    scale = section.number("px_per_mm", PX_PER_MM, above=0.0)
+    seen = Camera(
+        blur_px=section.number("blur_px", BLUR_PX, low=0.1), noise_grey=section.number("noise_grey", NOISE_GREY, low=0)
+    )
+    optics = Optics(seen, scale, hypot(width_px, height_px) / 2 / scale)
+    return SimulatedCamera(
+        workshop.clock,
+        workshop.gripper,
+        hidden_in(optics, workshop.hidden),
+        (width_px, height_px),
+        section.number("rate_hz", RATE_HZ, low=1.0, high=1000.0),
+        (section.number("latency_s", LATENCY_S, low=0.0), section.number("jitter_s", JITTER_S, low=0.0)),
+        (
+            section.number("fingers_mm", FINGERS_MM, above=0.0),
+            section.number("tip_radius_mm", TIP_RADIUS_MM, low=0.0),
+            section.number("off_centre_mm", 0.0),
+            workshop.below_tip_mm,
+        ),
+        workshop.seed,
+    )

@@ -1,0 +1,105 @@
+"""A real actuator whose readings drive a simulated gripper: hardware in the loop."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fingervision.testbed.actuator import Actuator, Alarm, StageLimits
+from fingervision.testbed.reading import Reading
+from fingervision.testbed.simulation.gripper import Motion
+
+Array = NDArray[np.float64]
+
+
+class Followed:
+    """An actuator that remembers what it read.
+
+    Parameters
+    ----------
+    actuator : Actuator
+        The real one.
+    """
+
+    def __init__(self, actuator: Actuator) -> None:
+        self._actuator = actuator
+        self._time_s: list[float] = []
+        self._position_mm: list[float] = []
+        self._homed_s: list[float] = []
+        self._homing = False
+
+    @property
+    def name(self) -> str:
+        """What it is."""
+        return self._actuator.name
+
+    @property
+    def limits(self) -> StageLimits:
+        """What it can do."""
+        return self._actuator.limits
+
+    @property
+    def busy(self) -> bool:
+        """Whether it moves."""
+        return self._actuator.busy
+
+    @property
+    def alarm(self) -> Alarm | None:
+        """Why it refuses to move."""
+        return self._actuator.alarm
+
+    @property
+    def has_steps(self) -> bool:
+        """Whether `run_step` is possible."""
+        return self._actuator.has_steps
+
+    @property
+    def motion(self) -> Motion:
+        """The stage as far as it was read."""
+        return Motion(self._at_mm, self._known_until_s, lambda: len(self._time_s), lambda: list(self._homed_s))
+
+    def home(self) -> None:
+        """Go to the reference."""
+        self._actuator.home()
+        self._homing = True
+
+    def move(self, to_mm: float, speed_mm_s: float) -> None:
+        """Begin to move."""
+        self._actuator.move(to_mm, speed_mm_s)
+
+    def jog(self, speed_mm_s: float) -> None:
+        """Begin to move until stopped."""
+        self._actuator.jog(speed_mm_s)
+
+    def run_step(self, number: int) -> None:
+        """Begin a step data block."""
+        self._actuator.run_step(number)
+
+    def stop(self) -> None:
+        """Stop at once."""
+        self._actuator.stop()
+
+    def close(self) -> None:
+        """Stop and let go."""
+        self._actuator.close()
+
+    def readings(self) -> tuple[Reading, ...]:
+        """Positions since the last call; kept."""
+        readings = self._actuator.readings()
+        newest = readings[-1]
+        for reading in readings:
+            # Streamed values lie before the newest by what the board's own clock says.
+            at_s = 0.5 * (newest.asked_s + newest.got_s) - (newest.device_s - reading.device_s)
+            if not self._time_s or at_s > self._time_s[-1]:
+                self._time_s.append(at_s)
+                self._position_mm.append(reading.value)
+        if self._homing and not self._actuator.busy:
+            self._homing = False
+            self._homed_s.append(self._time_s[-1])
+        return readings
+
+    def _at_mm(self, time_s: Array) -> Array:
+        if not self._time_s:
+            return np.zeros_like(time_s)
+        return np.interp(time_s, self._time_s, self._position_mm)
+
+    def _known_until_s(self) -> float:
+        return self._time_s[-1] if self._time_s else 0.0

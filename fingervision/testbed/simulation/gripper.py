@@ -1,0 +1,120 @@
+"""A gripper on a stage: where its measuring points truly are, with everything that is hidden in drive and mechanism."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fingervision.domain.effect import DriveEffect, History, PointEffect
+from fingervision.domain.model import Model
+from fingervision.domain.response import Response
+from fingervision.effects import catalogue
+from fingervision.testbed.hidden import Hidden
+from fingervision.testbed.simulation.optics import IN_THE_PICTURE
+
+Array = NDArray[np.float64]
+
+# The stage's motion is followed at this rate: ten times a webcam's, so that what sticks and rings does so in between.
+RATE_HZ = 250.0
+# So much further than asked is computed at once while the stage stands.
+AHEAD_S = 2.0
+# What a new reference of the zero takes away.
+UNTIL_HOMED = ("input_offset",)
+
+
+@dataclass(frozen=True, slots=True)
+class Motion:
+    """Where the drive's stage is, was, and as far as planned will be.
+
+    Parameters
+    ----------
+    at_mm : callable
+        Positions at times, shape (n,).
+    known_until_s : callable
+        Until when they are known; after it the stage stands unless it is told otherwise.
+    version : callable
+        Changes whenever a plan changes.
+    homed_s : callable
+        When its zero was referenced anew: runs begin there, at rest.
+    """
+
+    at_mm: Callable[[Array], Array]
+    known_until_s: Callable[[], float]
+    version: Callable[[], int]
+    homed_s: Callable[[], list[float]]
+
+
+class SimulatedGripper:
+    """The mechanism, driven by a stage.
+
+    Effects act by their own definitions over the whole history of the stage since the bed began, in the catalogue's
+    order; camera effects that have a form in the picture are left to the camera.
+
+    Parameters
+    ----------
+    model : Model
+        The gripper as it is drawn.
+    motion : Motion
+        The stage.
+    hidden : Hidden
+        What else acts.
+    play_mm : float
+        The drive's own play.
+    """
+
+    def __init__(self, model: Model, motion: Motion, hidden: Hidden, play_mm: float = 0.0) -> None:
+        self._model, self._motion = model, motion
+        drive = dict(hidden.of_stage("drive"))
+        if play_mm > 0.0:
+            drive["backlash"] = {"play_mm": play_mm + drive.get("backlash", {}).get("play_mm", 0.0)}
+        camera = {name: values for name, values in hidden.of_stage("camera").items() if name not in IN_THE_PICTURE}
+        self._drive = drive
+        self._points: dict[str, Mapping[str, float]] = {**hidden.of_stage("mechanism"), **camera}
+        self._rest_gap_mm = float(model.respond(np.zeros(1)).gap_mm[0])
+        self._known: tuple[object, Array, Response] | None = None
+
+    def at(self, time_s: float) -> Response:
+        """Where the points are at one time of the bed, and the force; arrays of one element.
+
+        Times before the bed's beginning give its state at rest.
+        """
+        version = (self._motion.version(), len(self._motion.homed_s()))
+        if self._known is None or self._known[0] != version or time_s > self._known[1][-1]:
+            until_s = max(time_s + AHEAD_S, 0.0)
+            known_s = self._motion.known_until_s()
+            if np.isfinite(known_s):
+                until_s = max(until_s, known_s) if known_s > time_s else until_s
+            grid_s = np.arange(np.ceil(until_s * RATE_HZ) + 2.0) / RATE_HZ
+            self._known = (version, grid_s, self._respond(grid_s))
+        _, grid_s, known = self._known
+        at = np.array([time_s])
+        force = None if known.force_n is None else np.interp(at, grid_s, known.force_n)
+        return Response(np.interp(at, grid_s, known.left_mm), np.interp(at, grid_s, known.right_mm), force)
+
+    def _respond(self, grid_s: Array) -> Response:
+        u = self._motion.at_mm(grid_s)
+        borders = [0, *(int(np.searchsorted(grid_s, at_s)) for at_s in self._motion.homed_s()), grid_s.size]
+        runs = tuple(slice(a, b) for a, b in pairwise(borders) if b > a)
+        opening_mm = self._model.respond(u).gap_mm - self._rest_gap_mm
+        history = History(
+            input_mm=u,
+            time_s=grid_s,
+            runs=runs,
+            rest_gap_mm=self._rest_gap_mm,
+            opening_mm=float(np.max(np.abs(opening_mm))),
+            closing_mm=float(max(0.0, -np.min(opening_mm))),
+            force=True,
+        )
+        for name, effect in catalogue().items():
+            if name in self._drive and isinstance(effect, DriveEffect):
+                moved = effect.act(u, history, self._drive[name])
+                if name in UNTIL_HOMED and len(runs) > 1:
+                    moved[runs[1].start :] = u[runs[1].start :]
+                u = moved
+        response = self._model.respond(u)
+        for name, effect in catalogue().items():
+            if name in self._points and isinstance(effect, PointEffect):
+                response = effect.act(response, history, self._points[name])
+        return response

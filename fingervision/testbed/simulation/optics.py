@@ -1,0 +1,79 @@
+"""Camera effects in the picture itself: what the lens, the tilt and the light do to a scene, and when it is seen."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from math import asin, degrees
+
+from fingervision.rendering import Camera, RadialLens, Tilt
+from fingervision.testbed.hidden import Hidden
+
+# The keystone alone, as the catalogue has it: so near a plane that the tilt which gives it does not shorten it.
+TILT_SINE = 0.01
+
+
+@dataclass(frozen=True, slots=True)
+class Optics:
+    """How a frame is seen.
+
+    Parameters
+    ----------
+    camera : Camera
+        Tilt, lens, blooming, blur, noise.
+    px_per_mm : float
+        Scale in the middle of the picture.
+    half_diagonal_mm : float
+        Of the frame.
+    late_s : float
+        Frames show what was so long before their stamp.
+    """
+
+    camera: Camera
+    px_per_mm: float
+    half_diagonal_mm: float
+    late_s: float = 0.0
+
+
+Act = Callable[[Optics, Mapping[str, float]], Optics]
+
+
+def _lens(optics: Optics, values: Mapping[str, float]) -> Optics:
+    """Map x (1 + k x^2) in mm to the renderer's q = r / half the diagonal."""
+    lens = RadialLens(k1=values["k_per_mm2"] * optics.half_diagonal_mm**2)
+    return replace(optics, camera=replace(optics.camera, lens=lens))
+
+
+def _tilt(optics: Optics, values: Mapping[str, float]) -> Optics:
+    """Map x / (1 + k x) in mm to a plane tilted about the vertical axis: k = sin(tilt) / distance."""
+    k_per_mm = values["k_per_mm"]
+    if k_per_mm == 0.0:
+        return optics
+    sine = TILT_SINE if k_per_mm > 0.0 else -TILT_SINE
+    tilt = Tilt(about_y_deg=degrees(asin(sine)), distance_px=sine / k_per_mm * optics.px_per_mm)
+    return replace(optics, camera=replace(optics.camera, tilt=tilt))
+
+
+def _bloom(optics: Optics, values: Mapping[str, float]) -> Optics:
+    """Let light spread over both edges, half of the offset each."""
+    bloom_px = optics.camera.bloom_px + 0.5 * values["offset_mm"] * optics.px_per_mm
+    return replace(optics, camera=replace(optics.camera, bloom_px=bloom_px))
+
+
+def _late(optics: Optics, values: Mapping[str, float]) -> Optics:
+    return replace(optics, late_s=optics.late_s + values["delay_s"])
+
+
+IN_THE_PICTURE: Mapping[str, Act] = {
+    "lens_distortion": _lens,
+    "camera_tilt": _tilt,
+    "edge_bias": _bloom,
+    "camera_latency": _late,
+}
+"""All other camera effects move the scene before the camera, which is the same thing: drifts and scales."""
+
+
+def hidden_in(optics: Optics, hidden: Hidden) -> Optics:
+    """Add what is hidden in the camera."""
+    for name, values in hidden.of_stage("camera").items():
+        if name in IN_THE_PICTURE:
+            optics = IN_THE_PICTURE[name](optics, values)
+    return optics

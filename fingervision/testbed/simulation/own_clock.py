@@ -1,0 +1,39 @@
+"""An instrument's own clock: it began at some other time than the bed's, and runs a little fast or slow."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+# Quartz on microcontroller boards and in webcams: tens of parts in a million (data sheets of HC-49 crystals, 30 ppm).
+LARGEST_RATE_ERROR = 3e-5
+BEGAN_WITHIN_S = 1000.0
+
+
+@dataclass(frozen=True, slots=True)
+class OwnClock:
+    """A clock that nobody has joined to the bed's yet.
+
+    Parameters
+    ----------
+    began_s : float
+        Time of the bed at which it showed 0.
+    rate : float
+        Its seconds in one second of the bed's.
+    """
+
+    began_s: float
+    rate: float
+
+    @staticmethod
+    def drawn(rng: np.random.Generator) -> "OwnClock":
+        """Draw one as it comes from the shelf."""
+        began_s = rng.uniform(-BEGAN_WITHIN_S, 0.0)
+        return OwnClock(float(began_s), float(1.0 + rng.uniform(-LARGEST_RATE_ERROR, LARGEST_RATE_ERROR)))
+
+    def shows_s(self, bed_s: float) -> float:
+        """What it shows at a time of the bed."""
+        return (bed_s - self.began_s) * self.rate
+
+    def bed_s(self, shown_s: float) -> float:
+        """Time of the bed at which it shows this."""
+        return self.began_s + shown_s / self.rate
