@@ -17,6 +17,7 @@ LINE_COLOUR, LIMIT_COLOUR, PUSHING_COLOUR = "#11507a", "#c0392b", "#e8c170"
 POINTS_PER_MOTION = 200
 # Between motions the stage stands; so that each can be seen, a share of the whole.
 STANDING_SHARE = 0.02
+TITLE_PAD_POINTS = 30.0
 HEADER = (
     "step", "from mm", "to mm", "way mm", "operation", "load kg", "entry", "time s", "peak mm/s", "speeding mm/s2",
     "slowing mm/s2", "force N",
@@ -58,10 +59,10 @@ def draw_steps(path: Path, name: str, motions: Sequence[PlannedMotion], limits: 
     begin_s = 0.0
     for planned in motions:
         begin_s = _draw_motion(upper, lower, planned, begin_s, standing_s)
-    upper.set_title(name)
+    upper.set_title(name, pad=TITLE_PAD_POINTS)
     upper.set_ylabel("position (mm)")
     lower.set_ylabel("speed (mm/s)")
-    lower.set_xlabel("time (s), with short stands between the motions")
+    lower.set_xlabel("time (s), with a short stand after each motion; shaded: pushing, dashed: what the stage can do")
     for level_mm in (limits.lower_mm, limits.upper_mm):
         upper.axhline(level_mm, color=LIMIT_COLOUR, linewidth=0.8, linestyle="--")
     fastest_mm_s = max((each.motion.speed_mm_s for each in motions), default=0.0)
@@ -93,7 +94,7 @@ def _draw_motion(upper: Axes, lower: Axes, planned: PlannedMotion, begin_s: floa
         f"{planned.number}\n{planned.step.pushing_force_n:g} N" if planned.step.pushing_force_n else str(planned.number)
     )
     upper.annotate(
-        words, (0.5 * (begin_s + end_s), 1.0), (0, -3), xycoords=("data", "axes fraction"),
-        textcoords="offset points", ha="center", va="top", fontsize="small",
+        words, (0.5 * (begin_s + end_s), 1.0), (0, 3), xycoords=("data", "axes fraction"),
+        textcoords="offset points", ha="center", va="bottom", fontsize="small",
     )  # fmt: skip
     return end_s + standing_s
