@@ -169,7 +169,7 @@ def prepare(table: MeasuredTable, model: CorrectedModel, without: frozenset[str]
         # The staircase of an encoder is no white noise: a line averages it out less well than its leverage says.
         left, samples = np.maximum(left, STAIRCASE), max(samples, HELD_SAMPLES)
     error = slope * sigma * np.sqrt(left)
-    able, excluded = admissible(history, without)
+    able, excluded = admissible(history, without, model.base)
     distrusted, reasons = distrusted_rows(table, model.base, float(zero))
     notes += reasons
     return BenchData(table, model, chain, stacked, error, max(samples, 1.0), able, excluded, distrusted, tuple(notes))

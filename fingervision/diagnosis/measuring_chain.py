@@ -1,12 +1,13 @@
 """The measuring chain: recorded input, drive effects, the gripper, mechanism effects, camera effects."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from fingervision.domain.effect import Array, DriveEffect, Effect, History, PointEffect, Values
 from fingervision.domain.model import Model, PhysicalModel
+from fingervision.domain.parameter import Parameter
 from fingervision.domain.response import Response
 from fingervision.effects import catalogue
 
@@ -37,17 +38,15 @@ class MeasuringChain:
     def respond(self, settings: Settings) -> Response:
         """Run the chain; an effect named in `settings` replaces a fixed one of the same name."""
         acting = {**self.fixed, **settings}
-        order = [effect for name, effect in catalogue().items() if name in acting]
-        input_mm, model = self.history.input_mm, self.model
+        order = [obeyed(effect, self.model) for name, effect in catalogue().items() if name in acting]
+        input_mm = self.history.input_mm
         points: list[PointEffect] = []
         for effect in order:
             if isinstance(effect, DriveEffect):
                 input_mm = effect.act(input_mm, self.history, acting[effect.name])
-            elif isinstance(model, PhysicalModel) and effect.name in model.physics:
-                model = model.with_physics(effect.name, acting[effect.name])
             elif isinstance(effect, PointEffect):
                 points.append(effect)
-        response = model.respond(input_mm)
+        response = self.model.respond(input_mm)
         camera = False
         for effect in points:
             if effect.stage == "camera" and not camera:
@@ -66,11 +65,25 @@ class MeasuringChain:
         return np.concatenate(parts)
 
 
-def admissible(history: History, without: frozenset[str]) -> tuple[dict[str, Effect], dict[str, str]]:
+def obeyed(effect: Effect, model: Model) -> Effect:
+    """Return the effect as this model obeys it: a drawn gripper by its own physics, a table by the catalogue's form."""
+    law = model.laws.get(effect.name) if isinstance(model, PhysicalModel) else None
+    if law is None or not isinstance(effect, PointEffect):
+        return effect
+
+    def narrow(history: History) -> tuple[Parameter, ...] | str:
+        searched = effect.parameters if effect.narrow is None else effect.narrow(history)
+        return searched if isinstance(searched, str) else (*searched, *law.adds)
+
+    return replace(effect, act=law.act, narrow=narrow)
+
+
+def admissible(history: History, without: frozenset[str], model: Model) -> tuple[dict[str, Effect], dict[str, str]]:
     """Effects that these data can show, and the reasons for leaving out the others."""
     able: dict[str, Effect] = {}
     excluded: dict[str, str] = {}
-    for name, effect in catalogue().items():
+    for name, entry in catalogue().items():
+        effect = obeyed(entry, model)
         searched = effect.search(history)
         if name in without:
             excluded[name] = "left out by request"

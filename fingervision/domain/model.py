@@ -1,11 +1,14 @@
 """The seam between a gripper's model and whatever asks it."""
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
 
+from fingervision.domain.effect import PointAct
+from fingervision.domain.parameter import Parameter
 from fingervision.domain.response import Response
 
 
@@ -24,15 +27,37 @@ class Model(Protocol):
         ...
 
 
+@dataclass(frozen=True, slots=True)
+class PhysicalLaw:
+    """How a drawn gripper itself obeys an effect of the catalogue, instead of the form used with a table.
+
+    Parameters
+    ----------
+    act : callable
+        `act(response, history, values)` gives the points and the force after the effect, as `PointEffect.act` does.
+    adds : tuple of Parameter
+        What the drawing knows beside the catalogue's parameters (which half was changed); shapes, that change nothing
+        while the effect is at zero.
+    """
+
+    act: PointAct
+    adds: tuple[Parameter, ...] = ()
+
+
 @runtime_checkable
 class PhysicalModel(Model, Protocol):
     """A parametric gripper, where a mechanism effect is the physics itself and not the form used with a table."""
 
     @property
-    def physics(self) -> tuple[str, ...]:
-        """Names of the catalogue's mechanism effects that the model can switch on in itself."""
+    def laws(self) -> Mapping[str, PhysicalLaw]:
+        """Laws by the effect's name in the catalogue."""
         ...
 
-    def with_physics(self, name: str, values: Mapping[str, float]) -> Model:
-        """Return the same gripper with this effect switched on; parameters are named as in the catalogue."""
+    @property
+    def uncertain(self) -> Mapping[str, float]:
+        """Standard uncertainty of the drawing's numbers, by dotted name, where stated: they may be refitted."""
+        ...
+
+    def redrawn(self, changes: Mapping[str, float]) -> "PhysicalModel":
+        """Return the gripper with some of its numbers changed by so much, each in its own unit."""
         ...

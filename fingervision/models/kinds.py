@@ -53,7 +53,8 @@ def kinds() -> tuple[str, ...]:
         sorted(
             module.name
             for module in pkgutil.iter_modules([str(here)])
-            if f'\nKIND = "{module.name}"\n' in (here / f"{module.name}.py").read_text(encoding="utf-8")
+            if not module.ispkg
+            and f'\nKIND = "{module.name}"\n' in (here / f"{module.name}.py").read_text(encoding="utf-8")
         )
     )
 

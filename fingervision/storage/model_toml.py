@@ -5,20 +5,13 @@ import tomllib
 from collections.abc import Mapping
 from pathlib import Path
 
-import numpy as np
-
 from fingervision.domain.errors import FingervisionError
 from fingervision.domain.parameter import Estimate
 from fingervision.models.corrected import CorrectedModel
-from fingervision.models.hinge_correction import HingeTheory
-from fingervision.models.kinds import build_model, kinds
-from fingervision.models.physics import LINEAR
-from fingervision.models.table import TableModel
+from fingervision.models.kinds import kinds
+from fingervision.models.physical_gripper import PhysicalGripper
 from fingervision.storage.gripper_toml import read_gripper
 from fingervision.storage.simulation_table import read_simulation_table
-
-ROWS = 401
-"""Rows that a gripper is tabulated with; the linear models are straight lines, the others smooth."""
 
 
 def read_model(path: Path, kind: str = "lumped") -> CorrectedModel:
@@ -57,15 +50,11 @@ def read_model(path: Path, kind: str = "lumped") -> CorrectedModel:
 
 
 def _gripper(path: Path, kind: str) -> CorrectedModel:
-    """Tabulate a gripper's static answer once: the diagnosis asks for it thousands of times."""
+    """Build a gripper whose effects are its own physics."""
     if kind not in kinds():
         raise FingervisionError(f"--kind must be one of {', '.join(kinds())}, but is {kind}: choose one.")
-    gripper = build_model(kind, read_gripper(path), LINEAR, HingeTheory.CORRECTED)
-    low, high = gripper.input_range_mm
-    inputs = np.linspace(low, high, ROWS)
-    answer = gripper.respond(inputs)
-    table = TableModel(f"{path.name} ({kind})", inputs, answer.left_mm, answer.right_mm, answer.force_n)
-    return CorrectedModel(table.name, table, str(path), (low, high), {}, kind)
+    gripper = PhysicalGripper(read_gripper(path), kind)
+    return CorrectedModel(f"{path.name} ({kind})", gripper, str(path), gripper.input_range_mm, {}, kind)
 
 
 def write_model(

@@ -1,0 +1,40 @@
+"""Unequal halves: a link of one half has another length, so that this finger opens by more or less than drawn."""
+
+from dataclasses import replace
+
+from fingervision.domain.effect import History, Values
+from fingervision.domain.model import PhysicalLaw
+from fingervision.domain.parameter import Parameter
+from fingervision.domain.response import Response
+from fingervision.models.drawn_answer import DrawnAnswer
+
+EFFECT = "assembly_asymmetry"
+_HALF = Parameter("changed_half", "", -1.0, 1.0, "half whose link differs: 1 right, -1 left, 0 both oppositely",
+                  neutral=None, starts=2)  # fmt: skip
+
+_LEAST = 0.1
+"""A finger that hardly opens at all: the other's share of the opening goes no further."""
+
+
+def law(drawn: DrawnAnswer) -> PhysicalLaw | None:
+    """Change the links of the halves so that the right one has the stated share of the opening.
+
+    With shares 1/2 + share and 1/2 - share of an opening G times the drawn one, the right half alone is changed where
+    the left keeps its own: G (1 - 2 share) = 1; the left alone where G (1 + 2 share) = 1. Between them, G follows
+    1 / (1 - 2 changed_half share); at 0 the gap does not change, as with a table.
+    """
+    curves = drawn.lever
+    if curves is None:
+        return None
+
+    def act(response: Response, history: History, values: Values) -> Response:
+        share = values["share"]
+        gain = 1.0 / max(1.0 - 2.0 * values.get(_HALF.name, 0.0) * share, _LEAST)
+        opening_mm = response.gap_mm - history.rest_gap_mm
+        moved = response.with_gap(history.rest_gap_mm + gain * opening_mm).shifted(share * gain * opening_mm)
+        if moved.force_n is None:
+            return moved
+        right, left = (curves.force_at_gap(gain * (1.0 + sign * 2.0 * share)) for sign in (1.0, -1.0))
+        return replace(moved, force_n=0.5 * (right + left) * moved.force_n)
+
+    return PhysicalLaw(act, (_HALF,))

@@ -1,0 +1,51 @@
+"""Fingers that meet: Signorini's condition on the tips of the drawn body, and the force that it takes to close on."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from fingervision.domain.effect import History, Values
+from fingervision.domain.model import PhysicalLaw
+from fingervision.domain.response import Response
+from fingervision.models.drawn_answer import DrawnAnswer
+from fingervision.models.static_answer import gap_per_input
+
+EFFECT = "finger_contact"
+_DEPTHS = 60
+
+
+def law(drawn: DrawnAnswer) -> PhysicalLaw | None:
+    """Hold the fingers back as the drawn body does, and press the drive with what that takes.
+
+    The measuring point lies beside the point that touches, so that a share of the closing goes on there
+    (`remaining_slope`) even between rigid faces; soft faces let more of it go on and take less force, in proportion.
+    """
+    body, (lowest_mm, highest_mm) = drawn.body, drawn.input_range_mm
+    touch_mm = body.first_touch_mm()
+    if touch_mm is None or not lowest_mm < touch_mm < highest_mm:
+        return None
+    slope, floor_mm = gap_per_input(body), 2.0 * body.measured_rest_mm + gap_per_input(body) * touch_mm
+    inputs = np.linspace(touch_mm, lowest_mm, _DEPTHS)[1:]
+    states = [body.equilibrium(float(value), contact=True) for value in inputs]
+    free_mm = 2.0 * body.measured_rest_mm + slope * inputs
+    missing = np.concatenate([[0.0], floor_mm - free_mm])
+    held = np.concatenate([[0.0], [2.0 * body.measured_mm(s.displacement_mm) for s in states] - free_mm])
+    free_n = body.equilibrium(1.0).force_n * inputs
+    extra_n = np.concatenate([[0.0], [s.force_n for s in states] - free_n])
+    rigid_slope = 1.0 - held[1] / missing[1]
+    beyond = (
+        (held[-1] - held[-2]) / (missing[-1] - missing[-2]),
+        (extra_n[-1] - extra_n[-2]) / (missing[-1] - missing[-2]),
+    )
+
+    def act(response: Response, history: History, values: Values) -> Response:
+        del history
+        deep = np.maximum(values["floor_mm"] - response.gap_mm, 0.0)
+        share = (1.0 - values["remaining_slope"]) / (1.0 - rigid_slope)
+        past = np.maximum(deep - missing[-1], 0.0)
+        moved = response.with_gap(response.gap_mm + share * (np.interp(deep, missing, held) + beyond[0] * past))
+        if moved.force_n is None:
+            return moved
+        return replace(moved, force_n=moved.force_n + share * (np.interp(deep, missing, extra_n) + beyond[1] * past))
+
+    return PhysicalLaw(act)

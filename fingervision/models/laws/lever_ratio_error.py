@@ -1,0 +1,26 @@
+"""A link of another length: with l2 the amplification changes, and the force by nearly twice as much."""
+
+from dataclasses import replace
+
+from fingervision.domain.effect import History, Values
+from fingervision.domain.model import PhysicalLaw
+from fingervision.domain.response import Response
+from fingervision.models.drawn_answer import DrawnAnswer
+
+EFFECT = "lever_ratio_error"
+
+
+def law(drawn: DrawnAnswer) -> PhysicalLaw | None:
+    """Change the link by as much as gives the ratio of the openings that the catalogue's parameter states."""
+    curves = drawn.lever
+    if curves is None:
+        return None
+
+    def act(response: Response, history: History, values: Values) -> Response:
+        ratio = 1.0 + values["ratio"]
+        moved = response.with_gap(history.rest_gap_mm + ratio * (response.gap_mm - history.rest_gap_mm))
+        if moved.force_n is None:
+            return moved
+        return replace(moved, force_n=curves.force_at_gap(ratio) * moved.force_n)
+
+    return PhysicalLaw(act)

@@ -1,0 +1,103 @@
+"""A drawn gripper for the diagnosis: its small answer, and the laws by which it obeys effects of the catalogue.
+
+What is expensive (large rotation, contact, changed links) is worked out once and interpolated, so that a search may ask
+thousands of times.
+"""
+
+from collections.abc import Mapping
+from copy import copy
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fingervision.domain.gripper import Gripper
+from fingervision.domain.model import PhysicalLaw
+from fingervision.domain.response import Response
+from fingervision.models.drawn_answer import DrawnAnswer
+from fingervision.models.driven_body import DrivenBody
+from fingervision.models.half_frame import half_frame
+from fingervision.models.hinge_correction import HingeTheory
+from fingervision.models.kinds import build_model
+from fingervision.models.laws import laws_of
+from fingervision.models.physics import LINEAR
+from fingervision.models.redrawn import redrawn
+from fingervision.models.skeleton import skeleton_of
+from fingervision.models.small_answer import SmallAnswer, ratio_curves, small_answer
+
+Array = NDArray[np.float64]
+
+_SHORTER, _LONGER = -0.26, 0.5
+"""Of the lever's length: the amplification then changes by 30 % either way."""
+
+
+class PhysicalGripper:
+    """One kind of model of a drawing, with small displacements where no effect says otherwise.
+
+    Parameters
+    ----------
+    gripper : Gripper
+        The drawing.
+    kind : str
+        Kind of model. Changed links and hinges change its answer in the ratio in which they change the frame's
+        (`lumped`); large rotation and contact are the kind's own, and the frame's for `stiffness_matrix`.
+    theory : HingeTheory
+        Of the hinges.
+    """
+
+    def __init__(self, gripper: Gripper, kind: str, theory: HingeTheory = HingeTheory.CORRECTED) -> None:
+        self.gripper, self.theory = gripper, theory
+        self._model = build_model(kind, gripper, LINEAR, theory)
+        self.input_range_mm = self._model.input_range_mm
+        answer = self._model.respond(np.array([0.0, 1.0]))
+        gap, force = answer.gap_mm, answer.force_n
+        self._drawn = SmallAnswer(float(gap[0]), float(gap[1] - gap[0]), 0.0 if force is None else float(force[1]))
+        self.answer = self._drawn
+
+    def respond(self, input_mm: Array) -> Response:
+        """Answer by small displacements, both halves alike."""
+        answer = self.answer
+        right = 0.5 * (answer.rest_gap_mm + answer.gap_per_input * np.asarray(input_mm, dtype=float))
+        return Response(-right, right, answer.force_per_input_n_mm * np.asarray(input_mm, dtype=float))
+
+    @cached_property
+    def laws(self) -> Mapping[str, PhysicalLaw]:
+        """Laws by the effect's name in the catalogue."""
+        body = getattr(self._model, "half", None)
+        if not isinstance(body, DrivenBody):  # a model of small displacements alone: the frame of the same members
+            body = half_frame(self.gripper, skeleton_of(self.gripper, self.theory, 0))
+        length_mm = self.gripper.lever.l2_mm
+        lever = ratio_curves(
+            self.gripper,
+            self.theory,
+            lambda by: redrawn(self.gripper, "lever.l2_mm", by),
+            *sorted((_SHORTER * length_mm, _LONGER * length_mm)),
+        )
+        return laws_of(DrawnAnswer(self.gripper, self.theory, body, self.input_range_mm, lever))
+
+    @property
+    def uncertain(self) -> Mapping[str, float]:
+        """Standard uncertainty of the drawing's numbers, by dotted name, where stated."""
+        return {name: u for name, u in self.gripper.uncertainties.items() if u > 0.0}
+
+    def redrawn(self, changes: Mapping[str, float]) -> "PhysicalGripper":
+        """Return the gripper with some of its numbers changed; its laws stay those of the drawing."""
+        changed = copy(self)
+        changed.laws = self.laws
+        if not changes:
+            changed.answer = self._drawn
+            return changed
+        gripper = self.gripper
+        for name, by in changes.items():
+            gripper = redrawn(gripper, name, by)
+        new, old, drawn = small_answer(gripper, self.theory), self._frame, self._drawn
+        changed.answer = SmallAnswer(
+            drawn.rest_gap_mm + new.rest_gap_mm - old.rest_gap_mm,
+            drawn.gap_per_input * new.gap_per_input / old.gap_per_input,
+            drawn.force_per_input_n_mm * new.force_per_input_n_mm / old.force_per_input_n_mm,
+        )
+        return changed
+
+    @cached_property
+    def _frame(self) -> SmallAnswer:
+        return small_answer(self.gripper, self.theory)

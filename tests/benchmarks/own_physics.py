@@ -1,0 +1,200 @@
+"""Effects hidden in the mechanics: another gripper is built and run, and the diagnosis has the drawing of this one.
+
+Run as `python -m tests.benchmarks.own_physics [KIND] [--no-force]`: one line for each thing hidden, what it was named,
+and the disagreement before and after.
+"""
+
+import sys
+import tempfile
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fingervision.diagnosis.diagnose import diagnose
+from fingervision.domain.gripper import Gripper
+from fingervision.domain.report import DiagnosisReport
+from fingervision.models.compliance_chain import ComplianceChain
+from fingervision.models.hinge_correction import HingeTheory
+from fingervision.models.lumped import LumpedGripper
+from fingervision.models.physics import LINEAR, Physics
+from fingervision.models.skeleton import skeleton_of
+from fingervision.storage.gripper_toml import read_gripper
+from fingervision.storage.measured_table import read_measured_table
+from fingervision.storage.model_toml import read_model
+
+Array = NDArray[np.float64]
+Answer = tuple[Array, Array, Array]
+
+DRAWING = Path(__file__).parents[2] / "sample_frames" / "paper" / "gripper.toml"
+EDGE_MM = 0.001
+FORCE_N = 0.01
+RUN_MM = 0.0005
+MIDLINE_MM = 0.3
+RATE_HZ = 20.0
+SEED = 5
+CAMERA_ABOVE_MM = 100.0
+"""Distance of the camera's centre of projection from the plate."""
+OFF_PLANE_MM = 1.0
+"""How far out of the plate's middle plane the drive pushes."""
+
+
+def longer_lever(gripper: Gripper, by: float) -> Gripper:
+    """Draw hinge 1 and its pillar farther out, by a share of the lever's length."""
+    lever, links = gripper.lever, gripper.links
+    by_mm = by * lever.l2_mm
+    x0, x1, y0, y1 = links.pillar_and_root_mm
+    return replace(
+        gripper,
+        lever=replace(lever, l2_mm=lever.l2_mm + by_mm, hinge1_mm=(lever.hinge1_mm[0] + by_mm, lever.hinge1_mm[1])),
+        links=replace(links, pillar_and_root_mm=(x0 + by_mm, x1 + by_mm, y0, y1)),
+    )
+
+
+def halves(right: Gripper, left: Gripper, physics: Physics = LINEAR) -> Callable[[Array], Answer]:
+    """Run two halves in parallel; each is half of a gripper of two such halves."""
+
+    def run(input_mm: Array) -> Answer:
+        a, b = (LumpedGripper(half, physics).respond(input_mm) for half in (right, left))
+        assert a.force_n is not None
+        assert b.force_n is not None
+        return b.left_mm, a.right_mm, 0.5 * (a.force_n + b.force_n)
+
+    return run
+
+
+def lifted(gripper: Gripper) -> Callable[[Array], Answer]:
+    """Push off the middle plane: the drive's moment lifts the tips towards a camera above, in three dimensions."""
+    model = LumpedGripper(gripper)
+    chain = ComplianceChain(skeleton_of(gripper, HingeTheory.CORRECTED, 0))
+    tree = chain.skeleton
+    # The actuator guides the drive across the plane and in it; the moment about x of its force turns it.
+    stiffness = np.linalg.inv(chain.flexibility(tree.drive, tree.drive))
+    lift_mm_per_n_mm = float((chain.flexibility(tree.measured, tree.drive) @ stiffness[:, 3])[2] / stiffness[3, 3])
+
+    def run(input_mm: Array) -> Answer:
+        answer = model.respond(input_mm)
+        assert answer.force_n is not None
+        z_mm = lift_mm_per_n_mm * OFF_PLANE_MM * 0.5 * answer.force_n
+        scale = CAMERA_ABOVE_MM / (CAMERA_ABOVE_MM - z_mm)
+        return answer.left_mm * scale, answer.right_mm * scale, answer.force_n
+
+    return run
+
+
+@dataclass(frozen=True, slots=True)
+class Hidden:
+    """Something that the drawing does not know.
+
+    Parameters
+    ----------
+    effect : str
+        Its name in the catalogue; empty where nothing is hidden.
+    words : str
+        What was changed.
+    build : callable
+        Drawing to the gripper that is measured: input to left, right and force.
+    lowest_mm, highest_mm : float
+        Inputs of the runs.
+    """
+
+    effect: str
+    words: str
+    build: Callable[[Gripper], Callable[[Array], Answer]]
+    lowest_mm: float = -0.45
+    highest_mm: float = 1.5
+
+
+def _thinner(gripper: Gripper) -> Callable[[Array], Answer]:
+    thin = replace(gripper, hinge=replace(gripper.hinge, thickness_mm=gripper.hinge.thickness_mm - 0.1))
+    return halves(thin, thin)
+
+
+def _softer(gripper: Gripper) -> Callable[[Array], Answer]:
+    soft = replace(
+        gripper, material=replace(gripper.material, youngs_modulus_mpa=0.9 * gripper.material.youngs_modulus_mpa)
+    )
+    return halves(soft, soft)
+
+
+CASES = {
+    "nothing": Hidden("", "nothing", lambda g: halves(g, g)),
+    "link": Hidden("lever_ratio_error", "lever 1 % longer", lambda g: halves(*(longer_lever(g, 0.01),) * 2)),
+    "short link": Hidden("lever_ratio_error", "lever 1 % shorter", lambda g: halves(*(longer_lever(g, -0.01),) * 2)),
+    "contact": Hidden(
+        "finger_contact", "fingers that touch", lambda g: halves(g, g, Physics(contact=True)), lowest_mm=-0.6
+    ),
+    "large rotation": Hidden(
+        "large_deflection", "large rotation", lambda g: halves(g, g, Physics(large_rotation=True)), highest_mm=1.8
+    ),
+    "right half": Hidden(
+        "assembly_asymmetry", "right half's lever 1 % longer", lambda g: halves(longer_lever(g, 0.01), g)
+    ),
+    "left half": Hidden(
+        "assembly_asymmetry", "left half's lever 1 % longer", lambda g: halves(g, longer_lever(g, 0.01))
+    ),
+    "hinges": Hidden("hinge_stiffness_error", "hinges 0.1 mm thinner", _thinner),
+    "modulus": Hidden("hinge_stiffness_error", "modulus 10 % lower", _softer),
+    "out of plane": Hidden("out_of_plane_motion", "drive off the middle plane", lifted),
+}
+
+
+def triangle(low: float, high: float, seconds: float) -> Array:
+    """Up and down at one speed."""
+    up = np.linspace(low, high, round(seconds * RATE_HZ))
+    return np.concatenate([up, up[-2::-1]])
+
+
+def table(hidden: Hidden, folder: Path, *, force: bool, seed: int = SEED) -> Path:
+    """Measure four runs at two speeds, with holds and closing, and write them."""
+    rng = np.random.default_rng(seed)
+    low, high = hidden.lowest_mm, hidden.highest_mm
+    middle = 0.5 * (low + high)
+    held = np.concatenate([np.linspace(low, high, 40), np.full(60, high), np.linspace(high, middle, 30),
+                           np.full(40, middle)])  # fmt: skip
+    runs = [triangle(low, high, 8.0), triangle(low, high, 2.5), held, triangle(high, low, 5.0)]
+    measured = hidden.build(read_gripper(DRAWING))
+    lines, clock = [], 0.0
+    for index, u in enumerate(runs):
+        time = clock + np.arange(u.size) / RATE_HZ
+        clock = float(time[-1]) + 5.0
+        left, right, pull = measured(u)
+        shift = RUN_MM * rng.standard_normal(2)
+        left = left + MIDLINE_MM + shift[0] + EDGE_MM * rng.standard_normal(u.size)
+        right = right + MIDLINE_MM + shift[1] + EDGE_MM * rng.standard_normal(u.size)
+        columns = [time, u, right - left, left, right]
+        if force:
+            columns.append(pull + FORCE_N * rng.standard_normal(u.size))
+        lines += [f"run{index}," + ",".join(f"{x:.6f}" for x in row) for row in zip(*columns, strict=True)]
+    path = folder / "measured.csv"
+    header = "run,time_s,input_mm,gap_mm,left_mm,right_mm" + (",force_n" if force else "")
+    path.write_text("\n".join([header, *lines]) + "\n", encoding="utf-8")
+    return path
+
+
+def answered(hidden: Hidden, folder: Path, *, force: bool, kind: str = "lumped") -> DiagnosisReport:
+    """Measure and diagnose beside the drawing."""
+    measured = read_measured_table(table(hidden, folder, force=force))
+    return diagnose(measured, read_model(DRAWING, kind), seed=SEED).report
+
+
+def main(kind: str, *, force: bool) -> None:
+    """Print the table."""
+    for name, hidden in CASES.items():
+        with tempfile.TemporaryDirectory() as folder:
+            report = answered(hidden, Path(folder), force=force, kind=kind)
+        d = report.disagreement
+        found = " | ".join("+".join(names) for names in report.alternatives) or "-"
+        print(f"{name:15} {report.verdict:10} {found:50} {1e3 * d.before_rms_mm:8.1f} -> {1e3 * d.after_rms_mm:.2f} um"
+              f"   {report.seconds:.1f} s")  # fmt: skip
+        for effect in report.effects:
+            print("    ", effect.name, {k: (round(e.value, 5), e.u) for k, e in effect.parameters.items()})
+        if report.unknown:
+            print("    ", report.unknown)
+
+
+if __name__ == "__main__":
+    words = [word for word in sys.argv[1:] if not word.startswith("-")]
+    main(words[0] if words else "lumped", force="--no-force" not in sys.argv)

@@ -1,0 +1,172 @@
+"""Laws of a drawn gripper against the changed gripper itself, built and run."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from fingervision.diagnosis.measuring_chain import MeasuringChain, obeyed
+from fingervision.domain.effect import History
+from fingervision.domain.errors import FingervisionError
+from fingervision.domain.gripper import Gripper
+from fingervision.domain.response import Response
+from fingervision.effects import catalogue
+from fingervision.models.kinds import kinds
+from fingervision.models.lumped import LumpedGripper
+from fingervision.models.physical_gripper import PhysicalGripper
+from fingervision.models.physics import Physics
+from fingervision.models.redrawn import redrawn
+from tests.benchmarks.own_physics import longer_lever
+
+LAWS = {"lever_ratio_error", "large_deflection", "assembly_asymmetry", "finger_contact", "hinge_stiffness_error"}
+INTERPOLATED_MM, INTERPOLATED = 5e-4, 1e-4
+"""Interpolation in the laws, a tenth of an edge's noise and less; and the same relative to the force."""
+BENT_MM, BENT = 1e-3, 5e-4
+"""The arc's reach and height come from a least-squares fit to the equilibria, whose own spline has eleven nodes."""
+ROUNDING_MM = 1e-9
+INPUT = np.linspace(-0.6, 1.8, 97)
+
+
+@pytest.fixture(scope="module")
+def drawn(gripper: Gripper) -> PhysicalGripper:
+    return PhysicalGripper(gripper, "lumped")
+
+
+def history(model: PhysicalGripper, input_mm: np.ndarray = INPUT) -> History:
+    gap = model.respond(input_mm).gap_mm
+    return History(
+        input_mm,
+        None,
+        (slice(0, input_mm.size),),
+        4.0,
+        float(np.ptp(gap)),
+        closing_mm=4.0 - float(gap.min()),
+        force=True,
+    )
+
+
+def obeying(
+    model: PhysicalGripper, settings: Mapping[str, Mapping[str, float]], input_mm: np.ndarray = INPUT
+) -> Response:
+    return MeasuringChain(model, history(model, input_mm), {}).respond(settings)
+
+
+def agree(a: Response, b: Response, within_mm: float, within: float) -> None:
+    np.testing.assert_allclose(a.left_mm, b.left_mm, atol=within_mm)
+    np.testing.assert_allclose(a.right_mm, b.right_mm, atol=within_mm)
+    assert a.force_n is not None
+    assert b.force_n is not None
+    np.testing.assert_allclose(a.force_n, b.force_n, atol=within * float(np.abs(b.force_n).max()))
+
+
+def test_every_kind_obeys_the_same_laws_and_all_are_effects_of_the_catalogue(gripper: Gripper) -> None:
+    assert set(catalogue()) >= LAWS
+    for kind in kinds():
+        if kind != "finite_element":  # half a minute of equilibria; its own answers are tested beside its model
+            assert set(PhysicalGripper(gripper, kind).laws) == LAWS
+
+
+@pytest.mark.parametrize("name", sorted(LAWS))
+def test_zero_parameters_change_nothing(drawn: PhysicalGripper, name: str) -> None:
+    searched = obeyed(catalogue()[name], drawn).search(history(drawn))
+    assert not isinstance(searched, str)
+    zero = {p.name: float(p.starting_values()[0]) if p.neutral is None else p.neutral for p in searched}
+    if name == "large_deflection":
+        zero = dict.fromkeys(zero, 0.0)
+    if name == "finger_contact":
+        zero["floor_mm"] = -1.0
+    agree(obeying(drawn, {name: zero}), drawn.respond(INPUT), ROUNDING_MM, ROUNDING_MM)
+
+
+@pytest.mark.parametrize("by", [-0.1, -0.01, 0.01, 0.1])
+def test_a_longer_lever_is_its_ratio_in_gap_and_force(drawn: PhysicalGripper, gripper: Gripper, by: float) -> None:
+    changed = LumpedGripper(longer_lever(gripper, by)).respond(INPUT)
+    ratio = float((changed.gap_mm[-1] - 4.0) / (drawn.respond(INPUT).gap_mm[-1] - 4.0)) - 1.0
+    agree(obeying(drawn, {"lever_ratio_error": {"ratio": ratio}}), changed, INTERPOLATED_MM, INTERPOLATED)
+
+
+@pytest.mark.parametrize("right", [True, False])
+def test_one_half_with_another_link_is_its_share(drawn: PhysicalGripper, gripper: Gripper, right: bool) -> None:
+    bare, changed = drawn.respond(INPUT), LumpedGripper(longer_lever(gripper, 0.02)).respond(INPUT)
+    assert bare.force_n is not None
+    assert changed.force_n is not None
+    halves = (changed, bare) if right else (bare, changed)
+    unequal = Response(halves[1].left_mm, halves[0].right_mm, 0.5 * (bare.force_n + changed.force_n))
+    share = float((unequal.right_mm[-1] - 2.0) / (unequal.gap_mm[-1] - 4.0)) - 0.5
+    settings = {"assembly_asymmetry": {"share": share, "changed_half": 1.0 if right else -1.0}}
+    agree(obeying(drawn, settings), unequal, INTERPOLATED_MM, INTERPOLATED)
+
+
+def test_asymmetry_without_a_changed_half_leaves_the_gap(drawn: PhysicalGripper) -> None:
+    seen = obeying(drawn, {"assembly_asymmetry": {"share": 0.01}})
+    np.testing.assert_allclose(seen.gap_mm, drawn.respond(INPUT).gap_mm, atol=ROUNDING_MM)
+
+
+def test_thinner_hinges_are_their_ratio_in_gap_and_force(drawn: PhysicalGripper, gripper: Gripper) -> None:
+    thin = LumpedGripper(redrawn(gripper, "hinge.thickness_mm", -0.1)).respond(INPUT)
+    bare = drawn.respond(INPUT)
+    assert thin.force_n is not None
+    assert bare.force_n is not None
+    ratio = float(thin.force_n[-1] / bare.force_n[-1]) - 1.0
+    assert ratio == pytest.approx(-0.22, abs=0.01)  # mechanics of the paper's sample, section 5: -22 % of force
+    settings = {"hinge_stiffness_error": {"ratio": ratio, "thickness_share": 1.0}}
+    agree(obeying(drawn, settings), thin, INTERPOLATED_MM, INTERPOLATED)
+
+
+def test_a_softer_material_leaves_the_gap(drawn: PhysicalGripper, gripper: Gripper) -> None:
+    soft = LumpedGripper(redrawn(gripper, "material.youngs_modulus_mpa", -165.0)).respond(INPUT)
+    settings = {"hinge_stiffness_error": {"ratio": -0.1, "thickness_share": 0.0}}
+    agree(obeying(drawn, settings), soft, INTERPOLATED_MM, INTERPOLATED)
+
+
+def test_contact_is_the_bodys_own_with_its_force(drawn: PhysicalGripper, gripper: Gripper) -> None:
+    met = LumpedGripper(gripper, Physics(contact=True))
+    touch_mm = met.half.first_touch_mm()
+    assert touch_mm is not None
+    at = np.array([touch_mm - 0.02, touch_mm - 0.05, touch_mm])
+    gap = met.respond(at).gap_mm
+    slope = float(gap[0] - gap[1]) / (0.03 * drawn.answer.gap_per_input)
+    contact = {"finger_contact": {"floor_mm": float(gap[2]), "remaining_slope": slope}}
+    agree(obeying(drawn, contact), met.respond(INPUT), INTERPOLATED_MM, INTERPOLATED)
+
+
+def test_large_rotation_is_the_bodys_own_with_its_force(drawn: PhysicalGripper, gripper: Gripper) -> None:
+    bent = LumpedGripper(gripper, Physics(large_rotation=True)).respond(INPUT)
+    arc = {"reach_mm": 126.4, "cross": 0.1245}  # least squares on this gripper's equilibria
+    agree(obeying(drawn, {"large_deflection": arc}), bent, BENT_MM, BENT)
+
+
+def test_a_body_twice_as_large_bends_alike_at_twice_the_size(drawn: PhysicalGripper) -> None:
+    far = np.linspace(0.0, 1.2, 25)
+    small = obeying(drawn, {"large_deflection": {"reach_mm": 126.4, "cross": 0.1245}}, far)
+    large = obeying(drawn, {"large_deflection": {"reach_mm": 252.8, "cross": 0.1245}}, 2.0 * far)
+    np.testing.assert_allclose(large.gap_mm - 4.0, 2.0 * (small.gap_mm - 4.0), atol=ROUNDING_MM)
+    assert large.force_n is not None
+    assert small.force_n is not None
+    np.testing.assert_allclose(large.force_n, 2.0 * small.force_n, atol=ROUNDING_MM)
+
+
+@pytest.mark.parametrize("name", ["lever.l1_mm", "lever.l2_mm", "lever.l3_mm", "lever.l4_mm", "body.rest_gap_mm"])
+def test_a_redrawn_gripper_still_meets_and_comes_back(gripper: Gripper, name: str) -> None:
+    changed = redrawn(gripper, name, 0.25)
+    lever = changed.lever
+    assert np.subtract(lever.hinge1_mm, lever.hinge2_mm) == pytest.approx((lever.l2_mm, lever.l1_mm))
+    assert np.subtract(lever.hinge2_mm, lever.drive_mm) == pytest.approx((lever.l4_mm, lever.l3_mm))
+    assert changed.links.shuttle_from_mm == pytest.approx(lever.drive_mm)
+    assert lever.drive_mm[0] == 0.0
+    assert 2.0 * changed.tip_corner_mm[0] == pytest.approx(changed.body.rest_gap_mm)
+    back = LumpedGripper(redrawn(changed, name, -0.25)).respond(INPUT)
+    np.testing.assert_allclose(back.gap_mm, LumpedGripper(gripper).respond(INPUT).gap_mm, atol=ROUNDING_MM)
+
+
+def test_refitted_numbers_answer_as_the_drawing_with_them(drawn: PhysicalGripper, gripper: Gripper) -> None:
+    changes = {"hinge.thickness_mm": -0.05, "body.rest_gap_mm": 0.02}
+    told = drawn.redrawn(changes).respond(INPUT)
+    built = replace(redrawn(gripper, "hinge.thickness_mm", -0.05))
+    agree(told, LumpedGripper(redrawn(built, "body.rest_gap_mm", 0.02)).respond(INPUT), ROUNDING_MM, ROUNDING_MM)
+
+
+def test_a_name_that_is_no_number_of_the_drawing_is_said(gripper: Gripper) -> None:
+    with pytest.raises(FingervisionError, match=r"named as in gripper\.toml, but is hinge\.width_mm"):
+        redrawn(gripper, "hinge.width_mm", 0.1)
