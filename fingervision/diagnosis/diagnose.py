@@ -1,7 +1,7 @@
 """The whole loop: where they disagree, which effect is missing, how much it explains, what remains."""
 
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -9,6 +9,7 @@ from fingervision.diagnosis.bench_data import BenchData, prepare
 from fingervision.diagnosis.explanation import Explanation, Problem
 from fingervision.diagnosis.next_run import next_run
 from fingervision.diagnosis.noise import Noise
+from fingervision.diagnosis.posterior import settled
 from fingervision.diagnosis.search import Findings, Progress, search
 from fingervision.diagnosis.unseen_runs import rms_mm, unseen_rms_mm
 from fingervision.diagnosis.where import where
@@ -100,7 +101,9 @@ def diagnose(
         return bench.problem(bench.stacked_mm - bench.chain.stacked(values), free, explained=explanation is not None)
 
     found = search(problem, rng, forced, progress)
-    best, history = found.best, bench.chain.history
+    best, posterior = settled(found.problem, found.best, rng)
+    found = replace(found, best=best, alternatives=tuple(best if e is found.best else e for e in found.alternatives))
+    history = bench.chain.history
     n = history.input_mm.size
     before = bench.stacked_mm - bench.chain.stacked({})
     after = bench.stacked_mm - bench.chain.stacked(best.values)
@@ -117,7 +120,7 @@ def diagnose(
     }
     disagreement = Disagreement(rms_mm(before, n, edges), rms_mm(after, n, edges), noise_rms, *unseen, channels)
     effects = _named(found)
-    proposal = next_run(bench, found.problem, best, [e for e in found.alternatives if e is not best])
+    proposal = next_run(bench, found.problem, [e for e in found.alternatives if e.names], posterior, rng)
     report = DiagnosisReport(
         verdict=found.verdict,
         sentence=_sentence(found, effects, disagreement),

@@ -83,6 +83,12 @@ class Problem:
         """Predict and whiten; shape (m,)."""
         return self.whitener.one(self.chain.stacked(settings))
 
+    def score(self, settings: Mapping[str, Mapping[str, float]]) -> float:
+        """Judge parameters as they are: chi-square with the best run offsets, plus those offsets' penalty."""
+        residual = self.measured - self.whitened(settings)
+        sigma, penalty = self.offsets.spread(residual)
+        return _length(residual, residual, self.offsets, self.offsets.metric(sigma)) + penalty
+
     def nothing(self) -> Explanation:
         """Judge the model as it is."""
         residual = self.measured - self.whitened({})

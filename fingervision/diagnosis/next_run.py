@@ -1,98 +1,52 @@
 """The next run: the protocol that separates what is open, by expected distance per minute (Atkinson & Fedorov 1975)."""
 
-from dataclasses import replace
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from fingervision.diagnosis.bench_data import BenchData
-from fingervision.diagnosis.explanation import Explanation, Problem, fit
+from fingervision.diagnosis.explanation import Explanation, Point, Problem, fit
+from fingervision.diagnosis.posterior import draws
+from fingervision.diagnosis.protocols import Step, driven, protocols
 from fingervision.diagnosis.whitening import RunOffsets, Whitener
-from fingervision.domain.effect import Array, History
+from fingervision.domain.effect import Array, History, PointEffect
 from fingervision.domain.report import NextRun
+from fingervision.domain.response import Response
 
-Step = dict[str, object]
 SETTLE_MIN = 0.5
 """Minutes that any run costs beside its motion: starting, saving."""
-MOST_SAMPLES = 1500
+STILL_MIN = 1.5
+"""Minutes that re-zeroing, or putting a slot before the camera, takes."""
+MOST_SAMPLES = 6000
 WORTH = 9.0
 """Gain in chi-square above which two explanations count as separated."""
 ENOUGH = 50.0
 """Separating a pair more surely than this is worth no further minute."""
+MOST_RIVALS = 6
+TRUTHS = 16
+"""Draws of either explanation's parameters behind a promise."""
+PROMISED = 0.95
+CAMERA = frozenset({"scale_error", "edge_bias", "lens_distortion"})
+"""What a slot of known width in the picture shows."""
+SLOT_FRAMES, SLOT_U_MM = 10, 0.002
+"""Frames averaged on a reference slot, and the standard uncertainty of its width: an ordinary gauge block's."""
 
 
-def _motion(step: Step, start: float, step_s: float) -> Array:
-    """Where the stage is at each sample of a step, shape (k,)."""
+@dataclass(frozen=True, slots=True, eq=False)
+class _Proposal:
+    """A run with what it is worth: the chi-square by which it parts the leading explanation from each rival."""
 
-    def number(key: str) -> float:
-        return float(str(step[key]))
+    name: str
+    steps: list[Step]
+    inputs_mm: Array
+    gains: tuple[float, ...]
+    minutes: float
 
-    def ramp(a: float, b: float, speed: float) -> Array:
-        return np.linspace(a, b, max(2, round(abs(b - a) / speed / step_s) + 1))[1:]
-
-    kind = step["kind"]
-    if kind == "triangle":
-        low, high, speed = number("from_mm"), number("to_mm"), number("speed_mm_s")
-        cycle = [ramp(low, high, speed), ramp(high, low, speed)] * int(number("cycles"))
-        return np.concatenate([ramp(start, low, speed), *cycle]) if abs(start - low) > 1e-9 else np.concatenate(cycle)
-    if kind == "staircase":
-        levels = np.linspace(number("from_mm"), number("to_mm"), int(number("steps")) + 1)
-        parts, at = [], start
-        for level in [*levels, *levels[-2::-1]]:
-            if abs(level - at) > 1e-9:
-                parts.append(ramp(at, float(level), number("speed_mm_s")))
-            parts.append(np.full(max(1, round(number("dwell_s") / step_s)), level))
-            at = float(level)
-        return np.concatenate(parts)
-    if kind == "move":
-        return ramp(start, number("to_mm"), number("speed_mm_s"))
-    return np.full(max(1, round(number("seconds") / step_s)), start)
-
-
-def protocols(low_mm: float, high_mm: float) -> list[tuple[str, list[Step]]]:
-    """List what the test bed can run within the inputs that the model covers."""
-    span = high_mm - low_mm
-    low, high = round(low_mm + 0.03 * span, 4), round(high_mm - 0.03 * span, 4)
-    middle = round(0.5 * (low + high), 4)
-
-    def triangle(a: float, b: float, seconds: float, cycles: int = 1) -> Step:
-        speed = round(abs(b - a) / seconds, 5)
-        return {
-            "kind": "triangle",
-            "from_mm": a,
-            "to_mm": b,
-            "speed_mm_s": speed,
-            "cycles": cycles,
-            "frames": "continuous",
-        }
-
-    def stairs(steps: int, dwell_s: float) -> Step:
-        return {
-            "kind": "staircase",
-            "from_mm": low,
-            "to_mm": high,
-            "steps": steps,
-            "dwell_s": dwell_s,
-            "speed_mm_s": round(span / 4.0, 5),
-            "frames": "continuous",
-        }
-
-    return [
-        ("repeat slowly", [triangle(low, high, 20.0)]),
-        ("repeat fast", [triangle(low, high, 2.0, 3)]),
-        ("two speeds", [triangle(low, high, 3.0, 2), triangle(low, high, 20.0)]),
-        ("reversals", [triangle(low, middle, 5.0, 2), triangle(middle, high, 5.0, 2)]),
-        ("decreasing loops", [triangle(low + k * span / 10.0, high - k * span / 10.0, 6.0) for k in range(4)]),
-        ("staircase with holds", [stairs(8, 3.0)]),
-        (
-            "long hold",
-            [
-                {"kind": "move", "to_mm": high, "speed_mm_s": round(span / 2.0, 5)},
-                {"kind": "hold", "at_mm": high, "seconds": 60.0},
-            ],
-        ),
-        ("close fully", [triangle(low, round(low + 0.3 * span, 4), 8.0, 2)]),
-        ("small loops", [triangle(round(middle - 0.05 * span, 4), round(middle + 0.05 * span, 4), 2.0, 5)]),
-    ]
+    @property
+    def worth(self) -> float:
+        """Expected separation a minute."""
+        return sum(min(gain, ENOUGH) for gain in self.gains if gain > WORTH) / self.minutes
 
 
 def _joined(bench: BenchData, problem: Problem, inputs: Array) -> Problem:
@@ -127,81 +81,162 @@ def _joined(bench: BenchData, problem: Problem, inputs: Array) -> Problem:
     return replace(problem, chain=chain, whitener=whitener, measured=empty, offsets=RunOffsets.of(whitener))
 
 
-def _reference(best: Explanation, others: list[Explanation], sigma_mm: float) -> tuple[str, list[Step], float] | None:
-    """Propose what needs no motion: a re-zeroed stage has no input offset, a slot of known width no gripper."""
-    names = [set(best.names), *(set(other.names) for other in others)]
-    offset = next((e for e in (best, *others) if "input_offset" in e.names), None)
-    if offset is not None and any("input_offset" not in group for group in names):
-        shift = abs(offset.values["input_offset"]["offset_mm"])
-        return "re-zero the stage and repeat", [{"kind": "rezero"}], shift
-    camera = {"scale_error", "edge_bias", "lens_distortion", "camera_tilt"}
-    if any(group & camera for group in names) and not all(group & camera for group in names):
-        return "measure a reference slot", [{"kind": "reference_slot", "size_mm": 4.0, "u_size_mm": 0.002}], sigma_mm
+def _still(
+    name: str, steps: list[Step], size: float, spread: float, pair: tuple[Explanation, Explanation]
+) -> NextRun | None:
+    """Proposal whose worth is one number, known to `spread`: the rival has no parameter that could follow it."""
+    gain = (size / spread) ** 2
+    if gain <= WORTH:
+        return None
+    half = 1.96 * 2.0 * float(np.sqrt(gain))
+    names = ("+".join(pair[0].names), "+".join(pair[1].names))
+    words = f"{name}: it separates {' from '.join(names)} by an expected chi-square of {gain:.0f}."
+    return NextRun(name, tuple(steps), gain, (max(0.0, gain - half), gain + half), names, words)
+
+
+def _rezeroed(bench: BenchData, problem: Problem, pair: tuple[Explanation, Explanation]) -> NextRun | None:
+    """Re-zero the stage: an offset of the input is gone after it, an offset of the gap stays."""
+    offset = next(e for e in pair if "input_offset" in e.names)
+    history, offsets = bench.chain.history, problem.offsets
+    low, high = float(bench.table.input_mm.min()), float(bench.table.input_mm.max())
+    steps: list[Step] = [{"kind": "rezero"}]
+    steps += protocols(low, high, 0.1 if history.time_s is None else history.sample_time_s)[0][1]
+    moved = bench.chain.stacked({"input_offset": offset.values["input_offset"]}) - bench.chain.stacked({})
+    size = float(np.mean(moved[: history.input_mm.size]))
+    known = np.diag(offsets.gram)[: offsets.runs]
+    spread = float(
+        np.sqrt(1.0 / np.sum(known) + 1.0 / np.mean(known) + offset.sigma_mm[0] ** 2 * (1.0 + 1.0 / offsets.runs))
+    )
+    return _still("re-zero the stage and repeat", steps, size, spread, pair)
+
+
+def _slot(bench: BenchData, problem: Problem, pair: tuple[Explanation, Explanation]) -> NextRun | None:
+    """Measure a slot of known width: what the camera adds to a gap it adds to the slot, the gripper adds nothing."""
+    slot = np.full(1, round(bench.chain.history.rest_gap_mm, 1))
+    response = Response(-0.5 * slot, 0.5 * slot)
+    for name in CAMERA:
+        acting = next((e.values[name] for e in pair if name in e.names), None)
+        effect = problem.effects.get(name)
+        if acting is not None and isinstance(effect, PointEffect):
+            response = effect.act(response, bench.chain.history, acting)
+    size = float(response.gap_mm[0] - slot[0])
+    spread = float(np.hypot(problem.whitener.noises[0].total_mm / np.sqrt(SLOT_FRAMES), SLOT_U_MM))
+    steps: list[Step] = [{"kind": "reference_slot", "size_mm": float(slot[0]), "u_size_mm": SLOT_U_MM}]
+    return _still("measure a reference slot", steps, size, spread, pair)
+
+
+def _reference(bench: BenchData, problem: Problem, best: Explanation, rivals: list[Explanation]) -> NextRun | None:
+    """Propose what needs no other motion, for the first rival that it separates."""
+    for rival in rivals:
+        pair = (best, rival)
+        if sum("input_offset" in e.names for e in pair) == 1:
+            return _rezeroed(bench, problem, pair)
+        if sum(bool(CAMERA & set(e.names)) for e in pair) == 1:
+            return _slot(bench, problem, pair)
     return None
 
 
-def _between(problem: Problem, best: Explanation, other: Explanation) -> float:
-    """Distance of the best explanation's prediction to another, over the other's parameters."""
-    target = problem.whitened(best.values)
-    return fit(problem, other.names, other.values, target=target, sigma_mm=best.sigma_mm, iterations=6).score
+def _apart(problem: Problem, values: Mapping[str, Mapping[str, float]], rival: Explanation) -> float:
+    """Distance of a prediction to a rival, over the rival's parameters."""
+    target = problem.whitened(values)
+    return fit(problem, rival.names, rival.values, target=target, sigma_mm=rival.sigma_mm, iterations=8).score
 
 
-def next_run(bench: BenchData, problem: Problem, best: Explanation, others: list[Explanation]) -> NextRun | None:
-    """Choose the run that separates the worst open pair best, per minute of the rig's time.
+def _gain(old: Problem, joined: Problem, values: Mapping[str, Mapping[str, float]], rival: Explanation) -> float:
+    """What a run adds to the distance: the rival is refitted to old and new data together."""
+    return max(0.0, _apart(joined, values, rival) - _apart(old, values, rival))
+
+
+def _promise(
+    old: Problem,
+    joined: Problem,
+    pair: tuple[Explanation, Explanation],
+    found: tuple[Point, ...],
+    rng: np.random.Generator,
+) -> tuple[float, tuple[float, float]]:
+    """Gain to expect whichever of the two is true, and the interval that holds what will come.
+
+    The truth's parameters are drawn from what the data leave open; the new run's own noise adds 2 sqrt(gain) to the
+    difference of two chi-squares.
+    """
+    gains = []
+    count = TRUTHS if joined.chain.history.input_mm.size <= MOST_SAMPLES else TRUTHS // 4
+    for truth, rival, drawn in ((*pair, found), (*pair[::-1], None)):
+        points = draws(old, truth, rng) if drawn is None else drawn
+        picked = points[len(points) // (2 * count) :: max(1, len(points) // count)]
+        gains += [_gain(old, joined, values, rival) for values in picked]
+    expected = np.array(gains)
+    come = expected[:, None] + 2.0 * np.sqrt(expected)[:, None] * rng.standard_normal((expected.size, 400))
+    low, high = np.quantile(come, (0.5 - 0.5 * PROMISED, 0.5 + 0.5 * PROMISED))
+    return float(np.median(expected)), (float(low), float(high))
+
+
+def _proposals(
+    bench: BenchData, problem: Problem, best: Explanation, rivals: list[Explanation], ends: tuple[float, float]
+) -> list[_Proposal]:
+    step_s = bench.chain.history.sample_time_s
+    known = [_apart(problem, best.values, rival) for rival in rivals]
+    found = []
+    for name, steps in protocols(*ends, step_s):
+        inputs = driven(steps, step_s)
+        if inputs.size > MOST_SAMPLES:
+            continue
+        joined = _joined(bench, problem, inputs)
+        gains = [_apart(joined, best.values, rival) - before for rival, before in zip(rivals, known, strict=True)]
+        found.append(_Proposal(name, steps, inputs, tuple(gains), SETTLE_MIN + inputs.size * step_s / 60.0))
+    return found
+
+
+def next_run(
+    bench: BenchData,
+    problem: Problem,
+    members: list[Explanation],
+    found: tuple[Point, ...],
+    rng: np.random.Generator,
+) -> NextRun | None:
+    """Choose the run that separates what is open best, per minute of the rig's time.
+
+    Runs within the range that was measured come first: beyond it an explanation's form is not proven, and neither is
+    a promise that rests on it. The promise is for the pair of the leading explanation and the rival that the run
+    separates least.
 
     Parameters
     ----------
-    best, others : Explanation
-        What this data cannot tell apart.
+    members : list of Explanation
+        What this data cannot tell apart, the leading one first.
+    found : tuple of dict
+        Draws of the leading one's parameters.
+    rng : numpy Generator
+        For the promise's interval.
 
     Returns
     -------
     NextRun or None
-        None where nothing is open.
+        None where nothing is open, or nothing that can be driven would separate it.
     """
-    if not others:
+    if len(members) < 2:
         return None
-    names = tuple("+".join(e.names) for e in (best, *others))
-    low, high = bench.model.input_range_mm
-    sigma = problem.whitener.noises[0].total_mm
-    slope = abs(float(np.ptp(bench.model.base.respond(np.array([low, high])).gap_mm))) / (high - low)
-    special = _reference(best, others, sigma)
-    found: list[tuple[float, float, str, list[Step], tuple[str, ...]]] = []
-    if special is not None:
-        name, steps, size = special
-        run = protocols(max(low, float(bench.table.input_mm.min())), min(high, float(bench.table.input_mm.max())))[0][1]
-        difference = slope * size if steps[0]["kind"] == "rezero" else 0.01
-        spread = float(np.hypot(sigma / np.sqrt(10.0), max(best.sigma_mm[0], 1e-6)))
-        gain = (difference / spread) ** 2
-        steps = [*steps, *run] if steps[0]["kind"] == "rezero" else steps
-        found.append((min(gain, ENOUGH) / 1.5, gain, name, steps, names))
+    best, rivals = members[0], members[1 : 1 + MOST_RIVALS]
+    u = bench.table.input_mm
+    special = _reference(bench, problem, best, rivals)
+    proposals: list[_Proposal] = []
     if bench.chain.history.time_s is not None:
-        already = [_between(problem, best, other) for other in others[:6]]
-        step_s = bench.chain.history.sample_time_s
-        for name, steps in protocols(low, high):
-            at, parts = float(str(steps[0].get("from_mm", low))), []
-            for step in steps:
-                parts.append(_motion(step, at, step_s))
-                at = float(parts[-1][-1])
-            inputs = np.concatenate(parts)
-            minutes = SETTLE_MIN + inputs.size * step_s / 60.0
-            if inputs.size > 4 * MOST_SAMPLES:
-                continue
-            joined = _joined(bench, problem, inputs)
-            gains = [_between(joined, best, other) - known for other, known in zip(others[:6], already, strict=False)]
-            apart = [(o, gain) for o, gain in zip(others, gains, strict=False) if gain > WORTH]
-            if apart:
-                separated = tuple("+".join(other.names) for other, _ in apart)
-                worth = sum(min(gain, ENOUGH) for _, gain in apart) / minutes
-                least = min(gain for _, gain in apart)
-                found.append((worth, least, name, steps, ("+".join(best.names), *separated)))
-    if not found:
-        return None
-    _, gain, name, steps, separates = max(found, key=lambda item: item[0])
-    if gain < 4.0:
-        return None
-    half = 1.96 * (2.0 * float(np.sqrt(gain)) + 0.1 * gain)
-    left = [n for n in names if n not in separates]
-    words = f"{name}: it separates {' from '.join(separates)} by an expected chi-square of {gain:.0f}"
+        proposals = _proposals(bench, problem, best, rivals, (float(u.min()), float(u.max())))
+        if not any(gain > ENOUGH for proposal in proposals for gain in proposal.gains):
+            proposals += _proposals(bench, problem, best, rivals, bench.model.input_range_mm)
+    chosen = max(proposals, key=lambda proposal: proposal.worth, default=None)
+    if special is not None and (chosen is None or min(special.gain, ENOUGH) / STILL_MIN > chosen.worth):
+        return special
+    if chosen is None or chosen.worth == 0.0:
+        return special
+    apart = [(gain, rival) for gain, rival in zip(chosen.gains, rivals, strict=True) if gain > WORTH]
+    rival = min(apart, key=lambda item: item[0])[1]
+    joined = _joined(bench, problem, chosen.inputs_mm)
+    gain, interval = _promise(problem, joined, (best, rival), found, rng)
+    also = ["+".join(other.names) for _, other in apart if other is not rival]
+    left = ["+".join(other.names) for other in members[1:] if all(other is not one for _, one in apart)]
+    pair = ("+".join(best.names), "+".join(rival.names))
+    words = f"{chosen.name}: it separates {' from '.join(pair)} by an expected chi-square of {gain:.0f}"
+    words += f", and further {', '.join(also)}" if also else ""
     words += f"; no protocol tried separates {', '.join(left)}." if left else "."
-    return NextRun(name, tuple(steps), gain, (max(0.0, gain - half), gain + half), separates, words)
+    return NextRun(chosen.name, tuple(chosen.steps), gain, interval, pair, words)

@@ -36,6 +36,7 @@ def input_sigma(input_mm: Array, runs: tuple[slice, ...]) -> tuple[float, float]
 def _lines(time_s: Array, input_mm: Array, sigma: float, windows: Array) -> tuple[Array, Array]:
     count = input_mm.size
     smooth, leverage = input_mm.copy(), np.ones(count)
+    inside = np.zeros(count)
     for i in range(count):
         for width in windows:
             # A window that ends at the sample reaches up to a reversal without rounding it.
@@ -58,7 +59,8 @@ def _lines(time_s: Array, input_mm: Array, sigma: float, windows: Array) -> tupl
                     stt += (time_s[j] - t0) ** 2
                     stu += (time_s[j] - t0) * input_mm[j]
                 weight = 1.0 / m + (time_s[i] - t0) ** 2 / stt
-                if weight >= leverage[i]:
+                depth = min(i - low, high - 1 - i)
+                if weight >= leverage[i] and depth <= inside[i]:
                     continue
                 slope = stu / stt
                 reach = 0.5 * (time_s[high - 1] - time_s[low])
@@ -77,9 +79,13 @@ def _lines(time_s: Array, input_mm: Array, sigma: float, windows: Array) -> tupl
                 dof = m - 2
                 fits = chi / sigma**2 <= dof + 2.5 * np.sqrt(2.0 * dof) and ends <= 3.0 * sigma
                 if fits and abs(bend) <= 2.0 * sigma * np.sqrt(norm):
-                    smooth[i] = u0 + slope * (time_s[i] - t0)
-                    leverage[i] = weight
-    return smooth, leverage
+                    inside[i] = max(inside[i], depth)
+                    if weight < leverage[i]:
+                        smooth[i] = u0 + slope * (time_s[i] - t0)
+                        leverage[i] = weight
+    # A stage comes to its speed in no time only on paper: a corner rounded by less than the noise passes every test
+    # above, so that at a line's end nothing but the samples beyond it vouch for the line.
+    return smooth, np.maximum(leverage, 1.0 / (1.0 + inside))
 
 
 def smoothed(input_mm: Array, time_s: Array, runs: tuple[slice, ...], sigma_mm: float) -> tuple[Array, Array]:

@@ -81,7 +81,8 @@ def draw_design(rng: np.random.Generator, kind: Kind, inputs: InputRange) -> Des
         return Design(kind, (one, two), max(4.0, rng.uniform(210, 400) / total_s), restarts, rng.uniform(2, 30))
     count = int(rng.integers(15, 41))
     path = through([inputs.lower_mm, inputs.upper_mm], _speed(inputs, rng.uniform(10, 60)))
-    return Design(kind, (path,), (count - 1) / path.duration_s, restarts, 0.0)
+    # A single run has the one clock there is.
+    return Design(kind, (path,), (count - 1) / path.duration_s, False, 0.0)
 
 
 def unseen_motion(inputs: InputRange) -> Motion:

@@ -80,9 +80,12 @@ def gain_that_came(table: JudgedTable, answer: Answer) -> Gain | None:
     own = frozenset(h.name for h in table.experiment.plant.hidden)
     if promise is None or own not in apart or len(apart) < 2:
         return None
-    rivals = [names for names in apart if names != own]
-    path = table.folder / "diagnosis" / answer.report["next_run"]["recipe"]
     old = [(trace, k) for k, trace in enumerate(table.experiment.traces())]
+    known = {c.name for c in known_effects(table.experiment, _joined(table, old)[0])}
+    rivals = [names for names in apart if names != own and names <= known]
+    if not rivals:
+        return None
+    path = table.folder / "diagnosis" / answer.report["next_run"]["recipe"]
     new = [(trace, 100 + k) for k, trace in enumerate(drive_recipe(table.experiment, path))]
     before = _advantage(table, answer, own, rivals, old)
     after = _advantage(table, answer, own, rivals, old + new)

@@ -1,0 +1,128 @@
+"""Runs that a test bed can drive to tell explanations apart, as the steps of a recipe and as samples of the input."""
+
+import numpy as np
+
+from fingervision.domain.effect import Array
+
+Step = dict[str, object]
+EDGE = 0.03
+"""Share of the range that is left free at either end: an offset or a scale must not drive the stage beyond it."""
+SAMPLES_A_STROKE = 15
+"""A stroke of fewer samples would be told from another by its corners alone, which no stage drives as drawn."""
+
+
+def _number(step: Step, key: str) -> float:
+    return float(str(step[key]))
+
+
+def _ramp(start: float, end: float, speed_mm_s: float, step_s: float) -> Array:
+    return np.linspace(start, end, max(2, round(abs(end - start) / speed_mm_s / step_s) + 1))[1:]
+
+
+def _driven(step: Step, start: float, step_s: float) -> Array:
+    """Where the stage is at each sample of a step, shape (k,)."""
+    parts: list[Array] = []
+    at = start
+
+    def go(end: float) -> None:
+        nonlocal at
+        if abs(end - at) > 1e-9:
+            parts.append(_ramp(at, end, _number(step, "speed_mm_s"), step_s))
+        at = end
+
+    match step["kind"]:
+        case "triangle":
+            go(_number(step, "from_mm"))
+            for _ in range(int(_number(step, "cycles"))):
+                go(_number(step, "to_mm"))
+                go(_number(step, "from_mm"))
+        case "staircase":
+            levels = np.linspace(_number(step, "from_mm"), _number(step, "to_mm"), int(_number(step, "steps")) + 1)
+            for level in levels:
+                go(float(level))
+                parts.append(np.full(max(1, round(_number(step, "dwell_s") / step_s)), level))
+        case "move":
+            go(_number(step, "to_mm"))
+        case "hold":
+            parts.append(np.full(max(1, round(_number(step, "seconds") / step_s)), start))
+    return np.concatenate(parts)
+
+
+def driven(steps: list[Step], step_s: float) -> Array:
+    """Sample the input that a recipe's moving steps drive, beginning at rest where the first of them begins.
+
+    Parameters
+    ----------
+    steps : list of dict
+        Triangles, staircases, moves and holds.
+    step_s : float
+        Time between samples.
+
+    Returns
+    -------
+    ndarray of float, shape (n,), in mm
+    """
+    at = _number(steps[0], "from_mm") if "from_mm" in steps[0] else 0.0
+    parts = [np.array([at])]
+    for step in steps:
+        parts.append(_driven(step, at, step_s))
+        at = float(parts[-1][-1])
+    return np.concatenate(parts)
+
+
+def protocols(low_mm: float, high_mm: float, step_s: float) -> list[tuple[str, list[Step]]]:
+    """List runs within a range of the input, each with its name.
+
+    Parameters
+    ----------
+    low_mm, high_mm : float
+        Range of the input.
+    step_s : float
+        Time between samples: no stroke is faster than they can follow.
+    """
+    span = high_mm - low_mm
+    low, high = round(low_mm + EDGE * span, 4), round(high_mm - EDGE * span, 4)
+    middle = round(0.5 * (low + high), 4)
+
+    def speed(way_mm: float, seconds: float) -> float:
+        return float(f"{abs(way_mm) / max(seconds, SAMPLES_A_STROKE * step_s):.3g}")
+
+    def triangle(a: float, b: float, seconds: float, cycles: int = 1) -> Step:
+        return {
+            "kind": "triangle",
+            "from_mm": round(a, 4),
+            "to_mm": round(b, 4),
+            "speed_mm_s": speed(b - a, seconds),
+            "cycles": cycles,
+            "frames": "continuous",
+        }
+
+    def stairs(a: float, b: float, dwell_s: float) -> Step:
+        return {
+            "kind": "staircase",
+            "from_mm": a,
+            "to_mm": b,
+            "steps": 6,
+            "dwell_s": dwell_s,
+            "speed_mm_s": speed(b - a, 12.0),
+            "frames": "continuous",
+        }
+
+    def move(to: float) -> Step:
+        return {"kind": "move", "to_mm": to, "speed_mm_s": speed(span, 5.0)}
+
+    return [
+        ("there and back", [triangle(low, high, 8.0)]),
+        ("repeat slowly", [triangle(low, high, 30.0)]),
+        ("repeat fast", [triangle(low, high, 4.0)]),
+        ("repeat fast, three times", [triangle(low, high, 4.0, 3)]),
+        ("two speeds", [triangle(low, high, 4.0), triangle(low, high, 20.0)]),
+        ("reversals", [triangle(low, middle, 5.0, 2), triangle(middle, high, 5.0, 2)]),
+        ("decreasing loops", [triangle(low + k * span / 10.0, high - k * span / 10.0, 6.0) for k in range(4)]),
+        ("staircase with holds", [stairs(low, high, 3.0), stairs(high, low, 3.0)]),
+        ("short hold", [triangle(low, high, 4.0), move(high), {"kind": "hold", "at_mm": high, "seconds": 15.0}]),
+        ("long hold", [triangle(low, high, 4.0), move(high), {"kind": "hold", "at_mm": high, "seconds": 60.0}]),
+        ("close fully", [triangle(low + 0.3 * span, low, 6.0)]),
+        ("open fully", [triangle(high - 0.3 * span, high, 6.0)]),
+        ("small loops", [triangle(middle - 0.05 * span, middle + 0.05 * span, 4.0, 3)]),
+    ]
