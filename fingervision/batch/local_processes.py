@@ -4,14 +4,16 @@ import multiprocessing
 import os
 import signal
 from collections import deque
-from collections.abc import Generator, Sequence
-from contextlib import suppress
+from collections.abc import Generator, Iterator, Sequence
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from multiprocessing.connection import Connection, wait
 from multiprocessing.process import BaseProcess
+from typing import Self
 
-from fingervision.batch.task import Outcome, Perform, Task, failure
+from fingervision.batch.task import Ended, Outcome, Perform, Task, failure
 from fingervision.batch.work import work
+from fingervision.domain.errors import FingervisionError
 
 ATTEMPTS = 2
 """Times that a task is tried whose process dies under it: once may have been the system's choice of victim."""
@@ -23,6 +25,7 @@ class _Worker:
     link: Connection
     core: int
     number: int | None = None
+    is_asked: bool = False
 
 
 def cores() -> tuple[int, ...]:
@@ -32,10 +35,8 @@ def cores() -> tuple[int, ...]:
     return tuple(range(os.cpu_count() or 1))
 
 
-def outcomes_of(
-    tasks: Sequence[Task], perform: Perform, workers: int | None = None
-) -> Generator[tuple[int, Outcome], None, None]:
-    """Work on tasks in processes of their own, and give each outcome as it comes, with its task's number.
+class LocalCrew:
+    """Processes of this machine that start at once, and work on one task at a time each.
 
     Each process is bound to one core, so that decoders, OpenCV and linear algebra start one thread and not one a core:
     as many processes as cores then fill the machine and no more. A process that dies (of a fault in a decoder, for
@@ -43,65 +44,130 @@ def outcomes_of(
 
     Parameters
     ----------
-    tasks : sequence of Task
-        What shall be done.
     perform : callable
         Importable by its name.
-    workers : int, optional
-        Processes; one a core if not given.
+    size : int
+        Processes.
     """
-    places = cores()
-    waiting = deque(range(len(tasks)))
-    attempts = [0] * len(tasks)
-    context = multiprocessing.get_context("spawn")
-    crew: dict[object, _Worker] = {}
 
-    def engage(core: int) -> None:
-        link, theirs = context.Pipe()
-        process = context.Process(target=_serve, args=(theirs, perform, core), daemon=True)
-        process.start()
-        theirs.close()
-        crew[link] = _Worker(process, link, core)
-        hand_out(crew[link])
+    def __init__(self, perform: Perform, size: int) -> None:
+        self._perform, self._size = perform, size
+        self._context = multiprocessing.get_context("spawn")
+        self._workers: dict[object, _Worker] = {}
+        self._fill_up()
 
-    def hand_out(worker: _Worker) -> None:
-        worker.number = waiting.popleft() if waiting else None
-        if worker.number is not None:
-            attempts[worker.number] += 1
+    def __enter__(self) -> Self:
+        """Give the crew; all of it has ended when the block is left."""
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """Let all go."""
+        self._let_go()
+        for worker in self._workers.values():
+            worker.process.join()
+
+    def answer(self, command: str, arguments: tuple[str, ...]) -> Ended:
+        """Have a command performed whose result is its answer.
+
+        Every process is asked, so that all of them import meanwhile what the tasks will need; the first answer counts.
+
+        Raises
+        ------
+        FingervisionError
+            All of them died of it.
+        """
+        for worker in self._workers.values():
+            worker.is_asked = True
             with suppress(OSError):  # it died: that is seen when it is listened to
-                worker.link.send(tasks[worker.number])
-
-    try:
-        for k in range(min(workers or len(places), len(tasks))):
-            engage(places[k % len(places)])
-        while any(worker.number is not None for worker in crew.values()):
-            for link in wait([worker.link for worker in crew.values()]):
-                worker = crew[link]
-                number = worker.number
+                worker.link.send((command, arguments))
+        while self._workers:
+            for link in wait([worker.link for worker in self._workers.values()]):
+                worker = self._workers[link]
                 try:
-                    outcome: Outcome | None = worker.link.recv()
+                    ended: Ended = worker.link.recv()
                 except (EOFError, OSError):
-                    outcome = None
-                if outcome is not None:
-                    hand_out(worker)
-                else:
-                    worker.process.join()
-                    worker.link.close()
-                    del crew[link]
-                    if number is not None and attempts[number] < ATTEMPTS:
-                        waiting.append(number)
-                    elif number is not None:
-                        outcome = failure(tasks[number], _died(tasks[number], worker.process.exitcode))
-                    if waiting:
-                        engage(worker.core)
-                if number is not None and outcome is not None:
-                    yield number, outcome
-    finally:
-        for worker in crew.values():
+                    self._bury(worker)
+                    continue
+                worker.is_asked = False
+                return ended
+        raise FingervisionError(
+            f"Every process ended before its first task: try `fingervision {command}` on one input to see why."
+        )
+
+    def outcomes_of(self, tasks: Sequence[Task]) -> Generator[tuple[int, Outcome], None, None]:
+        """Work on tasks, and give each outcome as it comes, with its task's number; the crew is then let go.
+
+        Parameters
+        ----------
+        tasks : sequence of Task
+            What shall be done.
+        """
+        waiting = deque(range(len(tasks)))
+        attempts = [0] * len(tasks)
+
+        def hand_out(worker: _Worker) -> None:
+            worker.number = waiting.popleft() if waiting else None
             if worker.number is not None:
-                worker.process.kill()
+                attempts[worker.number] += 1
+                with suppress(OSError):
+                    worker.link.send(tasks[worker.number])
+
+        try:
+            self._fill_up()
+            for worker in self._workers.values():
+                if not worker.is_asked:
+                    hand_out(worker)
+            while waiting or any(worker.number is not None for worker in self._workers.values()):
+                for link in wait([worker.link for worker in self._workers.values()]):
+                    worker = self._workers[link]
+                    number = worker.number
+                    try:
+                        answer: Outcome | Ended | None = worker.link.recv()
+                    except (EOFError, OSError):
+                        answer = None
+                    if answer is not None:
+                        worker.is_asked = False
+                        hand_out(worker)
+                    else:
+                        self._bury(worker)
+                        if number is not None and attempts[number] < ATTEMPTS:
+                            waiting.append(number)
+                        elif number is not None:
+                            answer = failure(tasks[number], _died(tasks[number], worker.process.exitcode))
+                        if waiting:
+                            hand_out(self._engage(worker.core))
+                    if number is not None and isinstance(answer, Outcome):
+                        yield number, answer
+        finally:
+            self._let_go()
+
+    def _fill_up(self) -> None:
+        places = cores()
+        for k in range(len(self._workers), self._size):
+            self._engage(places[k % len(places)])
+
+    def _engage(self, core: int) -> _Worker:
+        link, theirs = self._context.Pipe()
+        process = self._context.Process(target=_serve, args=(theirs, self._perform, core), daemon=True)
+        with _no_interrupt():
+            process.start()
+        theirs.close()
+        self._workers[link] = _Worker(process, link, core)
+        return self._workers[link]
+
+    def _bury(self, worker: _Worker) -> None:
+        worker.process.join()
+        worker.link.close()
+        del self._workers[worker.link]
+
+    def _let_go(self) -> None:
+        """End what is in hand; who is idle ends by itself, while others go on here."""
+        busy = [worker for worker in self._workers.values() if worker.number is not None or worker.is_asked]
+        for worker in busy:
+            worker.process.kill()
+        for worker in self._workers.values():
             worker.link.close()
-        for worker in crew.values():
+        for worker in busy:  # nothing of theirs is written any more
             worker.process.join()
 
 
@@ -115,13 +181,29 @@ def _died(task: Task, exit_code: int | None) -> str:
     )
 
 
+@contextmanager
+def _no_interrupt() -> Iterator[None]:
+    """Hold Ctrl-C back: a process that starts meanwhile never gets it, also before it can say that it will not."""
+    if not hasattr(signal, "pthread_sigmask"):
+        yield
+        return
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
 def _serve(link: Connection, perform: Perform, core: int) -> None:
     """Be a worker until the link is closed."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches the whole group; the one who handed out decides
     if hasattr(os, "sched_setaffinity"):
         with suppress(OSError):
             os.sched_setaffinity(0, {core})
+    import cv2  # 0.1 s that the process that hands out need not spend
+
+    cv2.setNumThreads(1)  # also where a process cannot be bound
     with suppress(EOFError, OSError):
         while True:
-            task: Task = link.recv()
-            link.send(work(task, perform))
+            asked: Task | tuple[str, tuple[str, ...]] = link.recv()
+            link.send(work(asked, perform) if isinstance(asked, Task) else perform(*asked))

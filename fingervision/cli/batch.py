@@ -11,6 +11,7 @@ from fingervision.domain.errors import FingervisionError
 
 if TYPE_CHECKING:
     from fingervision.batch.run import Batch, Plan
+    from fingervision.batch.task import Perform
 
 EXAMPLES = """
 \b
@@ -89,7 +90,8 @@ def _run(
     from contextlib import ExitStack
     from functools import partial
 
-    from fingervision.batch import cluster, local_processes
+    from fingervision.batch import cluster
+    from fingervision.batch.local_processes import LocalCrew, cores
     from fingervision.batch.run import Crew, Job, planned, run
     from fingervision.cli._unattended import perform
 
@@ -100,11 +102,15 @@ def _run(
     arguments = tuple(_arguments(given, absolute=scheduler is not None))
     plan = planned(Job(name, inputs, arguments, _options_key(name, given), out))
     with ExitStack() as stack:
-        crew: Crew = partial(local_processes.outcomes_of, perform=perform, workers=jobs)
-        if plan.to_do:
-            _check_options(name, arguments)
-            if scheduler is not None:
-                crew = partial(cluster.outcomes_of, stack.enter_context(cluster.connected(scheduler)), perform=perform)
+        crew: Crew
+        if scheduler is None or not plan.to_do:
+            local = stack.enter_context(LocalCrew(perform, min(jobs or len(cores()), len(plan.to_do))))
+            crew = local.outcomes_of
+            if plan.to_do:
+                _check_options(name, arguments, local.answer)
+        else:
+            _check_options(name, arguments, perform)
+            crew = partial(cluster.outcomes_of, stack.enter_context(cluster.connected(scheduler)), perform=perform)
         show = stack.enter_context(_Bar(name, len(plan.to_do)))
         batch = run(plan, crew, show)
     _report(plan, batch, as_json)
@@ -158,18 +164,17 @@ def _content(path: Path) -> str:
     return hashlib.sha256(f"{found}\n{_content(path.parent / str(base))}".encode()).hexdigest()
 
 
-def _check_options(name: str, arguments: tuple[str, ...]) -> None:
+def _check_options(name: str, arguments: tuple[str, ...], ask: "Perform") -> None:
     """Refuse options that cannot be meant, once and before any work.
 
     The command is asked for an input that does not exist: it must complain of that and of nothing else.
     """
     from tempfile import TemporaryDirectory
 
-    from fingervision.cli._unattended import perform
     from fingervision.domain.errors import ExitCode, UsageError
 
     with TemporaryDirectory() as nowhere:
-        ended = perform(name, (*arguments, "--out", str(Path(nowhere) / "out"), "--", str(Path(nowhere) / "nothing")))
+        ended = ask(name, (*arguments, "--out", str(Path(nowhere) / "out"), "--", str(Path(nowhere) / "nothing")))
     if nowhere not in ended.words:
         kind = UsageError if ended.exit_code == ExitCode.WRONG_USAGE else FingervisionError
         raise kind(ended.words)

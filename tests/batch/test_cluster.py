@@ -14,6 +14,9 @@ import pytest
 
 pytest.importorskip("distributed", reason="Dask is not installed: pip install -e '.[cluster]'")
 
+from fingervision.batch import cluster as cluster_module
+from fingervision.domain.errors import FingervisionError
+
 ROOT = Path(__file__).parents[2]
 # Starting Python, Dask and our imports on a busy machine; nothing is measured by it.
 PATIENCE_S = 90.0
@@ -37,8 +40,10 @@ def started(folder: Path, *arguments: str) -> "subprocess.Popen[bytes]":
     return subprocess.Popen(program, cwd=folder, env=ENVIRONMENT, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
 
 
-@pytest.fixture
-def cluster(tmp_path: Path) -> Iterator[tuple[str, "list[subprocess.Popen[bytes]]"]]:
+@pytest.fixture(scope="module")
+def cluster(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[str, "list[subprocess.Popen[bytes]]"]]:
+    """One cluster for all: who kills a worker comes last."""
+    tmp_path = tmp_path_factory.mktemp("cluster")
     address = f"tcp://127.0.0.1:{free_port()}"
     host, port = "127.0.0.1", address.rpartition(":")[2]
     scheduler = started(tmp_path, "dask_scheduler", "--host", host, "--port", port, "--no-dashboard")
@@ -66,6 +71,49 @@ def wait_for_workers(address: str, count: int) -> None:
 
     with Client(address, timeout=PATIENCE_S, set_as_default=False) as client:
         client.wait_for_workers(count, timeout=PATIENCE_S)
+
+
+def test_a_scheduler_that_does_not_answer_is_said() -> None:
+    assert cluster_module.PATIENCE_S == 10
+    address = f"tcp://127.0.0.1:{free_port()}"
+    with (
+        pytest.raises(
+            FingervisionError, match=f"must answer within 0.5 s, but {address} does not: start `dask scheduler`"
+        ),
+        cluster_module.connected(address, patience_s=0.5),
+    ):
+        pass
+
+
+def test_workers_of_another_version_are_refused(
+    cluster: tuple[str, "list[subprocess.Popen[bytes]]"], recordings: Path, tmp_path: Path
+) -> None:
+    address, _ = cluster
+    wait_for_workers(address, 2)
+    # The same code but for one comment: a copy of which the workers know nothing.
+    copy = tmp_path / "copy"
+    for package in ("fingervision", "calib"):
+        for file in (ROOT / package).rglob("*"):
+            if file.is_file() and file.suffix != ".pyc":
+                target = copy / file.relative_to(ROOT)
+                target.parent.mkdir(parents=True, exist_ok=True)
+                target.write_bytes(file.read_bytes())
+    with (copy / "calib" / "limits.py").open("a", encoding="utf-8") as file:
+        file.write("# Changed.\n")
+    program = [sys.executable, "-m", "fingervision", "batch", "measure", f"{recordings}/**/*.mkv", *SCALE]
+    done = subprocess.run(
+        [*program, "--out", str(tmp_path / "out"), "--scheduler", address],
+        cwd=copy,
+        env={**ENVIRONMENT, "PYTHONPATH": os.pathsep.join([str(copy), ENVIRONMENT["PYTHONPATH"]])},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 1
+    assert "Every worker must run what runs here, but tcp://127.0.0.1:" in done.stderr
+    assert "source of fingervision" in done.stderr
+    assert "Traceback" not in done.stderr
+    assert not (tmp_path / "out").exists()
 
 
 def test_a_cluster_gives_the_same_and_survives_a_dead_worker(
@@ -100,43 +148,3 @@ def test_a_cluster_gives_the_same_and_survives_a_dead_worker(
     again = batch(tmp_path, f"{recordings}/**/good*.mkv", *SCALE, "--out", there, "--scheduler", address)
     assert again.returncode == 0, again.stderr
     assert "(0 worked on by this call)" in again.stdout or "nothing to do" in again.stdout
-
-
-def test_a_scheduler_that_does_not_answer_is_said(recordings: Path, tmp_path: Path) -> None:
-    address = f"tcp://127.0.0.1:{free_port()}"
-    done = batch(tmp_path, f"{recordings}/**/*.mkv", *SCALE, "--out", tmp_path / "out", "--scheduler", address)
-    assert done.returncode == 1
-    assert f"The scheduler must answer within 10 s, but {address} does not" in done.stderr
-    assert "Traceback" not in done.stderr
-    assert len(done.stderr.strip().splitlines()) == 1
-
-
-def test_workers_of_another_version_are_refused(
-    cluster: tuple[str, "list[subprocess.Popen[bytes]]"], recordings: Path, tmp_path: Path
-) -> None:
-    address, _ = cluster
-    wait_for_workers(address, 2)
-    # The same code but for one comment: a copy of which the workers know nothing.
-    copy = tmp_path / "copy"
-    for package in ("fingervision", "calib"):
-        for file in (ROOT / package).rglob("*"):
-            if file.is_file() and file.suffix != ".pyc":
-                target = copy / file.relative_to(ROOT)
-                target.parent.mkdir(parents=True, exist_ok=True)
-                target.write_bytes(file.read_bytes())
-    with (copy / "calib" / "limits.py").open("a", encoding="utf-8") as file:
-        file.write("# Changed.\n")
-    program = [sys.executable, "-m", "fingervision", "batch", "measure", f"{recordings}/**/*.mkv", *SCALE]
-    done = subprocess.run(
-        [*program, "--out", str(tmp_path / "out"), "--scheduler", address],
-        cwd=copy,
-        env={**ENVIRONMENT, "PYTHONPATH": os.pathsep.join([str(copy), ENVIRONMENT["PYTHONPATH"]])},
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-    assert done.returncode == 1
-    assert "Every worker must run what runs here, but tcp://127.0.0.1:" in done.stderr
-    assert "source of fingervision" in done.stderr
-    assert "Traceback" not in done.stderr
-    assert not (tmp_path / "out").exists()
