@@ -75,7 +75,7 @@ def obeyed(effect: Effect, model: Model) -> Effect:
         searched = effect.parameters if effect.narrow is None else effect.narrow(history)
         return searched if isinstance(searched, str) else (*searched, *law.adds)
 
-    return replace(effect, act=law.act, narrow=narrow)
+    return replace(effect, act=law.act, narrow=narrow, foretold=law.foretold)
 
 
 def admissible(history: History, without: frozenset[str], model: Model) -> tuple[dict[str, Effect], dict[str, str]]:

@@ -211,6 +211,7 @@ def search(
         if forced or not best.names
         else _set(problem, best, nothing, [*singles, *peers] if len(best.names) > 1 else singles, pairs)
     )
+    alternatives = _beside_foretold(problem, alternatives)
     best = min(alternatives, key=lambda e: e.bic(samples) + _surprise(problem, e)) if best.names else best
     alternatives.sort(key=lambda e: e is not best)
     verdict = Verdict.AGREES if not best.names else Verdict.NAMED if len(alternatives) == 1 else Verdict.AMBIGUOUS
@@ -310,6 +311,28 @@ def _set(
         if distance < INDISTINGUISHABLE and not limiting and not idle and other.score - best.score < ADMISSIBLE:
             members.append(other)
     return [m for m in members if not any(set(o.names) < set(m.names) for o in members)], distances
+
+
+def _beside_foretold(problem: Problem, members: list[Explanation]) -> list[Explanation]:
+    """Drop what only imitates an effect that came just as the drawing foretells it: that would be a coincidence.
+
+    An end stop at the very input at which the drawn fingers meet is the drawn fingers' contact.
+    """
+
+    def foretold(explanation: Explanation, name: str) -> bool:
+        ranges, values = problem.effects[name].foretold, explanation.values[name]
+        return bool(ranges) and all(low <= values[key] <= high for key, (low, high) in ranges.items())
+
+    def imitates(other: Explanation, member: Explanation) -> bool:
+        own, theirs = set(member.names) - set(other.names), set(other.names) - set(member.names)
+        return (
+            bool(own and theirs)
+            and len(member.names) <= len(other.names)
+            and all(foretold(member, name) for name in own)
+            and not any(foretold(other, name) for name in theirs)
+        )
+
+    return [other for other in members if not any(imitates(other, member) for member in members)]
 
 
 def _surprise(problem: Problem, explanation: Explanation) -> float:

@@ -1,8 +1,9 @@
 """A physical effect: something that happens between the recorded input and the measured points."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import StrEnum
+from types import MappingProxyType
 
 import numpy as np
 from numpy.typing import NDArray
@@ -123,6 +124,8 @@ class Effect:
     narrow : callable or None
         Bounds that follow from the data: `narrow(history)` gives the parameters to search, or the reason why
         these data cannot show the effect.
+    foretold : mapping of str to (float, float)
+        Where a drawing foretells the effect: the ranges that its parameters then lie in.
     """
 
     name: str
@@ -139,6 +142,7 @@ class Effect:
     needs_force: bool = False
     memory: bool = False
     narrow: Callable[[History], "tuple[Parameter, ...] | str"] | None = None
+    foretold: Mapping[str, tuple[float, float]] = field(default_factory=lambda: MappingProxyType({}))
 
     def search(self, history: History) -> tuple[Parameter, ...] | str:
         """Return the parameters with the bounds that these data leave, or the reason why these cannot show it."""

@@ -1,7 +1,8 @@
 """The seam between a gripper's model and whatever asks it."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from types import MappingProxyType
 from typing import Protocol, runtime_checkable
 
 import numpy as np
@@ -38,10 +39,13 @@ class PhysicalLaw:
     adds : tuple of Parameter
         What the drawing knows beside the catalogue's parameters (which half was changed); shapes, that change nothing
         while the effect is at zero.
+    foretold : mapping of str to (float, float)
+        Ranges in which the parameters lie where the gripper is as drawn; empty where the drawing foretells nothing.
     """
 
     act: PointAct
     adds: tuple[Parameter, ...] = ()
+    foretold: Mapping[str, tuple[float, float]] = field(default_factory=lambda: MappingProxyType({}))
 
 
 @runtime_checkable

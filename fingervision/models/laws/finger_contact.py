@@ -12,6 +12,10 @@ from fingervision.models.static_answer import gap_per_input
 
 EFFECT = "finger_contact"
 _DEPTHS = 60
+_AS_DRAWN = 0.01
+"""Of the rest gap: tips as true to the drawing as this meet where it says."""
+_RIGID = 0.05
+"""Faces that yield by less than a twentieth of what the fingers are held back are rigid."""
 
 
 def law(drawn: DrawnAnswer) -> PhysicalLaw | None:
@@ -48,4 +52,8 @@ def law(drawn: DrawnAnswer) -> PhysicalLaw | None:
             return moved
         return replace(moved, force_n=moved.force_n + share * (np.interp(deep, missing, extra_n) + beyond[1] * past))
 
-    return PhysicalLaw(act)
+    near_mm = _AS_DRAWN * 2.0 * body.measured_rest_mm
+    return PhysicalLaw(
+        act,
+        foretold={"floor_mm": (floor_mm - near_mm, floor_mm + near_mm), "remaining_slope": (0.0, rigid_slope + _RIGID)},
+    )

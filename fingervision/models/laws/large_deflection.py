@@ -20,6 +20,8 @@ Array = NDArray[np.float64]
 EFFECT = "large_deflection"
 _BELOW, _ABOVE = 4, 6
 _ROWS = 400
+_AS_DRAWN = 0.05
+"""Relative: links as true to the drawing as this bend as it says."""
 
 
 def law(drawn: DrawnAnswer) -> PhysicalLaw | None:
@@ -55,7 +57,13 @@ def law(drawn: DrawnAnswer) -> PhysicalLaw | None:
             return moved
         return replace(moved, force_n=np.interp(free_mm / scale, opening_mm, force_ratio) * moved.force_n)
 
-    return PhysicalLaw(act)
+    return PhysicalLaw(
+        act,
+        foretold={
+            "reach_mm": ((1.0 - _AS_DRAWN) * reach, (1.0 + _AS_DRAWN) * reach),
+            "cross": (cross - _AS_DRAWN * abs(cross), cross + _AS_DRAWN * abs(cross)),
+        },
+    )
 
 
 def _arc(opening_mm: Array, reach_mm: float, cross: float) -> Array:
