@@ -1,7 +1,5 @@
 """A run: the video, the gaps, the events and what they were measured with, in a folder that survives any end."""
 
-import hashlib
-import json
 from contextlib import suppress
 from dataclasses import asdict, dataclass, replace
 from datetime import UTC, datetime
@@ -14,13 +12,13 @@ from fingervision.domain.errors import FingervisionError
 from fingervision.domain.frame import Frame, LostFrame
 from fingervision.frames.received import OwnPacket
 from fingervision.frames.source import Description
-from fingervision.live.recorded_video import RecordedVideo
 from fingervision.measuring.measure import Task
 from fingervision.storage.calibration_json import write_calibration
 from fingervision.storage.gaps_csv import GapRow, GapsCsv
+from fingervision.storage.recorded_video import RecordedVideo
+from fingervision.storage.run_files import CALIBRATION, EVENTS, SCHEMA, VIDEO, RunFiles
 
-RUN, VIDEO, GAPS, EVENTS, CALIBRATION = "run.json", "video.mp4", "gaps.csv", "events.jsonl", "calibration.json"
-SCHEMA = 1
+GAPS = "gaps.csv"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -60,13 +58,10 @@ class RunFolder:
         self.frames = 0
         self._began = datetime.now(UTC)
         self._about = _about(description, task, self._began)
-        try:
-            self._write_about(complete=False)
-            if isinstance(task.scale, Calibration):
-                write_calibration(task.scale, self.path / CALIBRATION)
-            self._events = (self.path / EVENTS).open("a", encoding="utf-8", buffering=1)
-        except OSError as error:
-            raise self._failed(error) from error
+        self._files = RunFiles(self.path)
+        self._files.write_about(self._about, complete=False)
+        if isinstance(task.scale, Calibration):
+            write_calibration(task.scale, self.path / CALIBRATION)
         self._gaps = GapsCsv(self.path / GAPS)
         self._video = RecordedVideo(self.path / VIDEO, template)
         self._last_s = 0.0
@@ -83,43 +78,25 @@ class RunFolder:
 
     def event(self, name: str, words: str) -> None:
         """Append an event at the time of the last frame."""
-        line = {"time_s": round(self._last_s, 6), "event": name, "words": words}
-        try:
-            self._events.write(json.dumps(line, ensure_ascii=False) + "\n")
-        except OSError as error:
-            raise self._failed(error) from error
+        self._files.event({"time_s": round(self._last_s, 6), "event": name, "words": words})
 
     def close(self, why: str) -> None:
         """End the run; every file is closed even where one fails, and the first failure is raised."""
         failure: FingervisionError | None = None
         with suppress(FingervisionError):
             self.event("stopped", why)
-        for end in (self._video.close, self._gaps.close, self._events.close, self._finish):
+        for end in (self._video.close, self._gaps.close, self._files.close, self._finish):
             try:
                 end()
             except FingervisionError as error:
                 failure = failure or error
-            except OSError as error:
-                failure = failure or self._failed(error)
         if failure is not None:
             raise failure
 
     def _finish(self) -> None:
-        with (self.path / VIDEO).open("rb") as video:
-            self._about["sha256"] = {VIDEO: hashlib.file_digest(video, "sha256").hexdigest()}
+        self._about["sha256"] = {VIDEO: self._files.sha256(VIDEO)}
         self._about["frames"] = self.frames
-        self._write_about(complete=True)
-
-    def _write_about(self, *, complete: bool) -> None:
-        part = self.path / f".{RUN}.part"
-        part.write_text(json.dumps({**self._about, "complete": complete}, indent=2) + "\n", encoding="utf-8")
-        part.replace(self.path / RUN)
-
-    def _failed(self, error: OSError) -> FingervisionError:
-        return FingervisionError(
-            f"The run {self.path} could not be written any further ({error.strerror}); what was recorded until then is "
-            "in it: make room, or name another --out."
-        )
+        self._files.write_about(self._about, complete=True)
 
 
 def _new_folder(out: Path) -> Path:

@@ -1,9 +1,9 @@
 """One time for everything live: the source's own steps, joined across cuts and jumps by the host's clock."""
 
+from fingervision.storage.recorded_video import TICKS_PER_S
+
 # A source whose clock runs ahead of the host's by so much in one step has jumped.
 JUMP_S = 1.0
-# What a time in the recording is a multiple of.
-TICKS_PER_S = 1_000_000
 
 
 class Timeline:

@@ -1,15 +1,12 @@
 """gaps.csv: one row a frame, written while it is measured, valid whenever the program is stopped."""
 
-import os
 from collections.abc import Sequence
-from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
-from time import monotonic
 from types import TracebackType
 
-from fingervision.domain.errors import FingervisionError
 from fingervision.domain.status import Status
+from fingervision.storage.line_file import LineFile, cell, quoted
 
 COLUMNS = (
     "frame,time_s,status,gap_mm,u_gap_mm,u_random_mm,gap_px,u_gap_px,"
@@ -17,8 +14,6 @@ COLUMNS = (
 )
 # Decimal places; a nanosecond, a hundred-thousandth of a pixel and a tenth of a nanometre are below any uncertainty.
 TIME_PLACES, PX_PLACES, MM_PLACES, FORCE_PLACES = 9, 5, 7, 6
-# Rows also wait for company before they come here, so that a second at most is lost when the program is killed.
-FLUSH_EVERY_S = 0.5
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,16 +84,8 @@ class GapsCsv:
     """
 
     def __init__(self, path: Path, drive_columns: tuple[str, ...] = ()) -> None:
-        self._path = path
         self._drive_columns = drive_columns
-        self._pending: list[str] = []
-        self._whole_bytes = 0
-        try:
-            self._file = path.open("wb", buffering=0)
-        except OSError as error:
-            raise FingervisionError(f"{path} could not be written ({error.strerror}): name another --out.") from error
-        self._pending.append(",".join((COLUMNS, *drive_columns)))
-        self._write()
+        self._file = LineFile(path, ",".join((COLUMNS, *drive_columns)))
 
     def __enter__(self) -> "GapsCsv":
         return self
@@ -110,72 +97,33 @@ class GapsCsv:
 
     def add(self, rows: Sequence[GapRow]) -> None:
         """Add rows, in order."""
-        self._pending += [self._line(row) for row in rows]
-        if self._pending and monotonic() - self._written_at >= FLUSH_EVERY_S:
-            self._write()
+        self._file.add([self._line(row) for row in rows])
 
     def close(self) -> None:
         """Write what is pending and close; closing twice is allowed."""
-        if self._file.closed:
-            return
-        try:
-            self._write()
-        finally:
-            self._file.close()
-
-    def _write(self) -> None:
-        self._written_at = monotonic()
-        if not self._pending:
-            return
-        block = ("\n".join(self._pending) + "\n").encode()
-        self._pending.clear()
-        written = 0
-        try:
-            while written < len(block):
-                written += os.write(self._file.fileno(), block[written:])
-        except OSError as error:
-            # Half a row is no row.
-            self._whole_bytes += block[:written].rfind(b"\n") + 1
-            with suppress(OSError):  # a pipe cannot be cut back
-                os.ftruncate(self._file.fileno(), self._whole_bytes)
-            self._file.close()
-            raise FingervisionError(
-                f"{self._path} could not be written any further ({error.strerror}); the rows until then are in it: "
-                "make room and measure again."
-            ) from error
-        self._whole_bytes += len(block)
+        self._file.close()
 
     def _line(self, row: GapRow) -> str:
         cells = [
             str(row.frame),
-            _cell(row.time_s, TIME_PLACES),
+            cell(row.time_s, TIME_PLACES),
             row.status.value,
-            _cell(row.gap_mm, MM_PLACES),
-            _cell(row.u_gap_mm, MM_PLACES),
-            _cell(row.u_random_mm, MM_PLACES),
-            _cell(row.gap_px, PX_PLACES),
-            _cell(row.u_gap_px, PX_PLACES),
-            _cell(row.left_x_px, PX_PLACES),
-            _cell(row.left_y_px, PX_PLACES),
-            _cell(row.right_x_px, PX_PLACES),
-            _cell(row.right_y_px, PX_PLACES),
-            _cell(row.left_tip_px, PX_PLACES),
-            _cell(row.right_tip_px, PX_PLACES),
-            _cell(row.left_mm, MM_PLACES),
-            _cell(row.right_mm, MM_PLACES),
+            cell(row.gap_mm, MM_PLACES),
+            cell(row.u_gap_mm, MM_PLACES),
+            cell(row.u_random_mm, MM_PLACES),
+            cell(row.gap_px, PX_PLACES),
+            cell(row.u_gap_px, PX_PLACES),
+            cell(row.left_x_px, PX_PLACES),
+            cell(row.left_y_px, PX_PLACES),
+            cell(row.right_x_px, PX_PLACES),
+            cell(row.right_y_px, PX_PLACES),
+            cell(row.left_tip_px, PX_PLACES),
+            cell(row.right_tip_px, PX_PLACES),
+            cell(row.left_mm, MM_PLACES),
+            cell(row.right_mm, MM_PLACES),
         ]
         if self._drive_columns:
-            cells += [_quoted(row.run), _cell(row.input_mm, MM_PLACES)]
+            cells += [quoted(row.run), cell(row.input_mm, MM_PLACES)]
         if "force_n" in self._drive_columns:
-            cells.append(_cell(row.force_n, FORCE_PLACES))
+            cells.append(cell(row.force_n, FORCE_PLACES))
         return ",".join(cells)
-
-
-def _cell(value: float | None, places: int) -> str:
-    """Write a number without needless zeros, and nothing for nothing."""
-    return "" if value is None else f"{value:.{places}f}".rstrip("0").rstrip(".")
-
-
-def _quoted(text: str) -> str:
-    """Text as CSV holds it (RFC 4180)."""
-    return '"' + text.replace('"', '""') + '"' if any(mark in text for mark in ',"\n\r') else text

@@ -3,10 +3,38 @@
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
+from fingervision.domain.recipe import Recipe
+from fingervision.storage.toml_section import Section, read_document
 
-def write_recipe(path: Path, name: str, steps: Sequence[Mapping[str, object]], below_force_n: float = 5.0) -> None:
+SCHEMA = 1
+BELOW_FORCE_N = 5.0
+
+
+def read_recipe(path: Path) -> Recipe[Section]:
+    """Read a recipe; the steps' own keys are for their kinds to read.
+
+    Raises
+    ------
+    FingervisionError
+        There is no such file, it is no TOML, it is from a newer schema, it has no step, or a key is unknown.
+    """
+    document, text = read_document(path, "recipe")
+    top = Section(path, text, "", document)
+    top.only(("schema", "name", "below_force_n", "step"))
+    if top.whole("schema", low=1) > SCHEMA:
+        top.refuse("schema", f"must be at most {SCHEMA}, but is {document['schema']}: use a newer fingervision.")
+    steps = top.tables("step")
+    if not steps:
+        top.refuse(None, "must have at least one [[step]], but has none: add one with its kind.")
+    below_force_n = top.number("below_force_n", BELOW_FORCE_N, above=0.0)
+    return Recipe(top.word("name", path.stem), below_force_n, steps, text)
+
+
+def write_recipe(
+    path: Path, name: str, steps: Sequence[Mapping[str, object]], below_force_n: float = BELOW_FORCE_N
+) -> None:
     """Write a recipe of the given steps; keys and kinds are those of the design."""
-    lines = ["schema = 1", f'name = "{name}"', f"below_force_n = {below_force_n}"]
+    lines = [f"schema = {SCHEMA}", f'name = "{name}"', f"below_force_n = {below_force_n}"]
     for step in steps:
         lines += ["", "[[step]]"]
         lines += [f'{key} = "{value}"' if isinstance(value, str) else f"{key} = {value}" for key, value in step.items()]

@@ -96,7 +96,9 @@ class Section:
 
     def refuse(self, key: str | None, words: str) -> NoReturn:
         """Raise a sentence that begins with the key and says where it stands."""
-        name = key if key is not None else self.header
+        if key is None and not self.header:
+            raise FingervisionError(f"{self.path} {words}")
+        name = key if key is not None else f"[{self.header}]"
         raise FingervisionError(f"{name} in {self.at(key)} {words}")
 
     def only(self, keys: Iterable[str]) -> None:

@@ -10,9 +10,10 @@ import numpy as np
 from fingervision.domain.errors import FingervisionError
 from fingervision.domain.frame import Frame, LostFrame
 from fingervision.frames.received import OwnPacket
-from fingervision.live.timeline import TICKS_PER_S
 from fingervision.vision.grey import to_grey
 
+# What a time in the recording is a multiple of.
+TICKS_PER_S = 1_000_000
 TIME_BASE = Fraction(1, TICKS_PER_S)
 # Matroska keeps milliseconds alone; MP4 in fragments keeps every tick, and each frame stands for itself.
 CONTAINER = {"movflags": "frag_every_frame+empty_moov+default_base_moof", "flush_packets": "1"}
@@ -32,16 +33,28 @@ class RecordedVideo:
         The file.
     template : av.VideoStream or None
         The camera's coded stream, whose packets are kept as they are; None stores the grey levels with FFV1.
+    keep : int, optional
+        Go on with an FFV1 recording that broke off, after its first so many frames. The file on disk is whole at any
+        moment: what is kept is copied beside it, and then takes its name.
+
+    Raises
+    ------
+    FingervisionError
+        The file cannot be written, or holds fewer frames than are to be kept.
     """
 
-    def __init__(self, path: Path, template: av.VideoStream | None) -> None:
+    def __init__(self, path: Path, template: av.VideoStream | None, keep: int = 0) -> None:
         self._path = path
         self._template = template
         self._stream: Any = None
         self._first_s: float | None = None
         self._last_tick = -1
+        place = path.with_name(f".{path.name}.part") if keep else path
         try:
-            self._container = av.open(str(path), "w", format="mp4", options=dict(CONTAINER))
+            self._container = av.open(str(place), "w", format="mp4", options=dict(CONTAINER))
+            if keep:
+                self._keep(keep)
+                place.replace(path)
         except (av.FFmpegError, OSError) as error:
             raise self._failed(error) from error
 
@@ -87,6 +100,27 @@ class RecordedVideo:
         except (av.FFmpegError, OSError) as error:
             raise self._failed(error) from error
 
+    def _keep(self, frames: int) -> None:
+        with av.open(str(self._path)) as old:
+            stream = old.streams.video[0]
+            self._stream_of(stream.codec_context.width, stream.codec_context.height, str(stream.codec_context.pix_fmt))
+            kept = 0
+            for packet in old.demux(stream):
+                if kept == frames or packet.pts is None or packet.time_base is None:
+                    break
+                tick = round(packet.pts * packet.time_base * TICKS_PER_S)
+                packet.stream, packet.time_base, packet.pts, packet.dts = self._stream, TIME_BASE, tick, tick
+                packet.duration = 0
+                self._container.mux(packet)
+                self._last_tick = tick
+                kept += 1
+        if kept < frames:
+            raise FingervisionError(
+                f"{self._path} must hold {frames} frames to go on after them, but holds {kept}: start the run anew in "
+                "another folder."
+            )
+        self._first_s = 0.0
+
     def _begins_s(self, item: Frame | LostFrame, packets: tuple[OwnPacket, ...]) -> float | None:
         if self._template is not None:
             return next((own.time_s for own in packets if own.is_key), None)
@@ -113,15 +147,17 @@ class RecordedVideo:
     def _encode(self, frame: Frame, tick: int) -> None:
         grey: Any = np.ascontiguousarray(to_grey(frame.pixels))
         if self._stream is None:
-            self._stream = self._container.add_stream("ffv1", options=FFV1)
-            self._stream.width, self._stream.height = grey.shape[1], grey.shape[0]
-            self._stream.pix_fmt = GREY_FORMATS[str(grey.dtype)]
-            self._stream.codec_context.time_base = self._stream.time_base = TIME_BASE
-            self._stream.codec_context.thread_count = 1  # threads of frames would each hold one back
+            self._stream_of(grey.shape[1], grey.shape[0], GREY_FORMATS[str(grey.dtype)])
         picture = av.VideoFrame.from_ndarray(grey, format=GREY_FORMATS[str(grey.dtype)])
         picture.pts, picture.time_base = tick, TIME_BASE
         self._last_tick = tick
         self._container.mux(self._stream.encode(picture))
+
+    def _stream_of(self, width_px: int, height_px: int, pixel_format: str) -> None:
+        self._stream = self._container.add_stream("ffv1", options=FFV1)
+        self._stream.width, self._stream.height, self._stream.pix_fmt = width_px, height_px, pixel_format
+        self._stream.codec_context.time_base = self._stream.time_base = TIME_BASE
+        self._stream.codec_context.thread_count = 1  # threads of frames would each hold one back
 
     def _failed(self, error: Exception) -> FingervisionError:
         why = getattr(error, "strerror", None) or str(error)

@@ -1,0 +1,28 @@
+"""What the test bed is to do, as it is written down."""
+
+from dataclasses import dataclass
+from typing import Generic, TypeVar
+
+Step = TypeVar("Step")
+
+
+@dataclass(frozen=True, slots=True)
+class Recipe(Generic[Step]):
+    """The steps of a run.
+
+    Parameters
+    ----------
+    name : str
+        What it is called.
+    below_force_n : float
+        The force that it must not go beyond; the bed's own limit holds as well.
+    steps : tuple
+        In order, each as its kind reads it.
+    text : str
+        The whole file, kept with the run.
+    """
+
+    name: str
+    below_force_n: float
+    steps: tuple[Step, ...]
+    text: str

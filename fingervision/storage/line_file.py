@@ -1,0 +1,93 @@
+"""A text file that grows line by line and holds whole lines whenever the program is stopped."""
+
+import os
+from collections.abc import Sequence
+from contextlib import suppress
+from pathlib import Path
+from time import monotonic
+
+from fingervision.domain.errors import FingervisionError
+
+# Lines wait for company so long, and in front of it once more as long; a second at most is lost when the program is
+# killed.
+FLUSH_EVERY_S = 0.5
+
+
+class LineFile:
+    """Appends lines.
+
+    Whole lines reach the file at least every second. If the disk is full the file is cut back to its last whole line.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    header : str
+        First line of a new file.
+    go_on : bool
+        Append to what is there; else a file that is there is replaced.
+
+    Raises
+    ------
+    FingervisionError
+        The file cannot be written; also from `add` and `close`.
+    """
+
+    def __init__(self, path: Path, header: str, *, go_on: bool = False) -> None:
+        self._path = path
+        self._pending: list[str] = []
+        try:
+            self._file = path.open("ab" if go_on else "wb", buffering=0)
+            self._whole_bytes = path.stat().st_size
+        except OSError as error:
+            raise FingervisionError(f"{path} could not be written ({error.strerror}): name another --out.") from error
+        if not go_on:
+            self._pending.append(header)
+        self._write()
+
+    def add(self, lines: Sequence[str]) -> None:
+        """Add lines, in order."""
+        self._pending += lines
+        if self._pending and monotonic() - self._written_at >= FLUSH_EVERY_S:
+            self._write()
+
+    def close(self) -> None:
+        """Write what is pending and close; closing twice is allowed."""
+        if self._file.closed:
+            return
+        try:
+            self._write()
+        finally:
+            self._file.close()
+
+    def _write(self) -> None:
+        self._written_at = monotonic()
+        if not self._pending:
+            return
+        block = ("\n".join(self._pending) + "\n").encode()
+        self._pending.clear()
+        written = 0
+        try:
+            while written < len(block):
+                written += os.write(self._file.fileno(), block[written:])
+        except OSError as error:
+            # Half a line is no line.
+            self._whole_bytes += block[:written].rfind(b"\n") + 1
+            with suppress(OSError):  # a pipe cannot be cut back
+                os.ftruncate(self._file.fileno(), self._whole_bytes)
+            self._file.close()
+            raise FingervisionError(
+                f"{self._path} could not be written any further ({error.strerror}); the rows until then are in it: "
+                "make room and measure again."
+            ) from error
+        self._whole_bytes += len(block)
+
+
+def cell(value: float | None, places: int) -> str:
+    """Write a number without needless zeros, and nothing for nothing."""
+    return "" if value is None else f"{value:.{places}f}".rstrip("0").rstrip(".")
+
+
+def quoted(text: str) -> str:
+    """Text as CSV holds it (RFC 4180)."""
+    return '"' + text.replace('"', '""') + '"' if any(mark in text for mark in ',"\n\r') else text

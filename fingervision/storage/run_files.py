@@ -1,0 +1,72 @@
+"""What every run folder has: run.json, events.jsonl, a video; each whole at any moment."""
+
+import hashlib
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from fingervision.domain.errors import FingervisionError
+
+RUN, VIDEO, EVENTS, CALIBRATION = "run.json", "video.mp4", "events.jsonl", "calibration.json"
+SCHEMA = 1
+
+
+class RunFiles:
+    """Writes what is said of a run, and what happens in it.
+
+    Parameters
+    ----------
+    path : Path
+        The run's folder.
+
+    Raises
+    ------
+    FingervisionError
+        A file cannot be written; from every method.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        try:
+            self._events = (path / EVENTS).open("a", encoding="utf-8", buffering=1)
+        except OSError as error:
+            raise self.failed(error) from error
+
+    def write_about(self, about: Mapping[str, Any], *, complete: bool) -> None:
+        """Write run.json, or replace it by a whole new one."""
+        part = self.path / f".{RUN}.part"
+        try:
+            part.write_text(json.dumps({**about, "complete": complete}, indent=2) + "\n", encoding="utf-8")
+            part.replace(self.path / RUN)
+        except OSError as error:
+            raise self.failed(error) from error
+
+    def event(self, line: Mapping[str, Any]) -> None:
+        """Append an event."""
+        try:
+            self._events.write(json.dumps(line, ensure_ascii=False) + "\n")
+        except OSError as error:
+            raise self.failed(error) from error
+
+    def sha256(self, name: str) -> str:
+        """Digest of one of the run's files."""
+        try:
+            with (self.path / name).open("rb") as file:
+                return hashlib.file_digest(file, "sha256").hexdigest()
+        except OSError as error:
+            raise self.failed(error) from error
+
+    def close(self) -> None:
+        """Close events.jsonl."""
+        try:
+            self._events.close()
+        except OSError as error:
+            raise self.failed(error) from error
+
+    def failed(self, error: OSError) -> FingervisionError:
+        """Say that the run could not be written."""
+        return FingervisionError(
+            f"The run {self.path} could not be written any further ({error.strerror}); what was recorded until then is "
+            "in it: make room, or name another --out."
+        )

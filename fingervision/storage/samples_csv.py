@@ -1,0 +1,145 @@
+"""samples.csv of a run on the bed: a measured table, with what else is known of each row."""
+
+import csv
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from fingervision.domain.errors import FingervisionError
+from fingervision.domain.status import Status
+from fingervision.storage.line_file import LineFile, cell, quoted
+
+COLUMNS = (
+    "run,time_s,input_mm,gap_mm,left_mm,right_mm,u_gap_mm,u_random_mm,force_n,status,frame,step,camera_s,arrived_s"
+)
+# Decimal places: a microsecond, a tenth of a nanometre and a micronewton are below any uncertainty.
+TIME_PLACES, MM_PLACES, FORCE_PLACES = 6, 7, 6
+
+
+@dataclass(frozen=True, slots=True)
+class SampleRow:
+    """One row of samples.csv; None is an empty cell.
+
+    Parameters
+    ----------
+    run : str
+        Re-zeroing and whatever else breaks with the past begins another.
+    time_s : float
+        Since the folder's first row, on the camera's clock.
+    input_mm : float or None
+        The actuator's own reading, at the time of the exposure.
+    gap_mm, left_mm, right_mm : float or None
+        Gap and measuring points.
+    u_gap_mm, u_random_mm : float or None
+        Standard uncertainty of the gap with the whole budget, and its random part alone.
+    force_n : float or None
+        Force at the drive, at the time of the exposure.
+    status : Status
+        Whether there is a gap, and if not, why.
+    frame : int
+        Place in the video, from 0.
+    step : int
+        Step of the recipe, from 1.
+    camera_s, arrived_s : float
+        The frame's stamp on the camera's own clock, and when the host had it on the bed's.
+    """
+
+    run: str
+    time_s: float
+    input_mm: float | None
+    gap_mm: float | None
+    left_mm: float | None
+    right_mm: float | None
+    u_gap_mm: float | None
+    u_random_mm: float | None
+    force_n: float | None
+    status: Status
+    frame: int
+    step: int
+    camera_s: float
+    arrived_s: float
+
+    def line(self) -> str:
+        """Write it as the file holds it."""
+        mm = (self.input_mm, self.gap_mm, self.left_mm, self.right_mm, self.u_gap_mm, self.u_random_mm)
+        return ",".join(
+            [
+                quoted(self.run),
+                cell(self.time_s, TIME_PLACES),
+                *(cell(value, MM_PLACES) for value in mm),
+                cell(self.force_n, FORCE_PLACES),
+                self.status.value,
+                str(self.frame),
+                str(self.step),
+                cell(self.camera_s, TIME_PLACES),
+                cell(self.arrived_s, TIME_PLACES),
+            ]
+        )
+
+
+class SamplesCsv:
+    """Writes samples.csv row by row.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    go_on : bool
+        Append to the rows that are there.
+    """
+
+    def __init__(self, path: Path, *, go_on: bool = False) -> None:
+        self._file = LineFile(path, COLUMNS, go_on=go_on)
+
+    def add(self, rows: Sequence[SampleRow]) -> None:
+        """Add rows, in order."""
+        self._file.add([row.line() for row in rows])
+
+    def close(self) -> None:
+        """Write what is pending and close."""
+        self._file.close()
+
+
+def read_samples(path: Path) -> list[SampleRow]:
+    """Read the whole rows of a run that may have broken off, and cut what is no whole row off the file.
+
+    Raises
+    ------
+    FingervisionError
+        The file is not one of a run on the bed.
+    """
+    try:
+        text = path.read_bytes()
+        whole = text[: text.rfind(b"\n") + 1]
+        lines = whole.decode("utf-8").splitlines()
+        columns = lines[0] if lines else COLUMNS
+        rows = [_row(cells) for cells in csv.reader(lines[1:])] if columns == COLUMNS else []
+        if len(whole) < len(text):
+            with path.open("rb+") as file:
+                file.truncate(len(whole))
+    except FileNotFoundError:
+        return []
+    except (OSError, ValueError, IndexError) as error:
+        raise FingervisionError(
+            f"{path} must be the table of a run on the bed to go on with it, but is not ({error}): name another --out."
+        ) from error
+    if columns != COLUMNS:
+        raise FingervisionError(f"{path} must be the table of a run on the bed, but its header is another.")
+    return rows
+
+
+def write_rows(path: Path, rows: Sequence[SampleRow]) -> None:
+    """Replace the table by one of these rows, whole at any moment."""
+    part = path.with_name(f".{path.name}.part")
+    part.write_text("\n".join((COLUMNS, *(row.line() for row in rows))) + "\n", encoding="utf-8")
+    part.replace(path)
+
+
+def _row(cells: list[str]) -> SampleRow:
+    def number(at: int) -> float | None:
+        return float(cells[at]) if cells[at] else None
+
+    return SampleRow(
+        cells[0], float(cells[1]), number(2), number(3), number(4), number(5), number(6), number(7), number(8),
+        Status(cells[9]), int(cells[10]), int(cells[11]), float(cells[12]), float(cells[13]),
+    )  # fmt: skip

@@ -1,0 +1,15 @@
+"""Close until the fingers meet something, with a limit of force."""
+
+from collections.abc import Iterator
+
+from fingervision.storage.toml_section import Section
+from fingervision.testbed.legs import Close
+from fingervision.testbed.recipe_kinds import Asked
+
+KEYS = ("speed_mm_s", "below_force_n")
+
+
+def acts(section: Section, at_mm: float) -> Iterator[Asked]:
+    """One motion that ends by what is felt and seen."""
+    speed, force_n = section.number("speed_mm_s", above=0.0), section.number("below_force_n", above=0.0)
+    yield Close(speed, force_n), "below_force_n"

@@ -1,0 +1,19 @@
+"""Stand at a position."""
+
+from collections.abc import Iterator
+
+from fingervision.storage.toml_section import Section
+from fingervision.testbed.legs import Go, Stand
+from fingervision.testbed.recipe_kinds import Asked, frames_of
+
+KEYS = ("at_mm", "seconds", "frames")
+# A hold states no speed: slow enough for a webcam to follow the way there.
+APPROACH_MM_S = 0.5
+
+
+def acts(section: Section, at_mm: float) -> Iterator[Asked]:
+    """To the position where the stage is elsewhere, then stand."""
+    hold_mm, seconds, frames = section.number("at_mm"), section.number("seconds", above=0.0), frames_of(section)
+    if at_mm != hold_mm:
+        yield Go(hold_mm, APPROACH_MM_S, None if frames is None else 0), "at_mm"
+    yield Stand(seconds, frames), "seconds"

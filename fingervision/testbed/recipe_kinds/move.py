@@ -1,0 +1,14 @@
+"""Move to a position."""
+
+from collections.abc import Iterator
+
+from fingervision.storage.toml_section import Section
+from fingervision.testbed.legs import Go
+from fingervision.testbed.recipe_kinds import Asked, frames_of
+
+KEYS = ("to_mm", "speed_mm_s", "frames")
+
+
+def acts(section: Section, at_mm: float) -> Iterator[Asked]:
+    """One motion; with a number of frames they are taken at its end."""
+    yield Go(section.number("to_mm"), section.number("speed_mm_s", above=0.0), frames_of(section)), "to_mm"

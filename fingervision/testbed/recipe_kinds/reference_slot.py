@@ -1,0 +1,14 @@
+"""Measure a slot of known width in the gripper's place."""
+
+from collections.abc import Iterator
+
+from fingervision.storage.toml_section import Section
+from fingervision.testbed.legs import Slot
+from fingervision.testbed.recipe_kinds import Asked
+
+KEYS = ("size_mm", "u_size_mm")
+
+
+def acts(section: Section, at_mm: float) -> Iterator[Asked]:
+    """Have it put in, measure, have it taken out."""
+    yield Slot(section.number("size_mm", above=0.0), section.number("u_size_mm", 0.0, low=0.0)), "size_mm"

@@ -1,0 +1,14 @@
+"""Shift the picture, so that the fingers stand elsewhere in it."""
+
+from collections.abc import Iterator
+
+from fingervision.storage.toml_section import Section
+from fingervision.testbed.legs import Shift
+from fingervision.testbed.recipe_kinds import Asked
+
+KEYS = ()
+
+
+def acts(section: Section, at_mm: float) -> Iterator[Asked]:
+    """Once; a new run begins with it."""
+    yield Shift(), "kind"

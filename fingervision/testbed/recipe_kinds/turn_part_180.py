@@ -1,0 +1,14 @@
+"""Turn the part by 180 degrees in the picture."""
+
+from collections.abc import Iterator
+
+from fingervision.storage.toml_section import Section
+from fingervision.testbed.legs import Turn
+from fingervision.testbed.recipe_kinds import Asked
+
+KEYS = ()
+
+
+def acts(section: Section, at_mm: float) -> Iterator[Asked]:
+    """Once; a new run begins with it."""
+    yield Turn(), "kind"
