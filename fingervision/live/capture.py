@@ -9,6 +9,7 @@ from time import monotonic
 from fingervision.domain.errors import FingervisionError
 from fingervision.domain.frame import Frame, LostFrame
 from fingervision.frames.received import LiveSource, OwnPacket, Received
+from fingervision.live.promptness import be_prompt
 from fingervision.live.timeline import Timeline
 
 # Frames that may wait while something else holds the processor up: four seconds at 25 frames a second. What comes on
@@ -90,6 +91,7 @@ class Capture:
             return None
 
     def _read(self) -> None:
+        be_prompt()
         while not self._stopped.is_set():
             try:
                 for received in self.source.received():

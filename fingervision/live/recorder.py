@@ -4,6 +4,7 @@ from queue import Empty, Full, Queue
 from threading import Thread
 
 from fingervision.domain.errors import FingervisionError
+from fingervision.live.promptness import be_prompt
 from fingervision.live.run_folder import RecordedFrame, RunFolder
 
 # Frames that may wait for the disk: ten seconds at 25 frames a second. The recording ends rather than wait for more.
@@ -69,6 +70,7 @@ class Recorder:
         )
 
     def _write(self) -> None:
+        be_prompt()
         try:
             while True:
                 try:

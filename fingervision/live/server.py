@@ -23,6 +23,7 @@ from fingervision.live.commands import Answer, obey, save_gaps
 from fingervision.live.guard import EVERYWHERE, POLICY_VIOLATION, Guard
 from fingervision.live.page_token import kept_token
 from fingervision.live.preview import message
+from fingervision.live.promptness import be_prompt
 from fingervision.live.session import Seen, Session
 
 PAGE = Path(__file__).parent / "page"
@@ -31,6 +32,8 @@ MESSAGE_BYTES, MESSAGES_A_SECOND, PAGES_AT_ONCE = 4096, 120, 4
 TRY_AGAIN_LATER = 1013
 # The preview is as fast as a screen needs it; without a new picture the page hears of the state so often.
 PREVIEW_EVERY_S, STATE_EVERY_S, LOOK_EVERY_S = 0.03, 0.2, 0.01
+# When measuring or the disk lags, a picture now and then must do.
+PREVIEW_IN_A_HURRY_EVERY_S = 0.5
 # A page that does not acknowledge is gone.
 ACKNOWLEDGED_WITHIN_S = 20.0
 
@@ -122,6 +125,7 @@ class Page:
         self._listening.close()
 
     def _run(self) -> None:
+        be_prompt()
         asyncio.run(self._server.serve(sockets=[self._listening]))
 
     async def _index(self, request: Request) -> Response:
@@ -169,12 +173,16 @@ class Page:
         session = self._session
         rows = messages = 0
         shown: Seen | None = None
+        pictured_s = float("-inf")
         while not self._ending:
             asked_s = monotonic()
             while monotonic() - asked_s < STATE_EVERY_S and session.seen is shown:
                 await asyncio.sleep(LOOK_EVERY_S)
             seen = session.seen
-            picture = seen if seen is not shown and not session.in_a_hurry else None
+            every_s = PREVIEW_IN_A_HURRY_EVERY_S if session.in_a_hurry else 0.0
+            picture = seen if seen is not shown and monotonic() - pictured_s >= every_s else None
+            if picture is not None:
+                pictured_s = monotonic()
             following = await asyncio.to_thread(message, session, rows, messages, picture)
             rows, messages = following.rows, following.messages
             shown = seen

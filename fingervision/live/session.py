@@ -17,6 +17,7 @@ from fingervision.live.capture import Arrival, Capture, Ended, Happening
 from fingervision.live.choices import Choices
 from fingervision.live.exposure import Exposure
 from fingervision.live.history import History
+from fingervision.live.promptness import be_prompt
 from fingervision.live.recorder import Recorder
 from fingervision.live.run_folder import RecordedFrame, RunFolder
 from fingervision.measuring.other_camera import other_camera
@@ -27,8 +28,8 @@ from fingervision.vision.pipeline import measure_frame
 # Without a frame for so long, or for so many periods, the source is silent.
 SILENT_S, SILENT_PERIODS = 0.5, 5.0
 MESSAGES_KEPT = 50
-# Frames waiting for the measurement from which on the preview gives way.
-FRAMES_UNTIL_HURRY = 4
+# With more frames than this waiting for the measurement, it is late by one, and the preview gives way.
+FRAMES_UNTIL_HURRY = 1
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -200,6 +201,7 @@ class Session:
         return lags or (recorder is not None and recorder.in_a_hurry)
 
     def _measure(self) -> None:
+        be_prompt()
         try:
             self._measure_all()
         except Exception as error:

@@ -1,23 +1,29 @@
 """Live measuring of a network camera on loopback: frames lost, lateness, processor, memory.
 
-    python tests/benchmarks/live.py [--seconds 600] [--size 640x480] [--rate-hz 25] [--record]
+    python tests/benchmarks/live.py [--seconds 600] [--size 640x480] [--rate-hz 25] [--record] [--page]
 
-ffmpeg serves MJPEG over HTTP; capture and measuring run in this process, as `fingervision live` runs them.
+ffmpeg serves MJPEG over HTTP; capture and measuring run in this process, as `fingervision live` runs them. It ends by
+itself. Each line is a figure, with its bar where it has one.
 
 * lost: frames that arrived and were not measured, and frames that are missing between two that arrived;
 * expected: frames that ffmpeg's pace gives in the time between the first and the last;
-* late: from arrival to number, in milliseconds and, at the 99th percentile, in frames;
+* late: from arrival to number;
 * core: processor time of this process, as a share of one core (decoding, measuring, watching);
 * memory: resident, after a tenth of the time and at the end.
+
+With --page somebody looks: the page is served and each picture acknowledged, by a process of its own.
 """
 
 import argparse
+import os
 import socket
 import subprocess
+import sys
 import tempfile
 import time
 from math import cos, pi
 from pathlib import Path
+from threading import Event, Thread
 
 import cv2
 import numpy as np
@@ -26,20 +32,34 @@ from calib.calibration import BareScale
 from fingervision.frames.source import Wish
 from fingervision.live.choices import Choices
 from fingervision.live.opening import opened
+from fingervision.live.server import Page, bound
 from fingervision.live.session import Session
 from fingervision.rendering import Camera, render, two_fingers
 from fingervision.storage.gaps_csv import GapRow
 
 CYCLE, PX_PER_MM = 50, 34.0
+MOST_CORE, MOST_GROWN = 0.25, 1.05
+# What a page does: take each message and acknowledge it.
+LOOKS = """
+import sys
+from urllib.parse import urlsplit
+from websockets.sync.client import connect
+at = urlsplit(sys.argv[1])
+with connect(f"ws://{at.netloc}/socket?{at.query}", origin=f"http://{at.netloc}", max_size=None) as page:
+    for message in page:
+        if isinstance(message, bytes):
+            page.send('{"do": "ack"}')
+"""
 
 
 def main() -> None:
-    """Run once and print one row."""
+    """Run once and print the table."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--seconds", type=float, default=600.0)
     parser.add_argument("--size", default="640x480")
     parser.add_argument("--rate-hz", type=int, default=25)
     parser.add_argument("--record", action="store_true")
+    parser.add_argument("--page", action="store_true")
     wanted = parser.parse_args()
     width_px, height_px = (int(part) for part in wanted.size.split("x"))
     with tempfile.TemporaryDirectory() as folder:
@@ -73,6 +93,7 @@ def run(address: str, folder: Path, wanted: argparse.Namespace) -> None:
         frames.append(row.frame)
 
     session.on_row.append(note)
+    looking = looked_at(session) if wanted.page else None
     session.start()
     while len(frames) < 2 * wanted.rate_hz:  # compiled code is loaded with the first frames
         time.sleep(0.1)
@@ -87,16 +108,39 @@ def run(address: str, folder: Path, wanted: argparse.Namespace) -> None:
     core = (time.process_time() - used_s) / (time.monotonic() - began_s)
     last, late_bytes = len(frames) - 1, resident_bytes()
     lost = session.capture.overflowed + session.cadence.missing + (frames[last] - frames[first]) - (last - first)
+    load = os.getloadavg()[0]
+    if looking is not None:
+        looking.kill()
+        looking.wait()
     session.stop()
     expected = (arrived[last] - arrived[first]) * wanted.rate_hz
+    period_ms = 1e3 / wanted.rate_hz
     late_ms = 1e3 * np.array(late_s[first : last + 1])
-    p50, p99 = np.percentile(late_ms, (50, 99))
-    print("size     rate  seconds  frames expected  lost  late p50 ms  p99 ms  p99 frames  worst ms  core   memory MB")
-    print(
-        f"{wanted.size:8} {wanted.rate_hz:4d} {arrived[last] - arrived[first]:8.1f} {last - first:7d} {expected:8.1f} "
-        f"{lost:5d} {p50:12.2f} {p99:7.2f} {p99 * wanted.rate_hz / 1e3:11.3f} {late_ms.max():9.1f} {100 * core:4.1f}% "
-        f"{early_bytes / 1e6:7.1f} -> {late_bytes / 1e6:.1f}"
-    )
+    p50_ms, p99_ms = np.percentile(late_ms, (50, 99))
+    looked = ", page open" if wanted.page else ""
+    recorded = ", recording" if wanted.record else ""
+    print(f"{wanted.size} at {wanted.rate_hz} frames/s for {arrived[last] - arrived[first]:.1f} s{recorded}{looked}")
+    told("frames measured, of so many expected", f"{last - first} of {expected:.1f}")
+    told("frames lost", f"{lost}", "none", lost == 0)
+    told("late, median", f"{p50_ms:.1f} ms")
+    told("late, 99th percentile", f"{p99_ms:.1f} ms", f"a frame, {period_ms:.1f} ms", p99_ms <= period_ms)
+    told("late, worst", f"{late_ms.max():.1f} ms")
+    told("share of a core", f"{100 * core:.1f} %", f"{100 * MOST_CORE:.0f} %", core <= MOST_CORE)
+    grown = late_bytes / early_bytes
+    told("memory", f"{early_bytes / 1e6:.1f} to {late_bytes / 1e6:.1f} MB", "flat, within 5 %", grown <= MOST_GROWN)
+    told("load of the machine at the end", f"{load:.1f}")
+
+
+def told(what: str, figure: str, bar: str = "", met: bool | None = None) -> None:
+    """Print a line of the table: what, how much, the bar, and whether it is met."""
+    print(f"{what:38} {figure:>20}  {bar:18} {'' if met is None else 'met' if met else 'MISSED'}", flush=True)
+
+
+def looked_at(session: Session) -> "subprocess.Popen[bytes]":
+    """Serve the page, and look at it from a process of its own."""
+    page = Page(session, bound("127.0.0.1", 0), "127.0.0.1")
+    Thread(target=page.serve, args=(Event(),), daemon=True).start()
+    return subprocess.Popen([sys.executable, "-c", LOOKS, page.address])
 
 
 def draw(path: Path, width_px: int, height_px: int) -> None:
