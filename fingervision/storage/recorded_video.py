@@ -165,3 +165,15 @@ class RecordedVideo:
             f"{self._path} could not be written any further ({why}); what was recorded until then is in it: make room, "
             "or name another --out."
         )
+
+
+def frames_in(path: Path) -> int:
+    """Count the whole frames of a recording that may have broken off; 0 where there is none."""
+    count = 0
+    try:
+        with av.open(str(path)) as container:
+            for packet in container.demux(container.streams.video[0]):
+                count += packet.pts is not None and packet.size > 0
+    except (av.FFmpegError, OSError, IndexError):
+        return count
+    return count

@@ -1,0 +1,84 @@
+"""`fingervision bed run`: a recipe on the bed, from the first check to the table that `diagnose` takes."""
+
+from pathlib import Path
+
+import click
+
+from fingervision.cli._on_bed import bed_option, hide_option
+
+EXAMPLES = """
+\b
+Examples:
+  fingervision bed run recipe.toml --out run
+  fingervision bed run recipe.toml --hide backlash:play_mm=0.2 --hide camera_tilt --out run
+  fingervision bed run recipe.toml --hide sealed.toml --out run
+  fingervision bed run diagnosis/next_run.toml --bed lab.toml --out second
+  fingervision diagnose run/samples.csv --model run/simulation.csv --out diagnosis
+
+\b
+Files written to --out:
+  samples.csv   one row a frame: input, gap, both edges, force      video.mp4     every frame, lossless (FFV1)
+  run.json      recipe, bed, clocks, digests                        events.jsonl  what happened, when
+  recipe.toml   the recipe                                          simulation.csv what a simulated gripper should do
+
+A run that broke off, for whatever reason, goes on with the same command. While it runs on a terminal: p and Enter
+pauses and goes on, q and Enter or Ctrl-C ends it; the motor stops first.
+"""
+
+
+@click.command(epilog=EXAMPLES)
+@click.argument("recipe_toml", metavar="RECIPE.toml", type=click.Path(path_type=Path))
+@bed_option
+@hide_option
+@click.option("--out", type=click.Path(path_type=Path), default=Path("run"), show_default=True, help="Folder to write.")
+@click.option(
+    "--seed", type=click.IntRange(0), help="Of everything random in simulated parts; the same gives the same."
+)
+@click.option("--real-time", is_flag=True, help="Let a simulated bed take the time that it would take.")
+@click.option("--json", "as_json", is_flag=True, help="Print the end of the run as JSON.")
+def command(
+    recipe_toml: Path,
+    bed_name: str,
+    hide: tuple[str, ...],
+    out: Path,
+    seed: int | None,
+    real_time: bool,
+    as_json: bool,
+) -> None:
+    """Run a recipe on the bed and measure every picture.
+
+    The whole recipe is held against the bed's limits before anything moves.
+    """
+    import json
+    import sys
+
+    from fingervision.storage.recipe_toml import read_recipe
+    from fingervision.testbed.hidden_words import hidden_from
+    from fingervision.testbed.put_together import open_bed
+    from fingervision.testbed.run import run_recipe
+
+    recipe, hidden = read_recipe(recipe_toml), hidden_from(hide)
+    bed = open_bed(bed_name, hidden, pace=1.0 if real_time else 0.0, seed=seed)
+    try:
+        with click.progressbar(length=1000, label="running", file=sys.stderr, hidden=not sys.stderr.isatty()) as bar:
+            done = run_recipe(
+                recipe,
+                bed,
+                out,
+                hidden,
+                on_progress=lambda now, total: bar.update(max(0, int(1000 * now / total) - bar.pos) if total else 0),
+                say=lambda words: click.echo(words, err=True),
+            )
+    finally:
+        bed.close()
+    if as_json:
+        counts = done.counts
+        document = {"folder": str(done.folder), "frames": counts.recorded, "frames_with_gap": counts.with_gap}
+        click.echo(json.dumps({**document, "frames_lost": counts.lost, "resumed_after": done.resumed_after}))
+        return
+    went_on = f", after {done.resumed_after} that were there" if done.resumed_after else ""
+    click.echo(f"{done.counts.recorded} frames{went_on}, {done.counts.with_gap} with a gap: {out / 'samples.csv'}")
+    if bed.model is not None:
+        click.echo(
+            f"next: fingervision diagnose {out / 'samples.csv'} --model {out / 'simulation.csv'} --out diagnosis"
+        )

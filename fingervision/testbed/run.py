@@ -1,0 +1,87 @@
+"""A recipe on a bed: planned, checked, run, written."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+from fingervision.domain.recipe import Recipe
+from fingervision.storage.toml_section import Section
+from fingervision.testbed.bed import Bed
+from fingervision.testbed.controls import Controls
+from fingervision.testbed.hidden import NOTHING, Hidden
+from fingervision.testbed.plan import Plan, plan
+from fingervision.testbed.run_folder import BedRunFolder
+from fingervision.testbed.runner import Counts, Progress, Runner, Say
+from fingervision.testbed.sight import Sight
+
+
+@dataclass(frozen=True, slots=True)
+class RunDone:
+    """A run that came to its end.
+
+    Parameters
+    ----------
+    folder : Path
+        Its files.
+    counts : Counts
+        What became of the frames.
+    resumed_after : int
+        Frames that were there before; 0 for a new run.
+    """
+
+    folder: Path
+    counts: Counts
+    resumed_after: int
+
+
+def run_recipe(
+    recipe: Recipe[Section],
+    bed: Bed,
+    out: Path,
+    hidden: Hidden = NOTHING,
+    *,
+    controls: Controls | None = None,
+    on_progress: Progress = lambda done, total: None,
+    say: Say = lambda words: None,
+    on_plan: Callable[[Plan], None] = lambda planned: None,
+) -> RunDone:
+    """Run a recipe; nothing moves before all of it was held against the limits and the fingers were seen.
+
+    Parameters
+    ----------
+    recipe : Recipe
+        What to do.
+    bed : Bed
+        Where; it is left open.
+    out : Path
+        Folder for the run; one that broke off is gone on with.
+    hidden : Hidden
+        What the bed was put together with.
+    controls : Controls, optional
+        Pause and stop.
+    on_progress, say, on_plan : callable
+        Told of the way: seconds done and expected, sentences, and the plan before it is run.
+
+    Raises
+    ------
+    FingervisionError
+        In a sentence; the motor stands, and the folder is valid.
+    """
+    sight = Sight(bed)
+    sight.position.read()
+    planned = plan(recipe, bed.limits, bed.model, sight.position.newest, sight.rate_hz)
+    on_plan(planned)
+    folder = BedRunFolder(out, recipe, bed, hidden)
+    try:
+        size_px = (sight.camera.description.width_px, sight.camera.description.height_px)
+        left = max(sum(planned.seconds) * sight.rate_hz - len(folder.rows), 0.0)
+        folder.needs_room(left, size_px)
+        runner = Runner(
+            bed, planned, sight, folder, controls or Controls(), recipe.below_force_n, on_progress=on_progress, say=say
+        )
+        counts = runner.execute()
+        folder.finish(runner.found())
+    except BaseException as error:
+        folder.break_off(str(error) or type(error).__name__)
+        raise
+    return RunDone(out, counts, len(folder.rows))
