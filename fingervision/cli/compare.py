@@ -46,5 +46,5 @@ def command(measured: Path, model_path: Path, out: Path, seed: int, kind: str, a
         click.echo(f"  {place.words}")
     if not found.places:
         click.echo("  nowhere beyond the noise")
-    for words in found.bench.notes:
+    for words in (*found.bench.notes, *found.bench.refitted()):
         click.echo(f"  note: {words}")

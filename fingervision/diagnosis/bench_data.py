@@ -5,7 +5,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from fingervision.diagnosis.distrusted_rows import distrusted_rows
-from fingervision.diagnosis.explanation import Problem
+from fingervision.diagnosis.drawing_refit import BENT, DrawingRefit, estimated, tangent, with_moved
+from fingervision.diagnosis.explanation import Explanation, Problem
 from fingervision.diagnosis.measuring_chain import MeasuringChain, admissible
 from fingervision.diagnosis.noise import Noise, estimate_noise, gate
 from fingervision.diagnosis.smooth_input import input_sigma, smoothed
@@ -13,12 +14,15 @@ from fingervision.diagnosis.whitening import RunOffsets, Whitener
 from fingervision.domain.effect import Array, Effect, Flags, History
 from fingervision.domain.errors import FingervisionError
 from fingervision.domain.measured_table import MeasuredTable
+from fingervision.domain.model import PhysicalModel
 from fingervision.domain.response import Response
 from fingervision.models.corrected import CorrectedModel
 
 HELD_SAMPLES = 15
 STAIRCASE = 0.1
 """Share of an encoder step's variance that is left after smoothing."""
+DOUBTFUL = 2.0
+"""Standard uncertainties beyond which a number of the drawing is doubtful."""
 SHORT = 100
 """Samples below which nothing is set aside before something was explained."""
 OUTLIER_SIGMAS, RAW_SIGMAS = 4.5, 7.0
@@ -49,6 +53,8 @@ class BenchData:
         Rows that say nothing about the gripper: set instead of measured, or beside a fault of the simulation.
     notes : tuple of str
         What a reader must know.
+    refit : DrawingRefit
+        What the drawing's uncertain numbers do to the prediction.
     """
 
     table: MeasuredTable
@@ -61,6 +67,12 @@ class BenchData:
     excluded: dict[str, str]
     distrusted: Flags
     notes: tuple[str, ...]
+    refit: DrawingRefit
+
+    @property
+    def aim_mm(self) -> Array:
+        """What an explanation's prediction is fitted to: the measurement, seen from the drawn numbers; shape (m,)."""
+        return np.asarray(self.stacked_mm + self.refit.shift)
 
     @property
     def channels(self) -> tuple[str, ...]:
@@ -90,8 +102,42 @@ class BenchData:
             error > 0.3 * noises[0].total_mm
         ):
             error = np.zeros_like(error)
-        whitener = Whitener(history, tuple(noises), np.concatenate(aside), error, self.input_samples)
-        return Problem(self.chain, whitener.one(self.stacked_mm), whitener, RunOffsets.of(whitener), self.effects)
+        drawing = self.refit.columns if self.refit.moved else None
+        whitener = Whitener(history, tuple(noises), np.concatenate(aside), error, self.input_samples, drawing)
+        return Problem(self.chain, whitener.one(self.aim_mm), whitener, RunOffsets.of(whitener), self.effects)
+
+    def redrawn(self, problem: Problem, explanation: Explanation) -> "BenchData":
+        """Refit the drawing's uncertain numbers beside an explanation, and predict with them from now on."""
+        drawn = self.model.base
+        if not (self.refit.moved and isinstance(drawn, PhysicalModel)):
+            return self
+        moved, known = estimated(self.refit, problem, explanation)
+        model = with_moved(drawn, moved)
+        rest_mm = float(model.respond(np.zeros(1)).gap_mm[0])
+        chain = replace(self.chain, model=model, history=replace(self.chain.history, rest_gap_mm=rest_mm))
+        return replace(self, chain=chain, refit=replace(tangent(chain, drawn, moved), known=known))
+
+    def straight(self, drawn: "BenchData", problem: Problem) -> bool:
+        """Whether the tangent at other numbers of the drawing foretold this prediction, to within the noise."""
+        bent = self.chain.stacked({}) - drawn.chain.stacked({})
+        bent -= drawn.refit.columns @ (
+            np.array(list(self.refit.moved.values())) - np.array(list(drawn.refit.moved.values()))
+        )
+        missed = problem.whitener.one(bent)
+        return float(missed @ missed) < BENT
+
+    def refitted(self) -> tuple[str, ...]:
+        """Say which numbers of the drawing were refitted, and to what; a sentence each."""
+        drawn = self.model.base
+        if not isinstance(drawn, PhysicalModel):
+            return ()
+        out = []
+        for name, by in self.refit.moved.items():
+            u = drawn.uncertain[name]
+            left = self.refit.known.get(name, 1.0) * u
+            far = ": the drawing is farther off than it states" if abs(by) > DOUBTFUL else ""
+            out.append(f"{name} was refitted by {by * u:+.3g} to within +-{left:.2g}, from +-{u:.2g} as drawn{far}.")
+        return tuple(out)
 
 
 def prepare(table: MeasuredTable, model: CorrectedModel, without: frozenset[str] = frozenset()) -> BenchData:
@@ -172,7 +218,11 @@ def prepare(table: MeasuredTable, model: CorrectedModel, without: frozenset[str]
     able, excluded = admissible(history, without, model.base)
     distrusted, reasons = distrusted_rows(table, model.base, float(zero))
     notes += reasons
-    return BenchData(table, model, chain, stacked, error, max(samples, 1.0), able, excluded, distrusted, tuple(notes))
+    uncertain = isinstance(model.base, PhysicalModel) and model.base.uncertain
+    refit = tangent(chain, model.base, {}) if uncertain else DrawingRefit(np.zeros((stacked.size, 0)), {})
+    return BenchData(
+        table, model, chain, stacked, error, max(samples, 1.0), able, excluded, distrusted, tuple(notes), refit
+    )
 
 
 def _is_motion(table: MeasuredTable, model: CorrectedModel, u: Array, smooth: Array) -> bool:

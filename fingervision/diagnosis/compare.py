@@ -54,7 +54,7 @@ class Comparison:
                 }
                 for p in self.places
             ],
-            "notes": list(self.bench.notes),
+            "notes": [*self.bench.notes, *self.bench.refitted()],
         }
 
 
@@ -63,6 +63,10 @@ def compare(table: MeasuredTable, model: CorrectedModel, *, seed: int = 1) -> Co
     bench = prepare(table, model)
     residual = bench.stacked_mm - bench.chain.stacked({})
     problem = bench.problem(residual, 0, explained=False)
+    if bench.refit.moved:
+        bench = bench.redrawn(problem, problem.nothing())
+        residual = bench.stacked_mm - bench.chain.stacked({})
+        problem = bench.problem(residual, 0, explained=False)
     found = places(bench, problem, residual, np.random.default_rng(seed))
     history = bench.chain.history
     rms = rms_mm(residual, history.input_mm.size, history.both_edges)

@@ -1,7 +1,7 @@
 """The whole loop: where they disagree, which effect is missing, how much it explains, what remains."""
 
 import time
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -9,8 +9,8 @@ from fingervision.diagnosis.bench_data import BenchData, prepare
 from fingervision.diagnosis.explanation import Explanation, Problem
 from fingervision.diagnosis.next_run import next_run
 from fingervision.diagnosis.noise import Noise
-from fingervision.diagnosis.posterior import settled
-from fingervision.diagnosis.search import Findings, Progress, search
+from fingervision.diagnosis.refitted_search import refitted_search
+from fingervision.diagnosis.search import Findings, Progress
 from fingervision.diagnosis.unseen_runs import rms_mm, unseen_rms_mm
 from fingervision.diagnosis.where import where
 from fingervision.domain.effect import Array
@@ -93,16 +93,8 @@ def diagnose(
     """
     begin = time.perf_counter()
     rng = np.random.default_rng(seed)
-    bench = prepare(table, model, without)
-
-    def problem(explanation: Explanation | None) -> Problem:
-        values = {} if explanation is None else explanation.values
-        free = 0 if explanation is None else explanation.free
-        return bench.problem(bench.stacked_mm - bench.chain.stacked(values), free, explained=explanation is not None)
-
-    found = search(problem, rng, forced, progress)
-    best, posterior = settled(found.problem, found.best, rng)
-    found = replace(found, best=best, alternatives=tuple(best if e is found.best else e for e in found.alternatives))
+    refitted = refitted_search(prepare(table, model, without), rng, forced, progress)
+    bench, found, best = refitted.bench, refitted.found, refitted.found.best
     history = bench.chain.history
     n = history.input_mm.size
     before = bench.stacked_mm - bench.chain.stacked({})
@@ -120,7 +112,7 @@ def diagnose(
     }
     disagreement = Disagreement(rms_mm(before, n, edges), rms_mm(after, n, edges), noise_rms, *unseen, channels)
     effects = _named(found)
-    proposal = next_run(bench, found.problem, [e for e in found.alternatives if e.names], posterior, rng)
+    proposal = next_run(bench, found.problem, [e for e in found.alternatives if e.names], refitted.posterior, rng)
     report = DiagnosisReport(
         verdict=found.verdict,
         sentence=_sentence(found, effects, disagreement),
@@ -143,7 +135,7 @@ def diagnose(
             for e in found.singles[:8]
             if e.names != best.names
         ),
-        notes=(*bench.notes, *_beyond(bench, best), *_input_dominates(bench, found.problem)),
+        notes=(*bench.notes, *bench.refitted(), *_beyond(bench, best), *_input_dominates(bench, found.problem)),
         seconds=time.perf_counter() - begin,
     )
     progress(1.0)

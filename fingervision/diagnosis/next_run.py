@@ -6,11 +6,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from fingervision.diagnosis.bench_data import BenchData
+from fingervision.diagnosis.drawing_refit import tangent
 from fingervision.diagnosis.explanation import Explanation, Point, Problem, fit
 from fingervision.diagnosis.posterior import draws
 from fingervision.diagnosis.protocols import Step, driven, protocols
 from fingervision.diagnosis.whitening import RunOffsets, Whitener
 from fingervision.domain.effect import Array, History, PointEffect
+from fingervision.domain.model import PhysicalModel
 from fingervision.domain.report import NextRun
 from fingervision.domain.response import Response
 
@@ -69,14 +71,17 @@ def _joined(bench: BenchData, problem: Problem, inputs: Array) -> Problem:
         ]
     )
     extra = float(np.median(problem.whitener.input_mm))
+    chain, drawn = replace(problem.chain, history=history), bench.model.base
     whitener = Whitener(
         history,
         problem.whitener.noises,
         aside,
         np.concatenate([problem.whitener.input_mm, np.full(inputs.size, extra)]),
         problem.whitener.input_samples,
+        tangent(chain, drawn, bench.refit.moved).columns
+        if bench.refit.moved and isinstance(drawn, PhysicalModel)
+        else None,
     )
-    chain = replace(problem.chain, history=history)
     empty = np.zeros(history.input_mm.size * len(bench.channels))
     return replace(problem, chain=chain, whitener=whitener, measured=empty, offsets=RunOffsets.of(whitener))
 

@@ -45,9 +45,7 @@ def unseen_rms_mm(bench: BenchData, problem: Problem, best: Explanation) -> tupl
         for channel in range(channels):
             hidden[channel * n + run.start : channel * n + run.stop] = True
         whitener = replace(problem.whitener, aside=hidden)
-        rest = replace(
-            problem, whitener=whitener, measured=whitener.one(bench.stacked_mm), offsets=RunOffsets.of(whitener)
-        )
+        rest = replace(problem, whitener=whitener, measured=whitener.one(bench.aim_mm), offsets=RunOffsets.of(whitener))
         fitted = fit(rest, best.names, best.values, sigma_mm=best.sigma_mm, iterations=6)
         residual = bench.stacked_mm - bench.chain.stacked(fitted.values)
         for channel in range(channels):

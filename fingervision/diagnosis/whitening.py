@@ -63,6 +63,8 @@ class Whitener:
         Standard deviation that the input's remaining error gives the gap; 0 where it is known.
     input_samples : float
         Samples over which that error is correlated.
+    drawing : ndarray of float, shape (channels * n, p), or None
+        What one standard uncertainty of each uncertain number of the gripper's drawing does to the prediction.
     """
 
     history: History
@@ -70,6 +72,7 @@ class Whitener:
     aside: Flags
     input_mm: Array
     input_samples: float
+    drawing: Array | None = None
 
     def columns(self, columns: Array) -> tuple[Array, float]:
         """Whiten columns of shape (channels * n, k); also the logarithm of the covariance's determinant."""
@@ -107,12 +110,15 @@ class Whitener:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RunOffsets:
-    """Re-zeroing between runs, a zero-mean random effect per channel, and the midline's free constant.
+    """What is refitted beside every explanation: re-zeroing between runs, the midline's constant, the drawing.
+
+    Re-zeroing is a zero-mean random effect per channel; the constant is free; an uncertain number of the drawing is a
+    random effect of its own uncertainty.
 
     Parameters
     ----------
     design : ndarray of float, shape (m, columns)
-        Whitened indicator columns: one a run and channel, and the midline's constant last.
+        Whitened columns: one a run and channel, then the midline's constant, then the drawing's uncertain numbers.
     channels : int
         Gap, then midline and force where they were measured.
     runs : int
@@ -121,6 +127,8 @@ class RunOffsets:
         Whether the second channel is the midline, whose constant is free.
     scales_mm : tuple of float
         Noise of each channel.
+    drawn : int
+        How many numbers of the drawing are uncertain.
     """
 
     design: Array
@@ -129,6 +137,7 @@ class RunOffsets:
     runs: int
     midline: bool
     scales_mm: tuple[float, ...]
+    drawn: int = 0
 
     @classmethod
     def of(cls, whitener: Whitener) -> "RunOffsets":
@@ -142,14 +151,17 @@ class RunOffsets:
                 columns[channel * n + run.start : channel * n + run.stop, channel * runs + index] = 1.0
         if free:
             columns[n : 2 * n, -1] = 1.0
+        drawn = 0 if whitener.drawing is None else whitener.drawing.shape[1]
+        if whitener.drawing is not None:
+            columns = np.hstack([columns, whitener.drawing])
         design = whitener.columns(columns)[0]
         scales = tuple(noise.total_mm for noise in whitener.noises)
-        return cls(design, design.T @ design, channels, runs, bool(free), scales)
+        return cls(design, design.T @ design, channels, runs, bool(free), scales, drawn)
 
     def metric(self, sigma_mm: tuple[float, ...]) -> Array:
         """Return G with r^T r - (Z^T r)^T G (Z^T r) the squared length once offsets of these spreads are allowed."""
         prior = [max(sigma_mm[channel], 1e-9) for channel in range(self.channels) for _ in range(self.runs)]
-        prior += [MIDLINE_FREE_MM] * int(self.midline)
+        prior += [MIDLINE_FREE_MM] * int(self.midline) + [1.0] * self.drawn
         return np.asarray(np.linalg.inv(self.gram + np.diag(1.0 / np.array(prior) ** 2)), dtype=np.float64)
 
     def spread(self, residual: Array) -> tuple[tuple[float, ...], float]:
@@ -168,6 +180,10 @@ class RunOffsets:
         if self.runs == 1:
             return (0.0,) * self.channels, 0.0
         shares = self.design.T @ residual
+        if self.drawn:
+            # What the drawing's numbers explain is no scatter between runs.
+            inner = self.gram[-self.drawn :, -self.drawn :] + np.eye(self.drawn)
+            shares = shares - self.gram[:, -self.drawn :] @ np.linalg.solve(inner, shares[-self.drawn :])
         out, total = [], 0.0
         for channel in range(self.channels):
             z = np.maximum(np.diag(self.gram)[channel * self.runs : (channel + 1) * self.runs], 1e-12)
