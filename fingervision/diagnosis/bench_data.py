@@ -8,7 +8,7 @@ from fingervision.diagnosis.distrusted_rows import distrusted_rows
 from fingervision.diagnosis.drawing_refit import BENT, DrawingRefit, estimated, tangent, with_moved
 from fingervision.diagnosis.explanation import Explanation, Problem
 from fingervision.diagnosis.measuring_chain import MeasuringChain, admissible
-from fingervision.diagnosis.noise import Noise, estimate_noise, gate
+from fingervision.diagnosis.noise import Noise, estimate_noise, gate, pooled_short_noise
 from fingervision.diagnosis.smooth_input import input_sigma, smoothed
 from fingervision.diagnosis.whitening import RunOffsets, Whitener
 from fingervision.domain.effect import Array, Effect, Flags, History
@@ -25,6 +25,8 @@ DOUBTFUL = 2.0
 """Standard uncertainties beyond which a number of the drawing is doubtful."""
 SHORT = 100
 """Samples below which nothing is set aside before something was explained."""
+SHORT_RUN = 60
+"""Samples of the longest run below which its spectrum says too little about the noise."""
 OUTLIER_SIGMAS, RAW_SIGMAS = 4.5, 7.0
 """Limits on the residual of the best explanation, and on the raw one, where effects still stand out themselves."""
 
@@ -87,14 +89,17 @@ class BenchData:
         sigmas = OUTLIER_SIGMAS if explained else None if timed and n < SHORT else RAW_SIGMAS
         rate = 1.0 / history.sample_time_s if timed else None
         floor = 0.0 if self.table.u_random_mm is None else float(np.median(self.table.u_random_mm))
-        noises: list[Noise] = []
-        aside: list[Flags] = []
-        for channel in range(len(self.channels)):
-            part = residual_mm[channel * n : (channel + 1) * n]
-            out = gate(part, history.runs, timed, sigmas) | self.distrusted
-            aside.append(out)
-            share = (floor, 0.5 * floor, 0.0)[("gap", "midline", "force").index(self.channels[channel])]
-            noises.append(estimate_noise(part, history.runs, rate, out, share, degrees))
+        floors = [{"gap": floor, "midline": 0.5 * floor, "force": 0.0}[name] for name in self.channels]
+        parts = [residual_mm[channel * n : (channel + 1) * n] for channel in range(len(self.channels))]
+        aside = [gate(part, history.runs, timed, sigmas) | self.distrusted for part in parts]
+        noises: tuple[Noise, ...]
+        if timed and max(run.stop - run.start for run in history.runs) < SHORT_RUN:
+            noises = pooled_short_noise(parts, history.runs, aside, floors, explained=explained)
+        else:
+            noises = tuple(
+                estimate_noise(part, history.runs, rate, out, share, degrees)
+                for part, out, share in zip(parts, aside, floors, strict=True)
+            )
         if history.both_edges:
             aside[0] = aside[1] = aside[0] | aside[1]
         error = self.input_error_mm
@@ -103,7 +108,7 @@ class BenchData:
         ):
             error = np.zeros_like(error)
         drawing = self.refit.columns if self.refit.moved else None
-        whitener = Whitener(history, tuple(noises), np.concatenate(aside), error, self.input_samples, drawing)
+        whitener = Whitener(history, noises, np.concatenate(aside), error, self.input_samples, drawing)
         return Problem(self.chain, whitener.one(self.aim_mm), whitener, RunOffsets.of(whitener), self.effects)
 
     def redrawn(self, problem: Problem, explanation: Explanation) -> "BenchData":

@@ -1,6 +1,6 @@
 """The next run: the protocol that separates what is open, by expected distance per minute (Atkinson & Fedorov 1975)."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -9,7 +9,7 @@ from fingervision.diagnosis.bench_data import BenchData
 from fingervision.diagnosis.drawing_refit import tangent
 from fingervision.diagnosis.explanation import Explanation, Point, Problem, fit
 from fingervision.diagnosis.posterior import draws
-from fingervision.diagnosis.protocols import Step, driven, protocols
+from fingervision.diagnosis.protocols import Step, driven, protocols, rounding_s
 from fingervision.diagnosis.whitening import RunOffsets, Whitener
 from fingervision.domain.effect import Array, History, PointEffect
 from fingervision.domain.model import PhysicalModel
@@ -28,11 +28,18 @@ ENOUGH = 50.0
 MOST_RIVALS = 6
 TRUTHS = 16
 """Draws of either explanation's parameters behind a promise."""
+FURTHER = 3
+"""Further starts of a rival's refit: one search may stand still beside the place where it imitates the truth."""
+SMALLER = (0.7, 0.5, 0.35, 0.25, 0.15)
+"""Shares of the range that are tried one after the other."""
+AT_END = 0.01
+"""Share of its range within which a parameter lies at the end."""
 PROMISED = 0.95
 CAMERA = frozenset({"scale_error", "edge_bias", "lens_distortion"})
 """What a slot of known width in the picture shows."""
 SLOT_FRAMES, SLOT_U_MM = 10, 0.002
 """Frames averaged on a reference slot, and the standard uncertainty of its width: an ordinary gauge block's."""
+Settings = Mapping[str, Mapping[str, float]]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -141,15 +148,32 @@ def _reference(bench: BenchData, problem: Problem, best: Explanation, rivals: li
     return None
 
 
-def _apart(problem: Problem, values: Mapping[str, Mapping[str, float]], rival: Explanation) -> float:
-    """Distance of a prediction to a rival, over the rival's parameters."""
+def _moved_bounds(old: Problem, new: Problem, names: tuple[str, ...], values: Settings) -> Point:
+    """Values for a table of another range: a stop that was not seen lies at the range's end, wherever that is."""
+    out: Point = {name: dict(values[name]) for name in names}
+    for (name, was), (_, now) in zip(old.parameters(names), new.parameters(names), strict=True):
+        near = AT_END * (was.upper - was.lower)
+        value = values[name][was.name]
+        if was.lower != now.lower and value <= was.lower + near:
+            out[name][was.name] = now.lower
+        elif was.upper != now.upper and value >= was.upper - near:
+            out[name][was.name] = now.upper
+    return out
+
+
+def _apart(problem: Problem, values: Settings, rival: Explanation, starts: Sequence[Settings]) -> float:
+    """Distance of a prediction to a rival, over the rival's parameters; the nearest of several searches."""
     target = problem.whitened(values)
-    return fit(problem, rival.names, rival.values, target=target, sigma_mm=rival.sigma_mm, iterations=8).score
+    return min(
+        fit(problem, rival.names, start, target=target, sigma_mm=rival.sigma_mm, iterations=8).score for start in starts
+    )
 
 
-def _gain(old: Problem, joined: Problem, values: Mapping[str, Mapping[str, float]], rival: Explanation) -> float:
+def _gain(old: Problem, joined: Problem, truth: Settings, rival: Explanation, starts: Sequence[Settings]) -> float:
     """What a run adds to the distance: the rival is refitted to old and new data together."""
-    return max(0.0, _apart(joined, values, rival) - _apart(old, values, rival))
+    before = _apart(old, truth, rival, starts)
+    anew = [_moved_bounds(old, joined, rival.names, start) for start in starts]
+    return max(0.0, _apart(joined, _moved_bounds(old, joined, tuple(truth), truth), rival, anew) - before)
 
 
 def _promise(
@@ -164,12 +188,13 @@ def _promise(
     The truth's parameters are drawn from what the data leave open; the new run's own noise adds 2 sqrt(gain) to the
     difference of two chi-squares.
     """
-    gains = []
+    gains: list[float] = []
     count = TRUTHS if joined.chain.history.input_mm.size <= MOST_SAMPLES else TRUTHS // 4
-    for truth, rival, drawn in ((*pair, found), (*pair[::-1], None)):
-        points = draws(old, truth, rng) if drawn is None else drawn
-        picked = points[len(points) // (2 * count) :: max(1, len(points) // count)]
-        gains += [_gain(old, joined, values, rival) for values in picked]
+    drawn = (found, draws(old, pair[1], rng))
+    for truth, rival in ((0, 1), (1, 0)):
+        starts = [pair[rival].values, *drawn[rival][:: max(1, len(drawn[rival]) // FURTHER)]]
+        step = max(1, len(drawn[truth]) // count)
+        gains += [_gain(old, joined, values, pair[rival], starts) for values in drawn[truth][step // 2 :: step]]
     expected = np.array(gains)
     come = expected[:, None] + 2.0 * np.sqrt(expected)[:, None] * rng.standard_normal((expected.size, 400))
     low, high = np.quantile(come, (0.5 - 0.5 * PROMISED, 0.5 + 0.5 * PROMISED))
@@ -177,19 +202,52 @@ def _promise(
 
 
 def _proposals(
-    bench: BenchData, problem: Problem, best: Explanation, rivals: list[Explanation], ends: tuple[float, float]
+    bench: BenchData,
+    problem: Problem,
+    best: Explanation,
+    rivals: list[Explanation],
+    ends: tuple[float, float],
+    only: str | None = None,
 ) -> list[_Proposal]:
-    step_s = bench.chain.history.sample_time_s
-    known = [_apart(problem, best.values, rival) for rival in rivals]
+    """Try every protocol between two ends of the input; of the two that might be true, the one that shows less."""
+    history = bench.chain.history
+    step_s = history.sample_time_s
+    round_s = rounding_s(bench.table.input_mm, step_s, history.runs)
     found = []
     for name, steps in protocols(*ends, step_s):
-        inputs = driven(steps, step_s)
-        if inputs.size > MOST_SAMPLES:
+        inputs = driven(steps, step_s, round_s)
+        if inputs.size > MOST_SAMPLES or (only is not None and name != only):
             continue
         joined = _joined(bench, problem, inputs)
-        gains = [_apart(joined, best.values, rival) - before for rival, before in zip(rivals, known, strict=True)]
+        gains = []
+        for rival in rivals:
+            there = _gain(problem, joined, best.values, rival, [rival.values])
+            gains.append(
+                there if there <= WORTH else min(there, _gain(problem, joined, rival.values, best, [best.values]))
+            )
         found.append(_Proposal(name, steps, inputs, tuple(gains), SETTLE_MIN + inputs.size * step_s / 60.0))
     return found
+
+
+def _no_larger_than_needed(
+    bench: BenchData, problem: Problem, best: Explanation, rivals: list[Explanation], chosen: _Proposal
+) -> _Proposal:
+    """Drive the same over less of the range while it still separates every rival that it did, surely enough.
+
+    Small motions are kinder to the gripper, and what a large one gains beyond need rests on the explanations' forms
+    more than on what was measured.
+    """
+    low, high = float(chosen.inputs_mm.min()), float(chosen.inputs_mm.max())
+    middle = 0.5 * (low + high)
+    apart = [rival for rival, gain in zip(rivals, chosen.gains, strict=True) if gain > WORTH]
+    for share in SMALLER:
+        ends = middle + share * (low - middle), middle + share * (high - middle)
+        (smaller,) = _proposals(bench, problem, best, apart, ends, chosen.name)
+        if min(smaller.gains) < ENOUGH:
+            break
+        gains = iter(smaller.gains)
+        chosen = replace(smaller, gains=tuple(next(gains) if gain > WORTH else gain for gain in chosen.gains))
+    return chosen
 
 
 def next_run(
@@ -234,6 +292,7 @@ def next_run(
         return special
     if chosen is None or chosen.worth == 0.0:
         return special
+    chosen = _no_larger_than_needed(bench, problem, best, rivals, chosen)
     apart = [(gain, rival) for gain, rival in zip(chosen.gains, rivals, strict=True) if gain > WORTH]
     rival = min(apart, key=lambda item: item[0])[1]
     joined = _joined(bench, problem, chosen.inputs_mm)

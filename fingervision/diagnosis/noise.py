@@ -78,7 +78,7 @@ def estimate_noise(
         Parameters that were fitted.
     """
     kept = residual[~aside]
-    if rate_hz is None or max(run.stop - run.start for run in runs) < 24:
+    if rate_hz is None:
         spread = float(np.sqrt(np.sum((kept - np.median(kept)) ** 2) / max(1, kept.size - 1 - degrees)))
         return Noise(max(spread, floor_mm, 1e-9), 0.0, 0.0)
     angles, powers = [], []

@@ -7,6 +7,10 @@ from fingervision.domain.effect import Array
 Step = dict[str, object]
 EDGE = 0.03
 """Share of the range that is left free at either end: an offset or a scale must not drive the stage beyond it."""
+ORDINARY_S, MOST_S = 0.3, 2.0
+"""Time of a reversal: of an ordinary stage, and at most."""
+FINE = 8
+"""Steps a sample in which a motion is put together."""
 SAMPLES_A_STROKE = 15
 """A stroke of fewer samples would be told from another by its corners alone, which no stage drives as drawn."""
 
@@ -48,7 +52,21 @@ def _driven(step: Step, start: float, step_s: float) -> Array:
     return np.concatenate(parts)
 
 
-def driven(steps: list[Step], step_s: float) -> Array:
+def rounding_s(input_mm: Array, step_s: float, runs: tuple[slice, ...]) -> float:
+    """Estimate how long the stage takes to reverse, from the sharpest corner that a record shows.
+
+    A reversal from speed v spread over T seconds has the acceleration 2 v / T. A record without one says nothing:
+    then an ordinary stage's third of a second.
+    """
+    speeds = np.concatenate([np.diff(input_mm[run]) for run in runs]) / step_s
+    bends = np.concatenate([np.abs(np.diff(input_mm[run], 2)) for run in runs]) / step_s**2
+    fast = float(np.quantile(np.abs(speeds), 0.95)) if speeds.size else 0.0
+    if not bends.size or speeds.max() < 0.5 * fast or speeds.min() > -0.5 * fast:
+        return ORDINARY_S
+    return float(np.clip(2.0 * fast / max(float(bends.max()), 1e-12), 0.0, MOST_S))
+
+
+def driven(steps: list[Step], step_s: float, round_s: float) -> Array:
     """Sample the input that a recipe's moving steps drive, beginning at rest where the first of them begins.
 
     Parameters
@@ -57,6 +75,8 @@ def driven(steps: list[Step], step_s: float) -> Array:
         Triangles, staircases, moves and holds.
     step_s : float
         Time between samples.
+    round_s : float
+        Time over which the stage rounds its corners.
 
     Returns
     -------
@@ -65,9 +85,12 @@ def driven(steps: list[Step], step_s: float) -> Array:
     at = _number(steps[0], "from_mm") if "from_mm" in steps[0] else 0.0
     parts = [np.array([at])]
     for step in steps:
-        parts.append(_driven(step, at, step_s))
+        parts.append(_driven(step, at, step_s / FINE))
         at = float(parts[-1][-1])
-    return np.concatenate(parts)
+    path = np.concatenate(parts)
+    width = round(round_s / step_s * FINE) // 2
+    padded = np.pad(path, width, mode="edge")
+    return np.convolve(padded, np.full(2 * width + 1, 1.0 / (2 * width + 1)), "valid")[::FINE]
 
 
 def protocols(low_mm: float, high_mm: float, step_s: float) -> list[tuple[str, list[Step]]]:

@@ -5,18 +5,20 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from fingervision.diagnosis.bootstrap import QUANTILE, gain_of_noise
 from fingervision.diagnosis.explanation import Explanation, Problem, fit
 from fingervision.diagnosis.probes import probes
-from fingervision.diagnosis.signatures import Signatures, signatures
+from fingervision.diagnosis.signatures import Signatures, signatures, tangents
 from fingervision.domain.effect import Array
 from fingervision.domain.report import Verdict
 
 Progress = Callable[[float], None]
 DRAWS = 300
-QUANTILE = 0.985
 INDISTINGUISHABLE = 9.0
 BARE_MENTION = 3.0
 """Below this difference of BIC simplicity is no evidence (Kass & Raftery 1995): tables of a score of rows."""
+LIMIT = 1.0
+"""Chi-square between two predictions below which the richer of two forms only repeats the simpler one."""
 ADMISSIBLE = 21.0
 """Chi-square by which a true explanation 9 away can come out worse, at 95 %: 9 + 1.96 * 2 * sqrt(9)."""
 SMALL_SHARE = 0.05
@@ -24,6 +26,8 @@ SMALL_SHARE = 0.05
 TRIPLE_SHARE = 0.15
 """A third effect needs evidence of its own: three effects bend to almost anything."""
 PAIRS_REFITTED = 60
+CLEARLY_NOT, CLEARLY = 0.6, 2.5
+"""Shares of the linear threshold outside which a gain needs no bootstrap to be judged."""
 STAIRCASE_SHARE = 0.5
 """What is smaller than half an encoder step's own error is not told from it: the staircase is no random noise."""
 SHORT = 100
@@ -83,18 +87,6 @@ def _singles(problem: Problem, atoms: Signatures, iterations: int) -> list[Expla
     return sorted(found, key=lambda explanation: explanation.score)
 
 
-def _tangents(problem: Problem, explanation: Explanation) -> Array:
-    base = problem.chain.stacked(explanation.values)
-    columns = []
-    for name, parameter in problem.parameters(explanation.names):
-        value = explanation.values[name][parameter.name]
-        step = 1e-3 * max(abs(value), 1e-3 * min(parameter.upper - parameter.lower, 1.0))
-        step = step if value + step <= parameter.upper else -step
-        moved = {**explanation.values, name: {**explanation.values[name], parameter.name: value + step}}
-        columns.append((problem.chain.stacked(moved) - base) / step)
-    return problem.whitener.columns(np.stack(columns, axis=1))[0]
-
-
 def _extended(
     problem: Problem, atoms: Signatures, bases: list[Explanation], most: int, progress: Progress
 ) -> list[Explanation]:
@@ -103,7 +95,7 @@ def _extended(
     planned: list[tuple[float, Explanation, str, dict[str, float]]] = []
     for base in bases:
         metric = problem.offsets.metric(base.sigma_mm)
-        gain, coefficient = atoms.gains(base.residual, problem.offsets, metric, _tangents(problem, base))
+        gain, coefficient = atoms.gains(base.residual, problem.offsets, metric, tangents(problem, base))
         for name in problem.effects:
             mine = np.flatnonzero(owner == name)
             if name in base.names or not mine.size:
@@ -190,16 +182,22 @@ def search(
     progress(0.3)
     best, peers = nothing, [nothing]
     pairs = []
-    if singles and (nothing.score - singles[0].score > threshold or forced):
+
+    def exceeds_noise(gained: float, base: Explanation) -> bool:
+        if not CLEARLY_NOT * threshold < gained < CLEARLY * threshold:
+            return gained > threshold
+        return gained > gain_of_noise(problem, atoms, base, rng)
+
+    if singles and (exceeds_noise(nothing.score - singles[0].score, nothing) or forced):
         best, peers = _choose(singles[:6], samples), singles
         bases = singles[:14]
         pairs = _extended(problem, atoms, bases, PAIRS_REFITTED, lambda share: progress(0.3 + 0.4 * share))
         gained = best.score - pairs[0].score if pairs else 0.0
-        if gained > threshold and _added(problem, best, pairs[0]) > SMALL_SHARE:
+        if pairs and _added(problem, best, pairs[0]) > SMALL_SHARE and exceeds_noise(gained, best):
             best, peers = _choose(pairs[:6], samples), pairs
             triples = _extended(problem, atoms, pairs[:3], 24, lambda share: progress(0.7 + 0.1 * share))
             gained = best.score - triples[0].score if triples else 0.0
-            if gained > threshold and _added(problem, best, triples[0]) > TRIPLE_SHARE:
+            if triples and _added(problem, best, triples[0]) > TRIPLE_SHARE and exceeds_noise(gained, best):
                 best, peers = _choose(triples[:6], samples), triples
     if forced:
         best = _insisted(problem, forced, [*singles, *pairs], singles, samples)
@@ -244,10 +242,10 @@ def _gate(problem: Problem, best: Explanation, rng: np.random.Generator) -> tupl
     dot = moved.T @ best.residual
     norm = np.einsum("ij,ij->j", shapes.columns, moved)
     if best.names:
-        tangents = _tangents(problem, best)
-        bent = tangents - offsets.design @ (metric @ (offsets.design.T @ tangents))
+        moves = tangents(problem, best)
+        bent = moves - offsets.design @ (metric @ (offsets.design.T @ moves))
         cross = bent.T @ shapes.columns
-        inverse = np.linalg.pinv(tangents.T @ bent)
+        inverse = np.linalg.pinv(moves.T @ bent)
         dot = dot - cross.T @ (inverse @ (bent.T @ best.residual))
         norm = norm - np.einsum("ij,ij->j", cross, inverse @ cross)
     usable = norm > 1e-3 * np.maximum(np.einsum("ij,ij->j", shapes.columns, shapes.columns), 1e-12)
@@ -289,28 +287,40 @@ def _set(
     rows = max(2, int(problem.measured.size - problem.whitener.aside.sum()))
     pool = list(pool)
     if len(best.names) == 1:
-        odds = best.bic(rows) + _surprise(problem, best) + BARE_MENTION
+        odds = best.bic(rows) + _surprise(problem, best) - BARE_MENTION
         pool += [pair for pair in pairs if pair.bic(rows) + _surprise(problem, pair) < odds]
+    smaller: list[Explanation] = [best]
     for other in pool:
-        if other.names == best.names or any(set(m.names) <= set(other.names) for m in members):
+        if other.names == best.names or any(set(m.names) <= set(other.names) for m in smaller):
             continue
-        gap = target - problem.whitened(other.values)
-        shared = problem.offsets.design.T @ gap
-        near = float(gap @ gap - shared @ metric @ shared)
+        near = _squared(problem, target - problem.whitened(other.values), metric)
         if near > 400.0 and other.score - best.score > 200.0:
             continue
         distance = near if near < INDISTINGUISHABLE else _distance(problem, best, other, best.sigma_mm)
         if distance >= INDISTINGUISHABLE and other.score - best.score < ADMISSIBLE:
             distance = min(distance, _distance(problem, other, best, best.sigma_mm))
         distances[other.names] = distance
-        # A richer form at its limit is the simpler name: friction of vanishing reach is backlash.
-        same_count = len(other.names) == len(best.names)
-        limiting = same_count and other.free > best.free and best.score - other.score < 1.0
         # One that leaves the data nearly as badly off as no effect at all explains nothing: the runs' scatter hides it.
         idle = nothing.score - other.score < 0.3 * (nothing.score - best.score)
-        if distance < INDISTINGUISHABLE and not limiting and not idle and other.score - best.score < ADMISSIBLE:
+        if distance < INDISTINGUISHABLE and not idle and other.score - best.score < ADMISSIBLE:
+            smaller.append(other)
             members.append(other)
+    members = [m for m in members if m is best or not any(_is_limit(problem, m, o, metric) for o in members)]
     return [m for m in members if not any(set(o.names) < set(m.names) for o in members)], distances
+
+
+def _squared(problem: Problem, whitened: Array, metric: Array) -> float:
+    """Squared length of a whitened difference once run offsets are allowed."""
+    shared = problem.offsets.design.T @ whitened
+    return float(whitened @ whitened - shared @ metric @ shared)
+
+
+def _is_limit(problem: Problem, richer: Explanation, simpler: Explanation, metric: Array) -> bool:
+    """Whether a richer form at its limit is the simpler name: friction of vanishing reach is backlash."""
+    if len(richer.names) != len(simpler.names) or richer.free <= simpler.free:
+        return False
+    apart = problem.whitened(richer.values) - problem.whitened(simpler.values)
+    return _squared(problem, apart, metric) < LIMIT
 
 
 def _beside_foretold(problem: Problem, members: list[Explanation]) -> list[Explanation]:

@@ -5,7 +5,7 @@ from itertools import product
 
 import numpy as np
 
-from fingervision.diagnosis.explanation import Problem
+from fingervision.diagnosis.explanation import Explanation, Problem
 from fingervision.diagnosis.whitening import RunOffsets
 from fingervision.domain.effect import Array
 
@@ -105,3 +105,16 @@ def signatures(problem: Problem) -> Signatures:
                     columns.append(column)
     whitened = problem.whitener.columns(np.stack(columns, axis=1))[0]
     return Signatures(tuple(names), tuple(starts), tuple(grows), whitened)
+
+
+def tangents(problem: Problem, explanation: Explanation) -> Array:
+    """Whitened derivatives of an explanation's prediction by its parameters; shape (m, p)."""
+    base = problem.chain.stacked(explanation.values)
+    columns = []
+    for name, parameter in problem.parameters(explanation.names):
+        value = explanation.values[name][parameter.name]
+        step = 1e-3 * max(abs(value), 1e-3 * min(parameter.upper - parameter.lower, 1.0))
+        step = step if value + step <= parameter.upper else -step
+        moved = {**explanation.values, name: {**explanation.values[name], parameter.name: value + step}}
+        columns.append((problem.chain.stacked(moved) - base) / step)
+    return problem.whitener.columns(np.stack(columns, axis=1))[0]

@@ -141,12 +141,24 @@ def judge(experiment: Experiment) -> Judgement:
             # A pair against a single effect: the tool's order of preference may drop it.
             sure = verdict and len(own.names) == 2
             (must if sure else may).append(names)
+    must, folded = _foldable(must)
+    may += folded
     if nothing < FAR:
         may, must = ([*may, *must], [frozenset()]) if nothing < NEAR else ([*may, frozenset()], must)
     nearest = dict(sorted(nearest.items(), key=lambda item: item[1])[:12])
     return Judgement(
         tuple(must), tuple(may), nothing, own.distance, own.effects, nearest, outside=False, rival=float(rival)
     )
+
+
+def _foldable(must: list[frozenset[str]]) -> tuple[list[frozenset[str]], list[frozenset[str]]]:
+    """Part off what only repeats another right answer at its limit: friction without reach beside a play."""
+    kept = list(must)
+    for names in must[1:]:
+        simpler = set().union(*(LIMITING.get(name, set()) for name in names)) if len(names) == 1 else set()
+        if any(other <= simpler for other in kept if other != names):
+            kept.remove(names)
+    return kept, [names for names in must if names not in kept]
 
 
 def _among(search: Search, form: Curve, singles: list[Fit], own: Fit) -> list[Fit]:
