@@ -13,8 +13,11 @@ LATE_SHARE = 0.75
 FRAMES_TO_KNOW_THE_PERIOD = 10
 # Frames that follow sooner than this share of a period were held up and hurry; nothing is judged by them.
 HURRY_SHARE = 0.5
-# A step that differs from the median by less is a usual one.
-USUAL_SHARE = 0.55
+# The period is the median over strides of so many frames, among so many: what holds frames up, and what is missing,
+# then weighs little. The mean of usual steps would be too short where many frames are a little late.
+FRAMES_A_STRIDE, FRAMES_FOR_THE_PERIOD = 25, 250
+# Of the lateness that is no missing frame, so much is taken over: the period is never quite right, and would add up.
+FORGIVEN_SHARE = 0.02
 
 
 class Cadence:
@@ -23,18 +26,21 @@ class Cadence:
     def __init__(self) -> None:
         self.missing = 0
         self._times_s: deque[float] = deque(maxlen=FRAMES_LOOKED_AT)
+        self._long_s: deque[float] = deque(maxlen=FRAMES_FOR_THE_PERIOD)
         self._lateness_s: deque[float] = deque(maxlen=FRAMES_UNTIL_SURE)
         self._due_s: float | None = None
 
     def restart(self) -> None:
         """Forget the times before a cut, which is no drop."""
         self._times_s.clear()
+        self._long_s.clear()
         self._lateness_s.clear()
         self._due_s = None
 
     def add(self, time_s: float) -> None:
         """Take in a frame's time."""
         self._times_s.append(time_s)
+        self._long_s.append(time_s)
         if len(self._times_s) < FRAMES_TO_KNOW_THE_PERIOD:
             return
         period_s = self.period_s
@@ -48,7 +54,10 @@ class Cadence:
             self._lateness_s.clear()
         elif self._times_s[-1] - self._times_s[-2] < HURRY_SHARE * period_s:
             self._lateness_s.clear()
-        self._lateness_s.append(time_s - self._due_s)
+        late_s = time_s - self._due_s
+        self._lateness_s.append(late_s)
+        if late_s < LATE_SHARE * period_s:
+            self._due_s += FORGIVEN_SHARE * late_s
         if len(self._lateness_s) < FRAMES_UNTIL_SURE:
             return
         late_s = min(self._lateness_s)
@@ -61,13 +70,12 @@ class Cadence:
     @property
     def period_s(self) -> float | None:
         """Usual time from frame to frame; None as long as it is not known."""
-        steps = [after - before for before, after in pairwise(self._times_s)]
-        usual_s = median(steps) if steps else 0.0
-        if usual_s <= 0.0:
+        times = tuple(self._long_s)
+        stride = min(FRAMES_A_STRIDE, len(times) // 2)
+        if stride < 1:
             return None
-        # The mean of the usual steps: held-up and hurried frames are left out, and so are holes.
-        near = [step for step in steps if abs(step - usual_s) < USUAL_SHARE * usual_s]
-        return sum(near) / len(near)
+        usual_s = median(after - before for before, after in zip(times, times[stride:], strict=False)) / stride
+        return usual_s if usual_s > 0.0 else None
 
     @property
     def rate_hz(self) -> float | None:

@@ -41,3 +41,18 @@ def test_rate_and_jitter_are_those_of_the_times() -> None:
     assert cadence.rate_hz == pytest.approx(25.0, rel=0.01)
     assert cadence.jitter_s == pytest.approx(0.001 * np.sqrt(2.0), rel=0.25)
     assert cadence.period_s == pytest.approx(PERIOD_S, rel=0.01)
+
+
+@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("lost", [[], [700], [300, 301, 1500]])
+def test_lateness_that_is_mostly_small_and_sometimes_large_is_no_drop(seed: int, lost: list[int]) -> None:
+    # A busy machine: as many frames as came are a little later than the one before as are earlier, a few much later.
+    rng = np.random.default_rng(seed)
+    late_s = rng.exponential(0.2 * PERIOD_S, 2000)
+    times = np.maximum.accumulate(np.arange(2000) * PERIOD_S + late_s)
+    assert watched(np.delete(times, lost)).missing == len(lost)
+
+
+def test_a_period_that_is_not_quite_right_adds_up_to_nothing() -> None:
+    drift = np.cumsum(0.004 * PERIOD_S * np.sin(np.arange(5000) / 400.0))
+    assert watched(np.arange(5000) * PERIOD_S + drift).missing == 0
