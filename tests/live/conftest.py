@@ -22,10 +22,13 @@ import pytest
 
 from fingervision.rendering import Camera, render, two_fingers
 
+# It is for the system's Python.
+collect_ignore = ["rtsp_server.py"]
 # Starting Python with its libraries takes seconds where two cores are shared by many.
 START_S = 60.0
 CYCLE = 50
 PX_PER_MM = 34.0
+JPEG_BEGINS = b"\xff\xd8\xff"
 
 
 @dataclass
@@ -132,6 +135,11 @@ def pictures(tmp_path_factory: pytest.TempPathFactory) -> Path:
             picture = render(scene, Camera(blur_px=0.9, noise_grey=2.0), rng)
             file.write(cv2.imencode(".jpg", picture, [cv2.IMWRITE_JPEG_QUALITY, 92])[1].tobytes())
     return path
+
+
+def single_pictures(pictures: Path) -> list[bytes]:
+    """Each JPEG of those that follow one another: all begin alike, and nothing within looks like that."""
+    return [JPEG_BEGINS + rest for rest in pictures.read_bytes().split(JPEG_BEGINS)[1:]]
 
 
 @pytest.fixture

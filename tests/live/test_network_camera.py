@@ -6,7 +6,10 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
+import av
 import pytest
+
+from tests.live.conftest import single_pictures
 
 SCALE = ("--px-per-mm", "34")
 MINUTE_S = 60.0
@@ -46,6 +49,12 @@ def test_every_frame_of_a_minute_is_measured_and_a_cut_is_a_gap(
     table = (run / "gaps.csv").read_text()
     assert len(rows(run / "gaps.csv")) == len(lines)
     assert measured(run / "video.mp4", *SCALE) == table
+    # The camera's own pictures, to the byte.
+    sent = set(single_pictures(camera.pictures))
+    with av.open(run / "video.mp4") as video:
+        kept = [bytes(packet) for packet in video.demux(video=0) if packet.size]
+    assert len(kept) == len(lines)
+    assert set(kept) <= sent
 
 
 def test_a_stream_of_h264_keeps_its_own_times_and_begins_with_a_whole_picture(
