@@ -98,6 +98,8 @@ class SimulatedGripper:
             if place not in drawn:
                 drawn[place] = self._drawn(place, rng)
             time_s = index / self._rate_hz
+            # A machine that draws too slowly gets a slower camera: like a real one, it never hurries to catch up.
+            started_s = max(started_s, monotonic() - time_s - 1.0 / self._rate_hz)
             if self._closed.wait(max(0.0, started_s + time_s - monotonic())):
                 return
             yield Received(Frame(drawn[place], index, time_s), monotonic())
