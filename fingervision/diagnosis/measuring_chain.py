@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from fingervision.domain.effect import Array, DriveEffect, Effect, History, PointEffect, Values
-from fingervision.domain.model import Model, PhysicalModel
+from fingervision.domain.model import Model, PhysicalLaw, PhysicalModel
 from fingervision.domain.parameter import Parameter
 from fingervision.domain.response import Response
 from fingervision.effects import catalogue
@@ -38,7 +38,8 @@ class MeasuringChain:
     def respond(self, settings: Settings) -> Response:
         """Run the chain; an effect named in `settings` replaces a fixed one of the same name."""
         acting = {**self.fixed, **settings}
-        order = [obeyed(effect, self.model) for name, effect in catalogue().items() if name in acting]
+        laws = laws_of(self.model)
+        order = [obeyed(effect, laws.get(name)) for name, effect in catalogue().items() if name in acting]
         input_mm = self.history.input_mm
         points: list[PointEffect] = []
         for effect in order:
@@ -65,9 +66,13 @@ class MeasuringChain:
         return np.concatenate(parts)
 
 
-def obeyed(effect: Effect, model: Model) -> Effect:
-    """Return the effect as this model obeys it: a drawn gripper by its own physics, a table by the catalogue's form."""
-    law = model.laws.get(effect.name) if isinstance(model, PhysicalModel) else None
+def laws_of(model: Model) -> Mapping[str, PhysicalLaw]:
+    """Laws by the effect's name: a drawn gripper obeys its own physics, a table has none."""
+    return model.laws if isinstance(model, PhysicalModel) else {}
+
+
+def obeyed(effect: Effect, law: PhysicalLaw | None) -> Effect:
+    """Return the effect as a model obeys it: by its own law, or without one by the catalogue's form."""
     if law is None or not isinstance(effect, PointEffect):
         return effect
 
@@ -82,8 +87,9 @@ def admissible(history: History, without: frozenset[str], model: Model) -> tuple
     """Effects that these data can show, and the reasons for leaving out the others."""
     able: dict[str, Effect] = {}
     excluded: dict[str, str] = {}
+    laws = laws_of(model)
     for name, entry in catalogue().items():
-        effect = obeyed(entry, model)
+        effect = obeyed(entry, laws.get(name))
         searched = effect.search(history)
         if name in without:
             excluded[name] = "left out by request"

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -42,7 +43,7 @@ def small_answer(gripper: Gripper, theory: HingeTheory) -> SmallAnswer:
     return SmallAnswer(2.0 * half.measured_rest_mm, gap_per_input(half), half.equilibrium(1.0).force_n)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class RatioCurves:
     """How gap and force change, relative to the drawing, along a change of one of its numbers.
 
@@ -60,17 +61,21 @@ class RatioCurves:
 
     def force_at_gap(self, gap_ratio: float) -> float:
         """Force ratio of the change that gives a gap ratio; both ratios are 1 at no change."""
-        return _between(self.gap, self.force, gap_ratio)
+        return float(self._force(np.clip(gap_ratio, self.gap.min(), self.gap.max())))
 
     def gap_at_force(self, force_ratio: float) -> float:
         """Gap ratio of the change that gives a force ratio."""
-        return _between(self.force, self.gap, force_ratio)
+        return float(self._gap(np.clip(force_ratio, self.force.min(), self.force.max())))
 
+    @cached_property
+    def _force(self) -> CubicSpline:
+        order = np.argsort(self.gap)
+        return CubicSpline(self.gap[order], self.force[order])
 
-def _between(along: Array, answer: Array, at: float) -> float:
-    order = np.argsort(along)
-    x = float(np.clip(at, along.min(), along.max()))
-    return float(CubicSpline(along[order], answer[order])(x))
+    @cached_property
+    def _gap(self) -> CubicSpline:
+        order = np.argsort(self.force)
+        return CubicSpline(self.force[order], self.gap[order])
 
 
 def ratio_curves(gripper: Gripper, theory: HingeTheory, change: Callable[[float], Gripper], low: float, high: float,

@@ -1,7 +1,7 @@
 """Effects hidden in the mechanics: another gripper is built and run, and the diagnosis has the drawing of this one.
 
-Run as `python -m tests.benchmarks.own_physics [KIND] [--no-force]`: one line for each thing hidden, what it was named,
-and the disagreement before and after.
+Run as `python -m tests.benchmarks.own_physics [--no-force]`: one line for each thing hidden, what it was named, and the
+disagreement before and after.
 """
 
 import sys
@@ -33,7 +33,7 @@ EDGE_MM = 0.001
 FORCE_N = 0.01
 RUN_MM = 0.0005
 MIDLINE_MM = 0.3
-RATE_HZ = 20.0
+RATE_HZ = 10.0
 SEED = 5
 CAMERA_ABOVE_MM = 100.0
 """Distance of the camera's centre of projection from the plate."""
@@ -174,27 +174,25 @@ def table(hidden: Hidden, folder: Path, *, force: bool, seed: int = SEED) -> Pat
     return path
 
 
-def answered(hidden: Hidden, folder: Path, *, force: bool, kind: str = "lumped") -> DiagnosisReport:
+def answered(hidden: Hidden, folder: Path, *, force: bool, drawing: Path = DRAWING) -> DiagnosisReport:
     """Measure and diagnose beside the drawing."""
     measured = read_measured_table(table(hidden, folder, force=force))
-    return diagnose(measured, read_model(DRAWING, kind), seed=SEED).report
+    return diagnose(measured, read_model(drawing), seed=SEED).report
 
 
-def main(kind: str, *, force: bool) -> None:
+def main(*, force: bool) -> None:
     """Print the table."""
     for name, hidden in CASES.items():
         with tempfile.TemporaryDirectory() as folder:
-            report = answered(hidden, Path(folder), force=force, kind=kind)
+            report = answered(hidden, Path(folder), force=force)
         d = report.disagreement
         found = " | ".join("+".join(names) for names in report.alternatives) or "-"
         print(f"{name:15} {report.verdict:10} {found:50} {1e3 * d.before_rms_mm:8.1f} -> {1e3 * d.after_rms_mm:.2f} um"
               f"   {report.seconds:.1f} s")  # fmt: skip
         for effect in report.effects:
-            print("    ", effect.name, {k: (round(e.value, 5), e.u) for k, e in effect.parameters.items()})
-        if report.unknown:
-            print("    ", report.unknown)
+            numbers = (f"{key} = {e.value:.5g} +- {e.u or 0.0:.2g}" for key, e in effect.parameters.items())
+            print(f"{'':16}{effect.name}: {', '.join(numbers)}")
 
 
 if __name__ == "__main__":
-    words = [word for word in sys.argv[1:] if not word.startswith("-")]
-    main(words[0] if words else "lumped", force="--no-force" not in sys.argv)
+    main(force="--no-force" not in sys.argv)
