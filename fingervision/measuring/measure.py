@@ -3,7 +3,6 @@
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, closing
 from dataclasses import dataclass, field, replace
-from itertools import islice
 from pathlib import Path
 from time import monotonic
 from typing import Any
@@ -29,10 +28,8 @@ from fingervision.measuring.summary import summarise
 from fingervision.storage.gaps_csv import GapsCsv
 from fingervision.storage.recorded_camera import recorded_camera
 from fingervision.storage.summary_json import write_summary
-from fingervision.vision.pipeline import Settings, measure_frames
+from fingervision.vision.pipeline import Settings, measure_frame
 
-# So many frames are measured together: more gain nothing, and each must be held in memory.
-FRAMES_TOGETHER = 8
 # Rows are made for so many frames at once, or for what has come in so many seconds, and then handed to the table.
 FRAMES_AT_ONCE, SECONDS_AT_ONCE = 128, 0.4
 
@@ -209,19 +206,8 @@ def _outcomes(
 ) -> Iterator[tuple[Frame | LostFrame, GapMeasurement | NoGap | LostFrame]]:
     """Every frame with what it says; the decoder runs ahead and is stopped when this is."""
     with closing(decoded_ahead(source)) as frames:
-        interruption: KeyboardInterrupt | None = None
-        while interruption is None:
-            together: list[Frame | LostFrame] = []
-            try:
-                together.extend(islice(frames, FRAMES_TOGETHER))
-                if not together:
-                    return
-            except KeyboardInterrupt as error:  # what has come is measured first
-                interruption = error
-            measured = iter(measure_frames([item for item in together if isinstance(item, Frame)], task.settings))
-            for item in together:
-                yield item, (next(measured) if isinstance(item, Frame) else item)
-        raise interruption
+        for item in frames:
+            yield item, measure_frame(item, task.settings) if isinstance(item, Frame) else item
 
 
 def _check(task: Task, description: Description) -> None:

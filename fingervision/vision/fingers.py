@@ -6,26 +6,26 @@ with two tops and a notch between them, and are found in the same way. What begi
 tip out of view.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import combinations
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import find_peaks
 
+from fingervision.domain.compiled import compiled
 from fingervision.domain.direction import Direction
 from fingervision.domain.gap import NoGap
 from fingervision.domain.status import Status
 from fingervision.vision.orientation import Orientation
 
-Outline = NDArray[np.int_]
+Outline = NDArray[np.int32]
 
 # A top that is lower than this is noise or dust on an outline, whatever the scale (pixels).
 SMALLEST_PROMINENCE_PX = 5.0
 # An outline that comes back up by more than this has passed the bottom of a notch.
-SMALLEST_NOTCH_PX = 3
+TURNED_PX = 3
 # Two tops with a notch between them are touching fingers where the notch has so much of the measuring height, and the
 # fingers so many times of it.
 SMALLEST_NOTCH_SHARE, LEAST_LENGTH_SHARE = 0.3, 4.0
@@ -43,7 +43,7 @@ class Top:
 
     Parameters
     ----------
-    outline : ndarray of int, shape (n, 2)
+    outline : ndarray of int32, shape (n, 2)
         Closed outline of the thing, (across, along), starting at its lowest point.
     index : int
         Place of the top on the outline.
@@ -75,7 +75,7 @@ class CoarseFinger:
 
     Parameters
     ----------
-    outline : ndarray of int, shape (n, 2)
+    outline : ndarray of int32, shape (n, 2)
         (across, along), the last pixels of the finger itself.
     inner_sign : int
         +1 where the gap lies at larger `across` (the left finger), -1 for the right finger.
@@ -115,7 +115,9 @@ def find_outlines(mask: NDArray[np.uint8]) -> list[Outline]:
     """Outlines (x, y) of everything set in a mask, holes included, but for specks."""
     outlines, _ = cv2.findContours(mask, cv2.RETR_LIST, cv2.CHAIN_APPROX_NONE)
     return [
-        np.asarray(outline[:, 0, :], dtype=np.int_) for outline in outlines if len(outline) > 4 * SMALLEST_PROMINENCE_PX
+        np.asarray(outline[:, 0, :], dtype=np.int32)
+        for outline in outlines
+        if len(outline) > 4 * SMALLEST_PROMINENCE_PX
     ]
 
 
@@ -163,24 +165,80 @@ def find_fingers(
 _SEVERITY = (Status.NO_FINGERS, Status.ONE_FINGER, Status.TIP_OUT_OF_VIEW, Status.TOUCHING)
 
 
-def _tops(mask: NDArray[np.uint8], outlines: list[Outline], orientation: Orientation) -> Iterator[Top]:
+def _tops(mask: NDArray[np.uint8], outlines: list[Outline], orientation: Orientation) -> list[Top]:
     upright = orientation.view(mask)
+    found = []
     for pixels in outlines:
-        across, along = orientation.to_axes(pixels[:, 0], pixels[:, 1])
-        lowest = int(np.argmax(along))
-        outline = np.column_stack((np.roll(across, -lowest), np.roll(along, -lowest)))
-        # Of two equally high places on one flat top the earlier is a little lower, so that one top remains.
-        height = 1e-6 * np.arange(len(outline)) - outline[:, 1]
-        # The outline is closed: its lowest point stands at both ends.
-        peaks, properties = find_peaks(np.append(height, height[0]), prominence=SMALLEST_PROMINENCE_PX, plateau_size=1)
-        for peak, prominence in zip(peaks, properties["prominences"], strict=True):
+        outline = in_axes(pixels, orientation)
+        bottom = outline[0, 1]
+        for peak, prominence in zip(*_peaks(outline), strict=True):
             a, r = outline[peak]
-            below = min(int(r) + 2, orientation.along_size - 1)
-            if not upright[below, a]:
+            if not upright[min(int(r) + 2, orientation.along_size - 1), a]:
                 continue  # the top of a hole, not of a thing
-            lowest_along = outline[0, 1]
-            is_rooted = bool(lowest_along == orientation.along_size - 1 and prominence > 0.5 * (lowest_along - r))
-            yield Top(outline, int(peak), float(prominence), is_rooted)
+            is_rooted = bool(bottom == orientation.along_size - 1 and prominence > 0.5 * (bottom - r))
+            found.append(Top(outline, int(peak), float(prominence), is_rooted))
+    return found
+
+
+def in_axes(pixels: Outline, orientation: Orientation) -> Outline:
+    """A closed outline (x, y) in the fingers' axes, from its lowest point on: it rises and falls back to it."""
+    return _from_lowest(pixels, orientation.direction.is_vertical, orientation.is_flipped, orientation.along_size)
+
+
+@compiled
+def _from_lowest(pixels: Outline, is_vertical: bool, is_flipped: bool, along_size: int) -> Outline:
+    n, axis = pixels.shape[0], 1 if is_vertical else 0
+    lowest = 0
+    for i in range(1, n):
+        down = pixels[i, axis] - pixels[lowest, axis]
+        if (down < 0) if is_flipped else (down > 0):
+            lowest = i
+    outline = np.empty((n, 2), dtype=np.int32)
+    for place in range(n):
+        i = (lowest + place) % n
+        outline[place, 0] = pixels[i, 1 - axis]
+        outline[place, 1] = along_size - 1 - pixels[i, axis] if is_flipped else pixels[i, axis]
+    return outline
+
+
+@compiled
+def _peaks(outline: Outline) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Places and prominences of the tops of an outline that starts, and so ends, at its lowest point.
+
+    A top counts once the outline has gone down from it by `SMALLEST_PROMINENCE_PX`, a valley once it has come up by as
+    much. Of several equally high places of one top the last counts.
+    """
+    n = outline.shape[0]
+    top, valley, tops = np.empty(n, dtype=np.int64), np.empty(n, dtype=np.int64), 0
+    # The outermost place since the last valley, or the lowest since the last top.
+    extreme, lowest, is_rising = 0, outline[0, 1], True
+    for place in range(1, n + 1):
+        i = place % n
+        down = outline[i, 1] - outline[extreme, 1]
+        if is_rising:
+            if down <= 0:
+                extreme = i
+            elif down >= SMALLEST_PROMINENCE_PX:
+                top[tops], valley[tops] = extreme, lowest
+                tops, extreme, is_rising = tops + 1, i, False
+        elif down > 0:
+            extreme = i
+        elif -down >= SMALLEST_PROMINENCE_PX:
+            lowest, extreme, is_rising = outline[extreme, 1], i, True
+    prominence = np.empty(tops, dtype=np.int64)
+    for k in range(tops):
+        height = outline[top[k], 1]
+        before, after = height, height
+        for j in range(k, -1, -1):
+            before = max(before, valley[j])
+            if j > 0 and outline[top[j - 1], 1] < height:
+                break
+        for j in range(k + 1, tops + 1):
+            after = max(after, valley[j] if j < tops else outline[0, 1])
+            if j < tops and outline[top[j], 1] <= height:
+                break
+        prominence[k] = min(before, after) - height
+    return top[:tops], prominence
 
 
 def _best_pair(
@@ -235,24 +293,21 @@ def _stand_side_by_side(left: Top, right: Top, below_tip_px: float) -> bool:
 
 def _follow(top: Top, inner_sign: int, below_tip_px: float, reach_px: float) -> CoarseFinger | None:
     """The outline from the inner side over the top to the outer side, as far down as `reach_px` or as it goes."""
-    along = top.outline[:, 1]
-    limit = top.along_px + reach_px
-    forward = _down_from(along[top.index :], limit)
-    backward = _down_from(along[top.index :: -1], limit)
-    start, stop = top.index - backward, top.index + forward
+    start, stop = (_end(top.outline, top.index, step, top.along_px + reach_px) for step in (-1, 1))
     piece = top.outline[start : stop + 1]
-    ends_across = piece[0, 0], piece[-1, 0]
-    if inner_sign * (ends_across[0] - ends_across[1]) < 0:
+    if inner_sign * (piece[0, 0] - piece[-1, 0]) < 0:
         piece = piece[::-1]
     if piece[0, 1] < top.along_px + below_tip_px:
         return None
     return CoarseFinger(np.ascontiguousarray(piece), inner_sign, top.along_px)
 
 
-def _down_from(along: NDArray[np.int_], limit: float) -> int:
-    """Steps until the outline has gone down to `limit`, or turns back up: at a notch, or at its own end."""
-    lowest = np.maximum.accumulate(along)
-    turned = lowest - along > SMALLEST_NOTCH_PX
-    past = int(np.argmax(turned)) if turned.any() else len(along)
-    reached = along[:past] >= limit
-    return int(np.argmax(reached)) if reached.any() else int(np.argmax(along[:past]))
+@compiled
+def _end(outline: Outline, top: int, step: int, limit: float) -> int:
+    """Where the outline, followed from its top, has gone down to `limit`, or was lowest before it turned back up."""
+    end, i = top, top
+    while 0 <= i < outline.shape[0] and outline[end, 1] < limit and outline[end, 1] - outline[i, 1] <= TURNED_PX:
+        if outline[i, 1] > outline[end, 1]:
+            end = i
+        i += step
+    return end

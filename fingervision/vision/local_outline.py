@@ -12,6 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fingervision.vision.finger_end import BIWEIGHT_REACH
+from fingervision.vision.first_guess import line
+from fingervision.vision.measuring_point import MeasuringPoint
+from fingervision.vision.outline_points import OutlinePoints
+from fingervision.vision.residuals import SHAPE_REACH_PX, is_on_outline
 
 Floats = NDArray[np.float64]
 
@@ -24,17 +28,8 @@ SPREAD_LIMIT = 1.5
 FEWEST_POINTS = 12
 # Spread (in units of the points' uncertainties) below which a residual is never an outlier.
 LEAST_SPREAD = 0.7
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class FingerPoints:
-    """The points of one finger's half-level outline; arrays of shape (n,), as in `OutlinePoints`."""
-
-    x: Floats
-    y: Floats
-    u: Floats
-    is_row: NDArray[np.bool_]
-    blur: Floats
+# An outline that is less sure than this (pixels) is not smooth; one that is flatter (across over along) has no edge.
+LEAST_SURE_PX, FLATTEST = 1.0, 3.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,7 +54,7 @@ class LocalOutline:
 
 
 def _polynomial(
-    points: FingerPoints, centre: tuple[float, float], normal: tuple[float, float], reach: float
+    points: OutlinePoints, centre: tuple[float, float], normal: tuple[float, float], reach: float
 ) -> tuple[Floats, float, float] | None:
     """Coefficients of normal distance over tangent distance, the variance at the centre, and the spread."""
     nx, ny = normal
@@ -98,7 +93,7 @@ def _polynomial(
 
 
 def outline_near(
-    points: FingerPoints, centre: tuple[float, float], normal: tuple[float, float], blur_px: float
+    points: OutlinePoints, centre: tuple[float, float], normal: tuple[float, float], blur_px: float
 ) -> tuple[Floats, float] | None:
     """Polynomial (normal over tangent distance) near a point, corrected for blur, and its uncertainty at the point.
 
@@ -126,7 +121,7 @@ def outline_near(
     return best
 
 
-def local_tip(points: FingerPoints, x: float, y: float, blur_px: float) -> LocalOutline | None:
+def local_tip(points: OutlinePoints, x: float, y: float, blur_px: float) -> LocalOutline | None:
     """The outermost point of a smooth outline near a first guess."""
     for _step in range(3):
         fit = outline_near(points, (x, y), (0.0, -1.0), blur_px)
@@ -145,7 +140,7 @@ def local_tip(points: FingerPoints, x: float, y: float, blur_px: float) -> Local
 
 
 def local_edge(
-    points: FingerPoints, x: float, y: float, slope: float, blur_px: float
+    points: OutlinePoints, x: float, y: float, slope: float, blur_px: float
 ) -> tuple[LocalOutline, float] | None:
     """Where a smooth inner edge crosses the height `y`, and its slope there, from a first guess."""
     for _step in range(3):
@@ -167,3 +162,39 @@ def local_edge(
         x += -s * ny + n * nx
         slope = (-ny + dn * nx) / (nx + dn * ny)
     return LocalOutline(x, y, u, nx, ny), slope
+
+
+def local_measuring_point(points: OutlinePoints, below_tip_px: float, shared: float) -> MeasuringPoint | None:
+    """Tip and edge of a finger of any smooth shape; None where there is none.
+
+    Parameters
+    ----------
+    points : OutlinePoints
+        Sub-pixel outline.
+    below_tip_px : float
+        Height of measuring below the tip.
+    shared : float
+        Neighbouring points that share their errors.
+    """
+    blur = float(np.median(points.blur))
+    top = int(np.argmin(points.y))
+    tip = local_tip(points, float(points.x[top]), float(points.y[top]), blur)
+    if tip is None:
+        return None
+    height = tip.y + below_tip_px
+    inner = np.flatnonzero(points.x > tip.x)
+    if not len(inner):
+        return None
+    nearest = inner[np.argmin(np.abs(points.y[inner] - height))]
+    near = inner[np.abs(points.y[inner] - height) < SHAPE_REACH_PX]
+    slope = line(points.y[near] - height, points.x[near])[1] if len(near) >= 3 else 0.0
+    found = local_edge(points, float(points.x[nearest]), height, min(max(slope, -FLATTEST), FLATTEST), blur)
+    if found is None or not is_on_outline(points, found[0].x, height):
+        return None
+    edge, slope = found
+    var_tip = shared * tip.u_normal**2
+    var_edge = shared * (edge.u_normal / edge.nx) ** 2 + slope**2 * var_tip
+    if var_edge > LEAST_SURE_PX**2:
+        return None
+    covariance = np.array([[var_tip, slope * var_tip], [slope * var_tip, var_edge]])
+    return MeasuringPoint(tip.y, tip.x, edge.x, slope, covariance)

@@ -7,9 +7,6 @@ that is turned or mirrored gives the same numbers.
 
 from dataclasses import dataclass
 
-import numpy as np
-from numpy.typing import NDArray
-
 from fingervision.domain.direction import Direction
 from fingervision.vision.grey import GreyImage
 
@@ -41,25 +38,21 @@ class Orientation:
         return self.height_px if self.direction.is_vertical else self.width_px
 
     @property
-    def _is_flipped(self) -> bool:
+    def is_flipped(self) -> bool:
+        """Whether the fingers' axis runs against the picture's."""
         return self.direction in (Direction.DOWN, Direction.RIGHT)
 
     def view(self, image: GreyImage) -> GreyImage:
         """The picture as if the tips pointed up: rows run along the fingers, columns across them."""
         upright = image if self.direction.is_vertical else image.T
-        return upright[::-1] if self._is_flipped else upright
-
-    def to_axes(self, x: NDArray[np.int_], y: NDArray[np.int_]) -> tuple[NDArray[np.int_], NDArray[np.int_]]:
-        """Pixel coordinates to (across, along)."""
-        across, along = (x, y) if self.direction.is_vertical else (y, x)
-        return across, (self.along_size - 1 - along if self._is_flipped else along)
+        return upright[::-1] if self.is_flipped else upright
 
     def to_pixels(self, across: float, along: float) -> tuple[float, float]:
         """(across, along) to pixel coordinates (x, y)."""
-        if self._is_flipped:
+        if self.is_flipped:
             along = self.along_size - 1 - along
         return (across, along) if self.direction.is_vertical else (along, across)
 
     def along_to_pixels(self, along: float) -> float:
         """A coordinate along the fingers to the picture's coordinate on the same axis."""
-        return self.along_size - 1 - along if self._is_flipped else along
+        return self.along_size - 1 - along if self.is_flipped else along

@@ -1,6 +1,6 @@
 """The order of the steps: grey, denoise, binarise, fingers, edges, tip, gap. Only this file knows it."""
 
-from collections.abc import Generator, Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,12 +13,12 @@ from fingervision.domain.status import Status
 from fingervision.vision.binarise import Binary, binarise, binarise_local
 from fingervision.vision.denoise import denoise
 from fingervision.vision.edges import EdgePoints, fit_edges
-from fingervision.vision.finger_end import OutlinePoints
 from fingervision.vision.fingers import CoarseFingers, find_fingers
-from fingervision.vision.gap import Explained, explain, measuring_gap
+from fingervision.vision.gap import measure_gap
 from fingervision.vision.grey import GreyImage, full_scale, to_grey
 from fingervision.vision.overlay import draw_boundary, draw_edge_points, draw_overlay, in_eight_bits
 from fingervision.vision.profile_lines import profile_lines
+from fingervision.vision.stripes import with_stripes
 
 # A picture whose two classes differ by less (share of full scale, and in units of the spread within) shows nothing.
 CONTRAST_FLOOR, SEPARATION_FLOOR = 0.03, 3.0
@@ -65,27 +65,8 @@ def measure_frame(frame: Frame, settings: Settings) -> GapMeasurement | NoGap:
     GapMeasurement or NoGap
         The number with its uncertainty, or why there is none.
     """
-    return measure_frames((frame,), settings)[0]
-
-
-def measure_frames(frames: Sequence[Frame], settings: Settings) -> list[GapMeasurement | NoGap]:
-    """Measure several frames together, which costs less than one by one and gives the same numbers.
-
-    Parameters
-    ----------
-    frames : sequence of Frame
-        The pictures.
-    settings : Settings
-        What the user chose.
-
-    Returns
-    -------
-    list of GapMeasurement or NoGap
-        One a frame, in order.
-    """
-    greys = [_part(to_grey(frame.pixels), settings.region) for frame in frames]
-    running = [_measuring(grey, settings, frame.coding) for grey, frame in zip(greys, frames, strict=True)]
-    return [_shifted(attempt.outcome, settings.region) for attempt in _together(running, settings.below_tip_px)]
+    grey = _part(to_grey(frame.pixels), settings.region)
+    return _shifted(_attempt(grey, settings, frame.coding).outcome, settings.region)
 
 
 def steps(frame: Frame, settings: Settings) -> list[tuple[str, Pixels]]:
@@ -105,7 +86,7 @@ def steps(frame: Frame, settings: Settings) -> list[tuple[str, Pixels]]:
     """
     grey = _part(to_grey(frame.pixels), settings.region)
     denoised = denoise(grey)
-    (attempt,) = _together([_measuring(grey, settings, frame.coding)], settings.below_tip_px)
+    attempt = _attempt(grey, settings, frame.coding)
     own = Frame(in_eight_bits(grey), frame.index)
     outcome = attempt.outcome
     words = f"gap {outcome.gap_px:.3f} px" if isinstance(outcome, GapMeasurement) else outcome.words
@@ -136,32 +117,16 @@ class _Attempt:
     edges: EdgePoints | None = None
 
 
-_Measuring = Generator[OutlinePoints, Explained, _Attempt]
-
-
-def _together(running: list[_Measuring], below_tip_px: float) -> list[_Attempt]:
-    """Let every frame go on until it asks for its outlines to be explained, and explain those of all at once."""
-    done: dict[int, _Attempt] = {}
-    answers: dict[int, Explained | None] = dict.fromkeys(range(len(running)))
-    while answers:
-        asked: dict[int, OutlinePoints] = {}
-        for number, answer in answers.items():
-            try:
-                asked[number] = running[number].send(answer)  # type: ignore[arg-type]  # None starts a generator
-            except StopIteration as stop:
-                done[number] = stop.value
-        answers = dict(zip(asked, explain(tuple(asked.values()), below_tip_px), strict=True)) if asked else {}
-    return [done[number] for number in range(len(running))]
-
-
-def _measuring(grey: GreyImage, settings: Settings, coding: Coding) -> _Measuring:
+def _attempt(grey: GreyImage, settings: Settings, coding: Coding) -> _Attempt:
     if min(grey.shape) < SMALLEST_SIDE_PX:
         return _Attempt(NoGap(Status.NO_FINGERS, "The picture is too small to hold two fingers."))
     scale = full_scale(grey)
-    if np.count_nonzero(grey == scale) > SATURATED_SHARE * grey.size:
-        return _Attempt(NoGap(Status.SATURATED, "The picture is white: nearly every pixel is at full scale."))
     denoised = denoise(grey)
     binary = binarise(denoised)
+    # The grey picture itself is counted only where denoising has left it nearly white.
+    if binary.full_scale_share > 0.9 and np.count_nonzero(grey == scale) > SATURATED_SHARE * grey.size:
+        words = "The picture is white: nearly every pixel is at full scale."
+        return _Attempt(NoGap(Status.SATURATED, words), binary)
     if binary.contrast < CONTRAST_FLOOR * scale or binary.separation < SEPARATION_FLOOR:
         words = "The picture is uniform: nothing in it differs from anything else."
         return _Attempt(NoGap(Status.LOW_CONTRAST, words), binary)
@@ -171,8 +136,8 @@ def _measuring(grey: GreyImage, settings: Settings, coding: Coding) -> _Measurin
             attempt = _Attempt(fingers, split)
         else:
             upright = fingers.orientation.view(grey)
-            edges = fit_edges(upright, profile_lines((fingers.left, fingers.right)))
-            outcome = yield from measuring_gap(fingers, edges, settings.below_tip_px, scale, light_gap, coding)
+            edges = with_stripes(upright, fit_edges(upright, profile_lines((fingers.left, fingers.right))))
+            outcome = measure_gap(fingers, edges, settings.below_tip_px, scale, light_gap, coding)
             attempt = _Attempt(outcome, split, fingers, edges)
         if isinstance(attempt.outcome, GapMeasurement) or attempt.outcome.status in FINAL:
             return attempt

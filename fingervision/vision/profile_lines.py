@@ -10,7 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from fingervision.vision.fingers import CoarseFinger
+from fingervision.domain.compiled import compiled
+from fingervision.vision.fingers import CoarseFinger, Outline
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int_]
@@ -21,10 +22,15 @@ ROWS = INNER + OUTER
 PLACES = ROWS + TIP
 IS_ROW = np.arange(PLACES) < ROWS
 IS_INNER = np.arange(PLACES) < INNER
-# 0 inner flank, 1 tip, 2 outer flank.
-SIDE = np.where(IS_ROW, np.where(IS_INNER, 0, 2), 1)
+# The sides of a finger, and which one each place belongs to.
+INNER_SIDE, TIP_SIDE, OUTER_SIDE = range(3)
+SIDE = np.where(IS_ROW, np.where(IS_INNER, INNER_SIDE, OUTER_SIDE), TIP_SIDE)
 # Outline slopes are taken over so many rows or columns to either side.
 SLOPE_REACH_PX = 4
+# Just below 45 degrees, so that no piece of the outline is seen both in rows and in columns.
+SLOPE_OF_A_TIP = 0.999
+# Beyond every picture (pixels).
+FAR = 10**9
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -61,38 +67,42 @@ def profile_lines(fingers: Sequence[CoarseFinger]) -> ProfileLines:
     slope, weight = np.zeros((2, count, PLACES))
     outward = np.full((count, PLACES), -1, dtype=np.intp)
     for k, finger in enumerate(fingers):
-        across, along = finger.outline[:, 0], finger.outline[:, 1]
-        crest = int(along.argmin())
-        sign = finger.inner_sign
-        outward[k, :INNER] = sign
-        outward[k, INNER:ROWS] = -sign
-        sides = (
-            (0, INNER, along[: crest + 1], across[: crest + 1], sign, 1.0),
-            (INNER, OUTER, along[crest:], across[crest:], -sign, 1.0),
-            (ROWS, TIP, across, along, -1, SLOPE_OF_A_TIP),
-        )
-        for first, places, lines, values, sense, steepest in sides:
-            # A tip is thinned out from its inner side, so that a mirrored finger has the mirrored lines.
-            from_end = first == ROWS and sign > 0
-            at, edge, change = _side(lines, values, sense, steepest, places, -1 if from_end else 1)
-            own = slice(first, first + len(at))
-            fixed[k, own], coarse[k, own], slope[k, own], weight[k, own] = at, edge, change, 1.0
+        outward[k, :INNER], outward[k, INNER:ROWS] = finger.inner_sign, -finger.inner_sign
+        _fill(finger.outline, finger.inner_sign, fixed[k], coarse[k], slope[k], weight[k])
     return ProfileLines(fixed, coarse, slope, weight, outward)
 
 
-# Just below 45 degrees, so that no piece of the outline is seen both in rows and in columns.
-SLOPE_OF_A_TIP = 0.999
-
-
-def _side(lines: Ints, values: Ints, sense: int, steepest: float, places: int, order: int) -> tuple[Ints, Ints, Floats]:
-    """The outermost pixel on every line that meets the outline steeply enough, its slope, thinned to the places."""
-    first = int(lines.min())
-    count = int(lines.max()) - first + 1
-    reach = np.full(count, -(10**9))
-    np.maximum.at(reach, lines - first, sense * values)
-    index = np.arange(count)
-    low, high = np.maximum(index - SLOPE_REACH_PX, 0), np.minimum(index + SLOPE_REACH_PX, count - 1)
-    slope = sense * (reach[high] - reach[low]) / np.maximum(high - low, 1)
-    keep = np.flatnonzero(np.abs(slope) <= steepest)
-    keep = keep[::order][:: -(-len(keep) // places) or 1]
-    return keep + first, sense * reach[keep], slope[keep]
+@compiled
+def _fill(outline: Outline, inner_sign: int, fixed: Ints, coarse: Ints, slope: Floats, weight: Floats) -> None:
+    """Put the lines of one finger into their places."""
+    across, along = outline[:, 0], outline[:, 1]
+    crest = along.argmin()
+    for side in range(3):
+        if side == 0:
+            first, past, sense, steepest = 0, INNER, inner_sign, 1.0
+            lines, values = along[: crest + 1], across[: crest + 1]
+        elif side == 1:
+            first, past, sense, steepest = INNER, ROWS, -inner_sign, 1.0
+            lines, values = along[crest:], across[crest:]
+        else:
+            first, past, sense, steepest = ROWS, PLACES, -1, SLOPE_OF_A_TIP
+            lines, values = across, along
+        lowest = lines.min()
+        reach = np.full(lines.max() - lowest + 1, -FAR)
+        for i in range(lines.size):
+            reach[lines[i] - lowest] = max(reach[lines[i] - lowest], sense * values[i])
+        change = np.empty(reach.size)
+        keep, kept = np.empty(reach.size, dtype=np.int64), 0
+        for i in range(reach.size):
+            low, high = max(i - SLOPE_REACH_PX, 0), min(i + SLOPE_REACH_PX, reach.size - 1)
+            change[i] = sense * (reach[high] - reach[low]) / max(high - low, 1)
+            if abs(change[i]) <= steepest:
+                keep[kept] = i
+                kept += 1
+        thinning = -(-kept // (past - first))
+        place = first
+        for n in range(0, kept, max(thinning, 1)):
+            # A tip is thinned out from its inner side, so that a mirrored finger has the mirrored lines.
+            i = keep[kept - 1 - n] if side == 2 and inner_sign > 0 else keep[n]
+            fixed[place], coarse[place], slope[place], weight[place] = i + lowest, sense * reach[i], change[i], 1.0
+            place += 1

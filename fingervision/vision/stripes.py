@@ -4,13 +4,16 @@ Its contrast cannot be told from its width in the row itself, so the contrast is
 ground lies open, and both edges of a row are fitted together.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fingervision.vision.edge_filters import blurred_step
+from fingervision.vision.edges import EdgePoints, curvature_gain
+from fingervision.vision.facing import facing_lines
 from fingervision.vision.grey import GreyImage
+from fingervision.vision.profile_lines import ROWS
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int_]
@@ -20,6 +23,8 @@ NEAR_SIGMAS = 7.0
 ITERATIONS = 6
 # The ground between the fingers and that beyond the tips are lit alike to this (standard uncertainty, relative).
 U_CONTRAST = 0.015
+# A notch whose sides close in at this slope is left out where it is narrower than so many sigma.
+CLOSING_SLOPE, NOTCH_SIGMAS = 0.1, 3.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -40,6 +45,60 @@ class StripeEdges:
     right: Floats
     u_noise: Floats
     u_shared: Floats
+
+
+def with_stripes(upright: GreyImage, edges: EdgePoints) -> EdgePoints:
+    """The same points, but where the fingers nearly touch both edges of a row are fitted as one stripe."""
+    lines, reach = edges.lines, edges.reach_px
+    facing = facing_lines(lines, reach)
+    if facing is None:
+        return edges
+    left, right = facing
+    gap = edges.position[1, right] - edges.position[0, left]
+    tips = lines.weight[:, ROWS:] > 0
+    blur = float(edges.blur_px[:, 1].mean())
+    near = gap < NEAR_SIGMAS * blur
+    if not near.any() or not tips.any():
+        return edges
+    left, right = left[near], right[near]
+    contrast = float(np.median(edges.contrast[:, ROWS:][tips]))
+    slope = 0.5 * (lines.slope[0, left] - lines.slope[1, right])
+    sigma = np.sqrt(blur**2 * (1.0 + slope**2) + slope**2 / 12.0)
+    stripes = fit_stripes(
+        upright,
+        lines.fixed[0, left],
+        edges.position[0, left],
+        edges.position[1, right],
+        sigma,
+        contrast,
+        edges.noise,
+        reach,
+    )
+    position, u_position = edges.position.copy(), edges.u_position.copy()
+    position[0, left], position[1, right] = stripes.left, stripes.right
+    # What all rows share must not average out over them.
+    u_row = np.hypot(stripes.u_noise, stripes.u_shared * np.sqrt(len(left)))
+    u_position[0, left] = u_position[1, right] = u_row
+    contrasts = edges.contrast.copy()
+    contrasts[0, left] = contrasts[1, right] = contrast
+    gain = edges.curvature_gain.copy()
+    gain[0, left] = gain[1, right] = curvature_gain(slope, (reach + 0.5 * gap[near]) / sigma)
+    # Where a notch closes, the fingers overlap just below: what blur brings up from there belongs to neither edge.
+    weight = lines.weight.copy()
+    closes = (slope > CLOSING_SLOPE) & (stripes.right - stripes.left < NOTCH_SIGMAS * sigma)
+    weight[0, left[closes]] = weight[1, right[closes]] = 0.0
+    lines = replace(lines, weight=weight)
+    blurs = edges.blur_px.copy()
+    blurs[:, 0] = blur
+    return replace(
+        edges,
+        lines=lines,
+        position=position,
+        u_position=u_position,
+        contrast=contrasts,
+        blur_px=blurs,
+        curvature_gain=gain,
+    )
 
 
 def fit_stripes(

@@ -6,6 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from fingervision.domain.direction import Direction
+from fingervision.vision.fingers import in_axes
 from fingervision.vision.orientation import Orientation
 
 
@@ -16,12 +17,12 @@ def test_a_pixel_keeps_its_level_through_view_and_axes(
     x, y = data.draw(st.integers(0, width - 1)), data.draw(st.integers(0, height - 1))
     image = np.arange(height * width, dtype=np.uint16).reshape(height, width)
     orientation = Orientation(direction, height, width)
-    across, along = orientation.to_axes(np.array([x]), np.array([y]))
+    ((across, along),) = in_axes(np.array([[x, y]]), orientation)
     upright = orientation.view(image)
     assert upright.shape == (orientation.along_size, orientation.across_size)
-    assert upright[along[0], across[0]] == image[y, x]
-    assert orientation.to_pixels(float(across[0]), float(along[0])) == (x, y)
-    assert orientation.along_to_pixels(float(along[0])) == (y if direction.is_vertical else x)
+    assert upright[along, across] == image[y, x]
+    assert orientation.to_pixels(float(across), float(along)) == (x, y)
+    assert orientation.along_to_pixels(float(along)) == (y if direction.is_vertical else x)
 
 
 @pytest.mark.parametrize("direction", list(Direction))
@@ -35,5 +36,4 @@ def test_a_view_copies_nothing(direction: Direction) -> None:
     [(Direction.UP, 2, 0), (Direction.DOWN, 2, 4), (Direction.LEFT, 0, 2), (Direction.RIGHT, 6, 2)],
 )
 def test_the_tips_side_of_the_picture_comes_first(direction: Direction, x: int, y: int) -> None:
-    _, along = Orientation(direction, 5, 7).to_axes(np.array([x]), np.array([y]))
-    assert along[0] == 0
+    assert in_axes(np.array([[x, y]]), Orientation(direction, 5, 7))[0, 1] == 0
