@@ -56,7 +56,7 @@ void identify(uint8_t number) {
 
 // Why no move may begin, or nothing.
 const __FlashStringHelper *hindrance() {
-    if (!tick::running) return F("not-set-up");
+    if (!tick::running || !lines::can_move()) return F("not-set-up");
     if (tick::cause != tick::NONE) return F("stopped");
     if (lines::active(lines::ALARM)) return F("alarm");
     return nullptr;
@@ -66,7 +66,7 @@ const __FlashStringHelper *start(uint8_t &at, bool &fine) {
     uint16_t given = wire::hex_at(at, fine);
     uint16_t period_ms = wire::hex_at(at, fine), silence_ms = wire::hex_at(at, fine), settle = wire::hex_at(at, fine);
     if (!fine || given == 0 || period_ms < 4 || period_ms > 255 || silence_ms < 10 || settle > 255) return F("value");
-    if (!lines::complete()) return F("map");
+    if (!lines::can_move() && !lines::mapped(lines::FORCE)) return F("map");
     session = given;
     lines::begin();
     tick::go(period_ms, silence_ms, settle);
@@ -86,8 +86,6 @@ const __FlashStringHelper *move(uint8_t &at, bool &fine) {
 // Do a command once; the reason if it cannot be done, or nothing.
 const __FlashStringHelper *obey(char kind, uint8_t &at, bool &fine) {
     switch (kind) {
-        case 'S':  // state
-            return nullptr;
         case 'U':  // unmap: back to what a reset makes
             tick::halt();
             lines::unmap();
@@ -136,6 +134,7 @@ void handle(uint32_t time_us) {
     at += 2;
     tick::heard();
     if (kind == 'I') return identify(number);
+    if (kind == 'S') return answer(number, time_us);  // state
     uint16_t crc = wire::crc_of(wire::line, wire::length);
     if (number != last_number || crc != last_crc) {
         last_refusal = obey(kind, at, fine);
@@ -146,23 +145,25 @@ void handle(uint32_t time_us) {
     else answer(number, time_us);
 }
 
-void send_queued() {
+// Changes of lines first, then samples; only what the serial buffer takes at once.
+bool send_queued() {
+    if (tick::changes.empty() && tick::samples.empty()) return false;
+    if (Serial.availableForWrite() < SAMPLE_LENGTH) return false;
     tick::Change change;
-    while (Serial.availableForWrite() >= SAMPLE_LENGTH && tick::changes.pop(change)) {
+    tick::Sample sample;
+    if (tick::changes.pop(change)) {
         wire::open('L');
         wire::put_hex(change.number, 2);
         wire::put_hex(change.time_us, 8);
         wire::put_hex(change.levels, 2);
-        wire::close();
-    }
-    tick::Sample sample;
-    while (Serial.availableForWrite() >= SAMPLE_LENGTH && tick::samples.pop(sample)) {
+    } else if (tick::samples.pop(sample)) {
         wire::open('F');
         wire::put_hex(sample.number, 4);
         wire::put_hex(sample.time_us, 8);
         wire::put_hex(sample.level, 3);
-        wire::close();
     }
+    wire::close();
+    return true;
 }
 
 void setup() {
@@ -176,7 +177,6 @@ void loop() {
         handle(micros());
         wire::forget();
     }
-    send_queued();
     // Idle until the next interrupt, a millisecond at most: the converter measures with less noise beside it.
-    if (!Serial.available()) sleep_mode();
+    if (!send_queued() && !Serial.available()) sleep_mode();
 }

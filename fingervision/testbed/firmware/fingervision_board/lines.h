@@ -40,7 +40,7 @@ bool set(uint8_t role, uint8_t pin, bool active_high) {
 }
 
 // Whether all that a move needs is known, with select and drive lines on one port, so that one write sets them.
-bool complete() {
+bool can_move() {
     for (uint8_t role = SELECT_0; role <= DRIVE; role++)
         if (!mapped(role) || map[role].out != map[DRIVE].out) return false;
     return mapped(BUSY) && mapped(ALARM);

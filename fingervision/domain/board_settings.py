@@ -1,0 +1,76 @@
+"""How a board is wired to a motor controller and a force sensor; it differs from laboratory to laboratory."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from enum import IntEnum
+
+
+class Role(IntEnum):
+    """What a pin is for; the numbers are those of the board's sketch (`lines.h`)."""
+
+    SELECT_0 = 0
+    SELECT_1 = 1
+    SELECT_2 = 2
+    SELECT_3 = 3
+    DRIVE = 4
+    ENABLE = 5
+    HOLD = 6
+    BUSY = 7
+    ALARM = 8
+    IN_POSITION = 9
+    FORCE = 10
+
+
+SELECT = (Role.SELECT_0, Role.SELECT_1, Role.SELECT_2, Role.SELECT_3)
+NEEDED_TO_MOVE = (*SELECT, Role.DRIVE, Role.BUSY, Role.ALARM)
+
+
+@dataclass(frozen=True, slots=True)
+class Line:
+    """One line.
+
+    Parameters
+    ----------
+    pin : int
+        Arduino's number: 2 to 13 are D2 to D13, 14 to 19 are A0 to A5.
+    active_high : bool
+        Whether the high level means yes.
+    """
+
+    pin: int
+    active_high: bool = True
+
+
+@dataclass(frozen=True, slots=True)
+class BoardSettings:
+    """A board, its wiring and its times.
+
+    Parameters
+    ----------
+    port : str
+        Name of the serial port.
+    lines : mapping of Role to Line
+        The wiring. All of `NEEDED_TO_MOVE` or none of them; a board without them is a force sensor only.
+    force_period_ms : int
+        Time between two samples of the force.
+    silence_ms : int
+        The board drops the drive line when it has heard nothing for so long.
+    settle_ms : int
+        Time from the select lines to the drive line; with 0 they change in the same instant.
+    """
+
+    port: str
+    lines: Mapping[Role, Line]
+    force_period_ms: int = 5
+    silence_ms: int = 80
+    settle_ms: int = 5
+
+    @property
+    def moves(self) -> bool:
+        """Whether a motor controller is wired to it."""
+        return Role.DRIVE in self.lines
+
+    @property
+    def senses_force(self) -> bool:
+        """Whether a force sensor is wired to it."""
+        return Role.FORCE in self.lines

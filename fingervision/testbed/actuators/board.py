@@ -1,0 +1,335 @@
+"""A motor controller on the parallel lines of a board: it runs the step data that it keeps."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from threading import Event, Thread
+
+from fingervision.domain.errors import FingervisionError
+from fingervision.domain.step_data import Coordinates, StepData
+from fingervision.storage.steps_toml import read_steps
+from fingervision.storage.toml_section import Section
+from fingervision.testbed.actuator import Alarm, StageLimits
+from fingervision.testbed.board import wire
+from fingervision.testbed.board.board import Board
+from fingervision.testbed.board.handshake import Handshake
+from fingervision.testbed.board.shared import KEY, board_of
+from fingervision.testbed.clock import Clock
+from fingervision.testbed.commanded_path import CommandedPath
+from fingervision.testbed.motion_profile import MotionProfile
+from fingervision.testbed.reading import Reading
+from fingervision.testbed.step_checks import PlannedMotion, planned
+from fingervision.testbed.step_route import jog_step, route
+from fingervision.testbed.workshop import Workshop
+
+SIMULATED = False
+# Section 3 of the paper: stroke 10 mm, 400 mm/s, accuracy +-90 um, 5.5 N.
+LOWER_MM, UPPER_MM, SPEED_MM_S, FORCE_N, ACCURACY_MM = 0.0, 10.0, 400.0, 5.5, 0.09
+KEYS = (
+    KEY, "steps", "lower_mm", "upper_mm", "speed_mm_s", "force_n", "accuracy_mm", "first_code", "home_code",
+    "home_within_s", "busy_within_s", "enable_s",
+)  # fmt: skip
+CODES = 16
+# A motion may take so much longer than its profile before it counts as stuck.
+PATIENCE, PATIENCE_S = 1.5, 1.0
+HOME_WITHIN_S, BUSY_WITHIN_S, ENABLE_S = 10.0, 0.5, 0.5
+READ_EVERY_S = 0.005
+STILL = MotionProfile(0.0, 0.0, 0.0, 0.0, 0.0)
+
+
+@dataclass(frozen=True, slots=True)
+class Codes:
+    """How the select lines name the steps.
+
+    Parameters
+    ----------
+    first : int
+        Code of step 1; the others follow.
+    home : int or None
+        Code of the return to the reference, if the controller has one.
+    """
+
+    first: int = 1
+    home: int | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Waits:
+    """What the controller is given time for.
+
+    Parameters
+    ----------
+    home_s : float
+        The return to the reference.
+    busy_s : float
+        From the drive line to the busy line.
+    enable_s : float
+        From the enable line to readiness; 0 without an enable line.
+    """
+
+    home_s: float
+    busy_s: float
+    enable_s: float
+
+
+@dataclass(frozen=True, slots=True)
+class _Run:
+    """One handshake: a code, how long it may take, and what it does to the position."""
+
+    code: int
+    at_most_s: float
+    motion: PlannedMotion | None
+
+
+class BoardActuator:
+    """The stage behind the board.
+
+    Parallel lines tell no position: it is where the steps lead, as their profiles say, within the stage's accuracy.
+
+    Parameters
+    ----------
+    board : Board
+        Set up.
+    data : StepData
+        What the controller keeps: the same as was put into it with its maker's tool.
+    limits : StageLimits
+        What the stage can do.
+    codes : Codes
+        Of the select lines.
+    waits : Waits
+        What the controller is given time for.
+    clock : Clock
+        The bed's.
+    """
+
+    has_steps = True
+
+    def __init__(
+        self, board: Board, data: StepData, limits: StageLimits, codes: Codes, waits: Waits, clock: Clock
+    ) -> None:
+        self.limits = limits
+        self._board, self._data, self._codes, self._waits, self._clock = board, data, codes, waits, clock
+        self._path = CommandedPath(data.start_mm)
+        self._known = False
+        self._failure: str | None = None
+        self._worker: Thread | None = None
+        self._stopped = Event()
+        self._read_s = clock.now_s()
+        self._ready_s = clock.now_s() + waits.enable_s
+        self._handshake = Handshake(board, clock, waits.busy_s, self._stopped)
+        self._closed = False
+
+    @property
+    def name(self) -> str:
+        """Board, port and firmware."""
+        return f"motor controller behind {self._board.name}"
+
+    @property
+    def busy(self) -> bool:
+        """Whether a motion is under way."""
+        self._board.check()
+        return self._worker is not None and self._worker.is_alive()
+
+    @property
+    def alarm(self) -> Alarm | None:
+        """The controller's alarm line, or why a motion was broken off."""
+        if wire.Levels.ALARM in self._board.levels:
+            return Alarm("alarm", "the motor controller's alarm line is active: clear the alarm there, then home")
+        if self._board.dropped is not None and self._board.dropped_code != "h":
+            return Alarm("dropped", f"{self._board.dropped}; its drive line was dropped: home it")
+        if self._failure is not None:
+            return Alarm("failed", self._failure)
+        return None
+
+    def home(self) -> None:
+        """Return to the reference, by its own code or an absolute step to 0; clears what stopped it before."""
+        if self.busy:
+            self._refuse_busy()
+        if wire.Levels.ALARM in self._board.levels:
+            self._refuse_alarm()
+        self._failure = None
+        if self._codes.home is not None:
+            self._begin([_Run(self._codes.home, self._waits.home_s, None)])
+            return
+        for number, step in self._data.steps.items():
+            if step.coordinates is Coordinates.ABSOLUTE and step.target_mm == 0.0:
+                self._begin([self._run_of(number, self._at_mm())])
+                return
+        raise FingervisionError(
+            "Homing must have a code of its own (home_code of the actuator) or an absolute step to 0 mm, but there is "
+            "neither: add one."
+        )
+
+    def move(self, to_mm: float, speed_mm_s: float) -> None:
+        """Begin to move, by the steps that lead there."""
+        if not self.limits.lower_mm <= to_mm <= self.limits.upper_mm:
+            raise FingervisionError(
+                f"The target must lie between {self.limits.lower_mm:g} and {self.limits.upper_mm:g} mm, but is "
+                f"{to_mm:g} mm: nothing was moved."
+            )
+        self._within_speed(speed_mm_s)
+        if speed_mm_s == 0.0:
+            raise FingervisionError("The speed must be positive, but is 0 mm/s: nothing was moved.")
+        self._ready()
+        at_mm = self._at_mm() if self._known else None
+        self._begin_steps(route(self._data.steps, at_mm, to_mm, speed_mm_s, self.limits.speed_mm_s))
+
+    def jog(self, speed_mm_s: float) -> None:
+        """Begin to move by a repeated relative step, until stopped or at a limit."""
+        self._within_speed(abs(speed_mm_s))
+        self._ready()
+        if speed_mm_s == 0.0:
+            return
+        number = jog_step(self._data.steps, speed_mm_s, self.limits.speed_mm_s)
+        self._check_known(number)
+        end_mm = self.limits.upper_mm if speed_mm_s > 0.0 else self.limits.lower_mm
+        count = int((end_mm - self._at_mm()) / self._data.steps[number].target_mm + 1e-9)
+        self._begin_steps((number,) * count)
+
+    def run_step(self, number: int) -> None:
+        """Begin one of the step data blocks."""
+        if number not in self._data.steps:
+            there = ", ".join(str(each) for each in self._data.steps)
+            raise FingervisionError(f"The step must be one that the controller keeps ({there}), but is {number}.")
+        self._ready()
+        self._check_known(number)
+        self._begin_steps((number,))
+
+    def stop(self) -> None:
+        """Drop the drive line at once; it may be called from a signal handler."""
+        self._stopped.set()
+        self._board.stop()
+
+    def readings(self) -> tuple[Reading, ...]:
+        """Positions since the last call, where it was sent: on the host's clock, since the host works them out."""
+        self._board.check()
+        now_s = self._clock.now_s()
+        times = [*self._path.times_of_motion_s(self._read_s, now_s, READ_EVERY_S).tolist(), now_s]
+        self._read_s = now_s
+        return tuple(Reading(at_s, at_s, at_s, self._path.at_mm(at_s)) for at_s in times)
+
+    def close(self) -> None:
+        """Stop and let go of the board."""
+        if self._closed:
+            return
+        self._closed = True
+        self.stop()
+        if self._worker is not None:
+            self._worker.join(timeout=1.0)
+        self._board.close()
+
+    # What may begin.
+
+    def _ready(self) -> None:
+        if self.busy:
+            self._refuse_busy()
+        alarm = self.alarm
+        if alarm is not None:
+            raise FingervisionError(
+                f"The actuator must have no alarm, but has {alarm.code} ({alarm.words}): nothing was moved."
+            )
+
+    def _refuse_busy(self) -> None:
+        raise FingervisionError("The actuator must stand before it moves again, but is busy: stop it first.")
+
+    def _refuse_alarm(self) -> None:
+        raise FingervisionError(
+            "The motor controller must have no alarm, but its alarm line is active: clear it there."
+        )
+
+    def _within_speed(self, speed_mm_s: float) -> None:
+        if not 0.0 <= speed_mm_s <= self.limits.speed_mm_s:
+            raise FingervisionError(
+                f"The speed must be at most {self.limits.speed_mm_s:g} mm/s, but is {speed_mm_s:g} mm/s: "
+                "nothing was moved."
+            )
+
+    def _check_known(self, number: int) -> None:
+        if not self._known and self._data.steps[number].coordinates is Coordinates.RELATIVE:
+            raise FingervisionError(
+                f"The position must be known before the relative step {number}, but is not since the start or the last "
+                "stop: home first."
+            )
+
+    # How it is done.
+
+    def _at_mm(self) -> float:
+        return self._path.at_mm(self._clock.now_s())
+
+    def _begin_steps(self, numbers: Sequence[int]) -> None:
+        runs: list[_Run] = []
+        at_mm = self._at_mm()
+        for number in numbers:
+            runs.append(self._run_of(number, at_mm))
+            motion = runs[-1].motion
+            assert motion is not None  # noqa: S101 - only homing has none
+            at_mm = motion.to_mm
+        self._begin(runs)
+
+    def _run_of(self, number: int, at_mm: float) -> _Run:
+        motion = planned(number, self._data.steps[number], at_mm, self.limits)
+        # From a position that is not known it may take as long as homing.
+        at_most_s = PATIENCE * motion.motion.seconds + PATIENCE_S + (0.0 if self._known else self._waits.home_s)
+        return _Run(self._codes.first + number - 1, at_most_s, motion)
+
+    def _begin(self, runs: Sequence[_Run]) -> None:
+        if not runs:
+            return
+        self._board.wait_for_stop()
+        if self._board.dropped is not None:
+            self._board.clear()
+            self._ready_s = self._clock.now_s() + self._waits.enable_s
+        self._stopped.clear()
+        self._worker = Thread(target=self._work, args=(runs,), name="motion", daemon=True)
+        self._worker.start()
+
+    def _work(self, runs: Sequence[_Run]) -> None:
+        try:
+            self._clock.wait_until(self._ready_s)
+            for run in runs:
+                if self._stopped.is_set() or not self._do(run):
+                    return
+        except FingervisionError as error:
+            self._path.break_off(self._clock.now_s())
+            self._failure = str(error)
+
+    def _do(self, run: _Run) -> bool:
+        known, self._known = self._known, False
+        motion = STILL if run.motion is None else run.motion.motion
+        done = self._handshake.run(run.code, run.at_most_s, lambda at_s: self._path.begin(at_s, motion))
+        now_s = self._clock.now_s()
+        if not done:
+            self._path.break_off(now_s)
+            return False
+        self._path.jump(now_s, 0.0 if run.motion is None else run.motion.to_mm)
+        self._known = known or run.motion is None or run.motion.step.coordinates is Coordinates.ABSOLUTE
+        return True
+
+
+def build(section: Section, workshop: Workshop) -> BoardActuator:
+    """Build it from its section of the configuration."""
+    lower_mm = section.number("lower_mm", LOWER_MM)
+    limits = StageLimits(
+        lower_mm=lower_mm,
+        upper_mm=section.number("upper_mm", UPPER_MM, above=lower_mm),
+        speed_mm_s=section.number("speed_mm_s", SPEED_MM_S, above=0.0),
+        force_n=section.number("force_n", FORCE_N, above=0.0),
+        accuracy_mm=section.number("accuracy_mm", ACCURACY_MM, low=0.0),
+    )
+    data = read_steps(workshop.folder / section.word("steps"))
+    first = section.whole("first_code", 1, low=0, high=CODES - 1)
+    if first + max(data.steps) - 1 >= CODES:
+        section.refuse(
+            "first_code", f"must leave codes for step {max(data.steps)} on four lines (at most 15), but is {first}."
+        )
+    has_home = "home_code" in section.values
+    codes = Codes(first, section.whole("home_code", low=0, high=CODES - 1) if has_home else None)
+    waits = Waits(
+        section.number("home_within_s", HOME_WITHIN_S, above=0.0, high=60.0),
+        section.number("busy_within_s", BUSY_WITHIN_S, above=0.0, high=60.0),
+        section.number("enable_s", ENABLE_S, low=0.0, high=60.0),
+    )
+    board = board_of(section, workshop)
+    if not board.settings.moves:
+        board.close()
+        section.refuse(KEY, "must have a motor controller on its lines, but has a force sensor only: add its lines.")
+    return BoardActuator(board, data, limits, codes, waits, workshop.clock)

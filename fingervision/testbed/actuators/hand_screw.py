@@ -1,0 +1,133 @@
+"""A micrometer screw that a person turns, typing in what it reads."""
+
+import sys
+from math import isfinite
+from typing import TextIO
+
+from fingervision.domain.errors import FingervisionError
+from fingervision.storage.toml_section import Section
+from fingervision.testbed.actuator import Alarm, StageLimits
+from fingervision.testbed.clock import Clock
+from fingervision.testbed.commanded_path import CommandedPath
+from fingervision.testbed.reading import Reading
+from fingervision.testbed.workshop import Workshop
+
+KEYS = ("lower_mm", "upper_mm", "accuracy_mm")
+SIMULATED = False
+# DIN 863-1 allows a micrometer screw of 25 mm an error of 4 um.
+ACCURACY_MM = 0.004
+# A typed value so far from the one asked for is a slip of the finger, and is asked for again.
+FAR_MM = 1.0
+ASK_AT_MOST = 3
+
+
+class HandScrew:
+    """Positions are asked for on the terminal; a move lasts until they are typed.
+
+    Parameters
+    ----------
+    limits : StageLimits
+        What the screw can do; its speed and force are those of a hand, which nobody limits.
+    clock : Clock
+        The bed's.
+    keyboard, screen : text streams
+        Where answers come from and questions go to.
+    """
+
+    name = "hand screw"
+    has_steps = False
+    busy = False
+    alarm: Alarm | None = None
+
+    def __init__(self, limits: StageLimits, clock: Clock, keyboard: TextIO, screen: TextIO) -> None:
+        self.limits = limits
+        self._clock, self._keyboard, self._screen = clock, keyboard, screen
+        self._path = CommandedPath(0.0)
+
+    def home(self) -> None:
+        """Ask for the screw to be set to its zero."""
+        self._ask_for("Turn the screw to where the gripper rests, set its reading to zero, and type that reading", 0.0)
+
+    def move(self, to_mm: float, speed_mm_s: float) -> None:
+        """Ask for the screw to be turned; a hand's speed is its own."""
+        if not self.limits.lower_mm <= to_mm <= self.limits.upper_mm:
+            raise FingervisionError(
+                f"The target must lie between {self.limits.lower_mm:g} and {self.limits.upper_mm:g} mm, but is "
+                f"{to_mm:g} mm: nothing was moved."
+            )
+        if not 0.0 < speed_mm_s <= self.limits.speed_mm_s:
+            raise FingervisionError(
+                f"The speed must be positive and at most {self.limits.speed_mm_s:g} mm/s, but is {speed_mm_s:g} mm/s: "
+                "nothing was moved."
+            )
+        self._ask_for(f"Turn the screw to {to_mm:.3f} mm and type its reading in mm", to_mm)
+
+    def jog(self, speed_mm_s: float) -> None:
+        """Refuse: nobody can say when a hand shall stop."""
+        raise FingervisionError(
+            f"A hand screw must be moved to positions, but was to jog at {speed_mm_s:g} mm/s: use move."
+        )
+
+    def run_step(self, number: int) -> None:
+        """Refuse: step data live in a motor controller."""
+        raise FingervisionError(
+            f"Step {number} must be kept by a motor controller, but a hand screw has none: use move."
+        )
+
+    def stop(self) -> None:
+        """Nothing moves by itself."""
+
+    def readings(self) -> tuple[Reading, ...]:
+        """What was typed last."""
+        now_s = self._clock.now_s()
+        return (Reading(now_s, now_s, now_s, self._path.at_mm(now_s)),)
+
+    def close(self) -> None:
+        """Nothing to let go of."""
+
+    def _ask_for(self, words: str, wanted_mm: float) -> None:
+        for _ in range(ASK_AT_MOST):
+            self._screen.write(f"{words} (Enter alone: {wanted_mm:.3f}): ")
+            self._screen.flush()
+            line = self._keyboard.readline()
+            if not line:
+                raise FingervisionError(
+                    "The hand screw must be turned by somebody, but nobody is at the terminal: run it from one."
+                )
+            typed_mm = _number(line.strip().replace(",", "."), wanted_mm)
+            if typed_mm is None:
+                self._screen.write(f"A reading must be a number in mm, but is '{line.strip()}'.\n")
+            elif not self.limits.lower_mm - FAR_MM <= typed_mm <= self.limits.upper_mm + FAR_MM:
+                self._screen.write(
+                    f"A reading must lie between {self.limits.lower_mm:g} and {self.limits.upper_mm:g} mm, "
+                    f"but is {typed_mm:g}.\n"
+                )
+            elif abs(typed_mm - wanted_mm) > FAR_MM:
+                self._screen.write(f"The reading must lie near {wanted_mm:.3f} mm, but is {typed_mm:g}.\n")
+            else:
+                self._path.jump(self._clock.now_s(), typed_mm)
+                return
+        raise FingervisionError(
+            f"The reading must be typed in mm, but was not, {ASK_AT_MOST} times: the run ends here."
+        )
+
+
+def _number(words: str, otherwise: float) -> float | None:
+    try:
+        value = float(words) if words else otherwise
+    except ValueError:
+        return None
+    return value if isfinite(value) else None
+
+
+def build(section: Section, workshop: Workshop) -> HandScrew:
+    """Build it from its section of the configuration; the terminal is asked."""
+    lower_mm = section.number("lower_mm")
+    limits = StageLimits(
+        lower_mm=lower_mm,
+        upper_mm=section.number("upper_mm", above=lower_mm),
+        speed_mm_s=float("inf"),
+        force_n=float("inf"),
+        accuracy_mm=section.number("accuracy_mm", ACCURACY_MM, low=0.0),
+    )
+    return HandScrew(limits, workshop.clock, sys.stdin, sys.stderr)

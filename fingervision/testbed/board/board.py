@@ -1,0 +1,248 @@
+"""A board that is set up: its lines, its force channel, its clock."""
+
+import random
+from collections import deque
+from dataclasses import dataclass
+from threading import Lock
+from typing import NoReturn
+
+from fingervision.domain.board_settings import BoardSettings, Role
+from fingervision.domain.errors import FingervisionError
+from fingervision.testbed.board import wire
+from fingervision.testbed.board.clock_join import FEWEST, JoinedClock
+from fingervision.testbed.board.link import ASK_EVERY_S, BoardLink, BoardRefusalError
+from fingervision.testbed.board.port import opened_port
+from fingervision.testbed.clock import Clock
+
+# A board that is reset by the opening of its port starts its sketch within two seconds.
+STARTS_WITHIN_S = 1.0
+JOINED_WITHIN_S = 20 * FEWEST * ASK_EVERY_S
+# Samples that nobody fetches: the newest ten minutes at 200 Hz.
+MOST_SAMPLES = 120_000
+DROPPED = {
+    "w": "the board had heard nothing from this program for {silence_ms} ms (is the computer overloaded?)",
+    "l": "the motion took longer than it may",
+    "a": "the motor controller raised its alarm",
+    "h": "this program stopped it",
+}
+
+
+@dataclass(frozen=True, slots=True)
+class ForceSample:
+    """Level of the force channel, 0 to 1023, at the board's time."""
+
+    board_s: float
+    level: int
+
+
+class Board:
+    """One board; made with `opened`. Several parts may share it.
+
+    Parameters
+    ----------
+    settings : BoardSettings
+        Its wiring.
+    link : BoardLink
+        Its connection.
+    identity : wire.Identity
+        What it says it is.
+    """
+
+    def __init__(self, settings: BoardSettings, link: BoardLink, identity: wire.Identity) -> None:
+        self.settings = settings
+        self.name = f"{identity.name} {identity.version} on {settings.port}"
+        self.lost_samples = 0
+        self._link = link
+        self._levels, self._cause = wire.Levels(0), wire.GOING
+        self._users = 0
+        self._driven_board_s: float | None = None
+        self._samples: deque[ForceSample] = deque(maxlen=MOST_SAMPLES)
+        self._numbers = wire.Unwrapped(16)
+        self._next_number: int | None = None
+        self._guard = Lock()
+
+    @property
+    def levels(self) -> wire.Levels:
+        """Lines that say yes, as last heard."""
+        self._link.check()
+        return self._levels
+
+    @property
+    def dropped(self) -> str | None:
+        """Why the drive line was dropped, in words; None if it was not."""
+        words = DROPPED.get(self._cause)
+        return None if words is None else words.format(silence_ms=self.settings.silence_ms)
+
+    @property
+    def dropped_code(self) -> str:
+        """The board's own letter for it."""
+        return self._cause
+
+    @property
+    def clock(self) -> JoinedClock:
+        """Its clock, joined to the host's."""
+        joined = self._link.joined
+        assert joined is not None  # noqa: S101 - a board is opened only with its clock joined
+        return joined
+
+    @property
+    def damaged_lines(self) -> int:
+        """Lines that came with a wrong checksum."""
+        return self._link.damaged_lines
+
+    @property
+    def driven_board_s(self) -> float | None:
+        """When the drive line last rose; None if it was not seen since the last `run`."""
+        return self._driven_board_s
+
+    def run(self, code: int, at_most_s: float) -> None:
+        """Set the select lines, let them settle, raise the drive line; the board drops it after the longest time."""
+        self._driven_board_s = None
+        self._do(f"R {code:X} {min(round(1e3 * at_most_s), 0xFFFF):X}")
+
+    def release(self) -> None:
+        """Lower the drive line."""
+        self._do("X")
+
+    def stop(self) -> None:
+        """Drop drive and enable line, raise hold, within milliseconds; moves are refused until `clear`.
+
+        It does not wait for the board, and may be called from a signal handler.
+        """
+        self._link.stop()
+
+    def wait_for_stop(self) -> None:
+        """Wait until a stop that was asked for has been done."""
+        while self._link.stopping:
+            self.wait(ASK_EVERY_S)
+
+    def check(self) -> None:
+        """Raise a sentence if the board is lost."""
+        self._link.check()
+
+    def clear(self) -> None:
+        """Allow moves again after a stop."""
+        self._do("K")
+        self._cause = wire.GOING
+        if Role.ENABLE in self.settings.lines:
+            self._do("E 1")
+
+    def wait(self, seconds: float) -> None:
+        """Wait until something has come from the board, or for so long."""
+        self._link.wait(seconds)
+        self._link.check()
+
+    def samples(self) -> tuple[ForceSample, ...]:
+        """Force samples since the last call."""
+        with self._guard:
+            taken = tuple(self._samples)
+            self._samples.clear()
+        if not taken:
+            self._link.check()
+        return taken
+
+    def hold(self) -> "Board":
+        """Count one more part that uses it."""
+        self._users += 1
+        return self
+
+    def close(self) -> None:
+        """Count one part less; with the last one drop all lines and let go of the port."""
+        self._users -= 1
+        if self._users != 0:
+            return
+        try:
+            self._link.command("U")
+        except FingervisionError:
+            return  # it is gone; its own watchdog has dropped the lines
+        finally:
+            self._link.close()
+
+    def on_state(self, answer: wire.Answer) -> None:
+        """Take the state (called by the link)."""
+        self._levels, self._cause = answer.levels, answer.cause
+
+    def on_change(self, change: wire.Change, board_s: float) -> None:
+        """Take changed lines (called by the link)."""
+        if change.levels & ~self._levels & wire.Levels.DRIVE:
+            self._driven_board_s = board_s
+        self._levels = change.levels
+
+    def on_sample(self, sample: wire.Sample, board_s: float) -> None:
+        """Take a force sample (called by the link)."""
+        number = self._numbers.of(sample.number)
+        if self._next_number is not None:
+            self.lost_samples += max(number - self._next_number, 0)
+        self._next_number = number + 1
+        with self._guard:
+            self._samples.append(ForceSample(board_s, sample.level))
+
+    def _do(self, words: str) -> None:
+        try:
+            self._link.command(words)
+        except BoardRefusalError as refusal:
+            self._explain(refusal.reason)
+
+    def _explain(self, reason: str) -> NoReturn:
+        sentences = {
+            "alarm": "The motor controller must have no alarm, but its alarm line is active: clear it there.",
+            "busy": "The motor controller must stand before it moves again, but its busy line is active.",
+            "stopped": f"The board must be cleared before it moves again, because {self.dropped or 'it was stopped'}: "
+            "home it.",
+        }
+        raise FingervisionError(
+            sentences.get(reason, f"{self.name} refused a command ({reason}): set it up anew by beginning again.")
+        )
+
+
+def opened(settings: BoardSettings, clock: Clock) -> Board:
+    """Open a board and set it up; who uses it says so with `hold`.
+
+    Raises
+    ------
+    FingervisionError
+        There is no such port, another program has it, nothing answers, it has another firmware, or it is wired
+        otherwise than its sketch can drive.
+    """
+    link = BoardLink(opened_port(settings.port), clock)
+    try:
+        board = Board(settings, link, _identified(link, settings.port))
+        _set_up(board, link, settings)
+        _wait_for_clock(board, link, clock)
+    except BaseException:
+        link.close()
+        raise
+    return board
+
+
+def _identified(link: BoardLink, port: str) -> wire.Identity:
+    identity = link.command("I", STARTS_WITHIN_S)
+    if not isinstance(identity, wire.Identity) or identity.name != wire.NAME:
+        raise FingervisionError(f"The board on {port} must run the sketch {wire.NAME}, but does not: upload it.")
+    if identity.protocol != wire.PROTOCOL:
+        raise FingervisionError(
+            f"The board on {port} must speak protocol {wire.PROTOCOL}, but its firmware {identity.version} speaks "
+            f"{identity.protocol}: upload the sketch of this fingervision (fingervision/testbed/firmware)."
+        )
+    return identity
+
+
+def _set_up(board: Board, link: BoardLink, settings: BoardSettings) -> None:
+    session = random.SystemRandom().randrange(1, 0x10000)
+    link.command("U")
+    for role, line in sorted(settings.lines.items()):
+        link.command(f"M {int(role):X} {line.pin:X} {int(line.active_high)}")
+    started = link.command(f"G {session:X} {settings.force_period_ms:X} {settings.silence_ms:X} {settings.settle_ms:X}")
+    assert isinstance(started, wire.Answer)  # noqa: S101 - only I is answered otherwise
+    board.on_state(started)
+    link.keep_awake(session, board)
+    if wire.Levels.ALARM not in started.levels:
+        board.clear()
+
+
+def _wait_for_clock(board: Board, link: BoardLink, clock: Clock) -> None:
+    until_s = clock.now_s() + JOINED_WITHIN_S
+    while link.joined is None:
+        if clock.now_s() > until_s:
+            raise FingervisionError(f"{board.name} must answer steadily, but most answers are damaged: mend its cable.")
+        board.wait(ASK_EVERY_S)

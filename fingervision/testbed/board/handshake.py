@@ -1,0 +1,92 @@
+"""One motion on parallel lines: select, settle, drive, busy, not busy; each step with its own patience."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from threading import Event
+
+from fingervision.domain.board_settings import Role
+from fingervision.domain.errors import FingervisionError
+from fingervision.testbed.board import wire
+from fingervision.testbed.board.board import Board
+from fingervision.testbed.clock import Clock
+
+LINE_WITHIN_S = 0.3
+WAIT_S = 0.01
+
+
+@dataclass(frozen=True, slots=True)
+class Handshake:
+    """The lines of one board.
+
+    Parameters
+    ----------
+    board : Board
+        Set up.
+    clock : Clock
+        The bed's.
+    busy_s : float
+        The motor controller answers the drive line with busy within this.
+    stopped : threading.Event
+        Set when somebody wants the motion to end.
+    """
+
+    board: Board
+    clock: Clock
+    busy_s: float
+    stopped: Event
+
+    def run(self, code: int, at_most_s: float, on_driven: Callable[[float], None]) -> bool:
+        """Run the step of a code to its end; False where it was stopped, or dropped by the board.
+
+        Parameters
+        ----------
+        code : int
+            For the select lines.
+        at_most_s : float
+            Longest time of the motion.
+        on_driven : callable
+            Told the host's time at which the drive line rose.
+
+        Raises
+        ------
+        FingervisionError
+            A step of the handshake did not come; the drive line is down then.
+        """
+        self.board.run(code, self.busy_s + at_most_s)
+        within_s = 1e-3 * self.board.settings.settle_ms + LINE_WITHIN_S
+        driven = self._came(wire.Levels.DRIVE, within_s, "the board has not raised its drive line")
+        if not driven:
+            return False
+        # Without the message of that change, which may come damaged, the state told it just now.
+        at_s, now_s = self.board.driven_board_s, self.clock.now_s()
+        on_driven(now_s if at_s is None else min(self.board.clock.host_at(at_s), now_s))
+        done = (
+            self._came(wire.Levels.BUSY_SEEN, self.busy_s, "the motor controller has not become busy")
+            and self._went(wire.Levels.BUSY, at_most_s, "the motor controller was still busy")
+        )  # fmt: skip
+        if not done:
+            return False
+        self.board.release()
+        if Role.IN_POSITION in self.board.settings.lines:
+            return self._came(wire.Levels.IN_POSITION, LINE_WITHIN_S, "the motor controller has not come into position")
+        return True
+
+    def _came(self, level: wire.Levels, within_s: float, otherwise: str) -> bool:
+        return self._until(lambda: level in self.board.levels, within_s, f"{otherwise} within {within_s:.3g} s")
+
+    def _went(self, level: wire.Levels, within_s: float, otherwise: str) -> bool:
+        return self._until(lambda: level not in self.board.levels, within_s, f"{otherwise} after {within_s:.3g} s")
+
+    def _until(self, holds: Callable[[], bool], within_s: float, otherwise: str) -> bool:
+        until_s = self.clock.now_s() + within_s
+        while not holds():
+            if self._ended():
+                return False
+            if self.clock.now_s() > until_s:
+                self.board.stop()
+                raise FingervisionError(f"A motion was broken off, because {otherwise}: look at the wiring, and home.")
+            self.board.wait(WAIT_S)
+        return not self._ended()
+
+    def _ended(self) -> bool:
+        return self.stopped.is_set() or self.board.dropped is not None

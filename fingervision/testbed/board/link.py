@@ -1,0 +1,255 @@
+"""The connection to a board: commands and their answers, what it streams, and what keeps it awake.
+
+A thread of the link reads all the time. It also asks for the state every few milliseconds, which tells the board that
+the computer lives, tells the link that the board does, and joins their clocks.
+"""
+
+import random
+from contextlib import suppress
+from threading import Condition, Lock, Thread
+from typing import Protocol
+
+import serial
+
+from fingervision.domain.errors import FingervisionError
+from fingervision.testbed.board import wire
+from fingervision.testbed.board.clock_join import ClockJoin, JoinedClock
+from fingervision.testbed.board.port import BAUD
+from fingervision.testbed.clock import Clock
+
+ASK_EVERY_S = 0.02
+# An answer takes 3 ms on the wire, and up to 16 ms more in the buffers of a USB adapter.
+ANSWER_WITHIN_S, TRIES = 0.1, 5
+LOST_AFTER_S = 0.5
+REFIT_EVERY_S = 0.25
+# No byte is faster than its ten bits; the board's 115200 baud are 2.1 % fast (ATmega328P, table of baud rates).
+BYTE_S = 10.0 / BAUD / 1.03
+LONGEST_LINE = 80
+US_PER_S = 1_000_000
+# Commands and questions have numbers of their own, so that a question in between never hides a repeated command.
+NUMBERS = 128
+
+
+class BoardRefusalError(FingervisionError):
+    """The board did not do a command; `reason` is its word for why."""
+
+    def __init__(self, port: str | None, reason: str) -> None:
+        super().__init__(f"The board on {port} refused a command ({reason}).")
+        self.reason = reason
+
+
+class Listener(Protocol):
+    """Who wants to know what the board says by itself; called by the link's thread."""
+
+    def on_state(self, answer: wire.Answer) -> None:
+        """The state, some fifty times a second."""
+        ...
+
+    def on_change(self, change: wire.Change, board_s: float) -> None:
+        """Lines have changed."""
+        ...
+
+    def on_sample(self, sample: wire.Sample, board_s: float) -> None:
+        """A force sample."""
+        ...
+
+
+class BoardLink:
+    """One open port.
+
+    Parameters
+    ----------
+    port : serial.Serial
+        Open.
+    clock : Clock
+        The host's time; it must be that of the machine (a virtual one does not pass while the board works).
+    """
+
+    def __init__(self, port: serial.Serial, clock: Clock) -> None:
+        self.damaged_lines = 0
+        self._port, self._clock = port, clock
+        self._listener: Listener | None = None
+        self._session: int | None = None
+        self._failure: str | None = None
+        self._awake = self._stopping = False
+        self._closed = False
+        self._news = Condition()
+        self._one_command, self._writing = Lock(), Lock()
+        self._answers: dict[int, wire.Message] = {}
+        self._command, self._question = random.SystemRandom().randrange(NUMBERS), 0
+        self._asked_s: dict[int, float] = {}
+        self._last_asked_s = self._last_heard_s = self._last_fit_s = clock.now_s()
+        self._time_us = wire.Unwrapped(32)
+        self._join = ClockJoin()
+        self._joined: JoinedClock | None = None
+        self._thread = Thread(target=self._read_on, name=f"board on {port.name}", daemon=True)
+        self._thread.start()
+
+    @property
+    def joined(self) -> JoinedClock | None:
+        """The board's clock on the host's; None in the first moments."""
+        return self._joined
+
+    @property
+    def stopping(self) -> bool:
+        """Whether a stop was asked for that the board has not yet confirmed."""
+        return self._stopping
+
+    def keep_awake(self, session: int, listener: Listener) -> None:
+        """From now on, ask for the state, tell a listener what comes, and fail if the board is lost or was reset."""
+        self._session, self._listener = session, listener
+        self._last_heard_s = self._clock.now_s()
+        self._awake = True
+
+    def check(self) -> None:
+        """Raise a sentence if the connection is lost."""
+        if self._failure is not None:
+            raise FingervisionError(self._failure)
+
+    def wait(self, seconds: float) -> None:
+        """Wait until something has come from the board, or for so long."""
+        with self._news:
+            if self._failure is None:
+                self._news.wait(seconds)
+
+    def command(self, words: str, within_s: float = ANSWER_WITHIN_S) -> wire.Answer | wire.Identity:
+        """Send a command, again if its answer is lost, and give the answer. The board does it once.
+
+        Raises
+        ------
+        FingervisionError
+            The connection is lost.
+        BoardRefusalError
+            The board did not do it.
+        """
+        with self._one_command:
+            self._command = (self._command + 1) % NUMBERS
+            line = wire.encoded(f"{self._command:02X} {words}")
+            for _ in range(TRIES):
+                with self._news:
+                    self._answers.pop(self._command, None)
+                self._send(line)
+                answer = self._answer(self._command, within_s)
+                if isinstance(answer, wire.Refusal):
+                    raise BoardRefusalError(self._port.name, answer.reason)
+                if isinstance(answer, wire.Answer | wire.Identity):
+                    return answer
+        raise FingervisionError(
+            f"The board on {self._port.name} must answer within {within_s:g} s, but did not, {TRIES} times: is it the "
+            "right port, and is the sketch in fingervision/testbed/firmware uploaded?"
+        )
+
+    def stop(self) -> None:
+        """Let the link's thread tell the board to stop, now and until the board has done it.
+
+        It only sets a flag, so that a signal handler may call it whatever the program was doing.
+        """
+        self._stopping = True
+
+    def close(self) -> None:
+        """Let go of the port; closing twice is allowed."""
+        self._closed = True
+        self._thread.join(timeout=1.0)
+        with suppress(OSError, serial.SerialException):
+            self._port.close()
+
+    def _answer(self, number: int, within_s: float) -> wire.Message | None:
+        until_s = self._clock.now_s() + within_s
+        with self._news:
+            while number not in self._answers and self._failure is None:
+                left_s = until_s - self._clock.now_s()
+                if left_s <= 0.0:
+                    return None
+                self._news.wait(left_s)
+            self.check()
+            return self._answers.pop(number)
+
+    def _send(self, line: bytes) -> None:
+        try:
+            with self._writing:
+                self._port.write(line)
+        except (OSError, serial.SerialException) as error:
+            self._fail(self._pulled(error))
+        self.check()
+
+    def _pulled(self, error: Exception) -> str:
+        return f"The board on {self._port.name} was lost ({error}): is its cable in? Plug it in and begin again."
+
+    def _fail(self, sentence: str) -> None:
+        with self._news:
+            if self._failure is None and not self._closed:
+                self._failure = sentence
+            self._news.notify_all()
+
+    def _read_on(self) -> None:
+        rest = b""
+        while not self._closed and self._failure is None:
+            try:
+                rest += self._port.read(max(1, self._port.in_waiting))
+            except (OSError, serial.SerialException, TypeError) as error:  # TypeError: closed by another thread
+                self._fail(self._pulled(error))
+                return
+            got_s = self._clock.now_s()
+            *lines, rest = rest.split(b"\n")
+            rest = rest[-LONGEST_LINE:]
+            for line in lines:
+                self._take(line, got_s)
+            if lines:
+                with self._news:
+                    self._news.notify_all()
+            if self._awake:
+                self._stay_awake(got_s)
+
+    def _take(self, line: bytes, got_s: float) -> None:
+        message = wire.decoded(line)
+        if message is None:
+            self.damaged_lines += 1
+            return
+        self._last_heard_s = got_s
+        if isinstance(message, wire.Sample | wire.Change):
+            board_s = self._time_us.of(message.time_us) / US_PER_S
+            if self._listener is not None and isinstance(message, wire.Sample):
+                self._listener.on_sample(message, board_s)
+            elif self._listener is not None and isinstance(message, wire.Change):
+                self._listener.on_change(message, board_s)
+            return
+        if isinstance(message, wire.Answer) and self._session is not None:
+            if message.session != self._session:
+                self._fail(
+                    f"The board on {self._port.name} was reset in the middle, by its button, its supply or another "
+                    "program; all its lines are off: begin again."
+                )
+                return
+            if message.cause != wire.GOING:
+                self._stopping = False
+            if message.number in self._asked_s:
+                earliest_s = self._asked_s.pop(message.number)
+                board_s = self._time_us.of(message.time_us) / US_PER_S
+                self._join.add(board_s, earliest_s, got_s - BYTE_S * (len(line) + 1))
+            if self._listener is not None:
+                self._listener.on_state(message)
+        if message.number < NUMBERS:
+            with self._news:
+                self._answers[message.number] = message
+
+    def _stay_awake(self, now_s: float) -> None:
+        if now_s - self._last_heard_s > LOST_AFTER_S:
+            self._fail(
+                f"The board on {self._port.name} was lost: it has said nothing for {LOST_AFTER_S:g} s. Look at its "
+                "cable and its supply, and begin again."
+            )
+            return
+        if now_s - self._last_asked_s >= ASK_EVERY_S or self._stopping:
+            self._ask("Z" if self._stopping else "S")
+        if now_s - self._last_fit_s >= REFIT_EVERY_S or self._joined is None:
+            self._last_fit_s = now_s
+            self._joined = self._join.joined()
+
+    def _ask(self, words: str) -> None:
+        self._question = (self._question + 1) % NUMBERS
+        number = NUMBERS + self._question
+        line = wire.encoded(f"{number:02X} {words}")
+        self._last_asked_s = self._clock.now_s()
+        self._asked_s[number] = self._last_asked_s + BYTE_S * len(line)
+        with suppress(FingervisionError):
+            self._send(line)

@@ -1,0 +1,51 @@
+"""The serial port that a board hangs on."""
+
+import errno
+
+import serial
+from serial.tools.list_ports import comports
+
+from fingervision.domain.errors import FingervisionError
+
+BAUD = 115200
+# The link reads in a thread of its own; it looks up this often to send what keeps the board awake.
+READ_TIMEOUT_S = 0.005
+WRITE_TIMEOUT_S = 1.0
+
+
+def found_ports() -> tuple[tuple[str, str], ...]:
+    """Names of this machine's serial ports, each with what hangs on it."""
+    return tuple(sorted((port.device, port.description) for port in comports()))
+
+
+def opened_port(name: str) -> serial.Serial:
+    """Open a serial port for this program alone.
+
+    Raises
+    ------
+    FingervisionError
+        There is no such port, another program has it, or this user may not open it.
+    """
+    try:
+        return serial.Serial(name, BAUD, timeout=READ_TIMEOUT_S, write_timeout=WRITE_TIMEOUT_S, exclusive=True)
+    except ValueError as error:
+        raise FingervisionError(f"The board's port must be a serial port, but is {name!r} ({error}).") from error
+    except serial.SerialException as error:
+        raise FingervisionError(_why_closed(name, error)) from error
+
+
+def _why_closed(name: str, error: serial.SerialException) -> str:
+    # Another program's lock comes as EAGAIN, Windows' "access denied" without a number.
+    if error.errno in (errno.EAGAIN, errno.EBUSY) or "Could not exclusively lock" in str(error):
+        return f"The port {name} must be free, but another program has it open: close that one first."
+    if error.errno in (errno.EACCES, errno.EPERM):
+        return (
+            f"The port {name} must be open to this user, but access was denied: join the group that owns it (on Debian "
+            "`sudo adduser $USER dialout`, then log in again), or close the program that has it."
+        )
+    ports = found_ports()
+    there = "; there are " + ", ".join(f"{port} ({words})" for port, words in ports) if ports else ""
+    hint = there or "; this machine has no serial port: plug the board in"
+    if error.errno in (errno.ENOENT, errno.ENODEV, errno.ENXIO):
+        return f"There is no serial port {name}{hint}."
+    return f"The port {name} could not be opened as a serial port ({error}){hint}."

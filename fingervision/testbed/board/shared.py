@@ -1,0 +1,24 @@
+"""One board for all parts of a bed that name the same file."""
+
+from fingervision.storage.board_toml import read_board
+from fingervision.storage.toml_section import Section
+from fingervision.testbed.board.board import Board, opened
+from fingervision.testbed.workshop import Workshop
+
+KEY = "board"
+
+
+def board_of(section: Section, workshop: Workshop) -> Board:
+    """Give the board that a part's section names in its key `board`, opened once.
+
+    Raises
+    ------
+    FingervisionError
+        Its file cannot be meant, or it cannot be opened.
+    """
+    path = workshop.folder / section.word(KEY)
+    name = f"{KEY} {path.resolve()}"
+    if name not in workshop.shared:
+        workshop.shared[name] = opened(read_board(path), workshop.clock)
+    board: Board = workshop.shared[name]
+    return board.hold()

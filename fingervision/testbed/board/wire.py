@@ -1,0 +1,163 @@
+"""Messages between computer and board, one a line, as the board's sketch speaks them (`firmware/README.md`).
+
+`words*CRC`, ended by a line feed; the CRC is CRC-16/XMODEM of the words, in four hexadecimal digits.
+"""
+
+from binascii import crc_hqx
+from collections.abc import Callable
+from dataclasses import dataclass
+from enum import IntFlag
+
+PROTOCOL = 1
+NAME = "fingervision-board"
+# Cause of a board that has not dropped its drive line.
+GOING = "-"
+
+
+class Levels(IntFlag):
+    """Lines that say yes."""
+
+    DRIVE = 1
+    ENABLE = 2
+    HOLD = 4
+    BUSY = 8
+    ALARM = 16
+    IN_POSITION = 32
+    BUSY_SEEN = 64
+
+
+@dataclass(frozen=True, slots=True)
+class Identity:
+    """What a board says it is."""
+
+    number: int
+    name: str
+    protocol: int
+    version: str
+
+
+@dataclass(frozen=True, slots=True)
+class Answer:
+    """A command was done, and this is the state after it.
+
+    Parameters
+    ----------
+    number : int
+        Of the command.
+    time_us : int
+        Board's time when the command was received; wraps at 2**32.
+    session : int
+        Of the set-up; 0 after a reset.
+    levels : Levels
+        Lines that say yes.
+    changes : int
+        How many changes of lines the board has noticed, wrapping at 256.
+    cause : str
+        Why the drive line was dropped: w silence, l too long, a alarm, h by the computer, - not at all.
+    """
+
+    number: int
+    time_us: int
+    session: int
+    levels: Levels
+    changes: int
+    cause: str
+
+
+@dataclass(frozen=True, slots=True)
+class Refusal:
+    """A command was not done, for a reason in one word."""
+
+    number: int
+    reason: str
+
+
+@dataclass(frozen=True, slots=True)
+class Sample:
+    """The force channel's level, numbered (wrapping at 65536), at the board's time."""
+
+    number: int
+    time_us: int
+    level: int
+
+
+@dataclass(frozen=True, slots=True)
+class Change:
+    """Lines have changed to these levels; numbered (wrapping at 256), at the board's time."""
+
+    number: int
+    time_us: int
+    levels: Levels
+
+
+Message = Identity | Answer | Refusal | Sample | Change
+
+
+def encoded(words: str) -> bytes:
+    r"""Give the line of a message.
+
+    Examples
+    --------
+    >>> encoded("00 I")
+    b'00 I*3647\n'
+    """
+    text = words.encode("ascii")
+    return b"%s*%04X\n" % (text, crc_hqx(text, 0))
+
+
+def decoded(line: bytes) -> Message | None:
+    r"""Give the message of a line without its line feed, or None if it was damaged.
+
+    Examples
+    --------
+    >>> decoded(encoded("N 05 busy").rstrip())
+    Refusal(number=5, reason='busy')
+    >>> decoded(b"N 05 bvsy*0000") is None
+    True
+    """
+    text, star, crc = line.rpartition(b"*")
+    if not star or crc != b"%04X" % crc_hqx(text, 0):
+        return None
+    try:
+        kind, *words = text.decode("ascii").split(" ")
+        return _READERS[kind](*words)
+    except (UnicodeDecodeError, KeyError, TypeError, ValueError):
+        return None
+
+
+def _hex(word: str) -> int:
+    return int(word, 16)
+
+
+_READERS: dict[str, Callable[..., Message]] = {
+    "I": lambda number, name, protocol, version: Identity(_hex(number), name, _hex(protocol), version),
+    "A": lambda number, time, session, levels, changes, cause: Answer(
+        _hex(number), _hex(time), _hex(session), Levels(_hex(levels)), _hex(changes), cause
+    ),
+    "N": lambda number, reason: Refusal(_hex(number), reason),
+    "F": lambda number, time, level: Sample(_hex(number), _hex(time), _hex(level)),
+    "L": lambda number, time, levels: Change(_hex(number), _hex(time), Levels(_hex(levels))),
+}
+
+
+class Unwrapped:
+    """A counter that wraps, counted on: each value is taken as the one nearest to the last.
+
+    Parameters
+    ----------
+    bits : int
+        It wraps at 2**bits.
+    """
+
+    def __init__(self, bits: int) -> None:
+        self._turn = 1 << bits
+        self._last: int | None = None
+
+    def of(self, value: int) -> int:
+        """Give the count that a wrapped value stands for."""
+        if self._last is None:
+            self._last = value
+        ahead = (value - self._last + self._turn // 2) % self._turn - self._turn // 2
+        count = self._last + ahead
+        self._last = max(self._last, count)
+        return count

@@ -1,0 +1,112 @@
+"""A force sensor with an analogue output, on the board's converter."""
+
+from collections.abc import Sequence
+from itertools import pairwise
+
+import numpy as np
+
+from fingervision.domain.errors import FingervisionError
+from fingervision.storage.toml_section import Section
+from fingervision.testbed.board.board import Board
+from fingervision.testbed.board.shared import KEY, board_of
+from fingervision.testbed.clock import Clock
+from fingervision.testbed.reading import Reading
+from fingervision.testbed.workshop import Workshop
+
+KEYS = (KEY, "volts", "newtons", "reference_v")
+SIMULATED = False
+CONVERTER_STEPS = 1024
+REFERENCE_V = 5.0
+# A sample is on its way for at most the time of a few lines on the wire, and of a USB adapter's buffer.
+ON_ITS_WAY_S = 0.1
+WAIT_S = 0.005
+
+
+class BoardForceSensor:
+    """Volts turned into newtons by a table that was measured.
+
+    Parameters
+    ----------
+    board : Board
+        Set up, with a force line.
+    volts, newtons : sequence of float, length n
+        The table: volts increasing. Between its rows the force is linear, beyond them it goes on as between the last
+        two, so that an overload is never taken for less.
+    reference_v : float
+        Voltage that the converter compares with (AVcc, the board's 5 V).
+    clock : Clock
+        The bed's.
+    """
+
+    def __init__(
+        self, board: Board, volts: Sequence[float], newtons: Sequence[float], reference_v: float, clock: Clock
+    ) -> None:
+        self.full_scale_n = float(max(abs(value) for value in newtons))
+        self._board, self._clock, self._reference_v = board, clock, reference_v
+        self._volts, self._newtons = np.array(volts), np.array(newtons)
+        self._closed = False
+
+    @property
+    def name(self) -> str:
+        """Board, port and firmware."""
+        return f"force sensor at {self._board.name}"
+
+    def readings(self) -> tuple[Reading, ...]:
+        """Forces since the last call, each with the bounds of its time on the host's clock.
+
+        Raises
+        ------
+        FingervisionError
+            The board is lost, or sends no samples.
+        """
+        until_s = self._clock.now_s() + 1e-3 * self._board.settings.force_period_ms + ON_ITS_WAY_S
+        samples = self._board.samples()
+        while not samples and self._clock.now_s() < until_s:
+            self._board.wait(WAIT_S)
+            samples = self._board.samples()
+        if not samples:
+            raise FingervisionError(f"{self._board.name} must send force samples, but has sent none for a while.")
+        clock = self._board.clock
+        return tuple(
+            Reading(sample.board_s, *clock.bounds_at(sample.board_s), self.force_n(sample.level)) for sample in samples
+        )
+
+    def force_n(self, level: int) -> float:
+        """Force at a level of the converter, which stands for the middle of its step."""
+        volts, newtons = self._volts, self._newtons
+        at_v = (level + 0.5) * self._reference_v / CONVERTER_STEPS
+        if volts[0] <= at_v <= volts[-1]:
+            return float(np.interp(at_v, volts, newtons))
+        a, b = (0, 1) if at_v < volts[0] else (-2, -1)
+        slope = (newtons[b] - newtons[a]) / (volts[b] - volts[a])
+        return float(newtons[a] + slope * (at_v - volts[a]))
+
+    def close(self) -> None:
+        """Let go of the board."""
+        if not self._closed:
+            self._closed = True
+            self._board.close()
+
+
+def build(section: Section, workshop: Workshop) -> BoardForceSensor:
+    """Build it from its section of the configuration."""
+    volts, newtons = _column(section, "volts"), _column(section, "newtons")
+    if len(newtons) != len(volts):
+        section.refuse("newtons", f"must have as many values as volts ({len(volts)}), but has {len(newtons)}.")
+    if any(b <= a for a, b in pairwise(volts)):
+        section.refuse("volts", f"must increase, but is {volts!r}.")
+    reference_v = section.number("reference_v", REFERENCE_V, above=0.0)
+    board = board_of(section, workshop)
+    if not board.settings.senses_force:
+        board.close()
+        section.refuse(KEY, "must have a force sensor on its lines, but has none: add its force line.")
+    return BoardForceSensor(board, volts, newtons, reference_v, workshop.clock)
+
+
+def _column(section: Section, key: str) -> list[float]:
+    raw = section.values.get(key)
+    if not isinstance(raw, list) or len(raw) < 2 or not all(isinstance(each, int | float) for each in raw):
+        section.refuse(
+            key if raw is not None else None, f"must hold {key} as a list of at least two numbers, but is {raw!r}."
+        )
+    return [float(each) for each in raw]
