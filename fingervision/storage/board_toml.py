@@ -112,6 +112,6 @@ def _check(section: Section, lines: dict[Role, Line]) -> None:
     if len(used) > 1:
         section.refuse(
             "drive",
-            "must lie on one port with the select lines (D2-D7, D8-D13 or A0-A5), so that they change at once, but does "
-            "not.",
+            "must lie on one port with the select lines (D2-D7, D8-D13 or A0-A5), so that they change at once, but "
+            "does not.",
         )
