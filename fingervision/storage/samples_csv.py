@@ -10,7 +10,8 @@ from fingervision.domain.status import Status
 from fingervision.storage.line_file import LineFile, cell, quoted
 
 COLUMNS = (
-    "run,time_s,input_mm,gap_mm,left_mm,right_mm,u_gap_mm,u_random_mm,force_n,status,frame,step,camera_s,arrived_s"
+    "run,time_s,input_mm,gap_mm,left_mm,right_mm,u_gap_mm,u_random_mm,force_n,status,frame,step,encoder_mm,camera_s,"
+    "arrived_s"
 )
 # Decimal places: a microsecond, a tenth of a nanometre and a micronewton are below any uncertainty.
 TIME_PLACES, MM_PLACES, FORCE_PLACES = 6, 7, 6
@@ -27,7 +28,7 @@ class SampleRow:
     time_s : float
         Since the folder's first row, on the camera's clock.
     input_mm : float or None
-        The actuator's own reading, at the time of the exposure.
+        Position of the stage at the time of the exposure, between the steps of its encoder.
     gap_mm, left_mm, right_mm : float or None
         Gap and measuring points.
     u_gap_mm, u_random_mm : float or None
@@ -40,6 +41,8 @@ class SampleRow:
         Place in the video, from 0.
     step : int
         Step of the recipe, from 1.
+    encoder_mm : float or None
+        The actuator's own newest reading when the frame had come.
     camera_s, arrived_s : float
         The frame's stamp on the camera's own clock, and when the host had it on the bed's.
     """
@@ -56,6 +59,7 @@ class SampleRow:
     status: Status
     frame: int
     step: int
+    encoder_mm: float | None
     camera_s: float
     arrived_s: float
 
@@ -71,6 +75,7 @@ class SampleRow:
                 self.status.value,
                 str(self.frame),
                 str(self.step),
+                cell(self.encoder_mm, MM_PLACES),
                 cell(self.camera_s, TIME_PLACES),
                 cell(self.arrived_s, TIME_PLACES),
             ]
@@ -141,5 +146,5 @@ def _row(cells: list[str]) -> SampleRow:
 
     return SampleRow(
         cells[0], float(cells[1]), number(2), number(3), number(4), number(5), number(6), number(7), number(8),
-        Status(cells[9]), int(cells[10]), int(cells[11]), float(cells[12]), float(cells[13]),
+        Status(cells[9]), int(cells[10]), int(cells[11]), number(12), float(cells[13]), float(cells[14]),
     )  # fmt: skip

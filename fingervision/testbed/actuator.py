@@ -20,6 +20,8 @@ class StageLimits:
         Highest force.
     accuracy_mm : float
         It comes to a stand within +- this of where it was sent; its encoder says where.
+    encoder_step_mm : float
+        Positions are read in multiples of it; 0 where they are not.
     """
 
     lower_mm: float
@@ -27,6 +29,7 @@ class StageLimits:
     speed_mm_s: float
     force_n: float
     accuracy_mm: float = 0.0
+    encoder_step_mm: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)

@@ -17,7 +17,7 @@ from fingervision.testbed.soft_limits import SoftLimits
 SLACK_MM = 1e-9
 # What one frame at a point costs beside its own time: settling.
 SETTLE_S = 0.3
-REZERO_S = 1.0
+REZERO_S = 2.0
 
 
 @dataclass(frozen=True, slots=True)

@@ -17,9 +17,12 @@ class Reading:
         answer before), and one without a clock of its own gives the middle as `device_s`.
     value : float
         Position in mm, or force in N.
+    moving : bool or None
+        For a position: whether a motion was under way (the controller's BUSY line); None where that is not known.
     """
 
     device_s: float
     asked_s: float
     got_s: float
     value: float
+    moving: bool | None = None

@@ -1,7 +1,9 @@
 """A plan on a bed: one leg after the other, every frame looked at, the motor stopped before anything else."""
 
+from collections import deque
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from contextlib import suppress
+from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime
 from math import sin, tau
 from typing import Any
@@ -95,6 +97,7 @@ class Runner:
     _base_s: float = 0.0
     _leg: Leg | None = None
     _closing_below_mm: float = 0.0
+    _waiting: deque[tuple[Frame, SampleRow, float]] = field(default_factory=deque)
     slots: list[dict[str, float]] = field(default_factory=list)
 
     def execute(self) -> Counts:
@@ -112,6 +115,8 @@ class Runner:
                 self._execute()
         except BaseException:
             self.bed.actuator.stop()
+            with suppress(FingervisionError):
+                self._write(at_once=True)
             raise
         return Counts(self._rows, self._with_gap, self._lost)
 
@@ -131,6 +136,7 @@ class Runner:
             self._do(leg, number)
             done_s += seconds
             self.on_progress(done_s, total_s)
+        self._write(at_once=True)
         joined = self._clocks()
         self._event("clocks", "The instruments' clocks beside the bed's.", **joined)
         self._event("ended", f"{self._rows} frames.")
@@ -314,10 +320,11 @@ class Runner:
             if self._zero_s is None:
                 self._zero_s = look.shot.device_s - self._base_s
             row = self._row(look, measured, self._zero_s)
-            self.folder.add(item, row)
+            self._waiting.append((item, row, look.exposed_s))
             self._count(row)
         elif record:
             self._lost += 1
+        self._write()
         gap_mm = measured.gap_mm
         if gap_mm is not None and gap_mm < self.bed.limits.gap_mm and not isinstance(self._act, Close):
             raise FingervisionError(
@@ -326,6 +333,16 @@ class Runner:
             )
         return look, measured
 
+    def _write(self, *, at_once: bool = False) -> None:
+        """Write the rows whose place between the encoder's steps is known by now."""
+        while self._waiting:
+            item, row, exposed_s = self._waiting[0]
+            input_mm = self.sight.position.at(exposed_s, at_once=at_once)
+            if input_mm is None:
+                return
+            self.folder.add(item, replace(row, input_mm=round(input_mm, MM_PLACES)))
+            self._waiting.popleft()
+
     def _row(self, look: Look, measured: GapRow, zero_s: float) -> SampleRow:
         def rounded(value: float | None) -> float | None:
             return None if value is None else round(value, MM_PLACES)
@@ -333,7 +350,7 @@ class Runner:
         return SampleRow(
             run=f"{self.run}{self.part}",
             time_s=round(look.shot.device_s - zero_s, 6),
-            input_mm=rounded(look.input_mm),
+            input_mm=None,
             gap_mm=rounded(measured.gap_mm),
             left_mm=rounded(measured.left_mm),
             right_mm=rounded(measured.right_mm),
@@ -343,6 +360,7 @@ class Runner:
             status=measured.status,
             frame=self._rows,
             step=0 if self._leg is None else self._leg.step,
+            encoder_mm=rounded(look.encoder_mm),
             camera_s=round(look.shot.device_s, 6),
             arrived_s=round(look.shot.arrived_s, 6),
         )

@@ -16,46 +16,81 @@ from fingervision.testbed.bed import Bed
 from fingervision.testbed.board.clock_join import ClockJoin
 from fingervision.testbed.camera import BedCamera, Shot
 from fingervision.testbed.force_sensor import ForceSensor
+from fingervision.testbed.reading import Reading
+from fingervision.testbed.stage_track import StageTrack
 from fingervision.vision.pipeline import Settings, measure_frame
 
 # Readings that are kept: a frame looks back over its own latency, which is far less at 200 readings a second.
 READINGS_KEPT = 2000
 
 
-class Instrument:
-    """Readings of an actuator or a force sensor, at any time of the bed.
+class JoinedInstrument:
+    """An instrument whose clock is joined to the bed's by every answer.
 
     Parameters
     ----------
     source : Actuator or ForceSensor
-        Where they come from.
+        Where the readings come from.
     """
 
     def __init__(self, source: Actuator | ForceSensor) -> None:
         self._source = source
         self.clock = ClockJoin()
-        self._device_s: deque[float] = deque(maxlen=READINGS_KEPT)
-        self._values: deque[float] = deque(maxlen=READINGS_KEPT)
         self.newest = 0.0
 
-    def read(self) -> None:
+    def read(self) -> tuple[Reading, ...]:
         """Take what came since the last time."""
         readings = self._source.readings()
-        for reading in readings:
-            if not self._device_s or reading.device_s > self._device_s[-1]:
-                self._device_s.append(reading.device_s)
-                self._values.append(reading.value)
         asked = readings[-1]
         self.clock.add(asked.device_s, asked.asked_s, asked.got_s)
         self.newest = asked.value
+        return readings
+
+    def device_at(self, bed_s: float) -> float:
+        """Time of the instrument at a time of the bed; the bed's own before the clocks are joined."""
+        joined = self.clock.joined()
+        return bed_s if joined is None else joined.board_s + (bed_s - joined.host_s) / joined.rate
+
+
+class Position(JoinedInstrument):
+    """The stage's place, between the steps of its encoder."""
+
+    def __init__(self, actuator: Actuator) -> None:
+        super().__init__(actuator)
+        self._track = StageTrack(actuator.limits.encoder_step_mm)
+
+    def read(self) -> tuple[Reading, ...]:
+        """Take what came since the last time."""
+        readings = super().read()
+        for reading in readings:
+            self._track.add(reading)
+        return readings
+
+    def at(self, bed_s: float, *, at_once: bool = False) -> float | None:
+        """Place at a time of the bed; None where later readings will tell it better (see `StageTrack`)."""
+        return self._track.at_mm(self.device_at(bed_s), at_once=at_once)
+
+
+class Force(JoinedInstrument):
+    """The force at the drive."""
+
+    def __init__(self, sensor: ForceSensor) -> None:
+        super().__init__(sensor)
+        self._device_s: deque[float] = deque(maxlen=READINGS_KEPT)
+        self._force_n: deque[float] = deque(maxlen=READINGS_KEPT)
+
+    def read(self) -> tuple[Reading, ...]:
+        """Take what came since the last time."""
+        readings = super().read()
+        for reading in readings:
+            if not self._device_s or reading.device_s > self._device_s[-1]:
+                self._device_s.append(reading.device_s)
+                self._force_n.append(reading.value)
+        return readings
 
     def at(self, bed_s: float) -> float:
-        """Interpolate between the readings about a time of the bed."""
-        joined = self.clock.joined()
-        if joined is None:
-            return self.newest
-        device_s = joined.board_s + (bed_s - joined.host_s) / joined.rate
-        return float(np.interp(device_s, self._device_s, self._values))
+        """Force at a time of the bed, linear between readings."""
+        return float(np.interp(self.device_at(bed_s), self._device_s, self._force_n))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -66,16 +101,19 @@ class Look:
     ----------
     shot : Shot
         The frame, perhaps not yet drawn.
-    input_mm : float
-        Position of the stage, as read by the actuator.
+    exposed_s : float
+        When, on the bed's clock, as far as the camera's is joined to it.
+    encoder_mm : float
+        The newest reading of the stage.
     force_n : float or None
-        Force at the drive.
+        Force at the drive at the exposure.
     force_now_n : float or None
         The newest force.
     """
 
     shot: Shot
-    input_mm: float
+    exposed_s: float
+    encoder_mm: float
     force_n: float | None
     force_now_n: float | None
 
@@ -105,8 +143,8 @@ class Sight:
         bed.scale.check_frame_size(description.width_px, description.height_px)
         self.camera: BedCamera = bed.camera
         self.rate_hz = description.rate_hz or 25.0
-        self.position = Instrument(bed.actuator)
-        self.force = None if bed.force_sensor is None else Instrument(bed.force_sensor)
+        self.position = Position(bed.actuator)
+        self.force = None if bed.force_sensor is None else Force(bed.force_sensor)
         self.camera_clock = ArrivalClock(bed.camera.latency)
         self._settings = Settings(bed.below_tip_mm * bed.scale.px_per_mm)
         self._rows = RowMaker(bed.scale, (description.width_px, description.height_px))
@@ -120,7 +158,8 @@ class Sight:
             self.force.read()
         exposed_s = self.camera_clock.joined().bed_at(shot.device_s)
         force_n = None if self.force is None else self.force.at(exposed_s)
-        return Look(shot, self.position.at(exposed_s), force_n, None if self.force is None else self.force.newest)
+        force_now_n = None if self.force is None else self.force.newest
+        return Look(shot, exposed_s, self.position.newest, force_n, force_now_n)
 
     def measure(self, item: Frame | LostFrame) -> tuple[GapRow, str]:
         """Measure a picture: its row, and where there is no number the reason in a sentence."""

@@ -1,6 +1,9 @@
 """A simulated actuator: the paper's, with its encoder, its accuracy and its play."""
 
+from dataclasses import replace
+
 import numpy as np
+from numpy.typing import NDArray
 
 from fingervision.domain.errors import FingervisionError
 from fingervision.storage.toml_section import Section
@@ -21,8 +24,12 @@ SPEED_MM_S, FORCE_N, ENCODER_STEP_MM, ACCURACY_MM = 400.0, 5.5, 0.03, 0.09
 # 1.2 ms measured with an ATmega328P).
 RATE_HZ = 200.0
 ANSWER_S, SLOW_ANSWER_S = 0.001, 0.0005
-HOMING_MM_S = 5.0
-STAGE = "simulated stage"
+# Edges of the encoder and of the BUSY line are stamped by interrupts: micros() of an ATmega328P counts in 4 us.
+EDGE_WITHIN_S = 2e-6
+# Between two points of this grid the stage moves evenly enough to place an edge: at 16 m/s2 within 2 us at 1 mm/s.
+EDGE_GRID_S = 0.0005
+HOMING_MM_S = 1.0
+Array = NDArray[np.float64]
 
 
 class SimulatedActuator:
@@ -36,8 +43,6 @@ class SimulatedActuator:
         What moves.
     limits : StageLimits
         What it can do.
-    encoder_step_mm : float
-        Positions are read in multiples of it; 0 reads them as they are.
     rng : numpy.random.Generator
         Of clock and answering times.
     """
@@ -45,13 +50,11 @@ class SimulatedActuator:
     name = "simulated actuator"
     has_steps = False
 
-    def __init__(
-        self, clock: Clock, stage: SimulatedStage, limits: StageLimits, encoder_step_mm: float, rng: np.random.Generator
-    ) -> None:
+    def __init__(self, clock: Clock, stage: SimulatedStage, limits: StageLimits, rng: np.random.Generator) -> None:
         self.limits = limits
-        self._clock, self._stage, self._step_mm, self._rng = clock, stage, encoder_step_mm, rng
+        self._clock, self._stage, self._step_mm, self._rng = clock, stage, limits.encoder_step_mm, rng
         self._board = OwnClock.drawn(rng)
-        self._read_until = int(np.ceil(self._board.shows_s(clock.now_s()) * RATE_HZ))
+        self._read_until_s = clock.now_s()
         self._answered_s = clock.now_s()
         self._alarm: Alarm | None = None
 
@@ -108,20 +111,44 @@ class SimulatedActuator:
         self._stage.halt(self._clock.now_s())
 
     def readings(self) -> tuple[Reading, ...]:
-        """Positions since the last call, at the board's own rate, then as of now."""
+        """Positions since the last call: at the board's own rate, about every edge, and as of now."""
         asked_s = self._clock.now_s()
         answer_s = ANSWER_S + SLOW_ANSWER_S * float(self._rng.random())
         self._clock.wait_until(asked_s + answer_s)
         got_s = self._clock.now_s()
-        now_s = self._board.shows_s(asked_s + 0.5 * answer_s)
-        ticks = np.arange(self._read_until, int(np.floor(now_s * RATE_HZ)) + 1)
-        device_s = np.append(ticks / RATE_HZ, now_s)
-        true_mm = self._stage.at_mm(np.array([self._board.bed_s(at) for at in device_s.tolist()]))
+        began_s, self._read_until_s = self._read_until_s, asked_s + 0.5 * answer_s
+        at_s = np.unique(np.concatenate([self._ticks_s(began_s), self._edges_s(began_s), [self._read_until_s]]))
+        earliest_s, self._answered_s = self._answered_s, got_s
+        read_mm, moving = self._encoder_mm(at_s), self._stage.moves(at_s)
+        streamed = [
+            Reading(self._board.shows_s(at), earliest_s, got_s, mm, busy)
+            for at, mm, busy in zip(at_s.tolist(), read_mm.tolist(), moving.tolist(), strict=True)
+        ]
+        return (*streamed[:-1], replace(streamed[-1], asked_s=asked_s))
+
+    def _ticks_s(self, began_s: float) -> Array:
+        """Times since the last answer at which the board looked by itself."""
+        first, last = (self._board.shows_s(at_s) * RATE_HZ for at_s in (began_s, self._read_until_s))
+        return np.array([self._board.bed_s(tick / RATE_HZ) for tick in range(int(first) + 1, int(last) + 1)])
+
+    def _edges_s(self, began_s: float) -> Array:
+        """Times shortly before and after every edge of the encoder's and the BUSY line since the last answer."""
+        grid_s = np.linspace(began_s, self._read_until_s, int((self._read_until_s - began_s) / EDGE_GRID_S) + 2)
+        edges_s = self._stage.turns_s(began_s, self._read_until_s)
         if self._step_mm > 0.0:
-            true_mm = np.round(np.rint(true_mm / self._step_mm) * self._step_mm, 9)
-        earliest_s, self._answered_s, self._read_until = self._answered_s, got_s, int(np.floor(now_s * RATE_HZ)) + 1
-        since = [Reading(at, earliest_s, got_s, mm) for at, mm in zip(device_s.tolist(), true_mm.tolist(), strict=True)]
-        return (*since[:-1], Reading(since[-1].device_s, asked_s, got_s, since[-1].value))
+            cells = self._stage.at_mm(grid_s) / self._step_mm + 0.5
+            for k in np.flatnonzero(np.diff(np.floor(cells))):
+                low, high = sorted((cells[k], cells[k + 1]))
+                shares = (np.arange(np.floor(low) + 1.0, np.floor(high) + 1.0) - cells[k]) / (cells[k + 1] - cells[k])
+                edges_s += (grid_s[k] + shares * (grid_s[k + 1] - grid_s[k])).tolist()
+        around_s = [at_s + aside_s for at_s in edges_s for aside_s in (-EDGE_WITHIN_S, EDGE_WITHIN_S)]
+        return np.array([at_s for at_s in around_s if began_s < at_s < self._read_until_s])
+
+    def _encoder_mm(self, at_s: Array) -> Array:
+        true_mm = self._stage.at_mm(at_s)
+        if self._step_mm == 0.0:
+            return true_mm
+        return np.asarray(np.round(np.floor(true_mm / self._step_mm + 0.5) * self._step_mm, 9))
 
     def close(self) -> None:
         """Stop."""
@@ -152,6 +179,7 @@ def build(section: Section, workshop: Workshop) -> SimulatedActuator:
         speed_mm_s=section.number("speed_mm_s", SPEED_MM_S, above=0.0),
         force_n=section.number("force_n", FORCE_N, above=0.0),
         accuracy_mm=section.number("accuracy_mm", ACCURACY_MM, low=0.0),
+        encoder_step_mm=section.number("encoder_step_mm", ENCODER_STEP_MM, low=0.0),
     )
     rng = np.random.default_rng([workshop.seed, 1])
     # A controller knows the bed's limits as its own: not even its inaccuracy takes the stage beyond them.
@@ -161,5 +189,4 @@ def build(section: Section, workshop: Workshop) -> SimulatedActuator:
         stage.at_mm, lambda: stage.planned_until_s, lambda: stage.version, lambda: list(stage.homed_s)
     )
     workshop.play_mm = section.number("play_mm", 0.0, low=0.0)
-    step_mm = section.number("encoder_step_mm", ENCODER_STEP_MM, low=0.0)
-    return SimulatedActuator(workshop.clock, stage, limits, step_mm, rng)
+    return SimulatedActuator(workshop.clock, stage, limits, rng)

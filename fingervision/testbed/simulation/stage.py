@@ -92,10 +92,24 @@ class SimulatedStage:
         self.homed_s.append(max(now_s, self.planned_until_s))
         self.version += 1
 
+    def turns_s(self, after_s: float, until_s: float) -> list[float]:
+        """Times at which a motion began or ended."""
+        ends = [(begin_s, begin_s + duration_s) for begin_s, _, _, _, duration_s in self._pieces[1:]]
+        joined = {begin_s for begin_s, _ in ends} & {end_s for _, end_s in ends}
+        return sorted({at for piece in ends for at in piece if at not in joined and after_s < at <= until_s})
+
+    def moves(self, time_s: Array) -> NDArray[np.bool_]:
+        """Whether a motion is under way at times of the bed, shape (n,)."""
+        rows = self._pieces_at(time_s)
+        return np.asarray(time_s < rows[:, 0] + rows[:, 4], dtype=np.bool_)
+
     def at_mm(self, time_s: Array) -> Array:
         """True positions at times of the bed, shape (n,)."""
-        begins = np.array([piece[0] for piece in self._pieces])
-        rows = np.array(self._pieces)[np.searchsorted(begins, time_s, side="right") - 1]
+        rows = self._pieces_at(time_s)
         rows[:, 0] = np.where(np.isfinite(rows[:, 0]), rows[:, 0], time_s)
         since_s = np.minimum(time_s - rows[:, 0], rows[:, 4])
         return np.asarray(rows[:, 1] + rows[:, 2] * since_s + 0.5 * rows[:, 3] * since_s**2, dtype=np.float64)
+
+    def _pieces_at(self, time_s: Array) -> Array:
+        begins = np.array([piece[0] for piece in self._pieces])
+        return np.asarray(np.array(self._pieces)[np.searchsorted(begins, time_s, side="right") - 1])
