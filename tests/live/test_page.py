@@ -165,6 +165,83 @@ def test_the_page_shows_records_and_saves(
     shown(page, "document.querySelector('#status').textContent === 'ok'")
 
 
+def under_cursor_s(page: Any, share: float) -> float:
+    """Time that the chart's legend gives with the cursor at a share of its width."""
+    box = page.locator("#chart .u-over").bounding_box()
+    page.mouse.move(box["x"] + share * box["width"], box["y"] + box["height"] / 2)
+    page.wait_for_function("() => /\\d/.test(document.querySelector('.u-legend .u-value').textContent)")
+    return float(page.locator("#chart .u-legend .u-value").first.inner_text())
+
+
+def test_the_chart_zooms_and_every_key_and_limit_does_what_it_says(
+    live: Callable[..., Any], opened: Callable[..., Any]
+) -> None:
+    view = live("simulated", "--port", "0")
+    page = opened(view.address)
+    shown(page, "Number(document.querySelector('#picture').dataset.shown) > 60")
+
+    # The cursor reads the chart, a drag zooms in, what comes in does not move it, and a key follows again.
+    page.locator("#chart").scroll_into_view_if_needed()
+    began_s, newest_s = under_cursor_s(page, 0.01), under_cursor_s(page, 0.99)
+    box = page.locator("#chart .u-over").bounding_box()
+    middle = box["y"] + box["height"] / 2
+    page.mouse.move(box["x"] + 0.4 * box["width"], middle)
+    page.mouse.down()
+    page.mouse.move(box["x"] + 0.6 * box["width"], middle, steps=4)
+    page.mouse.up()
+    zoomed_s = (under_cursor_s(page, 0.02), under_cursor_s(page, 0.98))
+    assert began_s < zoomed_s[0] < zoomed_s[1] < newest_s
+    page.wait_for_timeout(500)
+    assert (under_cursor_s(page, 0.02), under_cursor_s(page, 0.98)) == zoomed_s
+    page.locator("body").press("f")
+    shown(page, "document.querySelector('#follow').textContent === 'Follow'")
+    page.wait_for_timeout(300)
+    assert under_cursor_s(page, 0.99) > newest_s
+
+    # Where the tips cannot point there is no gap.
+    page.select_option("#tips", "left")
+    shown(page, "document.querySelector('#status').textContent !== 'ok'")
+    page.select_option("#tips", "up")
+    shown(page, "document.querySelector('#status').textContent === 'ok'")
+
+    # The simulated gripper moves between 1 and 4 mm.
+    for least, greatest, verdict in (("5", "6", "fail"), ("0.5", "5", "pass")):
+        page.fill("#least", least)
+        page.fill("#greatest", greatest)
+        page.press("#greatest", "Enter")
+        page.locator("#verdict", has_text=verdict).wait_for()
+    page.fill("#least", "7")
+    page.press("#least", "Enter")
+    says(page, "The lower limit must be below the upper one, but they are 7 and 5 mm.")
+    page.press("#least", "Escape")
+
+    page.locator("body").press("z")
+    says(page, "Gaps are shown less")
+    off_mm = float(re.search(r"less ([\d.]+) mm", page.locator("#log li", has_text="less").inner_text())[1])
+    page.locator("#unzero").wait_for()
+    page.locator("body").press("p")
+    assert page.inner_text("#pause") == "Go on"
+    shown_mm, frame = float(page.inner_text("#gap_mm")), int(page.get_attribute("#gap_mm", "data-frame"))
+    with page.expect_download() as saved:
+        page.click("#save_csv")
+    table = {int(row["frame"]): row for row in csv.DictReader(io.StringIO(Path(saved.value.path()).read_text()))}
+    assert float(table[frame]["gap_mm"]) - off_mm == pytest.approx(shown_mm, abs=2 * SHOWN_MM)
+    page.wait_for_timeout(300)
+    assert int(page.get_attribute("#gap_mm", "data-frame")) == frame
+    page.locator("body").press("p")
+    shown(page, f"Number(document.querySelector('#gap_mm').dataset.frame) > {frame}")
+
+    page.locator("body").press("s")
+    says(page, "Snapshot of frame")
+    page.locator("body").press("i")
+    page.locator("#step_pictures img").first.wait_for()
+    # Every control can be reached without a mouse, and shows that it is.
+    page.locator("#pause").focus()
+    page.keyboard.press("Tab")
+    assert page.evaluate("document.activeElement.id") == "record"
+    assert page.evaluate("getComputedStyle(document.activeElement).outlineStyle") == "solid"
+
+
 def test_a_scale_is_asked_for_and_found_on_a_reference(
     live: Callable[..., Any], opened: Callable[..., Any], tmp_path: Path
 ) -> None:
