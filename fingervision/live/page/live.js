@@ -120,6 +120,7 @@
     say("status", now ? now.status : "–", `badge ${now && now.status === "ok" ? "good" : "bad"}`);
     at("why").textContent = now ? now.words : "";
     at("unzero").hidden = !now || now.zero_mm === 0;
+    if (now) at("unzero").textContent = `Zero off (${now.zero_mm.toFixed(4)} mm)`;
     const verdict = now ? now.verdict : "";
     at("verdict").hidden = !verdict;
     say("verdict", verdict, `badge ${{ pass: "good", fail: "bad", unsure: "unsure" }[verdict] || ""}`);
