@@ -56,7 +56,7 @@ def open_bed(name: str, hidden: Hidden = NOTHING, *, pace: float = 0.0, seed: in
     FingervisionError
         The configuration makes no sense, or a part cannot be opened; what was open by then is closed.
     """
-    top = _top(name)
+    top = read_configuration(name)
     sections = {part: top.table(part) for part in PARTS if part in top.values}
     if "actuator" not in sections:
         top.refuse(None, "must have an [actuator], but has none: add it with its kind.")
@@ -133,7 +133,14 @@ def _built(
     )
 
 
-def _top(name: str) -> Section:
+def read_configuration(name: str) -> Section:
+    """Read what a bed is made of, without opening anything.
+
+    Raises
+    ------
+    FingervisionError
+        There is no such file, or it is no bed's.
+    """
     if name == SIMULATED:
         with resources.as_file(resources.files("fingervision.testbed").joinpath("simulated.toml")) as path:
             document, text = read_document(path, "bed")

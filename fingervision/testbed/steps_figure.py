@@ -1,4 +1,4 @@
-"""A sequence of steps over time: position, speed and force, as a picture; and as a table."""
+"""A sequence of steps over time: position and speed, as a picture."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -8,7 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from fingervision.domain.errors import FingervisionError
-from fingervision.domain.step_data import CycleTime, Operation
+from fingervision.domain.step_data import Operation
 from fingervision.testbed.actuator import StageLimits
 from fingervision.testbed.step_checks import PlannedMotion
 
@@ -18,31 +18,6 @@ POINTS_PER_MOTION = 200
 # Between motions the stage stands; so that each can be seen, a share of the whole.
 STANDING_SHARE = 0.02
 TITLE_PAD_POINTS = 30.0
-HEADER = (
-    "step", "from mm", "to mm", "way mm", "operation", "load kg", "entry", "time s", "peak mm/s", "speeding mm/s2",
-    "slowing mm/s2", "force N",
-)  # fmt: skip
-
-
-def steps_table(motions: Sequence[PlannedMotion]) -> str:
-    """Give one line a motion, columns aligned to the right."""
-    rows = [HEADER, *(_row(motion) for motion in motions)]
-    widths = [max(len(row[column]) for row in rows) for column in range(len(HEADER))]
-    return "\n".join(
-        "  ".join(cell.rjust(width) for cell, width in zip(row, widths, strict=True)).rstrip() for row in rows
-    )
-
-
-def _row(planned: PlannedMotion) -> tuple[str, ...]:
-    step, motion = planned.step, planned.motion
-    pushing = f"pushing {step.pushing_force_n:g} N" if step.operation is Operation.PUSHING else "moving"
-    return (
-        str(planned.number), f"{planned.from_mm:.3f}", f"{planned.to_mm:.3f}",
-        f"{planned.to_mm - planned.from_mm:+.3f}", pushing, f"{step.load_kg:g}",
-        "cycle time" if isinstance(step.entry, CycleTime) else "speed", f"{motion.seconds:.4f}",
-        f"{motion.speed_mm_s:.1f}", f"{motion.acceleration_mm_s2:.0f}", f"{motion.deceleration_mm_s2:.0f}",
-        f"{planned.force_n:.2f}",
-    )  # fmt: skip
 
 
 def draw_steps(path: Path, name: str, motions: Sequence[PlannedMotion], limits: StageLimits) -> None:

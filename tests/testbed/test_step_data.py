@@ -11,7 +11,8 @@ from fingervision.domain.step_data import Coordinates, CycleTime, Operation, Spe
 from fingervision.storage.steps_toml import read_steps, write_steps
 from fingervision.testbed.actuator import StageLimits
 from fingervision.testbed.step_checks import planned_sequence
-from fingervision.testbed.steps_figure import draw_steps, steps_table
+from fingervision.testbed.steps_figure import draw_steps
+from fingervision.testbed.steps_table import steps_table
 
 LIMITS = StageLimits(lower_mm=0.0, upper_mm=10.0, speed_mm_s=400.0, force_n=5.5)
 GOOD = """schema = 1

@@ -2,31 +2,33 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from threading import Event, Thread
 
 from fingervision.domain.errors import FingervisionError
 from fingervision.domain.step_data import Coordinates, StepData
+from fingervision.storage.board_toml import read_board
 from fingervision.storage.steps_toml import read_steps
 from fingervision.storage.toml_section import Section
+from fingervision.testbed import published_stage
 from fingervision.testbed.actuator import Alarm, StageLimits
 from fingervision.testbed.board import wire
 from fingervision.testbed.board.board import Board
 from fingervision.testbed.board.handshake import Handshake
+from fingervision.testbed.board.port import holder_of
 from fingervision.testbed.board.shared import KEY, board_of
 from fingervision.testbed.clock import Clock
 from fingervision.testbed.commanded_path import CommandedPath
 from fingervision.testbed.motion_profile import MotionProfile
+from fingervision.testbed.published_stage import stage_limits
 from fingervision.testbed.reading import Reading
 from fingervision.testbed.step_checks import PlannedMotion, planned
 from fingervision.testbed.step_route import jog_step, route
 from fingervision.testbed.workshop import Workshop
 
 SIMULATED = False
-# Section 3 of the paper: stroke 10 mm, 400 mm/s, accuracy +-90 um, 5.5 N.
-LOWER_MM, UPPER_MM, SPEED_MM_S, FORCE_N, ACCURACY_MM = 0.0, 10.0, 400.0, 5.5, 0.09
 KEYS = (
-    KEY, "steps", "lower_mm", "upper_mm", "speed_mm_s", "force_n", "accuracy_mm", "first_code", "home_code",
-    "home_within_s", "busy_within_s", "enable_s",
+    KEY, "steps", *published_stage.KEYS, "first_code", "home_code", "home_within_s", "busy_within_s", "enable_s",
 )  # fmt: skip
 CODES = 16
 # A motion may take so much longer than its profile before it counts as stuck.
@@ -305,16 +307,13 @@ class BoardActuator:
         return True
 
 
+def holder(section: Section, folder: Path) -> int | None:
+    """Process that has its board's port open; None if none is known of."""
+    return holder_of(read_board(folder / section.word(KEY)).port)
+
+
 def build(section: Section, workshop: Workshop) -> BoardActuator:
     """Build it from its section of the configuration."""
-    lower_mm = section.number("lower_mm", LOWER_MM)
-    limits = StageLimits(
-        lower_mm=lower_mm,
-        upper_mm=section.number("upper_mm", UPPER_MM, above=lower_mm),
-        speed_mm_s=section.number("speed_mm_s", SPEED_MM_S, above=0.0),
-        force_n=section.number("force_n", FORCE_N, above=0.0),
-        accuracy_mm=section.number("accuracy_mm", ACCURACY_MM, low=0.0),
-    )
     data = read_steps(workshop.folder / section.word("steps"))
     first = section.whole("first_code", 1, low=0, high=CODES - 1)
     if first + max(data.steps) - 1 >= CODES:
@@ -332,4 +331,4 @@ def build(section: Section, workshop: Workshop) -> BoardActuator:
     if not board.settings.moves:
         board.close()
         section.refuse(KEY, "must have a motor controller on its lines, but has a force sensor only: add its lines.")
-    return BoardActuator(board, data, limits, codes, waits, workshop.clock)
+    return BoardActuator(board, data, stage_limits(section), codes, waits, workshop.clock)

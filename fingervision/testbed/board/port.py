@@ -1,6 +1,8 @@
 """The serial port that a board hangs on."""
 
 import errno
+import os
+from pathlib import Path
 
 import serial
 from serial.tools.list_ports import comports
@@ -16,6 +18,19 @@ WRITE_TIMEOUT_S = 1.0
 def found_ports() -> tuple[tuple[str, str], ...]:
     """Names of this machine's serial ports, each with what hangs on it."""
     return tuple(sorted((port.device, port.description) for port in comports()))
+
+
+def holder_of(name: str) -> int | None:
+    """Process of this user that has a port open, besides this one; None if none is seen (other systems than Linux)."""
+    port = Path(name).resolve()
+    for folder in Path("/proc").glob("[0-9]*/fd"):
+        process = int(folder.parent.name)
+        try:
+            if process != os.getpid() and any(file.readlink() == port for file in folder.iterdir()):
+                return process
+        except OSError:  # it has ended, or belongs to somebody else
+            continue
+    return None
 
 
 def opened_port(name: str) -> serial.Serial:
@@ -37,7 +52,9 @@ def opened_port(name: str) -> serial.Serial:
 def _why_closed(name: str, error: serial.SerialException) -> str:
     # Another program's lock comes as EAGAIN, Windows' "access denied" without a number.
     if error.errno in (errno.EAGAIN, errno.EBUSY) or "Could not exclusively lock" in str(error):
-        return f"The port {name} must be free, but another program has it open: close that one first."
+        process = holder_of(name)
+        who = "another program" if process is None else f"another program (process {process})"
+        return f"The port {name} must be free, but {who} has it open: close that one first."
     if error.errno in (errno.EACCES, errno.EPERM):
         return (
             f"The port {name} must be open to this user, but access was denied: join the group that owns it (on Debian "

@@ -1,0 +1,28 @@
+"""`fingervision bed home`: go to the reference, and make it position 0."""
+
+import click
+
+from fingervision.cli._on_bed import bed_option
+
+EXAMPLES = """
+\b
+Examples:
+  fingervision bed home --bed lab.toml
+"""
+
+
+@click.command(epilog=EXAMPLES)
+@bed_option
+def command(bed_name: str) -> None:
+    """Go to the reference: position 0.
+
+    This also clears what stopped the motor before.
+    """
+    from fingervision.testbed import by_hand
+    from fingervision.testbed.put_together import open_bed
+
+    bed = open_bed(bed_name)
+    try:
+        click.echo(f"homed: {by_hand.home(bed):.3f} mm")
+    finally:
+        bed.close()

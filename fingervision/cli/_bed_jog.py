@@ -1,0 +1,33 @@
+"""`fingervision bed jog`: move at a speed until stopped."""
+
+import click
+
+from fingervision.cli._on_bed import bed_option
+
+EXAMPLES = """
+\b
+Examples:
+  fingervision bed jog 0.5 --for-s 1
+  fingervision bed jog -2 --bed lab.toml      until Ctrl-C, or the bed's limit
+"""
+
+
+@click.command(epilog=EXAMPLES, context_settings={"ignore_unknown_options": True})
+@click.argument("speed_mm_s", type=float)
+@click.option("--for-s", type=click.FloatRange(0.0, min_open=True), help="Stop by itself after so long.")
+@bed_option
+def command(speed_mm_s: float, for_s: float | None, bed_name: str) -> None:
+    """Move the stage at SPEED_MM_S until stopped.
+
+    Positive opens. Ctrl-C stops it, or --for-s, or the bed's limit.
+    """
+    from math import inf
+
+    from fingervision.testbed import by_hand
+    from fingervision.testbed.put_together import open_bed
+
+    bed = open_bed(bed_name, pace=1.0)
+    try:
+        click.echo(f"jogged: {by_hand.jog(bed, speed_mm_s, inf if for_s is None else for_s):.3f} mm")
+    finally:
+        bed.close()

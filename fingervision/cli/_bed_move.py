@@ -1,0 +1,36 @@
+"""`fingervision bed move`: move to a position."""
+
+import click
+
+from fingervision.cli._on_bed import bed_option
+
+EXAMPLES = """
+\b
+Examples:
+  fingervision bed move 1.25
+  fingervision bed move -0.3 --speed-mm-s 0.5
+  fingervision bed move 5 --speed-mm-s 20 --bed lab.toml
+
+\b
+A motor controller behind a board goes by its step data: by a step to that position, or by repeated relative steps, none
+of them faster than asked. Ctrl-C stops the motor first.
+"""
+
+
+@click.command(epilog=EXAMPLES, context_settings={"ignore_unknown_options": True})
+@click.argument("to_mm", type=float)
+@click.option("--speed-mm-s", type=float, default=1.0, show_default=True, help="Speed of the stage.")
+@bed_option
+def command(to_mm: float, speed_mm_s: float, bed_name: str) -> None:
+    """Move the stage to TO_MM; positive opens.
+
+    Nothing moves if the target is beyond the bed's limits.
+    """
+    from fingervision.testbed import by_hand
+    from fingervision.testbed.put_together import open_bed
+
+    bed = open_bed(bed_name)
+    try:
+        click.echo(f"moved: {by_hand.move(bed, to_mm, speed_mm_s):.3f} mm")
+    finally:
+        bed.close()
