@@ -15,8 +15,9 @@ Examples:
 @click.command(epilog=EXAMPLES, context_settings={"ignore_unknown_options": True})
 @click.argument("speed_mm_s", type=float)
 @click.option("--for-s", type=click.FloatRange(0.0, min_open=True), help="Stop by itself after so long.")
+@click.option("--home-first", is_flag=True, help="Home before: steps behind a board need a known position.")
 @bed_option
-def command(speed_mm_s: float, for_s: float | None, bed_name: str) -> None:
+def command(speed_mm_s: float, for_s: float | None, home_first: bool, bed_name: str) -> None:
     """Move the stage at SPEED_MM_S until stopped.
 
     Positive opens. Ctrl-C stops it, or --for-s, or the bed's limit.
@@ -28,6 +29,8 @@ def command(speed_mm_s: float, for_s: float | None, bed_name: str) -> None:
 
     bed = open_bed(bed_name, pace=1.0)
     try:
+        if home_first:
+            by_hand.home(bed)
         click.echo(f"jogged: {by_hand.jog(bed, speed_mm_s, inf if for_s is None else for_s):.3f} mm")
     finally:
         bed.close()

@@ -20,8 +20,9 @@ of them faster than asked. Ctrl-C stops the motor first.
 @click.command(epilog=EXAMPLES, context_settings={"ignore_unknown_options": True})
 @click.argument("to_mm", type=float)
 @click.option("--speed-mm-s", type=float, default=1.0, show_default=True, help="Speed of the stage.")
+@click.option("--home-first", is_flag=True, help="Home before: steps behind a board need a known position.")
 @bed_option
-def command(to_mm: float, speed_mm_s: float, bed_name: str) -> None:
+def command(to_mm: float, speed_mm_s: float, home_first: bool, bed_name: str) -> None:
     """Move the stage to TO_MM; positive opens.
 
     Nothing moves if the target is beyond the bed's limits.
@@ -31,6 +32,8 @@ def command(to_mm: float, speed_mm_s: float, bed_name: str) -> None:
 
     bed = open_bed(bed_name)
     try:
+        if home_first:
+            by_hand.home(bed)
         click.echo(f"moved: {by_hand.move(bed, to_mm, speed_mm_s):.3f} mm")
     finally:
         bed.close()

@@ -131,10 +131,10 @@ def test_a_time_too_short_is_answered_with_the_shortest_and_that_is_enough(tmp_p
          "speed_mm_s in line 7 of {path} must not stand beside positioning_time_s, from which it follows: "
          "leave one out."),
         ("positioning_time_s = 0.2", "",
-         "step in line 3 of {path} must state positioning_time_s, or speed_mm_s, acceleration_mm_s2, "
+         "[step] in line 3 of {path} must state positioning_time_s, or speed_mm_s, acceleration_mm_s2, "
          "deceleration_mm_s2, but states neither."),
         ("deceleration_mm_s2 = 500.0", "",
-         "step in line 7 of {path} must state deceleration_mm_s2, but does not: add it."),
+         "[step] in line 7 of {path} must state deceleration_mm_s2, but does not: add it."),
         ('operation = "pushing"', "",
          'pushing_force_n in line 11 of {path} must come with operation = "pushing", but the operation is '
          "moving."),

@@ -249,7 +249,7 @@ class BoardActuator:
         if not self._known and self._data.steps[number].coordinates is Coordinates.RELATIVE:
             raise FingervisionError(
                 f"The position must be known before the relative step {number}, but is not since the start or the last "
-                "stop: home first."
+                "stop: home first (--home-first)."
             )
 
     # How it is done.
