@@ -241,7 +241,8 @@ def _report(plan: "Plan", batch: "Batch", as_json: bool) -> None:
         click.echo(f"{there} of {len(batch.outcomes)} inputs have their result ({what}).")
         click.echo(f"Written: {batch.out / 'batch.csv'}, {batch.out / 'batch.png'}, {batch.out / 'index.html'}")
     for one in batch.bad[:BAD_SHOWN] if not batch.stopped else ():
-        click.echo(f"fingervision: {one.input}: {one.words}", err=True)
+        subject = "" if one.words.startswith(one.input) else f"{one.input}: "
+        click.echo(f"fingervision: {subject}{one.words}", err=True)
     if len(batch.bad) > BAD_SHOWN and not batch.stopped:
         click.echo(f"fingervision: {len(batch.bad) - BAD_SHOWN} more are in {batch.out / 'batch.csv'}.", err=True)
     if batch.stopped:

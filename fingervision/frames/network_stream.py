@@ -1,5 +1,6 @@
 """Network cameras: rtsp:// and http:// streams through PyAV, with the camera's own packets kept."""
 
+import re
 from collections.abc import Iterator
 from itertools import count
 from threading import Event
@@ -34,6 +35,11 @@ def accepts(name: str) -> bool:
     return name.startswith(STARTS)
 
 
+def without_password(name: str) -> str:
+    """Give the address as it may be shown and kept: a camera's password belongs in neither page nor run."""
+    return re.sub(r"^(\w+://[^/@:]*):[^/@]*@", r"\1:***@", name)
+
+
 def open_frames(name: str, wish: Wish) -> "NetworkStream":
     """Connect to a stream.
 
@@ -46,7 +52,8 @@ def open_frames(name: str, wish: Wish) -> "NetworkStream":
     """
     if wish.rate_hz is not None or wish.size_px is not None:
         raise UsageError(
-            f"--size and --rate-hz are for cameras of this machine, but {name} decides itself: set them there."
+            "--size and --rate-hz are for cameras of this machine, but "
+            f"{without_password(name)} decides itself: set them there."
         )
     return NetworkStream(name)
 
@@ -69,17 +76,17 @@ class NetworkStream:
     """
 
     def __init__(self, name: str) -> None:
-        self.name = name
+        self.name = without_password(name)
         try:
             self._container = av.open(name, options=dict(OPTIONS), timeout=(OPEN_TIMEOUT_S, READ_TIMEOUT_S))
         except (av.FFmpegError, OSError, ValueError) as error:
             raise FingervisionError(
-                f"The stream {name} must answer with a video, but does not ({_reason(error)}): check the address and "
-                "that the camera is on and nobody else has it."
+                f"The stream {self.name} must answer with a video, but does not ({_reason(error)}): check the address, "
+                "and that the camera is on and nobody else has it."
             ) from error
         if not self._container.streams.video or self._container.streams.video[0].codec_context is None:
             self._container.close()
-            raise FingervisionError(f"The stream {name} must hold a video that can be decoded, but has none.")
+            raise FingervisionError(f"The stream {self.name} must hold a video that can be decoded, but has none.")
         self.template: av.VideoStream | None = self._container.streams.video[0]
         self._stream = self._container.streams.video[0]
         codec = self._stream.codec_context
@@ -87,13 +94,13 @@ class NetworkStream:
         codec.thread_count = 1  # threads of frames would each keep one back
         if codec.width < 1 or codec.height < 1:
             self._container.close()
-            raise FingervisionError(f"The stream {name} must say how large its pictures are, but does not.")
+            raise FingervisionError(f"The stream {self.name} must say how large its pictures are, but does not.")
         self.has_own_clock = self._container.format.name not in WITHOUT_TIMES
         self._closed = Event()
         coding = Coding.INTRAFRAME if codec.name in INTRAFRAME_CODECS else Coding.INTERFRAME
         rate = self._stream.average_rate
         self.description = Description(
-            name=name,
+            name=self.name,
             kind="network stream",
             codec=codec.name,
             coding=Coding.LOSSLESS if codec.name in LOSSLESS_CODECS else coding,

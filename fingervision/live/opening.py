@@ -4,6 +4,7 @@ from typing import cast
 
 from fingervision.domain.errors import UsageError
 from fingervision.frames import camera
+from fingervision.frames.network_stream import without_password
 from fingervision.frames.received import LiveSource
 from fingervision.frames.source import CameraWish, Wish, open_source
 from fingervision.live.capture import Capture
@@ -23,7 +24,7 @@ def opened(name: str, wish: Wish) -> Capture:
     if wish.camera != CameraWish() and not camera.accepts(name):
         raise UsageError(
             "--format, --exposure-ms, --gain, --focus and --white-balance-k are for cameras of this machine, but "
-            f"{name} is none: leave them out."
+            f"{without_password(name)} is none: leave them out."
         )
     source = open_source(name, wish)
     if not hasattr(source, "received"):
