@@ -8,6 +8,7 @@ EXAMPLES = """
 \b
 Examples:
   fingervision compare samples.csv --model comsol.csv --out results
+  fingervision compare samples.csv --model gripper.toml
   fingervision compare samples.csv --model results/model.toml --json
 
 \b
@@ -18,11 +19,21 @@ Files written to --out: compare.json, compare.png
 @click.command(epilog=EXAMPLES)
 @click.argument("measured", type=click.Path(path_type=Path))
 @click.option(
-    "--model", "model_path", required=True, type=click.Path(path_type=Path), help="Simulation .csv, model.toml."
+    "--model",
+    "model_path",
+    required=True,
+    type=click.Path(path_type=Path),
+    help="Simulation .csv, gripper.toml or model.toml.",
 )
 @click.option("--out", type=click.Path(path_type=Path, file_okay=False), default=Path("comparison"), show_default=True)
 @click.option("--seed", default=1, show_default=True, help="Of the bootstrapped threshold.")
-@click.option("--kind", default="lumped", show_default=True, help="Model of a gripper.toml.")
+@click.option(
+    "--kind",
+    type=click.Choice(["stiffness_matrix", "lumped", "finite_element"]),
+    default="lumped",
+    show_default=True,
+    help="Which model answers for a gripper.toml.",
+)
 @click.option("--json", "as_json", is_flag=True, help="Print compare.json.")
 def command(measured: Path, model_path: Path, out: Path, seed: int, kind: str, as_json: bool) -> None:
     """Say where a measured table and a model disagree beyond the noise."""

@@ -11,6 +11,7 @@ EXAMPLES = """
 Examples:
   fingervision diagnose samples.csv --model comsol.csv --out results
   fingervision diagnose samples.csv --model results/model.toml --out again
+  fingervision diagnose samples.csv --model gripper.toml --kind finite_element
   fingervision diagnose samples.csv --model comsol.csv --without lens_distortion --json
 
 \b
@@ -23,13 +24,23 @@ Files written to --out:
 @click.command(epilog=EXAMPLES)
 @click.argument("measured", type=click.Path(path_type=Path))
 @click.option(
-    "--model", "model_path", required=True, type=click.Path(path_type=Path), help="Simulation .csv, model.toml."
+    "--model",
+    "model_path",
+    required=True,
+    type=click.Path(path_type=Path),
+    help="Simulation .csv, gripper.toml or model.toml.",
 )
 @click.option("--out", type=click.Path(path_type=Path, file_okay=False), default=Path("diagnosis"), show_default=True)
 @click.option("--with", "forced", multiple=True, metavar="EFFECT", help="Insist on this effect.")
 @click.option("--without", multiple=True, metavar="EFFECT", help="Rule this effect out.")
 @click.option("--seed", default=1, show_default=True, help="Of the bootstrap: the same seed gives the same report.")
-@click.option("--kind", default="lumped", show_default=True, help="Model of a gripper.toml.")
+@click.option(
+    "--kind",
+    type=click.Choice(["stiffness_matrix", "lumped", "finite_element"]),
+    default="lumped",
+    show_default=True,
+    help="Which model answers for a gripper.toml.",
+)
 @click.option("--json", "as_json", is_flag=True, help="Print report.json.")
 def command(
     measured: Path,

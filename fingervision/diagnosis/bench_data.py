@@ -138,10 +138,14 @@ class BenchData:
             return ()
         out = []
         for name, by in self.refit.moved.items():
-            u = drawn.uncertain[name]
+            number = drawn.uncertain[name]
+            u = number.u or 0.0
             left = self.refit.known.get(name, 1.0) * u
-            far = ": the drawing is farther off than it states" if abs(by) > DOUBTFUL else ""
-            out.append(f"{name} was refitted by {by * u:+.3g} to within +-{left:.2g}, from +-{u:.2g} as drawn{far}.")
+            far = ": it lies farther off than the drawing states" if abs(by) > DOUBTFUL else ""
+            out.append(
+                f"{name} was refitted to {number.value + by * u:.6g} +-{left:.2g}, "
+                f"drawn as {number.value:g} +-{u:.2g}{far}."
+            )
         return tuple(out)
 
 

@@ -76,7 +76,7 @@ def tangent(chain: MeasuringChain, drawn: PhysicalModel, moved: Mapping[str, flo
 
 def with_moved(drawn: PhysicalModel, moved: Mapping[str, float]) -> PhysicalModel:
     """Redraw the gripper, each number by so many of its standard uncertainties."""
-    return drawn.redrawn({name: by * drawn.uncertain[name] for name, by in moved.items()})
+    return drawn.redrawn({name: by * (drawn.uncertain[name].u or 0.0) for name, by in moved.items()})
 
 
 def estimated(

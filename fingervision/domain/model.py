@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fingervision.domain.effect import PointAct
-from fingervision.domain.parameter import Parameter
+from fingervision.domain.parameter import Estimate, Parameter
 from fingervision.domain.response import Response
 
 
@@ -58,8 +58,8 @@ class PhysicalModel(Model, Protocol):
         ...
 
     @property
-    def uncertain(self) -> Mapping[str, float]:
-        """Standard uncertainty of the drawing's numbers, by dotted name, where stated: they may be refitted."""
+    def uncertain(self) -> Mapping[str, Estimate]:
+        """Numbers of the drawing whose uncertainty is stated, by dotted name: they may be refitted within it."""
         ...
 
     def redrawn(self, changes: Mapping[str, float]) -> "PhysicalModel":

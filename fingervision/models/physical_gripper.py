@@ -7,12 +7,14 @@ thousands of times.
 from collections.abc import Mapping
 from copy import copy
 from functools import cached_property
+from operator import attrgetter
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fingervision.domain.gripper import Gripper
 from fingervision.domain.model import PhysicalLaw
+from fingervision.domain.parameter import Estimate
 from fingervision.domain.response import Response
 from fingervision.models.drawn_answer import DrawnAnswer
 from fingervision.models.driven_body import DrivenBody
@@ -76,9 +78,13 @@ class PhysicalGripper:
         return laws_of(DrawnAnswer(self.gripper, self.theory, body, self.input_range_mm, lever))
 
     @property
-    def uncertain(self) -> Mapping[str, float]:
-        """Standard uncertainty of the drawing's numbers, by dotted name, where stated."""
-        return {name: u for name, u in self.gripper.uncertainties.items() if u > 0.0}
+    def uncertain(self) -> Mapping[str, Estimate]:
+        """Numbers of the drawing whose uncertainty is stated, by dotted name: they may be refitted within it."""
+        return {
+            name: Estimate(attrgetter(name)(self.gripper), u)
+            for name, u in self.gripper.uncertainties.items()
+            if u > 0.0
+        }
 
     def redrawn(self, changes: Mapping[str, float]) -> "PhysicalGripper":
         """Return the gripper with some of its numbers changed; its laws stay those of the drawing."""

@@ -3,10 +3,12 @@
 import os
 import tomllib
 from collections.abc import Mapping
+from difflib import get_close_matches
 from pathlib import Path
 
 from fingervision.domain.errors import FingervisionError
 from fingervision.domain.parameter import Estimate
+from fingervision.effects import catalogue
 from fingervision.models.corrected import CorrectedModel
 from fingervision.models.kinds import kinds
 from fingervision.models.physical_gripper import PhysicalGripper
@@ -46,13 +48,32 @@ def read_model(path: Path, kind: str = "lumped") -> CorrectedModel:
                 f"An effect in {path} must have a name and parameters like play_mm = {{ value = 0.01, u = 0.001 }}, "
                 f"but is {entry}: mend it."
             ) from error
+    for name, values in effects.items():
+        _check(name, values, path)
     return CorrectedModel(base.name, base.base, base.base_path, base.input_range_mm, effects, base.kind)
+
+
+def _check(name: str, values: Mapping[str, Estimate], path: Path) -> None:
+    """Refuse what is no effect of the catalogue, or lacks one of its parameters."""
+    if name not in catalogue():
+        near = get_close_matches(name, catalogue(), n=1)
+        hint = f"did you mean {near[0]}?" if near else "`fingervision effects` lists them."
+        raise FingervisionError(f"An effect in {path} must be one of the catalogue, but is {name}: {hint}")
+    wanted = [parameter.name for parameter in catalogue()[name].parameters]
+    missing = [key for key in wanted if key not in values]
+    if missing:
+        raise FingervisionError(
+            f"The effect {name} in {path} must state {', '.join(wanted)}, but {', '.join(missing)} is not there "
+            f"(it states {', '.join(values) or 'nothing'}): add it."
+        )
 
 
 def _gripper(path: Path, kind: str) -> CorrectedModel:
     """Build a gripper whose effects are its own physics."""
     if kind not in kinds():
-        raise FingervisionError(f"--kind must be one of {', '.join(kinds())}, but is {kind}: choose one.")
+        raise FingervisionError(
+            f"The kind of model for {path} must be one of {', '.join(kinds())}, but is {kind}: choose one."
+        )
     gripper = PhysicalGripper(read_gripper(path), kind)
     return CorrectedModel(f"{path.name} ({kind})", gripper, str(path), gripper.input_range_mm, {}, kind)
 

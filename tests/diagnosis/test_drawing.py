@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from fingervision.diagnosis.compare import compare
+from fingervision.domain.errors import FingervisionError
 from fingervision.domain.report import DiagnosisReport, Verdict
 from fingervision.storage.measured_table import read_measured_table
 from fingervision.storage.model_toml import read_model, write_model
@@ -93,9 +94,9 @@ def test_the_corrected_drawing_agrees_and_keeps_its_kind(diagnosed: Diagnosed, t
 def test_an_uncertain_thickness_is_refitted_and_nothing_is_missing(tmp_path: Path) -> None:
     report = answered(CASES["hinges"], tmp_path, force=True, drawing=uncertain(tmp_path, thickness_mm=0.1))
     assert report.verdict is Verdict.AGREES, report.sentence
-    note = next(note for note in report.notes if note.startswith("hinge.thickness_mm was refitted by "))
-    assert float(note.split()[4]) == pytest.approx(-0.1, abs=0.001)  # known to 0.0005 from 400 samples
-    assert note.endswith("from +-0.1 as drawn.")
+    note = next(note for note in report.notes if note.startswith("hinge.thickness_mm was refitted to "))
+    assert float(note.split()[4]) == pytest.approx(0.9, abs=0.001)  # known to 0.0005 from 400 samples
+    assert note.endswith("drawn as 1 +-0.1.")
     assert report.disagreement.after_rms_mm < NOISE_SHARE * EDGE_MM
 
 
@@ -111,4 +112,22 @@ def test_compare_refits_the_drawing_too_and_says_so(tmp_path: Path) -> None:
     measured = read_measured_table(table(CASES["link"], tmp_path, force=True))
     found = compare(measured, read_model(uncertain(tmp_path, l2_mm=0.2)))
     assert found.rms_mm < NOISE_SHARE * EDGE_MM
-    assert "lever.l2_mm was refitted by +0.178 " in found.bench.refitted()[0]
+    assert found.bench.refitted()[0].startswith("lever.l2_mm was refitted to 17.99")
+
+
+@pytest.mark.parametrize(
+    ("lines", "words"),
+    [
+        ('kind = "lump"', r"must be one of finite_element, lumped, stiffness_matrix, but is lump: choose one"),
+        ('[[effect]]\nname = "backlsh"\n[effect.parameters]', r"but is backlsh: did you mean backlash\?"),
+        (
+            '[[effect]]\nname = "backlash"\n[effect.parameters]\nplay = { value = 0.01 }',
+            r"must state play_mm, but play_mm is not there \(it states play\): add it",
+        ),
+    ],
+)
+def test_a_wrong_corrected_model_is_refused_in_a_sentence(tmp_path: Path, lines: str, words: str) -> None:
+    path = tmp_path / "model.toml"
+    path.write_text(f'schema = 1\nbase = "{DRAWING}"\n{lines}\n', encoding="utf-8")
+    with pytest.raises(FingervisionError, match=words):
+        read_model(path)
