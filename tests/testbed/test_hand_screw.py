@@ -1,0 +1,62 @@
+"""A hand screw: what is asked, what is typed, and what is then its position."""
+
+from io import StringIO
+
+import pytest
+
+from fingervision.domain.errors import FingervisionError
+from fingervision.testbed.actuator import StageLimits
+from fingervision.testbed.actuators.hand_screw import HandScrew
+from fingervision.testbed.clock import VirtualClock
+
+LIMITS = StageLimits(lower_mm=-1.0, upper_mm=6.0, speed_mm_s=float("inf"), force_n=float("inf"), accuracy_mm=0.004)
+
+
+def screw(typed: str) -> tuple[HandScrew, StringIO]:
+    screen = StringIO()
+    return HandScrew(LIMITS, VirtualClock(), StringIO(typed), screen), screen
+
+
+def test_the_reading_that_was_typed_is_the_position() -> None:
+    actuator, screen = screw("1,252\n")
+    actuator.move(1.25, 1.0)
+    assert actuator.readings()[-1].value == 1.252
+    assert screen.getvalue() == "Turn the screw to 1.250 mm and type its reading in mm (Enter alone: 1.250): "
+
+
+def test_enter_alone_means_that_it_stands_there() -> None:
+    actuator, _ = screw("\n")
+    actuator.move(1.25, 1.0)
+    assert actuator.readings()[-1].value == 1.25
+
+
+def test_a_slip_of_the_finger_is_asked_for_again() -> None:
+    actuator, screen = screw("12.5\none\n3.5\n")
+    with pytest.raises(FingervisionError, match=r"^The reading must be typed in mm, but was not, 3 times"):
+        actuator.move(1.25, 1.0)
+    assert "A reading must lie between -1 and 6 mm, but is 12.5.\n" in screen.getvalue()
+    assert "A reading must be a number in mm, but is 'one'.\n" in screen.getvalue()
+    assert "The reading must lie near 1.250 mm, but is 3.5.\n" in screen.getvalue()
+    assert actuator.readings()[-1].value == 0.0
+
+
+def test_nobody_at_the_terminal_is_said() -> None:
+    actuator, _ = screw("")
+    with pytest.raises(FingervisionError) as raised:
+        actuator.home()
+    assert str(raised.value) == (
+        "The hand screw must be turned by somebody, but nobody is at the terminal: run it from one."
+    )
+
+
+def test_what_a_hand_cannot_do_is_refused() -> None:
+    actuator, screen = screw("0\n")
+    with pytest.raises(FingervisionError, match=r"^A hand screw must be moved to positions, but was to jog at 2 mm/s"):
+        actuator.jog(2.0)
+    with pytest.raises(
+        FingervisionError, match=r"^Step 3 must be kept by a motor controller, but a hand screw has none"
+    ):
+        actuator.run_step(3)
+    with pytest.raises(FingervisionError, match=r"^The target must lie between -1 and 6 mm, but is 7 mm: nothing was"):
+        actuator.move(7.0, 1.0)
+    assert screen.getvalue() == ""
