@@ -194,9 +194,9 @@ def _first_line(file: Path) -> str:
 @contextmanager
 def _quiet() -> Iterator[None]:
     """Keep OpenCV's own words about cameras that are not there off the screen."""
-    before = cv2.getLogLevel()  # type: ignore[attr-defined]
-    cv2.setLogLevel(0)  # type: ignore[attr-defined]
+    before = cv2.utils.logging.getLogLevel()
+    cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_SILENT)
     try:
         yield
     finally:
-        cv2.setLogLevel(before)  # type: ignore[attr-defined]
+        cv2.utils.logging.setLogLevel(before)

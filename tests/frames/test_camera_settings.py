@@ -2,11 +2,13 @@
 
 from collections.abc import Mapping
 from dataclasses import replace
+from pathlib import Path
 
 import cv2
 import pytest
 
-from fingervision.domain.errors import UsageError
+from fingervision.domain.errors import FingervisionError, UsageError
+from fingervision.frames.camera import CameraFrames
 from fingervision.frames.camera_settings import MSMF, READ, V4L2, Settled, requests, settled
 from fingervision.frames.source import CameraWish, Wish
 
@@ -155,3 +157,13 @@ def test_what_no_camera_has_is_refused(wish: Mapping[str, str | float], sentence
     with pytest.raises(UsageError) as refused:
         CameraWish(**wish)  # type: ignore[arg-type]
     assert str(refused.value) == sentence
+
+
+def test_what_is_no_camera_is_refused_and_opencv_keeps_its_words_to_itself(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    device = tmp_path / "video0"
+    device.touch()
+    with pytest.raises(FingervisionError, match=f"The camera {device} cannot be opened: it is in use"):
+        CameraFrames(str(device), Wish())
+    assert capfd.readouterr().err == ""
