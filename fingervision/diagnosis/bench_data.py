@@ -8,7 +8,9 @@ from fingervision.diagnosis.distrusted_rows import distrusted_rows
 from fingervision.diagnosis.drawing_refit import BENT, DrawingRefit, estimated, tangent, with_moved
 from fingervision.diagnosis.explanation import Explanation, Problem
 from fingervision.diagnosis.measuring_chain import MeasuringChain, admissible
-from fingervision.diagnosis.noise import Noise, estimate_noise, gate, pooled_short_noise
+from fingervision.diagnosis.noise import Noise, gate, white_noise
+from fingervision.diagnosis.noise_short import noise_of_short_runs
+from fingervision.diagnosis.noise_spectrum import noise_by_spectrum
 from fingervision.diagnosis.smooth_input import input_sigma, smoothed
 from fingervision.diagnosis.whitening import RunOffsets, Whitener
 from fingervision.domain.effect import Array, Effect, Flags, History
@@ -87,19 +89,11 @@ class BenchData:
         history = self.chain.history
         n, timed = history.input_mm.size, history.time_s is not None
         sigmas = OUTLIER_SIGMAS if explained else None if timed and n < SHORT else RAW_SIGMAS
-        rate = 1.0 / history.sample_time_s if timed else None
         floor = 0.0 if self.table.u_random_mm is None else float(np.median(self.table.u_random_mm))
         floors = [{"gap": floor, "midline": 0.5 * floor, "force": 0.0}[name] for name in self.channels]
         parts = [residual_mm[channel * n : (channel + 1) * n] for channel in range(len(self.channels))]
         aside = [gate(part, history.runs, timed, sigmas) | self.distrusted for part in parts]
-        noises: tuple[Noise, ...]
-        if timed and max(run.stop - run.start for run in history.runs) < SHORT_RUN:
-            noises = pooled_short_noise(parts, history.runs, aside, floors, explained=explained)
-        else:
-            noises = tuple(
-                estimate_noise(part, history.runs, rate, out, share, degrees)
-                for part, out, share in zip(parts, aside, floors, strict=True)
-            )
+        noises = self._noises(parts, aside, floors, degrees, explained=explained)
         if history.both_edges:
             aside[0] = aside[1] = aside[0] | aside[1]
         error = self.input_error_mm
@@ -110,6 +104,26 @@ class BenchData:
         drawing = self.refit.columns if self.refit.moved else None
         whitener = Whitener(history, noises, np.concatenate(aside), error, self.input_samples, drawing)
         return Problem(self.chain, whitener.one(self.aim_mm), whitener, RunOffsets.of(whitener), self.effects)
+
+    def _noises(
+        self, parts: list[Array], aside: list[Flags], floors: list[float], degrees: int, *, explained: bool
+    ) -> tuple[Noise, ...]:
+        """Estimate every channel's noise; what was fitted leaves gap and midline the noise of the same pictures."""
+        history = self.chain.history
+        if history.time_s is None:
+            return tuple(
+                white_noise(part, out, floor, degrees) for part, out, floor in zip(parts, aside, floors, strict=True)
+            )
+        rate_hz = 1.0 / history.sample_time_s
+        together = 2 if history.both_edges and explained else 1
+        groups = [slice(0, together), *(slice(k, k + 1) for k in range(together, len(parts)))]
+        if max(run.stop - run.start for run in history.runs) < SHORT_RUN:
+            return noise_of_short_runs(parts, history.runs, aside, floors, explained=explained)
+        return tuple(
+            noise
+            for g in groups
+            for noise in noise_by_spectrum(parts[g], history.runs, rate_hz, aside[g], floors[g], explained=explained)
+        )
 
     def redrawn(self, problem: Problem, explanation: Explanation) -> "BenchData":
         """Refit the drawing's uncertain numbers beside an explanation, and predict with them from now on."""

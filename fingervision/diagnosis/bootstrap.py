@@ -19,14 +19,15 @@ GUMBEL = float(-np.log(-np.log(QUANTILE)) - np.euler_gamma) * float(np.sqrt(6.0)
 def noise_doubt(problem: Problem) -> float:
     """Relative standard uncertainty of the noise's power where it is slow, as an autoregression estimates it.
 
-    The power at zero frequency goes with (1 + rho) / (1 - rho), and rho is known to sqrt((1 - rho^2) / n).
+    The power at zero frequency goes with (1 + rho) / (1 - rho), and rho is known to sqrt((1 - rho^2) / n): together
+    2 / sqrt((1 - rho^2) n).
     """
     rows = max(2, problem.chain.history.input_mm.size - 2)
     parts = []
     for noise in problem.whitener.noises:
         share = noise.correlated_mm**2 / noise.total_mm**2
         rho = noise.correlation
-        parts.append(2.0 / rows + share * 4.0 * rho**2 * (1.0 + rho) / (1.0 - rho) / rows)
+        parts.append((2.0 + share * 4.0 * rho**2 / (1.0 - rho**2)) / rows)
     return float(np.sqrt(np.mean(parts)))
 
 

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from fingervision.diagnosis.bench_data import BenchData
+from fingervision.diagnosis.bootstrap import noise_doubt
 from fingervision.diagnosis.drawing_refit import tangent
 from fingervision.diagnosis.explanation import Explanation, Point, Problem, fit
 from fingervision.diagnosis.posterior import draws
@@ -62,7 +63,7 @@ def _joined(bench: BenchData, problem: Problem, inputs: Array) -> Problem:
     """Put a run behind the data: same noise, later on the same clock."""
     old = bench.chain.history
     step_s = old.sample_time_s
-    time = float(old.times.max()) + 5.0 + step_s * np.arange(inputs.size)
+    time = float(old.times.max()) + 60.0 * SETTLE_MIN + step_s * np.arange(inputs.size)
     history: History = replace(
         old,
         input_mm=np.concatenate([old.input_mm, inputs]),
@@ -185,8 +186,8 @@ def _promise(
 ) -> tuple[float, tuple[float, float]]:
     """Gain to expect whichever of the two is true, and the interval that holds what will come.
 
-    The truth's parameters are drawn from what the data leave open; the new run's own noise adds 2 sqrt(gain) to the
-    difference of two chi-squares.
+    The truth's parameters are drawn from what the data leave open, and the noise is known only so well; the new run's
+    own noise adds 2 sqrt(gain) to the difference of two chi-squares.
     """
     gains: list[float] = []
     count = TRUTHS if joined.chain.history.input_mm.size <= MOST_SAMPLES else TRUTHS // 4
@@ -196,7 +197,9 @@ def _promise(
         step = max(1, len(drawn[truth]) // count)
         gains += [_gain(old, joined, values, pair[rival], starts) for values in drawn[truth][step // 2 :: step]]
     expected = np.array(gains)
-    come = expected[:, None] + 2.0 * np.sqrt(expected)[:, None] * rng.standard_normal((expected.size, 400))
+    doubt = np.exp(noise_doubt(old) * rng.standard_normal((expected.size, 400)))
+    come = expected[:, None] * doubt
+    come = come + 2.0 * np.sqrt(come) * rng.standard_normal(come.shape)
     low, high = np.quantile(come, (0.5 - 0.5 * PROMISED, 0.5 + 0.5 * PROMISED))
     return float(np.median(expected)), (float(low), float(high))
 

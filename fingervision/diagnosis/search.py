@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fingervision.diagnosis.bootstrap import QUANTILE, gain_of_noise
+from fingervision.diagnosis.bootstrap import QUANTILE, gain_of_noise, noise_doubt
 from fingervision.diagnosis.explanation import Explanation, Problem, fit
 from fingervision.diagnosis.probes import probes
 from fingervision.diagnosis.signatures import Signatures, signatures, tangents
@@ -17,12 +17,13 @@ DRAWS = 300
 INDISTINGUISHABLE = 9.0
 BARE_MENTION = 3.0
 """Below this difference of BIC simplicity is no evidence (Kass & Raftery 1995): tables of a score of rows."""
-LIMIT = 1.0
-"""Chi-square between two predictions below which the richer of two forms only repeats the simpler one."""
 ADMISSIBLE = 21.0
 """Chi-square by which a true explanation 9 away can come out worse, at 95 %: 9 + 1.96 * 2 * sqrt(9)."""
 SMALL_SHARE = 0.05
 """What the catalogue's form leaves over of the truth's is a few per cent of what was explained, no second name."""
+FORM_SHARE = 0.02
+"""Share of what is explained below which the difference between two forms is their own fault: no reason to choose the
+richer one, such as a resonance for a delay that falls between two samples."""
 TRIPLE_SHARE = 0.15
 """A third effect needs evidence of its own: three effects bend to almost anything."""
 PAIRS_REFITTED = 60
@@ -66,8 +67,9 @@ def _null_maximum(problem: Problem, columns: Array, sigma: tuple[float, ...], rn
         norm = np.einsum("ij,ij->j", kept, kept)
     usable = norm > 1e-9
     gains = (kept.T[usable] @ noise) ** 2 / norm[usable, None]
-    quantile = float(np.quantile(gains.max(axis=0), QUANTILE))
     # The noise itself is estimated, from as many samples as there are.
+    doubt = np.exp(noise_doubt(problem) * rng.standard_normal(DRAWS))
+    quantile = float(np.quantile(gains.max(axis=0) * doubt, QUANTILE))
     return quantile * (1.0 + 3.0 * float(np.sqrt(2.0 / columns.shape[0]))) + 1.5
 
 
@@ -141,8 +143,12 @@ def _added(problem: Problem, smaller: Explanation, larger: Explanation) -> float
     return float(np.linalg.norm(after - before) / max(1e-12, float(np.linalg.norm(after - bare))))
 
 
-def _choose(candidates: list[Explanation], samples: int) -> Explanation:
-    return min(candidates, key=lambda explanation: explanation.bic(samples))
+def _choose(candidates: list[Explanation], samples: int, nothing: Explanation) -> Explanation:
+    """Choose by Schwarz's criterion, and the simpler form where the richer one gains no more than forms deviate."""
+    best = min(candidates, key=lambda explanation: explanation.bic(samples))
+    within = FORM_SHARE**2 * (nothing.score - best.score)
+    simpler = [e for e in candidates if e.free < best.free and e.score - best.score < within]
+    return min(simpler, key=lambda explanation: explanation.score, default=best)
 
 
 def search(
@@ -189,16 +195,16 @@ def search(
         return gained > gain_of_noise(problem, atoms, base, rng)
 
     if singles and (exceeds_noise(nothing.score - singles[0].score, nothing) or forced):
-        best, peers = _choose(singles[:6], samples), singles
+        best, peers = _choose(singles[:6], samples, nothing), singles
         bases = singles[:14]
         pairs = _extended(problem, atoms, bases, PAIRS_REFITTED, lambda share: progress(0.3 + 0.4 * share))
         gained = best.score - pairs[0].score if pairs else 0.0
         if pairs and _added(problem, best, pairs[0]) > SMALL_SHARE and exceeds_noise(gained, best):
-            best, peers = _choose(pairs[:6], samples), pairs
+            best, peers = _choose(pairs[:6], samples, nothing), pairs
             triples = _extended(problem, atoms, pairs[:3], 24, lambda share: progress(0.7 + 0.1 * share))
             gained = best.score - triples[0].score if triples else 0.0
             if triples and _added(problem, best, triples[0]) > TRIPLE_SHARE and exceeds_noise(gained, best):
-                best, peers = _choose(triples[:6], samples), triples
+                best, peers = _choose(triples[:6], samples, nothing), triples
     if forced:
         best = _insisted(problem, forced, [*singles, *pairs], singles, samples)
     progress(0.82)
@@ -272,7 +278,7 @@ def _insisted(
     able = forced & set(problem.effects)
     holding = [explanation for explanation in found if able <= set(explanation.names)]
     if holding or not able:
-        return _choose(holding, samples) if able else problem.nothing()
+        return _choose(holding, samples, problem.nothing()) if able else problem.nothing()
     begin = {e.names[0]: e.values[e.names[0]] for e in singles if e.names[0] in able}
     return fit(problem, tuple(begin), begin, iterations=20)
 
@@ -285,17 +291,13 @@ def _set(
     target = problem.whitened(best.values)
     metric = problem.offsets.metric(best.sigma_mm)
     rows = max(2, int(problem.measured.size - problem.whitener.aside.sum()))
-    pool = list(pool)
-    if len(best.names) == 1:
-        odds = best.bic(rows) + _surprise(problem, best) - BARE_MENTION
-        pool += [pair for pair in pairs if pair.bic(rows) + _surprise(problem, pair) < odds]
-    smaller: list[Explanation] = [best]
-    for other in pool:
-        if other.names == best.names or any(set(m.names) <= set(other.names) for m in smaller):
-            continue
+
+    def join(other: Explanation) -> None:
+        if other.names == best.names or any(set(m.names) <= set(other.names) for m in members):
+            return
         near = _squared(problem, target - problem.whitened(other.values), metric)
         if near > 400.0 and other.score - best.score > 200.0:
-            continue
+            return
         distance = near if near < INDISTINGUISHABLE else _distance(problem, best, other, best.sigma_mm)
         if distance >= INDISTINGUISHABLE and other.score - best.score < ADMISSIBLE:
             distance = min(distance, _distance(problem, other, best, best.sigma_mm))
@@ -303,9 +305,19 @@ def _set(
         # One that leaves the data nearly as badly off as no effect at all explains nothing: the runs' scatter hides it.
         idle = nothing.score - other.score < 0.3 * (nothing.score - best.score)
         if distance < INDISTINGUISHABLE and not idle and other.score - best.score < ADMISSIBLE:
-            smaller.append(other)
             members.append(other)
-    members = [m for m in members if m is best or not any(_is_limit(problem, m, o, metric) for o in members)]
+
+    def odds(explanation: Explanation) -> float:
+        return explanation.bic(rows) + _surprise(problem, explanation)
+
+    for other in pool:
+        join(other)
+    if len(best.names) == 1:
+        # Two effects beside one, only where every single one that would do is physically a surprise.
+        most = min(odds(member) for member in members) + BARE_MENTION
+        for pair in pairs:
+            if odds(pair) < most:
+                join(pair)
     return [m for m in members if not any(set(o.names) < set(m.names) for o in members)], distances
 
 
@@ -313,14 +325,6 @@ def _squared(problem: Problem, whitened: Array, metric: Array) -> float:
     """Squared length of a whitened difference once run offsets are allowed."""
     shared = problem.offsets.design.T @ whitened
     return float(whitened @ whitened - shared @ metric @ shared)
-
-
-def _is_limit(problem: Problem, richer: Explanation, simpler: Explanation, metric: Array) -> bool:
-    """Whether a richer form at its limit is the simpler name: friction of vanishing reach is backlash."""
-    if len(richer.names) != len(simpler.names) or richer.free <= simpler.free:
-        return False
-    apart = problem.whitened(richer.values) - problem.whitened(simpler.values)
-    return _squared(problem, apart, metric) < LIMIT
 
 
 def _beside_foretold(problem: Problem, members: list[Explanation]) -> list[Explanation]:
