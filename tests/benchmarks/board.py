@@ -86,7 +86,7 @@ def silences(emulated: EmulatedBoard) -> None:
         link._send = send  # type: ignore[method-assign]
         board.close()
     print(
-        f"silence, {SILENCES} times: the drive line is down within {max(falls_ms):.1f} ms (must be 100) of the last word"
+        f"silence, {SILENCES} times: drive line down {max(falls_ms):.1f} ms (must be 100) after the last word, at most"
     )
 
 

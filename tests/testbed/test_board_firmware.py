@@ -31,6 +31,7 @@ def controller(emulated: EmulatedBoard) -> Iterator[MotorController]:
 def board(emulated: EmulatedBoard, controller: MotorController) -> Iterator[Board]:
     """The board, set up."""
     board = opened(emulated.settings(), emulated.clock).hold()
+    board.clear()
     yield board
     board.close()
 

@@ -54,7 +54,7 @@ def test_a_force_sensor_alone_is_a_board_too(tmp_path: Path) -> None:
         ('"D12"', "12", "drive in line 6 of {path} must be a text, but is 12."),
         ('busy = "D2"\n', "",
          "[lines] in line 4 of {path} must state busy, without which no motor is driven."),
-        ('"D8", ', "", 
+        ('"D8", ', "",
          "select in line 5 of {path} must be a list of 4 pins, bit 0 first, but is ['D9', 'D10', 'D11']."),
         ('"A5"', '"D4"', "force in line 9 of {path} must be an analogue pin, A0 to A5, but is a digital one."),
         ('["busy", ', '["bsy", ',

@@ -116,7 +116,7 @@ class BoardActuator:
         self._worker: Thread | None = None
         self._stopped = Event()
         self._read_s = clock.now_s()
-        self._ready_s = clock.now_s() + waits.enable_s
+        self._ready_s = clock.now_s()
         self._handshake = Handshake(board, clock, waits.busy_s, self._stopped)
         self._closed = False
 
@@ -277,7 +277,7 @@ class BoardActuator:
         if not runs:
             return
         self._board.wait_for_stop()
-        if self._board.dropped is not None:
+        if not self._board.ready:
             self._board.clear()
             self._ready_s = self._clock.now_s() + self._waits.enable_s
         self._stopped.clear()

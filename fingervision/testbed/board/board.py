@@ -120,8 +120,14 @@ class Board:
         """Raise a sentence if the board is lost."""
         self._link.check()
 
+    @property
+    def ready(self) -> bool:
+        """Whether a move may begin: not dropped, and enabled if there is a line for it."""
+        enabled = Role.ENABLE not in self.settings.lines or wire.Levels.ENABLE in self.levels
+        return enabled and self.dropped is None
+
     def clear(self) -> None:
-        """Allow moves again after a stop."""
+        """Allow moves, first of all and after a stop: hold down, enable up."""
         self._do("K")
         self._cause = wire.GOING
         if Role.ENABLE in self.settings.lines:
@@ -236,8 +242,6 @@ def _set_up(board: Board, link: BoardLink, settings: BoardSettings) -> None:
     assert isinstance(started, wire.Answer)  # noqa: S101 - only I is answered otherwise
     board.on_state(started)
     link.keep_awake(session, board)
-    if wire.Levels.ALARM not in started.levels:
-        board.clear()
 
 
 def _wait_for_clock(board: Board, link: BoardLink, clock: Clock) -> None:
