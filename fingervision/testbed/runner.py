@@ -22,7 +22,7 @@ from fingervision.testbed.run_folder import BedRunFolder
 from fingervision.testbed.sight import Look, Sight
 
 # The clocks are joined by so many frames before anything moves; the fingers must be seen in one of the last.
-FIRST_FRAMES, FRAMES_TO_FIND_FINGERS = 25, 3
+FIRST_FRAMES, FRAMES_TO_FIND_FINGERS = 50, 3
 # A recorded run begins at rest.
 REST_FRAMES = 5
 # The picture is still when so many frames in a row differ by less than so many times their own uncertainty.
@@ -187,6 +187,9 @@ class Runner:
             self.bed.actuator.move(to_mm, speed_mm_s)
             if self._while_busy(record=frames is None):
                 break
+        if frames is None:
+            # A corner is seen: what has a memory remembers it, and no sample beside it tells where it was.
+            self._seen(record=True)
         self._point(frames)
 
     def _while_busy(self, *, record: bool, until: Callable[[Look, GapRow], bool] | None = None) -> bool:
@@ -195,6 +198,8 @@ class Runner:
             look, row = self._seen(record=record)
             if until is not None and until(look, row):
                 self.bed.actuator.stop()
+                while self.bed.actuator.busy:
+                    self._seen(record=record)
                 return True
             if self._paused(record=record):
                 return False

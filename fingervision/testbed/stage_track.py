@@ -45,11 +45,8 @@ class StageTrack:
         # Borders passed in the motion under way.
         self._borders: deque[Knot] = deque(maxlen=BORDERS_FOR_SPEED)
         self._last: Reading | None = None
-
-    @property
-    def newest_mm(self) -> float:
-        """The newest reading, as the encoder gave it."""
-        return 0.0 if self._last is None else self._last.value
+        # Whether it stopped after a way too short for its speed to be known: anywhere in its cell.
+        self._lost = False
 
     def add(self, reading: Reading) -> None:
         """Take a reading; older ones than the last are not looked at."""
@@ -66,13 +63,16 @@ class StageTrack:
         between_s = 0.5 * (last.device_s + reading.device_s)
         if reading.moving and not last.moving:
             self._borders.clear()
-            self._note(Knot(between_s, self._knots[-1].position_mm))
+            if not self._lost:
+                self._note(Knot(between_s, self._knots[-1].position_mm))
         if reading.value != last.value:
             border = Knot(between_s, 0.5 * (last.value + reading.value))
             self._borders.append(border)
             self._note(border)
         if last.moving and not reading.moving:
-            self._note(Knot(between_s, self._onwards_mm(between_s, reading.value)))
+            self._lost = len(self._borders) < 2
+            if not self._lost:
+                self._note(Knot(between_s, self._onwards_mm(between_s, reading.value)))
 
     def at_mm(self, device_s: float, *, at_once: bool = False) -> float | None:
         """Position at a time of the instrument's clock.
@@ -92,7 +92,7 @@ class StageTrack:
         if self._last is None:
             return 0.0
         if device_s >= self._times[-1]:
-            if self._step_mm == 0.0 or not self._last.moving:
+            if self._step_mm == 0.0 or not (self._last.moving or self._lost):
                 return self._knots[-1].position_mm
             if not at_once and self._last.device_s - device_s < WAIT_FOR_BORDER_S:
                 return None

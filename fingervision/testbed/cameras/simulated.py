@@ -26,7 +26,7 @@ SIMULATED = True
 WIDTH_PX, HEIGHT_PX, RATE_HZ, PX_PER_MM = 640, 160, 25.0, 34.0
 BLUR_PX, NOISE_GREY = 0.9, 2.0
 # From exposure to arrival: read-out and transfer, never less, often a little more.
-LATENCY_S, JITTER_S, U_LATENCY_S = 0.008, 0.002, 0.0005
+LATENCY_S, JITTER_S, U_LATENCY_S = 0.008, 0.0003, 0.0005
 FINGERS_MM, TIP_RADIUS_MM = 3.0, 0.9
 # Where the operator shifts the picture to.
 SHIFT_MM = 0.5
@@ -101,6 +101,7 @@ class SimulatedCamera:
         self._jitter_s, self._fingers_mm, self._seed = arrival_s[1], fingers_mm, seed
         self._own = OwnClock.drawn(np.random.default_rng([seed, 3]))
         self._exposure, self._index = int(np.ceil(self._own.shows_s(clock.now_s()) * rate_hz)), 0
+        gripper.looked_at(self._own.bed_s(self._exposure / rate_hz), 1.0 / (rate_hz * self._own.rate))
 
     def next(self) -> SimulatedShot:
         """Wait for the next frame; those that nobody waited for are gone."""

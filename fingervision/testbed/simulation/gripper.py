@@ -1,7 +1,7 @@
 """A gripper on a stage: where its measuring points truly are, with everything that is hidden in drive and mechanism."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
@@ -16,10 +16,18 @@ from fingervision.testbed.simulation.optics import IN_THE_PICTURE
 
 Array = NDArray[np.float64]
 
-# The stage's motion is followed at this rate: ten times a webcam's, so that what sticks and rings does so in between.
-RATE_HZ = 250.0
+# The stage's motion is followed in so many steps a frame, so that what creeps and rings does so in between.
+STEPS_A_FRAME = 10
+# Until a camera says when it looks.
+USUAL_PERIOD_S = 0.04
+# These are looked at with the frames alone. A slip between two frames would land elsewhere than the catalogue's, which
+# is defined on samples, and the places would drift apart along a run: another effect, not another form of this one.
+WITH_THE_FRAMES = ("stick_slip",)
 # So much further than asked is computed at once while the stage stands.
 AHEAD_S = 2.0
+# What the fingers press on while they are kept from closing, felt at the drive.
+PRESSED = ("finger_contact",)
+CONTACT_N_PER_MM = 3.0
 # What a new reference of the zero takes away.
 UNTIL_HOMED = ("input_offset",)
 
@@ -73,7 +81,14 @@ class SimulatedGripper:
         self._drive = drive
         self._points: dict[str, Mapping[str, float]] = {**hidden.of_stage("mechanism"), **camera}
         self._rest_gap_mm = float(model.respond(np.zeros(1)).gap_mm[0])
+        self._begin_s, self._period_s = 0.0, USUAL_PERIOD_S
         self._known: tuple[object, Array, Response] | None = None
+
+    def looked_at(self, begin_s: float, period_s: float) -> None:
+        """Say when the camera looks: at one time of the bed, and every period before and after."""
+        # The first look of the grid lies before the bed's beginning.
+        self._begin_s, self._period_s = begin_s - np.ceil(begin_s / period_s) * period_s, period_s
+        self._known = None
 
     def at(self, time_s: float) -> Response:
         """Where the points are at one time of the bed, and the force; arrays of one element.
@@ -86,7 +101,8 @@ class SimulatedGripper:
             known_s = self._motion.known_until_s()
             if np.isfinite(known_s):
                 until_s = max(until_s, known_s) if known_s > time_s else until_s
-            grid_s = np.arange(np.ceil(until_s * RATE_HZ) + 2.0) / RATE_HZ
+            frames = np.ceil((until_s - self._begin_s) / self._period_s) + 1.0
+            grid_s = self._begin_s + np.arange(frames * STEPS_A_FRAME) * (self._period_s / STEPS_A_FRAME)
             self._known = (version, grid_s, self._respond(grid_s))
         _, grid_s, known = self._known
         at = np.array([time_s])
@@ -109,12 +125,28 @@ class SimulatedGripper:
         )
         for name, effect in catalogue().items():
             if name in self._drive and isinstance(effect, DriveEffect):
-                moved = effect.act(u, history, self._drive[name])
+                moved = self._act(effect, u, history)
                 if name in UNTIL_HOMED and len(runs) > 1:
                     moved[runs[1].start :] = u[runs[1].start :]
                 u = moved
         response = self._model.respond(u)
+        pressed_mm = np.zeros_like(u)
         for name, effect in catalogue().items():
             if name in self._points and isinstance(effect, PointEffect):
-                response = effect.act(response, history, self._points[name])
-        return response
+                acted = effect.act(response, history, self._points[name])
+                if name in PRESSED:
+                    pressed_mm = acted.gap_mm - response.gap_mm
+                response = acted
+        if response.force_n is None:
+            return response
+        return replace(response, force_n=response.force_n - CONTACT_N_PER_MM * pressed_mm)
+
+    def _act(self, effect: DriveEffect, u: Array, history: History) -> Array:
+        if effect.name not in WITH_THE_FRAMES:
+            return effect.act(u, history, self._drive[effect.name])
+        # Runs begin on whole frames for what is looked at with them.
+        borders = [-(-run.start // STEPS_A_FRAME) for run in history.runs] + [-(-u.size // STEPS_A_FRAME)]
+        runs = tuple(slice(a, b) for a, b in pairwise(borders) if b > a)
+        frames = u[::STEPS_A_FRAME]
+        seen = replace(history, input_mm=frames, time_s=history.times[::STEPS_A_FRAME], runs=runs)
+        return np.repeat(effect.act(frames, seen, self._drive[effect.name]), STEPS_A_FRAME)[: u.size]
