@@ -80,6 +80,7 @@ def command(
         write_simulation(folder / "simulation.csv", inputs, answers[name])
         if name == "finite_element":
             _draw_body(model, inputs, out / "deformed.png")
+        if name == "finite_element" or kind != "all":
             _warn_of_stress(gripper, figures, inputs)
     if inputs is not None:
         _draw_models(gripper, inputs, answers, out / "models.png")

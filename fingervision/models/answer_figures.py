@@ -7,7 +7,7 @@ from fingervision.domain.gripper import PointMm
 
 @dataclass(frozen=True, slots=True)
 class PeakStress:
-    """Largest von Mises stress on a notch per millimetre of input.
+    """Largest stress on a notch per millimetre of input: von Mises's, or the nominal one of a model made of bars.
 
     Parameters
     ----------

@@ -9,10 +9,11 @@ from numpy.typing import NDArray
 
 from fingervision.domain.gripper import Gripper
 from fingervision.domain.response import Response
-from fingervision.models.answer_figures import ModelFigures
+from fingervision.models.answer_figures import ModelFigures, PeakStress
 from fingervision.models.covered_inputs import covered_inputs_mm
 from fingervision.models.half_frame import half_frame
 from fingervision.models.hinge_correction import HingeTheory
+from fingervision.models.hinge_stress import peak_hinge_stress
 from fingervision.models.physics import LINEAR, Physics
 from fingervision.models.skeleton import skeleton_of
 from fingervision.models.static_answer import gap_per_input, symmetric_response
@@ -49,7 +50,8 @@ class LumpedGripper:
     ) -> None:
         self.gripper = gripper
         self.physics = physics
-        self.half = half_frame(gripper, skeleton_of(gripper, theory, segments))
+        self.skeleton = skeleton_of(gripper, theory, segments)
+        self.half = half_frame(gripper, self.skeleton)
 
     @property
     def input_range_mm(self) -> tuple[float, float]:
@@ -65,6 +67,10 @@ class LumpedGripper:
         """Answer statically at each input."""
         return symmetric_response(self.half, self.physics, input_mm)
 
+    def peak_stress(self) -> PeakStress:
+        """Largest nominal stress in the hinges by 1 mm of input."""
+        return peak_hinge_stress(self.gripper, self.skeleton, self.half.unit_displacement_mm)
+
     def modes_hz(self, *, drive_held: bool, count: int = _MODES) -> tuple[float, ...]:
         """First symmetric in-plane natural frequencies, without the actuator's mass."""
         rad_s, _ = self.half.modes(drive_held=drive_held, count=count)
@@ -75,7 +81,7 @@ class LumpedGripper:
         return ModelFigures(
             gap_per_input(self.half),
             self.half.equilibrium(1.0).force_n,
-            None,
+            self.peak_stress(),
             self.modes_hz(drive_held=False),
             self.modes_hz(drive_held=True),
             self.half.first_touch_mm(),

@@ -9,6 +9,8 @@ from click.testing import CliRunner
 from fingervision.cli.model import command
 from fingervision.domain.errors import FingervisionError, UsageError
 
+NOTCH = 0.03
+"""What a notch adds to the nominal stress of its thinnest section, at t / R = 0.25 (1.03 by finite elements)."""
 GRIPPER = Path(__file__).parents[2] / "sample_frames" / "paper" / "gripper.toml"
 
 
@@ -29,7 +31,8 @@ def test_all_models_side_by_side(tmp_path: Path) -> None:
     assert list(rows) == ["finite_element", "lumped", "stiffness_matrix"]
     assert rows["finite_element"]["gap_per_input"] == pytest.approx(7.7212, abs=0.01)
     assert rows["finite_element"]["input_at_yield_mm"] == pytest.approx(48.0 / 19.07, rel=0.02)
-    assert rows["lumped"]["peak_stress_mpa_per_mm"] is None
+    assert rows["lumped"]["peak_stress_mpa_per_mm"] == pytest.approx(19.07, rel=NOTCH)
+    assert rows["stiffness_matrix"]["peak_stress_mpa_per_mm"] is None
     for kind in rows:
         with (tmp_path / "o" / kind / "simulation.csv").open() as file:
             table = list(csv.DictReader(file))
@@ -58,6 +61,12 @@ def test_a_drive_beyond_the_stress_limit_is_warned_about(tmp_path: Path) -> None
     output = run(GRIPPER, "--kind", "finite_element", "--drive", given, "--out", tmp_path)
     assert "at an input of 3 mm the stress at (35, 30) must stay below the yield of 48 MPa, but is 57.2 MPa" in output
     assert "stay within 2.52 mm" in output
+
+
+def test_the_lumped_model_warns_with_its_nominal_stress(tmp_path: Path) -> None:
+    given = drive(tmp_path / "drive.csv", [0.0, 3.0])
+    output = run(GRIPPER, "--kind", "lumped", "--drive", given, "--out", tmp_path)
+    assert "at (18.05, 29.66) must stay below the yield of 48 MPa, but is 56.6 MPa, 8.57 MPa too much" in output
 
 
 def test_the_stiffness_matrix_knows_small_displacements_alone(tmp_path: Path) -> None:
