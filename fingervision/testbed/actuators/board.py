@@ -15,7 +15,7 @@ from fingervision.testbed.actuator import Alarm, StageLimits
 from fingervision.testbed.board import wire
 from fingervision.testbed.board.board import Board
 from fingervision.testbed.board.handshake import Handshake
-from fingervision.testbed.board.port import holder_of
+from fingervision.testbed.board.port import fingervision_at
 from fingervision.testbed.board.shared import KEY, board_of
 from fingervision.testbed.clock import Clock
 from fingervision.testbed.commanded_path import CommandedPath
@@ -308,8 +308,8 @@ class BoardActuator:
 
 
 def holder(section: Section, folder: Path) -> int | None:
-    """Process that has its board's port open; None if none is known of."""
-    return holder_of(read_board(folder / section.word(KEY)).port)
+    """Process of another fingervision that has its board's port open; None if none is seen."""
+    return fingervision_at(read_board(folder / section.word(KEY)).port)
 
 
 def build(section: Section, workshop: Workshop) -> BoardActuator:

@@ -10,6 +10,7 @@ from serial.tools.list_ports import comports
 from fingervision.domain.errors import FingervisionError
 
 BAUD = 115200
+PROGRAM = "fingervision"
 # The link reads in a thread of its own; it looks up this often to send what keeps the board awake.
 READ_TIMEOUT_S = 0.005
 WRITE_TIMEOUT_S = 1.0
@@ -20,16 +21,29 @@ def found_ports() -> tuple[tuple[str, str], ...]:
     return tuple(sorted((port.device, port.description) for port in comports()))
 
 
-def holder_of(name: str) -> int | None:
-    """Process of this user that has a port open, besides this one; None if none is seen (other systems than Linux)."""
+def holders_of(name: str) -> tuple[int, ...]:
+    """Other processes of this user that have a port open; none are seen on other systems than Linux."""
     port = Path(name).resolve()
+    holders = []
     for folder in Path("/proc").glob("[0-9]*/fd"):
         process = int(folder.parent.name)
         try:
             if process != os.getpid() and any(file.readlink() == port for file in folder.iterdir()):
-                return process
+                holders.append(process)
         except OSError:  # it has ended, or belongs to somebody else
             continue
+    return tuple(sorted(holders))
+
+
+def fingervision_at(name: str) -> int | None:
+    """Process of another fingervision that has a port open, which may be asked to end; None if there is none."""
+    for process in holders_of(name):
+        try:
+            words = Path(f"/proc/{process}/cmdline").read_bytes().split(b"\0")
+        except OSError:
+            continue
+        if any(Path(os.fsdecode(word)).name in (PROGRAM, f"{PROGRAM}.exe") for word in words):
+            return process
     return None
 
 
@@ -52,8 +66,8 @@ def opened_port(name: str) -> serial.Serial:
 def _why_closed(name: str, error: serial.SerialException) -> str:
     # Another program's lock comes as EAGAIN, Windows' "access denied" without a number.
     if error.errno in (errno.EAGAIN, errno.EBUSY) or "Could not exclusively lock" in str(error):
-        process = holder_of(name)
-        who = "another program" if process is None else f"another program (process {process})"
+        holders = ", ".join(f"process {process}" for process in holders_of(name))
+        who = f"another program ({holders})" if holders else "another program"
         return f"The port {name} must be free, but {who} has it open: close that one first."
     if error.errno in (errno.EACCES, errno.EPERM):
         return (
