@@ -12,7 +12,7 @@ Examples:
   fingervision bed run recipe.toml --out run
   fingervision bed run recipe.toml --hide backlash:play_mm=0.2 --hide camera_tilt --out run
   fingervision bed run recipe.toml --hide sealed.toml --out run
-  fingervision bed run diagnosis/next_run.toml --bed lab.toml --out second
+  fingervision bed run diagnosis/next_run.toml --after run --out second
   fingervision diagnose run/samples.csv --model run/simulation.csv --out diagnosis
 
 \b
@@ -41,6 +41,7 @@ def command(
     bed_name: str,
     hide: tuple[str, ...],
     out: Path,
+    after: Path | None,
     seed: int | None,
     real_time: bool,
     as_json: bool,
@@ -56,9 +57,12 @@ def command(
     from fingervision.testbed.hidden_words import hidden_from
     from fingervision.testbed.put_together import open_bed
     from fingervision.testbed.run import run_recipe
+    from fingervision.testbed.run_folder import rows_before
 
     recipe, hidden = read_recipe(recipe_toml), hidden_from(hide)
-    bed = open_bed(bed_name, hidden, pace=1.0 if real_time else 0.0, seed=seed)
+    before = [] if after is None else rows_before(after)
+    begin_s = before[-1].arrived_s if before else 0.0
+    bed = open_bed(bed_name, hidden, pace=1.0 if real_time else 0.0, seed=seed, begin_s=begin_s)
     try:
         with click.progressbar(length=1000, label="running", file=sys.stderr, hidden=not sys.stderr.isatty()) as bar:
             done = run_recipe(
@@ -66,6 +70,7 @@ def command(
                 bed,
                 out,
                 hidden,
+                before=before,
                 on_progress=lambda now, total: bar.update(max(0, int(1000 * now / total) - bar.pos) if total else 0),
                 say=lambda words: click.echo(words, err=True),
             )

@@ -37,15 +37,17 @@ class VirtualClock:
     ----------
     pace : float
         Seconds of the bed in a second of the host: 1 is real time, 0 as fast as it goes.
+    begin_s : float
+        Its first time: that much has passed before.
     """
 
-    def __init__(self, pace: float = 0.0) -> None:
-        self._now_s = 0.0
+    def __init__(self, pace: float = 0.0, begin_s: float = 0.0) -> None:
+        self._now_s = begin_s
         self._pace = pace
         self._host_began_s: float | None = None
 
     def now_s(self) -> float:
-        """Seconds since the bed began."""
+        """Seconds of the bed."""
         return self._now_s
 
     def wait_until(self, time_s: float) -> None:

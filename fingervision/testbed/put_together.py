@@ -37,7 +37,9 @@ PARTS = ("actuator", "force_sensor", "camera")
 TOP_KEYS = ("schema", "name", "seed", "below_tip_mm", *PARTS, "gripper", "limits", "scale")
 
 
-def open_bed(name: str, hidden: Hidden = NOTHING, *, pace: float = 0.0, seed: int | None = None) -> Bed:
+def open_bed(
+    name: str, hidden: Hidden = NOTHING, *, pace: float = 0.0, seed: int | None = None, begin_s: float = 0.0
+) -> Bed:
     """Put a bed together.
 
     Parameters
@@ -50,6 +52,8 @@ def open_bed(name: str, hidden: Hidden = NOTHING, *, pace: float = 0.0, seed: in
         Seconds of a wholly simulated bed in one second of the host; 0 is as fast as it goes.
     seed : int, optional
         Of everything random in the simulated parts; by default that of the configuration.
+    begin_s : float
+        First time of a wholly simulated bed: what was hidden in it has acted since 0.
 
     Raises
     ------
@@ -65,7 +69,7 @@ def open_bed(name: str, hidden: Hidden = NOTHING, *, pace: float = 0.0, seed: in
     has_gripper = "gripper" in top.values
     if hidden.effects and not has_gripper:
         raise UsageError(f"--hide must have a simulated gripper to act in, but {name} has no [gripper]: add one.")
-    clock: Clock = VirtualClock(pace) if all_simulated else HostClock()
+    clock: Clock = VirtualClock(pace, begin_s) if all_simulated else HostClock()
     workshop = Workshop(
         clock=clock,
         folder=top.path.parent,

@@ -1,10 +1,11 @@
 """A recipe on a bed: planned, checked, run, written."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 from fingervision.domain.recipe import Recipe
+from fingervision.storage.samples_csv import SampleRow
 from fingervision.storage.toml_section import Section
 from fingervision.testbed.bed import Bed
 from fingervision.testbed.controls import Controls
@@ -40,6 +41,7 @@ def run_recipe(
     out: Path,
     hidden: Hidden = NOTHING,
     *,
+    before: Sequence[SampleRow] = (),
     controls: Controls | None = None,
     on_progress: Progress = lambda done, total: None,
     say: Say = lambda words: None,
@@ -57,6 +59,8 @@ def run_recipe(
         Folder for the run; one that broke off is gone on with.
     hidden : Hidden
         What the bed was put together with.
+    before : sequence of SampleRow
+        Rows of an earlier run on this bed, which this one goes on from: its runs are numbered on, on the same clock.
     controls : Controls, optional
         Pause and stop.
     on_progress, say, on_plan : callable
@@ -71,7 +75,7 @@ def run_recipe(
     sight.position.read()
     planned = plan(recipe, bed.limits, bed.model, sight.position.newest, sight.rate_hz)
     on_plan(planned)
-    folder = BedRunFolder(out, recipe, bed, hidden)
+    folder = BedRunFolder(out, recipe, bed, hidden, before)
     try:
         size_px = (sight.camera.description.width_px, sight.camera.description.height_px)
         left = max(sum(planned.seconds) * sight.rate_hz - len(folder.rows), 0.0)
@@ -79,6 +83,8 @@ def run_recipe(
         runner = Runner(
             bed, planned, sight, folder, controls or Controls(), recipe.below_force_n, on_progress=on_progress, say=say
         )
+        if before:
+            runner.follow(before[-1])
         counts = runner.execute()
         folder.finish(runner.found())
     except BaseException as error:

@@ -3,7 +3,7 @@
 import hashlib
 import json
 import shutil
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from datetime import UTC, datetime
@@ -29,7 +29,7 @@ from fingervision.testbed.bed import Bed
 from fingervision.testbed.hidden import Hidden
 from fingervision.testbed.soft_limits import SoftLimits
 
-SAMPLES, SIMULATION, RECIPE = "samples.csv", "simulation.csv", "recipe.toml"
+SAMPLES, SIMULATION, RECIPE, JOINED = "samples.csv", "simulation.csv", "recipe.toml", "joined.csv"
 KIND = "bed run"
 # FFV1 of a picture with noise takes up to this many bytes a pixel.
 BYTES_PER_PX = 0.8
@@ -50,6 +50,8 @@ class BedRunFolder:
         Where.
     hidden : Hidden
         Its digest belongs to the run: a simulation that hides something else is another bed.
+    before : sequence of SampleRow
+        Rows of an earlier run that this one follows; both together are written to joined.csv.
 
     Raises
     ------
@@ -57,8 +59,10 @@ class BedRunFolder:
         The folder holds something else, a finished run or another recipe's, is in use, or cannot be written.
     """
 
-    def __init__(self, path: Path, recipe: Recipe[Section], bed: Bed, hidden: Hidden) -> None:
-        self.path = path
+    def __init__(
+        self, path: Path, recipe: Recipe[Section], bed: Bed, hidden: Hidden, before: Sequence[SampleRow] = ()
+    ) -> None:
+        self.path, self.before = path, tuple(before)
         _claim(path)
         self._lock = FolderLock(path)
         try:
@@ -114,7 +118,9 @@ class BedRunFolder:
     def finish(self, found: Mapping[str, Any]) -> None:
         """End a run that came to its end."""
         self._end()
-        self._about |= dict(found)
+        if self.before:
+            write_rows(self.path / JOINED, [*self.before, *read_samples(self.path / SAMPLES)])
+        self._about |= {**found, "joined": JOINED if self.before else None}
         self._about["sha256"] = {name: self._files.sha256(name) for name in (VIDEO, SAMPLES)}
         self._files.write_about(self._about, complete=True)
         self._files.close()
@@ -133,6 +139,21 @@ class BedRunFolder:
     def _end(self) -> None:
         self._video.close()
         self._samples.close()
+
+
+def rows_before(path: Path) -> list[SampleRow]:
+    """Rows of a finished run, with those of the runs that it followed.
+
+    Raises
+    ------
+    FingervisionError
+        There is no finished run in the folder.
+    """
+    table = path / (JOINED if (path / JOINED).exists() else SAMPLES)
+    rows = read_samples(table)
+    if not rows:
+        raise FingervisionError(f"--after must be the folder of an earlier run on the bed, but {path} holds none.")
+    return rows
 
 
 def _claim(path: Path) -> None:

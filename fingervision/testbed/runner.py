@@ -31,6 +31,8 @@ STILL_FRAMES, STILL_SIGMAS = 4, 4.0
 STILL_WITHIN_S = 5.0
 # A new reference is only as good as the rest before it.
 REST_AFTER_HOMING_S = 1.0
+# A run that follows another begins at least so much after it.
+PAUSE_S = 5.0
 # A sine is driven in pieces of so many frames.
 SWING_FRAMES = 3
 SLOT_FRAMES = 10
@@ -100,6 +102,15 @@ class Runner:
     _waiting: deque[tuple[Frame, SampleRow, float]] = field(default_factory=deque)
     slots: list[dict[str, float]] = field(default_factory=list)
 
+    def follow(self, last: SampleRow) -> None:
+        """Go on from the last row of an earlier run; to be called first."""
+        self.run = run_number(last) + 1
+        since_s = PAUSE_S
+        if not self.bed.replays:
+            # Two clocks of unlike kind: what has passed between two runs is known to the second, and needs no better.
+            since_s = max(PAUSE_S, self.bed.clock.now_s() - last.arrived_s)
+        self._base_s = last.time_s + since_s
+
     def execute(self) -> Counts:
         """Run it to its end.
 
@@ -151,7 +162,7 @@ class Runner:
         self._with_gap = sum(row.gap_mm is not None for row in self.folder.rows)
         if self.folder.rows:
             last = self.folder.rows[-1]
-            self.run = int(last.run.split()[0]) + 1
+            self.run = run_number(last) + 1
             since_s = (datetime.now(UTC) - self.folder.began_at).total_seconds()
             self._base_s = max(last.time_s + 1.0, since_s)
         return int(legs[-1]["leg"]) if legs else 0
@@ -426,6 +437,11 @@ class Runner:
             "clocks": self._clocks(),
             "reference_slots": self.slots,
         }
+
+
+def run_number(row: SampleRow) -> int:
+    """Number of a row's run: the label's first word."""
+    return int(row.run.split()[0])
 
 
 def _still(rows: list[GapRow]) -> bool:

@@ -46,6 +46,7 @@ class SimulatedShot:
     """A frame that is drawn when it is asked for, as it was seen."""
 
     index: int
+    exposure: int
     device_s: float
     arrived_s: float
     exposed_s: float
@@ -115,7 +116,7 @@ class SimulatedCamera:
                 break
         self._clock.wait_until(arrived_s)
         self._index += 1
-        return SimulatedShot(self._index - 1, device_s, arrived_s, exposed_s, self.placed, self)
+        return SimulatedShot(self._index - 1, self._exposure - 1, device_s, arrived_s, exposed_s, self.placed, self)
 
     def place(self, placed: Placed) -> None:
         """Lay the part otherwise."""
@@ -131,7 +132,7 @@ class SimulatedCamera:
             scene = self._slot(placed.slot_mm)
         else:
             scene = self._scene(shot.exposed_s - optics.late_s, placed)
-        rng = np.random.default_rng([self._seed, 5, shot.index])
+        rng = np.random.default_rng([self._seed, 5, abs(shot.exposure)])
         return np.asarray(render(scene, optics.camera, rng), dtype=np.uint8)
 
     def _slot(self, size_mm: float) -> Scene:

@@ -1,0 +1,43 @@
+"""`fingervision demo`: the whole loop on the simulated bed, each step in a line."""
+
+from pathlib import Path
+
+import click
+
+from fingervision.cli._on_bed import hide_option
+
+EXAMPLES = """
+\b
+Examples:
+  fingervision demo
+  fingervision demo --hide backlash:play_mm=0.15
+  fingervision demo --seed 5 --out shown
+"""
+
+
+@click.command(epilog=EXAMPLES)
+@hide_option
+@click.option("--seed", type=click.IntRange(0), default=1, show_default=True,
+              help="Of everything random; without --hide also of what is hidden.")  # fmt: skip
+@click.option(
+    "--out", type=click.Path(path_type=Path), default=Path("demo"), show_default=True, help="Folder to write."
+)
+def command(hide: tuple[str, ...], seed: int, out: Path) -> None:
+    """Hide an effect in the simulated bed, run a recipe, measure its pictures, and find what was hidden.
+
+    Where the first run leaves the answer open, the proposed next one is run as well.
+    """
+    from fingervision.testbed.demonstration import demonstrate, drawn
+    from fingervision.testbed.hidden_words import hidden_from
+
+    hidden = hidden_from(hide) if hide else drawn(seed)
+    click.echo("An effect is hidden in the simulated bed; nobody looks at which until the end.")
+    shown = demonstrate(hidden, seed, out, click.echo)
+    truth = " and ".join(
+        f"{name} ({', '.join(f'{key} = {value:.4g}' for key, value in values.items())})"
+        for name, values in hidden.effects.items()
+    )
+    ending = "found" if shown.found else "not settled"
+    runs = "one run" if shown.runs == 1 else f"{shown.runs} runs"
+    click.echo(f"Hidden was {truth or 'nothing'}: {ending} after {runs}.")
+    click.echo(f"Report: {shown.page}")

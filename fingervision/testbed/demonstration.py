@@ -1,0 +1,137 @@
+"""The whole loop on the simulated bed: hide, run, measure, diagnose, run what was proposed, and say how it ended."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from fingervision.diagnosis.diagnose import Diagnosis, diagnose
+from fingervision.diagnosis.report_page import report_page
+from fingervision.domain.parameter import Estimate
+from fingervision.domain.report import DiagnosisReport, Verdict
+from fingervision.effects import catalogue
+from fingervision.storage.measured_table import read_measured_table
+from fingervision.storage.model_toml import read_model, write_model
+from fingervision.storage.recipe_toml import read_recipe, write_recipe
+from fingervision.storage.report_json import report_document, write_report
+from fingervision.testbed.hidden import Hidden
+from fingervision.testbed.hidden_words import usual_values
+from fingervision.testbed.put_together import SIMULATED, open_bed
+from fingervision.testbed.run import run_recipe
+from fingervision.testbed.run_folder import JOINED, SAMPLES, SIMULATION, rows_before
+
+# What a run of a quarter of a minute can show, or nearly: one of these is hidden where nobody says which.
+SHOWN = (
+    "backlash", "friction_hysteresis", "encoder_cyclic_error", "end_stop", "finger_contact", "assembly_asymmetry",
+    "viscoelastic_creep", "thermal_drift", "lens_distortion", "camera_tilt", "camera_drift", "lever_ratio_error",
+    "rest_gap_error",
+)  # fmt: skip
+# Sizes are drawn between these multiples of the usual one.
+SIZES = (0.6, 1.4)
+# One way only at first, as at a bench where nobody knows yet what to look for.
+FIRST_RUN: tuple[dict[str, object], ...] = (
+    {"kind": "triangle", "from_mm": -0.4, "to_mm": 1.3, "speed_mm_s": 0.5, "cycles": 1, "frames": "continuous"},
+)
+MOST_RUNS = 3
+Say = Callable[[str], None]
+
+
+@dataclass(frozen=True, slots=True)
+class Shown:
+    """How a demonstration ended.
+
+    Parameters
+    ----------
+    hidden : Hidden
+        The truth.
+    report : DiagnosisReport
+        The last answer.
+    page : Path
+        Its report.
+    runs : int
+        How many runs it took.
+    """
+
+    hidden: Hidden
+    report: DiagnosisReport
+    page: Path
+    runs: int
+
+    @property
+    def found(self) -> bool:
+        """Whether the answer is what was hidden."""
+        return {effect.name for effect in self.report.effects} == set(self.hidden.effects) and (
+            self.report.verdict is (Verdict.NAMED if self.hidden.effects else Verdict.AGREES)
+        )
+
+
+def drawn(seed: int) -> Hidden:
+    """Choose an effect and its size by a seed."""
+    rng = np.random.default_rng([seed, 7])
+    name = SHOWN[int(rng.integers(len(SHOWN)))]
+    effect = catalogue()[name]
+    values = usual_values(effect)
+    for p in effect.parameters:
+        if p.neutral == 0.0:
+            values[p.name] = float(np.clip(values[p.name] * rng.uniform(*SIZES), p.lower, p.upper))
+    return Hidden({name: values})
+
+
+def demonstrate(hidden: Hidden, seed: int, out: Path, say: Say) -> Shown:
+    """Run the loop until the answer is one, or nothing more is proposed.
+
+    Parameters
+    ----------
+    hidden : Hidden
+        What acts in the bed; nothing here looks at it before the end.
+    seed : int
+        Of everything random.
+    out : Path
+        Folder; new or empty.
+    say : callable
+        Told each step in a line.
+
+    Raises
+    ------
+    FingervisionError
+        The folder cannot be written, or a run could not be made.
+    """
+    recipe = out / "recipe.toml"
+    out.mkdir(parents=True, exist_ok=True)
+    write_recipe(recipe, "there and back", FIRST_RUN)
+    before: Path | None = None
+    for number in range(1, MOST_RUNS + 1):
+        folder = out / f"run-{number}"
+        rows = [] if before is None else rows_before(before)
+        bed = open_bed(SIMULATED, hidden, seed=seed, begin_s=rows[-1].arrived_s if rows else 0.0)
+        try:
+            done = run_recipe(read_recipe(recipe), bed, folder, hidden, before=rows)
+        finally:
+            bed.close()
+        say(f"Run {number}, {read_recipe(recipe).name}: {done.counts.with_gap} gaps measured in as many pictures.")
+        table = folder / (SAMPLES if before is None else JOINED)
+        answer, page = _answer(table, folder / SIMULATION, out / f"diagnosis-{number}", seed)
+        say(f"{answer.report.verdict}: {answer.report.sentence}")
+        settled = answer.report.verdict in (Verdict.NAMED, Verdict.AGREES)
+        if settled or answer.report.next_run is None or number == MOST_RUNS:
+            break
+        say(f"Next: {answer.report.next_run.words}")
+        before, recipe = folder, out / f"diagnosis-{number}" / "next_run.toml"
+    return Shown(hidden, answer.report, page, number)
+
+
+def _answer(table: Path, simulation: Path, out: Path, seed: int) -> tuple[Diagnosis, Path]:
+    """Diagnose and write what `fingervision diagnose` writes."""
+    model = read_model(simulation)
+    done = diagnose(read_measured_table(table), model, seed=seed)
+    out.mkdir(parents=True, exist_ok=True)
+    effects: dict[str, dict[str, Estimate]] = {e.name: dict(e.parameters) for e in done.report.effects}
+    write_model(out / "model.toml", Path(model.base_path), effects, model.kind)
+    proposal = done.report.next_run
+    if proposal is not None:
+        write_recipe(out / "next_run.toml", proposal.name, proposal.steps)
+    write_report(out / "report.json", report_document(done.report, "model.toml", "next_run.toml" if proposal else None))
+    page = out / "report.html"
+    page.write_text(report_page(done), encoding="utf-8")
+    return done, page
