@@ -32,6 +32,9 @@ pauses and goes on, q and Enter or Ctrl-C ends it; the motor stops first.
 @hide_option
 @click.option("--out", type=click.Path(path_type=Path), default=Path("run"), show_default=True, help="Folder to write.")
 @click.option(
+    "--after", type=click.Path(path_type=Path), help="Earlier run on this bed; joined.csv then holds the rows of both."
+)
+@click.option(
     "--seed", type=click.IntRange(0), help="Of everything random in simulated parts; the same gives the same."
 )
 @click.option("--real-time", is_flag=True, help="Let a simulated bed take the time that it would take.")
@@ -57,12 +60,11 @@ def command(
     from fingervision.testbed.hidden_words import hidden_from
     from fingervision.testbed.put_together import open_bed
     from fingervision.testbed.run import run_recipe
-    from fingervision.testbed.run_folder import rows_before
+    from fingervision.testbed.run_folder import rows_before, times_of
 
     recipe, hidden = read_recipe(recipe_toml), hidden_from(hide)
     before = [] if after is None else rows_before(after)
-    begin_s = before[-1].arrived_s if before else 0.0
-    bed = open_bed(bed_name, hidden, pace=1.0 if real_time else 0.0, seed=seed, begin_s=begin_s)
+    bed = open_bed(bed_name, hidden, pace=1.0 if real_time else 0.0, seed=seed, earlier_s=times_of(before))
     try:
         with click.progressbar(length=1000, label="running", file=sys.stderr, hidden=not sys.stderr.isatty()) as bar:
             done = run_recipe(

@@ -19,7 +19,7 @@ from fingervision.testbed.hidden import Hidden
 from fingervision.testbed.hidden_words import usual_values
 from fingervision.testbed.put_together import SIMULATED, open_bed
 from fingervision.testbed.run import run_recipe
-from fingervision.testbed.run_folder import JOINED, SAMPLES, SIMULATION, rows_before
+from fingervision.testbed.run_folder import JOINED, SAMPLES, SIMULATION, rows_before, times_of
 
 # What a run of a quarter of a minute can show, or nearly: one of these is hidden where nobody says which.
 SHOWN = (
@@ -104,7 +104,7 @@ def demonstrate(hidden: Hidden, seed: int, out: Path, say: Say) -> Shown:
     for number in range(1, MOST_RUNS + 1):
         folder = out / f"run-{number}"
         rows = [] if before is None else rows_before(before)
-        bed = open_bed(SIMULATED, hidden, seed=seed, begin_s=rows[-1].arrived_s if rows else 0.0)
+        bed = open_bed(SIMULATED, hidden, seed=seed, earlier_s=times_of(rows))
         try:
             done = run_recipe(read_recipe(recipe), bed, folder, hidden, before=rows)
         finally:

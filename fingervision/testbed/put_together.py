@@ -38,7 +38,12 @@ TOP_KEYS = ("schema", "name", "seed", "below_tip_mm", *PARTS, "gripper", "limits
 
 
 def open_bed(
-    name: str, hidden: Hidden = NOTHING, *, pace: float = 0.0, seed: int | None = None, begin_s: float = 0.0
+    name: str,
+    hidden: Hidden = NOTHING,
+    *,
+    pace: float = 0.0,
+    seed: int | None = None,
+    earlier_s: tuple[float, float] | None = None,
 ) -> Bed:
     """Put a bed together.
 
@@ -52,8 +57,9 @@ def open_bed(
         Seconds of a wholly simulated bed in one second of the host; 0 is as fast as it goes.
     seed : int, optional
         Of everything random in the simulated parts; by default that of the configuration.
-    begin_s : float
-        First time of a wholly simulated bed: what was hidden in it has acted since 0.
+    earlier_s : (float, float), optional
+        First and last time of the runs that this one follows on a wholly simulated bed: it has warmed and drifted since
+        the first, and goes on from the last.
 
     Raises
     ------
@@ -69,7 +75,7 @@ def open_bed(
     has_gripper = "gripper" in top.values
     if hidden.effects and not has_gripper:
         raise UsageError(f"--hide must have a simulated gripper to act in, but {name} has no [gripper]: add one.")
-    clock: Clock = VirtualClock(pace, begin_s) if all_simulated else HostClock()
+    clock: Clock = VirtualClock(pace, earlier_s[1] if earlier_s else 0.0) if all_simulated else HostClock()
     workshop = Workshop(
         clock=clock,
         folder=top.path.parent,
@@ -78,6 +84,7 @@ def open_bed(
         limits=_limits(top.table("limits")),
         scale=_scale(top.table("scale"), top.path.parent),
         below_tip_mm=top.number("below_tip_mm", 0.3, above=0.0),
+        since_s=earlier_s[0] if earlier_s else None,
     )
     model = _model(top.table("gripper"), top.path.parent) if has_gripper else None
     return _built(top, sections, parts, workshop, model, replays=all_simulated)
@@ -101,7 +108,9 @@ def _built(
             if workshop.motion is None:
                 actuator = followed = Followed(actuator)
                 workshop.motion = followed.motion
-            workshop.gripper = SimulatedGripper(model, workshop.motion, workshop.hidden, workshop.play_mm)
+            workshop.gripper = SimulatedGripper(
+                model, workshop.motion, workshop.hidden, workshop.play_mm, workshop.since_s
+            )
         force: ForceSensor | None = None
         if "force_sensor" in parts:
             force = parts["force_sensor"].build(sections["force_sensor"], workshop)

@@ -156,6 +156,11 @@ def rows_before(path: Path) -> list[SampleRow]:
     return rows
 
 
+def times_of(rows: Sequence[SampleRow]) -> tuple[float, float] | None:
+    """First and last time of rows on their bed's clock; None without rows."""
+    return (rows[0].arrived_s, rows[-1].arrived_s) if rows else None
+
+
 def _claim(path: Path) -> None:
     try:
         path.mkdir(parents=True, exist_ok=True)

@@ -31,6 +31,8 @@ class Workshop:
         Of the camera, as the configuration states it.
     below_tip_mm : float
         Height of measuring.
+    since_s : float or None
+        Since when a simulated gripper warms and drifts, on the bed's clock; None where the bed begins anew.
     motion : Motion or None
         What a simulated gripper is driven by; a simulated actuator puts it here.
     play_mm : float
@@ -48,6 +50,7 @@ class Workshop:
     limits: SoftLimits
     scale: Scale | None
     below_tip_mm: float
+    since_s: float | None = None
     motion: Motion | None = None
     play_mm: float = 0.0
     gripper: SimulatedGripper | None = None

@@ -186,7 +186,11 @@ def build(section: Section, workshop: Workshop) -> SimulatedActuator:
     ends_mm = max(limits.lower_mm, workshop.limits.lower_mm), min(limits.upper_mm, workshop.limits.upper_mm)
     stage = SimulatedStage(*ends_mm, limits.accuracy_mm, rng)
     workshop.motion = Motion(
-        stage.at_mm, lambda: stage.planned_until_s, lambda: stage.version, lambda: list(stage.homed_s)
+        stage.at_mm,
+        lambda: stage.planned_until_s,
+        lambda: stage.version,
+        lambda: list(stage.homed_s),
+        lambda: stage.began_s,
     )
     workshop.play_mm = section.number("play_mm", 0.0, low=0.0)
     return SimulatedActuator(workshop.clock, stage, limits, rng)

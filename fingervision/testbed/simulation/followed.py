@@ -54,7 +54,9 @@ class Followed:
     @property
     def motion(self) -> Motion:
         """The stage as far as it was read."""
-        return Motion(self._at_mm, self._known_until_s, lambda: len(self._time_s), lambda: list(self._homed_s))
+        return Motion(
+            self._at_mm, self._known_until_s, lambda: len(self._time_s), lambda: list(self._homed_s), self._began_s
+        )
 
     def home(self) -> None:
         """Go to the reference."""
@@ -100,6 +102,10 @@ class Followed:
         if not self._time_s:
             return np.zeros_like(time_s)
         return np.interp(time_s, self._time_s, self._position_mm)
+
+    def _began_s(self) -> float:
+        moved = (at_s for at_s, mm in zip(self._time_s, self._position_mm, strict=True) if mm != self._position_mm[0])
+        return next(moved, float("inf"))
 
     def _known_until_s(self) -> float:
         return self._time_s[-1] if self._time_s else 0.0

@@ -23,6 +23,8 @@ USUAL_PERIOD_S = 0.04
 # These are looked at with the frames alone. A slip between two frames would land elsewhere than the catalogue's, which
 # is defined on samples, and the places would drift apart along a run: another effect, not another form of this one.
 WITH_THE_FRAMES = ("stick_slip",)
+# A run is watched at rest for so long before it begins to move.
+BEFORE_MOTION_S = 0.2
 # So much further than asked is computed at once while the stage stands.
 AHEAD_S = 2.0
 # What the fingers press on while they are kept from closing, felt at the drive.
@@ -46,12 +48,15 @@ class Motion:
         Changes whenever a plan changes.
     homed_s : callable
         When its zero was referenced anew: runs begin there, at rest.
+    began_s : callable
+        When it first moved; infinity before that.
     """
 
     at_mm: Callable[[Array], Array]
     known_until_s: Callable[[], float]
     version: Callable[[], int]
     homed_s: Callable[[], list[float]]
+    began_s: Callable[[], float]
 
 
 class SimulatedGripper:
@@ -70,9 +75,13 @@ class SimulatedGripper:
         What else acts.
     play_mm : float
         The drive's own play.
+    since_s : float, optional
+        Since when it warms and drifts; by default since shortly before it is first moved, from when on it is watched.
     """
 
-    def __init__(self, model: Model, motion: Motion, hidden: Hidden, play_mm: float = 0.0) -> None:
+    def __init__(
+        self, model: Model, motion: Motion, hidden: Hidden, play_mm: float = 0.0, since_s: float | None = None
+    ) -> None:
         self._model, self._motion = model, motion
         drive = dict(hidden.of_stage("drive"))
         if play_mm > 0.0:
@@ -81,28 +90,31 @@ class SimulatedGripper:
         self._drive = drive
         self._points: dict[str, Mapping[str, float]] = {**hidden.of_stage("mechanism"), **camera}
         self._rest_gap_mm = float(model.respond(np.zeros(1)).gap_mm[0])
+        self._since_s = since_s
         self._begin_s, self._period_s = 0.0, USUAL_PERIOD_S
         self._known: tuple[object, Array, Response] | None = None
 
     def looked_at(self, begin_s: float, period_s: float) -> None:
         """Say when the camera looks: at one time of the bed, and every period before and after."""
-        # The first look of the grid lies before the bed's beginning.
-        self._begin_s, self._period_s = begin_s - np.ceil(begin_s / period_s) * period_s, period_s
+        self._begin_s, self._period_s = begin_s, period_s
         self._known = None
 
     def at(self, time_s: float) -> Response:
         """Where the points are at one time of the bed, and the force; arrays of one element.
 
-        Times before the bed's beginning give its state at rest.
+        Times before it was watched give its state at rest.
         """
-        version = (self._motion.version(), len(self._motion.homed_s()))
+        began_s = self._motion.began_s()
+        version = (self._motion.version(), len(self._motion.homed_s()), began_s)
         if self._known is None or self._known[0] != version or time_s > self._known[1][-1]:
-            until_s = max(time_s + AHEAD_S, 0.0)
-            known_s = self._motion.known_until_s()
-            if np.isfinite(known_s):
-                until_s = max(until_s, known_s) if known_s > time_s else until_s
-            frames = np.ceil((until_s - self._begin_s) / self._period_s) + 1.0
-            grid_s = self._begin_s + np.arange(frames * STEPS_A_FRAME) * (self._period_s / STEPS_A_FRAME)
+            since_s = self._since_s if self._since_s is not None else min(began_s, time_s) - BEFORE_MOTION_S
+            until_s = max(time_s + AHEAD_S, since_s)
+            planned_s = self._motion.known_until_s()
+            if np.isfinite(planned_s):
+                until_s = max(until_s, planned_s)
+            first, last = (np.floor((at_s - self._begin_s) / self._period_s) for at_s in (since_s, until_s))
+            steps = np.arange((last - first + 2.0) * STEPS_A_FRAME) / STEPS_A_FRAME
+            grid_s = self._begin_s + (first + steps) * self._period_s
             self._known = (version, grid_s, self._respond(grid_s))
         _, grid_s, known = self._known
         at = np.array([time_s])
@@ -111,7 +123,8 @@ class SimulatedGripper:
 
     def _respond(self, grid_s: Array) -> Response:
         u = self._motion.at_mm(grid_s)
-        borders = [0, *(int(np.searchsorted(grid_s, at_s)) for at_s in self._motion.homed_s()), grid_s.size]
+        homed = (int(np.searchsorted(grid_s, at_s)) for at_s in self._motion.homed_s())
+        borders = [0, *(at for at in homed if at < grid_s.size), grid_s.size]
         runs = tuple(slice(a, b) for a, b in pairwise(borders) if b > a)
         opening_mm = self._model.respond(u).gap_mm - self._rest_gap_mm
         history = History(

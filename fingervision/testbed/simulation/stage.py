@@ -41,6 +41,11 @@ class SimulatedStage:
         begin_s, _, _, _, duration_s = self._pieces[-1]
         return begin_s + duration_s
 
+    @property
+    def began_s(self) -> float:
+        """When it first moved; infinity before that."""
+        return self._pieces[1][0] if len(self._pieces) > 1 else float("inf")
+
     def lands_at_mm(self, target_mm: float) -> float:
         """Where it comes to a stand when it is sent somewhere."""
         waves = sum(
