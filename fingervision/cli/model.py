@@ -142,6 +142,8 @@ def _row(gripper: "Gripper", figures: "ModelFigures") -> dict[str, Any]:
         "input_at_yield_mm": travel,
         "first_mode_drive_free_hz": figures.free_modes_hz[0] if figures.free_modes_hz else None,
         "first_mode_drive_held_hz": figures.locked_modes_hz[0] if figures.locked_modes_hz else None,
+        "first_swaying_mode_hz": figures.swaying_modes_hz[0] if figures.swaying_modes_hz else None,
+        "first_out_of_plane_mode_hz": figures.out_of_plane_modes_hz[0] if figures.out_of_plane_modes_hz else None,
         "contact_input_mm": figures.contact_input_mm,
     }
 

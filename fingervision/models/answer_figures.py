@@ -37,6 +37,8 @@ class ModelFigures:
         First symmetric in-plane modes with the drive free along its axis, and held.
     contact_input_mm : float or None
         Input at which the fingers first touch.
+    swaying_modes_hz, out_of_plane_modes_hz : tuple of float
+        First antisymmetric in-plane modes, the drive free to go sideways; first modes out of the plane, drive held.
     """
 
     gap_per_input: float
@@ -45,3 +47,5 @@ class ModelFigures:
     free_modes_hz: tuple[float, ...] = ()
     locked_modes_hz: tuple[float, ...] = ()
     contact_input_mm: float | None = None
+    swaying_modes_hz: tuple[float, ...] = ()
+    out_of_plane_modes_hz: tuple[float, ...] = ()

@@ -59,6 +59,9 @@ class DrivenBody:
         Displacements to tangent stiffness and internal forces, in the deformed shape.
     driven, free : ndarray of int
         Unknowns that move by the input, and that nothing holds; the others are held.
+    swaying : ndarray of int
+        Unknowns that nothing holds while both halves move the same way sideways, the drive with them: the symmetry axis
+        then cannot move along itself, and the actuator guides nothing across.
     face, face_rest_mm : ndarray
         Unknowns across the symmetry plane of the points that may touch it, and their distances from it at rest.
     measured, weights : ndarray
@@ -72,6 +75,7 @@ class DrivenBody:
     tangent: Callable[[Array], tuple[csr_matrix, Array]]
     driven: Indices
     free: Indices
+    swaying: Indices
     face: Indices
     face_rest_mm: Array
     measured: Indices
@@ -161,7 +165,13 @@ class DrivenBody:
         ndarray of float, shape (unknowns, count)
             Shapes, normalised by the mass of one half.
         """
-        free = self.unknowns_in_motion(drive_held=drive_held)
+        return self._modes_among(self.unknowns_in_motion(drive_held=drive_held), count)
+
+    def swaying_modes(self, *, count: int) -> tuple[Array, Array]:
+        """First antisymmetric natural modes, the drive free to go sideways; returns as `modes` does."""
+        return self._modes_among(self.swaying, count)
+
+    def _modes_among(self, free: Indices, count: int) -> tuple[Array, Array]:
         stiffness, mass = self.stiffness_n_mm[free][:, free], self.mass_t[free][:, free]
         if free.size < _DENSE_BELOW:
             # The reciprocal problem: lumped masses may be zero, the stiffness is positive definite.

@@ -45,6 +45,7 @@ def half_frame(gripper: Gripper, skeleton: Skeleton) -> DrivenBody:
         tangent=frame.internal_force_n,
         driven=driven,
         free=np.setdiff1d(np.arange(frame.unknowns), [*held, *driven]),
+        swaying=np.setdiff1d(np.arange(frame.unknowns), [0, 1, 2, *driven]),
         face=face,
         face_rest_mm=np.array([gripper.tip_corner_mm[0], gripper.tip_heel_mm[0]]),
         measured=np.array([3 * (skeleton.measured + 1)]),

@@ -42,6 +42,7 @@ def half_plate(gripper: Gripper, plate: PlaneStressPlate) -> DrivenBody:
         if not nodes.any():
             raise FingervisionError(f"The body must reach the {name}, but has no material there; check the links.")
     held = np.concatenate([plate.x_dofs[clamped | axis], plate.y_dofs[clamped]])
+    held_swaying = np.concatenate([plate.x_dofs[clamped], plate.y_dofs[clamped | axis]])
     moved = plate.y_dofs[driven]
     edges = _inner_face(gripper, plate)
     face = np.unique(edges)
@@ -52,6 +53,7 @@ def half_plate(gripper: Gripper, plate: PlaneStressPlate) -> DrivenBody:
         tangent=plate.internal_force_n,
         driven=moved,
         free=np.setdiff1d(np.arange(plate.unknowns), np.concatenate([held, moved])),
+        swaying=np.setdiff1d(np.arange(plate.unknowns), held_swaying),
         face=plate.x_dofs[face],
         face_rest_mm=x[face],
         measured=plate.x_dofs[nodes],

@@ -76,6 +76,11 @@ class LumpedGripper:
         rad_s, _ = self.half.modes(drive_held=drive_held, count=count)
         return tuple((rad_s / (2.0 * np.pi)).tolist())
 
+    def swaying_modes_hz(self, *, count: int = 1) -> tuple[float, ...]:
+        """First antisymmetric in-plane natural frequencies, the drive free to go sideways."""
+        rad_s, _ = self.half.swaying_modes(count=count)
+        return tuple((rad_s / (2.0 * np.pi)).tolist())
+
     def figures(self) -> ModelFigures:
         """Compute the model's row of the comparison."""
         return ModelFigures(
@@ -85,6 +90,7 @@ class LumpedGripper:
             self.modes_hz(drive_held=False),
             self.modes_hz(drive_held=True),
             self.half.first_touch_mm(),
+            self.swaying_modes_hz(),
         )
 
 

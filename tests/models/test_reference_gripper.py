@@ -14,6 +14,7 @@ from fingervision.models.lumped import LumpedGripper
 from fingervision.models.mesh_outline import PlaneMesh
 from fingervision.models.physics import Physics
 from fingervision.models.published_table import COMSOL_MM, INPUT_MM
+from fingervision.models.redrawn import redrawn
 from fingervision.models.stiffness_matrix import StiffnessMatrixGripper
 
 SLOPE_MM = 0.01  # per mm of input; of the mesh limit 7.7212
@@ -30,6 +31,7 @@ def test_plane_stress_of_the_reference(finite_element: FiniteElementGripper) -> 
     assert figures.input_stiffness_n_mm == pytest.approx(2.001, rel=FORCE)
     assert figures.free_modes_hz[0] == pytest.approx(44.6, rel=MODES)
     assert figures.locked_modes_hz[0] == pytest.approx(357.9, rel=MODES)
+    assert figures.swaying_modes_hz[0] == pytest.approx(70.1, rel=MODES)
     assert figures.contact_input_mm == pytest.approx(-0.516, rel=TOUCH)
 
 
@@ -108,6 +110,7 @@ def test_lumped_is_near_finite_elements(finite_element: FiniteElementGripper, lu
     assert ours.input_stiffness_n_mm == pytest.approx(reference.input_stiffness_n_mm, rel=0.05)
     assert ours.free_modes_hz[0] == pytest.approx(reference.free_modes_hz[0], rel=0.05)
     assert ours.locked_modes_hz[0] == pytest.approx(reference.locked_modes_hz[0], rel=0.05)
+    assert ours.swaying_modes_hz[0] == pytest.approx(reference.swaying_modes_hz[0], rel=0.05)
 
 
 def test_lumped_in_large_rotation(gripper: Gripper) -> None:
@@ -130,6 +133,23 @@ def test_stiffness_matrix_is_near_finite_elements(gripper: Gripper) -> None:
     for rigid in (False, True):
         ours = StiffnessMatrixGripper(gripper, rigid_links=rigid)
         assert ours.gap_per_input == pytest.approx(7.7212, rel=0.015)
+
+
+def test_the_first_mode_out_of_the_plane_is_as_much_too_high_as_the_sag_is_too_small(gripper: Gripper) -> None:
+    ours = StiffnessMatrixGripper(gripper)
+    # Bricks: 62 Hz and 0.105 mm. Bars joined at points miss some of the compliance; of one compliance, omega^2 sag = g.
+    sag_mm, _ = ours.gravity_sag_mm()
+    missing = np.sqrt(0.105 / sag_mm)
+    assert ours.out_of_plane_modes_hz()[0] == pytest.approx(62.0 * missing, rel=0.02)
+
+
+def test_modes_out_of_the_plane_scale_with_modulus_and_density(gripper: Gripper) -> None:
+    bare = StiffnessMatrixGripper(gripper).out_of_plane_modes_hz(count=3)
+    stiff = redrawn(
+        redrawn(gripper, "material.youngs_modulus_mpa", 3.0 * 1650.0), "material.density_kg_m3", 8.0 * 930.0
+    )
+    assert StiffnessMatrixGripper(stiff).out_of_plane_modes_hz(count=3) == pytest.approx([2.0 / 3.0 * f for f in bare])
+    assert list(bare) == sorted(bare)
 
 
 def test_stiffness_matrix_and_lumped_are_the_same_body(gripper: Gripper, lumped: LumpedGripper) -> None:
