@@ -69,14 +69,22 @@ class Capture:
         self.overflowed = 0
         self.waiting: Queue[Arrival | Happening | Ended] = Queue(FRAMES_WAITING)
         self._again = again
-        self._stopped = Event()
+        self._begun, self._stopped = Event(), Event()
         self._index = 0
         self._timeline = Timeline(monotonic())
         self._thread = Thread(target=self._read, name="capture", daemon=True)
 
     def start(self) -> None:
-        """Begin to read."""
-        self._thread.start()
+        """Begin to read what comes whether it is read or not: pictures that pile up would come late and all at once."""
+        if self._again is not None:
+            self._thread.start()
+
+    def begin(self) -> None:
+        """Hand over what comes from now on; a recording is read from its first frame."""
+        self._timeline = Timeline(monotonic())
+        self._begun.set()
+        if self._again is None:
+            self._thread.start()
 
     def stop(self) -> None:
         """End reading; what is waiting stays."""
@@ -95,7 +103,8 @@ class Capture:
         while not self._stopped.is_set():
             try:
                 for received in self.source.received():
-                    self._hand_over(received)
+                    if self._begun.is_set():
+                        self._hand_over(received)
                     if self._stopped.is_set():
                         return
                 if self._stopped.is_set():

@@ -1,11 +1,11 @@
 """One drawn frame measured before the first real one: compiled code is then there, and no frame waits for it."""
 
+from collections.abc import Callable
 from threading import Timer
 
 import numpy as np
 
 from fingervision.domain.frame import Frame
-from fingervision.live.session import Session
 from fingervision.rendering import Camera, render, two_fingers
 from fingervision.vision.pipeline import Settings, measure_frame
 
@@ -14,10 +14,16 @@ BELOW_TIP_PX, GAP_PX, FRAME_PX = 10.0, 60.0, (320, 240)
 SAID_AFTER_S = 1.5
 
 
-def rehearse(session: Session) -> None:
-    """Measure a drawn frame; where that takes its time, the session says why."""
+def rehearse(say: Callable[[str, str], None]) -> None:
+    """Measure a drawn frame.
+
+    Parameters
+    ----------
+    say : callable
+        Told a name and a sentence where it takes its time.
+    """
     words = "Preparing to measure: after an installation this takes up to a minute, once."
-    late = Timer(SAID_AFTER_S, session.say, ("preparing", words))
+    late = Timer(SAID_AFTER_S, say, ("preparing", words))
     late.daemon = True
     late.start()
     try:

@@ -13,7 +13,6 @@ from types import FrameType
 from fingervision.domain.errors import ExitCode, FingervisionError
 from fingervision.live.capture import Capture
 from fingervision.live.choices import Choices
-from fingervision.live.rehearsal import rehearse
 from fingervision.live.server import Page, bound
 from fingervision.live.session import Session
 from fingervision.live.terminal import JsonLines, StatusLine, told
@@ -70,7 +69,6 @@ def run(capture: Capture, choices: Choices, out: Path, showing: Showing) -> None
     if showing.record:
         session.record()
     with _until_signalled() as signalled:
-        rehearse(session)
         session.start()
         try:
             if page is None:

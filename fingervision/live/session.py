@@ -19,6 +19,7 @@ from fingervision.live.exposure import Exposure
 from fingervision.live.history import History
 from fingervision.live.promptness import be_prompt
 from fingervision.live.recorder import Recorder
+from fingervision.live.rehearsal import rehearse
 from fingervision.live.run_folder import RecordedFrame, RunFolder
 from fingervision.measuring.other_camera import other_camera
 from fingervision.measuring.rows import Result, RowMaker
@@ -102,9 +103,11 @@ class Session:
                 self.say("camera", note)
 
     def start(self) -> None:
-        """Begin to measure."""
-        self._frame_at_s = monotonic()
+        """Begin to measure, once the measurement is ready."""
         self.capture.start()
+        rehearse(self.say)
+        self.capture.begin()
+        self._frame_at_s = monotonic()
         self._thread.start()
 
     def stop(self) -> None:

@@ -95,7 +95,7 @@ def run(address: str, folder: Path, wanted: argparse.Namespace) -> None:
     session.on_row.append(note)
     looking = looked_at(session) if wanted.page else None
     session.start()
-    while len(frames) < 2 * wanted.rate_hz:  # compiled code is loaded with the first frames
+    while len(frames) < 2 * wanted.rate_hz:  # the period is known then, and what ffmpeg had ready has come
         time.sleep(0.1)
     if wanted.record:
         session.record()
