@@ -85,3 +85,12 @@ def test_one_exchange_that_belies_all_others_changes_little() -> None:
     clock = join.joined()
     assert clock is not None
     assert abs(clock.host_at(5.0) - 5.0) < 1e-3
+
+
+def test_an_instrument_on_the_host_clock_is_joined_exactly() -> None:
+    join = ClockJoin()
+    for number in range(50):
+        join.add(0.04 * number, 0.04 * number, 0.04 * number)
+    clock = join.joined()
+    assert clock is not None
+    assert clock.host_at(1.5) == pytest.approx(1.5, abs=1e-9)

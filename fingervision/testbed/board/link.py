@@ -20,7 +20,8 @@ from fingervision.testbed.clock import Clock
 ASK_EVERY_S = 0.02
 # An answer takes 3 ms on the wire, and up to 16 ms more in the buffers of a USB adapter.
 ANSWER_WITHIN_S, TRIES = 0.1, 5
-LOST_AFTER_S = 0.5
+# The motor does not wait for this: the board has dropped the drive line long before.
+LOST_AFTER_S = 1.0
 REFIT_EVERY_S = 0.25
 # No byte is faster than its ten bits; the board's 115200 baud are 2.1 % fast (ATmega328P, table of baud rates).
 BYTE_S = 10.0 / BAUD / 1.03
