@@ -241,8 +241,9 @@ def prepare(table: MeasuredTable, model: CorrectedModel, without: frozenset[str]
     able, excluded = admissible(history, without, model.base)
     distrusted, reasons = distrusted_rows(table, model.base, float(zero))
     notes += reasons
-    uncertain = isinstance(model.base, PhysicalModel) and model.base.uncertain
-    refit = tangent(chain, model.base, {}) if uncertain else DrawingRefit(np.zeros((stacked.size, 0)), {})
+    refit = DrawingRefit(np.zeros((stacked.size, 0)), {})
+    if isinstance(model.base, PhysicalModel) and model.base.uncertain:
+        refit = tangent(chain, model.base, {})
     return BenchData(
         table, model, chain, stacked, error, max(samples, 1.0), able, excluded, distrusted, tuple(notes), refit
     )

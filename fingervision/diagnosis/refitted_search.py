@@ -1,6 +1,7 @@
 """The search beside a drawing: what is missing and the drawing's uncertain numbers are found in turn."""
 
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -52,7 +53,7 @@ def refitted_search(bench: BenchData, rng: np.random.Generator, forced: frozense
     progress : callable
         Told the share that is done.
     """
-    found = search(lambda explanation: _problem(bench, explanation), rng, forced, progress)
+    found = search(partial(_problem, bench), rng, forced, progress)
     if not bench.refit.moved:
         best, posterior = settled(found.problem, found.best, rng)
         return Refitted(bench, _with_best(found, best), posterior)
@@ -62,7 +63,7 @@ def refitted_search(bench: BenchData, rng: np.random.Generator, forced: frozense
         bench = nearer
         if straight:
             break
-        found = search(lambda explanation, beside=bench: _problem(beside, explanation), rng, forced, progress)
+        found = search(partial(_problem, bench), rng, forced, progress)
     found = replace(found, problem=_problem(bench, found.best))
     refit = fit(found.problem, found.best.names, found.best.values, iterations=20) if found.best.names else found.best
     best, posterior = settled(found.problem, refit, rng)
