@@ -116,6 +116,18 @@ def test_a_silent_computer_loses_the_drive_line_within_a_tenth_of_a_second(
     assert board.dropped == ("the board had heard nothing from this program for 80 ms (is the computer overloaded?)")
 
 
+def test_a_silent_computer_loses_the_standing_motor_too_but_later(
+    emulated: EmulatedBoard, board: Board, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Ten times the silence: a standing motor is no danger, and a computer may be held up for a moment."""
+    emulated.wait_for(lambda edge: edge.level(ENABLE_PIN) == 1)
+    since, last_s = len(emulated.edges), emulated.clock.now_s()
+    monkeypatch.setattr(board._link, "_send", lambda line: None)
+    down = emulated.wait_for(lambda edge: edge.level(ENABLE_PIN) == 0, since=since)
+    assert 0.75 <= down.host_s - last_s <= 0.85
+    monkeypatch.undo()
+
+
 def test_a_motion_that_takes_too_long_loses_the_drive_line(emulated: EmulatedBoard, board: Board) -> None:
     since = len(emulated.edges)
     board.run(3, 0.05)

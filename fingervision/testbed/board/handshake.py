@@ -1,6 +1,8 @@
 """One motion on parallel lines: select, settle, drive, busy, not busy; each step with its own patience."""
 
-from collections.abc import Callable
+import gc
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from threading import Event
 
@@ -12,6 +14,21 @@ from fingervision.testbed.clock import Clock
 
 LINE_WITHIN_S = 0.3
 WAIT_S = 0.01
+
+
+@contextmanager
+def _no_collection() -> Iterator[None]:
+    """Keep Python's cyclic garbage for later: with large libraries loaded its collection stops all threads for 0.1 s.
+
+    The board would take that for silence and stop the motor.
+    """
+    was_on = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if was_on:
+            gc.enable()
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,6 +69,10 @@ class Handshake:
         FingervisionError
             A step of the handshake did not come; the drive line is down then.
         """
+        with _no_collection():
+            return self._run(code, at_most_s, on_driven)
+
+    def _run(self, code: int, at_most_s: float, on_driven: Callable[[float], None]) -> bool:
         self.board.run(code, self.busy_s + at_most_s)
         within_s = 1e-3 * self.board.settings.settle_ms + LINE_WITHIN_S
         driven = self._came(wire.Levels.DRIVE, within_s, "the board has not raised its drive line")

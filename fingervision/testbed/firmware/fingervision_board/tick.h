@@ -31,6 +31,9 @@ template <typename T, uint8_t SIZE> struct Queue {
     bool empty() const { return first == last; }
 };
 
+// A motor that stands enabled is let go of after so many times the silence that a moving one is stopped by.
+constexpr uint16_t STANDING = 10;
+
 Queue<Sample, 32> samples;
 Queue<Change, 16> changes;
 
@@ -146,11 +149,12 @@ ISR(TIMER1_COMPA_vect) {
         lines::write(lines::DRIVE, true);
     }
     bool driven = lines::active(lines::DRIVE);
-    bool armed = driven || settling || lines::active(lines::ENABLE);
+    bool moving = driven || settling;
     if (silent_ms < 0xFFFF) silent_ms++;
-    if (armed && silent_ms >= watchdog_ms) drop(SILENCE);
+    if (moving && silent_ms >= watchdog_ms) drop(SILENCE);
+    if (lines::active(lines::ENABLE) && silent_ms >= STANDING * watchdog_ms) drop(SILENCE);
     if (driven && ++driven_ms > longest_ms) drop(TOO_LONG);
-    if ((driven || settling) && lines::active(lines::ALARM)) drop(ALARMED);
+    if (moving && lines::active(lines::ALARM)) drop(ALARMED);
     notice();
     if (lines::mapped(lines::FORCE) && ++since_sample_ms >= period_ms) {
         since_sample_ms = 0;
