@@ -151,3 +151,27 @@ def test_elliptic_membrane() -> None:
     at_d = np.argmin(np.hypot(x[: corners.size] - 2.0, y[: corners.size]))
     # The value is printed with three digits.
     assert corners[at_d] == pytest.approx(92.7, rel=3e-3)
+
+
+def test_cooks_membrane() -> None:
+    """Cook's tapered panel under shear at its end: 23.96 at the middle of that end.
+
+    Geometry, load and value (64 x 64 incompatible quadrilaterals; Bergan and Felippa's best, 1985, is 23.9) as given by
+    ENERCALC 3D's verification problem C-04, which is public.
+    """
+    grid = rectangle(1.0, 1.0, 32, 32)
+    s, t = grid.nodes_mm
+    place = np.stack([48.0 * s, 44.0 * s + (44.0 - 28.0 * s) * t])
+    plate = PlaneStressPlate(PlaneMesh(place, grid.triangles), Material("unit", 1.0, 1.0 / 3.0, 1.0, 1.0), 1.0)
+    x, y = plate.nodes_mm
+    load = np.zeros(plate.unknowns)
+    end = x > 48.0 - 1e-9
+    edges = plate.outline_edges
+    for a, b, m in edges[:, np.all(end[edges], axis=0)].T:
+        for node, weight in ((a, 1 / 6), (b, 1 / 6), (m, 4 / 6)):
+            load[plate.y_dofs[node]] += abs(y[a] - y[b]) / 16.0 * weight
+    held = np.concatenate([plate.x_dofs[x < 1e-9], plate.y_dofs[x < 1e-9]])
+    moved = solve(plate, held, np.zeros(held.size), load)
+    tip = float(moved[plate.y_dofs[end & (np.abs(y - 52.0) < 1e-9)]][0])
+    # The value is printed with four digits.
+    assert tip == pytest.approx(23.96, rel=5e-4)
