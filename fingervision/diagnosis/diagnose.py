@@ -7,6 +7,7 @@ import numpy as np
 
 from fingervision.diagnosis.bench_data import BenchData, prepare
 from fingervision.diagnosis.explanation import Explanation, Problem
+from fingervision.diagnosis.force_hint import force_hint
 from fingervision.diagnosis.next_run import next_run
 from fingervision.diagnosis.noise import Noise
 from fingervision.diagnosis.refitted_search import refitted_search
@@ -135,7 +136,13 @@ def diagnose(
             for e in found.singles[:8]
             if e.names != best.names
         ),
-        notes=(*bench.notes, *bench.refitted(), *_beyond(bench, best), *_input_dominates(bench, found.problem)),
+        notes=(
+            *bench.notes,
+            *bench.refitted(),
+            *force_hint(bench, found.alternatives),
+            *_beyond(bench, best),
+            *_input_dominates(bench, found.problem),
+        ),
         seconds=time.perf_counter() - begin,
     )
     progress(1.0)

@@ -75,9 +75,12 @@ def test_thinner_hinges_are_out_of_reach_without_a_force(diagnosed: Diagnosed) -
 
 
 def test_a_link_without_a_force_is_the_set_that_no_gap_can_tell_apart(diagnosed: Diagnosed) -> None:
-    report, _ = diagnosed("hinges", False)  # their 0.17 % of the amplification looks like a link
+    report, _ = diagnosed("link", False)
     assert report.verdict is Verdict.AMBIGUOUS
     assert set(report.alternatives) == {("lever_ratio_error",), ("input_scale",)}
+    assert any(
+        note.startswith("measure force_n too: lever_ratio_error differs from input_scale") for note in report.notes
+    )
 
 
 def test_the_corrected_drawing_agrees_and_keeps_its_kind(diagnosed: Diagnosed, tmp_path: Path) -> None:
