@@ -2,13 +2,16 @@
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from fingervision.domain.errors import FingervisionError
 from fingervision.domain.frame import Coding, Frame, LostFrame
 from fingervision.frames.source import Description
-from fingervision.rendering import Camera, Scene, render
+
+if TYPE_CHECKING:
+    from fingervision.rendering import Camera, Scene
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,8 +35,8 @@ class RenderedFrames:
         There is no scene, or the frames are not of one size.
     """
 
-    scenes: Sequence[Scene]
-    camera: Camera
+    scenes: "Sequence[Scene]"
+    camera: "Camera"
     rng: np.random.Generator
     rate_hz: float | None = 25.0
 
@@ -62,6 +65,8 @@ class RenderedFrames:
 
     def __iter__(self) -> Iterator[Frame | LostFrame]:
         """Draw the frames one by one."""
+        from fingervision.rendering import render  # a third of a second that no recording of a camera needs
+
         for index, scene in enumerate(self.scenes):
             time_s = None if self.rate_hz is None else index / self.rate_hz
             yield Frame(render(scene, self.camera, self.rng), index, time_s)

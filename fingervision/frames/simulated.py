@@ -13,7 +13,6 @@ from fingervision.domain.errors import UsageError
 from fingervision.domain.frame import Coding, Frame, LostFrame, Pixels
 from fingervision.frames.received import Received
 from fingervision.frames.source import Description, Wish
-from fingervision.rendering import Camera, render, two_fingers
 
 NAME = "simulated"
 # The paper's scale, and the paper's gripper between nearly closed and open (mm).
@@ -109,6 +108,8 @@ class SimulatedGripper:
         self._closed.set()
 
     def _drawn(self, place: int, rng: np.random.Generator) -> Pixels:
+        from fingervision.rendering import Camera, render, two_fingers  # see `frames.rendered`
+
         # A wide picture shows the same gripper, a narrow one a smaller opening.
         share = min(1.0, self._size_px[0] / 640)
         scene = two_fingers(
