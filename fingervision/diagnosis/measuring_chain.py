@@ -38,7 +38,7 @@ class MeasuringChain:
     def respond(self, settings: Settings) -> Response:
         """Run the chain; an effect named in `settings` replaces a fixed one of the same name."""
         acting = {**self.fixed, **settings}
-        laws = laws_of(self.model)
+        laws = own_laws(self.model)
         order = [obeyed(effect, laws.get(name)) for name, effect in catalogue().items() if name in acting]
         input_mm = self.history.input_mm
         points: list[PointEffect] = []
@@ -66,7 +66,7 @@ class MeasuringChain:
         return np.concatenate(parts)
 
 
-def laws_of(model: Model) -> Mapping[str, PhysicalLaw]:
+def own_laws(model: Model) -> Mapping[str, PhysicalLaw]:
     """Laws by the effect's name: a drawn gripper obeys its own physics, a table has none."""
     return model.laws if isinstance(model, PhysicalModel) else {}
 
@@ -87,7 +87,7 @@ def admissible(history: History, without: frozenset[str], model: Model) -> tuple
     """Effects that these data can show, and the reasons for leaving out the others."""
     able: dict[str, Effect] = {}
     excluded: dict[str, str] = {}
-    laws = laws_of(model)
+    laws = own_laws(model)
     for name, entry in catalogue().items():
         effect = obeyed(entry, laws.get(name))
         searched = effect.search(history)
