@@ -6,18 +6,20 @@ the two apart, so the least latency must be known (`Latency` of the camera).
 """
 
 from dataclasses import dataclass
-from math import hypot
+from math import hypot, sqrt
 
 import numpy as np
 
 from fingervision.testbed.camera import Latency
 
-# The earliest of so many seconds counts; two quartz clocks part by 0.3 ms meanwhile (twice 30 parts in a million).
-BIN_S = 5.0
-# From here on the rate is fitted.
-RATE_AFTER_S = 20.0
-# Twenty minutes; older ones say nothing of now that newer ones do not.
-MOST_BINS = 240
+# The earliest of so many seconds counts.
+BIN_S = 1.0
+# Two quartz clocks part by so much in a second, as a standard deviation (30 parts in a million either, data sheets).
+LIKELY_RATE = 3e-5
+# The offset is that of the earliest frame of so many seconds; the rate is taken from all of them.
+NEWEST_BINS, MOST_BINS = 10, 600
+# Until the arrivals themselves tell how they scatter.
+FIRST_SCATTER_S = 1e-3
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,29 +57,25 @@ class ArrivalClock:
 
     def __init__(self, latency: Latency) -> None:
         self._latency = latency
-        # Of each bin: its beginning; stamp and delay of its earliest arrival; delay of the next earliest.
-        self._bins: list[tuple[float, float, float, float]] = []
+        # Of each bin: its beginning; stamp and delay of its earliest arrival.
+        self._bins: list[tuple[float, float, float]] = []
 
     def add(self, camera_s: float, arrived_s: float) -> None:
         """Take a frame."""
         delay_s = arrived_s - self._latency.least_s - camera_s
         if not self._bins or camera_s - self._bins[-1][0] > BIN_S:
-            self._bins = [*self._bins[-MOST_BINS + 1 :], (camera_s, camera_s, delay_s, float("inf"))]
-            return
-        begin_s, at_s, first_s, second_s = self._bins[-1]
-        if delay_s < first_s:
-            self._bins[-1] = (begin_s, camera_s, delay_s, first_s)
-        else:
-            self._bins[-1] = (begin_s, at_s, first_s, min(second_s, delay_s))
+            self._bins = [*self._bins[-MOST_BINS + 1 :], (camera_s, camera_s, delay_s)]
+        elif delay_s < self._bins[-1][2]:
+            self._bins[-1] = (self._bins[-1][0], camera_s, delay_s)
 
     def joined(self) -> CameraClock:
         """Fit the clock to what came until now."""
-        _, at_s, first_s, second_s = np.array(self._bins).T
-        about_s, rate = float(at_s[-1]), 0.0
-        if at_s[-1] - at_s[0] >= RATE_AFTER_S:
-            rate = float(np.polyfit(at_s - about_s, first_s, 1)[0])
-        level_s = first_s - rate * (at_s - about_s)
-        lowest_s = float(np.min(level_s))
-        spread_s = float(np.median(level_s) - lowest_s) if level_s.size > 1 else float(second_s[0] - first_s[0])
-        u_s = hypot(self._latency.u_s, spread_s if np.isfinite(spread_s) else 0.0)
-        return CameraClock(about_s, about_s + lowest_s, 1.0 + rate, u_s)
+        _, at_s, delay_s = np.array(self._bins).T
+        about_s = float(at_s[-1])
+        since_s = at_s - at_s.mean()
+        # Scatter of the earliest arrivals from bin to bin; neighbours differ by next to nothing else.
+        scatter_s = float(np.std(np.diff(delay_s))) / sqrt(2.0) if delay_s.size > 2 else FIRST_SCATTER_S
+        # A ridge: where the arrivals tell less of the rate than the data sheets, it stays small.
+        rate = float(since_s @ delay_s) / float(since_s @ since_s + (scatter_s / LIKELY_RATE) ** 2 + 1e-12)
+        level_s = (delay_s - rate * (at_s - about_s))[-NEWEST_BINS:]
+        return CameraClock(about_s, about_s + float(level_s.min()), 1.0 + rate, hypot(self._latency.u_s, scatter_s))

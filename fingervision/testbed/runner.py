@@ -22,7 +22,7 @@ from fingervision.testbed.run_folder import BedRunFolder
 from fingervision.testbed.sight import Look, Sight
 
 # The clocks are joined by so many frames before anything moves; the fingers must be seen in one of the last.
-FIRST_FRAMES, FRAMES_TO_FIND_FINGERS = 50, 3
+FIRST_FRAMES, FRAMES_TO_FIND_FINGERS = 75, 3
 # A recorded run begins at rest.
 REST_FRAMES = 5
 # The picture is still when so many frames in a row differ by less than so many times their own uncertainty.

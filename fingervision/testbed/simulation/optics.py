@@ -1,4 +1,4 @@
-"""Camera effects in the picture itself: what the lens, the tilt and the light do to a scene, and when it is seen."""
+"""Camera effects in the picture itself: what lens and tilt do to a scene, and when it is seen."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
@@ -18,7 +18,7 @@ class Optics:
     Parameters
     ----------
     camera : Camera
-        Tilt, lens, blooming, blur, noise.
+        Tilt, lens, blur, noise.
     px_per_mm : float
         Scale in the middle of the picture.
     half_diagonal_mm : float
@@ -52,12 +52,6 @@ def _tilt(optics: Optics, values: Mapping[str, float]) -> Optics:
     return replace(optics, camera=replace(optics.camera, tilt=tilt))
 
 
-def _bloom(optics: Optics, values: Mapping[str, float]) -> Optics:
-    """Let light spread over both edges, half of the offset each."""
-    bloom_px = optics.camera.bloom_px + 0.5 * values["offset_mm"] * optics.px_per_mm
-    return replace(optics, camera=replace(optics.camera, bloom_px=bloom_px))
-
-
 def _late(optics: Optics, values: Mapping[str, float]) -> Optics:
     return replace(optics, late_s=optics.late_s + values["delay_s"])
 
@@ -65,10 +59,11 @@ def _late(optics: Optics, values: Mapping[str, float]) -> Optics:
 IN_THE_PICTURE: Mapping[str, Act] = {
     "lens_distortion": _lens,
     "camera_tilt": _tilt,
-    "edge_bias": _bloom,
     "camera_latency": _late,
 }
-"""All other camera effects move the scene before the camera, which is the same thing: drifts and scales."""
+"""All other camera effects move the scene before the camera: for drifts and scales that is the same thing. Light that
+blooms over round tips moves the gap by less than both edges (the tip goes down as well), and would be no `edge_bias` as
+the catalogue defines it: that, too, moves the fingers."""
 
 
 def hidden_in(optics: Optics, hidden: Hidden) -> Optics:

@@ -1,0 +1,65 @@
+"""Recipes and beds for the tests of runs."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+from fingervision.storage.recipe_toml import read_recipe
+from fingervision.testbed.hidden import NOTHING, Hidden
+from fingervision.testbed.put_together import open_bed
+from fingervision.testbed.run import RunDone, run_recipe
+
+# One second of motion, then a few points: the shortest run that has everything to break off in.
+SHORT = """
+schema = 1
+name = "short"
+
+[[step]]
+kind = "triangle"
+from_mm = -0.2
+to_mm = 0.4
+speed_mm_s = 1.0
+
+[[step]]
+kind = "staircase"
+from_mm = -0.2
+to_mm = 0.4
+steps = 2
+dwell_s = 0.1
+speed_mm_s = 1.0
+frames = 3
+
+[[step]]
+kind = "rezero"
+
+[[step]]
+kind = "move"
+to_mm = 0.3
+speed_mm_s = 1.0
+"""
+
+
+def recipe_at(folder: Path, text: str = SHORT) -> Path:
+    """Write a recipe."""
+    path = folder / "recipe.toml"
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+def steps(*tables: str) -> str:
+    """A recipe of steps, each `key = value` lines."""
+    return "schema = 1\n" + "".join(f"\n[[step]]\n{table}\n" for table in tables)
+
+
+def run(
+    folder: Path,
+    text: str = SHORT,
+    hidden: Hidden = NOTHING,
+    bed_name: str = "simulated",
+    say: Callable[[str], None] = lambda words: None,
+) -> RunDone:
+    """Run a recipe on a bed into a folder named run."""
+    bed = open_bed(bed_name, hidden)
+    try:
+        return run_recipe(read_recipe(recipe_at(folder, text)), bed, folder / "run", hidden, say=say)
+    finally:
+        bed.close()

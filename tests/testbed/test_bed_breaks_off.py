@@ -1,0 +1,90 @@
+"""A run that is killed at any moment is valid, loses a second at most, and comes to the same end as a whole one."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from fingervision.storage.recorded_video import frames_in
+from fingervision.storage.samples_csv import read_samples
+from tests.testbed.simulated_beds import SHORT, recipe_at, run
+
+PACE = ("--real-time",)
+MOMENTS = 3
+LOST_AT_MOST_S = 1.0
+PATIENCE_S = 60.0
+
+
+def killed(recipe: Path, out: Path, after_s: float) -> int:
+    """Kill a run so long after its first frames; how many had been written when it was killed, at least."""
+    words = [sys.executable, "-m", "fingervision", "bed", "run", str(recipe), "--out", str(out), *PACE]
+    process = subprocess.Popen(words, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    until_s = time.monotonic() + PATIENCE_S
+    while frames_in(out / "video.mp4") == 0 and process.poll() is None and time.monotonic() < until_s:
+        time.sleep(0.05)
+    time.sleep(after_s)
+    os.kill(process.pid, signal.SIGKILL)
+    process.wait()
+    return frames_in(out / "video.mp4")
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory: pytest.TempPathFactory) -> bytes:
+    folder = tmp_path_factory.mktemp("whole")
+    run(folder)
+    return (folder / "run" / "samples.csv").read_bytes()
+
+
+def test_a_killed_run_is_gone_on_with_to_the_same_end(tmp_path: Path, whole: bytes) -> None:
+    rng = np.random.default_rng(5)
+    for k in range(MOMENTS):
+        folder = tmp_path / str(k)
+        folder.mkdir()
+        in_video = killed(recipe_at(folder), folder / "run", float(rng.uniform(0.0, 2.0)))
+        rows = read_samples(folder / "run" / "samples.csv")
+        # Rows wait half a second for company; their pictures are in the video by then.
+        assert in_video - len(rows) <= LOST_AT_MOST_S * 25.0
+        about = json.loads((folder / "run" / "run.json").read_text())
+        done = run(folder)
+        assert done.resumed_after == min(len(rows), in_video) or about["complete"]
+        assert (folder / "run" / "samples.csv").read_bytes() == whole
+        assert frames_in(folder / "run" / "video.mp4") == len(read_samples(folder / "run" / "samples.csv"))
+        events = [json.loads(line) for line in (folder / "run" / "events.jsonl").read_text().splitlines()]
+        numbered = [event["n"] for event in events if "n" in event]
+        assert numbered == list(range(len(numbered)))
+        assert json.loads((folder / "run" / "run.json").read_text())["complete"] is True
+
+
+def test_half_a_row_and_half_an_event_are_cut_off(tmp_path: Path, whole: bytes) -> None:
+    run(tmp_path)
+    folder = tmp_path / "run"
+    lines = whole.splitlines(keepends=True)
+    (folder / "samples.csv").write_bytes(b"".join(lines[:12]) + lines[12][:20])
+    events = (folder / "events.jsonl").read_bytes().splitlines(keepends=True)
+    (folder / "events.jsonl").write_bytes(b"".join(events[:3]) + events[3][:15])
+    about = json.loads((folder / "run.json").read_text())
+    (folder / "run.json").write_text(json.dumps({**about, "complete": False}))
+    assert run(tmp_path).resumed_after == 11
+    assert (folder / "samples.csv").read_bytes() == whole
+
+
+def test_ctrl_c_ends_a_run_in_a_sentence_and_it_may_be_gone_on_with(tmp_path: Path, whole: bytes) -> None:
+    recipe = recipe_at(tmp_path, SHORT)
+    words = [sys.executable, "-m", "fingervision", "bed", "run", str(recipe), "--out", str(tmp_path / "run"), *PACE]
+    process = subprocess.Popen(words, stdin=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
+    until_s = time.monotonic() + PATIENCE_S
+    while frames_in(tmp_path / "run" / "video.mp4") < 5 and time.monotonic() < until_s:
+        time.sleep(0.05)
+    process.send_signal(signal.SIGINT)
+    _, errors = process.communicate(timeout=PATIENCE_S)
+    assert process.returncode == 1
+    assert "The run was stopped; the motor stands. The same command goes on with it." in errors
+    assert "Traceback" not in errors
+    run(tmp_path)
+    assert (tmp_path / "run" / "samples.csv").read_bytes() == whole

@@ -1,0 +1,126 @@
+"""Every actuator, force sensor and camera keeps its protocol; a part without hardware joins by being listed."""
+
+from collections.abc import Callable, Iterator
+from itertools import pairwise
+
+import pytest
+
+from fingervision.domain.errors import FingervisionError
+from fingervision.testbed.bed import Bed
+from fingervision.testbed.put_together import open_bed
+
+# A part is looked at through a bed that it belongs to.
+BEDS: dict[str, Callable[[], Bed]] = {"simulated": lambda: open_bed("simulated")}
+WAIT_S, PATIENCE_S = 0.01, 10.0
+
+
+@pytest.fixture(params=sorted(BEDS))
+def bed(request: pytest.FixtureRequest) -> Iterator[Bed]:
+    opened = BEDS[request.param]()
+    yield opened
+    opened.close()
+
+
+def at_rest(bed: Bed) -> float:
+    until_s = bed.clock.now_s() + PATIENCE_S
+    while bed.actuator.busy:
+        bed.clock.wait_until(bed.clock.now_s() + WAIT_S)
+        assert bed.clock.now_s() < until_s
+    return bed.actuator.readings()[-1].value
+
+
+def close_enough_mm(bed: Bed) -> float:
+    return bed.actuator.limits.accuracy_mm + 0.5 * bed.actuator.limits.encoder_step_mm + 1e-6
+
+
+def test_an_actuator_goes_where_it_is_sent(bed: Bed) -> None:
+    for to_mm in (0.5, -0.2, 0.0):
+        bed.actuator.move(to_mm, 2.0)
+        assert at_rest(bed) == pytest.approx(to_mm, abs=close_enough_mm(bed))
+
+
+def test_a_motion_takes_the_time_that_its_speed_says(bed: Bed) -> None:
+    began_s = bed.clock.now_s()
+    bed.actuator.move(1.0, 2.0)
+    assert bed.actuator.busy
+    at_rest(bed)
+    # The way may be longer or shorter by the accuracy at either end; it is looked at every WAIT_S.
+    assert bed.clock.now_s() - began_s == pytest.approx(0.5, abs=2 * bed.actuator.limits.accuracy_mm / 2.0 + 2 * WAIT_S)
+
+
+def test_homing_ends_at_zero(bed: Bed) -> None:
+    bed.actuator.move(0.7, 2.0)
+    at_rest(bed)
+    bed.actuator.home()
+    assert at_rest(bed) == pytest.approx(0.0, abs=1e-6)
+
+
+def test_a_jog_ends_with_a_stop(bed: Bed) -> None:
+    bed.actuator.jog(0.5)
+    bed.clock.wait_until(bed.clock.now_s() + 1.0)
+    assert bed.actuator.busy
+    bed.actuator.stop()
+    stopped_mm = at_rest(bed)
+    assert stopped_mm == pytest.approx(0.5, abs=close_enough_mm(bed) + 0.5 * WAIT_S)
+    bed.clock.wait_until(bed.clock.now_s() + 0.5)
+    assert bed.actuator.readings()[-1].value == stopped_mm
+
+
+def test_readings_come_in_order_and_between_question_and_answer(bed: Bed) -> None:
+    bed.actuator.move(0.5, 1.0)
+    seen = []
+    for _ in range(5):
+        bed.clock.wait_until(bed.clock.now_s() + 0.04)
+        before_s = bed.clock.now_s()
+        readings = bed.actuator.readings()
+        assert readings
+        assert before_s <= readings[-1].asked_s <= readings[-1].got_s <= bed.clock.now_s()
+        seen += readings
+    assert all(a.device_s < b.device_s for a, b in pairwise(seen))
+    assert all(reading.asked_s <= reading.got_s for reading in seen)
+
+
+@pytest.mark.parametrize("beyond_mm", [0.1, -0.1])
+def test_beyond_its_limits_nothing_moves(bed: Bed, beyond_mm: float) -> None:
+    limits = bed.actuator.limits
+    target_mm = (limits.upper_mm if beyond_mm > 0 else limits.lower_mm) + beyond_mm
+    with pytest.raises(FingervisionError, match=r"but is .*nothing was moved"):
+        bed.actuator.move(target_mm, 1.0)
+    with pytest.raises(FingervisionError, match=r"The speed must be .*nothing was moved"):
+        bed.actuator.move(0.0, limits.speed_mm_s * 1.01)
+    assert not bed.actuator.busy
+    assert bed.actuator.readings()[-1].value == 0.0
+
+
+def test_a_busy_actuator_refuses_another_motion(bed: Bed) -> None:
+    bed.actuator.move(1.0, 1.0)
+    with pytest.raises(FingervisionError, match="is busy: stop it first"):
+        bed.actuator.move(0.0, 1.0)
+
+
+def test_forces_come_in_order_and_within_the_full_scale(bed: Bed) -> None:
+    if bed.force_sensor is None:
+        pytest.skip("this bed has no force sensor")
+    seen = []
+    for _ in range(5):
+        bed.clock.wait_until(bed.clock.now_s() + 0.05)
+        seen += bed.force_sensor.readings()
+    assert all(a.device_s < b.device_s for a, b in pairwise(seen))
+    assert all(abs(reading.value) <= bed.force_sensor.full_scale_n for reading in seen)
+
+
+def test_frames_come_in_order_after_their_exposure(bed: Bed) -> None:
+    if bed.camera is None:
+        pytest.skip("this bed has no camera")
+    shots = [bed.camera.next() for _ in range(5)]
+    assert [shot.index for shot in shots] == list(range(shots[0].index, shots[0].index + 5))
+    assert all(a.device_s < b.device_s and a.arrived_s < b.arrived_s for a, b in pairwise(shots))
+    item = shots[-1].item()
+    assert item.time_s == shots[-1].device_s
+    description = bed.camera.description
+    assert item.pixels.shape[:2] == (description.height_px, description.width_px)  # type: ignore[union-attr]
+
+
+def test_closing_twice_is_allowed(bed: Bed) -> None:
+    bed.close()
+    bed.close()
