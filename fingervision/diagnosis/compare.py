@@ -1,19 +1,23 @@
 """Where a measured table and a model disagree, without a word about why."""
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
 from fingervision.diagnosis.bench_data import BenchData, prepare
 from fingervision.diagnosis.diagnose import by_channel, places
 from fingervision.diagnosis.unseen_runs import rms_mm
-from fingervision.domain.effect import Array
+from fingervision.domain.effect import Array, History
 from fingervision.domain.measured_table import MeasuredTable
 from fingervision.domain.report import Place
 from fingervision.models.corrected import CorrectedModel
 
 MOST_REFITS = 4
 """Steps of Newton's rule for a drawing's uncertain numbers; small changes of links and hinges need two."""
+
+PIECE_S, LEAST_PIECE = 1.0, 12
+"""Length of a straight piece in seconds, and in samples at least: noise is looked for in what is faster."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -61,6 +65,34 @@ class Comparison:
         }
 
 
+def rough(residual_mm: Array, history: History) -> Array:
+    """What is left of a residual beside broken lines, one from reversal to reversal in each run; shape as given.
+
+    A step where the direction turns reaches all frequencies, so that a spectrum alone would take it for noise.
+    """
+    n = history.input_mm.size
+    if history.time_s is None:
+        return residual_mm
+    rest = residual_mm.copy()
+    piece = max(LEAST_PIECE, round(PIECE_S / history.sample_time_s))
+    for run in history.runs:
+        way = np.sign(np.diff(history.input_mm[run], prepend=history.input_mm[run][0]))
+        turns = np.flatnonzero(np.diff(way)) + 1
+        ends = [0]
+        for turn in turns:
+            if turn - ends[-1] >= piece:
+                ends.append(int(turn))
+        ends.append(run.stop - run.start)
+        for start, stop in pairwise(ends):
+            at = np.arange(stop - start)
+            knots = np.linspace(0, max(1, stop - start - 1), 1 + max(1, (stop - start) // piece))
+            hats = np.maximum(0.0, 1.0 - np.abs(at[:, None] - knots) / (knots[1] - knots[0]))
+            for channel in range(residual_mm.size // n):
+                rows = slice(channel * n + run.start + start, channel * n + run.start + stop)
+                rest[rows] -= hats @ np.linalg.lstsq(hats, rest[rows], rcond=None)[0]
+    return rest
+
+
 def compare(table: MeasuredTable, model: CorrectedModel, *, seed: int = 1) -> Comparison:
     """Find where a measured table and a model disagree beyond the noise."""
     bench = prepare(table, model)
@@ -74,7 +106,9 @@ def compare(table: MeasuredTable, model: CorrectedModel, *, seed: int = 1) -> Co
         problem = bench.problem(residual, 0, explained=False)
         if settled:
             break
-    found = places(bench, problem, residual, np.random.default_rng(seed))
     history = bench.chain.history
+    # Nothing was explained yet: what the disagreement itself does within seconds is no noise.
+    problem = bench.problem(rough(residual, history), 0, explained=False)
+    found = places(bench, problem, residual, np.random.default_rng(seed))
     rms = rms_mm(residual, history.input_mm.size, history.both_edges)
     return Comparison(bench, by_channel(bench, residual), found, rms, problem.whitener.noises[0].total_mm)

@@ -9,7 +9,6 @@ from fingervision.diagnosis.bench_data import BenchData, prepare
 from fingervision.diagnosis.explanation import Explanation, Problem
 from fingervision.diagnosis.force_hint import force_hint
 from fingervision.diagnosis.next_run import next_run
-from fingervision.diagnosis.noise import Noise
 from fingervision.diagnosis.refitted_search import refitted_search
 from fingervision.diagnosis.search import Findings, Progress
 from fingervision.diagnosis.unseen_runs import rms_mm, unseen_rms_mm
@@ -60,9 +59,6 @@ def by_channel(bench: BenchData, stacked: Array) -> dict[str, Array]:
 def places(bench: BenchData, problem: Problem, residual: Array, rng: np.random.Generator) -> tuple[Place, ...]:
     """Say where a residual cannot be noise."""
     noises = dict(zip(bench.channels, problem.whitener.noises, strict=True))
-    if "midline" in noises:
-        edge = 0.5 * np.hypot(noises["gap"].total_mm, 2.0 * noises["midline"].total_mm)
-        noises["left"] = noises["right"] = Noise(float(edge), 0.0, noises["gap"].correlation)
     n = bench.chain.history.input_mm.size
     aside = problem.whitener.aside[:n]
     return where(by_channel(bench, residual), noises, bench.chain.history, aside, rng)
