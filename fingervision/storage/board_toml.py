@@ -46,8 +46,11 @@ def read_board(path: Path) -> BoardSettings:
     schema = top.whole("schema", low=1)
     if schema != SCHEMA:
         top.refuse("schema", f"must be {SCHEMA}, but is {schema}: this program is older than the file.")
+    port = top.word("port")
+    if not port:
+        top.refuse("port", "must be the name of a serial port, such as /dev/ttyACM0 or COM3, but is empty.")
     return BoardSettings(
-        port=top.word("port"),
+        port=port,
         lines=_lines(top.table("lines")),
         force_period_ms=_period_ms(top),
         silence_ms=top.whole("silence_ms", 80, low=10, high=LONGEST_SILENCE_MS),

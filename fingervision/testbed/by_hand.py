@@ -62,15 +62,13 @@ def jog(bed: Bed, speed_mm_s: float, for_s: float = inf) -> float:
     """Move at a signed speed until stopped, for a time, or to the bed's limit; give the position then."""
     _check_speed(bed, abs(speed_mm_s))
     end_mm = bed.limits.upper_mm if speed_mm_s > 0.0 else bed.limits.lower_mm
-    if not bed.actuator.has_steps:
-        return _watched(bed, lambda: bed.actuator.move(end_mm, abs(speed_mm_s)), for_s)
-    last_mm = end_mm - WARNING_S * speed_mm_s
-    return _watched(
-        bed,
-        lambda: bed.actuator.jog(speed_mm_s),
-        for_s,
-        lambda at_mm: copysign(1.0, speed_mm_s) * (at_mm - last_mm) >= 0.0,
-    )
+    # A block that has begun goes to its end unless it is stopped in time.
+    last_mm = end_mm - (WARNING_S * speed_mm_s if bed.actuator.has_steps else 0.0)
+
+    def enough(at_mm: float) -> bool:
+        return copysign(1.0, speed_mm_s) * (at_mm - last_mm) >= 0.0
+
+    return _watched(bed, lambda: bed.actuator.jog(speed_mm_s), for_s, enough)
 
 
 def run_step(bed: Bed, number: int) -> float:

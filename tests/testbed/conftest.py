@@ -1,5 +1,6 @@
 """Boards for the tests of the bed: the real sketch, emulated."""
 
+import gc
 import os
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
@@ -10,7 +11,7 @@ import pytest
 from tests.testbed.emulated_board import EmulatedBoard, compiled, missing_tools, running
 
 # In slow motion, so that a loaded machine is fast enough for the emulated board.
-SLOWER = 2
+SLOWER = 3
 PRIORITY = -10
 
 
@@ -32,12 +33,17 @@ def emulated(sketch: tuple[Path, Path]) -> Iterator[EmulatedBoard]:
 
 @contextmanager
 def ahead_of_others() -> Iterator[None]:
-    """Run before other processes, where that is allowed: who drives a motor must not keep it waiting."""
+    """Run before other processes, where that is allowed, and without the pauses of Python's garbage collection.
+
+    Who drives a motor must not keep it waiting.
+    """
     before = os.getpriority(os.PRIO_PROCESS, 0)
     with suppress(PermissionError):
         os.setpriority(os.PRIO_PROCESS, 0, PRIORITY)
+    gc.disable()
     try:
         yield
     finally:
+        gc.enable()
         with suppress(PermissionError):
             os.setpriority(os.PRIO_PROCESS, 0, before)

@@ -1,5 +1,7 @@
 """A motor controller behind the real sketch: what it is asked for, in which order, and what happens when it fails."""
 
+import os
+import signal
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -12,7 +14,7 @@ from fingervision.domain.errors import FingervisionError
 from fingervision.testbed.actuators.board import BoardActuator
 from fingervision.testbed.bed import Bed
 from fingervision.testbed.put_together import open_bed
-from tests.testbed.emulated_board import EmulatedBoard, MotorController
+from tests.testbed.emulated_board import HERTZ, Edge, EmulatedBoard, MotorController
 
 # A clock's millisecond, and the board's tick.
 SOON_S = 5.0
@@ -57,6 +59,7 @@ positioning_time_s = 1.0
 """
 BOARD = """schema = 1
 port = "{port}"
+silence_ms = 95
 [lines]
 select = ["D2", "D3", "D4", "D5"]
 drive = "D6"
@@ -269,6 +272,24 @@ def test_too_much_force_stops_a_motion(bed_toml: Path, emulated: EmulatedBoard, 
     done = CliRunner().invoke(cli, ["bed", "move", "9", "--speed-mm-s", "50", "--bed", str(bed_toml)])
     assert str(done.exception).startswith("The force must stay below 3 N, but is 4.99 N: the motor")
     emulated.wait_for(lambda edge: edge.level(6) is None, since=len(emulated.edges) - 1)
+
+
+def test_ctrl_c_stops_the_motor_before_anything_else(
+    bed_toml: Path, emulated: EmulatedBoard, controller: MotorController
+) -> None:
+    began: list[int] = []
+
+    def press(before: Edge, now: Edge) -> None:
+        if now.level(6) == 1 and before.level(6) != 1:
+            began.append(now.cycle)
+            os.kill(os.getpid(), signal.SIGINT)
+
+    emulated.on_edge.append(press)
+    done = CliRunner().invoke(cli, ["bed", "move", "9", "--speed-mm-s", "50", "--bed", str(bed_toml)])
+    assert str(done.exception).startswith("Stopped: the motor stands near ")
+    down = emulated.wait_for(lambda edge: edge.cycle > began[0] and edge.level(6) == 0)
+    # The step takes 0.4 s; a word to the board some milliseconds.
+    assert (down.cycle - began[0]) / HERTZ < 0.2
 
 
 def test_steps_are_run_in_their_sequence_if_the_controller_keeps_these(

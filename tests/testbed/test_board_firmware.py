@@ -29,7 +29,16 @@ def controller(emulated: EmulatedBoard) -> Iterator[MotorController]:
 
 @pytest.fixture
 def board(emulated: EmulatedBoard, controller: MotorController) -> Iterator[Board]:
-    """The board, set up."""
+    """The board, set up; with more patience than usual, since a loaded machine may keep it waiting."""
+    board = opened(emulated.settings(silence_ms=400), emulated.clock).hold()
+    board.clear()
+    yield board
+    board.close()
+
+
+@pytest.fixture
+def strict_board(emulated: EmulatedBoard, controller: MotorController) -> Iterator[Board]:
+    """The board with its usual patience."""
     board = opened(emulated.settings(), emulated.clock).hold()
     board.clear()
     yield board
@@ -92,12 +101,12 @@ def test_busy_and_alarm_are_read_back(emulated: EmulatedBoard, board: Board) -> 
 
 
 def test_a_silent_computer_loses_the_drive_line_within_a_tenth_of_a_second(
-    emulated: EmulatedBoard, board: Board, monkeypatch: pytest.MonkeyPatch
+    emulated: EmulatedBoard, strict_board: Board, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    board.run(3, 10.0)
-    wait_for(emulated, board, Levels.DRIVE)
+    strict_board.run(3, 10.0)
+    wait_for(emulated, strict_board, Levels.DRIVE)
     sent_s: list[float] = []
-    link = board._link
+    link = strict_board._link
     send = link._send
 
     def muted(line: bytes) -> None:
@@ -111,18 +120,20 @@ def test_a_silent_computer_loses_the_drive_line_within_a_tenth_of_a_second(
     assert down.host_s - sent_s[0] <= 0.1
     assert emulated.wait_for(lambda edge: edge.level(ENABLE_PIN) == 0, since=since).cycle - down.cycle < HERTZ * TICK_S
     monkeypatch.setattr(link, "_send", send)
-    while board.dropped is None:
-        board.wait(0.01)
-    assert board.dropped == ("the board had heard nothing from this program for 80 ms (is the computer overloaded?)")
+    while strict_board.dropped is None:
+        strict_board.wait(0.01)
+    assert strict_board.dropped == (
+        "the board had heard nothing from this program for 80 ms (is the computer overloaded?)"
+    )
 
 
 def test_a_silent_computer_loses_the_standing_motor_too_but_later(
-    emulated: EmulatedBoard, board: Board, monkeypatch: pytest.MonkeyPatch
+    emulated: EmulatedBoard, strict_board: Board, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Ten times the silence: a standing motor is no danger, and a computer may be held up for a moment."""
     emulated.wait_for(lambda edge: edge.level(ENABLE_PIN) == 1)
     since, last_s = len(emulated.edges), emulated.clock.now_s()
-    monkeypatch.setattr(board._link, "_send", lambda line: None)
+    monkeypatch.setattr(strict_board._link, "_send", lambda line: None)
     down = emulated.wait_for(lambda edge: edge.level(ENABLE_PIN) == 0, since=since)
     assert 0.75 <= down.host_s - last_s <= 0.85
     monkeypatch.undo()
@@ -193,16 +204,16 @@ def test_a_reset_in_the_middle_is_said_and_lets_go_of_every_line(emulated: Emula
     assert emulated.wait_for(lambda edge: edge.level(DRIVE_PIN) is None, since=len(emulated.edges) - 5)
 
 
-def test_a_pulled_cable_is_said_and_drops_the_drive_line(emulated: EmulatedBoard, board: Board) -> None:
-    board.run(3, 10.0)
-    wait_for(emulated, board, Levels.DRIVE)
+def test_a_pulled_cable_is_said_and_drops_the_drive_line(emulated: EmulatedBoard, strict_board: Board) -> None:
+    strict_board.run(3, 10.0)
+    wait_for(emulated, strict_board, Levels.DRIVE)
     since = len(emulated.edges)
     pulled_s = emulated.clock.now_s()
     emulated.say("unplug")
     down = emulated.wait_for(lambda edge: edge.level(DRIVE_PIN) == 0, since=since)
     assert down.host_s - pulled_s <= 0.1 + 5 * TICK_S  # the words to the emulator are on their way for a while
     with pytest.raises(FingervisionError, match=rf"^The board on {emulated.port} was lost \(.*\): is its cable in\?"):
-        until_lost(board)
+        until_lost(strict_board)
 
 
 def test_two_programs_on_one_port(emulated: EmulatedBoard, board: Board) -> None:
@@ -232,6 +243,7 @@ def test_another_firmware_is_refused(
 def test_an_unknown_port_is_answered_with_those_there_are(emulated: EmulatedBoard) -> None:
     settings = emulated.settings()
     with pytest.raises(
-        FingervisionError, match=r"^There is no serial port /dev/ttyACM99; (there are|this machine has no)"
+        FingervisionError,
+        match=r"^There is no serial port /dev/ttyACM99; (those of this machine are|this machine has none)",
     ):
         opened(type(settings)("/dev/ttyACM99", settings.lines), emulated.clock)

@@ -11,6 +11,8 @@ from fingervision.domain.errors import FingervisionError
 
 BAUD = 115200
 PROGRAM = "fingervision"
+# What pyserial says of a port that nothing is known of.
+UNKNOWN = "n/a"
 # The link reads in a thread of its own; it looks up this often to send what keeps the board awake.
 READ_TIMEOUT_S = 0.005
 WRITE_TIMEOUT_S = 1.0
@@ -75,8 +77,8 @@ def _why_closed(name: str, error: serial.SerialException) -> str:
             "`sudo adduser $USER dialout`, then log in again), or close the program that has it."
         )
     ports = found_ports()
-    there = "; there are " + ", ".join(f"{port} ({words})" for port, words in ports) if ports else ""
-    hint = there or "; this machine has no serial port: plug the board in"
+    there = ", ".join(port if words == UNKNOWN else f"{port} ({words})" for port, words in ports)
+    hint = f"; those of this machine are {there}" if ports else "; this machine has none: plug the board in"
     if error.errno in (errno.ENOENT, errno.ENODEV, errno.ENXIO):
         return f"There is no serial port {name}{hint}."
     return f"The port {name} could not be opened as a serial port ({error}){hint}."

@@ -105,8 +105,8 @@ def build(section: Section, workshop: Workshop) -> BoardForceSensor:
 
 def _column(section: Section, key: str) -> list[float]:
     raw = section.values.get(key)
+    if raw is None:
+        section.refuse(None, f"must state {key}, a list of at least two numbers, but does not: add it.")
     if not isinstance(raw, list) or len(raw) < 2 or not all(isinstance(each, int | float) for each in raw):
-        section.refuse(
-            key if raw is not None else None, f"must hold {key} as a list of at least two numbers, but is {raw!r}."
-        )
+        section.refuse(key, f"must be a list of at least two numbers, but is {raw!r}.")
     return [float(each) for each in raw]
