@@ -91,7 +91,7 @@ class Hidden:
     Parameters
     ----------
     effect : str
-        Its name in the catalogue; empty where nothing is hidden.
+        Its name in the catalogue, or two names; empty where nothing is hidden.
     words : str
         What was changed.
     build : callable
@@ -128,6 +128,13 @@ CASES = {
     ),
     "large rotation": Hidden(
         "large_deflection", "large rotation", lambda g: halves(g, g, Physics(large_rotation=True)), highest_mm=1.8
+    ),
+    "both": Hidden(
+        "large_deflection, finger_contact",
+        "large rotation, and fingers that touch",
+        lambda g: halves(g, g, Physics(large_rotation=True, contact=True)),
+        lowest_mm=-0.6,
+        highest_mm=1.8,
     ),
     "right half": Hidden(
         "assembly_asymmetry", "right half's lever 1 % longer", lambda g: halves(longer_lever(g, 0.01), g)
