@@ -23,8 +23,6 @@ USUAL_PERIOD_S = 0.04
 # These are looked at with the frames alone. A slip between two frames would land elsewhere than the catalogue's, which
 # is defined on samples, and the places would drift apart along a run: another effect, not another form of this one.
 WITH_THE_FRAMES = ("stick_slip",)
-# A run is watched at rest for so long before it begins to move.
-BEFORE_MOTION_S = 0.2
 # So much further than asked is computed at once while the stage stands.
 AHEAD_S = 2.0
 # What the fingers press on while they are kept from closing, felt at the drive.
@@ -76,7 +74,7 @@ class SimulatedGripper:
     play_mm : float
         The drive's own play.
     since_s : float, optional
-        Since when it warms and drifts; by default since shortly before it is first moved, from when on it is watched.
+        Since when it warms and drifts; by default since it is first moved.
     """
 
     def __init__(
@@ -102,24 +100,29 @@ class SimulatedGripper:
     def at(self, time_s: float) -> Response:
         """Where the points are at one time of the bed, and the force; arrays of one element.
 
-        Times before it was watched give its state at rest.
+        Times before that give its state at rest.
         """
         began_s = self._motion.began_s()
         version = (self._motion.version(), len(self._motion.homed_s()), began_s)
         if self._known is None or self._known[0] != version or time_s > self._known[1][-1]:
-            since_s = self._since_s if self._since_s is not None else min(began_s, time_s) - BEFORE_MOTION_S
-            until_s = max(time_s + AHEAD_S, since_s)
-            planned_s = self._motion.known_until_s()
-            if np.isfinite(planned_s):
-                until_s = max(until_s, planned_s)
-            first, last = (np.floor((at_s - self._begin_s) / self._period_s) for at_s in (since_s, until_s))
-            steps = np.arange((last - first + 2.0) * STEPS_A_FRAME) / STEPS_A_FRAME
-            grid_s = self._begin_s + (first + steps) * self._period_s
+            grid_s = self._grid_s(time_s, began_s if self._since_s is None else self._since_s)
             self._known = (version, grid_s, self._respond(grid_s))
         _, grid_s, known = self._known
         at = np.array([time_s])
         force = None if known.force_n is None else np.interp(at, grid_s, known.force_n)
         return Response(np.interp(at, grid_s, known.left_mm), np.interp(at, grid_s, known.right_mm), force)
+
+    def _grid_s(self, time_s: float, since_s: float) -> Array:
+        """Times to follow the stage at, for a time that is asked for; none before anything has happened."""
+        until_s = time_s
+        if since_s > time_s:
+            since_s = time_s
+        else:
+            planned_s = self._motion.known_until_s()
+            until_s = max(time_s + AHEAD_S, planned_s if np.isfinite(planned_s) else time_s)
+        first, last = (np.floor((at_s - self._begin_s) / self._period_s) for at_s in (since_s, until_s))
+        steps = np.arange((last - first + 2.0) * STEPS_A_FRAME) / STEPS_A_FRAME
+        return np.asarray(self._begin_s + (first + steps) * self._period_s)
 
     def _respond(self, grid_s: Array) -> Response:
         u = self._motion.at_mm(grid_s)
