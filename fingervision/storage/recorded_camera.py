@@ -4,7 +4,7 @@ import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-RUN = "run.json"
+from fingervision.storage.run_files import RUN
 
 
 def recorded_camera(files: Sequence[Path]) -> Mapping[str, str]:

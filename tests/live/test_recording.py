@@ -25,6 +25,7 @@ def test_measuring_the_recording_again_gives_the_same_table(live: Start, measure
     assert measured(run / "video.mp4", *SCALE) == table
     about = json.loads((run / "run.json").read_text())
     assert about["complete"] is True
+    assert about["device"]["camera"] == {}  # the simulated one has no settings
     assert about["frames"] == len(table.splitlines()) - 1
     events = [json.loads(line)["event"] for line in (run / "events.jsonl").read_text().splitlines()]
     assert events[0] == "recording"
