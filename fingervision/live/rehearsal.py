@@ -11,7 +11,7 @@ from fingervision.vision.pipeline import Settings, measure_frame
 
 BELOW_TIP_PX, GAP_PX, FRAME_PX = 10.0, 60.0, (320, 240)
 # Loading what is compiled takes less; after an installation or another version it is compiled first.
-SAID_AFTER_S = 1.5
+SAID_AFTER_S = 3.0
 
 
 def rehearse(say: Callable[[str, str], None]) -> None:
