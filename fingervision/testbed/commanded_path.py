@@ -57,11 +57,11 @@ class CommandedPath:
         -------
         ndarray of float, shape (n,)
         """
-        times = [
-            np.arange(
-                max(from_s, piece.begin_s), min(to_s, piece.until_s, piece.begin_s + piece.motion.seconds), every_s
-            )
-            for piece in self._pieces
-            if piece.motion.seconds > 0.0 and piece.begin_s < to_s and piece.begin_s + piece.motion.seconds > from_s
-        ]
-        return np.concatenate(times) if times else np.empty(0)
+        times = []
+        for piece in self._pieces:
+            end_s = min(to_s, piece.until_s, piece.begin_s + piece.motion.seconds)
+            begin_s = max(from_s, piece.begin_s)
+            if piece.motion.seconds > 0.0 and begin_s < end_s:
+                times.append(np.arange(begin_s + every_s, end_s, every_s))
+        found = np.concatenate(times) if times else np.empty(0)
+        return found[found < to_s]

@@ -4,11 +4,16 @@ import gc
 import os
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
+from io import StringIO
 from pathlib import Path
 
 import pytest
 
-from tests.testbed.emulated_board import EmulatedBoard, compiled, missing_tools, running
+from fingervision.testbed import by_hand
+from fingervision.testbed.bed import Bed
+from fingervision.testbed.put_together import open_bed
+from tests.testbed.board_bed import CONTRACT_STEPS, times_of, written_bed
+from tests.testbed.emulated_board import EmulatedBoard, MotorController, compiled, missing_tools, running
 
 # In slow motion, so that a loaded machine is fast enough for the emulated board.
 SLOWER = 3
@@ -29,6 +34,26 @@ def emulated(sketch: tuple[Path, Path]) -> Iterator[EmulatedBoard]:
     """A board that was just switched on."""
     with ahead_of_others(), running(sketch, SLOWER) as board:
         yield board
+
+
+@pytest.fixture
+def homed_board_bed(emulated: EmulatedBoard, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Bed]:
+    """A bed whose motor controller behind the board stands at its reference; who uses it closes it."""
+    monkeypatch.setattr("fingervision.testbed.put_together.HostClock", lambda: emulated.clock)
+    bed_toml = written_bed(tmp_path, emulated.port, CONTRACT_STEPS, lower_mm=-1.0)
+    controller = MotorController(emulated, times_of(tmp_path / "steps.toml"))
+    bed = open_bed(str(bed_toml))
+    by_hand.home(bed)
+    yield bed
+    controller.close()
+
+
+@pytest.fixture
+def hand_screw_bed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Bed:
+    """A bed with a hand screw and somebody who always turns it to where it is wanted."""
+    (tmp_path / "bed.toml").write_text('schema = 1\n[actuator]\nkind = "hand_screw"\nlower_mm = -1.0\nupper_mm = 6.0\n')
+    monkeypatch.setattr("sys.stdin", StringIO("\n" * 100))
+    return open_bed(str(tmp_path / "bed.toml"))
 
 
 @contextmanager

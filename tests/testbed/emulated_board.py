@@ -21,7 +21,9 @@ CORE_FILES = (
     "abi.cpp", "new.cpp", "WString.cpp",
 )  # fmt: skip
 HERTZ = 16_000_000
-# The host's clock began at another time than the board's, whose resonator is slow by as much as one may be.
+# What the force sensor's amplifier gives without a load: a live zero.
+UNLOADED_MV = 500
+# The host's clock began at another time than the board's, whose resonator is fast by as much as one may be.
 BEGAN_S, CRYSTAL_SLOW_BY = 5000.0, 1.005
 
 WIRING = {
@@ -214,7 +216,7 @@ class EmulatedBoard:
 
 
 class MotorController:
-    """Answers the drive line with busy, for a while, as a motor controller does.
+    """Answers the drive line with busy, for a while, as a motor controller does; the force sensor is not loaded.
 
     Parameters
     ----------
@@ -231,6 +233,7 @@ class MotorController:
         self._news, self._closed = Condition(), False
         board.outside(Role.BUSY, False)
         board.outside(Role.ALARM, False)
+        board.say(f"adc 0 {UNLOADED_MV}")
         board.on_edge.append(self._on_edge)
         self._thread = Thread(target=self._work, daemon=True)
         self._thread.start()

@@ -14,6 +14,7 @@ from fingervision.domain.errors import FingervisionError
 from fingervision.testbed.actuators.board import BoardActuator
 from fingervision.testbed.bed import Bed
 from fingervision.testbed.put_together import open_bed
+from tests.testbed.board_bed import written_bed
 from tests.testbed.emulated_board import HERTZ, Edge, EmulatedBoard, MotorController
 
 # A clock's millisecond, and the board's tick.
@@ -57,42 +58,11 @@ pushing_force_n = 2.0
 load_kg = 0.1
 positioning_time_s = 1.0
 """
-BOARD = """schema = 1
-port = "{port}"
-silence_ms = 95
-[lines]
-select = ["D2", "D3", "D4", "D5"]
-drive = "D6"
-enable = "D7"
-hold = "D11"
-busy = "D8"
-alarm = "D9"
-force = "A0"
-active_low = ["busy", "alarm"]
-"""
-BED = """schema = 1
-[actuator]
-kind = "board"
-board = "board.toml"
-steps = "steps.toml"
-home_code = 0
-enable_s = 0.0
-[force_sensor]
-kind = "board"
-board = "board.toml"
-volts = [0.5, 4.5]
-newtons = [0.0, 5.0]
-[limits]
-force_n = 3.0
-upper_mm = 9.5
-"""
-UNLOADED_MV = 500
 
 
 @pytest.fixture
 def controller(emulated: EmulatedBoard) -> Iterator[MotorController]:
     """A motor controller whose motions take 50 ms, the step of code 5 0.4 s."""
-    emulated.say(f"adc 0 {UNLOADED_MV}")
     controller = MotorController(emulated, lambda code: 0.4 if code == 5 else 0.05)
     yield controller
     controller.close()
@@ -104,10 +74,7 @@ def bed_toml(
 ) -> Path:
     """The configuration of a bed with that board; its time is the emulator's."""
     monkeypatch.setattr("fingervision.testbed.put_together.HostClock", lambda: emulated.clock)
-    (tmp_path / "steps.toml").write_text(STEPS, encoding="utf-8")
-    (tmp_path / "board.toml").write_text(BOARD.format(port=emulated.port), encoding="utf-8")
-    (tmp_path / "bed.toml").write_text(BED, encoding="utf-8")
-    return tmp_path / "bed.toml"
+    return written_bed(tmp_path, emulated.port, STEPS)
 
 
 @pytest.fixture
@@ -252,7 +219,7 @@ def test_force_is_what_the_table_says_of_the_voltage(bed: Bed, emulated: Emulate
 
 
 def test_a_jog_repeats_relative_steps_until_the_limit_of_the_bed(bed_toml: Path, controller: MotorController) -> None:
-    bed_toml.write_text(BED.replace("upper_mm = 9.5", "upper_mm = 4.0"), encoding="utf-8")
+    bed_toml.write_text(bed_toml.read_text(encoding="utf-8").replace("upper_mm = 9.5", "upper_mm = 4.0"))
     done = CliRunner().invoke(cli, ["bed", "jog", "20", "--home-first", "--bed", str(bed_toml)])
     assert done.exit_code == 0, done
     # It is stopped a tenth of a second before 4 mm at 20 mm/s, in the step from 2 mm or, if late, in the next.

@@ -12,10 +12,12 @@ from fingervision.testbed.commanded_path import CommandedPath
 from fingervision.testbed.reading import Reading
 from fingervision.testbed.workshop import Workshop
 
-KEYS = ("lower_mm", "upper_mm", "accuracy_mm")
+KEYS = ("lower_mm", "upper_mm", "speed_mm_s", "accuracy_mm")
 SIMULATED = False
 # DIN 863-1 allows a micrometer screw of 25 mm an error of 4 um.
 ACCURACY_MM = 0.004
+# Nobody turns a screw faster; how fast it is turned is the hand's own matter.
+SPEED_MM_S = 10.0
 # A typed value so far from the one asked for is a slip of the finger, and is asked for again.
 FAR_MM = 1.0
 ASK_AT_MOST = 3
@@ -27,7 +29,7 @@ class HandScrew:
     Parameters
     ----------
     limits : StageLimits
-        What the screw can do; its speed and force are those of a hand, which nobody limits.
+        What the screw can do; the force is that of a hand, which nobody limits.
     clock : Clock
         The bed's.
     keyboard, screen : text streams
@@ -126,7 +128,7 @@ def build(section: Section, workshop: Workshop) -> HandScrew:
     limits = StageLimits(
         lower_mm=lower_mm,
         upper_mm=section.number("upper_mm", above=lower_mm),
-        speed_mm_s=float("inf"),
+        speed_mm_s=section.number("speed_mm_s", SPEED_MM_S, above=0.0),
         force_n=float("inf"),
         accuracy_mm=section.number("accuracy_mm", ACCURACY_MM, low=0.0),
     )
