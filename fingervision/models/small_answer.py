@@ -96,9 +96,11 @@ def ratio_curves(gripper: Gripper, theory: HingeTheory, change: Callable[[float]
     Returns
     -------
     RatioCurves or None
-        None where the changed drawings are no grippers, or where the ratios turn back: no change could then be told
-        from its ratio.
+        None where there is nothing to change, where the changed drawings are no grippers, or where the ratios turn
+        back: no change could then be told from its ratio.
     """
+    if not low < 0.0 < high:
+        return None
     bare = small_answer(gripper, theory)
 
     def ratios(at: Array) -> Array:

@@ -12,11 +12,13 @@ from fingervision.domain.errors import FingervisionError
 from fingervision.domain.gripper import Gripper
 from fingervision.domain.response import Response
 from fingervision.effects import catalogue
+from fingervision.models.hinge_correction import HingeTheory
 from fingervision.models.kinds import kinds
 from fingervision.models.lumped import LumpedGripper
 from fingervision.models.physical_gripper import PhysicalGripper
 from fingervision.models.physics import Physics
 from fingervision.models.redrawn import redrawn
+from fingervision.models.small_answer import ratio_curves, small_answer
 from tests.benchmarks.own_physics import longer_lever
 
 LAWS = {"lever_ratio_error", "large_deflection", "assembly_asymmetry", "finger_contact", "hinge_stiffness_error"}
@@ -25,6 +27,8 @@ INTERPOLATED_MM, INTERPOLATED = 5e-4, 1e-4
 BENT_MM, BENT = 1e-3, 5e-4
 """The arc's reach and height come from a least-squares fit to the equilibria, whose own spline has eleven nodes."""
 ROUNDING_MM = 1e-9
+SPLINE = 1e-5
+"""Splines of both ratios over the change are good to 1e-6; of one over the other, ten times that at their ends."""
 INPUT = np.linspace(-0.6, 1.8, 97)
 
 
@@ -170,3 +174,26 @@ def test_refitted_numbers_answer_as_the_drawing_with_them(drawn: PhysicalGripper
 def test_a_name_that_is_no_number_of_the_drawing_is_said(gripper: Gripper) -> None:
     with pytest.raises(FingervisionError, match=r"named as in gripper\.toml, but is hinge\.width_mm"):
         redrawn(gripper, "hinge.width_mm", 0.1)
+
+
+def test_ratios_that_turn_back_are_no_law(gripper: Gripper) -> None:
+    """A changed height of hinge 1 adds force whichever way it goes: its ratio does not say which."""
+    theory = HingeTheory.CORRECTED
+    assert ratio_curves(gripper, theory, lambda by: redrawn(gripper, "lever.l1_mm", by), -2.0, 2.0) is None
+    assert ratio_curves(gripper, theory, lambda by: redrawn(gripper, "lever.l2_mm", by), 0.0, 0.0) is None
+
+
+@pytest.mark.parametrize(("name", "low", "high"), [("hinge.thickness_mm", -0.7, 0.4), ("lever.l2_mm", -4.6, 8.9)])
+def test_curves_are_as_fine_as_they_say(gripper: Gripper, name: str, low: float, high: float) -> None:
+    theory = HingeTheory.CORRECTED
+    curves = ratio_curves(gripper, theory, lambda by: redrawn(gripper, name, by), low, high)
+    assert curves is not None
+    bare = small_answer(gripper, theory)
+    for share in (0.03, 0.31, 0.5, 0.77, 0.96):
+        changed = small_answer(redrawn(gripper, name, low + share * (high - low)), theory)
+        gap = changed.gap_per_input / bare.gap_per_input
+        force = changed.force_per_input_n_mm / bare.force_per_input_n_mm
+        if name == "lever.l2_mm":  # the way in which each is asked
+            assert curves.force_at_gap(gap) == pytest.approx(force, abs=SPLINE)
+        else:
+            assert curves.gap_at_force(force) == pytest.approx(gap, abs=SPLINE)
