@@ -10,6 +10,7 @@ from fingervision.storage.gaps_csv import GapRow
 
 # In place on a terminal, line by line elsewhere.
 EVERY_S, EVERY_S_ELSEWHERE = 0.1, 1.0
+CLEARED = "\r\x1b[2K"
 DRIVE_COLUMNS = ("run", "input_mm", "force_n")
 
 
@@ -58,7 +59,7 @@ class StatusLine:
             return
         self._printed_at_s = monotonic()
         line = self._line(row)
-        self._stream.write(f"\r\x1b[2K{line}" if self._in_place else f"{line}\n")
+        self._stream.write(f"{CLEARED}{line}" if self._in_place else f"{line}\n")
         self._stream.flush()
 
     def end(self) -> None:
@@ -81,5 +82,6 @@ class StatusLine:
 
 def told(message: Message, stream: TextIO) -> None:
     """Print a message of the session."""
-    stream.write(f"fingervision: {message.words}\n")
+    # What stands in place, and the ^C of whoever ends it, gives way.
+    stream.write(f"{CLEARED if stream.isatty() else ''}fingervision: {message.words}\n")
     stream.flush()

@@ -1,6 +1,6 @@
 """Rates, memory and costs of a batch; prints tables, asserts nothing.
 
-Run as `python tests/benchmarks/batch.py [--recordings 12] [--frames 750] [--finished 10000]` on an idle machine
+Run as `python tests/benchmarks/batch.py [--recordings 12] [--frames 1500] [--finished 10000]` on an idle machine
 (some minutes). Each line is a figure, with its bar where it has one.
 
 * Workers: the same recordings (H.264, 640x480) with one worker and with two, alternating, three rounds; frames a second
@@ -159,7 +159,7 @@ def main() -> None:
     """Read the options and print."""
     options = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     options.add_argument("--recordings", type=int, default=12)
-    options.add_argument("--frames", type=int, default=750)
+    options.add_argument("--frames", type=int, default=1500)
     options.add_argument("--finished", type=int, default=10000)
     chosen = options.parse_args()
     with TemporaryDirectory() as name:
