@@ -14,7 +14,7 @@ def compiled(function: Function) -> Function:
     """Compile a function when it is first called; it lets other threads run meanwhile.
 
     Sums may be taken in any order, so that they use the processor's vector units: the same machine always gives the
-    same digits. Division by zero gives an infinity, as in NumPy. A compiled function may call others of its own package.
+    same digits. Division by zero gives an infinity, as in NumPy. A compiled function may call others of its package.
     Where there is no place to keep the machine code, neither beside the file nor in the user's cache folder, it is made
     anew in every run.
     """

@@ -55,6 +55,9 @@ class GapMeasurement:
         Standard uncertainty of `gap_px` from frame to frame.
     light_gap : bool
         True for dark fingers on a light ground; False for light fingers on a dark one.
+    u_shift_px : float
+        Standard uncertainty of `gap_px` for what may have moved the edges in every frame alike: a bright rim, or light
+        just beyond the end of the scale. Zero where the edges show neither.
     """
 
     left: FingerEdge
@@ -62,6 +65,7 @@ class GapMeasurement:
     direction: Direction
     u_gap_px: float
     light_gap: bool
+    u_shift_px: float = 0.0
 
     @property
     def status(self) -> Status:

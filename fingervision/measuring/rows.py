@@ -83,9 +83,9 @@ class RowMaker:
                 across[chosen] = self.scale.positions_mm(points[chosen], axis, light_gap[chosen], self.frame_size_px)
         u_mm: list[float | None] = [None] * len(measured)
         if distances.u_mm is not None:
-            u_mm = np.hypot(
-                distances.u_mm, u_tip_bias_mm(measured, self.scale.edge_bias_px, self.scale.px_per_mm)
-            ).tolist()
+            u_tip_mm = u_tip_bias_mm(measured, self.scale.edge_bias_px, self.scale.px_per_mm)
+            u_shift_mm = np.array([m.u_shift_px for m in measured]) / self.scale.px_per_mm
+            u_mm = np.sqrt(distances.u_mm**2 + u_tip_mm**2 + u_shift_mm**2).tolist()
         return list(
             zip(
                 distances.value_mm.tolist(),

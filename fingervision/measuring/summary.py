@@ -146,6 +146,7 @@ def _uncertainty(scale: Scale) -> dict[str, Any]:
                 f"everything of the scale: {scale.px_per_mm:g} px/mm was stated without an uncertainty, "
                 "so u_gap_mm is empty; calibrate to know it",
                 "edge bias (blooming), lens distortion, tilt, distance from the plane of the scale, temperature",
+                "bright rims beside the edges, and light beyond the end of the scale",
                 *never,
             ],
         }
@@ -155,6 +156,7 @@ def _uncertainty(scale: Scale) -> dict[str, Any]:
         "covers": [
             random,
             "scale and edge bias with their covariance, from the calibration",
+            "what the edges show of a bright rim, or of light just beyond the end of the scale",
             *(
                 f"{words}: {scale.how_stated(name, unit)}"
                 for name, words, unit in (

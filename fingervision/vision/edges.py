@@ -23,6 +23,7 @@ from fingervision.vision.edge_filters import (
     edge_filters,
     reach_for,
 )
+from fingervision.vision.edge_profile import NO_MARK, EdgeMark, edge_mark
 from fingervision.vision.facing import facing_lines, without_the_other
 from fingervision.vision.grey import GreyImage
 from fingervision.vision.median import middle
@@ -69,6 +70,8 @@ class EdgePoints:
         Whether the flank itself, not only the plateau, touches the end of the scale.
     reach_px : int
         Half-length of the window along each line.
+    marks : (EdgeMark, EdgeMark)
+        What each inner flank shows that a blurred step does not; nothing where the window holds both edges.
     """
 
     lines: ProfileLines
@@ -80,6 +83,7 @@ class EdgePoints:
     curvature_gain: Floats
     is_clipped: NDArray[np.bool_]
     reach_px: int
+    marks: tuple[EdgeMark, EdgeMark]
 
 
 def fit_edges(upright: GreyImage, lines: ProfileLines) -> EdgePoints:
@@ -191,6 +195,22 @@ def _fit(levels: Floats, lines: ProfileLines, blur_px: float, filters: EdgeFilte
             seen = without_the_other(levels, lines, facing, where, contrast, sigma)
     mean_square, gain = filters.mean_square(seen.reshape(-1, pixels), look)
     noise_variance = max(middle(mean_square[real]), ROUNDING)
+    noise = float(np.sqrt(noise_variance))
+    marks = (NO_MARK, NO_MARK)
+    if facing is None:
+        left, right = (
+            edge_mark(
+                levels[k, rows],
+                position[k * PLACES + rows],
+                look.sigma[k * PLACES + rows],
+                look.contrast[k * PLACES + rows],
+                mean_square[k * PLACES + rows],
+                noise,
+                top_level,
+            )
+            for k, rows in enumerate(np.flatnonzero(inner) for inner in lines.weight[:, :INNER])
+        )
+        marks = (left, right)
     u_position = np.sqrt(np.maximum(mean_square, noise_variance)) / (np.abs(look.contrast) * gain)
     return EdgePoints(
         lines,
@@ -198,10 +218,11 @@ def _fit(levels: Floats, lines: ProfileLines, blur_px: float, filters: EdgeFilte
         _shaped(u_position),
         _shaped(look.contrast),
         blur.reshape(2, 2),
-        float(np.sqrt(noise_variance)),
+        noise,
         curvature_gain(lines.slope, filters.reach_px / _shaped(look.sigma)),
         _shaped(_clipped(levels.reshape(-1, pixels), position, look.sigma, top_level)),
         filters.reach_px,
+        marks,
     )
 
 

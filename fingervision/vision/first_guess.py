@@ -32,8 +32,8 @@ SQUARE_PRIOR = 0.01
 SLOPE_PRIOR = 0.3
 # A flank that no point speaks of lies so far beyond the outermost column, give or take a pixel.
 BEYOND_BORDER_PX = 3.0
-# A fillet that is blurred into its corner has its radius from the corner alone, to so much (pixels).
-SHARP_PRIOR_PX = 0.3
+# A fillet that is blurred into its corner has its radius from the corner alone, to so many sigma.
+SHARP_PRIOR_IN_BLURS = 1.0
 # A sharp corner's half-level stays away by so many sigma; points that lie so far inside both sides are on a fillet.
 SHARP_CORNER, INSIDE_CORNER_PX = 0.7706, 0.5
 # Distance of a fillet of radius one from its corner.
@@ -86,7 +86,7 @@ def _guess(
         radius = _radius(sense * (x - x0), sense * (c - x0), sense * m, y, below_top - top_c, sense * top_m, blur)
         start[number] = min(radius, largest)
         if radius < SHARP_IN_BLURS * blur and u_prior[number] > 1.0:
-            u_prior[number] = SHARP_PRIOR_PX
+            u_prior[number] = SHARP_PRIOR_IN_BLURS * blur
     return start, np.array([x0, below_tip]), u_prior
 
 

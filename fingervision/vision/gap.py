@@ -29,6 +29,8 @@ BLUR_LIMIT_PX = 5.0
 FEWEST_ROWS = 4
 # A finger's end has eight parameters: it needs this many lines across its outline.
 FEWEST_LINES = 2 * PARAMETERS
+# A flank of which more than this share lies beyond the end of the scale is cut off.
+CUT_OFF_LIMIT = 0.08
 # Below this ratio of contrast to noise nothing is measured.
 CONTRAST_TO_NOISE = 3.0
 
@@ -94,7 +96,7 @@ def _refuse(edges: EdgePoints, full_scale: int, light_gap: bool) -> NoGap | None
     contrast = middle(edges.contrast[inner]) * (1.0 if light_gap else -1.0)
     if contrast < CONTRAST_TO_NOISE * edges.noise or contrast < 0.02 * full_scale:
         return NoGap(Status.LOW_CONTRAST, "The fingers hardly differ from their ground.")
-    if edges.is_clipped[inner].mean() > 0.5:
+    if edges.is_clipped[inner].mean() > 0.5 or max(mark.beyond for mark in edges.marks) > CUT_OFF_LIMIT:
         return NoGap(Status.SATURATED, "The flank of the edges is cut off at the end of the grey scale.")
     blur = float(np.sqrt(edges.blur_px[:, 0].max() ** 2 + PIXEL_VARIANCE))
     if blur > BLUR_LIMIT_PX:
@@ -127,7 +129,9 @@ def _assemble(
         # Either edge closes the gap as it grows, each seen from its own finger; the tips move the points' heights.
         gradient = np.array([end * dy / gap, -dx / gap])
         variance += float(gradient @ m.covariance @ gradient)
-    return GapMeasurement(found[0], found[1], orientation.direction, float(np.sqrt(variance)), light_gap)
+    # A rim or too much light does the same to both edges.
+    u_shift = abs(sum(mark.shift_px for mark in edges.marks))
+    return GapMeasurement(found[0], found[1], orientation.direction, float(np.sqrt(variance)), light_gap, u_shift)
 
 
 def _finger_edge(

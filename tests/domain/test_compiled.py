@@ -34,7 +34,8 @@ def _package(folder: Path, factor: float) -> None:
 
 def _run(folder: Path, **variables: str) -> list[str]:
     top = Path(__file__).resolve().parents[2]
-    environment = {**os.environ, "PYTHONPATH": f"{folder}{os.pathsep}{top}", "PYTHONDONTWRITEBYTECODE": "1", **variables}
+    path = f"{folder}{os.pathsep}{top}"
+    environment = {**os.environ, "PYTHONPATH": path, "PYTHONDONTWRITEBYTECODE": "1", **variables}
     done = subprocess.run([sys.executable, "-c", RUN], capture_output=True, text=True, check=True, env=environment)
     return done.stdout.split()
 

@@ -1,0 +1,70 @@
+"""A rim or too much light moves an edge unseen: it is stated, refused, or not there."""
+
+import numpy as np
+import pytest
+
+from fingervision.domain.direction import Direction
+from fingervision.domain.frame import Frame
+from fingervision.domain.gap import GapMeasurement, NoGap
+from fingervision.domain.status import Status
+from fingervision.rendering import Camera, Light, Rim, TrueGap, render, truth, two_fingers
+from fingervision.vision.pipeline import Settings, measure_frame
+
+# A bound on what may have moved the edges is taken for a standard uncertainty.
+SIGMAS = 2.0
+POSITIONS = 6
+
+
+def _measured(number: int, camera: Camera, **options: object) -> tuple[GapMeasurement | NoGap, float]:
+    """One of a few sub-pixel positions, and its true gap."""
+    places = {"gap_px": 141.3 + 0.37 * number, "tip_at_px": 120.4 + 0.13 * number, "radius_px": 30.0}
+    scene = two_fingers(**{**places, **options})  # type: ignore[arg-type]
+    true = truth(scene, camera, 10.2)
+    assert isinstance(true, TrueGap)
+    pixels = render(scene, camera, np.random.default_rng([96, number]))
+    return measure_frame(Frame(pixels, number), Settings(10.2, Direction.UP)), true.gap_px
+
+
+SHARP = "what is left of a sharp flank far beyond the scale looks like a sharper one: 0.6 px in some positions"
+
+
+@pytest.mark.parametrize(
+    ("exposure", "blur_px"),
+    [
+        pytest.param(e, b, marks=pytest.mark.xfail(reason=SHARP, strict=True) if (e, b) == (1.5, 0.9) else ())
+        for e in (1.0, 1.03, 1.06, 1.2, 1.5)
+        for b in (0.9, 1.5, 2.5)
+    ],
+)
+def test_light_beyond_the_scale_is_refused_or_stated(exposure: float, blur_px: float) -> None:
+    refused = 0
+    for number in range(POSITIONS):
+        light = Light(ground=200.0, exposure=exposure * 255.0 / 200.0)
+        found, true_px = _measured(number, Camera(blur_px=blur_px, noise_grey=2.0), light=light)
+        if isinstance(found, NoGap):
+            assert found.status is Status.SATURATED
+            refused += 1
+        else:
+            assert abs(found.gap_px - true_px) < SIGMAS * np.hypot(found.u_gap_px, found.u_shift_px)
+    # Light that just fills the scale is the normal set-up; a fifth beyond it is cut off.
+    assert refused == 0 if exposure <= 1.0 else refused > 0 if exposure >= 1.2 else True
+
+
+@pytest.mark.parametrize("width_px", [1.5, 2.5, 4.0])
+@pytest.mark.parametrize("level", [200.0, 235.0])
+def test_a_rim_is_stated(width_px: float, level: float) -> None:
+    for number in range(POSITIONS):
+        camera = Camera(blur_px=0.9, noise_grey=2.0)
+        found, true_px = _measured(number, camera, light=Light(ground=170.0), rim=Rim(width_px, level))
+        assert isinstance(found, GapMeasurement)
+        assert found.u_shift_px > 0
+        assert abs(found.gap_px - true_px) < SIGMAS * np.hypot(found.u_gap_px, found.u_shift_px)
+
+
+@pytest.mark.parametrize("options", [{}, {"tilt_deg": (6.0, -4.0)}, {"radius_px": 0.0}, {"light": Light(slope_x=0.4)}])
+@pytest.mark.parametrize("blur_px", [0.7, 1.5, 3.0])
+def test_clean_edges_show_neither(options: dict, blur_px: float) -> None:
+    for number in range(POSITIONS):
+        found, _ = _measured(number, Camera(blur_px=blur_px, noise_grey=2.0), **options)
+        assert isinstance(found, GapMeasurement)
+        assert found.u_shift_px == 0.0
