@@ -8,7 +8,7 @@ from fingervision.diagnosis.distrusted_rows import distrusted_rows
 from fingervision.diagnosis.drawing_refit import BENT, DrawingRefit, estimated, tangent, with_moved
 from fingervision.diagnosis.explanation import Explanation, Problem
 from fingervision.diagnosis.measuring_chain import MeasuringChain, admissible
-from fingervision.diagnosis.noise import Noise, gate, white_noise
+from fingervision.diagnosis.noise import Noise, gate, white_noise, without_input
 from fingervision.diagnosis.noise_short import noise_of_short_runs
 from fingervision.diagnosis.noise_spectrum import noise_by_spectrum
 from fingervision.diagnosis.smooth_input import input_sigma, smoothed
@@ -21,8 +21,10 @@ from fingervision.domain.response import Response
 from fingervision.models.corrected import CorrectedModel
 
 HELD_SAMPLES = 15
-STAIRCASE = 0.1
-"""Share of an encoder step's variance that is left after smoothing."""
+STAIRCASE = 0.85
+"""Share of an encoder step's variance that smoothing leaves: errors within half a step hide any bend of a line."""
+STAYING = 0.2
+"""Leverage below which neighbours share so many samples that they share the error too."""
 DOUBTFUL = 2.0
 """Standard uncertainties beyond which a number of the drawing is doubtful."""
 SHORT = 100
@@ -47,8 +49,10 @@ class BenchData:
         Measured gap, then midline where there is one.
     input_error_mm : ndarray of float, shape (n,)
         What the input's remaining error does to the gap.
+    input_stays : ndarray of bool, shape (n,)
+        Where that error stays from sample to sample; elsewhere it is another one at each.
     input_samples : float
-        Samples over which that error is correlated.
+        Samples over which it stays.
     effects : dict
         Effects that the data can show.
     excluded : dict
@@ -66,6 +70,7 @@ class BenchData:
     chain: MeasuringChain
     stacked_mm: Array
     input_error_mm: Array
+    input_stays: Flags
     input_samples: float
     effects: dict[str, Effect]
     excluded: dict[str, str]
@@ -101,8 +106,12 @@ class BenchData:
             error > 0.3 * noises[0].total_mm
         ):
             error = np.zeros_like(error)
+        passing = np.where(self.input_stays, 0.0, error)
+        noises = (without_input(noises[0], passing), *noises[1:])
         drawing = self.refit.columns if self.refit.moved else None
-        whitener = Whitener(history, noises, np.concatenate(aside), error, self.input_samples, drawing)
+        whitener = Whitener(
+            history, noises, np.concatenate(aside), error - passing, self.input_samples, passing, drawing
+        )
         return Problem(self.chain, whitener.one(self.aim_mm), whitener, RunOffsets.of(whitener), self.effects)
 
     def _noises(
@@ -234,9 +243,10 @@ def prepare(table: MeasuredTable, model: CorrectedModel, without: frozenset[str]
     samples = 1.0 / float(np.median(leverage)) if np.median(leverage) > 0.0 else 1.0
     # A stage that stands between two encoder steps keeps its error: averaging does not help there.
     left = np.where(held, 1.0, leverage)
+    stays = left < STAYING
     if step > 0.0:
         # The staircase of an encoder is no white noise: a line averages it out less well than its leverage says.
-        left, samples = np.maximum(left, STAIRCASE), max(samples, HELD_SAMPLES)
+        left, samples, stays = np.maximum(left, STAIRCASE), max(samples, HELD_SAMPLES), held
     error = slope * sigma * np.sqrt(left)
     able, excluded = admissible(history, without, model.base)
     distrusted, reasons = distrusted_rows(table, model.base, float(zero))
@@ -245,7 +255,7 @@ def prepare(table: MeasuredTable, model: CorrectedModel, without: frozenset[str]
     if isinstance(model.base, PhysicalModel) and model.base.uncertain:
         refit = tangent(chain, model.base, {})
     return BenchData(
-        table, model, chain, stacked, error, max(samples, 1.0), able, excluded, distrusted, tuple(notes), refit
+        table, model, chain, stacked, error, stays, max(samples, 1.0), able, excluded, distrusted, tuple(notes), refit
     )
 
 

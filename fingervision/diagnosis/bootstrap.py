@@ -1,16 +1,22 @@
 """How much one more effect gains from noise alone: draws of the null, refitted as the data are."""
 
+from collections.abc import Mapping
+from dataclasses import replace
+
 import numpy as np
+from scipy.signal import lfilter
 
 from fingervision.diagnosis.explanation import Explanation, Problem, fit
 from fingervision.diagnosis.signatures import Signatures, tangents
 from fingervision.domain.effect import Array
 
 QUANTILE = 0.985
-DRAWS, LONG_DRAWS = 48, 24
+DRAWS, LONG_DRAWS, FEWEST = 40, 20, 10
+SURELY = 3.0
+"""Standard errors of the quantile beyond which no further draw would change the answer."""
 LONG = 6000
 """Samples above which fewer draws must do."""
-REFITTED = 4
+REFITTED = 2
 """Effects of each draw that are refitted: those whose signatures take the most of it."""
 GUMBEL = float(-np.log(-np.log(QUANTILE)) - np.euler_gamma) * float(np.sqrt(6.0)) / float(np.pi)
 """Standard deviations from the mean of a maximum's distribution (Gumbel 1958) to its quantile."""
@@ -31,38 +37,96 @@ def noise_doubt(problem: Problem) -> float:
     return float(np.sqrt(np.mean(parts)))
 
 
-def noise_alone(problem: Problem, base: Explanation, rng: np.random.Generator) -> Array:
-    """Draw a whitened measurement in which `base` is the whole truth; shape (m,)."""
-    offsets = problem.offsets
-    noise = np.where(problem.whitener.aside, 0.0, rng.standard_normal(problem.measured.size))
+def noise_alone(problem: Problem, base: Explanation, rng: np.random.Generator) -> tuple[Problem, Array]:
+    """Draw a measurement in which `base` is the whole truth.
+
+    Returns
+    -------
+    shaken : Problem
+        With a recorded input that holds other errors. They are in the input that every effect acts on, so that some
+        effects seem to take them out again: a delay of part of a sample averages two of them, a stop cuts the largest.
+    target : ndarray of float, shape (m,)
+        Whitened measurement.
+    """
+    offsets, whitener = problem.offsets, problem.whitener
+    truth = problem.whitened(base.values)
     spread = np.repeat(base.sigma_mm, offsets.runs) * rng.standard_normal(offsets.channels * offsets.runs)
-    return np.asarray(problem.whitened(base.values) + noise + offsets.design[:, : spread.size] @ spread)
+    truth = truth + offsets.design[:, : spread.size] @ spread
+    if not whitener.passing_mm.any():
+        noise = np.where(whitener.aside, 0.0, rng.standard_normal(problem.measured.size))
+        return problem, np.asarray(truth + noise)
+    history, samples = problem.chain.history, problem.chain.history.input_mm.size
+    reach = 1e-3 * history.input_span_mm
+    ends = [replace(history, input_mm=history.input_mm + way) for way in (-reach, reach)]
+    low, high = (replace(problem.chain, history=end).stacked(base.values)[:samples] for end in ends)
+    slope = np.maximum(np.abs(high - low) / (2.0 * reach), 1e-9)
+    error = whitener.passing_mm / slope * rng.standard_normal(samples)
+    shaken = replace(history, input_mm=history.input_mm + error)
+    noise = whitener.one(_of_pictures(problem, rng))
+    return replace(problem, chain=replace(problem.chain, history=shaken)), np.asarray(truth + noise)
 
 
-def gain_of_noise(problem: Problem, atoms: Signatures, base: Explanation, rng: np.random.Generator) -> float:
-    """Quantile of the score that the best of all further effects gains where there is none.
+def _of_pictures(problem: Problem, rng: np.random.Generator) -> Array:
+    """Draw what is not the input's passing error, channels stacked; shape (m,), in mm."""
+    whitener, history = problem.whitener, problem.chain.history
+    stays = float(np.exp(-2.0 / max(whitener.input_samples, 0.04)))
+    out = []
+    for channel, noise in enumerate(whitener.noises):
+        for run in history.runs:
+            count = run.stop - run.start
+            part = noise.white_mm * rng.standard_normal(count)
+            part = part + noise.correlated_mm * _autoregression(noise.correlation, count, rng)
+            if channel == 0:
+                part = part + whitener.input_mm[run] * _autoregression(stays, count, rng)
+            out.append(part)
+    return np.concatenate(out)
+
+
+def _autoregression(phi: float, count: int, rng: np.random.Generator) -> Array:
+    """First-order autoregression of unit variance; shape (count,)."""
+    start = phi * rng.standard_normal(1)
+    shocks = np.sqrt(1.0 - phi**2) * rng.standard_normal(count)
+    return np.asarray(lfilter([1.0], [1.0, -phi], shocks, zi=start)[0], dtype=np.float64)
+
+
+def exceeds_noise(
+    gained: float,
+    problem: Problem,
+    atoms: Signatures,
+    base: Explanation,
+    suspects: list[dict[str, Mapping[str, float]]],
+    rng: np.random.Generator,
+) -> bool:
+    """Whether a gain is above the quantile of what the best of all further effects gains where there is none.
 
     Linear signatures on their grid of shapes take less from noise than the refitted effects do: a period finds its
     best place between two of the grid, an end stop the samples that it suits. So each draw is fitted with `base`,
-    extended by the likeliest effects, and refitted, as the measurement was.
+    extended by the likeliest effects, and refitted, as the measurement was. `suspects` are what the measurement itself
+    speaks for, with parameters: they are tried on every draw.
     """
     owner = np.array(atoms.names)
-    gains = []
+    gains: list[float] = []
+    quantile = 0.0
     doubt = noise_doubt(problem)
     for _ in range(DRAWS if problem.chain.history.input_mm.size <= LONG else LONG_DRAWS):
-        target = noise_alone(problem, base, rng)
-        alone = fit(problem, base.names, base.values, target=target, iterations=5)
+        shaken, target = noise_alone(problem, base, rng)
+        alone = fit(shaken, base.names, base.values, target=target, iterations=5)
         along = tangents(problem, alone) if alone.names else None
         gain, coefficient = atoms.gains(alone.residual, problem.offsets, problem.offsets.metric(alone.sigma_mm), along)
         gain[np.isin(owner, base.names)] = 0.0
-        best = alone.score
+        starts = [{**alone.values, **suspect} for suspect in suspects]
         for _ in range(REFITTED):
             top = int(np.argmax(gain))
-            if gain[top] <= 0.0:
-                break
-            name = atoms.names[top]
-            start = {**alone.values, name: atoms.begin(top, float(coefficient[top]))}
-            best = min(best, fit(problem, (*base.names, name), start, target=target, iterations=6).score)
-            gain[owner == name] = 0.0
-        gains.append((alone.score - best) * float(np.exp(doubt * rng.standard_normal())))
-    return float(np.mean(gains) + GUMBEL * np.std(gains))
+            if gain[top] > 0.0:
+                name = atoms.names[top]
+                starts.append({**alone.values, name: atoms.begin(top, float(coefficient[top]))})
+                gain[owner == name] = 0.0
+        scores = [fit(shaken, tuple(start), start, target=target, iterations=6).score for start in starts]
+        gains.append((alone.score - min([alone.score, *scores])) * float(np.exp(doubt * rng.standard_normal())))
+        spread = float(np.std(gains))
+        quantile = float(np.mean(gains)) + GUMBEL * spread
+        # The quantile's own error is that of a mean and of GUMBEL standard deviations together.
+        error = spread * float(np.sqrt((1.0 + 0.5 * GUMBEL**2) / len(gains)))
+        if len(gains) >= FEWEST and abs(gained - quantile) > SURELY * error:
+            break
+    return gained > quantile

@@ -79,7 +79,7 @@ class Problem:
         """List the parameters of some effects with the bounds that the data leave."""
         found: list[tuple[str, Parameter]] = []
         for name in names:
-            searched = self.effects[name].search(self.chain.history)
+            searched = self.effects[name].search(self.whitener.history)
             found += [(name, parameter) for parameter in searched if not isinstance(parameter, str)]
         return found
 

@@ -86,6 +86,9 @@ def _joined(bench: BenchData, problem: Problem, inputs: Array) -> Problem:
         aside,
         np.concatenate([problem.whitener.input_mm, np.full(inputs.size, extra)]),
         problem.whitener.input_samples,
+        np.concatenate(
+            [problem.whitener.passing_mm, np.full(inputs.size, float(np.median(problem.whitener.passing_mm)))]
+        ),
         tangent(chain, drawn, bench.refit.moved).columns
         if bench.refit.moved and isinstance(drawn, PhysicalModel)
         else None,

@@ -6,6 +6,9 @@ import numpy as np
 
 from fingervision.domain.effect import Array, Flags
 
+LEAST_SHARE = 0.1
+"""Of a residual's variance that is the picture's own at least."""
+
 
 @dataclass(frozen=True, slots=True)
 class Noise:
@@ -68,3 +71,18 @@ def white_noise(residual: Array, aside: Flags, floor_mm: float, degrees: int) ->
     kept = residual[~aside]
     spread = float(np.sqrt(np.sum((kept - np.median(kept)) ** 2) / max(1, kept.size - 1 - degrees)))
     return Noise(max(spread, floor_mm, 1e-9), 0.0, 0.0)
+
+
+def without_input(noise: Noise, input_mm: Array) -> Noise:
+    """Take out what the input's passing errors added, which the residual held too.
+
+    Parameters
+    ----------
+    noise : Noise
+        As it was estimated from the residual.
+    input_mm : ndarray of float, shape (n,)
+        What the error of each recorded input does to the gap; it counts beside the noise from now on.
+    """
+    share = 1.0 - float(np.mean(input_mm**2)) / noise.total_mm**2
+    scale = float(np.sqrt(max(share, LEAST_SHARE)))
+    return Noise(scale * noise.white_mm, scale * noise.correlated_mm, noise.correlation)

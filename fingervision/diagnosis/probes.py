@@ -7,6 +7,9 @@ import numpy as np
 from fingervision.diagnosis.whitening import Whitener
 from fingervision.domain.effect import Array, History
 
+SPAN = 5
+"""Samples over which a speed is taken."""
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Probes:
@@ -15,6 +18,17 @@ class Probes:
     words: tuple[str, ...]
     columns: Array
     rms: Array
+
+
+def _speed(input_mm: Array, time_s: Array) -> Array:
+    """Slope over `SPAN` samples: neighbours' differences hold the input's errors, which the residual holds too."""
+    if input_mm.size <= SPAN:
+        return np.full(input_mm.size, float(np.ptp(input_mm)) / max(float(np.ptp(time_s)), 1e-9))
+    ahead = np.minimum(np.arange(input_mm.size) + SPAN // 2 + 1, input_mm.size - 1)
+    behind = np.maximum(np.arange(input_mm.size) - SPAN // 2 - 1, 0)
+    around = np.stack([input_mm[ahead], input_mm[np.maximum(ahead - 1, 0)]]).mean(axis=0)
+    back = np.stack([input_mm[behind], input_mm[np.minimum(behind + 1, input_mm.size - 1)]]).mean(axis=0)
+    return np.asarray((around - back) / (time_s[ahead] - time_s[behind]), dtype=np.float64)
 
 
 def probes(history: History, whitener: Whitener, most: int) -> Probes:
@@ -57,7 +71,7 @@ def probes(history: History, whitener: Whitener, most: int) -> Probes:
             phase = 2.0 * np.pi * cycles * (t - begin) / length
             label = f"a wave over time with a period of {length / cycles:.3g} s"
             shapes += [(label, np.sin(phase)), (label, np.cos(phase))]
-        speed = np.concatenate([np.gradient(u[run], history.times[run]) for run in history.runs])
+        speed = np.concatenate([_speed(u[run], history.times[run]) for run in history.runs])
         sense = np.sign(np.where(np.abs(speed) > 0.1 * np.max(np.abs(speed)), speed, 0.0))
         shapes += [
             ("a difference between opening and closing", sense),

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fingervision.diagnosis.bootstrap import QUANTILE, gain_of_noise, noise_doubt
+from fingervision.diagnosis.bootstrap import QUANTILE, exceeds_noise, noise_doubt
 from fingervision.diagnosis.explanation import Explanation, Problem, fit
 from fingervision.diagnosis.probes import probes
 from fingervision.diagnosis.signatures import Signatures, signatures, tangents
@@ -27,8 +27,12 @@ richer one, such as a resonance for a delay that falls between two samples."""
 TRIPLE_SHARE = 0.15
 """A third effect needs evidence of its own: three effects bend to almost anything."""
 PAIRS_REFITTED = 60
-CLEARLY_NOT, CLEARLY = 0.6, 2.5
-"""Shares of the linear threshold outside which a gain needs no bootstrap to be judged."""
+SUSPECTS = 2
+"""Explanations of the measurement that are tried on every draw of noise as well."""
+CLEARLY = 2.5
+"""Times the linear threshold above which a gain needs no bootstrap to be judged."""
+REFIT_MARGIN = 0.2
+"""Share at most by which the threshold of linear signatures is raised for all that refitting finds between them."""
 STAIRCASE_SHARE = 0.5
 """What is smaller than half an encoder step's own error is not told from it: the staircase is no random noise."""
 SHORT = 100
@@ -70,7 +74,7 @@ def _null_maximum(problem: Problem, columns: Array, sigma: tuple[float, ...], rn
     # The noise itself is estimated, from as many samples as there are.
     doubt = np.exp(noise_doubt(problem) * rng.standard_normal(DRAWS))
     quantile = float(np.quantile(gains.max(axis=0) * doubt, QUANTILE))
-    return quantile * (1.0 + 3.0 * float(np.sqrt(2.0 / columns.shape[0]))) + 1.5
+    return quantile * (1.0 + min(REFIT_MARGIN, 3.0 * float(np.sqrt(2.0 / columns.shape[0])))) + 1.5
 
 
 def _singles(problem: Problem, atoms: Signatures, iterations: int) -> list[Explanation]:
@@ -143,11 +147,15 @@ def _added(problem: Problem, smaller: Explanation, larger: Explanation) -> float
     return float(np.linalg.norm(after - before) / max(1e-12, float(np.linalg.norm(after - bare))))
 
 
-def _choose(candidates: list[Explanation], samples: int, nothing: Explanation) -> Explanation:
-    """Choose by Schwarz's criterion, and the simpler form where the richer one gains no more than forms deviate."""
-    best = min(candidates, key=lambda explanation: explanation.bic(samples))
+def _choose(candidates: list[Explanation], samples: int) -> Explanation:
+    return min(candidates, key=lambda explanation: explanation.bic(samples))
+
+
+def _simplest(singles: list[Explanation], samples: int, nothing: Explanation) -> Explanation:
+    """Choose one effect, the simpler form where the richer one gains no more than forms deviate."""
+    best = _choose(singles, samples)
     within = FORM_SHARE**2 * (nothing.score - best.score)
-    simpler = [e for e in candidates if e.free < best.free and e.score - best.score < within]
+    simpler = [e for e in singles if e.free < best.free and e.score - best.score < within]
     return min(simpler, key=lambda explanation: explanation.score, default=best)
 
 
@@ -189,22 +197,26 @@ def search(
     best, peers = nothing, [nothing]
     pairs = []
 
-    def exceeds_noise(gained: float, base: Explanation) -> bool:
-        if not CLEARLY_NOT * threshold < gained < CLEARLY * threshold:
+    def is_evidence(base: Explanation, found: list[Explanation]) -> bool:
+        gained = base.score - found[0].score if found else 0.0
+        if gained <= threshold or gained > CLEARLY * threshold:
             return gained > threshold
-        return gained > gain_of_noise(problem, atoms, base, rng)
+        suspects = [
+            {name: e.values[name] for name in e.names if name not in base.names}
+            for e in found[:SUSPECTS]
+            if set(base.names) <= set(e.names)
+        ]
+        return exceeds_noise(gained, problem, atoms, base, suspects, rng)
 
-    if singles and (exceeds_noise(nothing.score - singles[0].score, nothing) or forced):
-        best, peers = _choose(singles[:6], samples, nothing), singles
+    if singles and (is_evidence(nothing, singles) or forced):
+        best, peers = _simplest(singles[:6], samples, nothing), singles
         bases = singles[:14]
         pairs = _extended(problem, atoms, bases, PAIRS_REFITTED, lambda share: progress(0.3 + 0.4 * share))
-        gained = best.score - pairs[0].score if pairs else 0.0
-        if pairs and _added(problem, best, pairs[0]) > SMALL_SHARE and exceeds_noise(gained, best):
-            best, peers = _choose(pairs[:6], samples, nothing), pairs
+        if pairs and _added(problem, best, pairs[0]) > SMALL_SHARE and is_evidence(best, pairs):
+            best, peers = _choose(pairs[:6], samples), pairs
             triples = _extended(problem, atoms, pairs[:3], 24, lambda share: progress(0.7 + 0.1 * share))
-            gained = best.score - triples[0].score if triples else 0.0
-            if triples and _added(problem, best, triples[0]) > TRIPLE_SHARE and exceeds_noise(gained, best):
-                best, peers = _choose(triples[:6], samples, nothing), triples
+            if triples and _added(problem, best, triples[0]) > TRIPLE_SHARE and is_evidence(best, triples):
+                best, peers = _choose(triples[:6], samples), triples
     if forced:
         best = _insisted(problem, forced, [*singles, *pairs], singles, samples)
     progress(0.82)
@@ -278,7 +290,7 @@ def _insisted(
     able = forced & set(problem.effects)
     holding = [explanation for explanation in found if able <= set(explanation.names)]
     if holding or not able:
-        return _choose(holding, samples, problem.nothing()) if able else problem.nothing()
+        return _choose(holding, samples) if able else problem.nothing()
     begin = {e.names[0]: e.values[e.names[0]] for e in singles if e.names[0] in able}
     return fit(problem, tuple(begin), begin, iterations=20)
 

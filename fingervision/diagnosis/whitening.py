@@ -60,9 +60,11 @@ class Whitener:
     aside : ndarray of bool, shape (channels * n,)
         Outliers: they count as not measured.
     input_mm : ndarray of float, shape (n,)
-        Standard deviation that the input's remaining error gives the gap; 0 where it is known.
+        Standard deviation that an error of the input which stays gives the gap; 0 where there is none.
     input_samples : float
-        Samples over which that error is correlated.
+        Samples over which it stays.
+    passing_mm : ndarray of float, shape (n,)
+        The same of errors that are another at each sample.
     drawing : ndarray of float, shape (channels * n, p), or None
         What one standard uncertainty of each uncertain number of the gripper's drawing does to the prediction.
     """
@@ -72,6 +74,7 @@ class Whitener:
     aside: Flags
     input_mm: Array
     input_samples: float
+    passing_mm: Array
     drawing: Array | None = None
 
     def columns(self, columns: Array) -> tuple[Array, float]:
@@ -82,7 +85,7 @@ class Whitener:
         time = np.arange(n, dtype=np.float64) if clock is None else clock / step
         out, total = np.empty_like(columns), 0.0
         for channel, noise in enumerate(self.noises):
-            white = np.full(n, noise.white_mm**2)
+            white = noise.white_mm**2 + (self.passing_mm**2 if channel == 0 else np.zeros(n))
             part = slice(channel * n, (channel + 1) * n)
             white[self.aside[part]] = -1.0
             lag1 = -np.log(max(noise.correlation, 1e-6))
