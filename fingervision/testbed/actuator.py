@@ -76,6 +76,10 @@ class Actuator(Protocol):
         """Go to the reference and make it position 0."""
         ...
 
+    def check(self, from_mm: float, to_mm: float, speed_mm_s: float) -> None:
+        """Raise the sentence with which `move` would refuse to go from one position to another."""
+        ...
+
     def move(self, to_mm: float, speed_mm_s: float) -> None:
         """Begin to move to a position at a positive speed."""
         ...

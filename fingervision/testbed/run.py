@@ -7,9 +7,11 @@ from pathlib import Path
 from fingervision.domain.recipe import Recipe
 from fingervision.storage.samples_csv import SampleRow
 from fingervision.storage.toml_section import Section
+from fingervision.testbed import by_hand
 from fingervision.testbed.bed import Bed
 from fingervision.testbed.controls import Controls
 from fingervision.testbed.hidden import NOTHING, Hidden
+from fingervision.testbed.moves_check import check_moves
 from fingervision.testbed.plan import Plan, plan
 from fingervision.testbed.run_folder import BedRunFolder
 from fingervision.testbed.runner import Counts, Progress, Runner, Say
@@ -73,7 +75,10 @@ def run_recipe(
     """
     sight = Sight(bed)
     sight.position.read()
-    planned = plan(recipe, bed.limits, bed.model, sight.position.newest, sight.rate_hz)
+    # A real stage is sent to its reference first: where it stands before, nobody knows.
+    at_mm = sight.position.newest if bed.replays else 0.0
+    planned = plan(recipe, bed.limits, bed.model, at_mm, sight.rate_hz)
+    check_moves(planned, bed, at_mm)
     on_plan(planned)
     folder = BedRunFolder(out, recipe, bed, hidden, before)
     try:
@@ -85,6 +90,8 @@ def run_recipe(
         )
         if before:
             runner.follow(before[-1])
+        if not bed.replays:
+            say(f"homed: {by_hand.home(bed):.3f} mm")
         counts = runner.execute()
         folder.finish(runner.found())
     except BaseException as error:

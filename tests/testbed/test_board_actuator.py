@@ -280,3 +280,18 @@ def test_one_board_serves_both_parts_and_both_let_go(bed: Bed) -> None:
     bed.force_sensor.close()
     bed.actuator.home()  # the board is still there
     assert stands(bed) == 0.0
+
+
+def test_a_recipe_that_the_steps_cannot_do_is_refused_before_anything_moves(
+    bed_toml: Path, controller: MotorController, tmp_path: Path
+) -> None:
+    configuration = bed_toml.read_text(encoding="utf-8")
+    bed_toml.write_text(configuration + '[camera]\nkind = "simulated"\n[gripper]\n[scale]\npx_per_mm = 34.0\n')
+    recipe = tmp_path / "recipe.toml"
+    recipe.write_text('schema = 1\nbelow_force_n = 2.0\n[[step]]\nkind = "move"\nto_mm = 0.7\nspeed_mm_s = 50.0\n')
+    done = CliRunner().invoke(cli, ["bed", "run", str(recipe), "--bed", str(bed_toml), "--out", str(tmp_path / "run")])
+    assert str(done.exception).startswith(
+        f"to_mm in line 5 of {recipe} cannot be done: A step must lead to 0.7 mm, but "
+    )
+    assert controller.codes == []
+    assert not (tmp_path / "run").exists()

@@ -12,6 +12,7 @@ from fingervision.storage.steps_toml import read_steps
 from fingervision.storage.toml_section import Section
 from fingervision.testbed import published_stage
 from fingervision.testbed.actuator import Alarm, StageLimits
+from fingervision.testbed.asked_move import check_move, check_speed
 from fingervision.testbed.board import wire
 from fingervision.testbed.board.board import Board
 from fingervision.testbed.board.handshake import Handshake
@@ -161,23 +162,21 @@ class BoardActuator:
             "neither: add one."
         )
 
+    def check(self, from_mm: float, to_mm: float, speed_mm_s: float) -> None:
+        """Refuse what is beyond the limits, and where no steps lead."""
+        check_move(self.limits, to_mm, speed_mm_s)
+        route(self._data.steps, from_mm, to_mm, speed_mm_s, self.limits.speed_mm_s)
+
     def move(self, to_mm: float, speed_mm_s: float) -> None:
         """Begin to move, by the steps that lead there."""
-        if not self.limits.lower_mm <= to_mm <= self.limits.upper_mm:
-            raise FingervisionError(
-                f"The target must lie between {self.limits.lower_mm:g} and {self.limits.upper_mm:g} mm, but is "
-                f"{to_mm:g} mm: nothing was moved."
-            )
-        self._within_speed(speed_mm_s)
-        if speed_mm_s == 0.0:
-            raise FingervisionError("The speed must be positive, but is 0 mm/s: nothing was moved.")
+        check_move(self.limits, to_mm, speed_mm_s)
         self._ready()
         at_mm = self._at_mm() if self._known else None
         self._begin_steps(route(self._data.steps, at_mm, to_mm, speed_mm_s, self.limits.speed_mm_s))
 
     def jog(self, speed_mm_s: float) -> None:
         """Begin to move by a repeated relative step, until stopped or at a limit."""
-        self._within_speed(abs(speed_mm_s))
+        check_speed(self.limits, abs(speed_mm_s))
         self._ready()
         if speed_mm_s == 0.0:
             return
@@ -237,13 +236,6 @@ class BoardActuator:
         raise FingervisionError(
             "The motor controller must have no alarm, but its alarm line is active: clear it there."
         )
-
-    def _within_speed(self, speed_mm_s: float) -> None:
-        if not 0.0 <= speed_mm_s <= self.limits.speed_mm_s:
-            raise FingervisionError(
-                f"The speed must be at most {self.limits.speed_mm_s:g} mm/s, but is {speed_mm_s:g} mm/s: "
-                "nothing was moved."
-            )
 
     def _check_known(self, number: int) -> None:
         if not self._known and self._data.steps[number].coordinates is Coordinates.RELATIVE:

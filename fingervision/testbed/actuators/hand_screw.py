@@ -7,6 +7,7 @@ from typing import TextIO
 from fingervision.domain.errors import FingervisionError
 from fingervision.storage.toml_section import Section
 from fingervision.testbed.actuator import Alarm, StageLimits
+from fingervision.testbed.asked_move import check_move
 from fingervision.testbed.clock import Clock
 from fingervision.testbed.commanded_path import CommandedPath
 from fingervision.testbed.reading import Reading
@@ -50,18 +51,13 @@ class HandScrew:
         """Ask for the screw to be set to its zero."""
         self._ask_for("Turn the screw to where the gripper rests, set its reading to zero, and type that reading", 0.0)
 
+    def check(self, from_mm: float, to_mm: float, speed_mm_s: float) -> None:
+        """Refuse what is beyond the limits."""
+        check_move(self.limits, to_mm, speed_mm_s)
+
     def move(self, to_mm: float, speed_mm_s: float) -> None:
         """Ask for the screw to be turned; a hand's speed is its own."""
-        if not self.limits.lower_mm <= to_mm <= self.limits.upper_mm:
-            raise FingervisionError(
-                f"The target must lie between {self.limits.lower_mm:g} and {self.limits.upper_mm:g} mm, but is "
-                f"{to_mm:g} mm: nothing was moved."
-            )
-        if not 0.0 < speed_mm_s <= self.limits.speed_mm_s:
-            raise FingervisionError(
-                f"The speed must be positive and at most {self.limits.speed_mm_s:g} mm/s, but is {speed_mm_s:g} mm/s: "
-                "nothing was moved."
-            )
+        check_move(self.limits, to_mm, speed_mm_s)
         self._ask_for(f"Turn the screw to {to_mm:.3f} mm and type its reading in mm", to_mm)
 
     def jog(self, speed_mm_s: float) -> None:

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from fingervision.domain.errors import FingervisionError
 from fingervision.storage.toml_section import Section
 from fingervision.testbed.actuator import Alarm, StageLimits
+from fingervision.testbed.asked_move import check_move, check_speed
 from fingervision.testbed.clock import Clock
 from fingervision.testbed.reading import Reading
 from fingervision.testbed.simulation.gripper import Motion
@@ -79,22 +80,19 @@ class SimulatedActuator:
         self._ready()
         self._stage.home(self._clock.now_s(), HOMING_MM_S)
 
+    def check(self, from_mm: float, to_mm: float, speed_mm_s: float) -> None:
+        """Refuse what is beyond the limits."""
+        check_move(self.limits, to_mm, speed_mm_s)
+
     def move(self, to_mm: float, speed_mm_s: float) -> None:
         """Begin to move."""
-        if not self.limits.lower_mm <= to_mm <= self.limits.upper_mm:
-            raise FingervisionError(
-                f"The target must lie between {self.limits.lower_mm:g} and {self.limits.upper_mm:g} mm, but is "
-                f"{to_mm:g} mm: nothing was moved."
-            )
-        self._within_speed(speed_mm_s)
-        if speed_mm_s == 0.0:
-            raise FingervisionError("The speed must be positive, but is 0 mm/s: nothing was moved.")
+        check_move(self.limits, to_mm, speed_mm_s)
         self._ready()
         self._stage.go(self._clock.now_s(), to_mm, speed_mm_s)
 
     def jog(self, speed_mm_s: float) -> None:
         """Begin to move until stopped or at a limit."""
-        self._within_speed(abs(speed_mm_s))
+        check_speed(self.limits, abs(speed_mm_s))
         self._ready()
         if speed_mm_s != 0.0:
             end_mm = self.limits.upper_mm if speed_mm_s > 0.0 else self.limits.lower_mm
@@ -161,13 +159,6 @@ class SimulatedActuator:
             )
         if self.busy:
             raise FingervisionError("The actuator must stand before it moves again, but is busy: stop it first.")
-
-    def _within_speed(self, speed_mm_s: float) -> None:
-        if not 0.0 <= speed_mm_s <= self.limits.speed_mm_s:
-            raise FingervisionError(
-                f"The speed must be at most {self.limits.speed_mm_s:g} mm/s, but is {speed_mm_s:g} mm/s: "
-                "nothing was moved."
-            )
 
 
 def build(section: Section, workshop: Workshop) -> SimulatedActuator:

@@ -63,6 +63,10 @@ class Followed:
         self._actuator.home()
         self._homing = True
 
+    def check(self, from_mm: float, to_mm: float, speed_mm_s: float) -> None:
+        """Refuse a move that cannot be done."""
+        self._actuator.check(from_mm, to_mm, speed_mm_s)
+
     def move(self, to_mm: float, speed_mm_s: float) -> None:
         """Begin to move."""
         self._actuator.move(to_mm, speed_mm_s)
