@@ -5,10 +5,10 @@ from typing import TYPE_CHECKING
 
 import click
 
+from fingervision.cli._where_to_measure import region_of, where_to_measure
 from fingervision.domain.errors import UsageError
 
 if TYPE_CHECKING:
-    from fingervision.domain.region import Region
     from fingervision.live.choices import Choices
 
 EXAMPLES = """
@@ -51,17 +51,7 @@ USUAL_OUT, USUAL_PORT = Path("live"), 8025
 @click.option("--gain", type=float, help="Amplification, in the camera's own units.")
 @click.option("--focus", type=float, help="Focus, in the camera's own units.")
 @click.option("--white-balance-k", type=float, help="Colour temperature.")
-@click.option("--calibration", type=click.Path(path_type=Path), help="calibration.json: the scale, with uncertainty.")
-@click.option("--px-per-mm", type=float, help="The scale alone.")
-@click.option("--below-tip-mm", type=float, default=0.3, show_default=True, help="Height of measuring below each tip.")
-@click.option(
-    "--tips",
-    type=click.Choice(["auto", "up", "down", "left", "right"]),
-    default="auto",
-    show_default=True,
-    help="Where the fingers point in the picture.",
-)
-@click.option("--roi", metavar="X,Y,W,H", help="Region of interest: first column, first row, width, height in pixels.")
+@where_to_measure
 def command(
     source: str | None,
     list_cameras: bool,
@@ -140,18 +130,8 @@ def _choices(
         scale_file=calibration,
         below_tip_mm=below_tip_mm,
         direction=None if tips == "auto" else Direction(tips),
-        region=None if roi is None else _region(roi),
+        region=region_of(roi),
     )
-
-
-def _region(words: str) -> "Region":
-    from fingervision.domain.region import Region
-
-    try:
-        x_px, y_px, width_px, height_px = (int(part) for part in words.split(","))
-    except ValueError:
-        raise UsageError(f"--roi must be four whole numbers X,Y,W,H in pixels, but is '{words}'.") from None
-    return Region(x_px, y_px, width_px, height_px)
 
 
 def _size(words: str) -> tuple[int, int]:

@@ -5,10 +5,10 @@ from typing import TYPE_CHECKING
 
 import click
 
+from fingervision.cli._where_to_measure import region_of, where_to_measure
 from fingervision.domain.errors import UsageError
 
 if TYPE_CHECKING:
-    from fingervision.domain.region import Region
     from fingervision.measuring.measure import Measured, Progress
     from fingervision.measuring.scale import Scale
 
@@ -38,25 +38,7 @@ Exit codes: 0 done; 1 could not, or no frame gave a number; 2 wrong usage;
 
 @click.command(epilog=EXAMPLES)
 @click.argument("recording")
-@click.option(
-    "--calibration", type=click.Path(path_type=Path), help="calibration.json: the scale with its uncertainty."
-)
-@click.option("--px-per-mm", type=float, help="The scale alone; the uncertainty then holds the random part alone.")
-@click.option(
-    "--below-tip-mm",
-    type=float,
-    default=0.3,
-    show_default=True,
-    help="How far below each finger's tip the gap is measured.",
-)
-@click.option(
-    "--tips",
-    type=click.Choice(["auto", "up", "down", "left", "right"]),
-    default="auto",
-    show_default=True,
-    help="Where the fingers point in the picture.",
-)
-@click.option("--roi", metavar="X,Y,W,H", help="Region of interest: first column, first row, width, height in pixels.")
+@where_to_measure
 @click.option("--rate-hz", type=float, help="Images in a second, where they have no times of their own.")
 @click.option("--drive", type=click.Path(path_type=Path), help="drive.csv: time_s,input_mm[,run][,force_n].")
 @click.option(
@@ -104,7 +86,7 @@ def command(
         scale_file=calibration,
         below_tip_mm=below_tip_mm,
         direction=None if tips == "auto" else Direction(tips),
-        region=None if roi is None else _region(roi),
+        region=region_of(roi),
         drive=None if drive is None else read_drive(drive),
         drive_offset_s=drive_offset_s,
         overlay=overlay,
@@ -134,16 +116,6 @@ def _scale(calibration: Path | None, px_per_mm: float | None) -> "Scale":
         return BareScale(px_per_mm)
     except ValueError as error:
         raise UsageError(f"--px-per-mm must be positive, but is {px_per_mm:g}.") from error
-
-
-def _region(words: str) -> "Region":
-    from fingervision.domain.region import Region
-
-    try:
-        x_px, y_px, width_px, height_px = (int(part) for part in words.split(","))
-    except ValueError:
-        raise UsageError(f"--roi must be four whole numbers X,Y,W,H in pixels, but is '{words}'.") from None
-    return Region(x_px, y_px, width_px, height_px)
 
 
 def _default_out(recording: str) -> Path:

@@ -280,10 +280,9 @@ def test_ctrl_c_keeps_what_was_measured(tmp_path: Path) -> None:
     out = tmp_path / "out"
     with subprocess.Popen(subprocess_of(path, *SCALE, "--out", out), stderr=subprocess.PIPE, text=True) as process:
         patience_s = 60.0
-        while not (out / "gaps.csv").exists() and patience_s > 0.0:
+        while not ((out / "gaps.csv").exists() and rows(out / "gaps.csv")) and patience_s > 0.0:
             time.sleep(0.02)
             patience_s -= 0.02
-        time.sleep(0.3)
         process.send_signal(signal.SIGINT)
         _, err = process.communicate()
     assert process.returncode == 1
