@@ -145,8 +145,8 @@ class Section:
             self.refuse(key, f"must be a text, but is {value!r}.")
         if of is not None and value not in (known := list(of)):
             near = difflib.get_close_matches(value, known, n=1)
-            hint = f"did you mean {near[0]}?" if near else ""
-            self.refuse(key, f"must be one of {', '.join(known)}, but is {value!r}. {hint}".rstrip())
+            hint = f": did you mean {near[0]}?" if near else "."
+            self.refuse(key, f"must be one of {', '.join(known)}, but is {value!r}{hint}")
         return value
 
     def flag(self, key: str, default: bool = False) -> bool:

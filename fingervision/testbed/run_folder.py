@@ -189,6 +189,10 @@ def _earlier(path: Path, recipe: Recipe[Section], digest: str) -> dict[str, Any]
         raise FingervisionError(
             f"The run in {path} is finished already: name another folder with --out, or remove that one."
         )
+    if not read_samples(path / SAMPLES):
+        # Nothing was recorded: there is nothing to go on with, and nothing to lose.
+        (path / EVENTS).unlink(missing_ok=True)
+        return None
     if about.get("recipe") != recipe.text:
         raise FingervisionError(
             f"The run in {path} broke off, but was of another recipe ({about.get('name')}): go on with that one, or "

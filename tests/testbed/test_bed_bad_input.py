@@ -1,0 +1,215 @@
+"""What cannot be run is said in a sentence, and nothing moves."""
+
+import json
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+from typing import NamedTuple
+
+import pytest
+
+from fingervision.domain.errors import FingervisionError
+from fingervision.storage.folder_lock import FolderLock
+from fingervision.storage.recipe_toml import read_recipe
+from fingervision.testbed.actuator import Alarm
+from fingervision.testbed.bed import Bed
+from fingervision.testbed.hidden import Hidden
+from fingervision.testbed.put_together import open_bed
+from fingervision.testbed.run import run_recipe
+from tests.testbed.simulated_beds import recipe_at, run, steps
+
+MOVE = 'kind = "move"\nto_mm = 0.3\nspeed_mm_s = 1.0'
+BED = """schema = 1
+[actuator]
+kind = "simulated"
+[camera]
+kind = "simulated"
+{camera}
+[gripper]
+[scale]
+px_per_mm = 34.0
+[limits]
+lower_mm = -0.4
+upper_mm = 1.4
+gap_mm = {gap_mm}
+"""
+
+
+@pytest.mark.parametrize(
+    ("step", "sentence"),
+    [
+        (
+            'kind = "triangle"\nfrom_mm = -0.3\nto_mm = 1.9\nspeed_mm_s = 0.5',
+            "to_mm in line 6 of {path} leads beyond the bed's limit of position, 1.45 mm: it needs 1.9, which is "
+            "0.45 mm too much. Nothing was moved.",
+        ),
+        (
+            'kind = "move"\nto_mm = -0.5\nspeed_mm_s = 0.5',
+            "to_mm in line 5 of {path} leads below the bed's limit of position, -0.46 mm: it needs -0.5, which is "
+            "0.04 mm too little. Nothing was moved.",
+        ),
+        (
+            'kind = "move"\nto_mm = 0.9\nspeed_mm_s = 500',
+            "speed_mm_s in line 6 of {path} leads beyond the bed's limit of speed, 400 mm/s: it needs 500, which is "
+            "100 mm/s too much. Nothing was moved.",
+        ),
+        (
+            'kind = "sine"\nmean_mm = 1.2\namplitude_mm = 0.5\nfrequency_hz = 0.1',
+            "amplitude_mm in line 6 of {path} leads beyond the bed's limit of position, 1.45 mm: it needs 1.7, which "
+            "is 0.25 mm too much. Nothing was moved.",
+        ),
+        (
+            'kind = "close_until_contact"\nspeed_mm_s = 1.0\nbelow_force_n = 7.0',
+            "below_force_n in line 6 of {path} leads beyond the bed's limit of force, 5 N: it needs 7, which is 2 N "
+            "too much. Nothing was moved.",
+        ),
+        (
+            'kind = "moove"\nto_mm = 1',
+            "kind in line 4 of {path} must be one of {kinds}, but is 'moove': did you mean move?",
+        ),
+        (
+            'kind = "move"\ntoo_mm = 1.0\nspeed_mm_s = 1.0',
+            "too_mm in line 5 of {path} is not known: did you mean to_mm?",
+        ),
+        ('kind = "move"\nspeed_mm_s = 1.0', "[step] in line 3 of {path} must state to_mm, but does not: add it."),
+        (
+            'kind = "move"\nto_mm = "far"\nspeed_mm_s = 1.0',
+            "to_mm in line 5 of {path} must be a number, but is 'far'.",
+        ),
+        (
+            'kind = "move"\nto_mm = 0.2\nspeed_mm_s = 0',
+            "speed_mm_s in line 6 of {path} must be greater than 0, but is 0.",
+        ),
+        (
+            'kind = "hold"\nat_mm = 0.2\nseconds = 1\nframes = "many"',
+            "frames in line 7 of {path} must be \"continuous\" or a number for each point, but is 'many'.",
+        ),
+    ],
+)
+def test_a_recipe_that_cannot_be_run_is_said_with_its_line(tmp_path: Path, step: str, sentence: str) -> None:
+    kinds = "close_until_contact, hold, move, reference_slot, rezero, shift_picture, sine, staircase, triangle"
+    with pytest.raises(FingervisionError) as caught:
+        run(tmp_path, steps(step))
+    path = tmp_path / "recipe.toml"
+    assert str(caught.value) == sentence.format(path=path, kinds=f"{kinds}, turn_part_180")
+    assert not (tmp_path / "run").exists()
+
+
+def test_a_force_that_the_gripper_would_need_is_foreseen(tmp_path: Path) -> None:
+    text = 'schema = 1\nbelow_force_n = 1.0\n[[step]]\nkind = "move"\nto_mm = 1.2\nspeed_mm_s = 1.0\n'
+    with pytest.raises(FingervisionError, match=r"to_mm in line 5 .* limit of force at 1\.2 mm, 1 N: it needs 2\.49"):
+        run(tmp_path, text)
+
+
+def test_a_camera_that_sees_no_fingers_lets_nothing_move(tmp_path: Path) -> None:
+    config = tmp_path / "blind.toml"
+    config.write_text(BED.format(camera="off_centre_mm = 30.0", gap_mm=0.0))
+    bed = open_bed(str(config))
+    with pytest.raises(FingervisionError, match="The camera must see both fingers before anything moves, but does not"):
+        run_recipe(read_recipe(recipe_at(tmp_path, steps(MOVE))), bed, tmp_path / "run")
+    assert bed.actuator.readings()[-1].value == 0.0
+    # Nothing was recorded: with the view mended, the same folder will do.
+    config.write_text(BED.format(camera="", gap_mm=0.0))
+    assert run(tmp_path, steps(MOVE), bed_name=str(config)).resumed_after == 0
+
+
+def test_a_gap_below_the_limit_stops_the_motor(tmp_path: Path) -> None:
+    config = tmp_path / "narrow.toml"
+    # By the drawing the gap stays above; what is hidden is not foreseen.
+    config.write_text(BED.format(camera="", gap_mm=2.0))
+    text = steps('kind = "move"\nto_mm = -0.25\nspeed_mm_s = 0.5')
+    hidden = Hidden({"rest_gap_error": {"offset_mm": -0.5}})
+    with pytest.raises(FingervisionError, match=r"The gap must stay above 2 mm, but is 1\.9\d+ mm at .*was stopped"):
+        run(tmp_path, text, hidden, str(config))
+
+
+def test_an_alarm_stops_the_run_and_is_said(tmp_path: Path) -> None:
+    class Failing(NamedTuple):
+        bed: Bed
+
+        def say_when(self, done: float, total: float) -> None:
+            self.bed.actuator.raise_alarm(Alarm("E7", "overload"))  # type: ignore[attr-defined]
+
+    bed = open_bed("simulated")
+    recipe = read_recipe(recipe_at(tmp_path))
+    with pytest.raises(FingervisionError, match=r"The actuator .* alarm.* E7 \(overload\)"):
+        run_recipe(recipe, bed, tmp_path / "run", on_progress=Failing(bed).say_when)
+    assert not bed.actuator.busy
+    assert json.loads((tmp_path / "run" / "run.json").read_text())["complete"] is False
+
+
+def test_a_folder_of_something_else_is_left_alone(tmp_path: Path) -> None:
+    (tmp_path / "run").mkdir()
+    (tmp_path / "run" / "thesis.tex").write_text("mine")
+    with pytest.raises(FingervisionError, match=r"must be a new or empty folder, but .* holds thesis\.tex"):
+        run(tmp_path, steps(MOVE))
+    assert (tmp_path / "run" / "thesis.tex").read_text() == "mine"
+
+
+def test_a_finished_run_is_left_alone(tmp_path: Path) -> None:
+    run(tmp_path, steps(MOVE))
+    table = (tmp_path / "run" / "samples.csv").read_bytes()
+    with pytest.raises(FingervisionError, match=r"is finished already: name another folder"):
+        run(tmp_path, steps(MOVE))
+    assert (tmp_path / "run" / "samples.csv").read_bytes() == table
+
+
+def test_two_programs_on_one_folder(tmp_path: Path) -> None:
+    (tmp_path / "run").mkdir()
+    lock = FolderLock(tmp_path / "run")
+    with pytest.raises(FingervisionError, match="is in use by another run: wait for its end"):
+        run(tmp_path, steps(MOVE))
+    lock.release()
+    run(tmp_path, steps(MOVE))
+
+
+def test_a_full_disk_is_seen_before_anything_moves(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(shutil, "disk_usage", lambda path: type("Usage", (), {"free": 1000})())
+    with pytest.raises(
+        FingervisionError, match=r"needs up to \d+ MB, but .* has 0 MB free: make room.*Nothing was moved"
+    ):
+        run(tmp_path, steps(MOVE))
+
+
+def test_a_disk_that_fills_up_ends_the_run_in_a_sentence(tmp_path: Path) -> None:
+    recipe = recipe_at(tmp_path)
+    program = (
+        "import resource, sys; resource.setrlimit(resource.RLIMIT_FSIZE, (300_000, 300_000));"
+        "import signal; signal.signal(signal.SIGXFSZ, signal.SIG_IGN);"
+        "from fingervision.cli import main; sys.argv = ['fv', 'bed', 'run', sys.argv[1], '--out', sys.argv[2]]; main()"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", program, str(recipe), str(tmp_path / "run")], capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 1
+    assert "could not be written any further" in done.stderr
+    assert "Traceback" not in done.stderr
+
+
+@pytest.mark.parametrize(
+    ("text", "sentence"),
+    [
+        ("schema = 1\n", "must have an [actuator], but has none: add it with its kind."),
+        ('schema = 1\n[actuator]\nkind = "simulated"\nspeed = 1\n', "speed in line 4 of {path} is not known"),
+        ("schema = 9\n", "schema in line 1 of {path} must be at most 1, but is 9: use a newer fingervision."),
+        ("schema = \n", "{path} must be TOML, but is not"),
+        (
+            'schema = 1\n[actuator]\nkind = "simulated"\n[camera]\nkind = "simulated"\n',
+            "A simulated camera (line 5 of {path}) must have a simulated gripper, but the bed has none",
+        ),
+    ],
+)
+def test_a_bed_that_makes_no_sense_is_said(tmp_path: Path, text: str, sentence: str) -> None:
+    config = tmp_path / "bed.toml"
+    config.write_text(text)
+    with pytest.raises(FingervisionError) as caught:
+        open_bed(str(config))
+    assert sentence.format(path=config) in str(caught.value)
+
+
+def test_a_bed_without_a_camera_or_a_scale_is_said(tmp_path: Path) -> None:
+    config = tmp_path / "bed.toml"
+    config.write_text('schema = 1\n[actuator]\nkind = "simulated"\n')
+    with pytest.raises(FingervisionError, match=r"A run must be seen, but the bed has no camera: add a \[camera\]"):
+        run(tmp_path, steps(MOVE), bed_name=str(config))

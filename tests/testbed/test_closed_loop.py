@@ -1,0 +1,65 @@
+"""What is hidden in the simulated bed is found in its pictures; tests/benchmarks/closed_loop.py asks for more of it."""
+
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner
+
+from fingervision.cli import cli
+from fingervision.diagnosis.diagnose import diagnose
+from fingervision.domain.report import DiagnosisReport, Verdict
+from fingervision.storage.measured_table import read_measured_table
+from fingervision.storage.model_toml import read_model
+from fingervision.testbed.demonstration import SHOWN, drawn
+from fingervision.testbed.hidden import Hidden
+from tests.testbed.simulated_beds import run, steps
+
+# One run there and back, one of another speed after a new reference: 400 frames.
+RECIPE = steps(
+    'kind = "triangle"\nfrom_mm = -0.3\nto_mm = 1.1\nspeed_mm_s = 0.5',
+    'kind = "rezero"',
+    'kind = "triangle"\nfrom_mm = -0.3\nto_mm = 1.1\nspeed_mm_s = 0.3',
+)
+# The stage's place and the gap are known within 1 um of gap each: a play of 0.1 mm to a part in a hundred at least.
+PART_OF_SIZE = 0.01
+
+
+def answer(folder: Path, hidden: Hidden) -> DiagnosisReport:
+    run(folder, RECIPE, hidden)
+    table = read_measured_table(folder / "run" / "samples.csv")
+    return diagnose(table, read_model(folder / "run" / "simulation.csv")).report
+
+
+@pytest.mark.parametrize(
+    ("name", "parameter", "size"), [("backlash", "play_mm", 0.08), ("lens_distortion", "k_per_mm2", 0.001)]
+)
+def test_what_is_hidden_is_named_with_its_size(tmp_path: Path, name: str, parameter: str, size: float) -> None:
+    report = answer(tmp_path, Hidden({name: {parameter: size}}))
+    assert report.verdict is Verdict.NAMED
+    (effect,) = report.effects
+    assert effect.name == name
+    # A lens acts on the whole picture, tips included, and not on the measuring points alone.
+    assert effect.parameters[parameter].value == pytest.approx(
+        size, rel=0.1 if name == "lens_distortion" else PART_OF_SIZE
+    )
+
+
+def test_where_nothing_is_hidden_it_agrees(tmp_path: Path) -> None:
+    assert answer(tmp_path, Hidden()).verdict is Verdict.AGREES
+
+
+def test_the_demonstration_finds_what_it_hid_and_says_each_step(tmp_path: Path) -> None:
+    done = CliRunner().invoke(cli, ["demo", "--hide", "backlash:play_mm=0.12", "--out", str(tmp_path / "demo")])
+    assert done.exception is None, done.output
+    lines = done.output.splitlines()
+    assert "named: The model lacks backlash (play_mm = 0.1" in done.output
+    assert "Hidden was backlash (play_mm = 0.12): found after one run." in lines
+    page = Path(lines[-1].removeprefix("Report: "))
+    assert "backlash" in page.read_text(encoding="utf-8")
+
+
+def test_a_seed_hides_one_effect_of_those_that_can_be_shown() -> None:
+    chosen = {name for seed in range(60) for name in drawn(seed).effects}
+    assert chosen <= set(SHOWN)
+    assert len(chosen) > len(SHOWN) // 2
+    assert drawn(3) == drawn(3)
