@@ -1,11 +1,12 @@
 """Pause, go on, stop: by Ctrl-C, by a request to terminate, or by a letter on the terminal."""
 
 import signal
-import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from threading import Event, Thread
+from threading import Event
 from types import FrameType
+
+from fingervision.testbed.terminal import TERMINAL
 
 PAUSE_LETTER, STOP_LETTER = "p", "q"
 
@@ -54,21 +55,17 @@ class Controls:
             self.stop()
 
         before = {each: signal.signal(each, note) for each in (signal.SIGINT, signal.SIGTERM)}
-        if sys.stdin is not None and sys.stdin.isatty():
-            Thread(target=self._read_letters, name="keys", daemon=True).start()
         try:
-            yield
+            with TERMINAL.listening(self._letter, self.stopped.is_set):
+                yield
         finally:
             for each, handler in before.items():
                 signal.signal(each, handler)
             self._stop_motor = None
 
-    def _read_letters(self) -> None:
-        for line in sys.stdin:
-            letter = line.strip().lower()
-            if letter == PAUSE_LETTER:
-                self.toggle_pause()
-            elif letter == STOP_LETTER:
-                self.stop()
-            if self._stop_motor is None:
-                return
+    def _letter(self, line: str) -> None:
+        letter = line.strip().lower()
+        if letter == PAUSE_LETTER:
+            self.toggle_pause()
+        elif letter == STOP_LETTER:
+            self.stop()

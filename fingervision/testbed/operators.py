@@ -1,12 +1,12 @@
 """The operators there are: a person at the terminal, and nobody, where the part is simulated."""
 
-import sys
 from dataclasses import replace
 
 from fingervision.domain.errors import FingervisionError
 from fingervision.testbed.camera import BedCamera
 from fingervision.testbed.cameras.simulated import SHIFT_MM, SimulatedCamera
 from fingervision.testbed.operator import Operator
+from fingervision.testbed.terminal import TERMINAL
 
 
 class AtTheBed:
@@ -29,9 +29,7 @@ class AtTheBed:
         self._ask("Take the reference slot away, so that the camera sees the fingers again.")
 
     def _ask(self, words: str) -> None:
-        sys.stderr.write(f"{words} Press Enter when it is done: ")
-        sys.stderr.flush()
-        if not sys.stdin.readline():
+        if TERMINAL.ask(f"{words} Press Enter when it is done: ") is None:
             raise FingervisionError(
                 f"The recipe asks the operator ({words.rstrip('.').lower()}), but nobody is at the terminal: run it "
                 "from one."

@@ -8,13 +8,14 @@ from fingervision.domain.errors import FingervisionError
 from fingervision.testbed.actuator import StageLimits
 from fingervision.testbed.actuators.hand_screw import HandScrew
 from fingervision.testbed.clock import VirtualClock
+from fingervision.testbed.terminal import Terminal
 
 LIMITS = StageLimits(lower_mm=-1.0, upper_mm=6.0, speed_mm_s=float("inf"), force_n=float("inf"), accuracy_mm=0.004)
 
 
 def screw(typed: str) -> tuple[HandScrew, StringIO]:
     screen = StringIO()
-    return HandScrew(LIMITS, VirtualClock(), StringIO(typed), screen), screen
+    return HandScrew(LIMITS, VirtualClock(), Terminal(StringIO(typed), screen)), screen
 
 
 def test_the_reading_that_was_typed_is_the_position() -> None:

@@ -1,8 +1,6 @@
 """A micrometer screw that a person turns, typing in what it reads."""
 
-import sys
 from math import isfinite
-from typing import TextIO
 
 from fingervision.domain.errors import FingervisionError
 from fingervision.storage.toml_section import Section
@@ -11,6 +9,7 @@ from fingervision.testbed.asked_move import check_move
 from fingervision.testbed.clock import Clock
 from fingervision.testbed.commanded_path import CommandedPath
 from fingervision.testbed.reading import Reading
+from fingervision.testbed.terminal import TERMINAL, Terminal
 from fingervision.testbed.workshop import Workshop
 
 KEYS = ("lower_mm", "upper_mm", "speed_mm_s", "accuracy_mm")
@@ -33,8 +32,8 @@ class HandScrew:
         What the screw can do; the force is that of a hand, which nobody limits.
     clock : Clock
         The bed's.
-    keyboard, screen : text streams
-        Where answers come from and questions go to.
+    terminal : Terminal
+        Where questions go to and answers come from.
     """
 
     name = "hand screw"
@@ -42,9 +41,9 @@ class HandScrew:
     busy = False
     alarm: Alarm | None = None
 
-    def __init__(self, limits: StageLimits, clock: Clock, keyboard: TextIO, screen: TextIO) -> None:
+    def __init__(self, limits: StageLimits, clock: Clock, terminal: Terminal) -> None:
         self.limits = limits
-        self._clock, self._keyboard, self._screen = clock, keyboard, screen
+        self._clock, self._terminal = clock, terminal
         self._path = CommandedPath(0.0)
 
     def home(self) -> None:
@@ -85,23 +84,21 @@ class HandScrew:
 
     def _ask_for(self, words: str, wanted_mm: float) -> None:
         for _ in range(ASK_AT_MOST):
-            self._screen.write(f"{words} (Enter alone: {wanted_mm:.3f}): ")
-            self._screen.flush()
-            line = self._keyboard.readline()
-            if not line:
+            line = self._terminal.ask(f"{words} (Enter alone: {wanted_mm:.3f}): ")
+            if line is None:
                 raise FingervisionError(
                     "The hand screw must be turned by somebody, but nobody is at the terminal: run it from one."
                 )
             typed_mm = _number(line.strip().replace(",", "."), wanted_mm)
             if typed_mm is None:
-                self._screen.write(f"A reading must be a number in mm, but is '{line.strip()}'.\n")
+                self._terminal.say(f"A reading must be a number in mm, but is '{line.strip()}'.\n")
             elif not self.limits.lower_mm - FAR_MM <= typed_mm <= self.limits.upper_mm + FAR_MM:
-                self._screen.write(
+                self._terminal.say(
                     f"A reading must lie between {self.limits.lower_mm:g} and {self.limits.upper_mm:g} mm, "
                     f"but is {typed_mm:g}.\n"
                 )
             elif abs(typed_mm - wanted_mm) > FAR_MM:
-                self._screen.write(f"The reading must lie near {wanted_mm:.3f} mm, but is {typed_mm:g}.\n")
+                self._terminal.say(f"The reading must lie near {wanted_mm:.3f} mm, but is {typed_mm:g}.\n")
             else:
                 self._path.jump(self._clock.now_s(), typed_mm)
                 return
@@ -128,4 +125,4 @@ def build(section: Section, workshop: Workshop) -> HandScrew:
         force_n=float("inf"),
         accuracy_mm=section.number("accuracy_mm", ACCURACY_MM, low=0.0),
     )
-    return HandScrew(limits, workshop.clock, sys.stdin, sys.stderr)
+    return HandScrew(limits, workshop.clock, TERMINAL)

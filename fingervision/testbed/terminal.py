@@ -1,0 +1,96 @@
+"""The terminal: one reader for the answers that were asked for, and for the letters that were not."""
+
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from queue import Empty, SimpleQueue
+from threading import Thread
+from typing import TextIO
+
+from fingervision.domain.errors import FingervisionError
+
+LOOK_EVERY_S = 0.2
+
+
+class Terminal:
+    """Keyboard and screen of the person at the bed.
+
+    Two readers of one keyboard would take each other's lines; here a line is an answer if a question stands, and a
+    letter of its own otherwise.
+
+    Parameters
+    ----------
+    keyboard, screen : text streams, optional
+        Standard input and standard error, if not given.
+    """
+
+    def __init__(self, keyboard: TextIO | None = None, screen: TextIO | None = None) -> None:
+        self._keyboard, self._screen = keyboard, screen
+        self._asked = False
+        self._answers: SimpleQueue[str] = SimpleQueue()
+        self._reader: Thread | None = None
+        self._unasked: Callable[[str], None] | None = None
+        self._ended: Callable[[], bool] = lambda: False
+
+    def ask(self, words: str) -> str | None:
+        """Ask and wait for the answer; None if nobody is there.
+
+        Raises
+        ------
+        FingervisionError
+            The run was stopped while the question stood.
+        """
+        self.say(words)
+        if self._reader is None:
+            return (self._keyboard or sys.stdin).readline() or None
+        self._asked = True
+        while True:
+            try:
+                return self._answers.get(timeout=LOOK_EVERY_S) or None
+            except Empty:
+                if self._ended():
+                    self._asked = False
+                    raise FingervisionError("The question was not answered, because the run was stopped.") from None
+
+    def say(self, words: str) -> None:
+        """Write on the screen."""
+        screen = self._screen or sys.stderr
+        screen.write(words)
+        screen.flush()
+
+    @contextmanager
+    def listening(self, unasked: Callable[[str], None], ended: Callable[[], bool]) -> Iterator[None]:
+        """Take letters too, if somebody is at the keyboard.
+
+        Parameters
+        ----------
+        unasked : callable
+            Told each line that answers no question.
+        ended : callable
+            Whether nobody waits for answers any more.
+        """
+        keyboard = self._keyboard or sys.stdin
+        if keyboard is None or not keyboard.isatty():
+            yield
+            return
+        self._unasked, self._ended = unasked, ended
+        if self._reader is None:
+            self._reader = Thread(target=self._read, args=(keyboard,), name="keys", daemon=True)
+            self._reader.start()
+        try:
+            yield
+        finally:
+            self._unasked, self._ended = None, lambda: False
+
+    def _read(self, keyboard: TextIO) -> None:
+        for line in keyboard:
+            unasked = self._unasked
+            if self._asked or unasked is None:
+                self._asked = False
+                self._answers.put(line)
+            else:
+                unasked(line)
+        self._answers.put("")
+
+
+TERMINAL = Terminal()
