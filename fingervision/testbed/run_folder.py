@@ -104,9 +104,12 @@ class BedRunFolder:
                 "make room, or name a folder on another disk. Nothing was moved."
             )
 
-    def add(self, frame: Frame, row: SampleRow) -> None:
-        """Write one frame: first its picture, then its row."""
-        self._video.add(replace(frame, time_s=row.time_s), ())
+    def add_picture(self, frame: Frame, time_s: float) -> None:
+        """Write a frame's picture, at its time in the run."""
+        self._video.add(replace(frame, time_s=time_s), ())
+
+    def add_row(self, row: SampleRow) -> None:
+        """Write a frame's row, after its picture."""
         self._samples.add((row,))
         self._last_s = row.time_s
 

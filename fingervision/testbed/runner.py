@@ -99,7 +99,7 @@ class Runner:
     _base_s: float = 0.0
     _leg: Leg | None = None
     _closing_below_mm: float = 0.0
-    _waiting: deque[tuple[Frame, SampleRow, float]] = field(default_factory=deque)
+    _waiting: deque[tuple[SampleRow, float]] = field(default_factory=deque)
     slots: list[dict[str, float]] = field(default_factory=list)
 
     def follow(self, last: SampleRow) -> None:
@@ -336,7 +336,8 @@ class Runner:
             if self._zero_s is None:
                 self._zero_s = look.shot.device_s - self._base_s
             row = self._row(look, measured, self._zero_s)
-            self._waiting.append((item, row, look.exposed_s))
+            self.folder.add_picture(item, row.time_s)
+            self._waiting.append((row, look.exposed_s))
             self._count(row)
         elif record:
             self._lost += 1
@@ -352,11 +353,11 @@ class Runner:
     def _write(self, *, at_once: bool = False) -> None:
         """Write the rows whose place between the encoder's steps is known by now."""
         while self._waiting:
-            item, row, exposed_s = self._waiting[0]
+            row, exposed_s = self._waiting[0]
             input_mm = self.sight.position.at(exposed_s, at_once=at_once)
             if input_mm is None:
                 return
-            self.folder.add(item, replace(row, input_mm=round(input_mm, MM_PLACES)))
+            self.folder.add_row(replace(row, input_mm=round(input_mm, MM_PLACES)))
             self._waiting.popleft()
 
     def _row(self, look: Look, measured: GapRow, zero_s: float) -> SampleRow:

@@ -15,8 +15,9 @@ from fingervision.testbed.reading import Reading
 
 # Borders that the speed of a motion is taken from.
 BORDERS_FOR_SPEED = 6
-# A stage that is slower than its step in so much time is taken to go on as before.
-WAIT_FOR_BORDER_S = 0.8
+# A stage that is slower than its step in so much time is taken to go on as before: with the half second that rows wait
+# for company, less than a second is lost where the program is killed.
+WAIT_FOR_BORDER_S = 0.4
 # Knots that are kept: a frame looks back over this wait, and no further.
 MOST_KNOTS = 4000
 
