@@ -20,7 +20,8 @@ from fingervision.domain.model import PhysicalModel
 from fingervision.domain.response import Response
 from fingervision.models.corrected import CorrectedModel
 
-HELD_SAMPLES = 15
+HELD_SAMPLES, SLOW_SAMPLES = 15, 5
+"""Samples over which a stage that stands, or turns back, stays on one encoder step or two."""
 STAIRCASE = 0.85
 """Share of an encoder step's variance that smoothing leaves: errors within half a step hide any bend of a line."""
 STAYING = 0.2
@@ -234,19 +235,15 @@ def prepare(table: MeasuredTable, model: CorrectedModel, without: frozenset[str]
     slope = np.abs(model.base.respond(smooth + reach).gap_mm - model.base.respond(smooth - reach).gap_mm) / (
         2.0 * reach
     )
-    held = np.zeros(u.size, dtype=bool)
-    if step > 0.0:
-        for run in table.runs:
-            if run.stop - run.start > HELD_SAMPLES:
-                padded = np.pad(u[run], HELD_SAMPLES // 2, mode="edge")
-                held[run] = np.ptp(np.lib.stride_tricks.sliding_window_view(padded, HELD_SAMPLES), axis=1) < 1.01 * step
+    held = _within(u, table.runs, HELD_SAMPLES, 1.01 * step)
     samples = 1.0 / float(np.median(leverage)) if np.median(leverage) > 0.0 else 1.0
     # A stage that stands between two encoder steps keeps its error: averaging does not help there.
     left = np.where(held, 1.0, leverage)
     stays = left < STAYING
     if step > 0.0:
         # The staircase of an encoder is no white noise: a line averages it out less well than its leverage says.
-        left, samples, stays = np.maximum(left, STAIRCASE), max(samples, HELD_SAMPLES), held
+        left, samples = np.maximum(left, STAIRCASE), max(samples, HELD_SAMPLES)
+        stays = held | _within(u, table.runs, SLOW_SAMPLES, 2.01 * step)
     error = slope * sigma * np.sqrt(left)
     able, excluded = admissible(history, without, model.base)
     distrusted, reasons = distrusted_rows(table, model.base, float(zero))
@@ -257,6 +254,16 @@ def prepare(table: MeasuredTable, model: CorrectedModel, without: frozenset[str]
     return BenchData(
         table, model, chain, stacked, error, stays, max(samples, 1.0), able, excluded, distrusted, tuple(notes), refit
     )
+
+
+def _within(input_mm: Array, runs: tuple[slice, ...], samples: int, reach_mm: float) -> Flags:
+    """Where the input stays within a reach over so many samples; nowhere where the reach is 0."""
+    out = np.zeros(input_mm.size, dtype=bool)
+    for run in runs:
+        if reach_mm > 0.0 and run.stop - run.start > samples:
+            padded = np.pad(input_mm[run], samples // 2, mode="edge")
+            out[run] = np.ptp(np.lib.stride_tricks.sliding_window_view(padded, samples), axis=1) < reach_mm
+    return out
 
 
 def _is_motion(table: MeasuredTable, model: CorrectedModel, u: Array, smooth: Array) -> bool:

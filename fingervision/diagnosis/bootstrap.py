@@ -52,7 +52,7 @@ def noise_alone(problem: Problem, base: Explanation, rng: np.random.Generator) -
     truth = problem.whitened(base.values)
     spread = np.repeat(base.sigma_mm, offsets.runs) * rng.standard_normal(offsets.channels * offsets.runs)
     truth = truth + offsets.design[:, : spread.size] @ spread
-    if not whitener.passing_mm.any():
+    if not (whitener.passing_mm.any() or whitener.input_mm.any()):
         noise = np.where(whitener.aside, 0.0, rng.standard_normal(problem.measured.size))
         return problem, np.asarray(truth + noise)
     history, samples = problem.chain.history, problem.chain.history.input_mm.size
@@ -60,25 +60,22 @@ def noise_alone(problem: Problem, base: Explanation, rng: np.random.Generator) -
     ends = [replace(history, input_mm=history.input_mm + way) for way in (-reach, reach)]
     low, high = (replace(problem.chain, history=end).stacked(base.values)[:samples] for end in ends)
     slope = np.maximum(np.abs(high - low) / (2.0 * reach), 1e-9)
-    error = whitener.passing_mm / slope * rng.standard_normal(samples)
+    stays = float(np.exp(-2.0 / max(whitener.input_samples, 0.04)))
+    staying = np.concatenate([_autoregression(stays, run.stop - run.start, rng) for run in history.runs])
+    error = (whitener.passing_mm * rng.standard_normal(samples) + whitener.input_mm * staying) / slope
     shaken = replace(history, input_mm=history.input_mm + error)
     noise = whitener.one(_of_pictures(problem, rng))
     return replace(problem, chain=replace(problem.chain, history=shaken)), np.asarray(truth + noise)
 
 
 def _of_pictures(problem: Problem, rng: np.random.Generator) -> Array:
-    """Draw what is not the input's passing error, channels stacked; shape (m,), in mm."""
-    whitener, history = problem.whitener, problem.chain.history
-    stays = float(np.exp(-2.0 / max(whitener.input_samples, 0.04)))
+    """Draw the noise of the pictures alone, channels stacked; shape (m,), in mm."""
     out = []
-    for channel, noise in enumerate(whitener.noises):
-        for run in history.runs:
+    for noise in problem.whitener.noises:
+        for run in problem.chain.history.runs:
             count = run.stop - run.start
-            part = noise.white_mm * rng.standard_normal(count)
-            part = part + noise.correlated_mm * _autoregression(noise.correlation, count, rng)
-            if channel == 0:
-                part = part + whitener.input_mm[run] * _autoregression(stays, count, rng)
-            out.append(part)
+            white = noise.white_mm * rng.standard_normal(count)
+            out.append(white + noise.correlated_mm * _autoregression(noise.correlation, count, rng))
     return np.concatenate(out)
 
 
@@ -115,8 +112,11 @@ def exceeds_noise(
         gain, coefficient = atoms.gains(alone.residual, problem.offsets, problem.offsets.metric(alone.sigma_mm), along)
         gain[np.isin(owner, base.names)] = 0.0
         starts = [{**alone.values, **suspect} for suspect in suspects]
-        for _ in range(REFITTED):
-            top = int(np.argmax(gain))
+        asked = [name for suspect in suspects for name in suspect]
+        for _ in range(len(asked) + REFITTED):
+            # What the measurement speaks for first, wherever it suits this draw; then what suits the draw best.
+            among = owner == asked.pop(0) if asked else np.ones(owner.size, dtype=bool)
+            top = int(np.argmax(np.where(among, gain, 0.0)))
             if gain[top] > 0.0:
                 name = atoms.names[top]
                 starts.append({**alone.values, name: atoms.begin(top, float(coefficient[top]))})
