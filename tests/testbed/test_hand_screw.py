@@ -2,6 +2,7 @@
 
 from io import StringIO
 
+import numpy as np
 import pytest
 
 from fingervision.domain.errors import FingervisionError
@@ -23,6 +24,20 @@ def test_the_reading_that_was_typed_is_the_position() -> None:
     actuator.move(1.25, 1.0)
     assert actuator.readings()[-1].value == 1.252
     assert screen.getvalue() == "Turn the screw to 1.250 mm and type its reading in mm (Enter alone: 1.250): "
+
+
+def test_nothing_lies_between_two_readings() -> None:
+    """Who interpolates between them finds the old one until the new one was typed."""
+    clock = VirtualClock()
+    actuator = HandScrew(LIMITS, clock, Terminal(StringIO("\n"), StringIO()))
+    before = actuator.readings()
+    clock.wait_until(10.0)
+    actuator.move(1.0, 1.0)
+    clock.wait_until(11.0)
+    readings = (*before, *actuator.readings())
+    times, values = [each.device_s for each in readings], [each.value for each in readings]
+    assert times == sorted(times)
+    assert np.interp([9.99, 10.0, 11.0], times, values).tolist() == [0.0, 1.0, 1.0]
 
 
 def test_enter_alone_means_that_it_stands_there() -> None:

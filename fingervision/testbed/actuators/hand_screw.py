@@ -7,7 +7,6 @@ from fingervision.storage.toml_section import Section
 from fingervision.testbed.actuator import Alarm, StageLimits
 from fingervision.testbed.asked_move import check_move
 from fingervision.testbed.clock import Clock
-from fingervision.testbed.commanded_path import CommandedPath
 from fingervision.testbed.reading import Reading
 from fingervision.testbed.terminal import TERMINAL, Terminal
 from fingervision.testbed.workshop import Workshop
@@ -21,6 +20,8 @@ SPEED_MM_S = 10.0
 # A typed value so far from the one asked for is a slip of the finger, and is asked for again.
 FAR_MM = 1.0
 ASK_AT_MOST = 3
+# Between two readings others interpolate; nobody knows how the screw was turned, only that it stands when one is typed.
+AN_INSTANT_S = 1e-4
 
 
 class HandScrew:
@@ -44,7 +45,8 @@ class HandScrew:
     def __init__(self, limits: StageLimits, clock: Clock, terminal: Terminal) -> None:
         self.limits = limits
         self._clock, self._terminal = clock, terminal
-        self._path = CommandedPath(0.0)
+        self._at_mm = 0.0
+        self._turned: list[Reading] = []
 
     def home(self) -> None:
         """Ask for the screw to be set to its zero."""
@@ -75,9 +77,11 @@ class HandScrew:
         """Nothing moves by itself."""
 
     def readings(self) -> tuple[Reading, ...]:
-        """What was typed last."""
+        """What was typed, each with the reading before it up to that instant, and what stands now."""
+        turned, self._turned = self._turned, []
         now_s = self._clock.now_s()
-        return (Reading(now_s, now_s, now_s, self._path.at_mm(now_s)),)
+        earlier = [reading for reading in turned if reading.device_s < now_s]
+        return (*earlier, Reading(now_s, now_s, now_s, self._at_mm))
 
     def close(self) -> None:
         """Nothing to let go of."""
@@ -100,7 +104,10 @@ class HandScrew:
             elif abs(typed_mm - wanted_mm) > FAR_MM:
                 self._terminal.say(f"The reading must lie near {wanted_mm:.3f} mm, but is {typed_mm:g}.\n")
             else:
-                self._path.jump(self._clock.now_s(), typed_mm)
+                now_s = self._clock.now_s()
+                for at_s, mm in ((now_s - AN_INSTANT_S, self._at_mm), (now_s, typed_mm)):
+                    self._turned.append(Reading(at_s, at_s, at_s, mm))
+                self._at_mm = typed_mm
                 return
         raise FingervisionError(
             f"The reading must be typed in mm, but was not, {ASK_AT_MOST} times: the run ends here."
