@@ -173,9 +173,10 @@ def _apart(problem: Problem, values: Settings, rival: Explanation, starts: Seque
     )
 
 
-def _gain(old: Problem, joined: Problem, truth: Settings, rival: Explanation, starts: Sequence[Settings]) -> float:
-    """What a run adds to the distance: the rival is refitted to old and new data together."""
-    before = _apart(old, truth, rival, starts)
+def _gain(
+    old: Problem, joined: Problem, truth: Settings, rival: Explanation, starts: Sequence[Settings], before: float
+) -> float:
+    """What a run adds to the distance `before` it: the rival is refitted to old and new data together."""
     anew = [_moved_bounds(old, joined, rival.names, start) for start in starts]
     return max(0.0, _apart(joined, _moved_bounds(old, joined, tuple(truth), truth), rival, anew) - before)
 
@@ -198,7 +199,9 @@ def _promise(
     for truth, rival in ((0, 1), (1, 0)):
         starts = [pair[rival].values, *drawn[rival][:: max(1, len(drawn[rival]) // FURTHER)]]
         step = max(1, len(drawn[truth]) // count)
-        gains += [_gain(old, joined, values, pair[rival], starts) for values in drawn[truth][step // 2 :: step]]
+        for values in drawn[truth][step // 2 :: step]:
+            before = _apart(old, values, pair[rival], starts)
+            gains.append(_gain(old, joined, values, pair[rival], starts, before))
     expected = np.array(gains)
     doubt = np.exp(noise_doubt(old) * rng.standard_normal((expected.size, 400)))
     come = expected[:, None] * doubt
@@ -219,6 +222,8 @@ def _proposals(
     history = bench.chain.history
     step_s = history.sample_time_s
     round_s = rounding_s(bench.table.input_mm, step_s, history.runs)
+    pairs = [(best, rival) for rival in rivals]
+    known = [[_apart(problem, one.values, other, [other.values]) for one, other in (p, p[::-1])] for p in pairs]
     found = []
     for name, steps in protocols(*ends, step_s):
         inputs = driven(steps, step_s, round_s)
@@ -226,11 +231,11 @@ def _proposals(
             continue
         joined = _joined(bench, problem, inputs)
         gains = []
-        for rival in rivals:
-            there = _gain(problem, joined, best.values, rival, [rival.values])
-            gains.append(
-                there if there <= WORTH else min(there, _gain(problem, joined, rival.values, best, [best.values]))
-            )
+        for (one, other), (ahead, back) in zip(pairs, known, strict=True):
+            gain = _gain(problem, joined, one.values, other, [other.values], ahead)
+            if gain > WORTH:
+                gain = min(gain, _gain(problem, joined, other.values, one, [one.values], back))
+            gains.append(gain)
         found.append(_Proposal(name, steps, inputs, tuple(gains), SETTLE_MIN + inputs.size * step_s / 60.0))
     return found
 

@@ -8,6 +8,8 @@ import numpy as np
 from fingervision.diagnosis.noise import Noise
 from fingervision.domain.effect import Array, Flags, History
 
+SPREADS = np.concatenate([[0.0], np.geomspace(0.01, 1e4, 121)])
+"""Spreads of the runs that are tried, over the noise."""
 MIDLINE_FREE_MM = 1e3
 """Prior spread of the midline's constant: large enough to be free."""
 
@@ -194,7 +196,7 @@ class RunOffsets:
             if channel == 1 and self.midline:
                 mean = mean - np.sum(mean * z) / np.sum(z)
             scale = self.scales_mm[channel]
-            sigma = np.concatenate([[0.0], scale * np.geomspace(0.01, 1e4, 121)])
+            sigma = scale * SPREADS
             spread = sigma[:, None] ** 2 * z
             extra = np.sum(np.log1p(spread) - mean**2 * z * spread / (1.0 + spread), axis=1)
             prior = 2.0 * np.log1p((sigma / scale) ** 2)
