@@ -174,7 +174,10 @@ def _check_options(name: str, arguments: tuple[str, ...], ask: "Perform") -> Non
     from fingervision.domain.errors import ExitCode, UsageError
 
     with TemporaryDirectory() as nowhere:
-        ended = ask(name, (*arguments, "--out", str(Path(nowhere) / "out"), "--", str(Path(nowhere) / "nothing")))
+        try:
+            ended = ask(name, (*arguments, "--out", str(Path(nowhere) / "out"), "--", str(Path(nowhere) / "nothing")))
+        except KeyboardInterrupt:
+            raise FingervisionError("Stopped by the user before any work: call again.") from None
     if nowhere not in ended.words:
         kind = UsageError if ended.exit_code == ExitCode.WRONG_USAGE else FingervisionError
         raise kind(ended.words)
