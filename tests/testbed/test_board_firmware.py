@@ -185,6 +185,9 @@ def test_corrupt_bytes_cost_single_samples_and_no_command(
         board.release()
         while Levels.DRIVE in board.levels:
             board.wait(0.01)
+    until_s = emulated.clock.now_s() + 5.0
+    while board.lost_samples == 0 and emulated.clock.now_s() < until_s:
+        board.wait(0.01)
     emulated.say("spoil 0 0")
     assert controller.codes == codes  # none twice, though answers were lost
     assert board.damaged_lines > 0

@@ -13,8 +13,9 @@ from fingervision.storage.toml_section import Section
 from fingervision.testbed import published_stage
 from fingervision.testbed.actuator import Alarm, StageLimits
 from fingervision.testbed.asked_move import check_move, check_speed
-from fingervision.testbed.board import wire
+from fingervision.testbed.board import controller_settings, wire
 from fingervision.testbed.board.board import Board
+from fingervision.testbed.board.controller_settings import Codes, Waits, codes_of, waits_of
 from fingervision.testbed.board.handshake import Handshake
 from fingervision.testbed.board.port import fingervision_at
 from fingervision.testbed.board.shared import KEY, board_of
@@ -28,50 +29,11 @@ from fingervision.testbed.step_route import jog_step, route
 from fingervision.testbed.workshop import Workshop
 
 SIMULATED = False
-KEYS = (
-    KEY, "steps", *published_stage.KEYS, "first_code", "home_code", "home_within_s", "busy_within_s", "enable_s",
-)  # fmt: skip
-CODES = 16
+KEYS = (KEY, "steps", *published_stage.KEYS, *controller_settings.KEYS)
 # A motion may take so much longer than its profile before it counts as stuck.
 PATIENCE, PATIENCE_S = 1.5, 1.0
-HOME_WITHIN_S, BUSY_WITHIN_S, ENABLE_S = 10.0, 0.5, 0.5
 READ_EVERY_S = 0.005
 STILL = MotionProfile(0.0, 0.0, 0.0, 0.0, 0.0)
-
-
-@dataclass(frozen=True, slots=True)
-class Codes:
-    """How the select lines name the steps.
-
-    Parameters
-    ----------
-    first : int
-        Code of step 1; the others follow.
-    home : int or None
-        Code of the return to the reference, if the controller has one.
-    """
-
-    first: int = 1
-    home: int | None = None
-
-
-@dataclass(frozen=True, slots=True)
-class Waits:
-    """What the controller is given time for.
-
-    Parameters
-    ----------
-    home_s : float
-        The return to the reference.
-    busy_s : float
-        From the drive line to the busy line.
-    enable_s : float
-        From the enable line to readiness; 0 without an enable line.
-    """
-
-    home_s: float
-    busy_s: float
-    enable_s: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -145,10 +107,11 @@ class BoardActuator:
 
     def home(self) -> None:
         """Return to the reference, by its own code or an absolute step to 0; clears what stopped it before."""
-        if self.busy:
-            self._refuse_busy()
+        self._stand()
         if wire.Levels.ALARM in self._board.levels:
-            self._refuse_alarm()
+            raise FingervisionError(
+                "The motor controller must have no alarm, but its alarm line is active: clear it there."
+            )
         self._failure = None
         if self._codes.home is not None:
             self._begin([_Run(self._codes.home, self._waits.home_s, None)])
@@ -220,22 +183,19 @@ class BoardActuator:
 
     # What may begin.
 
-    def _ready(self) -> None:
+    def _stand(self) -> None:
+        # First of all, so that a stop that comes while the motion is prepared is not forgotten.
+        self._stopped.clear()
         if self.busy:
-            self._refuse_busy()
+            raise FingervisionError("The actuator must stand before it moves again, but is busy: stop it first.")
+
+    def _ready(self) -> None:
+        self._stand()
         alarm = self.alarm
         if alarm is not None:
             raise FingervisionError(
                 f"The actuator must have no alarm, but has {alarm.code} ({alarm.words}): nothing was moved."
             )
-
-    def _refuse_busy(self) -> None:
-        raise FingervisionError("The actuator must stand before it moves again, but is busy: stop it first.")
-
-    def _refuse_alarm(self) -> None:
-        raise FingervisionError(
-            "The motor controller must have no alarm, but its alarm line is active: clear it there."
-        )
 
     def _check_known(self, number: int) -> None:
         if not self._known and self._data.steps[number].coordinates is Coordinates.RELATIVE:
@@ -272,7 +232,6 @@ class BoardActuator:
         if not self._board.ready:
             self._board.clear()
             self._ready_s = self._clock.now_s() + self._waits.enable_s
-        self._stopped.clear()
         self._worker = Thread(target=self._work, args=(runs,), name="motion", daemon=True)
         self._worker.start()
 
@@ -307,18 +266,7 @@ def holder(section: Section, folder: Path) -> int | None:
 def build(section: Section, workshop: Workshop) -> BoardActuator:
     """Build it from its section of the configuration."""
     data = read_steps(workshop.folder / section.word("steps"))
-    first = section.whole("first_code", 1, low=0, high=CODES - 1)
-    if first + max(data.steps) - 1 >= CODES:
-        section.refuse(
-            "first_code", f"must leave codes for step {max(data.steps)} on four lines (at most 15), but is {first}."
-        )
-    has_home = "home_code" in section.values
-    codes = Codes(first, section.whole("home_code", low=0, high=CODES - 1) if has_home else None)
-    waits = Waits(
-        section.number("home_within_s", HOME_WITHIN_S, above=0.0, high=60.0),
-        section.number("busy_within_s", BUSY_WITHIN_S, above=0.0, high=60.0),
-        section.number("enable_s", ENABLE_S, low=0.0, high=60.0),
-    )
+    codes, waits = codes_of(section, data), waits_of(section)
     board = board_of(section, workshop)
     if not board.settings.moves:
         board.close()

@@ -74,7 +74,7 @@ const __FlashStringHelper *start(uint8_t &at, bool &fine) {
 }
 
 const __FlashStringHelper *move(uint8_t &at, bool &fine) {
-    uint8_t code = wire::hex_at(at, fine);
+    uint16_t code = wire::hex_at(at, fine);
     uint16_t at_most_ms = wire::hex_at(at, fine);
     if (!fine || code > 15 || at_most_ms == 0) return F("value");
     if (const __FlashStringHelper *why = hindrance()) return why;
@@ -93,13 +93,13 @@ const __FlashStringHelper *obey(char kind, uint8_t &at, bool &fine) {
             return nullptr;
         case 'M': {  // map a line: role, pin, active level
             if (tick::running) return F("running");
-            uint8_t role = wire::hex_at(at, fine), pin = wire::hex_at(at, fine), level = wire::hex_at(at, fine);
+            uint16_t role = wire::hex_at(at, fine), pin = wire::hex_at(at, fine), level = wire::hex_at(at, fine);
             return fine && level <= 1 && lines::set(role, pin, level) ? nullptr : F("value");
         }
         case 'G':  // go: session, force period, silence, settling (ms)
             return tick::running ? F("running") : start(at, fine);
         case 'E': {  // enable line
-            uint8_t on = wire::hex_at(at, fine);
+            uint16_t on = wire::hex_at(at, fine);
             if (!fine || on > 1) return F("value");
             if (const __FlashStringHelper *why = on ? hindrance() : nullptr) return why;
             lines::write(lines::ENABLE, on);

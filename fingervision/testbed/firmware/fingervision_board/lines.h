@@ -29,13 +29,13 @@ void unmap() {
     for (Line &line : map) line.pin = NO_PIN;
 }
 
-bool set(uint8_t role, uint8_t pin, bool active_high) {
+bool set(uint16_t role, uint16_t pin, bool active_high) {
     if (role >= ROLES || pin < FIRST_PIN || pin > LAST_PIN) return false;
     if (role == FORCE && pin < A0) return false;
     for (const Line &other : map)
         if (other.pin == pin) return false;
     uint8_t port = digitalPinToPort(pin);
-    map[role] = {pin, active_high, portOutputRegister(port), portInputRegister(port), digitalPinToBitMask(pin)};
+    map[role] = {uint8_t(pin), active_high, portOutputRegister(port), portInputRegister(port), digitalPinToBitMask(pin)};
     return true;
 }
 
