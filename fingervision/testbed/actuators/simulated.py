@@ -27,8 +27,8 @@ RATE_HZ = 200.0
 ANSWER_S, SLOW_ANSWER_S = 0.001, 0.0005
 # Edges of the encoder and of the BUSY line are stamped by interrupts: micros() of an ATmega328P counts in 4 us.
 EDGE_WITHIN_S = 2e-6
-# Between two points of this grid the stage moves evenly enough to place an edge: at 16 m/s2 within 2 us at 1 mm/s.
-EDGE_GRID_S = 0.0005
+# Between two points of this grid a border is passed once; halved so often, it is known to half a microsecond.
+EDGE_GRID_S, BISECTIONS = 0.0005, 10
 HOMING_MM_S = 1.0
 Array = NDArray[np.float64]
 
@@ -131,16 +131,31 @@ class SimulatedActuator:
 
     def _edges_s(self, began_s: float) -> Array:
         """Times shortly before and after every edge of the encoder's and the BUSY line since the last answer."""
-        grid_s = np.linspace(began_s, self._read_until_s, int((self._read_until_s - began_s) / EDGE_GRID_S) + 2)
         edges_s = self._stage.turns_s(began_s, self._read_until_s)
         if self._step_mm > 0.0:
-            cells = self._stage.at_mm(grid_s) / self._step_mm + 0.5
-            for k in np.flatnonzero(np.diff(np.floor(cells))):
-                low, high = sorted((cells[k], cells[k + 1]))
-                shares = (np.arange(np.floor(low) + 1.0, np.floor(high) + 1.0) - cells[k]) / (cells[k + 1] - cells[k])
-                edges_s += (grid_s[k] + shares * (grid_s[k + 1] - grid_s[k])).tolist()
+            edges_s += self._borders_s(began_s)
         around_s = [at_s + aside_s for at_s in edges_s for aside_s in (-EDGE_WITHIN_S, EDGE_WITHIN_S)]
         return np.array([at_s for at_s in around_s if began_s < at_s < self._read_until_s])
+
+    def _borders_s(self, began_s: float) -> list[float]:
+        """Times at which the stage passed from one step of the encoder to the next, by bisection."""
+        grid_s = np.linspace(began_s, self._read_until_s, int((self._read_until_s - began_s) / EDGE_GRID_S) + 2)
+        cells = self._stage.at_mm(grid_s) / self._step_mm + 0.5
+        low_s, high_s, border = [], [], []
+        for k in np.flatnonzero(np.diff(np.floor(cells))).tolist():
+            passed = range(int(np.floor(min(cells[k : k + 2]))) + 1, int(np.floor(max(cells[k : k + 2]))) + 1)
+            low_s += [grid_s[k]] * len(passed)
+            high_s += [grid_s[k + 1]] * len(passed)
+            border += list(passed)
+        if not border:
+            return []
+        low, high, level = np.array(low_s), np.array(high_s), np.array(border, dtype=float)
+        rises = self._stage.at_mm(high) > self._stage.at_mm(low)
+        for _ in range(BISECTIONS):
+            middle = 0.5 * (low + high)
+            beyond = (self._stage.at_mm(middle) / self._step_mm + 0.5 >= level) == rises
+            low, high = np.where(beyond, low, middle), np.where(beyond, middle, high)
+        return [float(at_s) for at_s in 0.5 * (low + high)]
 
     def _encoder_mm(self, at_s: Array) -> Array:
         true_mm = self._stage.at_mm(at_s)
