@@ -33,6 +33,8 @@ SMALLEST_NOTCH_SHARE, LEAST_LENGTH_SHARE = 0.3, 4.0
 MOST_TOPS = 8
 # Fingers come in from the picture's border; things that lie in view are less likely to be fingers.
 ROOTED_BONUS = 2.0
+# Things that lie in view and are shorter than so many times the measuring height are letters or dirt.
+LYING_HEIGHTS = 6.0
 # A lone finger that comes in from the border for so many times the measuring height makes everything else a thing.
 ROOTED_HEIGHTS = 2.0
 
@@ -258,6 +260,8 @@ def _best_pair(
         is_rooted = left.is_rooted or right.is_rooted
         if left.is_rooted != right.is_rooted and left.outline is not right.outline:
             continue  # one comes in from the border and one lies in view: a finger and a thing
+        if not is_rooted and prominence < LYING_HEIGHTS * below_tip_px:
+            continue
         score = prominence * (ROOTED_BONUS if is_rooted else 1.0)
         if best is not None and score <= best.score:
             continue

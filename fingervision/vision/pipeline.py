@@ -3,6 +3,7 @@
 from collections.abc import Iterator
 from dataclasses import dataclass
 
+import cv2
 import numpy as np
 
 from fingervision.domain.direction import Direction
@@ -23,6 +24,8 @@ from fingervision.vision.stripes import with_stripes
 # A picture whose two classes differ by less (share of full scale, and in units of the spread within) shows nothing.
 CONTRAST_FLOOR, SEPARATION_FLOOR = 0.03, 3.0
 SATURATED_SHARE = 0.99
+# An edge at the limit of blur (5 px) makes half of its contrast within so many pixels to either side, shade does not.
+EDGE_REACH_PX, EDGE_SHARE = 3, 0.2
 # Two fingers and the edges between them need so many pixels.
 SMALLEST_SIDE_PX = 16
 # Where fingers were found and this was wrong with them, nothing else in the picture is taken for fingers.
@@ -133,6 +136,8 @@ def _attempt(grey: GreyImage, settings: Settings, coding: Coding) -> _Attempt:
     first: _Attempt | None = None
     for split, fingers, light_gap in _candidates(denoised, binary, settings):
         if isinstance(fingers, NoGap):
+            if fingers.status is Status.TOUCHING and not _has_edges(denoised, split, binary.contrast):
+                fingers = NoGap(Status.NO_FINGERS, "Light passes into shade without an edge.")
             attempt = _Attempt(fingers, split)
         else:
             upright = fingers.orientation.view(grey)
@@ -165,6 +170,14 @@ def _candidates(
             else:
                 yield split, fingers, light_gap
         yield from unsure
+
+
+def _has_edges(denoised: GreyImage, split: Binary, contrast: float) -> bool:
+    """Whether the grey level changes steeply where light and dark meet, as even the most blurred edge does."""
+    square = np.ones((2 * EDGE_REACH_PX + 1, 2 * EDGE_REACH_PX + 1), dtype=np.uint8)
+    border = np.asarray(cv2.morphologyEx(split.dark, cv2.MORPH_GRADIENT, np.ones((3, 3), dtype=np.uint8))) > 0
+    change = np.asarray(cv2.morphologyEx(denoised, cv2.MORPH_GRADIENT, square))[border]
+    return bool(change.size and np.median(change) > EDGE_SHARE * contrast)
 
 
 def _border_is_light(binary: Binary) -> bool:
