@@ -3,7 +3,7 @@
 import signal
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from math import copysign, inf
+from math import copysign, inf, isfinite
 from types import FrameType
 
 from fingervision.domain.errors import FingervisionError
@@ -48,6 +48,8 @@ def move(bed: Bed, to_mm: float, speed_mm_s: float) -> float:
         The target or the speed is beyond a limit (nothing was moved), or the motion was broken off.
     """
     limits = bed.limits
+    if not isfinite(to_mm):
+        raise FingervisionError(f"The target must be a finite number of mm, but is {to_mm:g}: nothing was moved.")
     if not limits.lower_mm <= to_mm <= limits.upper_mm:
         beyond_mm = max(limits.lower_mm - to_mm, to_mm - limits.upper_mm)
         raise FingervisionError(
