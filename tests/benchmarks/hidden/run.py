@@ -2,9 +2,10 @@
 
     python -m tests.benchmarks.hidden.run --tables 40 --jobs 2 --seed 1 --rows null,single_1 --methods diagnose,bic
 
-Everything is kept under --out by seed, row and number, so that a run may be stopped and goes on; --again METHOD asks
-that method anew. --scheduler tcp://HOST:PORT works on a Dask cluster whose workers were started at the top of the
-repository. Build with seeds below 1000, judge with seeds from 1000 on.
+Everything is kept under --out by seed, row and number, so that a run may be stopped and goes on; the same command again
+prints the table from what is kept; --again METHOD asks that method anew. --scheduler tcp://HOST:PORT works on a Dask
+cluster whose workers were started at the top of the repository. Build with seeds below 1000, judge with seeds from 1000
+on.
 """
 
 import argparse
@@ -48,6 +49,11 @@ class Task:
     method: str
     out: Path
 
+    @property
+    def folder(self) -> Path:
+        """Where the table, the answers and the marks are kept."""
+        return self.out / f"seed{self.seed}" / self.row / f"{self.index:04d}"
+
 
 def _ask(table: JudgedTable, method: str) -> Answer:
     kept = table.folder / f"{method}.json"
@@ -67,23 +73,32 @@ def _ask(table: JudgedTable, method: str) -> Answer:
     return answer
 
 
+def marked(task: Task) -> dict[str, object]:
+    """`work`, kept beside the table: a run that was stopped goes on, and its figures can be printed at any time."""
+    kept = task.folder / f"{task.method}_marks.json"
+    if kept.exists():
+        return dict(json.loads(kept.read_text(encoding="utf-8")))
+    result = work(task)
+    kept.write_text(json.dumps(result, indent=1), encoding="utf-8")
+    return result
+
+
 def work(task: Task) -> dict[str, object]:
     """Draw, ask, mark; a plain dictionary, so that it can be kept."""
-    row = ROWS[task.row]
-    folder = task.out / f"seed{task.seed}" / task.row / f"{task.index:04d}"
+    row, folder = ROWS[task.row], task.folder
     table = draw_table_of_row(row, task.seed, task.index, folder)
     hidden = frozenset(h.name for h in table.experiment.plant.hidden)
     if task.method == "gp":
         return {"unseen": unseen_error_ratio(table, None)} if row.hidden else {}
     answer = _ask(table, task.method)
-    marked = mark(row, table.judgement, answer, hidden)
-    result: dict[str, object] = {"mark": asdict(marked), "verdict": answer.verdict, "seconds": answer.seconds}
+    given = mark(row, table.judgement, answer, hidden)
+    result: dict[str, object] = {"mark": asdict(given), "verdict": answer.verdict, "seconds": answer.seconds}
     result |= {"sets": ["+".join(sorted(s)) for s in answer.sets], "hidden": "+".join(sorted(hidden))}
     result["folder"] = str(folder)
     if task.method != "diagnose" or answer.verdict == "failed":
         return result
     known = known_effects(table.experiment, problem_of(table.experiment, table.experiment.traces(), known_input=False))
-    if marked.right and row.hidden and answer.sets:
+    if given.right and row.hidden and answer.sets:
         names = {c.name: c.names for c in known}
         covered = intervals(table.judgement, answer, names)
         result["intervals"] = [asdict(c) for c in covered]
@@ -99,9 +114,9 @@ def work(task: Task) -> dict[str, object]:
 
 
 def guarded(task: Task) -> dict[str, object]:
-    """`work`, with a fault of a table told instead of the whole run stopped."""
+    """`marked`, with a fault of a table told instead of the whole run stopped."""
     try:
-        return work(task)
+        return marked(task)
     except Exception:
         return {"fault": traceback.format_exc(limit=6)}
 
@@ -169,8 +184,8 @@ def main() -> None:
     ]
     for task in tasks:
         if task.method == chosen.again:
-            folder = task.out / f"seed{task.seed}" / task.row / f"{task.index:04d}"
-            (folder / f"{task.method}.json").unlink(missing_ok=True)
+            (task.folder / f"{task.method}.json").unlink(missing_ok=True)
+            (task.folder / f"{task.method}_marks.json").unlink(missing_ok=True)
     os.environ.setdefault("OMP_NUM_THREADS", "1")
     # All methods of one table stay in one process: the table is drawn once.
     results: dict[str, dict[str, list[dict[str, object]]]] = {m: {r: [] for r in rows} for m in methods}
