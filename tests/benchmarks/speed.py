@@ -1,6 +1,6 @@
 """Speed, memory and start-up of `measure`.
 
-    python tests/benchmarks/speed.py [--frames 500] [--runs 5] [--only rate|memory|start]
+    python tests/benchmarks/speed.py [--frames 1500] [--runs 5] [--only rate|memory|start]
 
 Rate: frames per second of decoding alone and of measuring, in turn on the same file, medians; and milliseconds of one
 core for everything after decoding, beside the same steps written plainly with OpenCV and with scikit-image. Memory:
@@ -171,7 +171,7 @@ def start_up(runs: int) -> None:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--frames", type=int, default=500)
+    parser.add_argument("--frames", type=int, default=1500)
     parser.add_argument("--runs", type=int, default=5)
     parser.add_argument("--only", choices=["rate", "memory", "start"])
     asked = parser.parse_args()
