@@ -63,3 +63,26 @@ def run(
         return run_recipe(read_recipe(recipe_at(folder, text)), bed, folder / "run", hidden, say=say)
     finally:
         bed.close()
+
+
+LIVE_CAMERA = """schema = 1
+[actuator]
+kind = "simulated"
+[camera]
+kind = "source"
+source = "simulated"
+latency_s = 0.0
+u_latency_s = 0.001
+[scale]
+px_per_mm = 34.0
+[limits]
+lower_mm = -0.4
+upper_mm = 1.4
+"""
+
+
+def live_camera_at(folder: Path) -> Path:
+    """A bed with a simulated stage and a camera that goes on by itself, so that nothing of it can be played again."""
+    path = folder / "live.toml"
+    path.write_text(LIVE_CAMERA, encoding="utf-8")
+    return path

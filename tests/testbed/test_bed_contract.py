@@ -2,20 +2,29 @@
 
 from collections.abc import Callable, Iterator
 from itertools import pairwise
+from pathlib import Path
 
 import pytest
 
 from fingervision.domain.errors import FingervisionError
 from fingervision.testbed.bed import Bed
 from fingervision.testbed.put_together import open_bed
+from tests.testbed.simulated_beds import live_camera_at
 
 # A part is looked at through a bed that it belongs to.
 BEDS: dict[str, Callable[[pytest.FixtureRequest], Bed]] = {
     "simulated": lambda request: open_bed("simulated"),
     "board": lambda request: request.getfixturevalue("homed_board_bed"),
+    "source": lambda request: request.getfixturevalue("source_bed"),
     "hand_screw": lambda request: request.getfixturevalue("hand_screw_bed"),
 }
 WAIT_S, PATIENCE_S = 0.01, 10.0
+
+
+@pytest.fixture
+def source_bed(tmp_path: Path) -> Bed:
+    """A camera that goes on by itself, on the host's clock."""
+    return open_bed(str(live_camera_at(tmp_path)))
 
 
 @pytest.fixture(params=sorted(BEDS))

@@ -1,0 +1,111 @@
+"""Any live source of frames as the bed's camera: a camera at this machine, or a network stream."""
+
+from collections import deque
+from dataclasses import dataclass, replace
+from threading import Condition, Thread
+from typing import cast
+
+from fingervision.domain.errors import FingervisionError
+from fingervision.domain.frame import Frame, LostFrame
+from fingervision.frames.received import LiveSource, Received
+from fingervision.frames.source import Wish, open_source
+from fingervision.storage.toml_section import Section
+from fingervision.testbed.camera import Latency
+from fingervision.testbed.workshop import Workshop
+
+KEYS = ("source", "rate_hz", "width_px", "height_px", "patience_s", "latency_s", "u_latency_s")
+SIMULATED = False
+# A camera that gives nothing for so long is stale, and the motor stops.
+PATIENCE_S = 1.0
+# What a webcam takes at least is not known unless it was measured: a frame's time, give or take all of it.
+LATENCY_S, U_LATENCY_S = 0.04, 0.04
+# Frames that may wait; older ones are gone, for the bed wants to know what is now.
+FRAMES_WAITING = 8
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SourceShot:
+    """A frame that was received."""
+
+    index: int
+    device_s: float
+    arrived_s: float
+    received: Frame | LostFrame
+
+    def item(self) -> Frame | LostFrame:
+        """Give the picture."""
+        return self.received
+
+
+class SourceCamera:
+    """Reads a source in a thread of its own and hands over frames as the bed asks.
+
+    Parameters
+    ----------
+    source : LiveSource
+        Open.
+    latency : Latency
+        From exposure to arrival, as far as it is known.
+    patience_s : float
+        Without a frame for so long the camera is stale.
+    """
+
+    def __init__(self, source: LiveSource, latency: Latency, patience_s: float) -> None:
+        self.latency = latency
+        self._source, self._patience_s = source, patience_s
+        self._waiting: deque[Received] = deque(maxlen=FRAMES_WAITING)
+        self._changed = Condition()
+        self._ended = ""
+        self._index = 0
+        self.description = source.description
+        Thread(target=self._read, name="bed camera", daemon=True).start()
+
+    def next(self) -> SourceShot:
+        """Wait for the next frame."""
+        with self._changed:
+            self._changed.wait_for(lambda: self._waiting or self._ended, self._patience_s)
+            if not self._waiting:
+                why = self._ended or f"it gave no frame for {self._patience_s:g} s"
+                raise FingervisionError(
+                    f"The camera {self.description.name} must give frames while the bed works, but {why}: the motor "
+                    "was stopped; check its cable."
+                )
+            received = self._waiting.popleft()
+        index, self._index = self._index, self._index + 1
+        own_s = received.item.time_s if self._source.has_own_clock else None
+        device_s = received.arrived_s if own_s is None else own_s
+        return SourceShot(index, device_s, received.arrived_s, replace(received.item, index=index, time_s=device_s))
+
+    def close(self) -> None:
+        """Let go of the source."""
+        self._source.close()
+
+    def _read(self) -> None:
+        ended = "it ended"
+        try:
+            for received in self._source.received():
+                with self._changed:
+                    self._waiting.append(received)
+                    self._changed.notify()
+        except FingervisionError as error:
+            ended = f"it was cut off ({error})"
+        with self._changed:
+            self._ended = ended
+            self._changed.notify()
+
+
+def build(section: Section, workshop: Workshop) -> SourceCamera:
+    """Open it as its section of the configuration says."""
+    name = section.word("source")
+    size = None
+    if "width_px" in section.values or "height_px" in section.values:
+        size = section.whole("width_px", low=16, high=16384), section.whole("height_px", low=16, high=16384)
+    rate_hz = section.number("rate_hz", above=0.0) if "rate_hz" in section.values else None
+    latency = Latency(
+        section.number("latency_s", LATENCY_S, low=0.0), section.number("u_latency_s", U_LATENCY_S, low=0.0)
+    )
+    patience_s = section.number("patience_s", PATIENCE_S, above=0.0)
+    source = open_source(name, Wish(rate_hz=rate_hz, size_px=size))
+    if not hasattr(source, "received"):
+        section.refuse("source", f"must be a camera or a stream, but {name} is a recording: name a live source.")
+    return SourceCamera(cast("LiveSource", source), latency, patience_s)
