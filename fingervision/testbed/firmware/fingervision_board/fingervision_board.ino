@@ -19,18 +19,35 @@ int16_t last_number = -1;
 uint16_t last_crc;
 const __FlashStringHelper *last_refusal;
 
+bool send_change() {
+    tick::Change change;
+    if (!tick::changes.pop(change)) return false;
+    wire::open('L');
+    wire::put_hex(change.number, 2);
+    wire::put_hex(change.time_us, 8);
+    wire::put_hex(change.levels, 2);
+    wire::close();
+    return true;
+}
+
 void answer(uint8_t number, uint32_t time_us) {
+    uint8_t levels, seen;
+    char cause;
+    // No state overtakes the changes that led to it: the computer knows their times from them alone.
+    for (bool told = false; !told;) {
+        while (send_change()) {}
+        ATOMIC_BLOCK(ATOMIC_RESTORESTATE) {
+            if (tick::running) tick::notice();
+            told = tick::changes.empty();
+            levels = tick::levels;
+            seen = tick::change_number;
+            cause = tick::cause;
+        }
+    }
     wire::open('A');
     wire::put_hex(number, 2);
     wire::put_hex(time_us, 8);
     wire::put_hex(session, 4);
-    uint8_t levels, seen;
-    char cause;
-    ATOMIC_BLOCK(ATOMIC_RESTORESTATE) {
-        levels = tick::read_levels();
-        seen = tick::change_number;
-        cause = tick::cause;
-    }
     wire::put_hex(levels, 2);
     wire::put_hex(seen, 2);
     wire::put(' ');
@@ -145,25 +162,22 @@ void handle(uint32_t time_us) {
     else answer(number, time_us);
 }
 
+bool send_sample() {
+    tick::Sample sample;
+    if (!tick::samples.pop(sample)) return false;
+    wire::open('F');
+    wire::put_hex(sample.number, 4);
+    wire::put_hex(sample.time_us, 8);
+    wire::put_hex(sample.level, 3);
+    wire::close();
+    return true;
+}
+
 // Changes of lines first, then samples; only what the serial buffer takes at once.
 bool send_queued() {
     if (tick::changes.empty() && tick::samples.empty()) return false;
     if (Serial.availableForWrite() < SAMPLE_LENGTH) return false;
-    tick::Change change;
-    tick::Sample sample;
-    if (tick::changes.pop(change)) {
-        wire::open('L');
-        wire::put_hex(change.number, 2);
-        wire::put_hex(change.time_us, 8);
-        wire::put_hex(change.levels, 2);
-    } else if (tick::samples.pop(sample)) {
-        wire::open('F');
-        wire::put_hex(sample.number, 4);
-        wire::put_hex(sample.time_us, 8);
-        wire::put_hex(sample.level, 3);
-    }
-    wire::close();
-    return true;
+    return send_change() || send_sample();
 }
 
 void setup() {

@@ -110,6 +110,7 @@ void go(uint8_t force_period_ms, uint16_t silence_ms, uint8_t settle) {
 void halt() {
     ATOMIC_BLOCK(ATOMIC_RESTORESTATE) {
         drop(HOST);
+        levels = 0;
         TIMSK1 = 0;
         ADCSRA = 0;
         running = false;
