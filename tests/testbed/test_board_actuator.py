@@ -17,7 +17,7 @@ from fingervision.testbed.put_together import open_bed
 from tests.testbed.board_bed import written_bed
 from tests.testbed.emulated_board import HERTZ, Edge, EmulatedBoard, MotorController
 
-# A clock's millisecond, and the board's tick.
+# Every motion of these tests ends long before.
 SOON_S = 5.0
 # Steps 1 to 6; step n has code n, homing code 0.
 STEPS = """schema = 1
