@@ -124,7 +124,9 @@ class BedRunFolder:
         if self.before:
             write_rows(self.path / JOINED, [*self.before, *read_samples(self.path / SAMPLES)])
         self._about |= {**found, "joined": JOINED if self.before else None}
-        self._about["sha256"] = {name: self._files.sha256(name) for name in (VIDEO, SAMPLES)}
+        # A recipe that only asks the operator, for a reference slot say, records no frame.
+        names = [name for name in (VIDEO, SAMPLES) if (self.path / name).exists()]
+        self._about["sha256"] = {name: self._files.sha256(name) for name in names}
         self._files.write_about(self._about, complete=True)
         self._files.close()
         self._lock.release()

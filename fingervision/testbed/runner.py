@@ -277,8 +277,9 @@ class Runner:
 
     def _rest(self, leg: int) -> None:
         """Record the rest that a run begins with, if what follows is recorded continuously."""
-        following = next((each.act for each in self.plan.legs[leg:] if isinstance(each.act, Go | Stand | Swing)), None)
-        if isinstance(following, Swing) or (following is not None and following.frames is None):
+        following = self.plan.legs[leg].act if leg < len(self.plan.legs) else None
+        moves_on = isinstance(following, Swing | Close)
+        if moves_on or (isinstance(following, Go | Stand) and following.frames is None):
             for _ in range(REST_FRAMES):
                 self._seen(record=True)
 
