@@ -13,8 +13,9 @@ from fingervision.domain.parameter import Parameter
 Point = dict[str, dict[str, float]]
 AT_BOUND = 1e-6
 SCANS = ((0.06, 241), (0.012, 13), (0.003, 13))
-"""Relative half-widths, and values, of the scans of a parameter in which the prediction jumps; the first for thorough
-searches only: with hundreds of jumps in a record the right size stands in a basin a thousandth wide."""
+"""Relative half-widths, and values, of the scans of a parameter in which the prediction jumps. The first is for thorough
+searches of a single effect only: with hundreds of jumps in a record the right size stands in a basin a thousandth
+wide."""
 MANY_STEPS = 20
 
 
@@ -188,8 +189,9 @@ def fit(
             cost = _length(residual, residual, offsets, metric)
         if gained < 0.02 + 1e-5 * cost and step_number > 0:
             break
+    thorough = len(order) == 1 and iterations >= MANY_STEPS
     for i, (_, parameter) in enumerate(listed):
-        for width, count in SCANS[iterations < MANY_STEPS :] if parameter.rugged else ():
+        for width, count in SCANS[not thorough :] if parameter.rugged else ():
             for value in np.clip(x[i] * (1.0 + width * np.linspace(-1.0, 1.0, count)), lower[i], upper[i]):
                 trial = x.copy()
                 trial[i] = value
