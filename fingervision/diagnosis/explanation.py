@@ -13,9 +13,8 @@ from fingervision.domain.parameter import Parameter
 Point = dict[str, dict[str, float]]
 AT_BOUND = 1e-6
 SCANS = ((0.06, 241), (0.012, 13), (0.003, 13))
-"""Relative half-widths, and values, of the scans of a parameter in which the prediction jumps. The first is for thorough
-searches of a single effect only: with hundreds of jumps in a record the right size stands in a basin a thousandth
-wide."""
+"""Relative half-widths, and values, of the scans of a parameter in which the prediction jumps. The first is for a
+thorough search of a single effect: with hundreds of jumps in a record the right size has a basin a thousandth wide."""
 MANY_STEPS = 20
 
 
