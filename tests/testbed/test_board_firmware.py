@@ -147,6 +147,14 @@ def test_a_motion_that_takes_too_long_loses_the_drive_line(emulated: EmulatedBoa
     assert (down.cycle - up.cycle) / HERTZ == pytest.approx(0.05, abs=2 * TICK_S)
 
 
+def test_a_slow_motion_may_take_minutes(emulated: EmulatedBoard, board: Board) -> None:
+    since = len(emulated.edges)
+    board.run(3, 66.0)  # 66.000 s less the 65.536 s that 16 bits of milliseconds hold are 0.464 s
+    up = emulated.wait_for(lambda edge: edge.level(DRIVE_PIN) == 1, since=since)
+    emulated.clock.wait_until(up.host_s + 0.6)
+    assert emulated.edges[-1].level(DRIVE_PIN) == 1
+
+
 def test_force_is_sampled_at_its_rate_without_loss_and_converted_rightly(emulated: EmulatedBoard, board: Board) -> None:
     emulated.say("adc 0 1234")
     emulated.clock.wait_until(emulated.clock.now_s() + 0.2)

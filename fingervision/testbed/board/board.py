@@ -3,6 +3,7 @@
 import random
 from collections import deque
 from dataclasses import dataclass
+from math import ceil
 from threading import Lock
 from typing import NoReturn
 
@@ -98,7 +99,7 @@ class Board:
     def run(self, code: int, at_most_s: float) -> None:
         """Set the select lines, let them settle, raise the drive line; the board drops it after the longest time."""
         self._driven_board_s = None
-        self._do(f"R {code:X} {min(round(1e3 * at_most_s), 0xFFFF):X}")
+        self._do(f"R {code:X} {ceil(1e3 * at_most_s):X}")
 
     def release(self) -> None:
         """Lower the drive line."""

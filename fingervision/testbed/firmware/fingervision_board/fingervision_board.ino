@@ -92,7 +92,7 @@ const __FlashStringHelper *start(uint8_t &at, bool &fine) {
 
 const __FlashStringHelper *move(uint8_t &at, bool &fine) {
     uint16_t code = wire::hex_at(at, fine);
-    uint16_t at_most_ms = wire::hex_at(at, fine);
+    uint32_t at_most_ms = wire::hex_at(at, fine);
     if (!fine || code > 15 || at_most_ms == 0) return F("value");
     if (const __FlashStringHelper *why = hindrance()) return why;
     if (tick::settling || lines::active(lines::DRIVE) || lines::active(lines::BUSY)) return F("busy");

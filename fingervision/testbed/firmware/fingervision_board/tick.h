@@ -45,7 +45,8 @@ volatile uint16_t silent_ms = 0;
 
 uint8_t period_ms, settle_ms;
 uint16_t watchdog_ms;
-volatile uint16_t settle_left_ms, driven_ms, longest_ms;
+volatile uint16_t settle_left_ms;
+volatile uint32_t driven_ms, longest_ms;  // a slow motion takes minutes
 volatile bool settling = false;
 uint16_t since_sample_ms, sample_number;
 uint8_t change_number;
@@ -118,7 +119,7 @@ void halt() {
 }
 
 // Begin a move: the step's code, then after the settling time the drive line; no settling sets both in one write.
-void move(uint8_t code, uint16_t at_most_ms) {
+void move(uint8_t code, uint32_t at_most_ms) {
     ATOMIC_BLOCK(ATOMIC_RESTORESTATE) {
         busy_seen = false;
         driven_ms = 0;
