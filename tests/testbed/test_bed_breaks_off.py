@@ -16,7 +16,7 @@ from fingervision.storage.samples_csv import read_samples
 from tests.testbed.simulated_beds import SHORT, recipe_at, run
 
 PACE = ("--real-time",)
-MOMENTS = 3
+MOMENTS = 2
 LOST_AT_MOST_S = 1.0
 PATIENCE_S = 60.0
 
