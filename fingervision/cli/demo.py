@@ -37,7 +37,7 @@ def command(hide: tuple[str, ...], seed: int, out: Path) -> None:
         f"{name} ({', '.join(f'{key} = {value:.4g}' for key, value in values.items())})"
         for name, values in hidden.effects.items()
     )
-    ending = "found" if shown.found else "not settled"
+    ending = "found" if shown.found else "among what no further run was proposed for" if shown.among else "not found"
     runs = "one run" if shown.runs == 1 else f"{shown.runs} runs"
     click.echo(f"Hidden was {truth or 'nothing'}: {ending} after {runs}.")
     click.echo(f"Report: {shown.page}")
