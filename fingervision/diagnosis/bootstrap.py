@@ -16,6 +16,9 @@ SURELY = 3.0
 """Standard errors of the quantile beyond which no further draw would change the answer."""
 LONG = 6000
 """Samples above which fewer draws must do."""
+LINEAR_DRAWS = 300
+REFIT_MARGIN = 0.2
+"""Share at most by which the threshold of linear signatures is raised for all that refitting finds between them."""
 REFITTED = 2
 """Effects of each draw that are refitted: those whose signatures take the most of it."""
 GUMBEL = float(-np.log(-np.log(QUANTILE)) - np.euler_gamma) * float(np.sqrt(6.0)) / float(np.pi)
@@ -35,6 +38,27 @@ def noise_doubt(problem: Problem) -> float:
         rho = noise.correlation
         parts.append((2.0 + share * 4.0 * rho**2 / (1.0 - rho**2)) / rows)
     return float(np.sqrt(np.mean(parts)))
+
+
+def linear_threshold(problem: Problem, columns: Array, sigma: tuple[float, ...], rng: np.random.Generator) -> float:
+    """Largest gain that any column takes from noise alone, at the quantile of the family."""
+    offsets, metric = problem.offsets, problem.offsets.metric(sigma)
+    kept = columns if columns.shape[0] <= 6000 else columns[:: columns.shape[0] // 4000]
+    noise = rng.standard_normal((kept.shape[0], LINEAR_DRAWS))
+    if kept.shape[0] == columns.shape[0]:
+        shared = offsets.design.T @ columns
+        prior = np.array([sigma[c] for c in range(offsets.channels) for _ in range(offsets.runs)])
+        noise += offsets.design[:, : prior.size] @ (prior[:, None] * rng.standard_normal((prior.size, LINEAR_DRAWS)))
+        noise -= offsets.design @ (metric @ (offsets.design.T @ noise))
+        norm = np.einsum("ij,ij->j", columns, columns) - np.einsum("ij,ij->j", shared, metric @ shared)
+    else:
+        norm = np.einsum("ij,ij->j", kept, kept)
+    usable = norm > 1e-9
+    gains = (kept.T[usable] @ noise) ** 2 / norm[usable, None]
+    # The noise itself is estimated, from as many samples as there are.
+    doubt = np.exp(noise_doubt(problem) * rng.standard_normal(LINEAR_DRAWS))
+    quantile = float(np.quantile(gains.max(axis=0) * doubt, QUANTILE))
+    return quantile * (1.0 + min(REFIT_MARGIN, 3.0 * float(np.sqrt(2.0 / columns.shape[0])))) + 1.5
 
 
 def noise_alone(problem: Problem, base: Explanation, rng: np.random.Generator) -> tuple[Problem, Array]:

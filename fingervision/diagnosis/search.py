@@ -5,22 +5,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fingervision.diagnosis.bootstrap import QUANTILE, exceeds_noise, noise_doubt
+from fingervision.diagnosis.bootstrap import exceeds_noise, linear_threshold
 from fingervision.diagnosis.explanation import Explanation, Problem, fit
-from fingervision.diagnosis.probes import probes
+from fingervision.diagnosis.indistinguishable import beside_foretold, indistinguishable, surprise
 from fingervision.diagnosis.signatures import Signatures, signatures, tangents
-from fingervision.domain.effect import Array
+from fingervision.diagnosis.staircase import below_the_staircase
+from fingervision.diagnosis.unexplained import SMALL_SHARE, unexplained
 from fingervision.domain.report import Verdict
 
 Progress = Callable[[float], None]
-DRAWS = 300
-INDISTINGUISHABLE = 9.0
-BARE_MENTION = 3.0
-"""Below this difference of BIC simplicity is no evidence (Kass & Raftery 1995): tables of a score of rows."""
-ADMISSIBLE = 21.0
-"""Chi-square by which a true explanation 9 away can come out worse, at 95 %: 9 + 1.96 * 2 * sqrt(9)."""
-SMALL_SHARE = 0.05
-"""What the catalogue's form leaves over of the truth's is a few per cent of what was explained, no second name."""
 FORM_SHARE = 0.02
 """Share of what is explained below which the difference between two forms is their own fault: no reason to choose the
 richer one, such as a resonance for a delay that falls between two samples."""
@@ -31,10 +24,6 @@ SUSPECTS = 2
 """Explanations of the measurement that are tried on every draw of noise as well."""
 CLEARLY = 2.5
 """Times the linear threshold above which a gain needs no bootstrap to be judged."""
-REFIT_MARGIN = 0.2
-"""Share at most by which the threshold of linear signatures is raised for all that refitting finds between them."""
-STAIRCASE_SHARE = 0.5
-"""What is smaller than half an encoder step's own error is not told from it: the staircase is no random noise."""
 SHORT = 100
 """Samples below which the noise is estimated beside single effects only."""
 
@@ -54,27 +43,6 @@ class Findings:
     smallest: dict[str, dict[str, object]]
     distances: dict[tuple[str, ...], float]
     problem: Problem
-
-
-def _null_maximum(problem: Problem, columns: Array, sigma: tuple[float, ...], rng: np.random.Generator) -> float:
-    """Largest gain that any column takes from noise alone, at the quantile of the family."""
-    offsets, metric = problem.offsets, problem.offsets.metric(sigma)
-    kept = columns if columns.shape[0] <= 6000 else columns[:: columns.shape[0] // 4000]
-    noise = rng.standard_normal((kept.shape[0], DRAWS))
-    if kept.shape[0] == columns.shape[0]:
-        shared = offsets.design.T @ columns
-        prior = np.array([sigma[c] for c in range(offsets.channels) for _ in range(offsets.runs)])
-        noise += offsets.design[:, : prior.size] @ (prior[:, None] * rng.standard_normal((prior.size, DRAWS)))
-        noise -= offsets.design @ (metric @ (offsets.design.T @ noise))
-        norm = np.einsum("ij,ij->j", columns, columns) - np.einsum("ij,ij->j", shared, metric @ shared)
-    else:
-        norm = np.einsum("ij,ij->j", kept, kept)
-    usable = norm > 1e-9
-    gains = (kept.T[usable] @ noise) ** 2 / norm[usable, None]
-    # The noise itself is estimated, from as many samples as there are.
-    doubt = np.exp(noise_doubt(problem) * rng.standard_normal(DRAWS))
-    quantile = float(np.quantile(gains.max(axis=0) * doubt, QUANTILE))
-    return quantile * (1.0 + min(REFIT_MARGIN, 3.0 * float(np.sqrt(2.0 / columns.shape[0])))) + 1.5
 
 
 def _singles(problem: Problem, atoms: Signatures, iterations: int) -> list[Explanation]:
@@ -123,26 +91,10 @@ def _extended(
     )
 
 
-def _distance(problem: Problem, truth: Explanation, other: Explanation, sigma_mm: tuple[float, ...]) -> float:
-    """D_jk: squared whitened distance of one explanation's prediction to another, over the other's parameters.
-
-    Both directions count run offsets with the best explanation's spread: a worse one would hide its fault in them.
-    """
-    target = problem.whitened(truth.values)
-    return fit(problem, other.names, other.values, target=target, sigma_mm=sigma_mm, iterations=12).score
-
-
-def _staircase_mm(problem: Problem) -> float:
-    """Standard deviation that the steps of the input's encoder give the gap; 0 where none show."""
-    history = problem.chain.history
-    gap = problem.chain.stacked({})[: history.input_mm.size]
-    return float(np.ptp(gap)) / history.input_span_mm * history.input_step_mm / float(np.sqrt(12.0))
-
-
 def _added(problem: Problem, smaller: Explanation, larger: Explanation) -> float:
     """Size of what the larger explanation adds, as a share of all that it changes in the prediction, in mm."""
     bare, before, after = (problem.chain.stacked(values) for values in ({}, smaller.values, larger.values))
-    if np.sqrt(np.mean((after - before) ** 2)) < STAIRCASE_SHARE * _staircase_mm(problem):
+    if below_the_staircase(problem, float(np.sqrt(np.mean((after - before) ** 2)))):
         return 0.0
     return float(np.linalg.norm(after - before) / max(1e-12, float(np.linalg.norm(after - bare))))
 
@@ -192,7 +144,7 @@ def search(
     nothing = problem.nothing()
     samples = max(2, int(problem.measured.size))
     singles = _singles(problem, atoms, 20)
-    threshold = _null_maximum(problem, atoms.columns, nothing.sigma_mm, rng)
+    threshold = linear_threshold(problem, atoms.columns, nothing.sigma_mm, rng)
     progress(0.3)
     best, peers = nothing, [nothing]
     pairs = []
@@ -220,15 +172,15 @@ def search(
     if forced:
         best = _insisted(problem, forced, [*singles, *pairs], singles, samples)
     progress(0.82)
-    words, left = _gate(problem, best, rng)
+    words, left = unexplained(problem, best, rng)
     progress(0.9)
     alternatives, distances = (
         ([best], {})
         if forced or not best.names
-        else _set(problem, best, nothing, [*singles, *peers] if len(best.names) > 1 else singles, pairs)
+        else indistinguishable(problem, best, nothing, [*singles, *peers] if len(best.names) > 1 else singles, pairs)
     )
-    alternatives = _beside_foretold(problem, alternatives)
-    best = min(alternatives, key=lambda e: e.bic(samples) + _surprise(problem, e)) if best.names else best
+    alternatives = beside_foretold(problem, alternatives)
+    best = min(alternatives, key=lambda e: e.bic(samples) + surprise(problem, e)) if best.names else best
     alternatives.sort(key=lambda e: e is not best)
     verdict = Verdict.AGREES if not best.names else Verdict.NAMED if len(alternatives) == 1 else Verdict.AMBIGUOUS
     if words is not None:
@@ -251,38 +203,6 @@ def search(
     )
 
 
-def _gate(problem: Problem, best: Explanation, rng: np.random.Generator) -> tuple[str | None, str | None]:
-    """Test the largest of many probes; returns what is unknown, or what is left over but small."""
-    samples = problem.chain.history.input_mm.size
-    shapes = probes(problem.chain.history, problem.whitener, 2400 if samples <= 4000 else 800)
-    offsets, metric = problem.offsets, problem.offsets.metric(best.sigma_mm)
-    moved = shapes.columns - offsets.design @ (metric @ (offsets.design.T @ shapes.columns))
-    dot = moved.T @ best.residual
-    norm = np.einsum("ij,ij->j", shapes.columns, moved)
-    if best.names:
-        moves = tangents(problem, best)
-        bent = moves - offsets.design @ (metric @ (offsets.design.T @ moves))
-        cross = bent.T @ shapes.columns
-        inverse = np.linalg.pinv(moves.T @ bent)
-        dot = dot - cross.T @ (inverse @ (bent.T @ best.residual))
-        norm = norm - np.einsum("ij,ij->j", cross, inverse @ cross)
-    usable = norm > 1e-3 * np.maximum(np.einsum("ij,ij->j", shapes.columns, shapes.columns), 1e-12)
-    gain = np.where(usable, dot**2 / np.where(usable, norm, 1.0), 0.0)
-    threshold = _null_maximum(problem, shapes.columns[:, usable], best.sigma_mm, rng)
-    top = int(np.argmax(gain))
-    if gain[top] <= threshold:
-        return None, None
-    words = f"{shapes.words[top]} ({np.sqrt(gain[top]):.1f} sigma)"
-    changed = problem.whitened(best.values) - problem.whitened({})
-    explained = float(changed @ changed)
-    size_mm = abs(float(dot[top])) / float(norm[top]) * shapes.rms[top]
-    if size_mm < STAIRCASE_SHARE * _staircase_mm(problem):
-        return None, words
-    if best.names and gain[top] < SMALL_SHARE**2 * explained:
-        return None, words
-    return words, None
-
-
 def _insisted(
     problem: Problem, forced: frozenset[str], found: list[Explanation], singles: list[Explanation], samples: int
 ) -> Explanation:
@@ -293,81 +213,6 @@ def _insisted(
         return _choose(holding, samples) if able else problem.nothing()
     begin = {e.names[0]: e.values[e.names[0]] for e in singles if e.names[0] in able}
     return fit(problem, tuple(begin), begin, iterations=20)
-
-
-def _set(
-    problem: Problem, best: Explanation, nothing: Explanation, pool: list[Explanation], pairs: list[Explanation]
-) -> tuple[list[Explanation], dict[tuple[str, ...], float]]:
-    """Collect every minimal explanation that cannot be told apart from the best."""
-    members, distances = [best], {}
-    target = problem.whitened(best.values)
-    metric = problem.offsets.metric(best.sigma_mm)
-    rows = max(2, int(problem.measured.size - problem.whitener.aside.sum()))
-
-    def join(other: Explanation) -> None:
-        if other.names == best.names or any(set(m.names) <= set(other.names) for m in members):
-            return
-        near = _squared(problem, target - problem.whitened(other.values), metric)
-        if near > 400.0 and other.score - best.score > 200.0:
-            return
-        distance = near if near < INDISTINGUISHABLE else _distance(problem, best, other, best.sigma_mm)
-        if distance >= INDISTINGUISHABLE and other.score - best.score < ADMISSIBLE:
-            distance = min(distance, _distance(problem, other, best, best.sigma_mm))
-        distances[other.names] = distance
-        # One that leaves the data nearly as badly off as no effect at all explains nothing: the runs' scatter hides it.
-        idle = nothing.score - other.score < 0.3 * (nothing.score - best.score)
-        if distance < INDISTINGUISHABLE and not idle and other.score - best.score < ADMISSIBLE:
-            members.append(other)
-
-    def odds(explanation: Explanation) -> float:
-        return explanation.bic(rows) + _surprise(problem, explanation)
-
-    for other in pool:
-        join(other)
-    if len(best.names) == 1:
-        # Two effects beside one, only where every single one that would do is physically a surprise.
-        most = min(odds(member) for member in members) + BARE_MENTION
-        for pair in pairs:
-            if odds(pair) < most:
-                join(pair)
-    return [m for m in members if not any(set(o.names) < set(m.names) for o in members)], distances
-
-
-def _squared(problem: Problem, whitened: Array, metric: Array) -> float:
-    """Squared length of a whitened difference once run offsets are allowed."""
-    shared = problem.offsets.design.T @ whitened
-    return float(whitened @ whitened - shared @ metric @ shared)
-
-
-def _beside_foretold(problem: Problem, members: list[Explanation]) -> list[Explanation]:
-    """Drop what only imitates an effect that came just as the drawing foretells it: that would be a coincidence.
-
-    An end stop at the very input at which the drawn fingers meet is the drawn fingers' contact.
-    """
-
-    def foretold(explanation: Explanation, name: str) -> bool:
-        ranges, values = problem.effects[name].foretold, explanation.values[name]
-        return bool(ranges) and all(low <= values[key] <= high for key, (low, high) in ranges.items())
-
-    def imitates(other: Explanation, member: Explanation) -> bool:
-        own, theirs = set(member.names) - set(other.names), set(other.names) - set(member.names)
-        return (
-            bool(own and theirs)
-            and len(member.names) <= len(other.names)
-            and all(foretold(member, name) for name in own)
-            and not any(foretold(other, name) for name in theirs)
-        )
-
-    return [other for other in members if not any(imitates(other, member) for member in members)]
-
-
-def _surprise(problem: Problem, explanation: Explanation) -> float:
-    """Sum the squares of the parameters over their physical priors."""
-    return sum(
-        ((explanation.values[name][p.name] - (p.neutral or 0.0)) / p.typical) ** 2
-        for name, p in problem.parameters(explanation.names)
-        if p.typical is not None
-    )
 
 
 def _smallest(
