@@ -1,0 +1,74 @@
+"""Noise whose truth is known: its power where it is slow decides what counts as evidence."""
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from scipy.signal import lfilter
+
+from fingervision.diagnosis.noise import Noise
+from fingervision.diagnosis.noise_short import noise_of_short_runs
+from fingervision.diagnosis.noise_spectrum import noise_by_spectrum
+
+SEED = 3
+DRAWS = 30
+BIAS = 0.12
+"""Mean of the logarithm over 30 draws; one draw scatters by 0.1 to 0.3 (README), 30 of them by a fifth of that."""
+LOUDER = 2.0
+
+
+def drawn(rng: np.random.Generator, count: int, rho: float) -> NDArray[np.float64]:
+    start = rho * rng.standard_normal(1)
+    return np.asarray(lfilter([np.sqrt(1.0 - rho**2)], [1.0, -rho], rng.standard_normal(count), zi=start)[0])
+
+
+def slow_power(noise: Noise) -> float:
+    return float(noise.white_mm**2 + noise.correlated_mm**2 * (1.0 + noise.correlation) / (1.0 - noise.correlation))
+
+
+@pytest.mark.parametrize("rho", [0.0, 0.3, 0.5])
+def test_the_slow_power_of_long_records_has_no_bias(rho: float) -> None:
+    rng = np.random.default_rng(SEED)
+    runs = tuple(slice(340 * k, 340 * (k + 1)) for k in range(5))
+    none = np.zeros(1700, dtype=bool)
+    logs = []
+    for _ in range(DRAWS):
+        gap, midline = (np.concatenate([drawn(rng, 340, rho) for _ in runs]) for _ in range(2))
+        noises = noise_by_spectrum([LOUDER * gap, midline], runs, 5.0, [none, none], [0.0, 0.0], explained=True)
+        logs.append(np.log(slow_power(noises[0]) / LOUDER**2 * (1.0 - rho) / (1.0 + rho)))
+        assert noises[0].total_mm / noises[1].total_mm == pytest.approx(LOUDER, rel=0.2)
+    assert abs(float(np.mean(logs))) < BIAS
+
+
+def test_a_line_in_the_spectrum_is_no_noise() -> None:
+    rng = np.random.default_rng(SEED)
+    runs = (slice(0, 1000),)
+    none = np.zeros(1000, dtype=bool)
+    quiet = drawn(rng, 1000, 0.3)
+    (alone,) = noise_by_spectrum([quiet], runs, 5.0, [none], [0.0], explained=True)
+    hum = quiet + 3.0 * np.sin(2.0 * np.pi * 0.21 * np.arange(1000))
+    (beside,) = noise_by_spectrum([hum], runs, 5.0, [none], [0.0], explained=True)
+    assert beside.total_mm == pytest.approx(alone.total_mm, rel=0.05)
+
+
+@pytest.mark.parametrize("rho", [0.0, 0.5, 0.8])
+def test_short_records_show_their_correlation_on_average(rho: float) -> None:
+    rng = np.random.default_rng(SEED)
+    none = np.zeros(30, dtype=bool)
+    found = []
+    for _ in range(DRAWS):
+        pair = [drawn(rng, 30, rho) for _ in range(2)]
+        found.append(
+            noise_of_short_runs(pair, (slice(0, 30),), [none, none], [0.0, 0.0], explained=True)[0].correlation
+        )
+    # The flat prior on 0 to 0.95 draws 60 samples' estimate towards its middle.
+    assert float(np.mean(found)) == pytest.approx(rho, abs=0.17)
+
+
+def test_what_is_not_yet_explained_does_not_count_as_correlation() -> None:
+    rng = np.random.default_rng(SEED)
+    none = np.zeros(40, dtype=bool)
+    bent = drawn(rng, 40, 0.0) + 6.0 * np.linspace(-1.0, 1.0, 40) ** 2
+    noises = noise_of_short_runs(
+        [bent, drawn(rng, 40, 0.0)], (slice(0, 40),), [none, none], [0.0, 0.0], explained=False
+    )
+    assert noises[0].correlation < 0.35

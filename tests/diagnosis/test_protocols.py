@@ -1,0 +1,43 @@
+"""Runs that are proposed: the motion that a recipe's steps stand for, as a bed drives it."""
+
+import numpy as np
+import pytest
+
+from fingervision.diagnosis.protocols import SAMPLES_A_STROKE, driven, protocols, rounding_s
+
+STEP_S = 0.1
+
+
+def test_a_triangle_goes_there_and_back_at_its_speed() -> None:
+    step = {"kind": "triangle", "from_mm": -0.2, "to_mm": 0.6, "speed_mm_s": 0.4, "cycles": 2}
+    path = driven([step], STEP_S, 0.0)
+    assert (path[0], path[-1]) == pytest.approx((-0.2, -0.2))
+    assert path.size - 1 == round(4 * 0.8 / 0.4 / STEP_S)
+    assert np.max(np.abs(np.diff(path))) == pytest.approx(0.4 * STEP_S)
+
+
+def test_a_staircase_stands_on_every_level_one_way() -> None:
+    step = {"kind": "staircase", "from_mm": 0.0, "to_mm": 0.3, "steps": 3, "dwell_s": 2.0, "speed_mm_s": 0.5}
+    path = driven([step], STEP_S, 0.0)
+    assert np.all(np.diff(path) >= -1e-12)
+    for level in (0.0, 0.1, 0.2, 0.3):
+        assert np.sum(np.abs(path - level) < 1e-9) >= 20
+
+
+def test_corners_are_as_round_as_the_record_s_own() -> None:
+    sharp = {"kind": "triangle", "from_mm": 0.0, "to_mm": 1.0, "speed_mm_s": 0.5, "cycles": 3}
+    for seconds in (0.3, 0.8):
+        path = driven([sharp], 0.05, seconds)
+        assert rounding_s(path, 0.05, (slice(0, path.size),)) == pytest.approx(seconds, abs=0.11)
+
+
+@pytest.mark.parametrize("step_s", [0.05, 0.5, 2.0])
+def test_no_stroke_is_faster_than_the_samples_can_follow(step_s: float) -> None:
+    for _, steps in protocols(-0.5, 1.5, step_s):
+        for step in steps:
+            if step["kind"] == "triangle":
+                way = abs(float(str(step["to_mm"])) - float(str(step["from_mm"])))
+                assert way / float(str(step["speed_mm_s"])) >= 0.99 * SAMPLES_A_STROKE * step_s
+        path = driven(steps, step_s, 0.3)
+        assert path.min() > -0.5
+        assert path.max() < 1.5
