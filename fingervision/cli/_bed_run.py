@@ -86,6 +86,5 @@ def command(
     went_on = f", after {done.resumed_after} that were there" if done.resumed_after else ""
     click.echo(f"{done.counts.recorded} frames{went_on}, {done.counts.with_gap} with a gap: {out / 'samples.csv'}")
     if bed.model is not None:
-        click.echo(
-            f"next: fingervision diagnose {out / 'samples.csv'} --model {out / 'simulation.csv'} --out diagnosis"
-        )
+        table = out / ("samples.csv" if after is None else "joined.csv")
+        click.echo(f"next: fingervision diagnose {table} --model {out / 'simulation.csv'} --out diagnosis")

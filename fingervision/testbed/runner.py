@@ -105,11 +105,12 @@ class Runner:
     def follow(self, last: SampleRow) -> None:
         """Go on from the last row of an earlier run; to be called first."""
         self.run = run_number(last) + 1
-        since_s = PAUSE_S
-        if not self.bed.replays:
-            # Two clocks of unlike kind: what has passed between two runs is known to the second, and needs no better.
-            since_s = max(PAUSE_S, self.bed.clock.now_s() - last.arrived_s)
-        self._base_s = last.time_s + since_s
+        if self.bed.replays:
+            # The simulated camera's clock goes on.
+            self._zero_s = last.camera_s - last.time_s
+        else:
+            # What has passed between two runs is known as well as the host's clock, and needs no better.
+            self._base_s = last.time_s + max(PAUSE_S, self.bed.clock.now_s() - last.arrived_s)
 
     def execute(self) -> Counts:
         """Run it to its end.

@@ -5,14 +5,16 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from click.testing import CliRunner
 
+from fingervision.cli import cli
 from fingervision.frames.source import open_source
 from fingervision.storage.measured_table import read_measured_table
 from fingervision.storage.samples_csv import read_samples
 from fingervision.storage.simulation_table import read_simulation_table
 from fingervision.testbed.hidden import Hidden
 from fingervision.vision.pipeline import Settings, measure_frame
-from tests.testbed.simulated_beds import run, steps
+from tests.testbed.simulated_beds import recipe_at, run, steps
 
 # Frames of 640 columns with 2 grey levels of noise: 0.014 px of each gap, 0.4 um; five of them, and the stage's place.
 GAP_MM = 0.004
@@ -118,3 +120,22 @@ def test_what_is_hidden_acts_where_it_belongs(tmp_path: Path) -> None:
     moved = drift.time_s > 0.3
     assert np.polyfit(drift.time_s[moved], drift.midline_mm[moved], 1)[0] == pytest.approx(0.05, rel=0.02)
     assert np.median(drift.gap_mm - bare.gap_mm) == pytest.approx(0.0, abs=GAP_MM)
+
+
+def test_a_run_that_follows_another_goes_on_on_its_clock(tmp_path: Path) -> None:
+    recipe = recipe_at(tmp_path, steps('kind = "triangle"\nfrom_mm = 0.0\nto_mm = 0.3\nspeed_mm_s = 1.0'))
+    first, second = tmp_path / "first", tmp_path / "second"
+    drift = ["--hide", "camera_drift:rate_mm_per_s=0.05"]
+    for out, more in ((first, []), (second, ["--after", str(first)])):
+        done = CliRunner().invoke(cli, ["bed", "run", str(recipe), *drift, "--out", str(out), *more])
+        assert done.exception is None, done.output
+    assert "joined.csv --model" in done.output
+    table = read_measured_table(second / "joined.csv")
+    assert table.run_names == ("1", "2")
+    assert table.shared_clock
+    assert table.time_s is not None
+    assert table.midline_mm is not None
+    # The camera went on drifting in between.
+    moved = table.time_s > 0.3
+    assert np.polyfit(table.time_s[moved], table.midline_mm[moved], 1)[0] == pytest.approx(0.05, rel=0.02)
+    assert (first / "samples.csv").read_bytes() != (second / "samples.csv").read_bytes()
