@@ -19,9 +19,9 @@ from fingervision.live.exposure import Exposure
 from fingervision.live.history import History
 from fingervision.live.promptness import be_prompt
 from fingervision.live.recorder import Recorder
-from fingervision.live.rehearsal import rehearse
 from fingervision.live.run_folder import RecordedFrame, RunFolder
 from fingervision.measuring.other_camera import other_camera
+from fingervision.measuring.rehearsal import rehearse
 from fingervision.measuring.rows import Result, RowMaker
 from fingervision.storage.gaps_csv import GapRow
 from fingervision.vision.pipeline import measure_frame

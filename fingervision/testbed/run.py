@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from fingervision.domain.recipe import Recipe
+from fingervision.measuring.rehearsal import rehearse
 from fingervision.storage.samples_csv import SampleRow
 from fingervision.storage.toml_section import Section
 from fingervision.testbed import by_hand
@@ -73,6 +74,9 @@ def run_recipe(
     FingervisionError
         In a sentence; the motor stands, and the folder is valid.
     """
+    if not bed.replays:
+        # Compiling holds all threads up for longer than a board lets its motor go on without a word.
+        rehearse(lambda _, words: say(words))
     sight = Sight(bed)
     sight.position.read()
     # A real stage is sent to its reference first: where it stands before, nobody knows.
