@@ -162,8 +162,11 @@ def rows_before(path: Path) -> list[SampleRow]:
 
 
 def times_of(rows: Sequence[SampleRow]) -> tuple[float, float] | None:
-    """First and last time of rows on their bed's clock; None without rows."""
-    return (rows[0].arrived_s, rows[-1].arrived_s) if rows else None
+    """Times of the first row of a step (those before it are at rest) and of the last; None without rows."""
+    if not rows:
+        return None
+    began_s = next((row.arrived_s for row in rows if row.step > 0), rows[0].arrived_s)
+    return began_s, rows[-1].arrived_s
 
 
 def _claim(path: Path) -> None:
