@@ -139,3 +139,10 @@ def test_a_run_that_follows_another_goes_on_on_its_clock(tmp_path: Path) -> None
     moved = table.time_s > 0.3
     assert np.polyfit(table.time_s[moved], table.midline_mm[moved], 1)[0] == pytest.approx(0.05, rel=0.02)
     assert (first / "samples.csv").read_bytes() != (second / "samples.csv").read_bytes()
+
+
+def test_a_reference_slot_shows_a_wrong_scale(tmp_path: Path) -> None:
+    text = steps('kind = "reference_slot"\nsize_mm = 4.0\nu_size_mm = 0.002')
+    assert run(tmp_path, text, Hidden({"scale_error": {"ratio": 0.02}})).counts.recorded == 0
+    (found,) = json.loads((tmp_path / "run" / "run.json").read_text())["reference_slots"]
+    assert found["ratio"] == pytest.approx(1.02, abs=2e-4)

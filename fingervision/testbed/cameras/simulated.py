@@ -8,6 +8,7 @@ import numpy as np
 from fingervision.domain.direction import Direction
 from fingervision.domain.errors import FingervisionError
 from fingervision.domain.frame import Coding, Frame
+from fingervision.domain.response import Response
 from fingervision.frames.source import Description
 from fingervision.rendering import EVEN_LIGHT, Camera, Patch, Scene, render, two_fingers
 from fingervision.rendering.targets import slot
@@ -129,18 +130,19 @@ class SimulatedCamera:
         """Draw what the shot saw."""
         optics, placed = self._optics, shot.placed
         if placed.slot_mm is not None:
-            scene = self._slot(placed.slot_mm)
+            scene = self._slot(self._gripper.slot_at(placed.slot_mm, shot.exposed_s - optics.late_s))
         else:
             scene = self._scene(shot.exposed_s - optics.late_s, placed)
         rng = np.random.default_rng([self._seed, 5, abs(shot.exposure)])
         return np.asarray(render(scene, optics.camera, rng), dtype=np.uint8)
 
-    def _slot(self, size_mm: float) -> Scene:
+    def _slot(self, edges: Response) -> Scene:
         width_px, height_px = self.description.width_px, self.description.height_px
+        scale = self._optics.px_per_mm
         hole = slot(
-            size_mm * self._optics.px_per_mm,
+            float(edges.gap_mm[0]) * scale,
             0.7 * height_px,
-            x_px=(width_px - 1) / 2,
+            x_px=(width_px - 1) / 2 + float(edges.midline_mm[0]) * scale,
             y_px=(height_px - 1) / 2,
             frame=(width_px, height_px),
         )

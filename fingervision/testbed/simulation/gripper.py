@@ -112,6 +112,20 @@ class SimulatedGripper:
         force = None if known.force_n is None else np.interp(at, grid_s, known.force_n)
         return Response(np.interp(at, grid_s, known.left_mm), np.interp(at, grid_s, known.right_mm), force)
 
+    def slot_at(self, width_mm: float, time_s: float) -> Response:
+        """Where the edges of a slot in the gripper's place are for the camera, with what moves its whole picture."""
+        began_s = self._motion.began_s() if self._since_s is None else self._since_s
+        times_s = np.array([min(began_s, time_s - self._period_s), time_s])
+        half = np.full(2, 0.5 * width_mm)
+        edges = Response(-half, half)
+        history = History(
+            input_mm=np.zeros(2), time_s=times_s, runs=(slice(0, 2),), rest_gap_mm=width_mm, opening_mm=0.0
+        )
+        for name, effect in catalogue().items():
+            if name in self._points and isinstance(effect, PointEffect) and effect.stage == "camera":
+                edges = effect.act(edges, history, self._points[name])
+        return Response(edges.left_mm[1:], edges.right_mm[1:])
+
     def _grid_s(self, time_s: float, since_s: float) -> Array:
         """Times to follow the stage at, for a time that is asked for; none before anything has happened."""
         until_s = time_s
