@@ -8,8 +8,8 @@ import numpy as np
 from fingervision.diagnosis.bootstrap import exceeds_noise, linear_threshold
 from fingervision.diagnosis.explanation import Explanation, Problem, fit
 from fingervision.diagnosis.indistinguishable import beside_foretold, indistinguishable, surprise
+from fingervision.diagnosis.input_error import below_the_input
 from fingervision.diagnosis.signatures import Signatures, signatures, tangents
-from fingervision.diagnosis.staircase import below_the_staircase
 from fingervision.diagnosis.unexplained import SMALL_SHARE, unexplained
 from fingervision.domain.report import Verdict
 
@@ -94,7 +94,7 @@ def _extended(
 def _added(problem: Problem, smaller: Explanation, larger: Explanation) -> float:
     """Size of what the larger explanation adds, as a share of all that it changes in the prediction, in mm."""
     bare, before, after = (problem.chain.stacked(values) for values in ({}, smaller.values, larger.values))
-    if below_the_staircase(problem, float(np.sqrt(np.mean((after - before) ** 2)))):
+    if below_the_input(problem, float(np.sqrt(np.mean((after - before) ** 2)))):
         return 0.0
     return float(np.linalg.norm(after - before) / max(1e-12, float(np.linalg.norm(after - bare))))
 

@@ -4,9 +4,9 @@ import numpy as np
 
 from fingervision.diagnosis.bootstrap import linear_threshold
 from fingervision.diagnosis.explanation import Explanation, Problem
+from fingervision.diagnosis.input_error import below_the_input
 from fingervision.diagnosis.probes import probes
 from fingervision.diagnosis.signatures import tangents
-from fingervision.diagnosis.staircase import below_the_staircase
 
 SMALL_SHARE = 0.05
 """What the catalogue's form leaves over of the truth's is a few per cent of what was explained, no second name."""
@@ -37,7 +37,7 @@ def unexplained(problem: Problem, best: Explanation, rng: np.random.Generator) -
     changed = problem.whitened(best.values) - problem.whitened({})
     explained = float(changed @ changed)
     size_mm = abs(float(dot[top])) / float(norm[top]) * shapes.rms[top]
-    if below_the_staircase(problem, size_mm):
+    if below_the_input(problem, size_mm):
         return None, words
     if best.names and gain[top] < SMALL_SHARE**2 * explained:
         return None, words
