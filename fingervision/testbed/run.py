@@ -8,7 +8,6 @@ from fingervision.domain.recipe import Recipe
 from fingervision.measuring.rehearsal import rehearse
 from fingervision.storage.samples_csv import SampleRow
 from fingervision.storage.toml_section import Section
-from fingervision.testbed import by_hand
 from fingervision.testbed.bed import Bed
 from fingervision.testbed.controls import Controls
 from fingervision.testbed.hidden import NOTHING, Hidden
@@ -79,7 +78,7 @@ def run_recipe(
         rehearse(lambda _, words: say(words))
     sight = Sight(bed)
     sight.position.read()
-    # A real stage is sent to its reference first: where it stands before, nobody knows.
+    # A real stage is sent to its reference before the first leg.
     at_mm = sight.position.newest if bed.replays else 0.0
     planned = plan(recipe, bed.limits, bed.model, at_mm, sight.rate_hz)
     check_moves(planned, bed, at_mm)
@@ -94,8 +93,6 @@ def run_recipe(
         )
         if before:
             runner.follow(before[-1])
-        if not bed.replays:
-            say(f"homed: {by_hand.home(bed):.3f} mm")
         counts = runner.execute()
         folder.finish(runner.found())
     except BaseException as error:

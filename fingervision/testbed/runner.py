@@ -13,6 +13,7 @@ from fingervision.domain.frame import Frame
 from fingervision.domain.status import Status
 from fingervision.storage.gaps_csv import GapRow
 from fingervision.storage.samples_csv import MM_PLACES, SampleRow
+from fingervision.testbed import by_hand
 from fingervision.testbed.bed import Bed
 from fingervision.testbed.controls import Controls
 from fingervision.testbed.legs import Close, Frames, Go, Leg, Rezero, Shift, Slot, Stand, Swing, Turn
@@ -133,6 +134,10 @@ class Runner:
         return Counts(self._rows, self._with_gap, self._lost)
 
     def _execute(self) -> None:
+        if not self.bed.replays:
+            # A real stage is sent to its reference first: where it stands nobody knows. Not without fingers in view.
+            self._find_fingers(self._look())
+            self.say(f"homed: {by_hand.home(self.bed):.3f} mm")
         for _ in range(FIRST_FRAMES):
             look = self._look()
         self._find_fingers(look)

@@ -4,6 +4,8 @@ import json
 import shutil
 import subprocess
 import sys
+from contextlib import suppress
+from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
 
@@ -12,7 +14,7 @@ import pytest
 from fingervision.domain.errors import FingervisionError
 from fingervision.storage.folder_lock import FolderLock
 from fingervision.storage.recipe_toml import read_recipe
-from fingervision.testbed.actuator import Alarm
+from fingervision.testbed.actuator import Actuator, Alarm
 from fingervision.testbed.bed import Bed
 from fingervision.testbed.hidden import Hidden
 from fingervision.testbed.put_together import open_bed
@@ -112,6 +114,29 @@ def test_a_camera_that_sees_no_fingers_lets_nothing_move(tmp_path: Path) -> None
     # Nothing was recorded: with the view mended, the same folder will do.
     config.write_text(BED.format(camera="", gap_mm=0.0))
     assert run(tmp_path, steps(MOVE), bed_name=str(config)).resumed_after == 0
+
+
+def test_a_stage_of_unknown_place_is_not_homed_before_the_fingers_were_seen(tmp_path: Path) -> None:
+    class Unhomed:
+        def __init__(self, actuator: Actuator) -> None:
+            self.actuator, self.homed = actuator, False
+
+        def __getattr__(self, name: str) -> object:
+            return getattr(self.actuator, name)
+
+        def home(self) -> None:
+            self.homed = True
+            self.actuator.home()
+
+    for camera, homed in (("off_centre_mm = 30.0", False), ("", True)):
+        config = tmp_path / "bed.toml"
+        config.write_text(BED.format(camera=camera, gap_mm=0.0))
+        bed = open_bed(str(config))
+        actuator = Unhomed(bed.actuator)
+        real = replace(bed, replays=False, actuator=actuator)  # type: ignore[arg-type]
+        with suppress(FingervisionError):
+            run_recipe(read_recipe(recipe_at(tmp_path, steps(MOVE))), real, tmp_path / f"run-{homed}")
+        assert actuator.homed == homed
 
 
 def test_a_gap_below_the_limit_stops_the_motor(tmp_path: Path) -> None:
