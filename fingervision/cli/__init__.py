@@ -7,7 +7,7 @@ import sys
 import click
 
 from fingervision import __version__
-from fingervision.domain.errors import FingervisionError
+from fingervision.domain.errors import ExitCode, FingervisionError
 
 
 class Commands(click.Group):
@@ -42,3 +42,15 @@ def main() -> None:
     except FingervisionError as error:
         click.echo(f"fingervision: {error}", err=True)
         sys.exit(error.exit_code)
+    except SystemError as error:
+        # Code that is being compiled hands Ctrl-C on as a failure of its own.
+        if not _interrupted(error):
+            raise
+        click.echo("Aborted!", err=True)
+        sys.exit(ExitCode.COULD_NOT)
+
+
+def _interrupted(error: BaseException | None) -> bool:
+    return error is not None and (
+        isinstance(error, KeyboardInterrupt) or _interrupted(error.__cause__ or error.__context__)
+    )

@@ -16,6 +16,7 @@ from fingervision.domain.region import Region
 from fingervision.domain.status import Status
 from fingervision.frames.ahead import decoded_ahead
 from fingervision.frames.source import Description, FrameSource
+from fingervision.measuring.asked_to_stop import asked_to_stop
 from fingervision.measuring.gap_figure import draw_gap
 from fingervision.measuring.other_camera import other_camera
 from fingervision.measuring.output_folder import OutputFolder, claimed
@@ -159,6 +160,7 @@ def measure(source: FrameSource, task: Task, out: Path, on_progress: Progress | 
     series = GapSeries()
     stopped = False
     with ExitStack() as stack:
+        asked = stack.enter_context(asked_to_stop())
         table = stack.enter_context(GapsCsv(folder.gaps, task.drive_columns))
         video = stack.enter_context(OverlayVideo(folder.overlay, description)) if task.overlay else None
         pending: list[Result] = []
@@ -186,6 +188,9 @@ def measure(source: FrameSource, task: Task, out: Path, on_progress: Progress | 
                     handed_over_at = monotonic()
                     if on_progress is not None:
                         on_progress(series.frames, description.frame_count)
+                if asked.is_set():
+                    break
+            stopped = asked.is_set()
         except KeyboardInterrupt:
             stopped = True
     if on_progress is not None:
