@@ -4,6 +4,8 @@ from pathlib import Path
 
 import click
 
+from fingervision.cli._which_model import kind_option, model_option
+
 EXAMPLES = """
 \b
 Examples:
@@ -18,22 +20,10 @@ Files written to --out: compare.json, compare.png
 
 @click.command(epilog=EXAMPLES)
 @click.argument("measured", type=click.Path(path_type=Path))
-@click.option(
-    "--model",
-    "model_path",
-    required=True,
-    type=click.Path(path_type=Path),
-    help="Simulation .csv, gripper.toml or model.toml.",
-)
+@model_option
 @click.option("--out", type=click.Path(path_type=Path, file_okay=False), default=Path("comparison"), show_default=True)
 @click.option("--seed", default=1, show_default=True, help="Of the bootstrapped threshold.")
-@click.option(
-    "--kind",
-    type=click.Choice(["stiffness_matrix", "lumped", "finite_element"]),
-    default="lumped",
-    show_default=True,
-    help="Which model answers for a gripper.toml.",
-)
+@kind_option
 @click.option("--json", "as_json", is_flag=True, help="Print compare.json.")
 def command(measured: Path, model_path: Path, out: Path, seed: int, kind: str, as_json: bool) -> None:
     """Say where a measured table and a model disagree beyond the noise."""

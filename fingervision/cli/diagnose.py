@@ -4,6 +4,7 @@ from pathlib import Path
 
 import click
 
+from fingervision.cli._which_model import kind_option, model_option
 from fingervision.domain.errors import UsageError
 
 EXAMPLES = """
@@ -23,24 +24,12 @@ Files written to --out:
 
 @click.command(epilog=EXAMPLES)
 @click.argument("measured", type=click.Path(path_type=Path))
-@click.option(
-    "--model",
-    "model_path",
-    required=True,
-    type=click.Path(path_type=Path),
-    help="Simulation .csv, gripper.toml or model.toml.",
-)
+@model_option
 @click.option("--out", type=click.Path(path_type=Path, file_okay=False), default=Path("diagnosis"), show_default=True)
 @click.option("--with", "forced", multiple=True, metavar="EFFECT", help="Insist on this effect.")
 @click.option("--without", multiple=True, metavar="EFFECT", help="Rule this effect out.")
 @click.option("--seed", default=1, show_default=True, help="Of the bootstrap: the same seed gives the same report.")
-@click.option(
-    "--kind",
-    type=click.Choice(["stiffness_matrix", "lumped", "finite_element"]),
-    default="lumped",
-    show_default=True,
-    help="Which model answers for a gripper.toml.",
-)
+@kind_option
 @click.option("--json", "as_json", is_flag=True, help="Print report.json.")
 def command(
     measured: Path,
