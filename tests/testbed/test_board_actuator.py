@@ -19,6 +19,8 @@ from tests.testbed.emulated_board import HERTZ, Edge, EmulatedBoard, MotorContro
 
 # Every motion of these tests ends long before.
 SOON_S = 5.0
+# A sample's age when it is read: 5 ms to the next one, 10 ms between looks, and what the wire and a busy host add.
+MOST_DELAY_S = 0.05
 # Steps 1 to 6; step n has code n, homing code 0.
 STEPS = """schema = 1
 [[step]]
@@ -172,6 +174,21 @@ def test_a_stop_drops_the_drive_line_and_the_position_is_unknown_until_an_absolu
         bed.actuator.run_step(3)
     bed.actuator.run_step(2)
     assert stands(bed) == 5.0
+
+
+def test_force_samples_keep_coming_while_a_stop_is_confirmed(bed: Bed, controller: MotorController) -> None:
+    assert bed.force_sensor is not None
+    bed.actuator.home()
+    stands(bed)
+    bed.actuator.run_step(5)
+    wait_until(bed, lambda: controller.codes == [0, 5])
+    bed.force_sensor.readings()
+    began_s = bed.clock.now_s()
+    bed.actuator.stop()
+    while bed.clock.now_s() < began_s + 0.2:
+        # Answers to a stop in each turn of the link took 100 ms.
+        assert bed.clock.now_s() - bed.force_sensor.readings()[-1].got_s < MOST_DELAY_S
+        bed.clock.wait_until(bed.clock.now_s() + 0.01)
 
 
 def test_an_alarm_stops_the_motion_and_is_cleared_by_homing(

@@ -18,6 +18,9 @@ from fingervision.testbed.board.port import BAUD
 from fingervision.testbed.clock import Clock
 
 ASK_EVERY_S = 0.02
+# A stop is asked for until it is confirmed, but not faster than the wire carries question and answer (3.5 ms): the
+# answers to a flood of them let no force sample through for a tenth of a second.
+STOP_EVERY_S = 0.005
 # An answer takes 3 ms on the wire, and up to 16 ms more in the buffers of a USB adapter.
 ANSWER_WITHIN_S, TRIES = 0.1, 5
 # The motor does not wait for this: the board has dropped the drive line long before.
@@ -240,7 +243,7 @@ class BoardLink:
                 "cable and its supply, and begin again."
             )
             return
-        if now_s - self._last_asked_s >= ASK_EVERY_S or self._stopping:
+        if now_s - self._last_asked_s >= (STOP_EVERY_S if self._stopping else ASK_EVERY_S):
             self._ask("Z" if self._stopping else "S")
         if now_s - self._last_fit_s >= REFIT_EVERY_S or self._joined is None:
             self._last_fit_s = now_s
