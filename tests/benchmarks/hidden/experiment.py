@@ -213,10 +213,14 @@ def measured(experiment: Experiment, traces: list[Trace], rng: np.random.Generat
     return columns
 
 
-def write(experiment: Experiment, folder: Path) -> None:
-    """Write measured.csv, simulation.csv and truth.json."""
+def first_columns(experiment: Experiment) -> dict[str, list[Array]]:
+    """Columns of the experiment's own runs, with the noise that its table has."""
+    return measured(experiment, experiment.traces(), np.random.default_rng([experiment.seed, 7]))
+
+
+def write_table(experiment: Experiment, columns: dict[str, list[Array]], folder: Path) -> None:
+    """Write measured.csv and simulation.csv."""
     folder.mkdir(parents=True, exist_ok=True)
-    columns = measured(experiment, experiment.traces(), np.random.default_rng([experiment.seed, 7]))
     with_force = experiment.plant.table.force_n is not None
     header = ["run", "time_s", "input_mm", "gap_mm", "left_mm", "right_mm"] + ["force_n"] * with_force
     lines = [",".join(header)]
@@ -227,6 +231,11 @@ def write(experiment: Experiment, folder: Path) -> None:
         lines += [f"run{k + 1}," + ",".join(f"{v:.9g}" for v in row) for row in zip(*values, strict=True)]
     (folder / "measured.csv").write_text("\n".join(lines) + "\n", encoding="utf-8")
     experiment.plant.table.write(folder / "simulation.csv")
+
+
+def write(experiment: Experiment, folder: Path) -> None:
+    """Write measured.csv, simulation.csv and truth.json."""
+    write_table(experiment, first_columns(experiment), folder)
     truth = {
         "hidden": [asdict(h) for h in experiment.plant.hidden],
         "foreign": asdict(experiment.plant.foreign) if experiment.plant.foreign else None,

@@ -4,16 +4,19 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tests.benchmarks.hidden.catalogue_chain import Samples
 from tests.benchmarks.hidden.diagnose_adapter import Answer
-from tests.benchmarks.hidden.experiment import measured
+from tests.benchmarks.hidden.experiment import Experiment, first_columns, measured
 from tests.benchmarks.hidden.explanations import known_effects, problem_of
 from tests.benchmarks.hidden.fit import Curve, Problem, fit
 from tests.benchmarks.hidden.plant import Trace
 from tests.benchmarks.hidden.recipe import drive_recipe
 from tests.benchmarks.hidden.reported_effects import reported_effects
 from tests.benchmarks.hidden.table_cache import JudgedTable
+
+Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,16 +60,23 @@ def separated(answer: Answer) -> list[frozenset[str]]:
     return [_names(s) for s in spoken] or list(answer.sets)
 
 
-def _joined(table: JudgedTable, runs: list[tuple[Trace, int]]) -> tuple[Problem, Curve]:
-    """Noisy runs as the judge fits them; the integer seeds each run's noise."""
-    experiment = table.experiment
-    traces = [trace for trace, _ in runs]
-    problem = problem_of(experiment, traces, known_input=False)
-    parts = []
-    for trace, seed in runs:
-        columns = measured(experiment, [trace], np.random.default_rng([experiment.seed, 13, seed]))
-        parts.append((columns["left_mm"][0], columns["right_mm"][0], columns["input_mm"][0], columns["force_n"][0]))
-    left, right, recorded, force = (np.concatenate(p) for p in zip(*parts, strict=True))
+Columns = dict[str, list[Array]]
+"""Columns of a measured table, one array a run."""
+
+
+def with_second(experiment: Experiment, traces: list[Trace]) -> Columns:
+    """Columns of the table as it was measured, and of further runs behind it."""
+    old = first_columns(experiment)
+    new = measured(experiment, traces, np.random.default_rng([experiment.seed, 13]))
+    return {key: old[key] + new[key] for key in old}
+
+
+def _joined(table: JudgedTable, traces: list[Trace], columns: Columns) -> tuple[Problem, Curve]:
+    """Noisy runs as the judge fits them."""
+    problem = problem_of(table.experiment, traces, known_input=False)
+    left, right, recorded, force = (
+        np.concatenate(columns[key]) for key in ("left_mm", "right_mm", "input_mm", "force_n")
+    )
     at = Samples(recorded, problem.at.run_time_s, problem.at.table_time_s, problem.at.starts)
     return Problem(problem.model, at, problem.weights), (right - left, (left + right) / 2, force)
 
@@ -80,15 +90,17 @@ def gain_that_came(table: JudgedTable, answer: Answer) -> Gain | None:
     own = frozenset(h.name for h in table.experiment.plant.hidden)
     if promise is None or own not in apart or len(apart) < 2:
         return None
-    old = [(trace, k) for k, trace in enumerate(table.experiment.traces())]
-    known = {c.name for c in known_effects(table.experiment, _joined(table, old)[0])}
+    experiment = table.experiment
+    traces = experiment.traces()
+    old = _joined(table, traces, first_columns(experiment))
+    known = {c.name for c in known_effects(experiment, old[0])}
     rivals = [names for names in apart if names != own and names <= known]
     if not rivals:
         return None
     path = table.folder / "diagnosis" / answer.report["next_run"]["recipe"]
-    new = [(trace, 100 + k) for k, trace in enumerate(drive_recipe(table.experiment, path))]
-    before = _advantage(table, answer, own, rivals, old)
-    after = _advantage(table, answer, own, rivals, old + new)
+    more = drive_recipe(experiment, path)
+    both = _joined(table, [*traces, *more], with_second(experiment, more))
+    before, after = (_advantage(table, answer, own, rivals, *data) for data in (old, both))
     return Gain(*promise, min(b - a for a, b in zip(before, after, strict=True)))
 
 
@@ -97,10 +109,10 @@ def _advantage(
     answer: Answer,
     own: frozenset[str],
     rivals: list[frozenset[str]],
-    runs: list[tuple[Trace, int]],
+    problem: Problem,
+    target: Curve,
 ) -> list[float]:
     """Chi-square by which what is hidden fits noisy runs better than each rival."""
-    problem, target = _joined(table, runs)
     known = known_effects(table.experiment, problem)
     reported = reported_effects(answer.report, known)
     distances = []

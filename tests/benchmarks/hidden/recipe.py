@@ -42,13 +42,18 @@ def motions_of(path: Path, closed_mm: float) -> list[Motion]:
     return [motion] if motion else []
 
 
-def drive_recipe(experiment: Experiment, path: Path) -> list[Trace]:
-    """The recipe's runs, after those of the table."""
+def drive(experiment: Experiment, motions: list[Motion]) -> list[Trace]:
+    """Further runs, after those of the table."""
     design = experiment.design
     started = 0.0 if design.time_restarts else experiment.starts_s()[-1] + design.motions[-1].duration_s + 30.0
     traces = []
-    for k, motion in enumerate(motions_of(path, experiment.plant.inputs.lower_mm)):
+    for k, motion in enumerate(motions):
         begin = started if not design.time_restarts else 0.0
         traces.append(experiment.plant.trace(motion, design.rate_hz, begin, len(design.motions) + k))
         started += motion.duration_s + 30.0
     return traces
+
+
+def drive_recipe(experiment: Experiment, path: Path) -> list[Trace]:
+    """The recipe's runs, after those of the table."""
+    return drive(experiment, motions_of(path, experiment.plant.inputs.lower_mm))
