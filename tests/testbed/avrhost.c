@@ -1,12 +1,16 @@
 /* An ATmega328P that runs a sketch in step with the wall clock, its serial line on a pseudo-terminal.
 
+   Its time stands while what it has said, on the serial line or on stdout, is not yet read: a computer that is busy with
+   other work does not fall behind the board.
+
    avrhost SKETCH.elf SLOWER CLOCK: SLOWER is how many times slower than the wall clock, CLOCK a file of 8 bytes, where
    the number of the cycle always stands. Then on stdin, one command a line:
        pin N LEVEL      what stands outside at Arduino pin N         adc CHANNEL MILLIVOLT
        spoil OUT IN     flip a bit in every OUT-th byte to the computer, every IN-th to the board (0: none)
        reset            what the reset button does                    unplug     pull the cable
    and on stdout:
-       pty PATH   port LETTER PORT DDR CYCLE   (a port's registers, hexadecimal, at each change) */
+       pty PATH   port LETTER PORT DDR CYCLE   (a port's registers, hexadecimal, at each change)
+       done CYCLE                              (a command) */
 #define _GNU_SOURCE
 #include <fcntl.h>
 #include <poll.h>
@@ -14,9 +18,9 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/ioctl.h>
 #include <sys/mman.h>
 #include <sys/prctl.h>
-#include <sys/resource.h>
 #include <termios.h>
 #include <time.h>
 #include <unistd.h>
@@ -27,6 +31,8 @@
 #include <simavr/avr_uart.h>
 
 enum { HERTZ = 16000000, PACE_CYCLES = HERTZ / 4000, LEAST_SLEEP_NS = 100000, MOST_HURRY_NS = 2000000 };
+/* How often it looks whether it was heard, and how long it waits for a reader before it holds that there is none. */
+enum { LOOK_NS = 100000, LISTENER_WITHIN_NS = 2000000000 };
 
 static avr_t *avr;
 static int line = -1, keeper = -1; /* keeper holds the slave open, so that a closing client is no pulled cable */
@@ -86,7 +92,10 @@ static void listen_outside(void) {
     struct pollfd waiting = {STDIN_FILENO, POLLIN, 0};
     while (poll(&waiting, 1, 0) > 0) {
         if (read(STDIN_FILENO, words + length, 1) != 1) exit(0);
-        if (words[length] == '\n') words[length] = 0, length = 0, obey(words);
+        if (words[length] == '\n') {
+            words[length] = 0, length = 0, obey(words);
+            printf("done %llu\n", (unsigned long long)avr->cycle);
+        }
         else if (length < sizeof words - 2) length++;
     }
 }
@@ -101,10 +110,32 @@ static void feed_serial(void) {
     }
 }
 
+static int unread(void) {
+    int on_line = 0, on_stdout = 0;
+    if (line >= 0) ioctl(keeper, FIONREAD, &on_line);
+    ioctl(STDOUT_FILENO, FIONREAD, &on_stdout);
+    return on_line + on_stdout;
+}
+
+/* The wall clock's time that was spent until everything was read. */
+static int64_t waited_ns(void) {
+    static int nobody_reads;
+    struct timespec look = {0, LOOK_NS};
+    int64_t since = now_ns();
+    if (!unread()) return nobody_reads = 0;
+    while (!nobody_reads && unread()) {
+        nanosleep(&look, NULL);
+        listen_outside();
+        nobody_reads = now_ns() - since > LISTENER_WITHIN_NS;
+    }
+    return now_ns() - since;
+}
+
 /* In step with the wall clock, with an ear to the outside; after a hold-up at most twice as fast, so that the computer
    keeps up with the board. It is a timer of the emulated chip, since a sleeping chip skips what lies between its timers. */
 static avr_cycle_count_t pace(avr_t *a, avr_cycle_count_t when, void *param) {
     (void)a, (void)param;
+    start_ns += start_ns ? waited_ns() : 0;
     int64_t now = now_ns(), run_ns = slower * when * 1000 / (HERTZ / 1000000);
     if (!start_ns) start_ns = now - run_ns;
     int64_t due = start_ns + run_ns;
@@ -151,7 +182,6 @@ int main(int argc, char **argv) {
     }
     setvbuf(stdout, NULL, _IOLBF, 0);
     prctl(PR_SET_TIMERSLACK, 1UL);
-    setpriority(PRIO_PROCESS, 0, -10); /* where it is allowed: a real board waits for no other process */
     printf("pty %s\n", path);
     avr_cycle_timer_register(avr, PACE_CYCLES, pace, NULL);
     for (;;) {

@@ -1,9 +1,6 @@
 """Boards for the tests of the bed: the real sketch, emulated."""
 
-import gc
-import os
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
 from io import StringIO
 from pathlib import Path
 
@@ -17,7 +14,6 @@ from tests.testbed.emulated_board import EmulatedBoard, MotorController, compile
 
 # In slow motion, so that a loaded machine is fast enough for the emulated board.
 SLOWER = 3
-PRIORITY = -10
 
 
 @pytest.fixture(scope="session")
@@ -32,7 +28,7 @@ def sketch(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
 @pytest.fixture
 def emulated(sketch: tuple[Path, Path]) -> Iterator[EmulatedBoard]:
     """A board that was just switched on."""
-    with ahead_of_others(), running(sketch, SLOWER) as board:
+    with running(sketch, SLOWER) as board:
         yield board
 
 
@@ -54,21 +50,3 @@ def hand_screw_bed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Bed:
     (tmp_path / "bed.toml").write_text('schema = 1\n[actuator]\nkind = "hand_screw"\nlower_mm = -1.0\nupper_mm = 6.0\n')
     monkeypatch.setattr("sys.stdin", StringIO("\n" * 100))
     return open_bed(str(tmp_path / "bed.toml"))
-
-
-@contextmanager
-def ahead_of_others() -> Iterator[None]:
-    """Run before other processes, where that is allowed, and without the pauses of Python's garbage collection.
-
-    Who drives a motor must not keep it waiting.
-    """
-    before = os.getpriority(os.PRIO_PROCESS, 0)
-    with suppress(PermissionError):
-        os.setpriority(os.PRIO_PROCESS, 0, PRIORITY)
-    gc.disable()
-    try:
-        yield
-    finally:
-        gc.enable()
-        with suppress(PermissionError):
-            os.setpriority(os.PRIO_PROCESS, 0, before)

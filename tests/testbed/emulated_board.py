@@ -139,6 +139,8 @@ class EmulatedBoard:
         self.clock = EmulatedTime(shown)
         self.edges: list[Edge] = [Edge(0, 0.0, dict.fromkeys("BCD", 0), dict.fromkeys("BCD", 0))]
         self.on_edge: list[Callable[[Edge, Edge], None]] = []
+        self._said = 0
+        self._done_s: list[float] = []
         self._news = Condition()
         self._process = subprocess.Popen(
             [host, elf, str(slower), shown],
@@ -156,10 +158,19 @@ class EmulatedBoard:
         """Settings for it."""
         return BoardSettings(port=self.port, lines=WIRING, **others)
 
-    def say(self, words: str) -> None:
-        """Tell the host to change something outside."""
+    def say(self, words: str) -> int:
+        """Tell the host to change something outside; give the number of that command."""
         assert self._process.stdin is not None
-        self._process.stdin.write(words + "\n")
+        with self._news:
+            self._process.stdin.write(words + "\n")
+            self._said += 1
+            return self._said - 1
+
+    def done_s(self, command: int) -> float:
+        """Wait until a command was done; when that was, on the host's clock."""
+        with self._news:
+            self._news.wait_for(lambda: len(self._done_s) > command)
+            return self._done_s[command]
 
     def outside(self, role: Role, on: bool) -> None:
         """Let a line from the motor controller say yes or no."""
@@ -198,7 +209,10 @@ class EmulatedBoard:
         assert self._process.stdout is not None
         for line in self._process.stdout:
             word, *values = line.split()
-            if word != "port":
+            if word == "done":
+                with self._news:
+                    self._done_s.append(self.clock.at(int(values[0])))
+                    self._news.notify_all()
                 continue
             letter, port, direction, cycle = values
             last = self.edges[-1]

@@ -71,6 +71,7 @@ kind = "simulated"
 [camera]
 kind = "source"
 source = "simulated"
+patience_s = 60.0
 latency_s = 0.0
 u_latency_s = 0.001
 [scale]

@@ -9,6 +9,7 @@ import pytest
 from fingervision.domain.errors import FingervisionError
 from fingervision.testbed.bed import Bed
 from fingervision.testbed.put_together import open_bed
+from fingervision.testbed.reading import Reading
 from tests.testbed.simulated_beds import live_camera_at
 
 # A part is looked at through a bed that it belongs to.
@@ -39,12 +40,30 @@ def needs_a_motor(bed: Bed) -> None:
         pytest.skip("a hand has its own speed, and stands when it has answered")
 
 
-def at_rest(bed: Bed) -> float:
+def until_rest(bed: Bed) -> tuple[Reading, ...]:
+    """Readings up to the end of the motion, the last of them at rest."""
     until_s = bed.clock.now_s() + PATIENCE_S
     while bed.actuator.busy:
         bed.clock.wait_until(bed.clock.now_s() + WAIT_S)
         assert bed.clock.now_s() < until_s
-    return bed.actuator.readings()[-1].value
+    return bed.actuator.readings()
+
+
+def at_rest(bed: Bed) -> float:
+    return until_rest(bed)[-1].value
+
+
+def moved_s(readings: tuple[Reading, ...]) -> float:
+    """How long it moved, by the actuator's own clock: a busy machine looks late, but the readings bear their times."""
+    first, last = readings[0].value, readings[-1].value
+    began_s = max(each.device_s for each in readings if each.value == pytest.approx(first, abs=1e-9))
+    ended_s = min(each.device_s for each in readings if each.value == pytest.approx(last, abs=1e-9))
+    return ended_s - began_s
+
+
+def known_mm(bed: Bed, speed_mm_s: float) -> float:
+    """How well readings tell the way of a motion: by the encoder's steps, and the time between two readings."""
+    return bed.actuator.limits.encoder_step_mm + 2.0 * WAIT_S * speed_mm_s
 
 
 def close_enough_mm(bed: Bed) -> float:
@@ -59,12 +78,11 @@ def test_an_actuator_goes_where_it_is_sent(bed: Bed) -> None:
 
 def test_a_motion_takes_the_time_that_its_speed_says(bed: Bed) -> None:
     needs_a_motor(bed)
-    began_s = bed.clock.now_s()
+    before = bed.actuator.readings()[-1:]
     bed.actuator.move(1.0, 2.0)
-    assert bed.actuator.busy
-    at_rest(bed)
-    # The way may be longer or shorter by the accuracy at either end; it is looked at every WAIT_S.
-    assert bed.clock.now_s() - began_s == pytest.approx(0.5, abs=2 * bed.actuator.limits.accuracy_mm / 2.0 + 2 * WAIT_S)
+    # The way may be longer or shorter by the accuracy at either end.
+    within_mm = 2.0 * bed.actuator.limits.accuracy_mm + known_mm(bed, 2.0)
+    assert moved_s(before + until_rest(bed)) == pytest.approx(0.5, abs=within_mm / 2.0)
 
 
 def test_homing_ends_at_zero(bed: Bed) -> None:
@@ -76,12 +94,15 @@ def test_homing_ends_at_zero(bed: Bed) -> None:
 
 def test_a_jog_ends_with_a_stop(bed: Bed) -> None:
     needs_a_motor(bed)
+    before = bed.actuator.readings()[-1:]
     bed.actuator.jog(0.5)
     bed.clock.wait_until(bed.clock.now_s() + 1.0)
     assert bed.actuator.busy
     bed.actuator.stop()
-    stopped_mm = at_rest(bed)
-    assert stopped_mm == pytest.approx(0.5, abs=close_enough_mm(bed) + 0.5 * WAIT_S)
+    readings = before + until_rest(bed)
+    stopped_mm = readings[-1].value
+    assert stopped_mm == pytest.approx(0.5 * moved_s(readings), abs=known_mm(bed, 0.5))
+    assert stopped_mm < bed.limits.upper_mm - close_enough_mm(bed)
     bed.clock.wait_until(bed.clock.now_s() + 0.5)
     assert bed.actuator.readings()[-1].value == stopped_mm
 
@@ -114,7 +135,7 @@ def test_beyond_its_limits_nothing_moves(bed: Bed, beyond_mm: float) -> None:
 
 def test_a_busy_actuator_refuses_another_motion(bed: Bed) -> None:
     needs_a_motor(bed)
-    bed.actuator.move(1.0, 1.0)
+    bed.actuator.move(5.0, 0.5)
     with pytest.raises(FingervisionError, match="is busy: stop it first"):
         bed.actuator.move(0.0, 1.0)
 
