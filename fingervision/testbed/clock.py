@@ -3,6 +3,9 @@
 from time import monotonic, sleep
 from typing import Protocol
 
+# A paced clock may be so much late for a moment, and catches up.
+MOST_HURRY_S = 0.25
+
 
 class Clock(Protocol):
     """The bed's time; every `asked_s`, `got_s` and `arrived_s` is on it."""
@@ -33,6 +36,8 @@ class HostClock:
 class VirtualClock:
     """Time of a bed without any real part: it passes only while somebody waits.
 
+    With a pace it goes no faster than that; what was missed, by a pause or a busy machine, is not hurried after.
+
     Parameters
     ----------
     pace : float
@@ -51,7 +56,7 @@ class VirtualClock:
         return self._now_s
 
     def wait_until(self, time_s: float) -> None:
-        """Let time pass until then; with a pace, no faster than that."""
+        """Let time pass until then."""
         self._now_s = max(self._now_s, time_s)
         if self._pace > 0.0:
             if self._host_began_s is None:
@@ -59,3 +64,5 @@ class VirtualClock:
             left_s = self._host_began_s + self._now_s / self._pace - monotonic()
             if left_s > 0.0:
                 sleep(left_s)
+            elif left_s < -MOST_HURRY_S:
+                self._host_began_s -= left_s

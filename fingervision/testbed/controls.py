@@ -3,7 +3,6 @@
 import signal
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from threading import Event
 from types import FrameType
 
 from fingervision.testbed.terminal import TERMINAL
@@ -14,31 +13,38 @@ PAUSE_LETTER, STOP_LETTER = "p", "q"
 class Controls:
     """What the user wants, from any thread.
 
+    Plain flags, each set in one instruction: a signal handler that had to wait for a lock would wait for the program
+    that it interrupted.
+
     Attributes
     ----------
-    stopped, paused : threading.Event
+    stopped, paused : bool
         Whether the run shall end, or wait.
+    halted : bool
+        Whether a pause has stopped the motor since somebody last set it to False.
     """
 
     def __init__(self) -> None:
-        self.stopped = Event()
-        self.paused = Event()
-        self._stop_motor: Callable[[], None] | None = None
+        self.stopped = self.paused = self.halted = False
+        self._stop_motor: Callable[[], None] = lambda: None
+
+    @property
+    def waits(self) -> bool:
+        """Whether nothing shall happen for now."""
+        return self.paused and not self.stopped
 
     def stop(self) -> None:
-        """End the run; the motor stops first."""
-        if self._stop_motor is not None:
-            self._stop_motor()
-        self.stopped.set()
+        """End the run; the motor stops at once."""
+        self.stopped = True
+        self._stop_motor()
 
     def toggle_pause(self) -> None:
-        """Pause, or go on."""
-        if self.paused.is_set():
-            self.paused.clear()
-        else:
-            if self._stop_motor is not None:
-                self._stop_motor()
-            self.paused.set()
+        """Pause, which stops the motor at once, or go on."""
+        if self.paused:
+            self.paused = False
+            return
+        self.halted = self.paused = True
+        self._stop_motor()
 
     @contextmanager
     def listening(self, stop_motor: Callable[[], None]) -> Iterator[None]:
@@ -47,7 +53,7 @@ class Controls:
         Parameters
         ----------
         stop_motor : callable
-            Stops the motor at once, from a signal handler.
+            Stops the motor at once, from a signal handler or another thread.
         """
         self._stop_motor = stop_motor
 
@@ -56,12 +62,12 @@ class Controls:
 
         before = {each: signal.signal(each, note) for each in (signal.SIGINT, signal.SIGTERM)}
         try:
-            with TERMINAL.listening(self._letter, self.stopped.is_set):
+            with TERMINAL.listening(self._letter, lambda: self.stopped):
                 yield
         finally:
             for each, handler in before.items():
                 signal.signal(each, handler)
-            self._stop_motor = None
+            self._stop_motor = lambda: None
 
     def _letter(self, line: str) -> None:
         letter = line.strip().lower()

@@ -89,3 +89,19 @@ class Leg:
     step: int
     section: Section
     key: str = "kind"
+
+    @property
+    def words(self) -> str:
+        """What is done, for people."""
+        match self.act:
+            case Go(to_mm, speed, _):
+                return f"to {to_mm:g} mm at {speed:g} mm/s"
+            case Stand(seconds, _):
+                return f"stand for {seconds:g} s"
+            case Swing(mean_mm, amplitude_mm, frequency_hz, _):
+                return f"swing about {mean_mm:g} mm by {amplitude_mm:g} mm at {frequency_hz:g} Hz"
+            case Close(speed, force_n):
+                return f"close at {speed:g} mm/s below {force_n:g} N"
+            case Slot(size_mm, _):
+                return f"measure the slot of {size_mm:g} mm"
+        return self.act.__class__.__name__.lower()

@@ -14,8 +14,10 @@ from fingervision.testbed.hidden import NOTHING, Hidden
 from fingervision.testbed.moves_check import check_moves
 from fingervision.testbed.plan import Plan, plan
 from fingervision.testbed.run_folder import BedRunFolder
-from fingervision.testbed.runner import Counts, Progress, Runner, Say
+from fingervision.testbed.run_record import Counts, RunRecord
+from fingervision.testbed.runner import Progress, Runner
 from fingervision.testbed.sight import Sight
+from fingervision.testbed.watch import Say, Watch
 
 
 @dataclass(frozen=True, slots=True)
@@ -88,9 +90,9 @@ def run_recipe(
         size_px = (sight.camera.description.width_px, sight.camera.description.height_px)
         left = max(sum(planned.seconds) * sight.rate_hz - len(folder.rows), 0.0)
         folder.needs_room(left, size_px)
-        runner = Runner(
-            bed, planned, sight, folder, controls or Controls(), recipe.below_force_n, on_progress=on_progress, say=say
-        )
+        record = RunRecord(folder, lambda bed_s, at_once: sight.position.at(bed_s, at_once=at_once))
+        watch = Watch(bed, sight, record, controls or Controls(), recipe.below_force_n, say)
+        runner = Runner(planned, watch, on_progress)
         if before:
             runner.follow(before[-1])
         counts = runner.execute()

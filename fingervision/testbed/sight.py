@@ -161,6 +161,17 @@ class Sight:
         force_now_n = None if self.force is None else self.force.newest
         return Look(shot, exposed_s, self.position.newest, force_n, force_now_n)
 
+    def clocks(self) -> dict[str, dict[str, float]]:
+        """How each instrument's clock is joined to the bed's, for run.json."""
+        camera = self.camera_clock.joined()
+        clocks = {"camera": {"offset_s": camera.bed_s - camera.camera_s, "rate": camera.rate, "u_s": camera.u_s}}
+        for name, instrument in (("actuator", self.position), ("force_sensor", self.force)):
+            joined = None if instrument is None else instrument.clock.joined()
+            if joined is not None:
+                u_s = joined.u_at(joined.board_s)
+                clocks[name] = {"offset_s": joined.host_s - joined.board_s, "rate": joined.rate, "u_s": u_s}
+        return clocks
+
     def measure(self, item: Frame | LostFrame) -> tuple[GapRow, str]:
         """Measure a picture: its row, and where there is no number the reason in a sentence."""
         outcome = item if isinstance(item, LostFrame) else measure_frame(item, self._settings)

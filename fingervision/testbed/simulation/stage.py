@@ -6,6 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
+Piece = tuple[float, float, float, float, float]
+"""Begin, position and speed there, acceleration, duration."""
 
 # With 16 m/s2 the paper's stage covers its 10 mm within 50 ms as a triangle of 400 mm/s (v = 2 s / T, a = 4 s / T2).
 ACCELERATION_MM_S2 = 16000.0
@@ -30,8 +32,8 @@ class SimulatedStage:
         self.lower_mm, self.upper_mm = lower_mm, upper_mm
         self._accuracy_mm = accuracy_mm
         self._phases = rng.uniform(0.0, 2.0 * np.pi, len(LEAD_PERIODS_MM))
-        # Begin, position and speed there, acceleration, duration.
-        self._pieces: list[tuple[float, float, float, float, float]] = [(-np.inf, 0.0, 0.0, 0.0, 0.0)]
+        # Replaced as a whole: another thread may stop the stage while this one looks where it is.
+        self._pieces: tuple[Piece, ...] = ((-np.inf, 0.0, 0.0, 0.0, 0.0),)
         self.homed_s: list[float] = []
         self.version = 0
 
@@ -70,25 +72,29 @@ class SimulatedStage:
         ramp_s = top_mm_s / a
         cruise_s = max(abs(way_mm) / top_mm_s - ramp_s, 0.0)
         v, a = copysign(top_mm_s, way_mm), copysign(a, way_mm)
+        pieces = list(self._pieces)
         for speed, acceleration, duration_s in ((0.0, a, ramp_s), (v, 0.0, cruise_s), (v, -a, ramp_s)):
-            self._pieces.append((begin_s, from_mm, speed, acceleration, duration_s))
+            pieces.append((begin_s, from_mm, speed, acceleration, duration_s))
             from_mm += speed * duration_s + 0.5 * acceleration * duration_s**2
             begin_s += duration_s
+        self._pieces = tuple(pieces)
         self.version += 1
 
     def halt(self, now_s: float) -> None:
         """Break off the motion under way as fast as the stage can."""
         if now_s >= self.planned_until_s:
             return
-        while self._pieces[-1][0] > now_s:
-            self._pieces.pop()
-        begin_s, from_mm, speed, acceleration, _ = self._pieces.pop()
+        begun = [piece for piece in self._pieces if piece[0] <= now_s]
+        begin_s, from_mm, speed, acceleration, _ = begun[-1]
         since_s = now_s - begin_s
-        self._pieces.append((begin_s, from_mm, speed, acceleration, since_s))
         at_mm = from_mm + speed * since_s + 0.5 * acceleration * since_s**2
         speed += acceleration * since_s
         braking_s = abs(speed) / ACCELERATION_MM_S2
-        self._pieces.append((now_s, at_mm, speed, -copysign(ACCELERATION_MM_S2, speed), braking_s))
+        self._pieces = (
+            *begun[:-1],
+            (begin_s, from_mm, begun[-1][2], acceleration, since_s),
+            (now_s, at_mm, speed, -copysign(ACCELERATION_MM_S2, speed), braking_s),
+        )
         self.version += 1
 
     def home(self, now_s: float, speed_mm_s: float) -> None:
@@ -116,5 +122,5 @@ class SimulatedStage:
         return np.asarray(rows[:, 1] + rows[:, 2] * since_s + 0.5 * rows[:, 3] * since_s**2, dtype=np.float64)
 
     def _pieces_at(self, time_s: Array) -> Array:
-        begins = np.array([piece[0] for piece in self._pieces])
-        return np.asarray(np.array(self._pieces)[np.searchsorted(begins, time_s, side="right") - 1])
+        pieces = np.array(self._pieces)
+        return np.asarray(pieces[np.searchsorted(pieces[:, 0], time_s, side="right") - 1])
