@@ -16,6 +16,8 @@ SURELY = 3.0
 """Standard errors of the quantile beyond which no further draw would change the answer."""
 LONG = 6000
 """Samples above which fewer draws must do."""
+OWN_QUANTILE = 0.95
+"""Of what one family takes from noise: as far out as so many draws tell."""
 LINEAR_DRAWS = 300
 REFIT_MARGIN = 0.2
 """Share at most by which the threshold of linear signatures is raised for all that refitting finds between them."""
@@ -40,8 +42,24 @@ def noise_doubt(problem: Problem) -> float:
     return float(np.sqrt(np.mean(parts)))
 
 
-def linear_threshold(problem: Problem, columns: Array, sigma: tuple[float, ...], rng: np.random.Generator) -> float:
-    """Largest gain that any column takes from noise alone, at the quantile of the family."""
+def linear_thresholds(
+    problem: Problem, names: tuple[str, ...], columns: Array, sigma: tuple[float, ...], rng: np.random.Generator
+) -> dict[str, float]:
+    """Gains above which noise alone lifts any family's best column once in so many tables.
+
+    A family of many shapes takes more from noise than a single column does; under one threshold for all it would be
+    raised for all. So each family is measured against its own upper tail, and the largest excess of all is what must be
+    rare: the families have equal shares in the false claims (Beran 1988).
+
+    Parameters
+    ----------
+    names : tuple of str, length k
+        Family of each column.
+    columns : ndarray of float, shape (m, k)
+        Whitened signatures or probes.
+    sigma : tuple of float
+        Spread of the run offsets, one a channel.
+    """
     offsets, metric = problem.offsets, problem.offsets.metric(sigma)
     kept = columns if columns.shape[0] <= 6000 else columns[:: columns.shape[0] // 4000]
     noise = rng.standard_normal((kept.shape[0], LINEAR_DRAWS))
@@ -54,11 +72,22 @@ def linear_threshold(problem: Problem, columns: Array, sigma: tuple[float, ...],
     else:
         norm = np.einsum("ij,ij->j", kept, kept)
     usable = norm > 1e-9
-    gains = (kept.T[usable] @ noise) ** 2 / norm[usable, None]
+    owner = np.array(names)
     # The noise itself is estimated, from as many samples as there are.
     doubt = np.exp(noise_doubt(problem) * rng.standard_normal(LINEAR_DRAWS))
-    quantile = float(np.quantile(gains.max(axis=0) * doubt, QUANTILE))
-    return quantile * (1.0 + min(REFIT_MARGIN, 3.0 * float(np.sqrt(2.0 / columns.shape[0])))) + 1.5
+    margin = 1.0 + min(REFIT_MARGIN, 3.0 * float(np.sqrt(2.0 / columns.shape[0])))
+    tail, excess = {}, np.full(LINEAR_DRAWS, -np.inf)
+    for name in dict.fromkeys(names):
+        mine = usable & (owner == name)
+        if not mine.any():
+            continue
+        gains = np.max((kept.T[mine] @ noise) ** 2 / norm[mine, None], axis=0) * doubt
+        # Refitting finds what lies between the shapes of the grid; a single column has no shape.
+        gains = gains * margin + 1.5 if mine.sum() > 1 else gains
+        tail[name] = float(np.quantile(gains, OWN_QUANTILE))
+        excess = np.maximum(excess, gains - tail[name])
+    beyond = float(np.quantile(excess, QUANTILE))
+    return {name: own + beyond for name, own in tail.items()}
 
 
 def noise_alone(problem: Problem, base: Explanation, rng: np.random.Generator) -> tuple[Problem, Array]:
@@ -110,15 +139,21 @@ def _autoregression(phi: float, count: int, rng: np.random.Generator) -> Array:
     return np.asarray(lfilter([1.0], [1.0, -phi], shocks, zi=start)[0], dtype=np.float64)
 
 
+def price(thresholds: Mapping[str, float], base: Explanation, names: tuple[str, ...]) -> float:
+    """What more effects than `base` has must gain at least."""
+    return max(thresholds[name] for name in names if name not in base.names)
+
+
 def exceeds_noise(
-    gained: float,
+    excess: float,
     problem: Problem,
     atoms: Signatures,
+    thresholds: Mapping[str, float],
     base: Explanation,
     suspects: list[dict[str, Mapping[str, float]]],
     rng: np.random.Generator,
 ) -> bool:
-    """Whether a gain is above the quantile of what the best of all further effects gains where there is none.
+    """Whether an excess over the thresholds is above the quantile of what any further effect has where there is none.
 
     Linear signatures on their grid of shapes take less from noise than the refitted effects do: a period finds its
     best place between two of the grid, an end stop the samples that it suits. So each draw is fitted with `base`,
@@ -126,7 +161,8 @@ def exceeds_noise(
     speaks for, with parameters: they are tried on every draw.
     """
     owner = np.array(atoms.names)
-    gains: list[float] = []
+    asking = np.array([thresholds.get(name, np.inf) for name in atoms.names])
+    found: list[float] = []
     quantile = 0.0
     doubt = noise_doubt(problem)
     for _ in range(DRAWS if problem.chain.history.input_mm.size <= LONG else LONG_DRAWS):
@@ -134,23 +170,28 @@ def exceeds_noise(
         alone = fit(shaken, base.names, base.values, target=target, iterations=5)
         along = tangents(problem, alone) if alone.names else None
         gain, coefficient = atoms.gains(alone.residual, problem.offsets, problem.offsets.metric(alone.sigma_mm), along)
-        gain[np.isin(owner, base.names)] = 0.0
+        above = np.where((gain > 0.0) & ~np.isin(owner, base.names), gain - asking, -np.inf)
         starts = [{**alone.values, **suspect} for suspect in suspects]
         asked = [name for suspect in suspects for name in suspect]
         for _ in range(len(asked) + REFITTED):
             # What the measurement speaks for first, wherever it suits this draw; then what suits the draw best.
             among = owner == asked.pop(0) if asked else np.ones(owner.size, dtype=bool)
-            top = int(np.argmax(np.where(among, gain, 0.0)))
-            if gain[top] > 0.0:
+            top = int(np.argmax(np.where(among, above, -np.inf)))
+            if np.isfinite(above[top]) and among[top]:
                 name = atoms.names[top]
                 starts.append({**alone.values, name: atoms.begin(top, float(coefficient[top]))})
-                gain[owner == name] = 0.0
-        scores = [fit(shaken, tuple(start), start, target=target, iterations=6).score for start in starts]
-        gains.append((alone.score - min([alone.score, *scores])) * float(np.exp(doubt * rng.standard_normal())))
-        spread = float(np.std(gains))
-        quantile = float(np.mean(gains)) + GUMBEL * spread
+                above[owner == name] = -np.inf
+        luck = float(np.exp(doubt * rng.standard_normal()))
+        fits = [fit(shaken, tuple(start), start, target=target, iterations=6) for start in starts]
+        found.append(
+            max(max(0.0, alone.score - e.score) * luck - price(thresholds, base, e.names) for e in fits)
+            if fits
+            else -min(thresholds.values())
+        )
+        spread = float(np.std(found))
+        quantile = float(np.mean(found)) + GUMBEL * spread
         # The quantile's own error is that of a mean and of GUMBEL standard deviations together.
-        error = spread * float(np.sqrt((1.0 + 0.5 * GUMBEL**2) / len(gains)))
-        if len(gains) >= FEWEST and abs(gained - quantile) > SURELY * error:
+        error = spread * float(np.sqrt((1.0 + 0.5 * GUMBEL**2) / len(found)))
+        if len(found) >= FEWEST and abs(excess - quantile) > SURELY * error:
             break
-    return gained > quantile
+    return excess > max(quantile, 0.0)

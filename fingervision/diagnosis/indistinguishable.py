@@ -1,11 +1,16 @@
 """Sets: every minimal explanation that these data cannot tell apart from the best."""
 
+from math import comb
+
+import numpy as np
+
 from fingervision.diagnosis.explanation import Explanation, Problem, fit
 from fingervision.domain.effect import Array
 
 INDISTINGUISHABLE = 9.0
-BARE_MENTION = 3.0
-"""Below this difference of BIC simplicity is no evidence (Kass & Raftery 1995): tables of a score of rows."""
+FREEDOM = 4.0
+"""Degrees of freedom of Student's t for the physical priors: a typical size is itself known roughly only, so that far
+beyond it surprise grows slowly (Lange, Little & Taylor 1989)."""
 ADMISSIBLE = 21.0
 """Chi-square by which a true explanation 9 away can come out worse, at 95 %: 9 + 1.96 * 2 * sqrt(9)."""
 
@@ -34,16 +39,13 @@ def indistinguishable(
         if distance < INDISTINGUISHABLE and not idle and other.score - best.score < ADMISSIBLE:
             members.append(other)
 
-    def odds(explanation: Explanation) -> float:
-        return explanation.bic(rows) + surprise(problem, explanation)
-
     for other in pool:
         join(other)
     if len(best.names) == 1:
-        # Two effects beside one, only where every single one that would do is physically a surprise.
-        most = min(odds(member) for member in members) + BARE_MENTION
+        # Two effects beside one, only where every single one that would do is physically the greater surprise.
+        most = min(odds(problem, member, rows) for member in members)
         for pair in pairs:
-            if odds(pair) < most:
+            if odds(problem, pair, rows) < most:
                 join(pair)
     return [m for m in members if not any(set(o.names) < set(m.names) for o in members)], distances
 
@@ -85,10 +87,25 @@ def beside_foretold(problem: Problem, members: list[Explanation]) -> list[Explan
     return [other for other in members if not any(imitates(other, member) for member in members)]
 
 
+def odds(problem: Problem, explanation: Explanation, rows: int) -> float:
+    """-2 log of the posterior odds: BIC, the parameters' surprise, and the price of having had a choice."""
+    return explanation.bic(rows) + surprise(problem, explanation) + choices(problem, explanation)
+
+
+def choices(problem: Problem, explanation: Explanation) -> float:
+    """-2 log of the prior share of one explanation among all of as many effects.
+
+    There are so many more pairs than single effects that some pair fits well by chance; all numbers of effects are
+    taken for equally likely beforehand (extended BIC, Chen & Chen 2008).
+    """
+    return 2.0 * float(np.log(comb(len(problem.effects), len(explanation.names))))
+
+
 def surprise(problem: Problem, explanation: Explanation) -> float:
-    """Sum the squares of the parameters over their physical priors."""
+    """-2 log of the physical priors' density at the parameters over that at their middle."""
     return sum(
-        ((explanation.values[name][p.name] - (p.neutral or 0.0)) / p.typical) ** 2
+        (FREEDOM + 1.0) * float(np.log1p(((value - (p.neutral or 0.0)) / p.typical) ** 2 / FREEDOM))
         for name, p in problem.parameters(explanation.names)
         if p.typical is not None
+        for value in [explanation.values[name][p.name]]
     )

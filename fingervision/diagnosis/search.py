@@ -1,16 +1,16 @@
 """Which effects: singles, pairs and triples, refitted in the chain; thresholds from a bootstrap of the null."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
-from fingervision.diagnosis.bootstrap import exceeds_noise, linear_threshold
+from fingervision.diagnosis.bootstrap import exceeds_noise, linear_thresholds, price
 from fingervision.diagnosis.explanation import Explanation, Problem, fit
-from fingervision.diagnosis.indistinguishable import beside_foretold, indistinguishable, surprise
+from fingervision.diagnosis.indistinguishable import beside_foretold, indistinguishable, odds
 from fingervision.diagnosis.input_error import below_the_input
 from fingervision.diagnosis.signatures import Signatures, signatures, tangents
-from fingervision.diagnosis.unexplained import SMALL_SHARE, unexplained
+from fingervision.diagnosis.unexplained import SMALL_SHARE, stands_in, unexplained
 from fingervision.domain.report import Verdict
 
 Progress = Callable[[float], None]
@@ -39,7 +39,6 @@ class Findings:
     singles: tuple[Explanation, ...]
     unknown: str | None
     left_over: str | None
-    threshold: float
     smallest: dict[str, dict[str, object]]
     distances: dict[tuple[str, ...], float]
     problem: Problem
@@ -144,21 +143,26 @@ def search(
     nothing = problem.nothing()
     samples = max(2, int(problem.measured.size))
     singles = _singles(problem, atoms, 20)
-    threshold = linear_threshold(problem, atoms.columns, nothing.sigma_mm, rng)
+    thresholds = linear_thresholds(problem, atoms.names, atoms.columns, nothing.sigma_mm, rng)
     progress(0.3)
     best, peers = nothing, [nothing]
     pairs = []
 
     def is_evidence(base: Explanation, found: list[Explanation]) -> bool:
-        gained = base.score - found[0].score if found else 0.0
-        if gained <= threshold or gained > CLEARLY * threshold:
-            return gained > threshold
+        asked = {e.names: price(thresholds, base, e.names) for e in found}
+        ranked = sorted(found, key=lambda e: e.score + asked[e.names])
+        if not ranked:
+            return False
+        gained = base.score - ranked[0].score
+        least = asked[ranked[0].names]
+        if gained <= least or gained > CLEARLY * least:
+            return gained > least
         suspects = [
             {name: e.values[name] for name in e.names if name not in base.names}
-            for e in found[:SUSPECTS]
+            for e in ranked[:SUSPECTS]
             if set(base.names) <= set(e.names)
         ]
-        return exceeds_noise(gained, problem, atoms, base, suspects, rng)
+        return exceeds_noise(gained - least, problem, atoms, thresholds, base, suspects, rng)
 
     if singles and (is_evidence(nothing, singles) or forced):
         best, peers = _simplest(singles[:6], samples, nothing), singles
@@ -167,7 +171,12 @@ def search(
         if pairs and _added(problem, best, pairs[0]) > SMALL_SHARE and is_evidence(best, pairs):
             best, peers = _choose(pairs[:6], samples), pairs
             triples = _extended(problem, atoms, pairs[:3], 24, lambda share: progress(0.7 + 0.1 * share))
-            if triples and _added(problem, best, triples[0]) > TRIPLE_SHARE and is_evidence(best, triples):
+            if (
+                triples
+                and _added(problem, best, triples[0]) > TRIPLE_SHARE
+                and is_evidence(best, triples)
+                and not stands_in(problem, triples[0], [nothing, singles[0], *pairs[:2]])
+            ):
                 best, peers = _choose(triples[:6], samples), triples
     if forced:
         best = _insisted(problem, forced, [*singles, *pairs], singles, samples)
@@ -180,7 +189,7 @@ def search(
         else indistinguishable(problem, best, nothing, [*singles, *peers] if len(best.names) > 1 else singles, pairs)
     )
     alternatives = beside_foretold(problem, alternatives)
-    best = min(alternatives, key=lambda e: e.bic(samples) + surprise(problem, e)) if best.names else best
+    best = min(alternatives, key=lambda e: odds(problem, e, samples)) if best.names else best
     alternatives.sort(key=lambda e: e is not best)
     verdict = Verdict.AGREES if not best.names else Verdict.NAMED if len(alternatives) == 1 else Verdict.AMBIGUOUS
     if words is not None:
@@ -196,8 +205,7 @@ def search(
         tuple(singles),
         words,
         left,
-        threshold,
-        _smallest(problem, atoms, nothing, threshold),
+        _smallest(problem, atoms, nothing, thresholds),
         distances,
         problem,
     )
@@ -216,15 +224,17 @@ def _insisted(
 
 
 def _smallest(
-    problem: Problem, atoms: Signatures, nothing: Explanation, threshold: float
+    problem: Problem, atoms: Signatures, nothing: Explanation, thresholds: Mapping[str, float]
 ) -> dict[str, dict[str, object]]:
     """State the size of each effect that this data would have shown."""
     metric = problem.offsets.metric(nothing.sigma_mm)
     shared = problem.offsets.design.T @ atoms.columns
     norm = np.einsum("ij,ij->j", atoms.columns, atoms.columns) - np.einsum("ij,ij->j", shared, metric @ shared)
     out: dict[str, dict[str, object]] = {}
-    needed = float(np.sqrt(threshold)) + 1.645
     for name in problem.effects:
+        if name not in thresholds:
+            continue
+        needed = float(np.sqrt(thresholds[name])) + 1.645
         amplitudes = {p.name: p for _, p in problem.parameters((name,)) if p.neutral is not None}
         sizes: list[tuple[float, str]] = []
         for k in (k for k, owner in enumerate(atoms.names) if owner == name and norm[k] > 0.0):

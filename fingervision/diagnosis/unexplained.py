@@ -2,34 +2,81 @@
 
 import numpy as np
 
-from fingervision.diagnosis.bootstrap import linear_threshold
+from fingervision.diagnosis.bootstrap import linear_thresholds
 from fingervision.diagnosis.explanation import Explanation, Problem
+from fingervision.diagnosis.indistinguishable import choices
 from fingervision.diagnosis.input_error import below_the_input
-from fingervision.diagnosis.probes import probes
+from fingervision.diagnosis.probes import Probes, probes
 from fingervision.diagnosis.signatures import tangents
+from fingervision.domain.effect import Array
 
 SMALL_SHARE = 0.05
 """What the catalogue's form leaves over of the truth's is a few per cent of what was explained, no second name."""
+LONG = 4000
+"""Samples above which fewer probes must do."""
+STAND_INS = 2
+"""Probes that may take the place of several effects: a bump's width lies between two of the grid."""
+
+
+def _probes(problem: Problem) -> Probes:
+    history = problem.chain.history
+    return probes(history, problem.whitener, 2400 if history.input_mm.size <= LONG else 800)
+
+
+def _gains(problem: Problem, columns: Array, found: Explanation, taken: Array) -> tuple[Array, Array, Array]:
+    """Chi-square that each column takes from what an explanation and the columns already taken leave.
+
+    Returns
+    -------
+    gain, dot, norm : ndarray of float, shape (k,)
+        `dot / norm` is the column's coefficient; both are zero where nothing new is left of the column.
+    """
+    offsets, metric = problem.offsets, problem.offsets.metric(found.sigma_mm)
+    moved = columns - offsets.design @ (metric @ (offsets.design.T @ columns))
+    dot = moved.T @ found.residual
+    norm = np.einsum("ij,ij->j", columns, moved)
+    moves = np.hstack([tangents(problem, found), taken]) if found.names else taken
+    if moves.shape[1]:
+        bent = moves - offsets.design @ (metric @ (offsets.design.T @ moves))
+        cross = bent.T @ columns
+        inverse = np.linalg.pinv(moves.T @ bent)
+        dot = dot - cross.T @ (inverse @ (bent.T @ found.residual))
+        norm = norm - np.einsum("ij,ij->j", cross, inverse @ cross)
+    usable = norm > 1e-3 * np.maximum(np.einsum("ij,ij->j", columns, columns), 1e-12)
+    dot, norm = np.where(usable, dot, 0.0), np.where(usable, norm, 0.0)
+    return np.where(usable, dot**2 / np.where(usable, norm, 1.0), 0.0), dot, norm
+
+
+def stands_in(problem: Problem, several: Explanation, fewer: list[Explanation]) -> bool:
+    """Whether several effects only imitate something that the catalogue does not hold.
+
+    Three effects bend to almost anything. Where one or two generic shapes beside fewer effects explain the data better,
+    each at the price of its amplitude and of the choice among all shapes (`choices`), the effects are not the reason.
+    """
+    columns = _probes(problem).columns
+    rows = int(problem.measured.size)
+    each = float(np.log(rows)) + 2.0 * float(np.log(columns.shape[1]))
+    limit = several.bic(rows) + choices(problem, several)
+    for base in fewer:
+        taken = np.zeros((rows, 0))
+        cost = base.bic(rows) + choices(problem, base)
+        for _ in range(STAND_INS):
+            gain = _gains(problem, columns, base, taken)[0]
+            top = int(np.argmax(gain))
+            taken = np.hstack([taken, columns[:, top : top + 1]])
+            cost += each - float(gain[top])
+            if cost < limit:
+                return True
+    return False
 
 
 def unexplained(problem: Problem, best: Explanation, rng: np.random.Generator) -> tuple[str | None, str | None]:
     """Test the largest of many probes; returns what is unknown, or what is left over but small."""
-    samples = problem.chain.history.input_mm.size
-    shapes = probes(problem.chain.history, problem.whitener, 2400 if samples <= 4000 else 800)
-    offsets, metric = problem.offsets, problem.offsets.metric(best.sigma_mm)
-    moved = shapes.columns - offsets.design @ (metric @ (offsets.design.T @ shapes.columns))
-    dot = moved.T @ best.residual
-    norm = np.einsum("ij,ij->j", shapes.columns, moved)
-    if best.names:
-        moves = tangents(problem, best)
-        bent = moves - offsets.design @ (metric @ (offsets.design.T @ moves))
-        cross = bent.T @ shapes.columns
-        inverse = np.linalg.pinv(moves.T @ bent)
-        dot = dot - cross.T @ (inverse @ (bent.T @ best.residual))
-        norm = norm - np.einsum("ij,ij->j", cross, inverse @ cross)
-    usable = norm > 1e-3 * np.maximum(np.einsum("ij,ij->j", shapes.columns, shapes.columns), 1e-12)
-    gain = np.where(usable, dot**2 / np.where(usable, norm, 1.0), 0.0)
-    threshold = linear_threshold(problem, shapes.columns[:, usable], best.sigma_mm, rng)
+    shapes = _probes(problem)
+    gain, dot, norm = _gains(problem, shapes.columns, best, np.zeros((problem.measured.size, 0)))
+    usable = norm > 0.0
+    family = ("probe",) * int(usable.sum())
+    threshold = linear_thresholds(problem, family, shapes.columns[:, usable], best.sigma_mm, rng)["probe"]
     top = int(np.argmax(gain))
     if gain[top] <= threshold:
         return None, None

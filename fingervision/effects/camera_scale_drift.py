@@ -24,7 +24,7 @@ EFFECT = PointEffect(
     formula="x (1 + rate_per_s t)",
     source="definition",
     residual="proportional to the coordinate and to time",
-    parameters=(Parameter("rate_per_s", "1/s", -0.001, 0.001, "relative change of the scale", typical=1e-05),),
+    parameters=(Parameter("rate_per_s", "1/s", -0.001, 0.001, "relative change of the scale", typical=1e-4),),
     needs_times=True,
     needs_shared_clock=True,
     act=act,
