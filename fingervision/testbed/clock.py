@@ -4,7 +4,7 @@ from time import monotonic, sleep
 from typing import Protocol
 
 # A paced clock may be so much late for a moment, and catches up.
-MOST_HURRY_S = 0.25
+MOST_HURRY_S = 0.05
 
 
 class Clock(Protocol):

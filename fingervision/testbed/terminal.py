@@ -40,10 +40,11 @@ class Terminal:
         FingervisionError
             The run was stopped while the question stood.
         """
+        # Before the words are seen: an answer may come at once.
+        self._asked = self._reader is not None
         self.say(words)
         if self._reader is None:
             return (self._keyboard or sys.stdin).readline() or None
-        self._asked = True
         while True:
             try:
                 return self._answers.get(timeout=LOOK_EVERY_S) or None

@@ -14,6 +14,7 @@ from tests.live.conftest import single_pictures
 SCALE = ("--px-per-mm", "34")
 MINUTE_S = 60.0
 CUT_S = 3.0
+PROMPT_AMONG = 500
 # MPEG's clock has 90 000 ticks a second; each end of a step is rounded to microseconds too.
 CLOCK_TICK_S = 1.5e-5
 
@@ -26,7 +27,7 @@ def test_every_frame_of_a_minute_is_measured_and_a_cut_is_a_gap(
 ) -> None:
     view = live(camera.address, *SCALE, "--no-page", "--json")
     view.until(lambda seen: len(seen.lines()) > 10)
-    first_s, began_s = view.lines()[0]["time_s"], time.monotonic()
+    began_s = time.monotonic()
     view.until(lambda seen: time.monotonic() - began_s > MINUTE_S, within_s=2 * MINUTE_S)
     camera.stop()
     before = len(view.lines())
@@ -39,8 +40,10 @@ def test_every_frame_of_a_minute_is_measured_and_a_cut_is_a_gap(
     lines = view.lines()
     assert [line["frame"] for line in lines] == list(range(len(lines)))
     assert {line["status"] for line in lines[: before - 1]} == {"ok"}
-    # ffmpeg's clock and ours agree: as many frames as the time holds.
-    assert before == pytest.approx(25.0 * (lines[before - 1]["time_s"] - first_s), abs=4)
+    # ffmpeg's clock and ours agree: as many frames as the time holds. The promptest of many frames tell that, since a
+    # busy machine is late now and then.
+    late_s = [line["time_s"] - 0.04 * line["frame"] for line in lines[:before]]
+    assert min(late_s[-PROMPT_AMONG:]) == pytest.approx(min(late_s[:PROMPT_AMONG]), abs=4 * 0.04)
     longest_s = max(after["time_s"] - line["time_s"] for line, after in pairwise(lines))
     assert longest_s > CUT_S
     assert "The source is back" in view.text()

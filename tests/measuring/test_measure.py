@@ -3,7 +3,6 @@
 import csv
 import json
 import signal
-import time
 from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import pairwise
@@ -18,12 +17,14 @@ from fingervision.domain.direction import Direction
 from fingervision.domain.drive import DriveHistory
 from fingervision.domain.errors import ExitCode, FingervisionError, UsageError
 from fingervision.domain.frame import Coding, Frame, LostFrame
+from fingervision.domain.gap import GapMeasurement, NoGap
 from fingervision.domain.region import Region
 from fingervision.domain.status import Status
 from fingervision.frames.rendered import RenderedFrames
 from fingervision.frames.source import Description
 from fingervision.measuring.measure import Measured, Task, measure
 from fingervision.rendering import Camera, Scene, render, two_fingers
+from fingervision.vision.pipeline import Settings, measure_frame
 
 PX_PER_MM = 20.0
 BELOW_PX = 0.3 * PX_PER_MM
@@ -142,17 +143,19 @@ def test_the_overlay_keeps_the_times(tmp_path: Path) -> None:
     assert np.abs(colours[..., 0] - colours[..., 2]).max() > 50, "nothing is drawn in colour"
 
 
-def test_a_stop_keeps_what_was_measured(tmp_path: Path) -> None:
-    @dataclass(frozen=True)
-    class Stopped(Items):
-        def __iter__(self) -> Iterator[Frame | LostFrame]:
-            yield from self.items
-            time.sleep(0.5)
-            signal.raise_signal(signal.SIGINT)
-            time.sleep(0.5)
-            yield from ()
+def test_a_stop_keeps_what_was_measured(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    done = 0
 
-    measured = measure(Stopped(list(frames(6))), Task(BareScale(PX_PER_MM)), tmp_path)
+    def pressed_after_six(frame: Frame, settings: Settings) -> GapMeasurement | NoGap:
+        nonlocal done
+        outcome = measure_frame(frame, settings)
+        done += 1
+        if done == 6:
+            signal.raise_signal(signal.SIGINT)
+        return outcome
+
+    monkeypatch.setattr("fingervision.measuring.measure.measure_frame", pressed_after_six)
+    measured = measure(rendered(opening(9)), Task(BareScale(PX_PER_MM)), tmp_path)
     assert measured.stopped
     assert measured.exit_code is ExitCode.COULD_NOT
     assert [row["frame"] for row in rows_of(measured)] == [str(k) for k in range(6)]

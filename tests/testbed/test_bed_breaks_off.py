@@ -13,12 +13,12 @@ import pytest
 
 from fingervision.storage.recorded_video import frames_in
 from fingervision.storage.samples_csv import read_samples
-from tests.testbed.simulated_beds import SHORT, recipe_at, run
+from tests.testbed.simulated_beds import recipe_at, run, steps
 
 PACE = ("--real-time",)
 MOMENTS = 2
 LOST_AT_MOST_S = 1.0
-PATIENCE_S = 60.0
+PATIENCE_S = 120.0
 
 
 def killed(recipe: Path, out: Path, after_s: float) -> int:
@@ -50,9 +50,8 @@ def test_a_killed_run_is_gone_on_with_to_the_same_end(tmp_path: Path, whole: byt
         rows = read_samples(folder / "run" / "samples.csv")
         # Rows wait half a second for company; their pictures are in the video by then.
         assert in_video - len(rows) <= LOST_AT_MOST_S * 25.0
-        about = json.loads((folder / "run" / "run.json").read_text())
-        done = run(folder)
-        assert done.resumed_after == min(len(rows), in_video) or about["complete"]
+        if not json.loads((folder / "run" / "run.json").read_text())["complete"]:  # a busy machine is late to kill
+            assert run(folder).resumed_after == min(len(rows), in_video)
         assert (folder / "run" / "samples.csv").read_bytes() == whole
         assert frames_in(folder / "run" / "video.mp4") == len(read_samples(folder / "run" / "samples.csv"))
         events = [json.loads(line) for line in (folder / "run" / "events.jsonl").read_text().splitlines()]
@@ -74,8 +73,9 @@ def test_half_a_row_and_half_an_event_are_cut_off(tmp_path: Path, whole: bytes) 
     assert (folder / "samples.csv").read_bytes() == whole
 
 
-def test_ctrl_c_ends_a_run_in_a_sentence_and_it_may_be_gone_on_with(tmp_path: Path, whole: bytes) -> None:
-    recipe = recipe_at(tmp_path, SHORT)
+def test_ctrl_c_ends_a_run_in_a_sentence(tmp_path: Path) -> None:
+    # It never ends by itself before somebody has pressed.
+    recipe = recipe_at(tmp_path, steps('kind = "hold"\nat_mm = 0.2\nseconds = 60.0'))
     words = [sys.executable, "-m", "fingervision", "bed", "run", str(recipe), "--out", str(tmp_path / "run"), *PACE]
     process = subprocess.Popen(words, stdin=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
     until_s = time.monotonic() + PATIENCE_S
@@ -86,5 +86,3 @@ def test_ctrl_c_ends_a_run_in_a_sentence_and_it_may_be_gone_on_with(tmp_path: Pa
     assert process.returncode == 1
     assert "The run was stopped; the motor stands. The same command goes on with it." in errors
     assert "Traceback" not in errors
-    run(tmp_path)
-    assert (tmp_path / "run" / "samples.csv").read_bytes() == whole

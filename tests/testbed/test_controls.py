@@ -25,7 +25,7 @@ from tests.testbed.simulated_beds import SHORT, recipe_at, run, steps
 # Starting Python with its libraries on a busy machine; nothing is measured by it.
 PATIENCE_S = 120.0
 # Long enough that it never ends before somebody has typed.
-LONG = steps('kind = "hold"\nat_mm = 0.2\nseconds = 40.0')
+LONG = steps('kind = "hold"\nat_mm = 0.2\nseconds = 60.0')
 SLOW = steps('kind = "move"\nto_mm = 0.8\nspeed_mm_s = 0.5')
 SINE = steps('kind = "sine"\nmean_mm = 0.3\namplitude_mm = 0.2\nfrequency_hz = 0.5\ncycles = 1')
 # The first frames join the clocks; with this one a slow move, or a sine, is well under way.

@@ -25,7 +25,11 @@ def break_off(done: float, total: float) -> None:
     raise BreaksOffError
 
 
-def test_a_run_that_cannot_be_played_again_goes_on_with_its_leg_as_another_run(tmp_path: Path) -> None:
+def test_a_run_that_cannot_be_played_again_goes_on_with_its_leg_as_another_run(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    # The live gripper is never still.
+    monkeypatch.setattr("fingervision.testbed.doing.STILL_WITHIN_S", 0.5)
     config = live_camera_at(tmp_path)
     bed = open_bed(str(config))
     with pytest.raises(BreaksOffError):

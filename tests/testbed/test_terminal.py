@@ -2,9 +2,9 @@
 
 import os
 import pty
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from io import StringIO
-from threading import Event, Timer
+from threading import Event, Thread
 from time import monotonic, sleep
 
 import pytest
@@ -12,7 +12,8 @@ import pytest
 from fingervision.domain.errors import FingervisionError
 from fingervision.testbed.terminal import Terminal
 
-SOON_S = 10.0
+SOON_S = 60.0
+QUESTION = "How far? "
 
 
 @pytest.fixture
@@ -21,9 +22,11 @@ def keyboard() -> Iterator[tuple[int, Terminal, StringIO]]:
     typing, reading = pty.openpty()
     screen = StringIO()
     with os.fdopen(reading, "r") as stream:
-        yield typing, Terminal(stream, screen), screen
+        terminal = Terminal(stream, screen)
+        yield typing, terminal, screen
         os.write(typing, b"\x04")  # the end of input, so that the reader ends
-        sleep(0.1)
+        if terminal._reader is not None:
+            terminal._reader.join()
     os.close(typing)
 
 
@@ -35,22 +38,26 @@ def test_a_line_is_an_answer_if_a_question_stands_and_a_letter_otherwise(
     with terminal.listening(letters.append, lambda: False):
         for number in range(3):
             os.write(typing, b"p\n")
-            until_s = monotonic() + SOON_S
-            while len(letters) <= number:
-                assert monotonic() < until_s
-                sleep(0.01)
-            answer = _typed_when_asked(typing, terminal, f"{number}.5")
-            assert answer == f"{number}.5\n"
+            wait_until(lambda number=number: len(letters) > number)  # type: ignore[misc]
+            answering = Thread(target=answer, args=(typing, screen, number))
+            answering.start()
+            assert terminal.ask(QUESTION) == f"{number}.5\n"
+            answering.join()
     assert letters == ["p\n"] * 3
-    assert screen.getvalue() == "How far? " * 3
+    assert screen.getvalue() == QUESTION * 3
 
 
-def _typed_when_asked(typing: int, terminal: Terminal, words: str) -> str | None:
-    timer = Timer(0.1, lambda: os.write(typing, f"{words}\n".encode()))
-    timer.start()
-    answer = terminal.ask("How far? ")
-    timer.join()
-    return answer
+def answer(typing: int, screen: StringIO, number: int) -> None:
+    """Type as soon as the question is seen."""
+    wait_until(lambda: screen.getvalue().count(QUESTION) > number)
+    os.write(typing, f"{number}.5\n".encode())
+
+
+def wait_until(holds: Callable[[], bool]) -> None:
+    until_s = monotonic() + SOON_S
+    while not holds():
+        assert monotonic() < until_s
+        sleep(0.001)
 
 
 def test_a_stop_ends_the_waiting_for_an_answer(keyboard: tuple[int, Terminal, StringIO]) -> None:
@@ -61,7 +68,7 @@ def test_a_stop_ends_the_waiting_for_an_answer(keyboard: tuple[int, Terminal, St
         terminal.listening(lambda line: None, stopped.is_set),
         pytest.raises(FingervisionError, match=r"^The question was not answered, because the run was stopped\."),
     ):
-        terminal.ask("How far? ")
+        terminal.ask(QUESTION)
 
 
 def test_without_a_terminal_answers_are_read_as_they_come() -> None:
