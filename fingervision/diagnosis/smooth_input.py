@@ -1,8 +1,8 @@
 """The input's own error: local straight lines through the record, as wide as the record allows."""
 
-import numba
 import numpy as np
 
+from fingervision.domain.compiled import compiled_as_written
 from fingervision.domain.effect import Array
 
 WINDOWS = (241, 121, 61, 41, 27, 19, 13, 9, 7, 5)
@@ -32,7 +32,7 @@ def input_sigma(input_mm: Array, runs: tuple[slice, ...]) -> tuple[float, float]
     return (sigma if sigma > 1e-7 * np.ptp(input_mm) else 0.0), step
 
 
-@numba.njit(cache=True)
+@compiled_as_written
 def _lines(time_s: Array, input_mm: Array, sigma: float, windows: Array) -> tuple[Array, Array]:
     count = input_mm.size
     smooth, leverage = input_mm.copy(), np.ones(count)

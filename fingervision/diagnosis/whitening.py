@@ -2,10 +2,10 @@
 
 from dataclasses import dataclass
 
-import numba
 import numpy as np
 
 from fingervision.diagnosis.noise import Noise
+from fingervision.domain.compiled import compiled_as_written
 from fingervision.domain.effect import Array, Flags, History
 
 SPREADS = np.concatenate([[0.0], np.geomspace(0.01, 1e4, 121)])
@@ -14,8 +14,10 @@ MIDLINE_FREE_MM = 1e3
 """Prior spread of the midline's constant: large enough to be free."""
 
 
-@numba.njit(cache=True)
-def _innovations(columns, time, white, p1, lag1, h, p2, lag2):  # type: ignore[no-untyped-def]
+@compiled_as_written
+def _innovations(
+    columns: Array, time: Array, white: Array, p1: float, lag1: float, h: Array, p2: float, lag2: float
+) -> tuple[Array, float]:
     # States: the edge's correlated noise and the smoothed input's error, both Ornstein-Uhlenbeck.
     n, k = columns.shape
     out = np.zeros((n, k))
@@ -184,23 +186,42 @@ class RunOffsets:
         """
         if self.runs == 1:
             return (0.0,) * self.channels, 0.0
+        out, total = [], 0.0
+        for scale, determinant, gain in self._tried(residual):
+            best = int(np.argmin(determinant - gain))
+            out.append(scale * float(SPREADS[best]))
+            total += float(determinant[best])
+        return tuple(out), total
+
+    def doubt(self, residual: Array) -> float:
+        """-2 log of how much more probable a residual is over all spreads than at the best of them, to be added.
+
+        A few runs hardly tell their spread: parameters that act like an offset are known with Student's tails only.
+        """
+        if self.runs == 1:
+            return 0.0
+        width = np.gradient(SPREADS)
+        total = 0.0
+        for _, determinant, gain in self._tried(residual):
+            cost = determinant - gain
+            total -= 2.0 * float(np.log(np.sum(width * np.exp(-0.5 * (cost - cost.min())))))
+        return total
+
+    def _tried(self, residual: Array) -> list[tuple[float, Array, Array]]:
+        """For each channel its scale, and at all spreads the penalty and the chi-square that offsets take."""
         shares = self.design.T @ residual
         if self.drawn:
             # What the drawing's numbers explain is no scatter between runs.
             inner = self.gram[-self.drawn :, -self.drawn :] + np.eye(self.drawn)
             shares = shares - self.gram[:, -self.drawn :] @ np.linalg.solve(inner, shares[-self.drawn :])
-        out, total = [], 0.0
+        found = []
         for channel in range(self.channels):
             z = np.maximum(np.diag(self.gram)[channel * self.runs : (channel + 1) * self.runs], 1e-12)
             mean = shares[channel * self.runs : (channel + 1) * self.runs] / z
             if channel == 1 and self.midline:
                 mean = mean - np.sum(mean * z) / np.sum(z)
             scale = self.scales_mm[channel]
-            sigma = scale * SPREADS
-            spread = sigma[:, None] ** 2 * z
-            extra = np.sum(np.log1p(spread) - mean**2 * z * spread / (1.0 + spread), axis=1)
-            prior = 2.0 * np.log1p((sigma / scale) ** 2)
-            best = int(np.argmin(extra + prior))
-            out.append(float(sigma[best]))
-            total += float(np.sum(np.log1p(spread[best])) + prior[best])
-        return tuple(out), total
+            spread = (scale * SPREADS)[:, None] ** 2 * z
+            gain = np.sum(mean**2 * z * spread / (1.0 + spread), axis=1)
+            found.append((scale, np.sum(np.log1p(spread), axis=1) + 2.0 * np.log1p(SPREADS**2), gain))
+        return found

@@ -1,12 +1,12 @@
 """First-order low-pass of a signal that is linear between its samples: exact for any sampling."""
 
-import numba
 import numpy as np
 
+from fingervision.domain.compiled import compiled_as_written
 from fingervision.domain.effect import Array
 
 
-@numba.njit(cache=True)
+@compiled_as_written
 def low_pass(signal: Array, time_s: Array, tau_s: float) -> Array:
     """Relax one run's signal towards itself with time constant `tau_s`, at rest at the first sample; shape (n,)."""
     out = np.empty_like(signal)

@@ -1,12 +1,12 @@
 """The play operator: what lags behind by up to half a width, in either direction (Prandtl; Visintin 1994, III.2)."""
 
-import numba
 import numpy as np
 
+from fingervision.domain.compiled import compiled_as_written
 from fingervision.domain.effect import Array
 
 
-@numba.njit(cache=True)
+@compiled_as_written
 def play(input_mm: Array, width_mm: float) -> Array:
     """Follow one run's input with a play of full width `width_mm`, centred at the first sample; shape (n,)."""
     out = np.empty_like(input_mm)

@@ -2,14 +2,14 @@
 
 from dataclasses import replace
 
-import numba
 import numpy as np
 
+from fingervision.domain.compiled import compiled_as_written
 from fingervision.domain.effect import Array, DriveEffect, History, Stage, Values
 from fingervision.domain.parameter import Parameter
 
 
-@numba.njit(cache=True)
+@compiled_as_written
 def stick(input_mm: Array, jump_mm: float) -> Array:
     """Hold one run's input until it has moved on by more than `jump_mm`; shape (n,)."""
     out = np.empty_like(input_mm)

@@ -2,15 +2,15 @@
 
 from dataclasses import replace
 
-import numba
 import numpy as np
 
+from fingervision.domain.compiled import compiled_as_written
 from fingervision.domain.effect import Array, History, PointEffect, Stage, Values
 from fingervision.domain.parameter import Parameter
 from fingervision.domain.response import Response
 
 
-@numba.njit(cache=True)
+@compiled_as_written
 def ring(signal: Array, time_s: Array, frequency_hz: float, damping_ratio: float) -> Array:
     """Drive a second-order system with one run's signal, at rest at the first sample; exact; shape (n,)."""
     out = np.empty_like(signal)

@@ -5,6 +5,11 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
+from numpy.typing import NDArray
+
+from fingervision.domain.compiled import compiled_as_written
+
 HELPER = """
 from fingervision.domain.compiled import compiled
 
@@ -56,3 +61,17 @@ def test_without_a_place_to_keep_it_machine_code_is_made_anew(tmp_path: Path) ->
     home = str(tmp_path / "home")
     for _ in range(2):
         assert _run(tmp_path, HOME=home, XDG_CACHE_HOME=home, LOCALAPPDATA=home, NUMBA_CACHE_DIR="") == ["2.0", "0"]
+
+
+@compiled_as_written
+def in_turn(values: NDArray[np.float64]) -> float:
+    total = 0.0
+    for value in values:
+        total += value
+    return total
+
+
+def test_what_is_compiled_as_written_takes_its_sums_in_turn() -> None:
+    # Each small number is lost beside the large one before it; vectors would add them to each other first.
+    values = np.tile([1e16, 1.0, -1e16, 1.0], 64)
+    assert in_turn(values) == float(np.cumsum(values)[-1])
