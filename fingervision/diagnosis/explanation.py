@@ -16,6 +16,8 @@ SCANS = ((0.06, 241), (0.012, 13), (0.003, 13))
 """Relative half-widths, and values, of the scans of a parameter in which the prediction jumps. The first is for a
 thorough search of a single effect: with hundreds of jumps in a record the right size has a basin a thousandth wide."""
 MANY_STEPS = 20
+FORM_SHARE = 0.02
+"""By how much of what an effect changes the catalogue's form of it is typically off."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -93,12 +95,24 @@ class Problem:
         sigma, penalty = self.offsets.spread(residual)
         return _length(residual, residual, self.offsets, self.offsets.metric(sigma)) + penalty
 
+    def cost(self, settings: Mapping[str, Mapping[str, float]]) -> float:
+        """-2 log of the posterior, up to a constant: the score over all spreads of the runs instead of at the best."""
+        residual = self.measured - self.whitened(settings)
+        sigma, penalty = self.offsets.spread(residual)
+        metric = self.offsets.metric(sigma)
+        return _length(residual, residual, self.offsets, metric) + penalty + self.offsets.doubt(residual)
+
     def nothing(self) -> Explanation:
         """Judge the model as it is."""
         residual = self.measured - self.whitened({})
         sigma, penalty = self.offsets.spread(residual)
         score = _length(residual, residual, self.offsets, self.offsets.metric(sigma)) + penalty
         return Explanation((), {}, score, residual, np.zeros((0, 0)), 0, sigma)
+
+    def explained(self, settings: Mapping[str, Mapping[str, float]]) -> float:
+        """Squared whitened length of all that effects change in the prediction."""
+        changed = self.whitened(settings) - self.whitened({})
+        return float(changed @ changed)
 
 
 def _length(a: Array, b: Array, offsets: RunOffsets, metric: Array) -> float:

@@ -5,7 +5,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from fingervision.diagnosis.explanation import Explanation, Point, Problem
+from fingervision.diagnosis.bootstrap import noise_doubt
+from fingervision.diagnosis.explanation import FORM_SHARE, Explanation, Point, Problem
 from fingervision.domain.effect import Array
 from fingervision.domain.parameter import Parameter
 
@@ -18,6 +19,8 @@ FREEDOM = 5.0
 """Degrees of freedom of the independent proposals: tails that the posterior's do not outreach."""
 SCALES = (0.02, 0.1, 0.4, 1.2)
 """Steps of the local walk over the curvature's widths: one of them suits where the curvature misleads."""
+FORM_SHAPES = 10
+"""Independent shapes over which the catalogue's form may be off: a smooth curve's, not a sample's."""
 JUMPS = 0.01
 """Relative width that the walk begins with where the prediction jumps."""
 
@@ -104,8 +107,9 @@ def draws(problem: Problem, explanation: Explanation, rng: np.random.Generator) 
 
     Curvature at the best fit knows neither the bounds nor likelihoods that are not parabolas: a fraction at zero is
     not known exactly, and the size of a jump has no derivative at all. Independent proposals from the curvature take
-    turns with local steps of several sizes, so that either kind is reached. The spread of the runs' offsets is
-    profiled at every step.
+    turns with local steps of several sizes, so that either kind is reached. The walk goes over all spreads of the runs'
+    offsets, and over all levels of the noise, which is no better known than `noise_doubt` says: that gives the
+    posterior Student's tails (Box & Tiao 1973).
 
     Returns
     -------
@@ -124,7 +128,13 @@ def draws(problem: Problem, explanation: Explanation, rng: np.random.Generator) 
         z = inverse @ (at - best)
         return -0.5 * (FREEDOM + best.size) * float(np.log1p(z @ z / FREEDOM))
 
-    now, score = best, problem.score(explanation.values)
+    level = 2.0 / noise_doubt(problem) ** 2
+    least = problem.cost(explanation.values)
+
+    def cost(at: Array) -> float:
+        return level * float(np.log1p(max((problem.cost(walk.at(at)) - least) / level, -0.5)))
+
+    now, score = best, 0.0
     kept: list[Array] = []
     local = root
     for count in range(int(np.clip(EVALUATED / problem.chain.history.input_mm.size, LEAST_STEPS, MOST_STEPS))):
@@ -138,7 +148,7 @@ def draws(problem: Problem, explanation: Explanation, rng: np.random.Generator) 
             trial = now + SCALES[int(rng.integers(len(SCALES)))] * 2.4 / np.sqrt(best.size) * (local @ ahead)
         luck = np.log(rng.random())
         if np.all(trial >= lower) and np.all(trial <= upper):
-            new = problem.score(walk.at(trial))
+            new = cost(trial)
             if luck < 0.5 * (score - new) + (far(now) - far(trial) if alone else 0.0):
                 now, score = trial, new
         kept.append(now)
@@ -155,7 +165,9 @@ def settled(
     Returns
     -------
     explanation : Explanation
-        Its covariance is the mean square of the draws about its values.
+        Its covariance is the mean square of the draws about its values. The form of an effect is off by `FORM_SHARE`,
+        which moves the parameters as that much noise in `FORM_SHAPES` shapes would; and the size of a jump is known no
+        better than the recorded input in which it is seen.
     found : tuple of dict
         The draws.
     """
@@ -173,4 +185,7 @@ def settled(
     away = np.array(rows)
     residual = problem.measured - problem.whitened(values)
     covariance = away.T @ away / len(found)
+    covariance *= 1.0 + FORM_SHARE**2 * problem.explained(values) / FORM_SHAPES
+    rugged = np.array([parameter.rugged for _, parameter in walk.listed])
+    covariance[rugged, rugged] += problem.chain.history.input_sigma_mm**2
     return replace(explanation, values=values, score=score, residual=residual, covariance=covariance), found

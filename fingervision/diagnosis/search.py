@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fingervision.diagnosis.bootstrap import exceeds_noise, linear_thresholds, price
-from fingervision.diagnosis.explanation import Explanation, Problem, fit
+from fingervision.diagnosis.explanation import FORM_SHARE, Explanation, Problem, fit
 from fingervision.diagnosis.indistinguishable import beside_foretold, indistinguishable, odds
 from fingervision.diagnosis.input_error import below_the_input
 from fingervision.diagnosis.signatures import Signatures, signatures, tangents
@@ -14,9 +14,6 @@ from fingervision.diagnosis.unexplained import SMALL_SHARE, stands_in, unexplain
 from fingervision.domain.report import Verdict
 
 Progress = Callable[[float], None]
-FORM_SHARE = 0.02
-"""Share of what is explained below which the difference between two forms is their own fault: no reason to choose the
-richer one, such as a resonance for a delay that falls between two samples."""
 TRIPLE_SHARE = 0.15
 """A third effect needs evidence of its own: three effects bend to almost anything."""
 PAIRS_REFITTED = 60
@@ -103,7 +100,11 @@ def _choose(candidates: list[Explanation], samples: int) -> Explanation:
 
 
 def _simplest(singles: list[Explanation], samples: int, nothing: Explanation) -> Explanation:
-    """Choose one effect, the simpler form where the richer one gains no more than forms deviate."""
+    """Choose one effect, the simpler form where the richer one gains no more than forms deviate.
+
+    Such a difference is the forms' own fault, and no reason to choose a resonance for a delay that falls between two
+    samples.
+    """
     best = _choose(singles, samples)
     within = FORM_SHARE**2 * (nothing.score - best.score)
     simpler = [e for e in singles if e.free < best.free and e.score - best.score < within]

@@ -81,11 +81,9 @@ def unexplained(problem: Problem, best: Explanation, rng: np.random.Generator) -
     if gain[top] <= threshold:
         return None, None
     words = f"{shapes.words[top]} ({np.sqrt(gain[top]):.1f} sigma)"
-    changed = problem.whitened(best.values) - problem.whitened({})
-    explained = float(changed @ changed)
     size_mm = abs(float(dot[top])) / float(norm[top]) * shapes.rms[top]
     if below_the_input(problem, size_mm):
         return None, words
-    if best.names and gain[top] < SMALL_SHARE**2 * explained:
+    if best.names and gain[top] < SMALL_SHARE**2 * problem.explained(best.values):
         return None, words
     return words, None
