@@ -98,7 +98,7 @@ class BenchData:
         floor = 0.0 if self.table.u_random_mm is None else float(np.median(self.table.u_random_mm))
         floors = [{"gap": floor, "midline": 0.5 * floor, "force": 0.0}[name] for name in self.channels]
         parts = [residual_mm[channel * n : (channel + 1) * n] for channel in range(len(self.channels))]
-        aside = [gate(part, history.runs, timed, sigmas) | self.distrusted for part in parts]
+        aside = [gate(part, history.input_mm, history.runs, timed, sigmas) | self.distrusted for part in parts]
         noises = self._noises(parts, aside, floors, degrees, explained=explained)
         if history.both_edges:
             aside[0] = aside[1] = aside[0] | aside[1]

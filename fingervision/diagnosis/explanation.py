@@ -109,11 +109,6 @@ class Problem:
         score = _length(residual, residual, self.offsets, self.offsets.metric(sigma)) + penalty
         return Explanation((), {}, score, residual, np.zeros((0, 0)), 0, sigma)
 
-    def explained(self, settings: Mapping[str, Mapping[str, float]]) -> float:
-        """Squared whitened length of all that effects change in the prediction."""
-        changed = self.whitened(settings) - self.whitened({})
-        return float(changed @ changed)
-
 
 def _length(a: Array, b: Array, offsets: RunOffsets, metric: Array) -> float:
     return float(a @ b - (offsets.design.T @ a) @ metric @ (offsets.design.T @ b))

@@ -3,11 +3,15 @@
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.stats import binom
 
 from fingervision.domain.effect import Array, Flags
 
 LEAST_SHARE = 0.1
 """Of a residual's variance that is the picture's own at least."""
+PLACES, RARE, BY_CHANCE = 20, 0.005, 1e-3
+"""Parts of the input's range that are looked at, the share of gross errors that is nothing unusual, and how seldom
+they may crowd in any one part by chance."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,7 +28,7 @@ class Noise:
         return float(np.hypot(self.white_mm, self.correlated_mm))
 
 
-def gate(residual: Array, runs: tuple[slice, ...], ordered: bool, sigmas: float | None) -> Flags:
+def gate(residual: Array, input_mm: Array, runs: tuple[slice, ...], ordered: bool, sigmas: float | None) -> Flags:
     """Mark outliers against a running median; shape (n,), True where a value is to be set aside.
 
     Without an order (no times) the median of all stands for the running one. `sigmas` is the limit; None sets nothing
@@ -46,12 +50,26 @@ def gate(residual: Array, runs: tuple[slice, ...], ordered: bool, sigmas: float 
     middle, far = np.quantile(np.abs(rest), (0.5, 0.9))
     sigma = max(1.4826 * float(middle), float(far) / 1.645)
     if sigma > 0.0:
-        # A real reversal moves neighbours too; an outlier stands alone or in pairs.
         out = np.abs(rest) > sigmas * sigma
-        for i in range(2, residual.size - 2):
-            if ordered and out[i - 2 : i + 3].sum() >= 4:
-                out[i - 2 : i + 3] = False
+        if ordered:
+            there = _at_one_place(out, input_mm)
+            # A real reversal moves neighbours too; an outlier stands alone or in pairs.
+            for i in range(2, residual.size - 2):
+                if out[i - 2 : i + 3].sum() >= 4:
+                    out[i - 2 : i + 3] = False
+            out &= ~there
     return out
+
+
+def _at_one_place(out: Flags, input_mm: Array) -> Flags:
+    """Where more samples are off than gross errors would be, which come at any input: a contact, a stop."""
+    order = np.argsort(input_mm, kind="stable")
+    there = np.zeros(out.size, dtype=bool)
+    parts = np.array_split(order, min(PLACES, out.size))
+    for part in parts:
+        by_chance = binom.sf(out[part].sum() - 1, part.size, max(float(out.mean()), RARE))
+        there[part] = by_chance < BY_CHANCE / len(parts)
+    return there
 
 
 def white_noise(residual: Array, aside: Flags, floor_mm: float, degrees: int) -> Noise:

@@ -185,7 +185,8 @@ def settled(
     away = np.array(rows)
     residual = problem.measured - problem.whitened(values)
     covariance = away.T @ away / len(found)
-    covariance *= 1.0 + FORM_SHARE**2 * problem.explained(values) / FORM_SHAPES
+    explained = max(0.0, problem.cost({}) - problem.cost(values))
+    covariance *= 1.0 + FORM_SHARE**2 * explained / FORM_SHAPES
     rugged = np.array([parameter.rugged for _, parameter in walk.listed])
     covariance[rugged, rugged] += problem.chain.history.input_sigma_mm**2
     return replace(explanation, values=values, score=score, residual=residual, covariance=covariance), found

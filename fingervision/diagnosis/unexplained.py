@@ -84,6 +84,7 @@ def unexplained(problem: Problem, best: Explanation, rng: np.random.Generator) -
     size_mm = abs(float(dot[top])) / float(norm[top]) * shapes.rms[top]
     if below_the_input(problem, size_mm):
         return None, words
-    if best.names and gain[top] < SMALL_SHARE**2 * problem.explained(best.values):
+    changed = problem.whitened(best.values) - problem.whitened({})
+    if best.names and gain[top] < SMALL_SHARE**2 * float(changed @ changed):
         return None, words
     return words, None

@@ -5,7 +5,7 @@ import pytest
 from numpy.typing import NDArray
 from scipy.signal import lfilter
 
-from fingervision.diagnosis.noise import Noise
+from fingervision.diagnosis.noise import Noise, gate
 from fingervision.diagnosis.noise_short import noise_of_short_runs
 from fingervision.diagnosis.noise_spectrum import noise_by_spectrum
 
@@ -72,3 +72,19 @@ def test_what_is_not_yet_explained_does_not_count_as_correlation() -> None:
         [bent, drawn(rng, 40, 0.0)], (slice(0, 40),), [none, none], [0.0, 0.0], explained=False
     )
     assert noises[0].correlation < 0.35
+
+
+def test_what_is_off_at_one_input_in_every_run_is_no_outlier() -> None:
+    rng = np.random.default_rng(SEED)
+    stroke = 1.0 - np.abs(np.linspace(-1.0, 1.0, 80))
+    runs = tuple(slice(80 * k, 80 * (k + 1)) for k in range(4))
+    input_mm = np.tile(stroke, 4)
+    residual = rng.standard_normal(320)
+    wild = rng.choice(np.flatnonzero(input_mm > 0.2), 4, replace=False)
+    residual[wild] += 30.0
+    assert np.array_equal(np.flatnonzero(gate(residual, input_mm, runs, True, 7.0)), np.sort(wild))
+    # The fingers meet in the first and last two samples of each run.
+    touching = np.flatnonzero(input_mm < 0.04)
+    residual[touching] += 40.0
+    assert not np.any(gate(residual, input_mm, runs, True, 7.0)[touching])
+    assert np.all(gate(residual, input_mm, runs, True, 7.0)[wild])
