@@ -38,10 +38,7 @@ def test_what_is_hidden_is_named_with_its_size(tmp_path: Path, name: str, parame
     assert report.verdict is Verdict.NAMED
     (effect,) = report.effects
     assert effect.name == name
-    # A lens acts on the whole picture, tips included, and not on the measuring points alone.
-    assert effect.parameters[parameter].value == pytest.approx(
-        size, rel=0.1 if name == "lens_distortion" else PART_OF_SIZE
-    )
+    assert effect.parameters[parameter].value == pytest.approx(size, rel=PART_OF_SIZE)
 
 
 def test_where_nothing_is_hidden_it_agrees(tmp_path: Path) -> None:
