@@ -2,8 +2,8 @@
 
     python -m tests.benchmarks.hidden.run --tables 40 --jobs 2 --seed 1 --rows null,single_1 --methods diagnose,bic
 
-Everything is kept under --out by seed, row and number, so that a run may be stopped and goes on; the same command again
-prints the table from what is kept; --again METHOD asks that method anew. --scheduler tcp://HOST:PORT works on a Dask
+Everything is kept under --out by seed, row and number, so that a run may be stopped and goes on; the rows grow together,
+--minutes M begins no table after that time, and --minutes 0 prints the table from what is kept; --again METHOD asks that method anew. --scheduler tcp://HOST:PORT works on a Dask
 cluster whose workers were started at the top of the repository. Build with seeds below 1000, judge with seeds from 1000
 on.
 """
@@ -54,6 +54,11 @@ class Task:
         """Where the table, the answers and the marks are kept."""
         return self.out / f"seed{self.seed}" / self.row / f"{self.index:04d}"
 
+    @property
+    def kept(self) -> Path:
+        """The marks."""
+        return self.folder / f"{self.method}_marks.json"
+
 
 def _ask(table: JudgedTable, method: str) -> Answer:
     kept = table.folder / f"{method}.json"
@@ -75,11 +80,10 @@ def _ask(table: JudgedTable, method: str) -> Answer:
 
 def marked(task: Task) -> dict[str, object]:
     """`work`, kept beside the table: a run that was stopped goes on, and its figures can be printed at any time."""
-    kept = task.folder / f"{task.method}_marks.json"
-    if kept.exists():
-        return dict(json.loads(kept.read_text(encoding="utf-8")))
+    if task.kept.exists():
+        return dict(json.loads(task.kept.read_text(encoding="utf-8")))
     result = work(task)
-    kept.write_text(json.dumps(result, indent=1), encoding="utf-8")
+    task.kept.write_text(json.dumps(result, indent=1), encoding="utf-8")
     return result
 
 
@@ -167,6 +171,7 @@ def main() -> None:
     options.add_argument("--out", type=Path, default=Path("results/hidden"))
     options.add_argument("--again", default="", help="method whose kept answers are thrown away")
     options.add_argument("--misses", type=Path, help="folder that gets a copy of every table that diagnose missed")
+    options.add_argument("--minutes", type=float, default=np.inf, help="begin no table after so many")
     chosen = options.parse_args()
     rows, methods = chosen.rows.split(","), chosen.methods.split(",")
     for what, asked, there in (("rows", rows, ROWS), ("methods", methods, METHODS)):
@@ -178,29 +183,39 @@ def main() -> None:
     begun = time.perf_counter()
     tasks = [
         Task(row, index, chosen.seed, method, chosen.out.absolute())
-        for row in rows
         for index in range(chosen.first, chosen.first + chosen.tables)
+        for row in rows
         for method in methods
     ]
     for task in tasks:
         if task.method == chosen.again:
             (task.folder / f"{task.method}.json").unlink(missing_ok=True)
-            (task.folder / f"{task.method}_marks.json").unlink(missing_ok=True)
+            task.kept.unlink(missing_ok=True)
     os.environ.setdefault("OMP_NUM_THREADS", "1")
     # All methods of one table stay in one process: the table is drawn once.
     results: dict[str, dict[str, list[dict[str, object]]]] = {m: {r: [] for r in rows} for m in methods}
     batches = [tasks[i : i + len(methods)] for i in range(0, len(tasks), len(methods))]
-    with workers(chosen.scheduler, chosen.jobs) as pool:
-        waiting = {pool.submit(_batch, batch): batch for batch in batches}
-        for done, future in enumerate(as_completed(waiting), 1):
-            for task, result in zip(waiting[future], future.result(), strict=True):
-                results[task.method][task.row].append(result)
-                _tell(task, result, chosen.misses)
-            if done % 10 == 0:
-                print(f"   {done} of {len(batches)} tables, {time.perf_counter() - begun:.0f} s", flush=True)
+    known = [batch for batch in batches if all(task.kept.exists() for task in batch)]
+    for batch in known:
+        for task in batch:
+            results[task.method][task.row].append(marked(task))
+    if chosen.minutes > 0:
+        with workers(chosen.scheduler, chosen.jobs) as pool:
+            waiting = {pool.submit(_batch, batch): batch for batch in batches if batch not in known}
+            for done, future in enumerate(as_completed(waiting), 1):
+                if time.perf_counter() - begun > 60.0 * chosen.minutes:
+                    for later in waiting:
+                        later.cancel()
+                if future.cancelled():
+                    continue
+                for task, result in zip(waiting[future], future.result(), strict=True):
+                    results[task.method][task.row].append(result)
+                    _tell(task, result, chosen.misses)
+                if done % 10 == 0:
+                    print(f"   {done} of {len(waiting)} tables, {time.perf_counter() - begun:.0f} s", flush=True)
     for method in methods:
         print("\n".join(report_of(method, results[method])))
-    print(f"seed {chosen.seed}, {chosen.tables} tables a row, {time.perf_counter() - begun:.0f} s")
+    print(f"seed {chosen.seed}, {time.perf_counter() - begun:.0f} s")
 
 
 def _batch(tasks: list[Task]) -> list[dict[str, object]]:
