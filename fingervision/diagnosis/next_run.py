@@ -1,203 +1,198 @@
 """The next run: the protocol that separates what is open, by expected distance per minute (Atkinson & Fedorov 1975)."""
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterator
+from dataclasses import dataclass
+from math import ceil
 
 import numpy as np
 
 from fingervision.diagnosis.bench_data import BenchData
-from fingervision.diagnosis.bootstrap import noise_doubt
-from fingervision.diagnosis.drawing_refit import tangent
 from fingervision.diagnosis.explanation import Explanation, Point, Problem, fit
+from fingervision.diagnosis.indistinguishable import surprise
 from fingervision.diagnosis.posterior import draws
-from fingervision.diagnosis.protocols import Step, driven, protocols, rounding_s
+from fingervision.diagnosis.promise import MODERATE, Promise, promise
+from fingervision.diagnosis.protocols import SAMPLES_A_STROKE, Step, driven, protocols, repeated, rounding_s
+from fingervision.diagnosis.second_run import PAUSE_S, REFITTED, SecondRun
 from fingervision.diagnosis.still_proposals import WORTH, without_motion
-from fingervision.diagnosis.whitening import RunOffsets, Whitener
-from fingervision.domain.effect import Array, History
-from fingervision.domain.model import PhysicalModel
+from fingervision.domain.effect import Array
 from fingervision.domain.report import NextRun
 
-SETTLE_MIN = 0.5
-"""Minutes that any run costs beside its motion: starting, saving."""
 STILL_MIN = 1.5
 """Minutes that re-zeroing, or putting a slot before the camera, takes."""
-MOST_SAMPLES = 6000
-ENOUGH = 50.0
-"""Separating a pair more surely than this is worth no further minute."""
-MOST_RIVALS = 6
-TRUTHS = 16
-"""Draws of either explanation's parameters behind a promise."""
-FURTHER = 3
-"""Further starts of a rival's refit: one search may stand still beside the place where it imitates the truth."""
-SMALLER = (0.7, 0.5, 0.35, 0.25, 0.15)
-"""Shares of the range that are tried one after the other."""
-AT_END = 0.01
-"""Share of its range within which a parameter lies at the end."""
-PROMISED = 0.95
-Settings = Mapping[str, Mapping[str, float]]
+MOST_MIN, MOST_SAMPLES = 8.0, 6000
+"""A run of more would be another experiment."""
+NEEDED, BARELY = 30.0, 20.0
+"""Gain that settles a pair: 9, and what noise and the parameters' uncertainty take of it; and what will just do."""
+MOST_TRUTHS, MOST_RIVALS = 4, 8
+COMPARED = 6
+"""Pairs among which the one is sought that gains least."""
+LIKELY = 0.02
+"""Odds to the likeliest explanation above which another may be the truth that the run is chosen for."""
+SCREENED = 4
+"""Steps of a rival's refit where many runs are compared."""
+SMALLER = ((0.65, SAMPLES_A_STROKE), (0.4, SAMPLES_A_STROKE), (0.65, 6), (0.4, 6), (0.25, 6), (0.12, 6))
+"""Shares of the range, and samples that a stroke has at least, that are tried one after the other."""
+ALIKE = 0.03
+"""Difference in what is settled below which another run will do as well."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _Proposal:
-    """A run with what it is worth: the chi-square by which it parts the leading explanation from each rival."""
+class _Open:
+    """What the data cannot tell apart.
+
+    Parameters
+    ----------
+    members : list of Explanation
+        The leading one first.
+    odds : ndarray of float, shape (members,)
+        How likely each is by the data; together 1.
+    before : ndarray of float, shape (truths, members)
+        Distance of each truth's prediction to each member as it is; the truths are the first members.
+    """
+
+    members: list[Explanation]
+    odds: Array
+    before: Array
+
+    @property
+    def truths(self) -> int:
+        """How many members the run is chosen for, each as the truth."""
+        return len(self.before)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Plan:
+    """A run with what it adds to the distance of each truth to each member."""
 
     name: str
     steps: list[Step]
-    inputs_mm: Array
-    gains: tuple[float, ...]
+    times: int
+    input_mm: Array
+    gains: Array
     minutes: float
 
     @property
-    def worth(self) -> float:
-        """Expected separation a minute."""
-        return sum(min(gain, ENOUGH) for gain in self.gains if gain > WORTH) / self.minutes
+    def uneven(self) -> float:
+        """How much more is gained where one of two explanations is true than where the other is, at the worst.
+
+        Such a gain could only be promised with so wide an interval.
+        """
+        ahead, back = (np.maximum(g, 1.0) for g in (self.gains[0, 1 : self.gains.shape[0]], self.gains[1:, 0]))
+        return float(np.max(np.maximum(ahead / back, back / ahead), initial=1.0))
+
+    def apart(self, j: int, k: int) -> float:
+        """Gain between two members, the first a truth: of the two that might be true, the one that shows less."""
+        back = self.gains[k, j] if k < len(self.gains) else np.inf
+        return float(min(self.gains[j, k], back))
+
+    def pairs(self) -> list[tuple[int, int]]:
+        """Pairs that are told apart, those that are told apart least first."""
+        truths, members = self.gains.shape
+        found = [(j, k) for j in range(truths) for k in range(j + 1, members) if self.apart(j, k) >= WORTH]
+        return sorted(found, key=lambda pair: self.apart(*pair))
+
+    def worst(self, floor: float) -> float:
+        """Least gain of the pairs that gain so much at all; nothing where none does."""
+        settled = self.gains[(self.gains >= floor) & np.isfinite(self.gains)]
+        return float(settled.min()) if settled.size else 0.0
 
 
-def _joined(bench: BenchData, problem: Problem, inputs: Array) -> Problem:
-    """Put a run behind the data: same noise, later on the same clock."""
-    old = bench.chain.history
-    step_s = old.sample_time_s
-    time = float(old.times.max()) + 60.0 * SETTLE_MIN + step_s * np.arange(inputs.size)
-    history: History = replace(
-        old,
-        input_mm=np.concatenate([old.input_mm, inputs]),
-        time_s=np.concatenate([old.times, time]),
-        runs=(*old.runs, slice(old.input_mm.size, old.input_mm.size + inputs.size)),
-    )
-    n = old.input_mm.size
-    aside = np.concatenate(
-        [
-            part
-            for channel in range(len(bench.channels))
-            for part in (problem.whitener.aside[channel * n : (channel + 1) * n], np.zeros(inputs.size, dtype=bool))
-        ]
-    )
-    extra = float(np.median(problem.whitener.input_mm))
-    chain, drawn = replace(problem.chain, history=history), bench.model.base
-    whitener = Whitener(
-        history,
-        problem.whitener.noises,
-        aside,
-        np.concatenate([problem.whitener.input_mm, np.full(inputs.size, extra)]),
-        problem.whitener.input_samples,
-        np.concatenate(
-            [problem.whitener.passing_mm, np.full(inputs.size, float(np.median(problem.whitener.passing_mm)))]
-        ),
-        tangent(chain, drawn, bench.refit.moved).columns
-        if bench.refit.moved and isinstance(drawn, PhysicalModel)
-        else None,
-    )
-    empty = np.zeros(history.input_mm.size * len(bench.channels))
-    return replace(problem, chain=chain, whitener=whitener, measured=empty, offsets=RunOffsets.of(whitener))
+@dataclass(frozen=True, slots=True, eq=False)
+class _Chooser:
+    """Proposes runs for a table and what it leaves open."""
+
+    bench: BenchData
+    problem: Problem
+    open: _Open
+
+    @property
+    def step_s(self) -> float:
+        """Time between samples."""
+        return self.bench.chain.history.sample_time_s
+
+    def planned(self, name: str, steps: list[Step], iterations: int, times: int = 1) -> _Plan | None:
+        """Judge a run; None where it is too long."""
+        history = self.bench.chain.history
+        inputs = driven(steps, self.step_s, rounding_s(self.bench.table.input_mm, self.step_s, history.runs))
+        if inputs.size > MOST_SAMPLES:
+            return None
+        run = SecondRun.of(self.bench, self.problem, inputs)
+        gains = np.full(self.open.before.shape, np.inf)
+        for j, truth in enumerate(self.open.members[: self.open.truths]):
+            for k, rival in enumerate(self.open.members):
+                if j != k:
+                    apart = run.distance(truth.values, rival, iterations=iterations)
+                    gains[j, k] = max(0.0, apart - self.open.before[j, k])
+        return _Plan(name, steps, times, inputs, gains, (PAUSE_S + inputs.size * self.step_s) / 60.0)
+
+    def settled(self, gains: Array, needed: float = NEEDED) -> float:
+        """Share of what is open that gains settle, each truth by its odds."""
+        part = np.where(np.isfinite(gains), np.minimum(gains / needed, 1.0), 0.0)
+        odds = self.open.odds[: self.open.truths]
+        return float(odds @ part.sum(axis=1) / odds.sum() / max(1, len(self.open.members) - 1))
+
+    def shown(self, second: SecondRun, j: int, k: int) -> float:
+        """Gain to expect between two members, the likelier one true, where runs are not offset against each other."""
+        true, other = (j, k) if self.open.odds[j] >= self.open.odds[k] or k >= self.open.truths else (k, j)
+        truth, rival = self.open.members[true], self.open.members[other]
+        return second.distance(truth.values, rival, sigma_mm=rival.sigma_mm) - float(self.open.before[true, other])
+
+    def least(self, run: _Plan) -> tuple[float, tuple[int, int]] | None:
+        """Find the pair that gains least of those that are told apart, and what it gains; None without any."""
+        second = SecondRun.of(self.bench, self.problem, run.input_mm)
+        return min(((self.shown(second, *pair), pair) for pair in run.pairs()[:COMPARED]), default=None)
+
+    def best(self, ends: tuple[float, float]) -> _Plan | None:
+        """Choose the protocol, and how often it is driven, that settles most; of alike ones the cheapest."""
+        found: list[tuple[float, float, int, _Plan]] = []
+        for name, steps in protocols(*ends, self.step_s):
+            once = self.planned(name, steps, SCREENED)
+            if once is None:
+                continue
+            most = max(1, int(min((MOST_MIN - PAUSE_S / 60.0) / once.minutes, MOST_SAMPLES / once.input_mm.size)))
+            times = max(1, ceil(NEEDED / max(once.worst(NEEDED / most), NEEDED / most)))
+            found.append((self.settled(times * once.gains), times * once.minutes * once.uneven, times, once))
+        if not found:
+            return None
+        top = max(settled for settled, *_ in found)
+        _, _, times, once = min((each for each in found if each[0] >= top - ALIKE), key=lambda each: each[1])
+        return self.planned(once.name, repeated(once.steps, times), REFITTED, times)
+
+    def smaller(self, plan: _Plan) -> Iterator[_Plan]:
+        """Drive the same less often, then over less of the range and with fewer samples, while it settles what it did.
+
+        Small motions are kinder to the gripper, and what a large one gains beyond need rests on the explanations' forms
+        more than on what was measured.
+        """
+        low, high = float(plan.input_mm.min()), float(plan.input_mm.max())
+        half, middle = 0.5 * (high - low), 0.5 * (low + high)
+        least = self.settled(plan.gains, BARELY) - ALIKE
+        tries = [(plan.times // 2**k, 1.0, SAMPLES_A_STROKE) for k in range(1, plan.times.bit_length())]
+        tries += [(1, *less) for less in SMALLER]
+        for times, share, samples in tries:
+            ends = middle - share * half, middle + share * half
+            named = dict(protocols(*ends, self.step_s, samples))
+            less = self.planned(plan.name, repeated(named[plan.name], times), REFITTED, times)
+            if less is not None and self.settled(less.gains, BARELY) >= least:
+                yield less
 
 
-def _moved_bounds(old: Problem, new: Problem, names: tuple[str, ...], values: Settings) -> Point:
-    """Values for a table of another range: a stop that was not seen lies at the range's end, wherever that is."""
-    out: Point = {name: dict(values[name]) for name in names}
-    for (name, was), (_, now) in zip(old.parameters(names), new.parameters(names), strict=True):
-        near = AT_END * (was.upper - was.lower)
-        value = values[name][was.name]
-        if was.lower != now.lower and value <= was.lower + near:
-            out[name][was.name] = now.lower
-        elif was.upper != now.upper and value >= was.upper - near:
-            out[name][was.name] = now.upper
-    return out
-
-
-def _apart(problem: Problem, values: Settings, rival: Explanation, starts: Sequence[Settings]) -> float:
-    """Distance of a prediction to a rival, over the rival's parameters; the nearest of several searches."""
-    target = problem.whitened(values)
-    return min(
-        fit(problem, rival.names, start, target=target, sigma_mm=rival.sigma_mm, iterations=8).score for start in starts
-    )
-
-
-def _gain(
-    old: Problem, joined: Problem, truth: Settings, rival: Explanation, starts: Sequence[Settings], before: float
-) -> float:
-    """What a run adds to the distance `before` it: the rival is refitted to old and new data together."""
-    anew = [_moved_bounds(old, joined, rival.names, start) for start in starts]
-    return max(0.0, _apart(joined, _moved_bounds(old, joined, tuple(truth), truth), rival, anew) - before)
-
-
-def _promise(
-    old: Problem,
-    joined: Problem,
-    pair: tuple[Explanation, Explanation],
-    found: tuple[Point, ...],
-    rng: np.random.Generator,
-) -> tuple[float, tuple[float, float]]:
-    """Gain to expect whichever of the two is true, and the interval that holds what will come.
-
-    The truth's parameters are drawn from what the data leave open, and the noise is known only so well; the new run's
-    own noise adds 2 sqrt(gain) to the difference of two chi-squares.
-    """
-    gains: list[float] = []
-    count = TRUTHS if joined.chain.history.input_mm.size <= MOST_SAMPLES else TRUTHS // 4
-    drawn = (found, draws(old, pair[1], rng))
-    for truth, rival in ((0, 1), (1, 0)):
-        starts = [pair[rival].values, *drawn[rival][:: max(1, len(drawn[rival]) // FURTHER)]]
-        step = max(1, len(drawn[truth]) // count)
-        for values in drawn[truth][step // 2 :: step]:
-            before = _apart(old, values, pair[rival], starts)
-            gains.append(_gain(old, joined, values, pair[rival], starts, before))
-    expected = np.array(gains)
-    doubt = np.exp(noise_doubt(old) * rng.standard_normal((expected.size, 400)))
-    come = expected[:, None] * doubt
-    come = come + 2.0 * np.sqrt(come) * rng.standard_normal(come.shape)
-    low, high = np.quantile(come, (0.5 - 0.5 * PROMISED, 0.5 + 0.5 * PROMISED))
-    return float(np.median(expected)), (float(low), float(high))
-
-
-def _proposals(
-    bench: BenchData,
-    problem: Problem,
-    best: Explanation,
-    rivals: list[Explanation],
-    ends: tuple[float, float],
-    only: str | None = None,
-) -> list[_Proposal]:
-    """Try every protocol between two ends of the input; of the two that might be true, the one that shows less."""
-    history = bench.chain.history
-    step_s = history.sample_time_s
-    round_s = rounding_s(bench.table.input_mm, step_s, history.runs)
-    pairs = [(best, rival) for rival in rivals]
-    known = [[_apart(problem, one.values, other, [other.values]) for one, other in (p, p[::-1])] for p in pairs]
-    found = []
-    for name, steps in protocols(*ends, step_s):
-        inputs = driven(steps, step_s, round_s)
-        if inputs.size > MOST_SAMPLES or (only is not None and name != only):
-            continue
-        joined = _joined(bench, problem, inputs)
-        gains = []
-        for (one, other), (ahead, back) in zip(pairs, known, strict=True):
-            gain = _gain(problem, joined, one.values, other, [other.values], ahead)
-            if gain > WORTH:
-                gain = min(gain, _gain(problem, joined, other.values, one, [one.values], back))
-            gains.append(gain)
-        found.append(_Proposal(name, steps, inputs, tuple(gains), SETTLE_MIN + inputs.size * step_s / 60.0))
-    return found
-
-
-def _no_larger_than_needed(
-    bench: BenchData, problem: Problem, best: Explanation, rivals: list[Explanation], chosen: _Proposal
-) -> _Proposal:
-    """Drive the same over less of the range while it still separates every rival that it did, surely enough.
-
-    Small motions are kinder to the gripper, and what a large one gains beyond need rests on the explanations' forms
-    more than on what was measured.
-    """
-    low, high = float(chosen.inputs_mm.min()), float(chosen.inputs_mm.max())
-    middle = 0.5 * (low + high)
-    apart = [rival for rival, gain in zip(rivals, chosen.gains, strict=True) if gain > WORTH]
-    for share in SMALLER:
-        ends = middle + share * (low - middle), middle + share * (high - middle)
-        (smaller,) = _proposals(bench, problem, best, apart, ends, chosen.name)
-        if min(smaller.gains) < ENOUGH:
-            break
-        gains = iter(smaller.gains)
-        chosen = replace(smaller, gains=tuple(next(gains) if gain > WORTH else gain for gain in chosen.gains))
-    return chosen
+def _open(problem: Problem, members: list[Explanation]) -> _Open:
+    """Order the members by what the data say of them; the leading one stays first."""
+    rows = max(2, int(problem.measured.size - problem.whitener.aside.sum()))
+    cost = {id(e): e.bic(rows) + surprise(problem, e) for e in members}
+    best, others = members[0], sorted(members[1:], key=lambda e: cost[id(e)])[:MOST_RIVALS]
+    listed = [best, *others]
+    costs = np.array([cost[id(e)] for e in listed])
+    odds = np.exp(-0.5 * (costs - costs.min()))
+    truths = 1 + int(np.count_nonzero(odds[1:MOST_TRUTHS] >= LIKELY))
+    before = np.zeros((truths, len(listed)))
+    for j, truth in enumerate(listed[:truths]):
+        target = problem.whitened(truth.values)
+        for k, rival in enumerate(listed):
+            if j != k:
+                before[j, k] = fit(problem, rival.names, rival.values, target=target, iterations=REFITTED).score
+    return _Open(listed, odds / odds.sum(), before)
 
 
 def next_run(
@@ -207,7 +202,7 @@ def next_run(
     found: tuple[Point, ...],
     rng: np.random.Generator,
 ) -> NextRun | None:
-    """Choose the run that separates what is open best, per minute of the rig's time.
+    """Choose the run that settles most of what is open, in the least of the rig's time.
 
     Runs within the range that was measured come first: beyond it an explanation's form is not proven, and neither is
     a promise that rests on it. The promise is for the pair of the leading explanation and the rival that the run
@@ -229,28 +224,54 @@ def next_run(
     """
     if len(members) < 2:
         return None
-    best, rivals = members[0], members[1 : 1 + MOST_RIVALS]
+    special = without_motion(bench, problem, members[0], members[1:])
+    if bench.chain.history.time_s is None:
+        return special
+    choose = _Chooser(bench, problem, _open(problem, members))
     u = bench.table.input_mm
-    special = without_motion(bench, problem, best, rivals)
-    proposals: list[_Proposal] = []
-    if bench.chain.history.time_s is not None:
-        proposals = _proposals(bench, problem, best, rivals, (float(u.min()), float(u.max())))
-        if not any(gain > ENOUGH for proposal in proposals for gain in proposal.gains):
-            proposals += _proposals(bench, problem, best, rivals, bench.model.input_range_mm)
-    chosen = max(proposals, key=lambda proposal: proposal.worth, default=None)
-    if special is not None and (chosen is None or min(special.gain, ENOUGH) / STILL_MIN > chosen.worth):
+    plan = choose.best((float(u.min()), float(u.max())))
+    if plan is None or plan.worst(WORTH) == 0.0:
+        plan = choose.best(bench.model.input_range_mm)
+    if plan is None or plan.worst(WORTH) == 0.0:
         return special
-    if chosen is None or chosen.worth == 0.0:
-        return special
-    chosen = _no_larger_than_needed(bench, problem, best, rivals, chosen)
-    apart = [(gain, rival) for gain, rival in zip(chosen.gains, rivals, strict=True) if gain > WORTH]
-    rival = min(apart, key=lambda item: item[0])[1]
-    joined = _joined(bench, problem, chosen.inputs_mm)
-    gain, interval = _promise(problem, joined, (best, rival), found, rng)
-    also = ["+".join(other.names) for _, other in apart if other is not rival]
-    left = ["+".join(other.names) for other in members[1:] if all(other is not one for _, one in apart)]
-    pair = ("+".join(best.names), "+".join(rival.names))
-    words = f"{chosen.name}: it separates {' from '.join(pair)} by an expected chi-square of {gain:.0f}"
-    words += f", and further {', '.join(also)}" if also else ""
-    words += f"; no protocol tried separates {', '.join(left)}." if left else "."
-    return NextRun(chosen.name, tuple(chosen.steps), gain, interval, pair, words)
+    return _promised(choose, plan, members, found, rng) or special
+
+
+def _promised(
+    choose: _Chooser, plan: _Plan, members: list[Explanation], found: tuple[Point, ...], rng: np.random.Generator
+) -> NextRun | None:
+    """State what a run will gain, and make it smaller where nobody could rely on so large a promise."""
+    listed, odds = choose.open.members, choose.open.odds
+    walks: dict[int, tuple[Point, ...]] = {0: found}
+
+    def stated(run: _Plan, pair: tuple[int, int]) -> Promise:
+        j, k = pair
+        for each in pair:
+            if each not in walks:
+                walks[each] = draws(choose.problem, listed[each], rng)
+        share = float(odds[j] / (odds[j] + odds[k]))
+        both, chance, drawn = (listed[j], listed[k]), (share, 1.0 - share), (walks[j], walks[k])
+        return promise(choose.bench, choose.problem, run.input_mm, both, chance, drawn, rng)
+
+    worst = choose.least(plan)
+    if worst is None:
+        return None
+    separated = worst[1]
+    promised = stated(plan, separated)
+    for less in choose.smaller(plan) if not promised.sound else ():
+        worst = choose.least(less)
+        if worst is not None and worst[0] < MODERATE:
+            again = stated(less, worst[1])
+            if again.sound:
+                plan, separated, promised = less, worst[1], again
+                break
+    j, k = separated
+    pair = ("+".join(listed[j].names), "+".join(listed[k].names))
+    words = f"{plan.name}: it separates {' from '.join(pair)} by an expected chi-square of {promised.gain:.0f}"
+    leading = "+".join(listed[0].names)
+    apart = [e for i, e in enumerate(listed) if i and plan.apart(0, i) >= WORTH]
+    also = ["+".join(e.names) for e in apart if separated != (0, listed.index(e))]
+    left = ["+".join(e.names) for e in members[1:] if all(e is not one for one in apart)]
+    words += f", and {leading} from {', '.join(also)}" if also else ""
+    words += f"; no protocol tried separates {leading} from {', '.join(left)}." if left else "."
+    return NextRun(plan.name, tuple(plan.steps), promised.gain, promised.interval, pair, words)

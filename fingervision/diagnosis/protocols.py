@@ -93,7 +93,16 @@ def driven(steps: list[Step], step_s: float, round_s: float) -> Array:
     return np.convolve(padded, np.full(2 * width + 1, 1.0 / (2 * width + 1)), "valid")[::FINE]
 
 
-def protocols(low_mm: float, high_mm: float, step_s: float) -> list[tuple[str, list[Step]]]:
+def repeated(steps: list[Step], times: int) -> list[Step]:
+    """Drive the same so many times in one run: triangles in more cycles, anything else from the beginning again."""
+    if all(step["kind"] == "triangle" for step in steps):
+        return [{**step, "cycles": times * int(_number(step, "cycles"))} for step in steps]
+    return steps * times
+
+
+def protocols(
+    low_mm: float, high_mm: float, step_s: float, stroke_samples: int = SAMPLES_A_STROKE
+) -> list[tuple[str, list[Step]]]:
     """List runs within a range of the input, each with its name.
 
     Parameters
@@ -102,13 +111,15 @@ def protocols(low_mm: float, high_mm: float, step_s: float) -> list[tuple[str, l
         Range of the input.
     step_s : float
         Time between samples: no stroke is faster than they can follow.
+    stroke_samples : int
+        Samples that a stroke has at least.
     """
     span = high_mm - low_mm
     low, high = round(low_mm + EDGE * span, 4), round(high_mm - EDGE * span, 4)
     middle = round(0.5 * (low + high), 4)
 
     def speed(way_mm: float, seconds: float) -> float:
-        return float(f"{abs(way_mm) / max(seconds, SAMPLES_A_STROKE * step_s):.3g}")
+        return float(f"{abs(way_mm) / max(seconds, stroke_samples * step_s):.3g}")
 
     def triangle(a: float, b: float, seconds: float, cycles: int = 1) -> Step:
         return {
@@ -131,21 +142,23 @@ def protocols(low_mm: float, high_mm: float, step_s: float) -> list[tuple[str, l
             "frames": "continuous",
         }
 
-    def move(to: float) -> Step:
-        return {"kind": "move", "to_mm": to, "speed_mm_s": speed(span, 5.0)}
+    def held(at: float, seconds: float) -> list[Step]:
+        move: Step = {"kind": "move", "to_mm": at, "speed_mm_s": speed(span, 5.0)}
+        return [move, {"kind": "hold", "at_mm": at, "seconds": seconds}]
 
+    fast, small = triangle(low, high, 4.0), triangle(middle - 0.05 * span, middle + 0.05 * span, 4.0, 3)
     return [
         ("there and back", [triangle(low, high, 8.0)]),
-        ("repeat slowly", [triangle(low, high, 30.0)]),
-        ("repeat fast", [triangle(low, high, 4.0)]),
-        ("repeat fast, three times", [triangle(low, high, 4.0, 3)]),
-        ("two speeds", [triangle(low, high, 4.0), triangle(low, high, 20.0)]),
+        ("slowly there and back", [triangle(low, high, 30.0)]),
+        ("fast there and back", [fast]),
+        ("two speeds", [triangle(low, high, 4.0, 3), triangle(low, high, 20.0)]),
         ("reversals", [triangle(low, middle, 5.0, 2), triangle(middle, high, 5.0, 2)]),
         ("decreasing loops", [triangle(low + k * span / 10.0, high - k * span / 10.0, 6.0) for k in range(4)]),
         ("staircase with holds", [stairs(low, high, 3.0), stairs(high, low, 3.0)]),
-        ("short hold", [triangle(low, high, 4.0), move(high), {"kind": "hold", "at_mm": high, "seconds": 15.0}]),
-        ("long hold", [triangle(low, high, 4.0), move(high), {"kind": "hold", "at_mm": high, "seconds": 60.0}]),
+        ("short hold", [fast, *held(high, 15.0)]),
+        ("long hold", [fast, *held(high, 60.0)]),
+        ("two speeds, holds and small loops", [fast, *held(high, 20.0), triangle(low, high, 16.0), small]),
         ("close fully", [triangle(low + 0.3 * span, low, 6.0)]),
         ("open fully", [triangle(high - 0.3 * span, high, 6.0)]),
-        ("small loops", [triangle(middle - 0.05 * span, middle + 0.05 * span, 4.0, 3)]),
+        ("small loops", [small]),
     ]

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tests.benchmarks.hidden.binomial import Rate
 from tests.benchmarks.hidden.catalogue_chain import respond
@@ -27,6 +28,7 @@ from tests.benchmarks.hidden.recipe import NotDrivenError, drive, drive_recipe
 from tests.benchmarks.hidden.rows import ROWS
 from tests.benchmarks.hidden.table_cache import JudgedTable, draw_table_of_row
 
+Array = NDArray[np.float64]
 APART = 16.0
 """Distance above which the judge holds a set for one that a motion can settle: 9, and what noise takes of it."""
 
@@ -92,6 +94,7 @@ def could_be_settled(table: JudgedTable, answer: Answer) -> bool:
     experiment = table.experiment
     own = frozenset(h.name for h in experiment.plant.hidden)
     inputs = experiment.plant.inputs
+    nearest: dict[frozenset[str], list[Array]] = {}
     for motion in motions_of_the_judge(inputs.lower_mm, inputs.upper_mm):
         traces = [*experiment.traces(), *drive(experiment, [motion])]
         problem = problem_of(experiment, traces, known_input=False)
@@ -103,7 +106,11 @@ def could_be_settled(table: JudgedTable, answer: Answer) -> bool:
             if len(chosen) < len(names):
                 continue
             begins = [[c.starts[k * (len(c.starts) - 1) // 3] for c in chosen] for k in range(4)]
-            apart = min(apart, *(fit(problem, truth, chosen, begin, 60).distance for begin in begins))
+            if names in nearest:
+                begins.append(nearest[names])
+            best = min((fit(problem, truth, chosen, begin, 60) for begin in begins), key=lambda found: found.distance)
+            nearest[names] = [best.effects[c.name] for c in chosen]
+            apart = min(apart, best.distance)
             if apart < APART:
                 break
         if apart >= APART:

@@ -1,0 +1,102 @@
+"""What a run will be worth: the chi-square that it puts between two explanations, whichever of them is true."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from fingervision.diagnosis.bench_data import BenchData
+from fingervision.diagnosis.explanation import Explanation, Point, Problem, fit
+from fingervision.diagnosis.noise_draws import problems_of_drawn_noise
+from fingervision.diagnosis.second_run import REFITTED, SecondRun
+from fingervision.domain.effect import Array
+
+TRUTHS = 16
+"""Draws of either explanation's parameters, each with a noise of its own."""
+MANY_SAMPLES, FEW_TRUTHS = 6000, 4
+FURTHER = 2
+"""Further starts of a rival's refit: one search may stand still beside the place where it imitates the truth."""
+NOISES = 4000
+"""Draws of what the run's noise adds."""
+PROMISED = 0.95
+KEPT = (0.7, 1.3)
+"""Gain that came over the gain that was promised, where a promise is kept."""
+MODERATE, SURELY = 75.0, 0.8
+"""A larger promise is sound only where it is as likely as this to be kept."""
+
+
+@dataclass(frozen=True, slots=True)
+class Promise:
+    """A run's gain in chi-square: median, the interval that holds what comes, the chance to come near the median."""
+
+    gain: float
+    interval: tuple[float, float]
+    kept: float
+
+    @property
+    def sound(self) -> bool:
+        """Whether the promise is moderate, or else likely to be kept."""
+        return self.gain < MODERATE or self.kept >= SURELY
+
+
+def promise(
+    bench: BenchData,
+    problem: Problem,
+    input_mm: Array,
+    pair: tuple[Explanation, Explanation],
+    odds: tuple[float, float],
+    found: tuple[Sequence[Point], Sequence[Point]],
+    rng: np.random.Generator,
+) -> Promise:
+    """Foretell the gain from the data as they were measured: the posterior's predictive distribution.
+
+    A truth and a noise are drawn from what the data leave open, the run is driven with it, and both explanations are
+    refitted to the data and the run together. The run's own noise adds 2 sqrt(gain) to the difference of two
+    chi-squares.
+
+    Parameters
+    ----------
+    bench, problem : BenchData, Problem
+        The data.
+    input_mm : ndarray of float, shape (k,)
+        The run.
+    pair : tuple of Explanation
+        What is to be told apart.
+    odds : tuple of float
+        How likely either is by the data; together 1.
+    found : tuple of sequences of dict
+        Draws of either one's parameters.
+    rng : numpy Generator
+        For the noise.
+    """
+    count = TRUTHS if problem.chain.history.input_mm.size + input_mm.size <= MANY_SAMPLES else FEW_TRUTHS
+    gains: list[float] = []
+    chances: list[float] = []
+    for true, other in ((0, 1), (1, 0)):
+        starts = [pair[other].values, *_spread(found[other], FURTHER)]
+        truths = _spread(found[true], count)
+        noisy = problems_of_drawn_noise(bench, problem, pair[true], len(truths), rng)
+        for values, first in zip(truths, noisy, strict=True):
+            run = SecondRun.of(bench, first, input_mm)
+            target = run.expected(values)
+            after = run.score(target, pair[other], starts) - run.score(target, pair[true], [values])
+            gains.append(after - (_score(first, pair[other]) - _score(first, pair[true])))
+            chances.append(odds[true] / len(truths))
+    mean = np.maximum(np.array(gains), 0.0)
+    drawn = mean[rng.choice(mean.size, NOISES, p=np.array(chances) / sum(chances))]
+    come = drawn + 2.0 * np.sqrt(drawn) * rng.standard_normal(NOISES)
+    low, middle, high = np.quantile(come, (0.5 - 0.5 * PROMISED, 0.5, 0.5 + 0.5 * PROMISED))
+    near = (come >= KEPT[0] * middle) & (come <= KEPT[1] * middle)
+    return Promise(float(middle), (float(low), float(high)), float(np.mean(near)))
+
+
+def _score(problem: Problem, explanation: Explanation) -> float:
+    """Chi-square of an explanation refitted to the data alone."""
+    sigma = explanation.sigma_mm
+    return fit(problem, explanation.names, explanation.values, sigma_mm=sigma, iterations=REFITTED).score
+
+
+def _spread(points: Sequence[Point], count: int) -> Sequence[Point]:
+    """Pick so many, evenly from a walk."""
+    step = max(1, len(points) // count)
+    return points[step // 2 :: step]
