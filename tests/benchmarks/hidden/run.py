@@ -3,8 +3,8 @@
     python -m tests.benchmarks.hidden.run --tables 40 --jobs 2 --seed 1 --rows null,single_1 --methods diagnose,bic
 
 Everything is kept under --out by seed, row and number, so that a run may be stopped and goes on; the rows grow
-together, --minutes M begins no table after that time, and --minutes 0 prints the table from what is kept; --again METHOD
-asks that method anew. --scheduler tcp://HOST:PORT works on a Dask cluster whose workers were started at the top of the
+together, --minutes M begins no table after that time, and --minutes 0 prints the table from what is kept; --again
+METHOD asks it anew. --scheduler tcp://HOST:PORT works on a Dask cluster whose workers were started at the top of the
 repository. Build with seeds below 1000, judge with seeds from 1000 on.
 """
 
