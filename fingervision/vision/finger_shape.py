@@ -148,6 +148,18 @@ def compared(
 
 
 @compiled
+def on_flanks(p: Floats, origin: Floats, x: Floats, y: Floats) -> Flags:
+    """Whether each point lies on the straight part of a flank."""
+    corners = (corner(p, origin, 0), corner(p, origin, 1))
+    middle = 0.5 * (corners[0].centre_x + corners[1].centre_x)
+    is_on = np.zeros(x.size, dtype=np.bool_)
+    for i in range(x.size):
+        at = _place(corners[1 if x[i] <= middle else 0], x[i], y[i])
+        is_on[i] = not at.is_on_fillet and at.to_flank == 1.0
+    return is_on
+
+
+@compiled
 def corner_tops(p: Floats, origin: Floats) -> tuple[float, float, float, float]:
     """Where the inner and then the outer fillet is outermost along the axis: x, y, x, y."""
     inner, outer = corner(p, origin, 0), corner(p, origin, 1)

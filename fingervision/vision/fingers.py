@@ -3,29 +3,25 @@
 A finger is a place where the outline, followed from the tips' side of the picture, begins: a local top that goes on
 downwards for some way before it ends or meets another (topographic prominence). Two fingers that touch are one blob
 with two tops and a notch between them, and are found in the same way. What begins at the picture's own border has its
-tip out of view.
+tip out of view. Between the two there is nothing but ground, and no third thing stands beside them like a finger.
 """
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import combinations
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from fingervision.domain.compiled import compiled
 from fingervision.domain.direction import Direction
 from fingervision.domain.gap import NoGap
 from fingervision.domain.status import Status
+from fingervision.vision.flanks import follow_down, has_straight_flanks
 from fingervision.vision.orientation import Orientation
+from fingervision.vision.outlines import Outline, find_outlines
+from fingervision.vision.tops import Top, find_tops
+from fingervision.vision.way_between import Place, inner_crossing, is_free
 
-Outline = NDArray[np.int32]
-
-# A top that is lower than this is noise or dust on an outline, whatever the scale (pixels).
-SMALLEST_PROMINENCE_PX = 5.0
-# An outline that comes back up by more than this has passed the bottom of a notch.
-TURNED_PX = 3
 # Two tops with a notch between them are touching fingers where the notch has so much of the measuring height, and the
 # fingers so many times of it.
 SMALLEST_NOTCH_SHARE, LEAST_LENGTH_SHARE = 0.3, 4.0
@@ -37,38 +33,15 @@ ROOTED_BONUS = 2.0
 LYING_HEIGHTS = 6.0
 # A lone finger that comes in from the border for so many times the measuring height makes everything else a thing.
 ROOTED_HEIGHTS = 2.0
+# What stands beside the two, has so much of their height and leans by no more than this may be meant as well as they.
+THIRD_SHARE, THIRD_STEEPEST = 0.5, 1.0
+# The tips of one gripper differ in height by no more than so many times the measuring height, seen by a camera that is
+# turned by no more than this (slope; 14 degrees).
+STEP_HEIGHTS, MOST_TURNED = 4.0, 0.25
 
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Top:
-    """A place where something begins, seen from the tips' side.
-
-    Parameters
-    ----------
-    outline : ndarray of int32, shape (n, 2)
-        Closed outline of the thing, (across, along), starting at its lowest point.
-    index : int
-        Place of the top on the outline.
-    prominence_px : float
-        How far it goes down before it ends or meets a higher top.
-    is_rooted : bool
-        Whether it goes down as far as the picture does.
-    """
-
-    outline: Outline
-    index: int
-    prominence_px: float
-    is_rooted: bool
-
-    @property
-    def across_px(self) -> int:
-        """Coordinate across the fingers."""
-        return int(self.outline[self.index, 0])
-
-    @property
-    def along_px(self) -> int:
-        """Coordinate along the fingers."""
-        return int(self.outline[self.index, 1])
+MORE_THAN_TWO = NoGap(
+    Status.NO_FINGERS, "More than two things in the picture look like fingers: give the region that holds the two."
+)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -81,13 +54,18 @@ class CoarseFinger:
         (across, along), the last pixels of the finger itself.
     inner_sign : int
         +1 where the gap lies at larger `across` (the left finger), -1 for the right finger.
-    top_along_px : int
-        The outermost pixel.
+    top : Top
+        Where it begins.
     """
 
     outline: Outline
     inner_sign: int
-    top_along_px: int
+    top: Top
+
+    @property
+    def top_along_px(self) -> int:
+        """The outermost pixel along the fingers."""
+        return self.top.along_px
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -111,16 +89,6 @@ class CoarseFingers:
     orientation: Orientation
     score: float
     is_rooted: bool
-
-
-def find_outlines(mask: NDArray[np.uint8]) -> list[Outline]:
-    """Outlines (x, y) of everything set in a mask, holes included, but for specks."""
-    outlines, _ = cv2.findContours(mask, cv2.RETR_LIST, cv2.CHAIN_APPROX_NONE)
-    return [
-        np.asarray(outline[:, 0, :], dtype=np.int32)
-        for outline in outlines
-        if len(outline) > 4 * SMALLEST_PROMINENCE_PX
-    ]
 
 
 def find_fingers(
@@ -154,6 +122,8 @@ def find_fingers(
         if isinstance(found, NoGap):
             if found.status is Status.ONE_FINGER:
                 alone = found
+            if found is MORE_THAN_TWO:
+                return found
             if _SEVERITY.index(found.status) > _SEVERITY.index(worst_reason.status):
                 worst_reason = found
         elif best is None or found.score > best.score:
@@ -167,82 +137,6 @@ def find_fingers(
 _SEVERITY = (Status.NO_FINGERS, Status.ONE_FINGER, Status.TIP_OUT_OF_VIEW, Status.TOUCHING)
 
 
-def _tops(mask: NDArray[np.uint8], outlines: list[Outline], orientation: Orientation) -> list[Top]:
-    upright = orientation.view(mask)
-    found = []
-    for pixels in outlines:
-        outline = in_axes(pixels, orientation)
-        bottom = outline[0, 1]
-        for peak, prominence in zip(*_peaks(outline), strict=True):
-            a, r = outline[peak]
-            if not upright[min(int(r) + 2, orientation.along_size - 1), a]:
-                continue  # the top of a hole, not of a thing
-            is_rooted = bool(bottom == orientation.along_size - 1 and prominence > 0.5 * (bottom - r))
-            found.append(Top(outline, int(peak), float(prominence), is_rooted))
-    return found
-
-
-def in_axes(pixels: Outline, orientation: Orientation) -> Outline:
-    """A closed outline (x, y) in the fingers' axes, from its lowest point on: it rises and falls back to it."""
-    return _from_lowest(pixels, orientation.direction.is_vertical, orientation.is_flipped, orientation.along_size)
-
-
-@compiled
-def _from_lowest(pixels: Outline, is_vertical: bool, is_flipped: bool, along_size: int) -> Outline:
-    n, axis = pixels.shape[0], 1 if is_vertical else 0
-    lowest = 0
-    for i in range(1, n):
-        down = pixels[i, axis] - pixels[lowest, axis]
-        if (down < 0) if is_flipped else (down > 0):
-            lowest = i
-    outline = np.empty((n, 2), dtype=np.int32)
-    for place in range(n):
-        i = (lowest + place) % n
-        outline[place, 0] = pixels[i, 1 - axis]
-        outline[place, 1] = along_size - 1 - pixels[i, axis] if is_flipped else pixels[i, axis]
-    return outline
-
-
-@compiled
-def _peaks(outline: Outline) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Places and prominences of the tops of an outline that starts, and so ends, at its lowest point.
-
-    A top counts once the outline has gone down from it by `SMALLEST_PROMINENCE_PX`, a valley once it has come up by as
-    much. Of several equally high places of one top the last counts.
-    """
-    n = outline.shape[0]
-    top, valley, tops = np.empty(n, dtype=np.int64), np.empty(n, dtype=np.int64), 0
-    # The outermost place since the last valley, or the lowest since the last top.
-    extreme, lowest, is_rising = 0, outline[0, 1], True
-    for place in range(1, n + 1):
-        i = place % n
-        down = outline[i, 1] - outline[extreme, 1]
-        if is_rising:
-            if down <= 0:
-                extreme = i
-            elif down >= SMALLEST_PROMINENCE_PX:
-                top[tops], valley[tops] = extreme, lowest
-                tops, extreme, is_rising = tops + 1, i, False
-        elif down > 0:
-            extreme = i
-        elif -down >= SMALLEST_PROMINENCE_PX:
-            lowest, extreme, is_rising = outline[extreme, 1], i, True
-    prominence = np.empty(tops, dtype=np.int64)
-    for k in range(tops):
-        height = outline[top[k], 1]
-        before, after = height, height
-        for j in range(k, -1, -1):
-            before = max(before, valley[j])
-            if j > 0 and outline[top[j - 1], 1] < height:
-                break
-        for j in range(k + 1, tops + 1):
-            after = max(after, valley[j] if j < tops else outline[0, 1])
-            if j < tops and outline[top[j], 1] <= height:
-                break
-        prominence[k] = min(before, after) - height
-    return top[:tops], prominence
-
-
 def _best_pair(
     mask: NDArray[np.uint8],
     outlines: list[Outline],
@@ -250,9 +144,10 @@ def _best_pair(
     below_tip_px: float,
     reach_px: float,
 ) -> CoarseFingers | NoGap:
-    tops = sorted(_tops(mask, outlines, orientation), key=lambda top: -top.prominence_px)[:MOST_TOPS]
+    tops = find_tops(mask, outlines, orientation)[:MOST_TOPS]
     in_view = [top for top in tops if top.along_px > 0]
     best: CoarseFingers | None = None
+    two: tuple[Top, Top] | None = None
     shallow = False
     for first, second in combinations(in_view, 2):
         left, right = sorted((first, second), key=lambda top: top.across_px)
@@ -268,25 +163,65 @@ def _best_pair(
         if prominence < below_tip_px + 1.0:
             deeper = max(left.prominence_px, right.prominence_px)
             is_notch = prominence > SMALLEST_NOTCH_SHARE * below_tip_px and deeper > LEAST_LENGTH_SHARE * below_tip_px
-            shallow = shallow or is_notch
+            shallow = shallow or (is_notch and all(has_straight_flanks(top, below_tip_px) for top in (left, right)))
             continue
-        if not _stand_side_by_side(left, right, below_tip_px):
+        if not _end_alike(left, right, below_tip_px) or not _stand_side_by_side(left, right, below_tip_px):
             continue
         pair = (_follow(left, 1, below_tip_px, reach_px), _follow(right, -1, below_tip_px, reach_px))
-        if pair[0] is None or pair[1] is None:
-            continue
-        if pair[0].outline[0, 0] <= pair[1].outline[0, 0]:  # the inner sides, in this order
-            best = CoarseFingers(pair[0], pair[1], orientation, score, is_rooted)
-    standing = sum(top.is_rooted and top.prominence_px > ROOTED_HEIGHTS * below_tip_px for top in in_view)
-    if best is not None and (best.is_rooted or standing != 1):
-        return best
+        if pair[0] is None or pair[1] is None or pair[0].outline[0, 0] > pair[1].outline[0, 0]:
+            continue  # the inner sides, in this order
+        if is_free(mask, *_measured_at(pair[0], pair[1], orientation, below_tip_px)):
+            best, two = CoarseFingers(pair[0], pair[1], orientation, score, is_rooted), (left, right)
+    if best is not None and two is not None:
+        for top in in_view:
+            if top not in two and _is_third(top, two, below_tip_px):
+                return MORE_THAN_TWO
+        if best.is_rooted or len(_standing(in_view, below_tip_px)) != 1:
+            return best
     if shallow:
         return NoGap(Status.TOUCHING, "The fingers touch above the measuring height.")
-    if sum(top.along_px == 0 for top in tops) >= 1 and len(tops) >= 2:
+    return _why_none(tops, below_tip_px)
+
+
+def _is_third(top: Top, two: tuple[Top, Top], below_tip_px: float) -> bool:
+    """Whether a third thing may be meant as well as either of two fingers."""
+    lower = min(two, key=lambda finger: finger.prominence_px)
+    return (
+        (top.is_rooted == lower.is_rooted or top.outline is lower.outline)
+        and top.prominence_px > THIRD_SHARE * lower.prominence_px
+        and all(_stand_side_by_side(top, finger, below_tip_px) for finger in two)
+        and has_straight_flanks(top, below_tip_px, THIRD_STEEPEST)
+    )
+
+
+def _standing(tops: list[Top], below_tip_px: float) -> list[Top]:
+    """What comes in from the border like a finger."""
+    return [
+        top
+        for top in tops
+        if top.is_rooted
+        and top.prominence_px > ROOTED_HEIGHTS * below_tip_px
+        and has_straight_flanks(top, below_tip_px)
+    ]
+
+
+def _why_none(tops: list[Top], below_tip_px: float) -> NoGap:
+    """Say what is missing."""
+    standing = _standing(tops, below_tip_px)
+    if len(standing) > 2:
+        return MORE_THAN_TWO
+    if len(standing) == 2 and any(top.along_px == 0 for top in standing):
         return NoGap(Status.TIP_OUT_OF_VIEW, "A finger's tip lies beyond the picture's border.")
-    if standing == 1 or (len(in_view) == 1 and in_view[0].prominence_px > below_tip_px):
+    alone = [top for top in tops if top.along_px > 0]
+    if len(standing) == 1 or (len(alone) == 1 and has_straight_flanks(alone[0], below_tip_px)):
         return NoGap(Status.ONE_FINGER, "Only one finger is in view.")
     return NoGap(Status.NO_FINGERS, "Nothing in the picture looks like two fingers.")
+
+
+def _end_alike(left: Top, right: Top, below_tip_px: float) -> bool:
+    """Whether two tips are about equally high, as those of one gripper are, also where the camera is turned."""
+    apart_px = abs(right.across_px - left.across_px)
+    return abs(right.along_px - left.along_px) <= STEP_HEIGHTS * below_tip_px + MOST_TURNED * apart_px
 
 
 def _stand_side_by_side(left: Top, right: Top, below_tip_px: float) -> bool:
@@ -297,21 +232,21 @@ def _stand_side_by_side(left: Top, right: Top, below_tip_px: float) -> bool:
 
 def _follow(top: Top, inner_sign: int, below_tip_px: float, reach_px: float) -> CoarseFinger | None:
     """The outline from the inner side over the top to the outer side, as far down as `reach_px` or as it goes."""
-    start, stop = (_end(top.outline, top.index, step, top.along_px + reach_px) for step in (-1, 1))
+    start, stop = (follow_down(top.outline, top.index, step, top.along_px + reach_px) for step in (-1, 1))
     piece = top.outline[start : stop + 1]
     if inner_sign * (piece[0, 0] - piece[-1, 0]) < 0:
         piece = piece[::-1]
     if piece[0, 1] < top.along_px + below_tip_px:
         return None
-    return CoarseFinger(np.ascontiguousarray(piece), inner_sign, top.along_px)
+    return CoarseFinger(np.ascontiguousarray(piece), inner_sign, top)
 
 
-@compiled
-def _end(outline: Outline, top: int, step: int, limit: float) -> int:
-    """Where the outline, followed from its top, has gone down to `limit`, or was lowest before it turned back up."""
-    end, i = top, top
-    while 0 <= i < outline.shape[0] and outline[end, 1] < limit and outline[end, 1] - outline[i, 1] <= TURNED_PX:
-        if outline[i, 1] > outline[end, 1]:
-            end = i
-        i += step
-    return end
+def _measured_at(
+    left: CoarseFinger, right: CoarseFinger, orientation: Orientation, below_tip_px: float
+) -> tuple[Place, Place]:
+    """Where the two fingers will be measured, to a pixel, in the picture."""
+    first, second = (
+        orientation.to_pixels(*inner_crossing(finger.outline, finger.top_along_px + below_tip_px))
+        for finger in (left, right)
+    )
+    return first, second

@@ -10,16 +10,17 @@ from fingervision.domain.gap import FingerEdge, GapMeasurement, NoGap
 from fingervision.domain.status import Status
 from fingervision.vision.edge_filters import PIXEL_VARIANCE
 from fingervision.vision.edges import EdgePoints
-from fingervision.vision.finger_end import fit_finger_end
+from fingervision.vision.finger_end import FingerEnd, fit_finger_end
 from fingervision.vision.finger_shape import PARAMETERS
 from fingervision.vision.fingers import CoarseFinger, CoarseFingers
 from fingervision.vision.first_guess import first_guess
+from fingervision.vision.flanks import has_straight_flanks
 from fingervision.vision.local_outline import local_measuring_point
 from fingervision.vision.measuring_point import MeasuringPoint, measuring_point, squared
 from fingervision.vision.median import middle
-from fingervision.vision.outline_points import finger_origin, outline_points
+from fingervision.vision.outline_points import OutlinePoints, finger_origin, outline_points
 from fingervision.vision.profile_lines import IS_INNER, IS_ROW
-from fingervision.vision.residuals import SHARED_POINTS, shape_holds, shared_points, spread
+from fingervision.vision.residuals import SHARED_POINTS, has_flanks, shape_holds, shared_points, spread
 
 Floats = NDArray[np.float64]
 
@@ -31,6 +32,10 @@ FEWEST_ROWS = 4
 FEWEST_LINES = 2 * PARAMETERS
 # A flank of which more than this share lies beyond the end of the scale is cut off.
 CUT_OFF_LIMIT = 0.08
+# A tip has at least this share of the flanks' contrast.
+TIP_CONTRAST = 0.2
+# A gap that is less sure than this (pixels) is no measurement.
+LEAST_SURE_PX = 5.0
 # Below this ratio of contrast to noise nothing is measured.
 CONTRAST_TO_NOISE = 3.0
 
@@ -70,6 +75,9 @@ def measure_gap(
     shared = shared_points(points, (left, right), coding)
     fitted = [measuring_point(end, below_tip_px) for end in (left, right)]
     holds = [shape_holds(*one, below_tip_px) for one in zip(points, (left, right), fitted, strict=True)]
+    refusal = _no_fingers(fingers, points, (left, right), holds, below_tip_px)
+    if refusal is not None:
+        return refusal
     measured: list[MeasuringPoint] = []
     for p, end, found, does_hold in zip(points, (left, right), fitted, holds, strict=True):
         own = None
@@ -96,12 +104,34 @@ def _refuse(edges: EdgePoints, full_scale: int, light_gap: bool) -> NoGap | None
     contrast = middle(edges.contrast[inner]) * (1.0 if light_gap else -1.0)
     if contrast < CONTRAST_TO_NOISE * edges.noise or contrast < 0.02 * full_scale:
         return NoGap(Status.LOW_CONTRAST, "The fingers hardly differ from their ground.")
+    tips = real & ~IS_ROW
+    if tips.any() and abs(middle(edges.contrast[tips])) < TIP_CONTRAST * abs(contrast):
+        return NoGap(Status.NO_FINGERS, "What is in view fades away where a finger's tip would be.")
     if edges.is_clipped[inner].mean() > 0.5 or max(mark.beyond for mark in edges.marks) > CUT_OFF_LIMIT:
         return NoGap(Status.SATURATED, "The flank of the edges is cut off at the end of the grey scale.")
     blur = float(np.sqrt(edges.blur_px[:, 0].max() ** 2 + PIXEL_VARIANCE))
     if blur > BLUR_LIMIT_PX:
         return NoGap(Status.BLURRED, f"The edges are spread over {blur:.1f} px (standard deviation).")
     return None
+
+
+def _no_fingers(
+    fingers: CoarseFingers,
+    points: tuple[OutlinePoints, OutlinePoints],
+    ends: tuple[FingerEnd, FingerEnd],
+    holds: list[bool],
+    below_tip_px: float,
+) -> NoGap | None:
+    """Say so where what was measured is round all over: a finger has straight flanks."""
+    are_fingers = [
+        (does_hold and has_flanks(p, end)) or has_straight_flanks(finger.top, below_tip_px)
+        for finger, p, end, does_hold in zip((fingers.left, fingers.right), points, ends, holds, strict=True)
+    ]
+    if all(are_fingers):
+        return None
+    if any(are_fingers):
+        return NoGap(Status.ONE_FINGER, "Only one of two things in view has the straight flanks of a finger.")
+    return NoGap(Status.NO_FINGERS, "What is in view has no straight flanks, as fingers have.")
 
 
 def _assemble(
@@ -129,6 +159,8 @@ def _assemble(
         # Either edge closes the gap as it grows, each seen from its own finger; the tips move the points' heights.
         gradient = np.array([end * dy / gap, -dx / gap])
         variance += float(gradient @ m.covariance @ gradient)
+    if not variance < LEAST_SURE_PX**2:
+        return NoGap(Status.NO_FINGERS, "The outlines are too rough to say where a finger's tip and edge are.")
     # A rim or too much light does the same to both edges.
     u_shift = abs(sum(mark.shift_px for mark in edges.marks))
     return GapMeasurement(found[0], found[1], orientation.direction, float(np.sqrt(variance)), light_gap, u_shift)

@@ -141,7 +141,7 @@ def _attempt(grey: GreyImage, settings: Settings, coding: Coding) -> _Attempt:
     first: _Attempt | None = None
     for split, fingers, light_gap in _candidates(denoised, binary, settings):
         if isinstance(fingers, NoGap):
-            if fingers.status is Status.TOUCHING and not _has_edges(denoised, split, binary.contrast):
+            if fingers.status is not Status.NO_FINGERS and not _has_edges(denoised, split, binary.contrast):
                 fingers = NoGap(Status.NO_FINGERS, "Light passes into shade without an edge.")
             attempt = _Attempt(fingers, split)
         else:

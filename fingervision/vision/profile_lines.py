@@ -11,7 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fingervision.domain.compiled import compiled
-from fingervision.vision.fingers import CoarseFinger, Outline
+from fingervision.vision.fingers import CoarseFinger
+from fingervision.vision.outlines import Outline
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int_]

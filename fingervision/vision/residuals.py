@@ -6,7 +6,8 @@ from numpy.typing import NDArray
 from fingervision.domain.compiled import compiled
 from fingervision.domain.frame import Coding
 from fingervision.vision.finger_end import SIGMAS_IN_MEDIAN, FingerEnd
-from fingervision.vision.finger_shape import PARAMETERS
+from fingervision.vision.finger_shape import INNER_M, OUTER_M, PARAMETERS, on_flanks
+from fingervision.vision.flanks import STEEPEST
 from fingervision.vision.measuring_point import MeasuringPoint
 from fingervision.vision.median import middle
 from fingervision.vision.outline_points import OutlinePoints
@@ -22,6 +23,8 @@ SHARED_POINTS = {Coding.LOSSLESS: 1.0, Coding.INTRAFRAME: 2.5, Coding.INTERFRAME
 BIWEIGHT_SPREAD = 0.828
 # The three-sided shape holds where its mean residual near the two points that matter is below so many of its own sigma.
 SHAPE_LIMIT, MISFIT_LIMIT = 3.5, 2.5
+# So much of a finger's end, seen closely, are straight flanks; a round thing has next to nothing of them.
+FLANKS_SHARE = 0.05
 # Residuals within so many pixels of a point speak of the shape there.
 SHAPE_REACH_PX, FEWEST_NEAR = 8.0, 3.0
 # A measuring point farther from every point of the outline would be extrapolated (pixels).
@@ -75,6 +78,15 @@ def shape_holds(points: OutlinePoints, end: FingerEnd, found: MeasuringPoint, be
     limit = max(_roughness(end.residual, end.robust), 1.0)
     systematic = _systematic(points.x, points.y, end.residual, end.robust, found.edge, found.tip, below_tip_px)
     return systematic < SHAPE_LIMIT * limit and end.misfit < MISFIT_LIMIT * limit
+
+
+def has_flanks(points: OutlinePoints, end: FingerEnd) -> bool:
+    """Whether enough of the outline that was fitted belongs to flanks that stand nearly along the axis."""
+    if max(abs(end.parameters[INNER_M]), abs(end.parameters[OUTER_M])) > STEEPEST:
+        return False
+    seen = end.robust > 0.0
+    share = float(on_flanks(end.parameters, end.origin, points.x, points.y)[seen].mean())
+    return share > FLANKS_SHARE
 
 
 @compiled

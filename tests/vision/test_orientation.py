@@ -6,8 +6,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from fingervision.domain.direction import Direction
-from fingervision.vision.fingers import in_axes
 from fingervision.vision.orientation import Orientation
+from fingervision.vision.outlines import in_axes
 
 
 @given(direction=st.sampled_from(Direction), height=st.integers(1, 40), width=st.integers(1, 40), data=st.data())

@@ -29,7 +29,10 @@ from fingervision.vision.pipeline import Settings, measure_frame
 SCENE_PX, SIGMAS = 0.1, 4.0
 BASE = {"gap_px": 141.3, "radius_px": 30.0, "tip_at_px": 120.4}
 SQUARE = ((-30.0, -30.0), (30.0, -30.0), (30.0, 30.0), (-30.0, 30.0))
+BELOW = Motion(x_px=320.0, y_px=250.0)
 THING = Patch((polygon(SQUARE, (5.0,) * 4).moved(Motion(x_px=325.0, y_px=45.0)),), 60.0)
+# What the fingers stand on, across the whole picture.
+BODY = Patch((polygon(((-400.0, 0.0), (400.0, 0.0), (400.0, 300.0), (-400.0, 300.0)), (0.0,) * 4).moved(BELOW),), 40.0)
 SCENES: dict[str, dict] = {
     "plain": {},
     **{f"tips_{d}": {"direction": d, "tip_at_px": None, "gap_px": 120.0} for d in Direction},
@@ -46,6 +49,7 @@ SCENES: dict[str, dict] = {
     "fully_round": {"radius_px": 51.0},
     "slanted": {"tip": SquareTip(8.0, 12.0)},
     "other_things": {"behind": (THING,)},
+    "on_one_body": {"behind": (BODY,), "tip_at_px": 90.4},
     "blur_3": {"camera": Camera(blur_px=3.0, noise_grey=2.0)},
     "noise_10": {"camera": Camera(blur_px=0.9, noise_grey=10.0)},
     "jpeg_80": {"jpeg": 80},

@@ -1,0 +1,41 @@
+"""The outlines of everything in a binary picture, to a pixel, seen in the fingers' axes."""
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from fingervision.domain.compiled import compiled
+from fingervision.vision.orientation import Orientation
+
+# Points in order, shape (n, 2).
+Outline = NDArray[np.int32]
+
+# What has a shorter outline is a speck (pixels).
+SHORTEST_OUTLINE_PX = 20
+
+
+def find_outlines(mask: NDArray[np.uint8]) -> list[Outline]:
+    """Outlines (x, y) of everything set in a mask, holes included, but for specks."""
+    outlines, _ = cv2.findContours(mask, cv2.RETR_LIST, cv2.CHAIN_APPROX_NONE)
+    return [np.asarray(outline[:, 0, :], dtype=np.int32) for outline in outlines if len(outline) > SHORTEST_OUTLINE_PX]
+
+
+def in_axes(pixels: Outline, orientation: Orientation) -> Outline:
+    """A closed outline (x, y) in the fingers' axes, from its lowest point on: it rises and falls back to it."""
+    return _from_lowest(pixels, orientation.direction.is_vertical, orientation.is_flipped, orientation.along_size)
+
+
+@compiled
+def _from_lowest(pixels: Outline, is_vertical: bool, is_flipped: bool, along_size: int) -> Outline:
+    n, axis = pixels.shape[0], 1 if is_vertical else 0
+    lowest = 0
+    for i in range(1, n):
+        down = pixels[i, axis] - pixels[lowest, axis]
+        if (down < 0) if is_flipped else (down > 0):
+            lowest = i
+    outline = np.empty((n, 2), dtype=np.int32)
+    for place in range(n):
+        i = (lowest + place) % n
+        outline[place, 0] = pixels[i, 1 - axis]
+        outline[place, 1] = along_size - 1 - pixels[i, axis] if is_flipped else pixels[i, axis]
+    return outline
