@@ -19,8 +19,6 @@ FREEDOM = 5.0
 """Degrees of freedom of the independent proposals: tails that the posterior's do not outreach."""
 SCALES = (0.02, 0.1, 0.4, 1.2)
 """Steps of the local walk over the curvature's widths: one of them suits where the curvature misleads."""
-FORM_SHAPES = 10
-"""Independent shapes over which the catalogue's form may be off: a smooth curve's, not a sample's."""
 JUMPS = 0.01
 """Relative width that the walk begins with where the prediction jumps."""
 
@@ -166,8 +164,8 @@ def settled(
     -------
     explanation : Explanation
         Its covariance is the mean square of the draws about its values. The form of an effect is off by `FORM_SHARE`,
-        which moves the parameters as that much noise in `FORM_SHAPES` shapes would; and the size of a jump is known no
-        better than the recorded input in which it is seen.
+        in as many independent shapes as the catalogue tells apart: so much noise besides. The size of a jump is known
+        no better than the recorded input in which it is seen.
     found : tuple of dict
         The draws.
     """
@@ -186,7 +184,7 @@ def settled(
     residual = problem.measured - problem.whitened(values)
     covariance = away.T @ away / len(found)
     explained = max(0.0, problem.cost({}) - problem.cost(values))
-    covariance *= 1.0 + FORM_SHARE**2 * explained / FORM_SHAPES
+    covariance *= 1.0 + FORM_SHARE**2 * explained / len(problem.effects)
     rugged = np.array([parameter.rugged for _, parameter in walk.listed])
     covariance[rugged, rugged] += problem.chain.history.input_sigma_mm**2
     return replace(explanation, values=values, score=score, residual=residual, covariance=covariance), found
