@@ -11,6 +11,7 @@ from fingervision.diagnosis.report_page import report_page
 from fingervision.domain.parameter import Estimate
 from fingervision.domain.report import DiagnosisReport, Verdict
 from fingervision.effects import catalogue
+from fingervision.measuring.rehearsal import rehearse
 from fingervision.storage.measured_table import read_measured_table
 from fingervision.storage.model_toml import read_model, write_model
 from fingervision.storage.recipe_toml import read_recipe, write_recipe
@@ -19,7 +20,9 @@ from fingervision.testbed.hidden import Hidden
 from fingervision.testbed.hidden_words import usual_values
 from fingervision.testbed.put_together import SIMULATED, open_bed
 from fingervision.testbed.run import run_recipe
-from fingervision.testbed.run_folder import JOINED, SAMPLES, SIMULATION, rows_before, times_of
+from fingervision.testbed.run_about import JOINED, SAMPLES, SIMULATION
+from fingervision.testbed.run_folder import rows_before, times_of
+from fingervision.testbed.run_remains import claim, contents, refuse_others
 
 # What a few short runs can tell from everything else: one of these is hidden where nobody says which.
 SHOWN = (
@@ -102,18 +105,22 @@ def demonstrate(hidden: Hidden, seed: int, out: Path, say: Say) -> Shown:
         The folder cannot be written, or a run could not be made.
     """
     recipe = out / "recipe.toml"
-    out.mkdir(parents=True, exist_ok=True)
+    claim(out)
+    if held := contents(out):
+        refuse_others(out, held[0])
     write_recipe(recipe, "there and back", FIRST_RUN)
+    rehearse(lambda _, words: say(words))
     before: Path | None = None
     for number in range(1, MOST_RUNS + 1):
-        folder = out / f"run-{number}"
+        folder, asked = out / f"run-{number}", read_recipe(recipe)
+        say(f"Run {number}, {asked.name}: the stage moves, a camera looks on, every picture is measured.")
         rows = [] if before is None else rows_before(before)
         bed = open_bed(SIMULATED, hidden, seed=seed, earlier_s=times_of(rows))
         try:
-            done = run_recipe(read_recipe(recipe), bed, folder, hidden, before=rows)
+            done = run_recipe(asked, bed, folder, hidden, before=rows)
         finally:
             bed.close()
-        say(f"Run {number}, {read_recipe(recipe).name}: {done.counts.with_gap} gaps measured in as many pictures.")
+        say(f"{done.counts.with_gap} gaps in {done.counts.recorded} pictures. They are held against the simulation.")
         table = folder / (SAMPLES if before is None else JOINED)
         answer, page = _answer(table, folder / SIMULATION, out / f"diagnosis-{number}", seed)
         say(f"{answer.report.verdict}: {answer.report.sentence}")

@@ -36,7 +36,9 @@ class Plan:
     seconds: tuple[float, ...]
 
 
-def plan(recipe: Recipe[Section], limits: SoftLimits, model: Model | None, start_mm: float, rate_hz: float) -> Plan:
+def plan(
+    recipe: Recipe[Section], limits: SoftLimits, model: Model | None, start_mm: float, rate_hz: float, view_mm: float
+) -> Plan:
     """Read all steps and hold them against the limits.
 
     Parameters
@@ -51,6 +53,8 @@ def plan(recipe: Recipe[Section], limits: SoftLimits, model: Model | None, start
         Where the stage is.
     rate_hz : float
         Of the camera.
+    view_mm : float
+        Width of what it sees.
 
     Raises
     ------
@@ -66,6 +70,9 @@ def plan(recipe: Recipe[Section], limits: SoftLimits, model: Model | None, start
     for number, section in enumerate(recipe.steps, start=1):
         for act, key in kind_of(section).acts(section, at_mm):
             leg = Leg(act, number, section, key)
+            if isinstance(act, Slot) and act.size_mm >= view_mm:
+                words = f"must be less than the {view_mm:.3g} mm that the camera sees, but is {act.size_mm:g}."
+                section.refuse(key, words)
             _check(leg, limits, model, recipe.below_force_n)
             lasts_s, at_mm = _lasts(leg, at_mm, limits, rate_hz)
             legs.append(leg)
@@ -124,8 +131,6 @@ def _reached_mm(leg: Leg) -> Iterator[float]:
         case Swing(mean_mm, amplitude_mm, _, _):
             yield mean_mm - amplitude_mm
             yield mean_mm + amplitude_mm
-        case Slot() | _:
-            return
 
 
 def _beyond(section: Section, key: str, value: float, limit: float, unit: str, what: str) -> None:

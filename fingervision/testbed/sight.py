@@ -143,6 +143,7 @@ class Sight:
         bed.scale.check_frame_size(description.width_px, description.height_px)
         self.camera: BedCamera = bed.camera
         self.rate_hz = description.rate_hz or 25.0
+        self.width_mm = description.width_px / bed.scale.px_per_mm
         self.position = Position(bed.actuator)
         self.force = None if bed.force_sensor is None else Force(bed.force_sensor)
         self.camera_clock = ArrivalClock(bed.camera.latency)

@@ -16,6 +16,7 @@ from fingervision.storage.folder_lock import FolderLock
 from fingervision.storage.recipe_toml import read_recipe
 from fingervision.testbed.actuator import Actuator, Alarm
 from fingervision.testbed.bed import Bed
+from fingervision.testbed.demonstration import demonstrate
 from fingervision.testbed.hidden import Hidden
 from fingervision.testbed.put_together import open_bed
 from fingervision.testbed.run import run_recipe
@@ -84,6 +85,10 @@ gap_mm = {gap_mm}
             "speed_mm_s in line 6 of {path} must be greater than 0, but is 0.",
         ),
         (
+            'kind = "reference_slot"\nsize_mm = 40.0',
+            "size_mm in line 5 of {path} must be less than the 18.8 mm that the camera sees, but is 40.",
+        ),
+        (
             'kind = "hold"\nat_mm = 0.2\nseconds = 1\nframes = "many"',
             "frames in line 7 of {path} must be \"continuous\" or a number for each point, but is 'many'.",
         ),
@@ -102,6 +107,30 @@ def test_a_force_that_the_gripper_would_need_is_foreseen(tmp_path: Path) -> None
     text = 'schema = 1\nbelow_force_n = 1.0\n[[step]]\nkind = "move"\nto_mm = 1.2\nspeed_mm_s = 1.0\n'
     with pytest.raises(FingervisionError, match=r"to_mm in line 5 .* limit of force at 1\.2 mm, 1 N: it needs 2\.49"):
         run(tmp_path, text)
+
+
+def test_a_sine_needs_an_actuator_that_goes_anywhere(tmp_path: Path) -> None:
+    class Stepping:
+        has_steps = True
+
+        def __init__(self, actuator: Actuator) -> None:
+            self.actuator = actuator
+
+        def __getattr__(self, name: str) -> object:
+            return getattr(self.actuator, name)
+
+    bed = open_bed("simulated")
+    bed = replace(bed, actuator=Stepping(bed.actuator))  # type: ignore[arg-type]
+    sine = 'kind = "sine"\nmean_mm = 0.2\namplitude_mm = 0.1\nfrequency_hz = 0.1'
+    recipe = recipe_at(tmp_path, steps(sine))
+    with pytest.raises(FingervisionError) as raised:
+        run_recipe(read_recipe(recipe), bed, tmp_path / "run")
+    assert str(raised.value) == (
+        f"kind in line 4 of {recipe} cannot be done: A sine must be driven in short moves to anywhere on its way, but this "
+        "actuator goes only where its step data lead. Use a triangle or a staircase between two of its steps. Nothing "
+        "was moved."
+    )
+    assert not (tmp_path / "run").exists()
 
 
 def test_a_camera_that_sees_no_fingers_lets_nothing_move(tmp_path: Path) -> None:
@@ -170,6 +199,18 @@ def test_a_folder_of_something_else_is_left_alone(tmp_path: Path) -> None:
     with pytest.raises(FingervisionError, match=r"must be a new or empty folder, but .* holds thesis\.tex"):
         run(tmp_path, steps(MOVE))
     assert (tmp_path / "run" / "thesis.tex").read_text() == "mine"
+
+
+def test_a_demonstration_leaves_other_files_alone(tmp_path: Path) -> None:
+    (tmp_path / "thesis.tex").write_text("mine")
+    for out, sentence in (
+        (tmp_path, f"--out must be a new or empty folder, but {tmp_path} holds thesis.tex: name another."),
+        (tmp_path / "thesis.tex", f"--out must be a folder, but {tmp_path / 'thesis.tex'} is a file: name another."),
+    ):
+        with pytest.raises(FingervisionError) as raised:
+            demonstrate(Hidden(), 1, out, lambda words: None)
+        assert str(raised.value) == sentence
+    assert [path.name for path in tmp_path.iterdir()] == ["thesis.tex"]
 
 
 def test_a_finished_run_is_left_alone(tmp_path: Path) -> None:
