@@ -10,7 +10,7 @@ from fingervision.diagnosis.explanation import FORM_SHARE, Explanation, Problem,
 from fingervision.diagnosis.indistinguishable import beside_foretold, indistinguishable, odds
 from fingervision.diagnosis.input_error import below_the_input
 from fingervision.diagnosis.signatures import Signatures, signatures, tangents
-from fingervision.diagnosis.unexplained import SMALL_SHARE, stands_in, unexplained
+from fingervision.diagnosis.unexplained import SMALL_SHARE, imitated, unexplained
 from fingervision.domain.report import Verdict
 
 Progress = Callable[[float], None]
@@ -147,7 +147,7 @@ def search(
     thresholds = linear_thresholds(problem, atoms.names, atoms.columns, nothing.sigma_mm, rng)
     progress(0.3)
     best, peers = nothing, [nothing]
-    pairs = []
+    pairs, foreign = [], None
 
     def is_evidence(base: Explanation, found: list[Explanation]) -> bool:
         asked = {e.names: price(thresholds, base, e.names) for e in found}
@@ -172,17 +172,15 @@ def search(
         if pairs and _added(problem, best, pairs[0]) > SMALL_SHARE and is_evidence(best, pairs):
             best, peers = _choose(pairs[:6], samples), pairs
             triples = _extended(problem, atoms, pairs[:3], 24, lambda share: progress(0.7 + 0.1 * share))
-            if (
-                triples
-                and _added(problem, best, triples[0]) > TRIPLE_SHARE
-                and is_evidence(best, triples)
-                and not stands_in(problem, triples[0], [nothing, singles[0], *pairs[:2]])
-            ):
-                best, peers = _choose(triples[:6], samples), triples
+            if triples and _added(problem, best, triples[0]) > TRIPLE_SHARE and is_evidence(best, triples):
+                foreign = imitated(problem, triples[0], [nothing, *bases, *pairs[:3]])
+                if foreign is None:
+                    best, peers = _choose(triples[:6], samples), triples
     if forced:
-        best = _insisted(problem, forced, [*singles, *pairs], singles, samples)
+        best, foreign = _insisted(problem, forced, [*singles, *pairs], singles, samples), None
     progress(0.82)
     words, left = unexplained(problem, best, rng)
+    words = words or foreign
     progress(0.9)
     alternatives, distances = (
         ([best], {})

@@ -14,6 +14,8 @@ SMALL_SHARE = 0.05
 """What the catalogue's form leaves over of the truth's is a few per cent of what was explained, no second name."""
 LONG = 4000
 """Samples above which fewer probes must do."""
+VERY_STRONG = 10.0
+"""Evidence on the scale of BIC (Kass & Raftery 1995)."""
 STAND_INS = 2
 """Probes that may take the place of several effects: a bump's width lies between two of the grid."""
 
@@ -47,27 +49,30 @@ def _gains(problem: Problem, columns: Array, found: Explanation, taken: Array) -
     return np.where(usable, dot**2 / np.where(usable, norm, 1.0), 0.0), dot, norm
 
 
-def stands_in(problem: Problem, several: Explanation, fewer: list[Explanation]) -> bool:
-    """Whether several effects only imitate something that the catalogue does not hold.
+def imitated(problem: Problem, several: Explanation, fewer: list[Explanation]) -> str | None:
+    """What several effects only imitate, in words, where the catalogue does not hold it.
 
-    Three effects bend to almost anything. Where one or two generic shapes beside fewer effects explain the data better,
-    each at the price of its amplitude and of the choice among all shapes (`choices`), the effects are not the reason.
+    Three effects bend to almost anything. Unless they explain the data far better than one or two generic shapes beside
+    fewer effects, each at the price of its amplitude and of the choice among all shapes (`choices`), they are not the
+    reason.
     """
-    columns = _probes(problem).columns
-    rows = int(problem.measured.size)
+    shapes = _probes(problem)
+    columns, rows = shapes.columns, int(problem.measured.size)
     each = float(np.log(rows)) + 2.0 * float(np.log(columns.shape[1]))
-    limit = several.bic(rows) + choices(problem, several)
+    limit = several.bic(rows) + choices(problem, several) + VERY_STRONG
     for base in fewer:
         taken = np.zeros((rows, 0))
         cost = base.bic(rows) + choices(problem, base)
+        words: list[str] = []
         for _ in range(STAND_INS):
             gain = _gains(problem, columns, base, taken)[0]
             top = int(np.argmax(gain))
             taken = np.hstack([taken, columns[:, top : top + 1]])
+            words.append(f"{shapes.words[top]} ({np.sqrt(gain[top]):.1f} sigma)")
             cost += each - float(gain[top])
             if cost < limit:
-                return True
-    return False
+                return " and ".join(words)
+    return None
 
 
 def unexplained(problem: Problem, best: Explanation, rng: np.random.Generator) -> tuple[str | None, str | None]:
