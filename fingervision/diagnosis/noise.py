@@ -9,9 +9,10 @@ from fingervision.domain.effect import Array, Flags
 
 LEAST_SHARE = 0.1
 """Of a residual's variance that is the picture's own at least."""
-PLACES, RARE, BY_CHANCE = 20, 0.005, 1e-3
-"""Parts of the input's range that are looked at, the share of gross errors that is nothing unusual, and how seldom
-they may crowd in any one part by chance."""
+PLACES, ENDS = 20, (3, 5, 8)
+"""Parts of the input's range that are looked at, and how many samples at either end of it: stops act there."""
+RARE, BY_CHANCE = 0.005, 1e-3
+"""The share of gross errors that is nothing unusual, and how seldom they may crowd in any one part by chance."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,10 +66,11 @@ def _at_one_place(out: Flags, input_mm: Array) -> Flags:
     """Where more samples are off than gross errors would be, which come at any input: a contact, a stop."""
     order = np.argsort(input_mm, kind="stable")
     there = np.zeros(out.size, dtype=bool)
-    parts = np.array_split(order, min(PLACES, out.size))
+    ends = [part for count in ENDS for part in (order[:count], order[-count:])]
+    parts = [*np.array_split(order, min(PLACES, out.size)), *ends]
     for part in parts:
         by_chance = binom.sf(out[part].sum() - 1, part.size, max(float(out.mean()), RARE))
-        there[part] = by_chance < BY_CHANCE / len(parts)
+        there[part] |= by_chance < BY_CHANCE / len(parts)
     return there
 
 
