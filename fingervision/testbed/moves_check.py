@@ -24,9 +24,9 @@ def check_moves(plan: Plan, bed: Bed, at_mm: float) -> None:
             case Swing(mean, amplitude, frequency_hz):
                 if bed.actuator.has_steps:
                     raise FingervisionError(
-                        f"kind in {leg.section.at('kind')} cannot be done: A sine must be driven in short moves to anywhere on "
-                        "its way, but this actuator goes only where its step data lead. Use a triangle or a staircase "
-                        "between two of its steps. Nothing was moved."
+                        f"kind in {leg.section.at('kind')} cannot be done: A sine must be driven in short moves to "
+                        "anywhere on its way, but this actuator goes only where its step data lead. Use a triangle or "
+                        "a staircase between two of its steps. Nothing was moved."
                     )
                 to_mm, speed_mm_s = mean + amplitude, tau * frequency_hz * abs(amplitude)
             case Close(speed):

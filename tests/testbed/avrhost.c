@@ -1,10 +1,12 @@
 /* An ATmega328P that runs a sketch in step with the wall clock, its serial line on a pseudo-terminal.
 
-   Its time stands while what it has said, on the serial line or on stdout, is not yet read: a computer that is busy with
-   other work does not fall behind the board.
+   Its time stands while a byte is under way on the serial line, in either direction, or a line on stdout is unread: a
+   computer that is busy with other work does not fall behind the board. (The kernel carries bytes from one end of a
+   pseudo-terminal to the other when it finds the time, and neither end can ask for them: both count.)
 
-   avrhost SKETCH.elf SLOWER CLOCK: SLOWER is how many times slower than the wall clock, CLOCK a file of 8 bytes, where
-   the number of the cycle always stands. Then on stdin, one command a line:
+   avrhost SKETCH.elf SLOWER SHARED: SLOWER is how many times slower than the wall clock, SHARED a file of five numbers of
+   8 bytes: the cycle, the bytes that went out and came in here, and those that the computer has read and written
+   (greater than all: it has hung up). Then on stdin, one command a line:
        pin N LEVEL      what stands outside at Arduino pin N         adc CHANNEL MILLIVOLT
        spoil OUT IN     flip a bit in every OUT-th byte to the computer, every IN-th to the board (0: none)
        reset            what the reset button does                    unplug     pull the cable
@@ -38,7 +40,8 @@ static avr_t *avr;
 static int line = -1, keeper = -1; /* keeper holds the slave open, so that a closing client is no pulled cable */
 static unsigned spoil_out, spoil_in, sent, taken, may_send = 1;
 static int reset_wanted;
-static volatile uint64_t *shown; /* the cycle, for whoever maps the file */
+enum { CYCLE, OUT, IN, READ, WRITTEN, SHARED };
+static volatile uint64_t *shared;
 static int64_t start_ns, soonest_ns, slower;
 static struct { unsigned port, ddr; } ports[3];
 
@@ -61,9 +64,9 @@ static void on_port(avr_irq_t *irq, uint32_t value, void *param) {
 static void on_byte(avr_irq_t *irq, uint32_t value, void *param) {
     uint8_t byte = value;
     (void)irq, (void)param;
-    *shown = avr->cycle;
+    shared[CYCLE] = avr->cycle;
     if (spoil_out && ++sent % spoil_out == 0) byte ^= 1 << sent / spoil_out % 7;
-    if (line >= 0 && write(line, &byte, 1) < 0) return; /* nobody reads: lost, as on a real line */
+    if (line >= 0 && write(line, &byte, 1) == 1) shared[OUT]++; /* else nobody reads: lost, as on a real line */
 }
 
 static void on_flow(avr_irq_t *irq, uint32_t value, void *param) {
@@ -105,25 +108,27 @@ static void feed_serial(void) {
     if (!input) input = avr_io_getirq(avr, AVR_IOCTL_UART_GETIRQ('0'), UART_IRQ_INPUT);
     uint8_t byte;
     while (line >= 0 && may_send && read(line, &byte, 1) == 1) {
+        shared[IN]++;
         if (spoil_in && ++taken % spoil_in == 0) byte ^= 1 << taken / spoil_in % 7;
         avr_raise_irq(input, byte);
     }
 }
 
-static int unread(void) {
-    int on_line = 0, on_stdout = 0;
-    if (line >= 0) ioctl(keeper, FIONREAD, &on_line);
+static int under_way(void) {
+    int arrived = 0, on_stdout = 0;
     ioctl(STDOUT_FILENO, FIONREAD, &on_stdout);
-    return on_line + on_stdout;
+    if (line < 0 || on_stdout) return on_stdout;
+    ioctl(line, FIONREAD, &arrived);
+    return shared[READ] < shared[OUT] || (int64_t)(shared[WRITTEN] - shared[IN]) > arrived;
 }
 
-/* The wall clock's time that was spent until everything was read. */
+/* The wall clock's time that was spent until nothing was under way. */
 static int64_t waited_ns(void) {
     static int nobody_reads;
     struct timespec look = {0, LOOK_NS};
     int64_t since = now_ns();
-    if (!unread()) return nobody_reads = 0;
-    while (!nobody_reads && unread()) {
+    if (!under_way()) return nobody_reads = 0;
+    while (!nobody_reads && under_way()) {
         nanosleep(&look, NULL);
         listen_outside();
         nobody_reads = now_ns() - since > LISTENER_WITHIN_NS;
@@ -144,7 +149,7 @@ static avr_cycle_count_t pace(avr_t *a, avr_cycle_count_t when, void *param) {
     if (due < soonest_ns) due = soonest_ns;
     struct timespec t = {due / 1000000000, due % 1000000000};
     if (due > now + LEAST_SLEEP_NS) clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &t, NULL);
-    *shown = when;
+    shared[CYCLE] = when;
     listen_outside();
     feed_serial();
     return when + PACE_CYCLES;
@@ -155,8 +160,9 @@ static void sleep_in_loop(avr_t *a, avr_cycle_count_t cycles) { (void)a, (void)c
 int main(int argc, char **argv) {
     elf_firmware_t firmware = {0};
     if (argc != 4 || (slower = atoi(argv[2])) < 1 || elf_read_firmware(argv[1], &firmware)) return 2;
-    shown = mmap(NULL, sizeof *shown, PROT_READ | PROT_WRITE, MAP_SHARED, open(argv[3], O_RDWR), 0);
-    if (shown == MAP_FAILED) return 2;
+    shared = mmap(NULL, SHARED * sizeof *shared, PROT_READ | PROT_WRITE, MAP_SHARED, open(argv[3], O_RDWR), 0);
+    if (shared == MAP_FAILED) return 2;
+    shared[READ] = UINT64_MAX;
     avr = avr_make_mcu_by_name("atmega328p");
     avr_init(avr);
     firmware.frequency = HERTZ;

@@ -8,6 +8,7 @@ import pytest
 
 from fingervision.testbed import by_hand
 from fingervision.testbed.bed import Bed
+from fingervision.testbed.board.port import opened_port
 from fingervision.testbed.put_together import open_bed
 from tests.testbed.board_bed import CONTRACT_STEPS, times_of, written_bed
 from tests.testbed.emulated_board import EmulatedBoard, MotorController, compiled, missing_tools, running
@@ -26,9 +27,11 @@ def sketch(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
 
 
 @pytest.fixture
-def emulated(sketch: tuple[Path, Path]) -> Iterator[EmulatedBoard]:
-    """A board that was just switched on."""
+def emulated(sketch: tuple[Path, Path], monkeypatch: pytest.MonkeyPatch) -> Iterator[EmulatedBoard]:
+    """A board that was just switched on; its time stands while a byte is under way."""
     with running(sketch, SLOWER) as board:
+        opened = "fingervision.testbed.board.board.opened_port"
+        monkeypatch.setattr(opened, lambda name: board.shared.counted(opened_port(name)))
         yield board
 
 

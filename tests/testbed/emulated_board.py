@@ -5,11 +5,13 @@ import subprocess
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
-from mmap import PROT_READ, mmap
+from mmap import mmap
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from threading import Condition, Thread
 from time import sleep
+
+import serial
 
 from fingervision.domain.board_settings import SELECT, BoardSettings, Line, Role
 
@@ -93,23 +95,67 @@ class Edge:
         return self.ports[letter] >> bit & 1 if self.directions[letter] >> bit & 1 else None
 
 
+class Shared:
+    """Numbers that emulator and computer share: the cycle, and how many bytes went out and in at either end.
+
+    Parameters
+    ----------
+    path : Path
+        Of the file that both map.
+    """
+
+    CYCLE, OUT, IN, READ, WRITTEN = range(5)
+    HUNG_UP = 2**64 - 1
+
+    def __init__(self, path: Path) -> None:
+        path.write_bytes(bytes(8 * 5))
+        with path.open("r+b") as file:
+            self._shared = mmap(file.fileno(), 8 * 5)
+
+    def __getitem__(self, which: int) -> int:
+        return int.from_bytes(self._shared[8 * which : 8 * which + 8], "little")
+
+    def __setitem__(self, which: int, value: int) -> None:
+        self._shared[8 * which : 8 * which + 8] = value.to_bytes(8, "little")
+
+    def counted(self, port: serial.Serial) -> serial.Serial:
+        """Count what goes through an open port from now on."""
+        self[self.READ], self[self.WRITTEN] = self[self.OUT], self[self.IN]
+        read, write, close = port.read, port.write, port.close
+
+        def counting_read(size: int = 1) -> bytes:
+            got = read(size)
+            self[self.READ] += len(got)
+            return got
+
+        def counting_write(line: bytes) -> int | None:
+            done = write(line)
+            self[self.WRITTEN] += len(line)
+            return done
+
+        def hanging_up() -> None:
+            self[self.READ] = self.HUNG_UP
+            close()
+
+        port.read, port.write, port.close = counting_read, counting_write, hanging_up  # type: ignore[method-assign]
+        return port
+
+
 class EmulatedTime:
     """A host's clock that goes with the emulated crystal, however fast the emulator gets on.
 
     Parameters
     ----------
-    path : Path
+    shared : Shared
         Where the emulator shows its cycle.
     """
 
-    def __init__(self, path: Path) -> None:
-        path.write_bytes(bytes(8))
-        with path.open("rb") as file:
-            self._shown = mmap(file.fileno(), 8, prot=PROT_READ)
+    def __init__(self, shared: Shared) -> None:
+        self._shared = shared
 
     def now_s(self) -> float:
         """Seconds."""
-        return self.at(int.from_bytes(self._shown[:8], "little"))
+        return self.at(self._shared[Shared.CYCLE])
 
     def wait_until(self, time_s: float) -> None:
         """Sleep until then."""
@@ -135,15 +181,16 @@ class EmulatedBoard:
 
     def __init__(self, host: Path, elf: Path, slower: int) -> None:
         self._folder = TemporaryDirectory()
-        shown = Path(self._folder.name) / "cycle"
-        self.clock = EmulatedTime(shown)
+        path = Path(self._folder.name) / "shared"
+        self.shared = Shared(path)
+        self.clock = EmulatedTime(self.shared)
         self.edges: list[Edge] = [Edge(0, 0.0, dict.fromkeys("BCD", 0), dict.fromkeys("BCD", 0))]
         self.on_edge: list[Callable[[Edge, Edge], None]] = []
         self._said = 0
         self._done_s: list[float] = []
         self._news = Condition()
         self._process = subprocess.Popen(
-            [host, elf, str(slower), shown],
+            [host, elf, str(slower), path],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=subprocess.DEVNULL,

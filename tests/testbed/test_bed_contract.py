@@ -97,7 +97,7 @@ def test_a_jog_ends_with_a_stop(bed: Bed) -> None:
     before = bed.actuator.readings()[-1:]
     bed.actuator.jog(0.5)
     bed.clock.wait_until(bed.clock.now_s() + 1.0)
-    assert bed.actuator.busy
+    assert bed.actuator.busy, bed.actuator.alarm
     bed.actuator.stop()
     readings = before + until_rest(bed)
     stopped_mm = readings[-1].value

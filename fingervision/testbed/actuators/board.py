@@ -1,9 +1,7 @@
 """A motor controller on the parallel lines of a board: it runs the step data that it keeps."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
-from threading import Event, Thread
 
 from fingervision.domain.errors import FingervisionError
 from fingervision.domain.step_data import Coordinates, StepData
@@ -16,15 +14,13 @@ from fingervision.testbed.asked_move import check_move, check_speed
 from fingervision.testbed.board import controller_settings, wire
 from fingervision.testbed.board.board import Board
 from fingervision.testbed.board.controller_settings import Codes, Waits, codes_of, waits_of
-from fingervision.testbed.board.handshake import Handshake
+from fingervision.testbed.board.motions import Motions, Run
 from fingervision.testbed.board.port import fingervision_at
 from fingervision.testbed.board.shared import KEY, board_of
 from fingervision.testbed.clock import Clock
-from fingervision.testbed.commanded_path import CommandedPath
-from fingervision.testbed.motion_profile import MotionProfile
 from fingervision.testbed.published_stage import stage_limits
 from fingervision.testbed.reading import Reading
-from fingervision.testbed.step_checks import PlannedMotion, planned
+from fingervision.testbed.step_checks import planned
 from fingervision.testbed.step_route import jog_step, route
 from fingervision.testbed.workshop import Workshop
 
@@ -33,16 +29,7 @@ KEYS = (KEY, "steps", *published_stage.KEYS, *controller_settings.KEYS)
 # A motion may take so much longer than its profile before it counts as stuck.
 PATIENCE, PATIENCE_S = 1.5, 1.0
 READ_EVERY_S = 0.005
-STILL = MotionProfile(0.0, 0.0, 0.0, 0.0, 0.0)
-
-
-@dataclass(frozen=True, slots=True)
-class _Run:
-    """One handshake: a code, how long it may take, and what it does to the position."""
-
-    code: int
-    at_most_s: float
-    motion: PlannedMotion | None
+CLOSES_WITHIN_S = 1.0
 
 
 class BoardActuator:
@@ -73,14 +60,8 @@ class BoardActuator:
     ) -> None:
         self.limits = limits
         self._board, self._data, self._codes, self._waits, self._clock = board, data, codes, waits, clock
-        self._path = CommandedPath(data.start_mm)
-        self._known = False
-        self._failure: str | None = None
-        self._worker: Thread | None = None
-        self._stopped = Event()
+        self._motions = Motions(board, waits, clock, data.start_mm)
         self._read_s = clock.now_s()
-        self._ready_s = clock.now_s()
-        self._handshake = Handshake(board, clock, waits.busy_s, self._stopped)
         self._closed = False
 
     @property
@@ -92,7 +73,7 @@ class BoardActuator:
     def busy(self) -> bool:
         """Whether a motion is under way."""
         self._board.check()
-        return self._worker is not None and self._worker.is_alive()
+        return self._motions.busy
 
     @property
     def alarm(self) -> Alarm | None:
@@ -101,8 +82,8 @@ class BoardActuator:
             return Alarm("alarm", "the motor controller's alarm line is active: clear the alarm there, then home")
         if self._board.dropped is not None and self._board.dropped_code != "h":
             return Alarm("dropped", f"{self._board.dropped}; its drive line was dropped: home it")
-        if self._failure is not None:
-            return Alarm("failed", self._failure)
+        if self._motions.failure is not None:
+            return Alarm("failed", self._motions.failure)
         return None
 
     def home(self) -> None:
@@ -112,13 +93,13 @@ class BoardActuator:
             raise FingervisionError(
                 "The motor controller must have no alarm, but its alarm line is active: clear it there."
             )
-        self._failure = None
+        self._motions.failure = None
         if self._codes.home is not None:
-            self._begin([_Run(self._codes.home, self._waits.home_s, None)])
+            self._motions.begin([Run(self._codes.home, self._waits.home_s, None)])
             return
         for number, step in self._data.steps.items():
             if step.coordinates is Coordinates.ABSOLUTE and step.target_mm == 0.0:
-                self._begin([self._run_of(number, self._at_mm())])
+                self._motions.begin([self._run_of(number, self._at_mm())])
                 return
         raise FingervisionError(
             "Homing must have a code of its own (home_code of the actuator) or an absolute step to 0 mm, but there is "
@@ -134,7 +115,7 @@ class BoardActuator:
         """Begin to move, by the steps that lead there."""
         check_move(self.limits, to_mm, speed_mm_s)
         self._ready()
-        at_mm = self._at_mm() if self._known else None
+        at_mm = self._at_mm() if self._motions.known else None
         self._begin_steps(route(self._data.steps, at_mm, to_mm, speed_mm_s, self.limits.speed_mm_s))
 
     def jog(self, speed_mm_s: float) -> None:
@@ -160,16 +141,15 @@ class BoardActuator:
 
     def stop(self) -> None:
         """Drop the drive line at once; it may be called from a signal handler."""
-        self._stopped.set()
-        self._board.stop()
+        self._motions.stop()
 
     def readings(self) -> tuple[Reading, ...]:
         """Positions since the last call, where it was sent: on the host's clock, since the host works them out."""
         self._board.check()
         now_s = self._clock.now_s()
-        times = [*self._path.times_of_motion_s(self._read_s, now_s, READ_EVERY_S).tolist(), now_s]
+        times = [*self._motions.path.times_of_motion_s(self._read_s, now_s, READ_EVERY_S).tolist(), now_s]
         self._read_s = now_s
-        return tuple(Reading(at_s, at_s, at_s, self._path.at_mm(at_s)) for at_s in times)
+        return tuple(Reading(at_s, at_s, at_s, self._motions.path.at_mm(at_s)) for at_s in times)
 
     def close(self) -> None:
         """Stop and let go of the board."""
@@ -177,15 +157,14 @@ class BoardActuator:
             return
         self._closed = True
         self.stop()
-        if self._worker is not None:
-            self._worker.join(timeout=1.0)
+        self._motions.wait(CLOSES_WITHIN_S)
         self._board.close()
 
     # What may begin.
 
     def _stand(self) -> None:
         # First of all, so that a stop that comes while the motion is prepared is not forgotten.
-        self._stopped.clear()
+        self._motions.forget_stop()
         if self.busy:
             raise FingervisionError("The actuator must stand before it moves again, but is busy: stop it first.")
 
@@ -198,7 +177,7 @@ class BoardActuator:
             )
 
     def _check_known(self, number: int) -> None:
-        if not self._known and self._data.steps[number].coordinates is Coordinates.RELATIVE:
+        if not self._motions.known and self._data.steps[number].coordinates is Coordinates.RELATIVE:
             raise FingervisionError(
                 f"The position must be known before the relative step {number}, but is not since the start or the last "
                 "stop: home first (--home-first)."
@@ -207,55 +186,23 @@ class BoardActuator:
     # How it is done.
 
     def _at_mm(self) -> float:
-        return self._path.at_mm(self._clock.now_s())
+        return self._motions.path.at_mm(self._clock.now_s())
 
     def _begin_steps(self, numbers: Sequence[int]) -> None:
-        runs: list[_Run] = []
+        runs: list[Run] = []
         at_mm = self._at_mm()
         for number in numbers:
             runs.append(self._run_of(number, at_mm))
             motion = runs[-1].motion
             assert motion is not None  # noqa: S101 - only homing has none
             at_mm = motion.to_mm
-        self._begin(runs)
+        self._motions.begin(runs)
 
-    def _run_of(self, number: int, at_mm: float) -> _Run:
+    def _run_of(self, number: int, at_mm: float) -> Run:
         motion = planned(number, self._data.steps[number], at_mm, self.limits)
         # From a position that is not known it may take as long as homing.
-        at_most_s = PATIENCE * motion.motion.seconds + PATIENCE_S + (0.0 if self._known else self._waits.home_s)
-        return _Run(self._codes.first + number - 1, at_most_s, motion)
-
-    def _begin(self, runs: Sequence[_Run]) -> None:
-        if not runs:
-            return
-        self._board.wait_for_stop()
-        if not self._board.ready:
-            self._board.clear()
-            self._ready_s = self._clock.now_s() + self._waits.enable_s
-        self._worker = Thread(target=self._work, args=(runs,), name="motion", daemon=True)
-        self._worker.start()
-
-    def _work(self, runs: Sequence[_Run]) -> None:
-        try:
-            self._clock.wait_until(self._ready_s)
-            for run in runs:
-                if self._stopped.is_set() or not self._do(run):
-                    return
-        except FingervisionError as error:
-            self._path.break_off(self._clock.now_s())
-            self._failure = str(error)
-
-    def _do(self, run: _Run) -> bool:
-        known, self._known = self._known, False
-        motion = STILL if run.motion is None else run.motion.motion
-        done = self._handshake.run(run.code, run.at_most_s, lambda at_s: self._path.begin(at_s, motion))
-        now_s = self._clock.now_s()
-        if not done:
-            self._path.break_off(now_s)
-            return False
-        self._path.jump(now_s, 0.0 if run.motion is None else run.motion.to_mm)
-        self._known = known or run.motion is None or run.motion.step.coordinates is Coordinates.ABSOLUTE
-        return True
+        at_most_s = PATIENCE * motion.motion.seconds + PATIENCE_S + (0.0 if self._motions.known else self._waits.home_s)
+        return Run(self._codes.first + number - 1, at_most_s, motion)
 
 
 def holder(section: Section, folder: Path) -> int | None:

@@ -1,0 +1,105 @@
+"""Motions behind a board, one handshake after the other in a thread of their own, and where they lead."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from threading import Event, Thread
+
+from fingervision.domain.errors import FingervisionError
+from fingervision.domain.step_data import Coordinates
+from fingervision.testbed.board.board import Board
+from fingervision.testbed.board.controller_settings import Waits
+from fingervision.testbed.board.handshake import Handshake
+from fingervision.testbed.clock import Clock
+from fingervision.testbed.commanded_path import CommandedPath
+from fingervision.testbed.motion_profile import MotionProfile
+from fingervision.testbed.step_checks import PlannedMotion
+
+STILL = MotionProfile(0.0, 0.0, 0.0, 0.0, 0.0)
+
+
+@dataclass(frozen=True, slots=True)
+class Run:
+    """One handshake: a code, how long it may take, and what it does to the position; None goes to the reference."""
+
+    code: int
+    at_most_s: float
+    motion: PlannedMotion | None
+
+
+class Motions:
+    """Runs them, and follows the position by their profiles: parallel lines tell none.
+
+    Parameters
+    ----------
+    board : Board
+        Set up.
+    waits : Waits
+        What the controller is given time for.
+    clock : Clock
+        The bed's.
+    start_mm : float
+        Where the stage is taken to stand at first.
+    """
+
+    def __init__(self, board: Board, waits: Waits, clock: Clock, start_mm: float) -> None:
+        self.path = CommandedPath(start_mm)
+        # After a start or a stop only an absolute step or homing tells where the stage is.
+        self.known = False
+        self.failure: str | None = None
+        self._board, self._waits, self._clock = board, waits, clock
+        self._worker: Thread | None = None
+        self._stopped = Event()
+        self._ready_s = clock.now_s()
+        self._handshake = Handshake(board, clock, waits.busy_s, self._stopped)
+
+    @property
+    def busy(self) -> bool:
+        """Whether one is under way."""
+        return self._worker is not None and self._worker.is_alive()
+
+    def forget_stop(self) -> None:
+        """Take no notice of stops until now."""
+        self._stopped.clear()
+
+    def stop(self) -> None:
+        """Drop the drive line at once; it may be called from a signal handler."""
+        self._stopped.set()
+        self._board.stop()
+
+    def begin(self, runs: Sequence[Run]) -> None:
+        """Begin to run them, one after the other."""
+        if not runs:
+            return
+        self._board.wait_for_stop()
+        if not self._board.ready:
+            self._board.clear()
+            self._ready_s = self._clock.now_s() + self._waits.enable_s
+        self._worker = Thread(target=self._work, args=(runs,), name="motion", daemon=True)
+        self._worker.start()
+
+    def wait(self, seconds: float) -> None:
+        """Wait for the end of what is under way, for so long."""
+        if self._worker is not None:
+            self._worker.join(timeout=seconds)
+
+    def _work(self, runs: Sequence[Run]) -> None:
+        try:
+            self._clock.wait_until(self._ready_s)
+            for run in runs:
+                if self._stopped.is_set() or not self._do(run):
+                    return
+        except FingervisionError as error:
+            self.path.break_off(self._clock.now_s())
+            self.failure = str(error)
+
+    def _do(self, run: Run) -> bool:
+        known, self.known = self.known, False
+        motion = STILL if run.motion is None else run.motion.motion
+        done = self._handshake.run(run.code, run.at_most_s, lambda at_s: self.path.begin(at_s, motion))
+        now_s = self._clock.now_s()
+        if not done:
+            self.path.break_off(now_s)
+            return False
+        self.path.jump(now_s, 0.0 if run.motion is None else run.motion.to_mm)
+        self.known = known or run.motion is None or run.motion.step.coordinates is Coordinates.ABSOLUTE
+        return True
