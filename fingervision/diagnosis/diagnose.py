@@ -9,6 +9,7 @@ from fingervision.diagnosis.bench_data import BenchData, prepare
 from fingervision.diagnosis.explanation import Explanation, Problem
 from fingervision.diagnosis.force_hint import force_hint
 from fingervision.diagnosis.next_run import next_run
+from fingervision.diagnosis.other_evidence import other_evidence
 from fingervision.diagnosis.refitted_search import refitted_search
 from fingervision.diagnosis.search import Findings, Progress
 from fingervision.diagnosis.unseen_runs import rms_mm, unseen_rms_mm
@@ -136,6 +137,7 @@ def diagnose(
             *bench.notes,
             *bench.refitted(),
             *force_hint(bench, found.alternatives),
+            *other_evidence(found.alternatives),
             *_beyond(bench, best),
             *_input_dominates(bench, found.problem),
         ),

@@ -11,7 +11,15 @@ from fingervision.diagnosis.explanation import Explanation, Point, Problem, fit
 from fingervision.diagnosis.indistinguishable import surprise
 from fingervision.diagnosis.posterior import draws
 from fingervision.diagnosis.promise import MODERATE, Promise, promise
-from fingervision.diagnosis.protocols import SAMPLES_A_STROKE, Step, driven, protocols, repeated, rounding_s
+from fingervision.diagnosis.protocols import (
+    SAMPLES_A_STROKE,
+    Step,
+    driven,
+    measured_ends,
+    protocols,
+    repeated,
+    rounding_s,
+)
 from fingervision.diagnosis.second_run import PAUSE_S, REFITTED, SecondRun
 from fingervision.diagnosis.still_proposals import WORTH, without_motion
 from fingervision.domain.effect import Array
@@ -26,6 +34,8 @@ NEEDED, BARELY = 30.0, 20.0
 MOST_TRUTHS, MOST_RIVALS = 4, 8
 COMPARED = 6
 """Pairs among which the one is sought that gains least."""
+WITHIN = 1.5
+"""A pair is told apart within a run where known offsets of the runs would raise the gain by no more than this."""
 LIKELY = 0.02
 """Odds to the likeliest explanation above which another may be the truth that the run is chosen for."""
 SCREENED = 4
@@ -138,9 +148,15 @@ class _Chooser:
         return second.distance(truth.values, rival, sigma_mm=rival.sigma_mm) - float(self.open.before[true, other])
 
     def least(self, run: _Plan) -> tuple[float, tuple[int, int]] | None:
-        """Find the pair that gains least of those that are told apart, and what it gains; None without any."""
+        """Find the pair that gains least of those that are told apart, and what it gains; None without any.
+
+        Pairs that are told apart within the run come first: what rests on the run's offset against the data may be
+        taken for a re-zeroing.
+        """
         second = SecondRun.of(self.bench, self.problem, run.input_mm)
-        return min(((self.shown(second, *pair), pair) for pair in run.pairs()[:COMPARED]), default=None)
+        found = [(self.shown(second, *pair), pair) for pair in run.pairs()[:COMPARED]]
+        within = [each for each in found if each[0] < WITHIN * run.apart(*each[1])]
+        return min(within or found, default=None)
 
     def best(self, ends: tuple[float, float]) -> _Plan | None:
         """Choose the protocol, and how often it is driven, that settles most; of alike ones the cheapest."""
@@ -228,8 +244,7 @@ def next_run(
     if bench.chain.history.time_s is None:
         return special
     choose = _Chooser(bench, problem, _open(problem, members))
-    u = bench.table.input_mm
-    plan = choose.best((float(u.min()), float(u.max())))
+    plan = choose.best(measured_ends(bench.table.input_mm, bench.model.input_range_mm))
     if plan is None or plan.worst(WORTH) == 0.0:
         plan = choose.best(bench.model.input_range_mm)
     if plan is None or plan.worst(WORTH) == 0.0:

@@ -19,6 +19,8 @@ FURTHER = 2
 NOISES = 4000
 """Draws of what the run's noise adds."""
 PROMISED = 0.95
+REZEROED = 0.5
+"""Chance that the run is offset against the data."""
 KEPT = (0.7, 1.3)
 """Gain that came over the gain that was promised, where a promise is kept."""
 MODERATE, SURELY = 75.0, 0.8
@@ -78,8 +80,8 @@ def promise(
         noisy = problems_of_drawn_noise(bench, problem, pair[true], len(truths), rng)
         for values, first in zip(truths, noisy, strict=True):
             run = SecondRun.of(bench, first, input_mm)
-            target = run.expected(values)
-            after = run.score(target, pair[other], starts) - run.score(target, pair[true], [values])
+            target, sigma_mm = run.expected(values), _offsets(first, pair[true], rng)
+            after = run.score(target, pair[other], starts, sigma_mm) - run.score(target, pair[true], [values], sigma_mm)
             gains.append(after - (_score(first, pair[other]) - _score(first, pair[true])))
             chances.append(odds[true] / len(truths))
     mean = np.maximum(np.array(gains), 0.0)
@@ -88,6 +90,18 @@ def promise(
     low, middle, high = np.quantile(come, (0.5 - 0.5 * PROMISED, 0.5, 0.5 + 0.5 * PROMISED))
     near = (come >= KEPT[0] * middle) & (come <= KEPT[1] * middle)
     return Promise(float(middle), (float(low), float(high)), float(np.mean(near)))
+
+
+def _offsets(problem: Problem, explanation: Explanation, rng: np.random.Generator) -> tuple[float, ...]:
+    """Spread of the runs' offsets, one a channel: where there is one run only, a draw from its prior.
+
+    None at all in half of the draws, for nothing need be re-zeroed before the run; else the half-Cauchy prior by which
+    a diagnosis of both runs will judge them (`RunOffsets.spread`).
+    """
+    if problem.offsets.runs > 1:
+        return explanation.sigma_mm
+    share = abs(rng.standard_cauchy()) if rng.random() < REZEROED else 0.0
+    return tuple(share * scale for scale in problem.offsets.scales_mm)
 
 
 def _score(problem: Problem, explanation: Explanation) -> float:

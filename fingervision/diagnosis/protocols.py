@@ -93,6 +93,27 @@ def driven(steps: list[Step], step_s: float, round_s: float) -> Array:
     return np.convolve(padded, np.full(2 * width + 1, 1.0 / (2 * width + 1)), "valid")[::FINE]
 
 
+def measured_ends(input_mm: Array, within_mm: tuple[float, float]) -> tuple[float, float]:
+    """Take the range that was measured, but so that a run begins or turns at the stage's zero where that is near.
+
+    After a way of a step or two of the encoder from where the stage stands, its place is hardly known.
+
+    Parameters
+    ----------
+    input_mm : ndarray of float, shape (n,)
+        What was measured.
+    within_mm : tuple of float
+        What the model covers.
+    """
+    low, high = float(input_mm.min()), float(input_mm.max())
+    free = EDGE * (high - low)
+    if abs(low) < free and low - 2.0 * free > within_mm[0]:
+        low = -EDGE * high / (1.0 - EDGE)
+    if abs(high) < free and high + 2.0 * free < within_mm[1]:
+        high = -EDGE * low / (1.0 - EDGE)
+    return low, high
+
+
 def repeated(steps: list[Step], times: int) -> list[Step]:
     """Drive the same so many times in one run: triangles in more cycles, anything else from the beginning again."""
     if all(step["kind"] == "triangle" for step in steps):

@@ -8,7 +8,7 @@ from html import escape
 from fingervision.diagnosis.diagnose import Diagnosis, by_channel
 from fingervision.diagnosis.report_figure import residual_figure
 from fingervision.domain.parameter import Estimate
-from fingervision.domain.report import Verdict
+from fingervision.domain.report import DiagnosisReport, Verdict
 
 COVERAGE_FACTOR = 1.96
 """Standard uncertainties in half a 95 % interval."""
@@ -57,6 +57,16 @@ def _mm(value: float | None) -> str:
     return "-" if value is None else f"{value:.4g} mm"
 
 
+def _next_words(report: DiagnosisReport) -> str:
+    if report.next_run is not None:
+        return report.next_run.words
+    if report.verdict is Verdict.AMBIGUOUS:
+        return (
+            "No run that the bed can drive separates what is open; what else would, if anything, stands in the notes."
+        )
+    return "Nothing is open."
+
+
 def report_page(diagnosis: Diagnosis) -> str:
     """Write the report as HTML."""
     report = diagnosis.report
@@ -93,7 +103,7 @@ def report_page(diagnosis: Diagnosis) -> str:
         ("How much", numbers),
         ("Parameters, with 95 % intervals", _table(["effect", "parameter", "value", "interval"], parameters)),
         ("What cannot be told apart", _apart(report.alternatives)),
-        ("The next run", f"<p>{escape(report.next_run.words if report.next_run else 'Nothing is open.')}</p>"),
+        ("The next run", f"<p>{escape(_next_words(report))}</p>"),
         ("Runners-up", _table(["explanation", "chi-square behind", "distance to the answer"], near)),
         ("What remains", f"<p>{escape(report.remaining)}</p>"),
         ("Set aside", _list(list(report.outliers))),

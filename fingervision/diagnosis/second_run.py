@@ -115,14 +115,15 @@ class SecondRun:
         return self.both.whitener.one(_behind(self.data_mm, new.ravel(), self.channels))
 
     def score(
-        self, target: Array, explanation: Explanation, starts: Sequence[Settings], *, iterations: int = REFITTED
+        self, target: Array, explanation: Explanation, starts: Sequence[Settings], sigma_mm: tuple[float, ...]
     ) -> float:
-        """Chi-square of an explanation refitted to a target, the best of several searches."""
-        names, sigma = explanation.names, explanation.sigma_mm
+        """Chi-square of an explanation refitted to a target, the best of several searches, runs offset by a spread."""
+        names = explanation.names
         begins = [self.moved(names, start) for start in starts]
-        return min(
-            fit(self.both, names, begin, target=target, sigma_mm=sigma, iterations=REFITTED).score for begin in begins
-        )
+        tries = [
+            fit(self.both, names, begin, target=target, sigma_mm=sigma_mm, iterations=REFITTED) for begin in begins
+        ]
+        return min(found.score for found in tries)
 
 
 def _behind(old: Array, new: Array, channels: int) -> Array:

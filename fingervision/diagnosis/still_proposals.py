@@ -4,7 +4,7 @@ import numpy as np
 
 from fingervision.diagnosis.bench_data import BenchData
 from fingervision.diagnosis.explanation import Explanation, Problem
-from fingervision.diagnosis.protocols import Step, protocols
+from fingervision.diagnosis.protocols import Step, measured_ends, protocols
 from fingervision.domain.effect import PointEffect
 from fingervision.domain.report import NextRun
 from fingervision.domain.response import Response
@@ -32,9 +32,9 @@ def _rezeroed(bench: BenchData, problem: Problem, pair: tuple[Explanation, Expla
     """Re-zero the stage: an offset of the input is gone after it, an offset of the gap stays."""
     offset = next(e for e in pair if "input_offset" in e.names)
     history, offsets = bench.chain.history, problem.offsets
-    low, high = float(bench.table.input_mm.min()), float(bench.table.input_mm.max())
     steps: list[Step] = [{"kind": "rezero"}]
-    steps += protocols(low, high, 0.1 if history.time_s is None else history.sample_time_s)[0][1]
+    ends = measured_ends(bench.table.input_mm, bench.model.input_range_mm)
+    steps += protocols(*ends, 0.1 if history.time_s is None else history.sample_time_s)[0][1]
     moved = bench.chain.stacked({"input_offset": offset.values["input_offset"]}) - bench.chain.stacked({})
     size = float(np.mean(moved[: history.input_mm.size]))
     known = np.diag(offsets.gram)[: offsets.runs]

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from fingervision.diagnosis.protocols import SAMPLES_A_STROKE, driven, protocols, rounding_s
+from fingervision.diagnosis.protocols import SAMPLES_A_STROKE, driven, measured_ends, protocols, repeated, rounding_s
 
 STEP_S = 0.1
 
@@ -41,3 +41,20 @@ def test_no_stroke_is_faster_than_the_samples_can_follow(step_s: float) -> None:
         path = driven(steps, step_s, 0.3)
         assert path.min() > -0.5
         assert path.max() < 1.5
+
+
+def test_repeating_drives_the_same_again_in_one_run() -> None:
+    for name, steps in protocols(-0.5, 1.5, STEP_S):
+        once, thrice = driven(steps, STEP_S, 0.0), driven(repeated(steps, 3), STEP_S, 0.0)
+        assert thrice.min() == pytest.approx(once.min()), name
+        assert thrice.max() == pytest.approx(once.max()), name
+        strokes = [sum(int(str(step.get("cycles", 1))) for step in each) for each in (steps, repeated(steps, 3))]
+        assert strokes[1] == 3 * strokes[0], name
+
+
+def test_a_run_begins_at_zero_where_the_stage_stands_there() -> None:
+    ends = measured_ends(np.array([0.0, 0.6, 1.2]), (-0.5, 1.5))
+    step = protocols(*ends, STEP_S)[0][1][0]
+    assert step["from_mm"] == pytest.approx(0.0, abs=1e-4)
+    assert measured_ends(np.array([0.0, 1.2]), (0.0, 1.5)) == (0.0, 1.2)
+    assert measured_ends(np.array([-0.4, 1.2]), (-0.5, 1.5)) == (-0.4, 1.2)

@@ -1,0 +1,123 @@
+"""The next run: what it is promised to gain comes, and what no motion tells apart is said."""
+
+import itertools
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from fingervision.diagnosis.bench_data import BenchData, prepare
+from fingervision.diagnosis.explanation import Explanation, Problem, fit
+from fingervision.diagnosis.next_run import NEEDED, next_run
+from fingervision.diagnosis.noise_short import drawn_noises
+from fingervision.diagnosis.other_evidence import EVIDENCE, other_evidence
+from fingervision.diagnosis.posterior import draws
+from fingervision.diagnosis.promise import promise
+from fingervision.diagnosis.second_run import SecondRun
+from fingervision.domain.effect import Array
+from fingervision.effects import catalogue
+from fingervision.storage.measured_table import read_measured_table
+from fingervision.storage.model_toml import read_model
+
+EDGE_MM = 0.003
+SHARE = 0.01
+STEP_S = 0.25
+ONE_WAY = np.linspace(-0.5, 1.5, 40)
+BACK = np.concatenate([np.linspace(1.4, -0.4, 20), np.linspace(-0.4, 1.4, 20)])
+
+
+def measured(u: Array, rng: np.random.Generator) -> tuple[Array, Array]:
+    """Left and right of fingers of which one opens more than the other."""
+    opening = 7.0 * u
+    left, right = (side * (2.0 + 0.5 * opening) + SHARE * opening for side in (-1.0, 1.0))
+    return left + EDGE_MM * rng.standard_normal(u.size), right + EDGE_MM * rng.standard_normal(u.size)
+
+
+def bench(folder: Path, seed: int) -> tuple[BenchData, Problem]:
+    left, right = measured(ONE_WAY, np.random.default_rng(seed))
+    lines = [f"{STEP_S * k},{u},{r - x},{x},{r}" for k, (u, x, r) in enumerate(zip(ONE_WAY, left, right, strict=True))]
+    (folder / "measured.csv").write_text("time_s,input_mm,gap_mm,left_mm,right_mm\n" + "\n".join(lines) + "\n")
+    (folder / "sim.csv").write_text("input_mm,gap_mm\n-0.6,-0.2\n1.6,15.2\n")
+    data = prepare(read_measured_table(folder / "measured.csv"), read_model(folder / "sim.csv"))
+    alone = data.problem(data.stacked_mm - data.chain.stacked({}), 0, explained=False)
+    best = explained(alone, "assembly_asymmetry", share=SHARE)
+    return data, data.problem(data.stacked_mm - data.chain.stacked(best.values), 1, explained=True)
+
+
+def explained(problem: Problem, name: str, **start: float) -> Explanation:
+    return fit(problem, (name,), {name: start}, iterations=12)
+
+
+def both(problem: Problem) -> tuple[Explanation, Explanation]:
+    return (
+        explained(problem, "assembly_asymmetry", share=SHARE),
+        explained(problem, "camera_drift", rate_mm_per_s=0.002),
+    )
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+def test_what_comes_lies_in_the_promised_interval(tmp_path: Path, seed: int) -> None:
+    data, problem = bench(tmp_path, seed)
+    pair = both(problem)
+    rng = np.random.default_rng(seed)
+    found = (draws(problem, pair[0], rng), draws(problem, pair[1], rng))
+    promised = promise(data, problem, BACK, pair, (1.0, 0.0), found, rng)
+    run = SecondRun.of(data, problem, BACK)
+    left, right = measured(BACK, rng)
+    shown = np.stack([right - left, 0.5 * (left + right)])
+    target = run.both.whitener.one(np.concatenate([data.aim_mm.reshape(2, -1), shown], axis=1).ravel())
+    none = (0.0, 0.0)
+    after = run.score(target, pair[1], [pair[1].values], none) - run.score(target, pair[0], [pair[0].values], none)
+    came = after - (pair[1].score - pair[0].score)
+    low, high = promised.interval
+    assert low < promised.gain < high
+    assert low < came < high
+
+
+def test_the_data_stay_as_they_were_and_the_run_is_as_foretold(tmp_path: Path) -> None:
+    data, problem = bench(tmp_path, 1)
+    run = SecondRun.of(data, problem, BACK)
+    truth = {"assembly_asymmetry": {"share": SHARE}}
+    far = run.expected(truth).reshape(2, -1) - run.both.whitened(truth).reshape(2, -1)
+    n = ONE_WAY.size
+    assert np.allclose(far[:, n:], 0.0, atol=1e-9)
+    assert np.allclose(far[:, :n].ravel(), problem.measured - problem.whitened(truth), atol=1e-9)
+
+
+def test_a_run_is_proposed_that_settles_the_pair(tmp_path: Path) -> None:
+    data, problem = bench(tmp_path, 1)
+    pair = list(both(problem))
+    rng = np.random.default_rng(1)
+    proposal = next_run(data, problem, pair, draws(problem, pair[0], rng), rng)
+    assert proposal is not None
+    assert set(proposal.separates) == {"assembly_asymmetry", "camera_drift"}
+    assert proposal.gain > NEEDED
+    assert proposal.gain_interval[0] < proposal.gain < proposal.gain_interval[1]
+
+
+def test_exact_look_alikes_get_advice_and_no_run(tmp_path: Path) -> None:
+    data, problem = bench(tmp_path, 1)
+    pair = [
+        explained(problem, "input_scale", ratio=0.01),
+        explained(problem, "lever_ratio_error", ratio=0.01),
+    ]
+    rng = np.random.default_rng(1)
+    assert next_run(data, problem, pair, draws(problem, pair[0], rng), rng) is None
+    (sentence,) = other_evidence(tuple(pair))
+    assert sentence.startswith("input_scale or lever_ratio_error: measure the stage's travel with a gauge")
+
+
+def test_advice_names_effects_of_the_catalogue() -> None:
+    assert set(itertools.chain(*EVIDENCE)) <= set(catalogue())
+
+
+def test_drawn_noise_is_spread_as_a_variance_of_so_few_samples_is() -> None:
+    rng = np.random.default_rng(3)
+    white = [rng.standard_normal(40) for _ in range(2)]
+    aside = [np.zeros(40, dtype=bool)] * 2
+    noises = drawn_noises(white, (slice(0, 40),), aside, 2000, rng)
+    level = np.array([noise[0].total_mm for noise in noises if noise[0].correlation < 0.01])
+    # White noise is what half of the prior says, and nothing in the data speaks against it.
+    assert level.size > 1000
+    # The relative standard deviation of an estimated one is 1 / sqrt(2 (n - 2)); 2000 draws know it to a few per cent.
+    assert np.std(level) / np.mean(level) == pytest.approx(1.0 / np.sqrt(2.0 * 38.0), rel=0.15)
