@@ -7,6 +7,7 @@ import numpy as np
 
 from fingervision.diagnosis.bench_data import BenchData
 from fingervision.diagnosis.explanation import Explanation, Point, Problem, fit
+from fingervision.diagnosis.known_slots import told_by_slots
 from fingervision.diagnosis.posterior import settled
 from fingervision.diagnosis.search import Findings, Progress, search
 
@@ -53,23 +54,27 @@ def refitted_search(bench: BenchData, rng: np.random.Generator, forced: frozense
     progress : callable
         Told the share that is done.
     """
-    found = search(partial(_problem, bench), rng, forced, progress)
+    found, said = told_by_slots(bench, search(partial(_problem, bench), rng, forced, progress))
     if not bench.refit.moved:
         best, posterior = settled(found.problem, found.best, rng)
-        return Refitted(bench, _with_best(found, best), posterior)
+        return Refitted(_with_notes(bench, said), _with_best(found, best), posterior)
     for _ in range(MOST_SEARCHES - 1):
         nearer = bench.redrawn(found.problem, found.best)
         straight = nearer.straight(bench, found.problem)
         bench = nearer
         if straight:
             break
-        found = search(partial(_problem, bench), rng, forced, progress)
+        found, said = told_by_slots(bench, search(partial(_problem, bench), rng, forced, progress))
     found = replace(found, problem=_problem(bench, found.best))
     refit = fit(found.problem, found.best.names, found.best.values, iterations=20) if found.best.names else found.best
     best, posterior = settled(found.problem, refit, rng)
     found = _with_best(found, best)
     bench = bench.redrawn(found.problem, best if best.names else found.problem.nothing())
-    return Refitted(bench, replace(found, problem=_problem(bench, best)), posterior)
+    return Refitted(_with_notes(bench, said), replace(found, problem=_problem(bench, best)), posterior)
+
+
+def _with_notes(bench: BenchData, said: tuple[str, ...]) -> BenchData:
+    return replace(bench, notes=(*bench.notes, *said))
 
 
 def _with_best(found: Findings, best: Explanation) -> Findings:

@@ -6,6 +6,8 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from fingervision.domain.reference_slot import ReferenceSlot
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MeasuredTable:
@@ -29,6 +31,8 @@ class MeasuredTable:
         Force at the drive.
     notes : tuple of str
         What the reader mended or left out, a sentence each.
+    slots : tuple of ReferenceSlot
+        Widths that are known, measured through the same camera.
     """
 
     input_mm: NDArray[np.float64]
@@ -40,6 +44,7 @@ class MeasuredTable:
     u_random_mm: NDArray[np.float64] | None = None
     force_n: NDArray[np.float64] | None = None
     notes: tuple[str, ...] = ()
+    slots: tuple[ReferenceSlot, ...] = ()
 
     @property
     def shared_clock(self) -> bool:

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from fingervision.domain.errors import FingervisionError
 from fingervision.domain.measured_table import MeasuredTable
 from fingervision.storage.csv_columns import number, read_columns
+from fingervision.storage.reference_slots import slots_beside
 
 FEWEST_ROWS = 5
 NUMBERS = ("input_mm", "gap_mm", "time_s", "left_mm", "right_mm", "u_gap_mm", "u_random_mm", "force_n")
@@ -84,6 +85,7 @@ def read_measured_table(path: Path) -> MeasuredTable:
         u_random_mm=column.get("u_random_mm", column.get("u_gap_mm")),
         force_n=column.get("force_n"),
         notes=tuple(notes),
+        slots=slots_beside(path),
     )
 
 

@@ -1,0 +1,30 @@
+"""Reference slots of a run on the bed, as its run.json keeps them beside the table."""
+
+import json
+from pathlib import Path
+
+from fingervision.domain.reference_slot import ReferenceSlot
+from fingervision.storage.run_files import RUN
+
+KEY = "reference_slots"
+
+
+def slots_beside(table: Path) -> tuple[ReferenceSlot, ...]:
+    """Read the slots of the run that a table belongs to; none where it is not that of a run, or no slot was measured.
+
+    Parameters
+    ----------
+    table : Path
+        A file of a run folder, or any other table.
+    """
+    try:
+        about = json.loads((table.parent / RUN).read_text(encoding="utf-8"))
+        names = (about["samples"], about.get("joined"))
+        listed = about.get(KEY, []) if table.name in names else []
+        return tuple(
+            ReferenceSlot(*(float(slot[key]) for key in ("size_mm", "u_size_mm", "measured_mm", "u_random_mm")))
+            for slot in listed
+        )
+    except (OSError, ValueError, KeyError, TypeError, AttributeError):
+        # The folder is another program's, or the run broke off before it was finished.
+        return ()
