@@ -13,7 +13,7 @@ from fingervision.diagnosis.noise_short import noise_of_short_runs
 from fingervision.diagnosis.noise_spectrum import noise_by_spectrum
 from fingervision.diagnosis.smooth_input import input_sigma, smoothed
 from fingervision.diagnosis.whitening import RunOffsets, Whitener
-from fingervision.domain.effect import Array, Effect, Flags, History
+from fingervision.domain.effect import REZEROED, Array, Effect, Flags, History
 from fingervision.domain.errors import FingervisionError
 from fingervision.domain.measured_table import MeasuredTable
 from fingervision.domain.model import PhysicalModel
@@ -221,6 +221,7 @@ def prepare(table: MeasuredTable, model: CorrectedModel, without: frozenset[str]
         input_step_mm=step,
         both_edges=table.midline_mm is not None,
         force=table.force_n is not None and bare_force is not None,
+        rezeroed=_rezeroed(table),
     )
     fixed = {name: {key: e.value for key, e in values.items()} for name, values in model.effects.items()}
     chain = MeasuringChain(model.base, history, fixed)
@@ -254,6 +255,12 @@ def prepare(table: MeasuredTable, model: CorrectedModel, without: frozenset[str]
     return BenchData(
         table, model, chain, stacked, error, stays, max(samples, 1.0), able, excluded, distrusted, tuple(notes), refit
     )
+
+
+def _rezeroed(table: MeasuredTable) -> tuple[bool, ...]:
+    """Which runs came after a re-zeroing, by their names; empty where all did: no run shows the zero before."""
+    flags = tuple(REZEROED in name.split() for name in table.run_names)
+    return flags if any(flags) and not all(flags) else ()
 
 
 def _within(input_mm: Array, runs: tuple[slice, ...], samples: int, reach_mm: float) -> Flags:

@@ -49,6 +49,8 @@ def promise(
     odds: tuple[float, float],
     found: tuple[Sequence[Point], Sequence[Point]],
     rng: np.random.Generator,
+    *,
+    rezeroed: bool = False,
 ) -> Promise:
     """Foretell the gain from the data as they were measured: the posterior's predictive distribution.
 
@@ -70,6 +72,8 @@ def promise(
         Draws of either one's parameters.
     rng : numpy Generator
         For the noise.
+    rezeroed : bool
+        Whether the stage is re-zeroed before the run.
     """
     count = TRUTHS if problem.chain.history.input_mm.size + input_mm.size <= MANY_SAMPLES else FEW_TRUTHS
     gains: list[float] = []
@@ -79,8 +83,10 @@ def promise(
         truths = _spread(found[true], count)
         noisy = problems_of_drawn_noise(bench, problem, pair[true], len(truths), rng)
         for values, first in zip(truths, noisy, strict=True):
-            run = SecondRun.of(bench, first, input_mm)
-            target, sigma_mm = run.expected(values), _offsets(first, pair[true], rng)
+            run = SecondRun.of(bench, first, input_mm, rezeroed=rezeroed)
+            target = run.expected(values)
+            # A run after a re-zeroing is offset by as much as both runs together then say.
+            sigma_mm = None if rezeroed else _offsets(first, pair[true], rng)
             after = run.score(target, pair[other], starts, sigma_mm) - run.score(target, pair[true], [values], sigma_mm)
             gains.append(after - (_score(first, pair[other]) - _score(first, pair[true])))
             chances.append(odds[true] / len(truths))

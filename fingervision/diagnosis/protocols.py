@@ -5,6 +5,7 @@ import numpy as np
 from fingervision.domain.effect import Array
 
 Step = dict[str, object]
+REZERO: Step = {"kind": "rezero"}
 EDGE = 0.03
 """Share of the range that is left free at either end: an offset or a scale must not drive the stage beyond it."""
 ORDINARY_S, MOST_S = 0.3, 2.0
@@ -72,7 +73,7 @@ def driven(steps: list[Step], step_s: float, round_s: float) -> Array:
     Parameters
     ----------
     steps : list of dict
-        Triangles, staircases, moves and holds.
+        Triangles, staircases, moves and holds; a re-zeroing takes no sample.
     step_s : float
         Time between samples.
     round_s : float
@@ -82,9 +83,10 @@ def driven(steps: list[Step], step_s: float, round_s: float) -> Array:
     -------
     ndarray of float, shape (n,), in mm
     """
-    at = _number(steps[0], "from_mm") if "from_mm" in steps[0] else 0.0
+    moving = [step for step in steps if step["kind"] != "rezero"]
+    at = _number(moving[0], "from_mm") if "from_mm" in moving[0] else 0.0
     parts = [np.array([at])]
-    for step in steps:
+    for step in moving:
         parts.append(_driven(step, at, step_s / FINE))
         at = float(parts[-1][-1])
     path = np.concatenate(parts)
@@ -116,8 +118,10 @@ def measured_ends(input_mm: Array, within_mm: tuple[float, float]) -> tuple[floa
 
 def repeated(steps: list[Step], times: int) -> list[Step]:
     """Drive the same so many times in one run: triangles in more cycles, anything else from the beginning again."""
-    if all(step["kind"] == "triangle" for step in steps):
-        return [{**step, "cycles": times * int(_number(step, "cycles"))} for step in steps]
+    if all(step["kind"] in ("triangle", "rezero") for step in steps):
+        return [
+            {**step, "cycles": times * int(_number(step, "cycles"))} if "cycles" in step else step for step in steps
+        ]
     return steps * times
 
 
@@ -182,4 +186,5 @@ def protocols(
         ("close fully", [triangle(low + 0.3 * span, low, 6.0)]),
         ("open fully", [triangle(high - 0.3 * span, high, 6.0)]),
         ("small loops", [small]),
+        ("re-zero the stage, there and back", [REZERO, triangle(low, high, 8.0)]),
     ]

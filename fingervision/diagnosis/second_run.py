@@ -43,8 +43,8 @@ class SecondRun:
     channels: int
 
     @classmethod
-    def of(cls, bench: BenchData, first: Problem, input_mm: Array) -> "SecondRun":
-        """Put a run behind the data: same noise, later on the same clock."""
+    def of(cls, bench: BenchData, first: Problem, input_mm: Array, *, rezeroed: bool = False) -> "SecondRun":
+        """Put a run behind the data: same noise, later on the same clock; the stage may be re-zeroed before it."""
         old = bench.chain.history
         n, more = old.input_mm.size, input_mm.size
         time = float(old.times.max()) + PAUSE_S + old.sample_time_s * np.arange(more)
@@ -53,6 +53,7 @@ class SecondRun:
             input_mm=np.concatenate([old.input_mm, input_mm]),
             time_s=np.concatenate([old.times, time]),
             runs=(*old.runs, slice(n, n + more)),
+            rezeroed=(*(old.rezeroed or (False,) * len(old.runs)), rezeroed or any(old.rezeroed)),
         )
         count = len(bench.channels)
         whitener, drawn = first.whitener, bench.model.base
@@ -115,9 +116,9 @@ class SecondRun:
         return self.both.whitener.one(_behind(self.data_mm, new.ravel(), self.channels))
 
     def score(
-        self, target: Array, explanation: Explanation, starts: Sequence[Settings], sigma_mm: tuple[float, ...]
+        self, target: Array, explanation: Explanation, starts: Sequence[Settings], sigma_mm: tuple[float, ...] | None
     ) -> float:
-        """Chi-square of an explanation refitted to a target, the best of several searches, runs offset by a spread."""
+        """Chi-square of an explanation refitted to a target, the best of several searches; offsets as in `distance`."""
         names = explanation.names
         begins = [self.moved(names, start) for start in starts]
         tries = [

@@ -18,10 +18,14 @@ SLOT_FRAMES, SLOT_U_MM = 10, 0.002
 
 
 def without_motion(bench: BenchData, problem: Problem, best: Explanation, rivals: list[Explanation]) -> NextRun | None:
-    """Propose what needs no other motion, for the first rival that it separates."""
+    """Propose what needs no other motion, for the first rival that it separates.
+
+    Without times no motion can be judged by the memory of its samples, and a re-zeroing stands here; with them it is a
+    protocol among the others.
+    """
     for rival in rivals:
         pair = (best, rival)
-        if sum("input_offset" in e.names for e in pair) == 1:
+        if bench.chain.history.time_s is None and sum("input_offset" in e.names for e in pair) == 1:
             return _rezeroed(bench, problem, pair)
         if sum(bool(CAMERA & set(e.names)) for e in pair) == 1:
             return _slot(bench, problem, pair)

@@ -16,6 +16,10 @@ Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
 
+REZEROED = "rezeroed"
+"""Word in the name of a run that came after a re-zeroing of the stage."""
+
+
 class Stage(StrEnum):
     """Where in the measuring chain an effect acts."""
 
@@ -52,6 +56,8 @@ class History:
         Whether left and right were measured, or the gap alone.
     force : bool
         Whether a force was measured.
+    rezeroed : tuple of bool
+        Which runs came after a re-zeroing of the stage that others came before; empty where none did.
     """
 
     input_mm: Array
@@ -65,6 +71,7 @@ class History:
     input_step_mm: float = 0.0
     both_edges: bool = True
     force: bool = False
+    rezeroed: tuple[bool, ...] = ()
 
     @property
     def times(self) -> Array:

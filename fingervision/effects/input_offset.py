@@ -5,8 +5,12 @@ from fingervision.domain.parameter import Parameter
 
 
 def act(input_mm: Array, history: History, values: Values) -> Array:
-    """Apply the effect: the input's zero is off."""
-    return input_mm + values["offset_mm"]
+    """Apply the effect: the input's zero is off, until it is taken anew."""
+    out = input_mm + values["offset_mm"]
+    for run, rezeroed in zip(history.runs, history.rezeroed, strict=False):
+        if rezeroed:
+            out[run] = input_mm[run]
+    return out
 
 
 EFFECT = DriveEffect(
@@ -14,7 +18,7 @@ EFFECT = DriveEffect(
     stage=Stage.DRIVE,
     order=20,
     words="the input's zero is off",
-    formula="u + offset_mm",
+    formula="u + offset_mm; u after a re-zeroing",
     source="definition",
     residual="nearly a constant; follows the slope of a curved model",
     parameters=(Parameter("offset_mm", "mm", -0.5, 0.5, "offset of the input", typical=0.05),),

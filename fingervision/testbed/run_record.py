@@ -4,6 +4,7 @@ from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
+from fingervision.domain.effect import REZEROED
 from fingervision.domain.frame import Frame
 from fingervision.storage.gaps_csv import GapRow
 from fingervision.storage.samples_csv import MM_PLACES, SampleRow
@@ -40,7 +41,7 @@ class RunRecord:
     def __init__(self, folder: BedRunFolder, place_at: PlaceAt) -> None:
         self.folder = folder
         self._place_at = place_at
-        self._run, self._part = 1, ""
+        self._run, self.turned, self._rezeroed = 1, False, False
         self._rows = self._with_gap = self._lost = self._events = 0
         # Zero of the run's time on the camera's clock, once there is a frame, and the run's time there.
         self._zero_s: float | None = None
@@ -51,11 +52,6 @@ class RunRecord:
     def counts(self) -> Counts:
         """What became of the frames until now."""
         return Counts(self._rows, self._with_gap, self._lost)
-
-    @property
-    def turned(self) -> bool:
-        """Whether the part lies turned by 180 degrees."""
-        return bool(self._part)
 
     # How it begins.
 
@@ -82,9 +78,15 @@ class RunRecord:
             self._run = _run_number(last) + 1
             self._base_s = max(last.time_s + GAP_S, since_began_s)
 
-    def new_run(self, *, turned: bool) -> None:
-        """Begin another run of the same folder."""
-        self._run, self._part = self._run + 1, " turned" if turned else ""
+    @property
+    def label(self) -> str:
+        """The run's name: its number, and what a diagnosis must know of how it came about."""
+        words = [str(self._run), *(["turned"] if self.turned else []), *([REZEROED] if self._rezeroed else [])]
+        return " ".join(words)
+
+    def new_run(self, *, turned: bool, rezeroed: bool = False) -> None:
+        """Begin another run of the same folder; what was re-zeroed stays so."""
+        self._run, self.turned, self._rezeroed = self._run + 1, turned, self._rezeroed or rezeroed
 
     # Frames.
 
@@ -102,7 +104,7 @@ class RunRecord:
         if self._zero_s is None:
             self._zero_s = look.shot.device_s - self._base_s
         row = SampleRow(
-            run=f"{self._run}{self._part}",
+            run=self.label,
             time_s=round(look.shot.device_s - self._zero_s, 6),
             input_mm=None,
             gap_mm=_rounded(measured.gap_mm),

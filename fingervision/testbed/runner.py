@@ -136,7 +136,7 @@ class Runner:
                 self._slots.append(doing.slot(watch, leg.act))
             case Rezero():
                 doing.rezero(watch)
-                self._new_run(number, turned=False)
+                self._new_run(number, turned=watch.record.turned, rezeroed=True)
             case Turn():
                 watch.bed.operator.turn_part()
                 self._new_run(number, turned=not watch.record.turned)
@@ -144,8 +144,8 @@ class Runner:
                 watch.bed.operator.shift_picture()
                 self._new_run(number, turned=watch.record.turned)
 
-    def _new_run(self, leg: int, *, turned: bool) -> None:
-        self.watch.record.new_run(turned=turned)
+    def _new_run(self, leg: int, *, turned: bool, rezeroed: bool = False) -> None:
+        self.watch.record.new_run(turned=turned, rezeroed=rezeroed)
         self._rest(leg + 1)
 
     def _rest(self, leg: int) -> None:

@@ -32,7 +32,9 @@ NAMED = (
     "backlash", "friction_hysteresis", "stick_slip", "encoder_cyclic_error", "end_stop", "finger_contact",
     "assembly_asymmetry", "viscoelastic_creep", "thermal_drift", "lens_distortion", "camera_tilt", "camera_drift",
 )  # fmt: skip
-ALSO_OPEN = ("drive_lag", "input_scale", "lever_ratio_error", "rest_gap_error", "scale_error", "camera_latency")
+ALSO_OPEN = (
+    "drive_lag", "input_offset", "input_scale", "lever_ratio_error", "rest_gap_error", "scale_error", "camera_latency",
+)  # fmt: skip
 RICH: tuple[dict[str, object], ...] = (
     {"kind": "triangle", "from_mm": -0.42, "to_mm": 1.3, "speed_mm_s": 0.4, "cycles": 1},
     {"kind": "hold", "at_mm": 1.0, "seconds": 5.0},

@@ -8,11 +8,12 @@ import pytest
 
 from fingervision.diagnosis.bench_data import BenchData, prepare
 from fingervision.diagnosis.explanation import Explanation, Problem, fit
-from fingervision.diagnosis.next_run import NEEDED, next_run
+from fingervision.diagnosis.next_run import next_run
 from fingervision.diagnosis.noise_short import drawn_noises
 from fingervision.diagnosis.other_evidence import EVIDENCE, other_evidence
 from fingervision.diagnosis.posterior import draws
 from fingervision.diagnosis.promise import promise
+from fingervision.diagnosis.run_choice import NEEDED
 from fingervision.diagnosis.second_run import SecondRun
 from fingervision.domain.effect import Array
 from fingervision.effects import catalogue
@@ -121,3 +122,16 @@ def test_drawn_noise_is_spread_as_a_variance_of_so_few_samples_is() -> None:
     assert level.size > 1000
     # The relative standard deviation of an estimated one is 1 / sqrt(2 (n - 2)); 2000 draws know it to a few per cent.
     assert np.std(level) / np.mean(level) == pytest.approx(1.0 / np.sqrt(2.0 * 38.0), rel=0.15)
+
+
+def test_a_re_zeroed_stage_tells_its_own_offset_from_the_rest_gap(tmp_path: Path) -> None:
+    data, problem = bench(tmp_path, 1)
+    offset = {"input_offset": {"offset_mm": 0.02}}
+    moved = [
+        SecondRun.of(data, problem, BACK, rezeroed=rezeroed).both.chain.respond(offset).gap_mm[ONE_WAY.size :]
+        for rezeroed in (False, True)
+    ]
+    assert np.allclose(moved[0] - moved[1], 7.0 * 0.02)
+    again = SecondRun.of(data, problem, BACK, rezeroed=True)
+    gap = explained(problem, "rest_gap_error", offset_mm=0.14)
+    assert again.distance(offset, gap) > SecondRun.of(data, problem, BACK).distance(offset, gap) + NEEDED

@@ -48,7 +48,10 @@ def test_repeating_drives_the_same_again_in_one_run() -> None:
         once, thrice = driven(steps, STEP_S, 0.0), driven(repeated(steps, 3), STEP_S, 0.0)
         assert thrice.min() == pytest.approx(once.min()), name
         assert thrice.max() == pytest.approx(once.max()), name
-        strokes = [sum(int(str(step.get("cycles", 1))) for step in each) for each in (steps, repeated(steps, 3))]
+        strokes = [
+            sum(int(str(step.get("cycles", 1))) for step in each if step["kind"] != "rezero")
+            for each in (steps, repeated(steps, 3))
+        ]
         assert strokes[1] == 3 * strokes[0], name
 
 

@@ -37,7 +37,7 @@ def test_the_gap_is_that_of_the_gripper_at_the_recorded_input(short: Path) -> No
 
 def test_runs_points_and_clocks_are_as_the_recipe_says(short: Path) -> None:
     rows = read_samples(short / "samples.csv")
-    assert {row.run for row in rows} == {"1", "2"}
+    assert {row.run for row in rows} == {"1", "2 rezeroed"}
     assert [row.frame for row in rows] == list(range(len(rows)))
     # Three levels with three frames each, once the picture was still.
     levels = [row for row in rows if row.step == 2]
