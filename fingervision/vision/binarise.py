@@ -67,19 +67,23 @@ def binarise_local(denoised: GreyImage) -> Binary:
 
 @compiled
 def _histogram(grey: GreyImage, levels: int) -> NDArray[np.int64]:
-    """Pixels with each grey level; four counts in turn, since neighbours are alike and would wait for each other."""
-    count = np.zeros((4, levels), dtype=np.uint32)
+    """Pixels with each grey level; eight counts in turn, since neighbours are alike and would wait for each other."""
+    count = np.zeros((8, levels), dtype=np.uint32)
     for row in grey:
-        fours = row.size - row.size % 4
-        for j in range(0, fours, 4):
+        eights = row.size - row.size % 8
+        for j in range(0, eights, 8):
             count[0, row[j]] += 1
             count[1, row[j + 1]] += 1
             count[2, row[j + 2]] += 1
             count[3, row[j + 3]] += 1
-        for j in range(fours, row.size):
+            count[4, row[j + 4]] += 1
+            count[5, row[j + 5]] += 1
+            count[6, row[j + 6]] += 1
+            count[7, row[j + 7]] += 1
+        for j in range(eights, row.size):
             count[0, row[j]] += 1
     total = np.zeros(levels, dtype=np.int64)
-    for part in range(4):
+    for part in range(8):
         for level in range(levels):
             total[level] += count[part, level]
     return total

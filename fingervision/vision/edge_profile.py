@@ -31,6 +31,9 @@ MARKS = FITTED + len(RIM_PX) + len(BEYOND)
 SIGNIFICANT, LEAST_SHARE, SURE_SIGMAS = 30.0, 0.02, 1.5
 # A mark that the fit takes up but for this share of its power cannot be told from an edge.
 LEAST_OWN = 1e-3
+# What is left of a sharp flank far beyond the scale looks like a sharper flank. Where sigma (the pixel included) is below
+# this, nobody can tell the two apart: at twice the light the edge is moved by less than twice so much.
+HIDING_BLUR_PX, HIDDEN_SHIFT_PX = 0.65, 0.25
 # A row that fits worse than this (variance, in units of the noise's) has dust on it.
 DUSTY = 6.0
 
@@ -135,4 +138,6 @@ def edge_mark(
             beyond = max(beyond, BEYOND[k - len(RIM_PX)] * (size - SURE_SIGMAS * u_size))
         elif left * size > best and abs(size) > LEAST_SHARE:
             best, shift = left * size, moves * size
+    if is_cut and blur < HIDING_BLUR_PX:
+        shift = min(shift, -HIDDEN_SHIFT_PX)
     return EdgeMark(shift, beyond)

@@ -18,7 +18,7 @@ from fingervision.domain.gap import NoGap
 from fingervision.domain.status import Status
 from fingervision.vision.flanks import follow_down, has_straight_flanks
 from fingervision.vision.orientation import Orientation
-from fingervision.vision.outlines import Outline, find_outlines
+from fingervision.vision.outlines import Outline, find_outlines, longest_first
 from fingervision.vision.tops import Top, find_tops
 from fingervision.vision.way_between import Place, inner_crossing, is_free
 
@@ -116,7 +116,9 @@ def find_fingers(
     best: CoarseFingers | None = None
     alone: NoGap | None = None
     worst_reason = NoGap(Status.NO_FINGERS, "Nothing in the picture looks like a finger.")
-    for direction in directions:
+    for direction, longest_px in longest_first(outlines, directions):
+        if best is not None and best.is_rooted and ROOTED_BONUS * longest_px <= best.score:
+            break  # nothing goes on for so long that it could be a better pair
         orientation = Orientation(direction, *mask.shape)
         found = _best_pair(mask, outlines, orientation, below_tip_px, reach_px)
         if isinstance(found, NoGap):

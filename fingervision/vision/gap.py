@@ -73,7 +73,9 @@ def measure_gap(
         return NoGap(Status.NO_FINGERS, "Too little of a finger's outline is in view to be measured.")
     left, right = (squared(fit_finger_end(p, *first_guess(p, below_tip_px))) for p in points)
     shared = shared_points(points, (left, right), coding)
-    fitted = [measuring_point(end, below_tip_px) for end in (left, right)]
+    fitted = [
+        measuring_point(end, below_tip_px, float(p.blur[0])) for p, end in zip(points, (left, right), strict=True)
+    ]
     holds = [shape_holds(*one, below_tip_px) for one in zip(points, (left, right), fitted, strict=True)]
     refusal = _no_fingers(fingers, points, (left, right), holds, below_tip_px)
     if refusal is not None:

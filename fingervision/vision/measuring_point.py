@@ -7,7 +7,16 @@ from numpy.typing import NDArray
 
 from fingervision.domain.compiled import compiled
 from fingervision.vision.finger_end import FingerEnd
-from fingervision.vision.finger_shape import INNER_M, OUTER_M, PARAMETERS, TOP_M, corner_tops, inner_edge
+from fingervision.vision.finger_shape import (
+    INNER_M,
+    INNER_R,
+    OUTER_M,
+    OUTER_R,
+    PARAMETERS,
+    TOP_M,
+    corner_tops,
+    inner_edge,
+)
 
 Floats = NDArray[np.float64]
 
@@ -16,8 +25,13 @@ SQUARE_IN_SIGMAS, U_SQUARE = 2.5, 3e-4
 # A top whose two corners differ in height by less than so many sigma is level
 # (a corner that is not in view says nothing: never by more than this).
 LEVEL_IN_SIGMAS, LEVEL_LIMIT_PX = 2.0, 0.5
+# A corner that is blurred out, or nearly so, has its radius to so many sigma (standard uncertainty); nothing of it is
+# hidden from so many sigma on.
+U_CORNER_IN_BLURS, HIDDEN_IN_BLURS = 0.8, 8.0
 # Derivatives are taken over so much of each parameter to either side.
 STEP = 1e-3
+# For a radius that is its own uncertainty, up to so many pixels.
+LARGEST_STEP_PX = 2.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -64,13 +78,24 @@ def _squared(p: Floats, covariance: Floats, misfit: float) -> tuple[Floats, Floa
     return p - gain * off_square, covariance - gain.reshape(-1, 1) * toward
 
 
-def measuring_point(end: FingerEnd, below_tip_px: float) -> MeasuringPoint:
+def measuring_point(end: FingerEnd, below_tip_px: float, blur_px: float) -> MeasuringPoint:
     """Tip and inner edge of a fitted shape, with their covariance by the parameters' own.
 
     The tip is the higher of the two corners. Where noise alone decides which that is, the higher of two would be too
     high on average: a top that is level within twice its uncertainty counts as level.
     """
-    return MeasuringPoint(*_read_off(end.parameters, end.covariance, end.misfit, end.origin, below_tip_px))
+    covariance = _with_corners(end.parameters, end.covariance, blur_px)
+    return MeasuringPoint(*_read_off(end.parameters, covariance, end.misfit, end.origin, below_tip_px))
+
+
+@compiled
+def _with_corners(p: Floats, covariance: Floats, blur: float) -> Floats:
+    """The covariance with what blur hides of small corners: their radius, in both fingers alike."""
+    wider = covariance.copy()
+    for a in (INNER_R, OUTER_R):
+        hidden = max(1.0 - p[a] / (HIDDEN_IN_BLURS * blur), 0.0)
+        wider[a, a] += 2.0 * (U_CORNER_IN_BLURS * blur * hidden) ** 2
+    return wider
 
 
 @compiled
@@ -89,9 +114,12 @@ def _read_off(
     tip, edge, slope = _tip_and_edge(p, origin, inner_share, below_tip)
     by_tip, by_edge = np.empty(PARAMETERS), np.empty(PARAMETERS)
     for a in range(PARAMETERS):
-        up_tip, up_edge, _ = _tip_and_edge(_moved(p, a, STEP), origin, inner_share, below_tip)
-        down_tip, down_edge, _ = _tip_and_edge(_moved(p, a, -STEP), origin, inner_share, below_tip)
-        by_tip[a], by_edge[a] = (up_tip - down_tip) / (2.0 * STEP), (up_edge - down_edge) / (2.0 * STEP)
+        # A radius is not below zero, and may be so much larger that the measuring point comes to lie on the fillet.
+        is_radius = a in (INNER_R, OUTER_R)
+        more, less = (min(np.sqrt(covariance[a, a]), LARGEST_STEP_PX), 0.0) if is_radius else (STEP, STEP)
+        up_tip, up_edge, _ = _tip_and_edge(_moved(p, a, more), origin, inner_share, below_tip)
+        down_tip, down_edge, _ = _tip_and_edge(_moved(p, a, -less), origin, inner_share, below_tip)
+        by_tip[a], by_edge[a] = (up_tip - down_tip) / (more + less), (up_edge - down_edge) / (more + less)
     found = np.empty((2, 2))
     found[0, 0], found[1, 1] = _product(by_tip, covariance, by_tip), _product(by_edge, covariance, by_edge)
     found[0, 1] = found[1, 0] = _product(by_tip, covariance, by_edge)

@@ -188,8 +188,8 @@ def _has_edges(denoised: GreyImage, split: Binary, contrast: float) -> bool:
 def _border_is_light(binary: Binary) -> bool:
     """Whether most of the picture's border is ground of the light kind."""
     dark = binary.dark
-    border = np.concatenate((dark[0], dark[-1], dark[:, 0], dark[:, -1]))
-    return bool(np.count_nonzero(border) < 0.5 * border.size)
+    border = (dark[0], dark[-1], dark[:, 0], dark[:, -1])
+    return sum(int(np.count_nonzero(side)) for side in border) < 0.5 * sum(side.size for side in border)
 
 
 def _shifted(measured: GapMeasurement | NoGap, region: Region | None) -> GapMeasurement | NoGap:

@@ -47,16 +47,16 @@ class Top:
 
 def find_tops(mask: NDArray[np.uint8], outlines: list[Outline], orientation: Orientation) -> list[Top]:
     """The tops of all outlines, the most prominent first."""
-    upright = orientation.view(mask)
+    upright, deepest = orientation.view(mask), orientation.along_size - 1
     found = []
     for pixels in outlines:
         outline = in_axes(pixels, orientation)
         bottom = outline[0, 1]
         for first, peak, prominence in zip(*_peaks(outline), strict=True):
             r, middle = int(outline[peak, 1]), (int(outline[first, 0]) + int(outline[peak, 0])) // 2
-            if not upright[min(r + 2, orientation.along_size - 1), middle]:
+            if not upright[min(r + 2, deepest), middle]:
                 continue  # the top of a hole, not of a thing
-            is_rooted = bool(bottom == orientation.along_size - 1 and prominence > 0.5 * (bottom - r))
+            is_rooted = bool(bottom == deepest and prominence > 0.5 * (bottom - r))
             found.append(Top(outline, int(peak), float(prominence), is_rooted))
     return sorted(found, key=lambda top: -top.prominence_px)
 

@@ -18,7 +18,7 @@ from fingervision.domain.direction import Direction
 from fingervision.domain.frame import Coding, Frame
 from fingervision.domain.gap import GapMeasurement
 from fingervision.frames.video_file import VideoFile
-from fingervision.rendering import Camera, Light, TrueGap, dust, render, truth, two_fingers
+from fingervision.rendering import Camera, Light, SquareTip, TrueGap, dust, render, truth, two_fingers
 from fingervision.vision.pipeline import Settings, measure_frame
 
 TOP = Path(__file__).resolve().parents[2]
@@ -26,6 +26,9 @@ DROPS = TOP.parent / "shared" / "real" / "drops"
 PX_PER_MM = 34.0
 SURE = 0.999
 FRAMES = 120
+# The classes whose errors are told as one sample. A slanted tip is known far less surely: blur hides its corner's
+# radius, and all that it may be is in the uncertainty.
+POOLED = ("straight", "rounded", "blur_3", "mixed")
 
 
 @dataclass(frozen=True)
@@ -46,6 +49,8 @@ def _draw(name: str, rng: np.random.Generator) -> tuple[dict, Camera]:
         shape["radius_px"] = rng.uniform(0.5, 1.4) * PX_PER_MM
     if name == "blur_3":
         camera = Camera(blur_px=3.0, noise_grey=2.0)
+    if name == "slanted":
+        shape.update(radius_px=0.0, tip=SquareTip(rng.uniform(0, 0.6) * PX_PER_MM, rng.uniform(-20, 20)))
     if name == "mixed":
         camera = Camera(blur_px=rng.uniform(0.7, 2.5), noise_grey=rng.uniform(1, 6))
         shape["radius_px"] = rng.uniform(0.3, 1.4) * PX_PER_MM
@@ -59,7 +64,7 @@ def _draw(name: str, rng: np.random.Generator) -> tuple[dict, Camera]:
 def errors() -> dict[str, Errors]:
     """Every class measured once."""
     found = {}
-    for name in ("straight", "rounded", "blur_3", "mixed"):
+    for name in (*POOLED, "slanted"):
         rng = np.random.default_rng([94, len(name)])
         pairs = []
         for number in range(FRAMES):
@@ -102,13 +107,13 @@ def test_mixed_scenes_have_values_and_few_far_off(errors: dict[str, Errors]) -> 
 
 
 def test_the_stated_uncertainty_is_true(errors: dict[str, Errors]) -> None:
-    z = np.concatenate([np.abs(e.error) / e.u for e in errors.values()])
+    z = np.concatenate([np.abs(errors[name].error) / errors[name].u for name in POOLED])
     for sigmas, low, high in ((1, 0.63, 0.73), (2, 0.92, 0.98)):
         within = int(np.sum(z < sigmas))
         assert binom.ppf(1 - SURE, len(z), low) <= within <= binom.ppf(SURE, len(z), high)
 
 
-@pytest.mark.parametrize("name", ["straight", "rounded", "blur_3", "mixed"])
+@pytest.mark.parametrize("name", [*POOLED, "slanted"])
 def test_ninety_percent_of_every_class_lie_within_two(errors: dict[str, Errors], name: str) -> None:
     z = np.abs(errors[name].error) / errors[name].u
     assert np.sum(z < 2) >= binom.ppf(1 - SURE, len(z), 0.90)
