@@ -31,8 +31,8 @@ MARKS = FITTED + len(RIM_PX) + len(BEYOND)
 SIGNIFICANT, LEAST_SHARE, SURE_SIGMAS = 30.0, 0.02, 1.5
 # A mark that the fit takes up but for this share of its power cannot be told from an edge.
 LEAST_OWN = 1e-3
-# What is left of a sharp flank far beyond the scale looks like a sharper flank. Where sigma (the pixel included) is below
-# this, nobody can tell the two apart: at twice the light the edge is moved by less than twice so much.
+# What is left of a sharp flank far beyond the scale looks like a sharper flank. Where sigma (the pixel included) is
+# below this, nobody can tell the two apart: at twice the light the edge is moved by less than twice so much.
 HIDING_BLUR_PX, HIDDEN_SHIFT_PX = 0.65, 0.25
 # A row that fits worse than this (variance, in units of the noise's) has dust on it.
 DUSTY = 6.0
