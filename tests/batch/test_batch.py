@@ -10,6 +10,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from pathlib import Path
 
 import pytest
@@ -282,7 +283,8 @@ def test_a_worker_that_is_killed_costs_nothing(recordings: Path, tmp_path: Path)
         owner = next((int(part.name.split("~")[2]) for part in tmp_path.glob("out/.*.part~*")), None)
         time.sleep(0.001)
     assert owner is not None
-    os.kill(owner, signal.SIGKILL)
+    with suppress(ProcessLookupError):  # a busy machine is late to kill: everything is done then
+        os.kill(owner, signal.SIGKILL)
     _, err = running.communicate(timeout=PATIENCE_S)
     assert (running.returncode, err) == (0, "")
     assert len(made(tmp_path / "out")) == len(lines(tmp_path / "out")) == 4
