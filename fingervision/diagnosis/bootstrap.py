@@ -140,8 +140,8 @@ def _autoregression(phi: float, count: int, rng: np.random.Generator) -> Array:
 
 
 def price(thresholds: Mapping[str, float], base: Explanation, names: tuple[str, ...]) -> float:
-    """What more effects than `base` has must gain at least."""
-    return max(thresholds[name] for name in names if name not in base.names)
+    """What more effects than `base` has must gain at least; what offsets of the runs imitate wholly never can."""
+    return max(thresholds.get(name, np.inf) for name in names if name not in base.names)
 
 
 def exceeds_noise(
@@ -186,7 +186,7 @@ def exceeds_noise(
         found.append(
             max(max(0.0, alone.score - e.score) * luck - price(thresholds, base, e.names) for e in fits)
             if fits
-            else -min(thresholds.values())
+            else -min(thresholds.values(), default=0.0)
         )
         spread = float(np.std(found))
         quantile = float(np.mean(found)) + GUMBEL * spread

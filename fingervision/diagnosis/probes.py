@@ -43,12 +43,14 @@ def probes(history: History, whitener: Whitener, most: int) -> Probes:
     shapes: list[tuple[str, Array]] = []
     low, span = float(u.min()), history.input_span_mm
     fine = max(6, min(40, n // 8))
+    places = 2 - int(np.floor(np.log10(span)))
     for k in range(1, fine):
         at = low + span * k / fine
-        shapes.append((f"a step at input {at:.3g} mm", (u > at).astype(float)))
-        shapes.append((f"a kink at input {at:.3g} mm", np.maximum(u - at, 0.0)))
+        there = f"input {round(at, places):.3g} mm"
+        shapes.append((f"a step at {there}", (u > at).astype(float)))
+        shapes.append((f"a kink at {there}", np.maximum(u - at, 0.0)))
         shapes += [
-            (f"a bump about {2 * width:.2g} mm wide near input {at:.3g} mm", np.exp(-0.5 * ((u - at) / width) ** 2))
+            (f"a bump about {2 * width:.2g} mm wide near {there}", np.exp(-0.5 * ((u - at) / width) ** 2))
             for width in (span / fine, span / 12.0)
         ]
     for cycles in np.arange(1.0, min(60.0, n / 6.0), 0.5):

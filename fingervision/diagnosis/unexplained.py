@@ -50,7 +50,7 @@ def _gains(problem: Problem, columns: Array, found: Explanation, taken: Array) -
 
 
 def imitated(problem: Problem, several: Explanation, fewer: list[Explanation]) -> str | None:
-    """What several effects only imitate, in words, where the catalogue does not hold it.
+    """What several effects only imitate, in words; None where they are the reason themselves.
 
     Three effects bend to almost anything. Unless they explain the data far better than one or two generic shapes beside
     fewer effects, each at the price of its amplitude and of the choice among all shapes (`choices`), they are not the
@@ -59,7 +59,8 @@ def imitated(problem: Problem, several: Explanation, fewer: list[Explanation]) -
     shapes = _probes(problem)
     columns, rows = shapes.columns, int(problem.measured.size)
     each = float(np.log(rows)) + 2.0 * float(np.log(columns.shape[1]))
-    limit = several.bic(rows) + choices(problem, several) + VERY_STRONG
+    least = several.bic(rows) + choices(problem, several) + VERY_STRONG
+    best = None
     for base in fewer:
         taken = np.zeros((rows, 0))
         cost = base.bic(rows) + choices(problem, base)
@@ -70,9 +71,9 @@ def imitated(problem: Problem, several: Explanation, fewer: list[Explanation]) -
             taken = np.hstack([taken, columns[:, top : top + 1]])
             words.append(f"{shapes.words[top]} ({np.sqrt(gain[top]):.1f} sigma)")
             cost += each - float(gain[top])
-            if cost < limit:
-                return " and ".join(words)
-    return None
+            if cost < least:
+                least, best = cost, " and ".join(words)
+    return best
 
 
 def unexplained(problem: Problem, best: Explanation, rng: np.random.Generator) -> tuple[str | None, str | None]:

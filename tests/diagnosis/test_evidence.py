@@ -1,0 +1,79 @@
+"""What counts as evidence: families that noise lifts equally seldom, and effects that only imitate something else."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fingervision.diagnosis.bench_data import prepare
+from fingervision.diagnosis.bootstrap import QUANTILE, linear_thresholds
+from fingervision.diagnosis.explanation import Explanation, Problem, fit
+from fingervision.diagnosis.signatures import signatures
+from fingervision.diagnosis.unexplained import imitated
+from fingervision.storage.measured_table import read_measured_table
+from fingervision.storage.model_toml import read_model
+
+Array = NDArray[np.float64]
+EDGE_MM = 0.01
+SAMPLES = 160
+SEED = 5
+DRAWS = 1000
+FORMS = {
+    "encoder_cyclic_error": {"amplitude_mm": 0.02, "period_mm": 0.5, "phase_rad": 0.0},
+    "lever_ratio_error": {"ratio": 0.01},
+    "large_deflection": {"reach_mm": 6.0, "cross": 0.2},
+}
+"""What bends together to a kink."""
+
+
+def stroke() -> Array:
+    return np.asarray(0.5 * np.sin(np.linspace(0.0, 12.0, SAMPLES)))
+
+
+def several_and_fewer(problem: Problem) -> tuple[Explanation, list[Explanation]]:
+    fewer = [problem.nothing(), *(fit(problem, (name,), FORMS, iterations=30) for name in FORMS)]
+    return fit(problem, tuple(FORMS), FORMS, iterations=30), fewer
+
+
+def problem_of(folder: Path, away: Array) -> Problem:
+    """One run there and back whose gap is `away` from the model's."""
+    rng = np.random.default_rng(SEED)
+    u = stroke()
+    left, right = (side * (2.0 + 3.5 * u + 0.5 * away) + EDGE_MM * rng.standard_normal(SAMPLES) for side in (-1, 1))
+    lines = [f"{0.1 * k},{u[k]},{right[k] - left[k]},{left[k]},{right[k]}" for k in range(SAMPLES)]
+    (folder / "measured.csv").write_text("time_s,input_mm,gap_mm,left_mm,right_mm\n" + "\n".join(lines) + "\n")
+    (folder / "sim.csv").write_text("input_mm,gap_mm\n-0.6,-0.2\n0.6,8.2\n")
+    bench = prepare(read_measured_table(folder / "measured.csv"), read_model(folder / "sim.csv"))
+    # The noise is the pictures' own: what is hidden leaves none of itself in it.
+    return bench.problem(EDGE_MM * rng.standard_normal((2, SAMPLES)).ravel(), 0, explained=True)
+
+
+def test_noise_lifts_some_family_over_its_threshold_as_seldom_as_stated(tmp_path: Path) -> None:
+    problem = problem_of(tmp_path, np.zeros(SAMPLES))
+    atoms = signatures(problem)
+    thresholds = linear_thresholds(problem, atoms.names, atoms.columns, (0.0, 0.0), np.random.default_rng(SEED))
+    noise = np.random.default_rng(SEED + 1).standard_normal((atoms.columns.shape[0], DRAWS))
+    metric = problem.offsets.metric((0.0, 0.0))
+    noise -= problem.offsets.design @ (metric @ (problem.offsets.design.T @ noise))
+    shared = problem.offsets.design.T @ atoms.columns
+    norm = np.sum(atoms.columns**2, axis=0) - np.sum(shared * (metric @ shared), axis=0)
+    over = np.array([thresholds.get(name, np.inf) for name in atoms.names])
+    lifted = np.any((atoms.columns.T @ noise) ** 2 > (over * norm)[:, None], axis=0)
+    assert float(np.mean(lifted)) < 1.0 - QUANTILE
+    # A single column needs less than a family of periods does.
+    assert thresholds["lever_ratio_error"] < thresholds["encoder_cyclic_error"] - 3.0
+
+
+def test_three_effects_that_imitate_a_kink_give_way_to_it(tmp_path: Path) -> None:
+    problem = problem_of(tmp_path, 0.3 * np.abs(stroke()))
+    words = imitated(problem, *several_and_fewer(problem))
+    assert words is not None
+    assert "kink" in words
+
+
+def test_three_effects_that_are_there_imitate_nothing(tmp_path: Path) -> None:
+    problem = problem_of(tmp_path, np.zeros(SAMPLES))
+    there = problem.measured + problem.whitened(FORMS) - problem.whitened({})
+    problem = replace(problem, measured=there)
+    assert imitated(problem, *several_and_fewer(problem)) is None
