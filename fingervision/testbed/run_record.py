@@ -13,6 +13,8 @@ from fingervision.testbed.sight import Look
 
 # A run that follows another begins at least so much after it; one that goes on, so much after what it goes on with.
 PAUSE_S, GAP_S = 5.0, 1.0
+# Word in the name of a run whose part lies turned by 180 degrees.
+TURNED = "turned"
 
 PlaceAt = Callable[[float, bool], float | None]
 """Where the stage was at a time of the bed; None where that is not known yet, and need not be known at once."""
@@ -75,13 +77,14 @@ class RunRecord:
         self._with_gap = sum(row.gap_mm is not None for row in self.folder.rows)
         if self.folder.rows:
             last = self.folder.rows[-1]
-            self._run = _run_number(last) + 1
+            self._run, how = _run_number(last) + 1, last.run.split()
+            self.turned, self._rezeroed = TURNED in how, REZEROED in how
             self._base_s = max(last.time_s + GAP_S, since_began_s)
 
     @property
     def label(self) -> str:
         """The run's name: its number, and what a diagnosis must know of how it came about."""
-        words = [str(self._run), *(["turned"] if self.turned else []), *([REZEROED] if self._rezeroed else [])]
+        words = [str(self._run), *([TURNED] if self.turned else []), *([REZEROED] if self._rezeroed else [])]
         return " ".join(words)
 
     def new_run(self, *, turned: bool, rezeroed: bool = False) -> None:
