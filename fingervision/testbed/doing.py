@@ -1,5 +1,6 @@
 """What the bed does for each act of a recipe: moving, standing, swinging, closing, measuring a slot."""
 
+from functools import partial
 from math import sin, tau
 
 from fingervision.domain.frame import Frame
@@ -23,7 +24,7 @@ SLOT_FRAMES = 10
 
 def go(watch: Watch, act: Go) -> None:
     """Move to a position."""
-    watch.follow(lambda: watch.bed.actuator.move(act.to_mm, act.speed_mm_s), record=act.frames is None)
+    watch.follow(partial(watch.bed.actuator.move, act.to_mm, act.speed_mm_s), record=act.frames is None)
     if act.frames is None:
         # A corner is seen: what has a memory remembers it, and no sample beside it tells where it was.
         watch.see(record=True)
@@ -49,7 +50,7 @@ def swing(watch: Watch, act: Swing) -> None:
         to_mm = act.mean_mm + act.amplitude_mm * sin(tau * act.frequency_hz * then_s)
         if abs(to_mm - at_mm) > 1e-9 and then_s > now_s:
             speed_mm_s = max(abs(to_mm - at_mm) / (then_s - now_s), 1e-3)
-            watch.follow(lambda to=to_mm, speed=speed_mm_s: watch.bed.actuator.move(to, speed), record=True)  # type: ignore[misc]
+            watch.follow(partial(watch.bed.actuator.move, to_mm, speed_mm_s), record=True)
             at_mm = to_mm
         if since.s <= now_s:
             watch.see(record=True)
@@ -67,7 +68,7 @@ def close(watch: Watch, act: Close) -> None:
         return bool(felt)
 
     bed = watch.bed
-    watch.follow(lambda: bed.actuator.move(bed.limits.lower_mm, act.speed_mm_s), record=True, until=met)
+    watch.follow(partial(bed.actuator.move, bed.limits.lower_mm, act.speed_mm_s), record=True, until=met)
     why = felt[0] if felt else "nothing was met down to the bed's limit of position"
     watch.record.event("closed", f"Closing ended: {why}.", input_mm=watch.sight.position.newest)
 
