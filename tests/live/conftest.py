@@ -25,7 +25,7 @@ from fingervision.rendering import Camera, render, two_fingers
 # It is for the system's Python.
 collect_ignore = ["rtsp_server.py"]
 # Starting Python with its libraries takes seconds where two cores are shared by many.
-START_S = 60.0
+START_S = 120.0
 CYCLE = 50
 PX_PER_MM = 34.0
 JPEG_BEGINS = b"\xff\xd8\xff"
@@ -64,7 +64,7 @@ class Live:
     def stop(self, how: signal.Signals = signal.SIGINT) -> int:
         if self.process.poll() is None:
             self.process.send_signal(how)
-        return self.process.wait(30)
+        return self.process.wait(START_S)
 
     def runs(self) -> list[Path]:
         return sorted(path.parent for path in self.out.glob("*/gaps.csv"))

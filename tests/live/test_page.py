@@ -36,7 +36,7 @@ QUIET = [
     "--disable-component-update",
     "--disable-sync",
 ]
-PATIENCE_MS = 30_000
+PATIENCE_MS = 120_000
 # What the page shows has four decimals, the table seven.
 SHOWN_MM = 0.00005
 BAR_PX, BAR_MM = 136, 4.0
@@ -46,7 +46,7 @@ SAID_WITHIN_S = 1.0
 @pytest.fixture(scope="module")
 def browser() -> Iterator[Any]:
     with playwright_api.sync_playwright() as playwright:
-        found = playwright.chromium.launch(executable_path=CHROMIUM, args=QUIET)
+        found = playwright.chromium.launch(executable_path=CHROMIUM, args=QUIET, timeout=PATIENCE_MS)
         yield found
         found.close()
 
