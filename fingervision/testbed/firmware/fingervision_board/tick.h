@@ -124,7 +124,7 @@ void move(uint8_t code, uint32_t at_most_ms) {
         busy_seen = false;
         driven_ms = 0;
         longest_ms = at_most_ms;
-        settle_left_ms = settle_ms;
+        settle_left_ms = settle_ms + 1;  // the tick under way counts too, however little of it is left
         settling = settle_ms > 0;
         lines::select(code, !settling);
         notice();
