@@ -71,8 +71,7 @@ class Watch:
         FingervisionError
             The actuator has an alarm, or the force is beyond a limit.
         """
-        if self.controls.stopped:
-            raise StoppedError("The run was stopped; the motor stands. The same command goes on with it.")
+        self._end_if_stopped()
         look = self.sight.look()
         alarm = self.bed.actuator.alarm
         if alarm is not None:
@@ -123,6 +122,10 @@ class Watch:
             "recipe again."
         )
 
+    def _end_if_stopped(self) -> None:
+        if self.controls.stopped:
+            raise StoppedError("The run was stopped; the motor stands. The same command goes on with it.")
+
     @property
     def _closes(self) -> bool:
         """Whether force and touching fingers are what is looked for."""
@@ -147,6 +150,7 @@ class Watch:
         while True:
             self.wait_while_paused(record=record)
             self.controls.halted = broken_off = False
+            self._end_if_stopped()
             begin()
             while self.bed.actuator.busy:
                 seen = self.see(record=record)

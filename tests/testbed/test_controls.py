@@ -125,6 +125,31 @@ def test_a_stop_ends_a_pause(tmp_path: Path) -> None:
             pressed(tmp_path, SLOW, {UNDER_WAY: "p"}, replays=replays, on_say=Controls.stop)
 
 
+@pytest.mark.parametrize("replays", [True, False])
+def test_a_stop_before_a_motion_lets_nothing_move(tmp_path: Path, replays: bool) -> None:
+    bed, controls = replace(open_bed("simulated"), replays=replays), Controls()
+    moves: list[float] = []
+
+    class Counting:
+        def __getattr__(self, name: str) -> object:
+            return getattr(bed.actuator, name)
+
+        def move(self, to_mm: float, speed_mm_s: float) -> None:
+            moves.append(to_mm)
+
+    controls.toggle_pause()
+    counted = replace(bed, actuator=Counting())  # type: ignore[arg-type]
+    recipe = read_recipe(recipe_at(tmp_path, SLOW))
+    with pytest.raises(StoppedError):
+        run_recipe(recipe, counted, tmp_path / "run", controls=controls, say=lambda words: stop_at(words, controls))
+    assert moves == []
+
+
+def stop_at(words: str, controls: Controls) -> None:
+    if words.startswith("Paused"):
+        controls.stop()
+
+
 @pytest.fixture
 def typed(tmp_path: Path) -> Iterator[tuple[int, "subprocess.Popen[str]"]]:
     """The typing end of a terminal, and a run at its other end."""
