@@ -82,7 +82,7 @@ def unexplained(problem: Problem, best: Explanation, rng: np.random.Generator) -
     gain, dot, norm = _gains(problem, shapes.columns, best, np.zeros((problem.measured.size, 0)))
     usable = norm > 0.0
     family = ("probe",) * int(usable.sum())
-    threshold = linear_thresholds(problem, family, shapes.columns[:, usable], best.sigma_mm, rng)["probe"]
+    threshold = linear_thresholds(problem, family, shapes.columns[:, usable], best.sigma_mm, rng).get("probe", np.inf)
     top = int(np.argmax(gain))
     if gain[top] <= threshold:
         return None, None
