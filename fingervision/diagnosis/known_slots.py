@@ -35,7 +35,7 @@ def told_by_slots(bench: BenchData, found: Findings) -> tuple[Findings, tuple[st
     Returns
     -------
     Findings
-        With the best of the explanations that are left.
+        With the best of the explanations that are left, first among them.
     tuple of str
         A sentence for each slot, and one for what was dropped.
     """
@@ -54,7 +54,8 @@ def told_by_slots(bench: BenchData, found: Findings) -> tuple[Findings, tuple[st
     dropped = " and ".join("+".join(e.names) for e in members if e not in left)
     best = min(left, key=lambda e: e.score + costs[members.index(e)])
     verdict = Verdict.NAMED if len(left) == 1 else Verdict.AMBIGUOUS
-    told = replace(found, best=best, alternatives=tuple(left), verdict=verdict)
+    others = [e for e in left if e is not best]
+    told = replace(found, best=best, alternatives=(best, *others), verdict=verdict)
     return told, (*said, f"that rules out {dropped}.")
 
 
