@@ -22,8 +22,7 @@ def next_run(
     """Choose the run that settles most of what is open, in the least of the rig's time.
 
     Runs within the range that was measured come first: beyond it an explanation's form is not proven, and neither is
-    a promise that rests on it. The promise is for the pair of the leading explanation and the rival that the run
-    separates least.
+    a promise that rests on it. The promise is for the pair that the run separates least.
 
     Parameters
     ----------

@@ -4,7 +4,7 @@ import numpy as np
 
 from fingervision.diagnosis.bench_data import BenchData
 from fingervision.diagnosis.explanation import Explanation, Problem
-from fingervision.diagnosis.protocols import Step, measured_ends, protocols
+from fingervision.diagnosis.protocols import REZERO, Step, measured_ends, protocols
 from fingervision.domain.effect import PointEffect
 from fingervision.domain.report import NextRun
 from fingervision.domain.response import Response
@@ -13,6 +13,8 @@ WORTH = 9.0
 """Gain in chi-square above which two explanations count as separated."""
 CAMERA = frozenset({"scale_error", "edge_bias", "lens_distortion"})
 """What a slot of known width in the picture shows."""
+UNTIMED_S = 0.1
+"""Time between samples of a run after a table that has no times."""
 SLOT_FRAMES, SLOT_U_MM = 10, 0.002
 """Frames averaged on a reference slot, and the standard uncertainty of its width: an ordinary gauge block's."""
 
@@ -36,9 +38,8 @@ def _rezeroed(bench: BenchData, problem: Problem, pair: tuple[Explanation, Expla
     """Re-zero the stage: an offset of the input is gone after it, an offset of the gap stays."""
     offset = next(e for e in pair if "input_offset" in e.names)
     history, offsets = bench.chain.history, problem.offsets
-    steps: list[Step] = [{"kind": "rezero"}]
     ends = measured_ends(bench.table.input_mm, bench.model.input_range_mm)
-    steps += protocols(*ends, 0.1 if history.time_s is None else history.sample_time_s)[0][1]
+    steps = [REZERO, *protocols(*ends, UNTIMED_S)[0][1]]
     moved = bench.chain.stacked({"input_offset": offset.values["input_offset"]}) - bench.chain.stacked({})
     size = float(np.mean(moved[: history.input_mm.size]))
     known = np.diag(offsets.gram)[: offsets.runs]
