@@ -180,7 +180,8 @@ def search(
         best, foreign = _insisted(problem, forced, [*singles, *pairs], singles, samples), None
     progress(0.82)
     words, left = unexplained(problem, best, rng)
-    words = words or foreign
+    # What is small beside all that was explained is left over, whether probes found it or a third effect.
+    words = foreign if words is None and left is None else words
     progress(0.9)
     alternatives, distances = (
         ([best], {})
