@@ -238,8 +238,8 @@ def _follow(top: Top, inner_sign: int, below_tip_px: float, reach_px: float) -> 
     piece = top.outline[start : stop + 1]
     if inner_sign * (piece[0, 0] - piece[-1, 0]) < 0:
         piece = piece[::-1]
-    if piece[0, 1] < top.along_px + below_tip_px:
-        return None
+    if min(piece[0, 1], piece[-1, 1]) < top.along_px + below_tip_px:
+        return None  # what begins here is not a finger, but a speck on one
     return CoarseFinger(np.ascontiguousarray(piece), inner_sign, top)
 
 

@@ -8,8 +8,8 @@ from fingervision.vision.median import middle
 from fingervision.vision.outlines import Outline
 from fingervision.vision.tops import Top
 
-# An outline that comes back up by more than this has passed the bottom of a notch.
-TURNED_PX = 3
+# An outline that comes back up by more than this has passed the bottom of a notch; dust on a finger makes smaller ones.
+TURNED_PX = 5
 # A finger's flank is straight over so many times the measuring height and so much of its length.
 LEAST_HEIGHTS, LEAST_SHARE = 3.0, 0.25
 # A straight flank leans by no more than this (10 degrees of tilt and a taper), has so many of its rows within so many

@@ -84,8 +84,8 @@ def measuring_point(end: FingerEnd, below_tip_px: float, blur_px: float) -> Meas
     The tip is the higher of the two corners. Where noise alone decides which that is, the higher of two would be too
     high on average: a top that is level within twice its uncertainty counts as level.
     """
-    covariance = _with_corners(end.parameters, end.covariance, blur_px)
-    return MeasuringPoint(*_read_off(end.parameters, covariance, end.misfit, end.origin, below_tip_px))
+    wider = _with_corners(end.parameters, end.covariance, blur_px)
+    return MeasuringPoint(*_read_off(end.parameters, end.covariance, wider, end.misfit, end.origin, below_tip_px))
 
 
 @compiled
@@ -100,7 +100,7 @@ def _with_corners(p: Floats, covariance: Floats, blur: float) -> Floats:
 
 @compiled
 def _read_off(
-    p: Floats, covariance: Floats, misfit: float, origin: Floats, below_tip: float
+    p: Floats, covariance: Floats, wider: Floats, misfit: float, origin: Floats, below_tip: float
 ) -> tuple[float, float, float, float, Floats]:
     by_lean = np.empty(PARAMETERS)
     inner_x, inner_y, outer_x, outer_y = corner_tops(p, origin)
@@ -116,13 +116,13 @@ def _read_off(
     for a in range(PARAMETERS):
         # A radius is not below zero, and may be so much larger that the measuring point comes to lie on the fillet.
         is_radius = a in (INNER_R, OUTER_R)
-        more, less = (min(np.sqrt(covariance[a, a]), LARGEST_STEP_PX), 0.0) if is_radius else (STEP, STEP)
+        more, less = (min(np.sqrt(wider[a, a]), LARGEST_STEP_PX), 0.0) if is_radius else (STEP, STEP)
         up_tip, up_edge, _ = _tip_and_edge(_moved(p, a, more), origin, inner_share, below_tip)
         down_tip, down_edge, _ = _tip_and_edge(_moved(p, a, -less), origin, inner_share, below_tip)
         by_tip[a], by_edge[a] = (up_tip - down_tip) / (more + less), (up_edge - down_edge) / (more + less)
     found = np.empty((2, 2))
-    found[0, 0], found[1, 1] = _product(by_tip, covariance, by_tip), _product(by_edge, covariance, by_edge)
-    found[0, 1] = found[1, 0] = _product(by_tip, covariance, by_edge)
+    found[0, 0], found[1, 1] = _product(by_tip, wider, by_tip), _product(by_edge, wider, by_edge)
+    found[0, 1] = found[1, 0] = _product(by_tip, wider, by_edge)
     return tip, outer_x if inner_share == 0.0 else inner_x, edge, slope, found
 
 
