@@ -49,6 +49,13 @@ def _gains(problem: Problem, columns: Array, found: Explanation, taken: Array) -
     return np.where(usable, dot**2 / np.where(usable, norm, 1.0), 0.0), dot, norm
 
 
+def _explained(problem: Problem, found: Explanation) -> float:
+    """Squared whitened length of what an explanation changes; what offsets of the runs undo again does not count."""
+    changed = problem.whitened(found.values) - problem.whitened({})
+    shared = problem.offsets.design.T @ changed
+    return float(changed @ changed - shared @ problem.offsets.metric(found.sigma_mm) @ shared)
+
+
 def imitated(problem: Problem, several: Explanation, fewer: list[Explanation]) -> str | None:
     """What several effects only imitate, in words; None where they are the reason themselves.
 
@@ -90,7 +97,6 @@ def unexplained(problem: Problem, best: Explanation, rng: np.random.Generator) -
     size_mm = abs(float(dot[top])) / float(norm[top]) * shapes.rms[top]
     if below_the_input(problem, size_mm):
         return None, words
-    changed = problem.whitened(best.values) - problem.whitened({})
-    if best.names and gain[top] < SMALL_SHARE**2 * float(changed @ changed):
+    if best.names and gain[top] < SMALL_SHARE**2 * _explained(problem, best):
         return None, words
     return words, None
