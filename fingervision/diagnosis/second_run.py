@@ -14,8 +14,8 @@ from fingervision.domain.model import PhysicalModel
 
 PAUSE_S = 30.0
 """Time between the data and the run: starting, saving."""
-AT_END = 0.01
-"""Share of its range within which a parameter lies at the end."""
+AT_END = 1e-3
+"""Share of its range within which a parameter lies at the end; a stop a hundredth inside it was seen."""
 REFITTED = 8
 """Steps of a refit."""
 Settings = Mapping[str, Mapping[str, float]]
