@@ -29,7 +29,7 @@ DENOISE: dict[str, Callable[[np.ndarray], np.ndarray]] = {
     "scikit-image Gaussian 1 px": lambda a: (255 * gaussian(a, 1.0)).astype(np.uint8),
 }
 SPLIT: dict[str, Callable[[np.ndarray], np.ndarray]] = {
-    "OpenCV Otsu, every third (ours)": lambda a: binarise(a).dark > 0,
+    "Otsu with the spread (ours)": lambda a: binarise(a).dark > 0,
     "OpenCV Otsu": lambda a: cv2.threshold(a, 0, 255, cv2.THRESH_BINARY_INV | cv2.THRESH_OTSU)[1] > 0,
     "scikit-image Otsu": lambda a: a <= threshold_otsu(a),
 }
