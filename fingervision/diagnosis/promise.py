@@ -29,11 +29,15 @@ MODERATE, SURELY = 75.0, 0.8
 
 @dataclass(frozen=True, slots=True)
 class Promise:
-    """A run's gain in chi-square: median, the interval that holds what comes, the chance to come near the median."""
+    """A run's gain in chi-square: the one most likely to be kept, the interval that holds what comes, that likelihood.
+
+    Either explanation may be true, and often the two foretell different gains: a median would lie between them, where
+    nothing comes.
+    """
 
     gain: float
-    interval: tuple[float, float]
     kept: float
+    interval: tuple[float, float]
 
     @property
     def sound(self) -> bool:
@@ -93,9 +97,19 @@ def promise(
     mean = np.maximum(np.array(gains), 0.0)
     drawn = mean[rng.choice(mean.size, NOISES, p=np.array(chances) / sum(chances))]
     come = drawn + 2.0 * np.sqrt(drawn) * rng.standard_normal(NOISES)
-    low, middle, high = np.quantile(come, (0.5 - 0.5 * PROMISED, 0.5, 0.5 + 0.5 * PROMISED))
-    near = (come >= KEPT[0] * middle) & (come <= KEPT[1] * middle)
-    return Promise(float(middle), (float(low), float(high)), float(np.mean(near)))
+    low, high = np.quantile(come, (0.5 - 0.5 * PROMISED, 0.5 + 0.5 * PROMISED))
+    return Promise(*surest(come), interval=(float(low), float(high)))
+
+
+def surest(come: Array) -> tuple[float, float]:
+    """The gain that what comes is most often near to, and how often; the median where nothing is gained."""
+    come = np.sort(come)
+    named = come[come > 0.0]
+    if named.size == 0:
+        return float(np.median(come)), 0.0
+    counts = np.searchsorted(come, KEPT[1] * named, "right") - np.searchsorted(come, KEPT[0] * named, "left")
+    best = int(np.argmax(counts))
+    return float(named[best]), float(counts[best] / come.size)
 
 
 def _offsets(problem: Problem, explanation: Explanation, rng: np.random.Generator) -> tuple[float, ...]:

@@ -12,7 +12,7 @@ from fingervision.diagnosis.next_run import next_run
 from fingervision.diagnosis.noise_short import drawn_noises
 from fingervision.diagnosis.other_evidence import EVIDENCE, other_evidence
 from fingervision.diagnosis.posterior import draws
-from fingervision.diagnosis.promise import promise
+from fingervision.diagnosis.promise import promise, surest
 from fingervision.diagnosis.run_choice import NEEDED
 from fingervision.diagnosis.second_run import SecondRun
 from fingervision.domain.effect import Array
@@ -135,3 +135,24 @@ def test_a_re_zeroed_stage_tells_its_own_offset_from_the_rest_gap(tmp_path: Path
     again = SecondRun.of(data, problem, BACK, rezeroed=True)
     gap = explained(problem, "rest_gap_error", offset_mm=0.14)
     assert again.distance(offset, gap) > SecondRun.of(data, problem, BACK).distance(offset, gap) + NEEDED
+
+
+def test_the_promise_is_where_gains_come_and_not_between_two_that_may_come() -> None:
+    rng = np.random.default_rng(4)
+    likely, less = 100.0 + 5.0 * rng.standard_normal(650), 1000.0 + 50.0 * rng.standard_normal(350)
+    gain, kept = surest(np.concatenate([likely, less]))
+    assert 70.0 < gain < 130.0
+    assert kept == pytest.approx(0.65, abs=0.01)
+    assert surest(np.array([-3.0, -2.0, -1.0])) == (-2.0, 0.0)
+
+
+def test_only_a_stop_that_was_not_seen_goes_on_with_the_range(tmp_path: Path) -> None:
+    data, problem = bench(tmp_path, 1)
+    run = SecondRun.of(data, problem, np.linspace(-0.5, 2.0, 40))
+    (upper,) = (p.upper for where, p in problem.parameters(("end_stop",)) if p.name == "upper_mm")
+    (further,) = (p.upper for where, p in run.both.parameters(("end_stop",)) if p.name == "upper_mm")
+    assert further > upper
+    seen = {"end_stop": {"lower_mm": -0.4, "upper_mm": upper - 0.01 * (ONE_WAY[-1] - ONE_WAY[0])}}
+    assert run.moved(("end_stop",), seen) == seen
+    unseen = {"end_stop": {"lower_mm": -0.4, "upper_mm": upper}}
+    assert run.moved(("end_stop",), unseen)["end_stop"] == {"lower_mm": -0.4, "upper_mm": further}
