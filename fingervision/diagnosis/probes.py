@@ -58,12 +58,10 @@ def probes(history: History, whitener: Whitener, most: int) -> Probes:
         label = f"a wave over the input with a period of {span / cycles:.3g} mm"
         shapes += [(label, np.sin(phase)), (label, np.cos(phase))]
     if history.time_s is not None:
-        t = (
-            np.concatenate([np.arange(n)[run] for run in history.runs]) / n
-            if not history.shared_clock
-            else history.clock_s
-        )
+        t = history.clock_s if history.shared_clock else np.concatenate([np.arange(n)[run] for run in history.runs]) / n
         begin, length = float(t.min()), max(float(np.ptp(t)), 1e-9)
+        # Without a shared clock t counts samples, as shares of the table.
+        length_s = length if history.shared_clock else length * n * history.sample_time_s
         for k in range(1, fine):
             at = begin + length * k / fine
             label = f"{at:.3g} s" if history.shared_clock else f"{100 * k / fine:.0f} % of the table"
@@ -71,7 +69,7 @@ def probes(history: History, whitener: Whitener, most: int) -> Probes:
             shapes.append((f"a bump at {label}", np.exp(-0.5 * ((t - at) / (length / fine)) ** 2)))
         for cycles in np.arange(1.0, min(120.0, n / 6.0), 0.5):
             phase = 2.0 * np.pi * cycles * (t - begin) / length
-            label = f"a wave over time with a period of {length / cycles:.3g} s"
+            label = f"a wave over time with a period of {length_s / cycles:.3g} s"
             shapes += [(label, np.sin(phase)), (label, np.cos(phase))]
         speed = np.concatenate([_speed(u[run], history.times[run]) for run in history.runs])
         sense = np.sign(np.where(np.abs(speed) > 0.1 * np.max(np.abs(speed)), speed, 0.0))

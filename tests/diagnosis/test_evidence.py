@@ -1,14 +1,17 @@
 """What counts as evidence: families that noise lifts equally seldom, and effects that only imitate something else."""
 
+import re
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import pytest
 from numpy.typing import NDArray
 
 from fingervision.diagnosis.bench_data import prepare
 from fingervision.diagnosis.bootstrap import QUANTILE, linear_thresholds
 from fingervision.diagnosis.explanation import Explanation, Problem, fit
+from fingervision.diagnosis.probes import probes
 from fingervision.diagnosis.signatures import signatures
 from fingervision.diagnosis.unexplained import imitated
 from fingervision.storage.measured_table import read_measured_table
@@ -77,3 +80,16 @@ def test_three_effects_that_are_there_imitate_nothing(tmp_path: Path) -> None:
     there = problem.measured + problem.whitened(FORMS) - problem.whitened({})
     problem = replace(problem, measured=there)
     assert imitated(problem, *several_and_fewer(problem)) is None
+
+
+def test_waves_are_told_in_seconds_also_where_each_run_begins_at_zero(tmp_path: Path) -> None:
+    problem = problem_of(tmp_path, np.zeros(SAMPLES))
+    half = SAMPLES // 2
+    once = replace(problem.chain.history, runs=(slice(0, half), slice(half, SAMPLES)))
+    again = replace(once, time_s=np.tile(0.1 * np.arange(half), 2), shared_clock=False)
+    for history in (once, again):
+        words = probes(history, problem.whitener, 10_000).words
+        told = [re.search(r"over time with a period of (\S+) s in the gap", each) for each in words]
+        periods_s = [float(each[1]) for each in told if each]
+        assert max(periods_s) == pytest.approx(0.1 * (SAMPLES - 1), rel=5e-3)  # three digits are told
+        assert min(periods_s) > 2.0 * 0.1
