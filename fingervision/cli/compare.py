@@ -33,12 +33,15 @@ def command(measured: Path, model_path: Path, out: Path, seed: int, kind: str, a
     from fingervision.diagnosis.report_figure import residual_figure
     from fingervision.storage.measured_table import read_measured_table
     from fingervision.storage.model_toml import read_model
+    from fingervision.storage.out_folder import make_out_folder, out_folder
 
-    found = compare(read_measured_table(measured), read_model(model_path, kind), seed=seed)
-    out.mkdir(parents=True, exist_ok=True)
+    table, model = read_measured_table(measured), read_model(model_path, kind)
+    make_out_folder(out)
+    found = compare(table, model, seed=seed)
     document = found.document()
-    (out / "compare.json").write_text(json.dumps(document, indent=2, allow_nan=False) + "\n", encoding="utf-8")
-    (out / "compare.png").write_bytes(residual_figure(found.residual_mm, None, found.bench.chain.history))
+    with out_folder(out):
+        (out / "compare.json").write_text(json.dumps(document, indent=2, allow_nan=False) + "\n", encoding="utf-8")
+        (out / "compare.png").write_bytes(residual_figure(found.residual_mm, None, found.bench.chain.history))
     if as_json:
         click.echo(json.dumps(document, indent=2))
         return

@@ -6,7 +6,7 @@ import secrets
 from contextlib import suppress
 from pathlib import Path
 
-from fingervision.domain.errors import FingervisionError
+from fingervision.storage.out_folder import out_folder
 
 FILE = ".live_token"
 BYTES = 18
@@ -21,8 +21,7 @@ def kept_token(out: Path) -> str:
         The folder cannot be written.
     """
     path = out / FILE
-    try:
-        out.mkdir(parents=True, exist_ok=True)
+    with out_folder(out):
         with suppress(FileNotFoundError, UnicodeDecodeError):
             found = path.read_text(encoding="ascii").strip()
             if re.fullmatch(r"[A-Za-z0-9_-]{24,}", found) and path.stat().st_mode & 0o077 == 0:
@@ -31,10 +30,4 @@ def kept_token(out: Path) -> str:
         token = secrets.token_urlsafe(BYTES)
         with os.fdopen(os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600), "w", encoding="ascii") as file:
             file.write(token + "\n")
-    except FileExistsError:
-        raise FingervisionError(f"--out must be a folder, but {out} is a file: name another.") from None
-    except OSError as error:
-        raise FingervisionError(
-            f"The folder {out} cannot be written ({error.strerror}): name another with --out."
-        ) from error
     return token

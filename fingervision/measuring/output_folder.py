@@ -6,6 +6,7 @@ from pathlib import Path
 
 from fingervision.domain.errors import FingervisionError, UsageError
 from fingervision.storage.gaps_csv import COLUMNS
+from fingervision.storage.out_folder import out_folder
 
 GAPS, SUMMARY, FIGURE, OVERLAY, STEPS = "gaps.csv", "summary.json", "gap.png", "overlay.mp4", "steps"
 
@@ -64,8 +65,7 @@ def claimed(path: Path, recording_files: tuple[Path, ...]) -> OutputFolder:
         same = file.resolve().parent == path.resolve()
         if same and (len(recording_files) > 1 or file.name in names):
             raise UsageError(f"--out must not be the folder of the recording, but {path} is: name another folder.")
-    try:
-        path.mkdir(parents=True, exist_ok=True)
+    with out_folder(path):
         present = [name for name in names if (path / name).exists()]
         if present and not _is_ours(path / GAPS):
             raise FingervisionError(
@@ -80,12 +80,6 @@ def claimed(path: Path, recording_files: tuple[Path, ...]) -> OutputFolder:
         trial = path / ".fingervision.part"
         trial.touch()
         trial.unlink()
-    except FileExistsError:
-        raise FingervisionError(f"--out must be a folder, but {path} is a file: name another.") from None
-    except OSError as error:
-        raise FingervisionError(
-            f"The folder {path} cannot be written ({error.strerror}): name another with --out."
-        ) from error
     return OutputFolder(path)
 
 

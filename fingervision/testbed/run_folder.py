@@ -14,6 +14,7 @@ from fingervision.domain.frame import Frame
 from fingervision.domain.recipe import Recipe
 from fingervision.storage.calibration_json import write_calibration
 from fingervision.storage.folder_lock import FolderLock
+from fingervision.storage.out_folder import make_out_folder
 from fingervision.storage.recorded_video import RecordedVideo
 from fingervision.storage.run_files import CALIBRATION, VIDEO, RunFiles
 from fingervision.storage.samples_csv import SampleRow, SamplesCsv, read_samples, write_rows
@@ -21,7 +22,7 @@ from fingervision.storage.toml_section import Section
 from fingervision.testbed.bed import Bed
 from fingervision.testbed.hidden import Hidden
 from fingervision.testbed.run_about import JOINED, RECIPE, SAMPLES, SIMULATION, about_run, digest_of, write_expected
-from fingervision.testbed.run_remains import claim, remains
+from fingervision.testbed.run_remains import remains
 
 # FFV1 of a picture with noise takes up to this many bytes a pixel.
 BYTES_PER_PX = 0.8
@@ -53,7 +54,7 @@ class BedRunFolder:
         self, path: Path, recipe: Recipe[Section], bed: Bed, hidden: Hidden, before: Sequence[SampleRow] = ()
     ) -> None:
         self.path, self.before = path, tuple(before)
-        claim(path)
+        make_out_folder(path)
         self._lock = FolderLock(path)
         try:
             earlier = remains(path, recipe, digest_of(bed, hidden))

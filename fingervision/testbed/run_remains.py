@@ -34,24 +34,6 @@ class Remains:
     events: list[dict[str, Any]]
 
 
-def claim(path: Path) -> None:
-    """Make a folder, unless it is there.
-
-    Raises
-    ------
-    FingervisionError
-        It cannot be made.
-    """
-    try:
-        path.mkdir(parents=True, exist_ok=True)
-    except FileExistsError:
-        raise FingervisionError(f"--out must be a folder, but {path} is a file: name another.") from None
-    except OSError as error:
-        raise FingervisionError(
-            f"The folder {path} cannot be written ({error.strerror}): name another with --out."
-        ) from error
-
-
 def contents(path: Path) -> list[str]:
     """Names of what lies in a folder, sorted; hidden files do not count."""
     return sorted(item.name for item in path.iterdir() if not item.name.startswith("."))

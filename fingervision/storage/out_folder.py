@@ -1,0 +1,33 @@
+"""The folder that `--out` names: made, and a sentence where the system refuses."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from fingervision.domain.errors import FingervisionError
+
+
+@contextmanager
+def out_folder(path: Path) -> Iterator[None]:
+    """Make a folder, unless it is there, and take it for the cause of what the system refuses in the block.
+
+    Raises
+    ------
+    FingervisionError
+        It cannot be made or written.
+    """
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+        yield
+    except FileExistsError:
+        raise FingervisionError(f"--out must be a folder, but {path} is a file: name another.") from None
+    except OSError as error:
+        raise FingervisionError(
+            f"The folder {path} cannot be written ({error.strerror}): name another with --out."
+        ) from error
+
+
+def make_out_folder(path: Path) -> None:
+    """Make it before a long work begins, which would be lost where it cannot be made."""
+    with out_folder(path):
+        pass
