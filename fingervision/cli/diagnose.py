@@ -46,13 +46,12 @@ def command(
     import sys
     from difflib import get_close_matches
 
+    from fingervision.diagnosis.answer_files import PAGE, write_answer
     from fingervision.diagnosis.diagnose import diagnose
-    from fingervision.diagnosis.report_page import report_page
     from fingervision.effects import catalogue
     from fingervision.storage.measured_table import read_measured_table
-    from fingervision.storage.model_toml import read_model, write_model
-    from fingervision.storage.recipe_toml import write_recipe
-    from fingervision.storage.report_json import report_document, write_report
+    from fingervision.storage.model_toml import read_model
+    from fingervision.storage.out_folder import make_out_folder, out_folder
 
     for name in (*forced, *without):
         if name not in catalogue():
@@ -62,6 +61,7 @@ def command(
     if set(forced) & set(without):
         raise UsageError(f"An effect must be forced or left out, but {', '.join(set(forced) & set(without))} is both.")
     table, model = read_measured_table(measured), read_model(model_path, kind)
+    make_out_folder(out)
     with click.progressbar(length=1000, label="diagnosing", file=sys.stderr, hidden=not sys.stderr.isatty()) as bar:
         done = diagnose(
             table,
@@ -71,16 +71,9 @@ def command(
             without=frozenset(without),
             progress=lambda share: bar.update(max(0, int(1000 * share) - bar.pos)),
         )
+    with out_folder(out):
+        document = write_answer(out, done, model)
     report = done.report
-    out.mkdir(parents=True, exist_ok=True)
-    effects = {name: dict(values) for name, values in model.effects.items()}
-    effects |= {effect.name: dict(effect.parameters) for effect in report.effects}
-    write_model(out / "model.toml", Path(model.base_path), effects, model.kind)
-    if report.next_run is not None:
-        write_recipe(out / "next_run.toml", report.next_run.name, report.next_run.steps)
-    document = report_document(report, "model.toml", "next_run.toml" if report.next_run else None)
-    write_report(out / "report.json", document)
-    (out / "report.html").write_text(report_page(done), encoding="utf-8")
     if as_json:
         click.echo(json.dumps(document, indent=2))
         return
@@ -89,4 +82,4 @@ def command(
         click.echo(f"  note: {words}")
     if report.next_run is not None:
         click.echo(f"  next: {report.next_run.words}")
-    click.echo(f"  {out / 'report.html'}")
+    click.echo(f"  {out / PAGE}")

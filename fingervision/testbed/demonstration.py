@@ -6,23 +6,22 @@ from pathlib import Path
 
 import numpy as np
 
+from fingervision.diagnosis.answer_files import NEXT_RUN, PAGE, write_answer
 from fingervision.diagnosis.diagnose import Diagnosis, diagnose
-from fingervision.diagnosis.report_page import report_page
-from fingervision.domain.parameter import Estimate
 from fingervision.domain.report import DiagnosisReport, Verdict
 from fingervision.effects import catalogue
 from fingervision.measuring.rehearsal import rehearse
 from fingervision.storage.measured_table import read_measured_table
-from fingervision.storage.model_toml import read_model, write_model
+from fingervision.storage.model_toml import read_model
+from fingervision.storage.out_folder import make_out_folder, out_folder
 from fingervision.storage.recipe_toml import read_recipe, write_recipe
-from fingervision.storage.report_json import report_document, write_report
 from fingervision.testbed.hidden import Hidden
 from fingervision.testbed.hidden_words import usual_values
 from fingervision.testbed.put_together import SIMULATED, open_bed
 from fingervision.testbed.run import run_recipe
 from fingervision.testbed.run_about import JOINED, SAMPLES, SIMULATION
 from fingervision.testbed.run_folder import rows_before, times_of
-from fingervision.testbed.run_remains import claim, contents, refuse_others
+from fingervision.testbed.run_remains import contents, refuse_others
 
 # What a few short runs can tell from everything else: one of these is hidden where nobody says which.
 SHOWN = (
@@ -105,7 +104,7 @@ def demonstrate(hidden: Hidden, seed: int, out: Path, say: Say) -> Shown:
         The folder cannot be written, or a run could not be made.
     """
     recipe = out / "recipe.toml"
-    claim(out)
+    make_out_folder(out)
     if held := contents(out):
         refuse_others(out, held[0])
     write_recipe(recipe, "there and back", FIRST_RUN)
@@ -128,7 +127,7 @@ def demonstrate(hidden: Hidden, seed: int, out: Path, say: Say) -> Shown:
         if settled or answer.report.next_run is None or number == MOST_RUNS:
             break
         say(f"Next: {answer.report.next_run.words}")
-        before, recipe = folder, out / f"diagnosis-{number}" / "next_run.toml"
+        before, recipe = folder, out / f"diagnosis-{number}" / NEXT_RUN
     return Shown(hidden, answer.report, page, number)
 
 
@@ -136,13 +135,6 @@ def _answer(table: Path, simulation: Path, out: Path, seed: int) -> tuple[Diagno
     """Diagnose and write what `fingervision diagnose` writes."""
     model = read_model(simulation)
     done = diagnose(read_measured_table(table), model, seed=seed)
-    out.mkdir(parents=True, exist_ok=True)
-    effects: dict[str, dict[str, Estimate]] = {e.name: dict(e.parameters) for e in done.report.effects}
-    write_model(out / "model.toml", Path(model.base_path), effects, model.kind)
-    proposal = done.report.next_run
-    if proposal is not None:
-        write_recipe(out / "next_run.toml", proposal.name, proposal.steps)
-    write_report(out / "report.json", report_document(done.report, "model.toml", "next_run.toml" if proposal else None))
-    page = out / "report.html"
-    page.write_text(report_page(done), encoding="utf-8")
-    return done, page
+    with out_folder(out):
+        write_answer(out, done, model)
+    return done, out / PAGE

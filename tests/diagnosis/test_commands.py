@@ -51,6 +51,25 @@ def test_diagnose_writes_what_the_design_lays_down(tables: tuple[Path, Path], tm
     assert "nowhere beyond the noise" in again.output
 
 
+def test_an_answer_leaves_no_next_run_of_an_earlier_one(tables: tuple[Path, Path], tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    for model in (tables[1], out / "model.toml"):
+        done = CliRunner().invoke(cli, ["diagnose", str(tables[0]), "--model", str(model), "--out", str(out)])
+        assert done.exit_code == 0, done.output
+        asks = json.loads((out / "report.json").read_text())["next_run"] is not None
+        assert asks is (model == tables[1])
+        assert (out / "next_run.toml").exists() is asks
+
+
+def test_a_folder_that_cannot_be_made_is_refused(tables: tuple[Path, Path]) -> None:
+    for command in ("compare", "diagnose"):
+        inside = tables[0] / "out"
+        done = CliRunner().invoke(cli, [command, str(tables[0]), "--model", str(tables[1]), "--out", str(inside)])
+        assert str(done.exception) == (
+            f"The folder {inside} cannot be written (Not a directory): name another with --out."
+        )
+
+
 def test_the_user_may_insist_on_an_effect(tables: tuple[Path, Path], tmp_path: Path) -> None:
     command = [
         "diagnose",
