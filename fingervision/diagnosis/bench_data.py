@@ -22,12 +22,12 @@ from fingervision.models.corrected import CorrectedModel
 
 HELD_SAMPLES, SLOW_SAMPLES = 15, 5
 """Samples over which a stage that stands, or turns back, stays on one encoder step or two."""
-STAIRCASE = 0.85
-"""Share of an encoder step's variance that smoothing leaves: errors within half a step hide any bend of a line."""
 STAYING = 0.2
 """Leverage below which neighbours share so many samples that they share the error too."""
 DOUBTFUL = 2.0
 """Standard uncertainties beyond which a number of the drawing is doubtful."""
+SURELY = 3.0
+"""Standard errors by which the gap must follow the input's unrest before that is taken for motion."""
 SHORT = 100
 """Samples below which nothing is set aside before something was explained."""
 SHORT_RUN = 60
@@ -202,7 +202,7 @@ def prepare(table: MeasuredTable, model: CorrectedModel, without: frozenset[str]
         notes.append("only the gap was measured: what moves both fingers together cannot show.")
     smooth, leverage = u, np.zeros_like(u)
     if sigma > 0.0 and table.time_s is not None:
-        smooth, leverage = smoothed(u, table.time_s, table.runs, sigma)
+        smooth, leverage = smoothed(u, table.time_s, table.runs, sigma, step)
         if _is_motion(table, model, u, smooth):
             notes.append("the input's unrest shows in the gap as well: it is real motion and was not smoothed.")
             smooth, leverage, sigma, step = u, np.zeros_like(u), 0.0, 0.0
@@ -238,14 +238,11 @@ def prepare(table: MeasuredTable, model: CorrectedModel, without: frozenset[str]
     )
     held = _within(u, table.runs, HELD_SAMPLES, 1.01 * step)
     samples = 1.0 / float(np.median(leverage)) if np.median(leverage) > 0.0 else 1.0
-    # A stage that stands between two encoder steps keeps its error: averaging does not help there.
-    left = np.where(held, 1.0, leverage)
-    stays = left < STAYING
+    stays = leverage < STAYING
     if step > 0.0:
-        # The staircase of an encoder is no white noise: a line averages it out less well than its leverage says.
-        left, samples = np.maximum(left, STAIRCASE), max(samples, HELD_SAMPLES)
+        samples = max(samples, HELD_SAMPLES)
         stays = held | _within(u, table.runs, SLOW_SAMPLES, 2.01 * step)
-    error = slope * sigma * np.sqrt(left)
+    error = slope * sigma * np.sqrt(leverage)
     able, excluded = admissible(history, without, model.base)
     distrusted, reasons = distrusted_rows(table, model.base, float(zero))
     notes += reasons
@@ -281,5 +278,5 @@ def _is_motion(table: MeasuredTable, model: CorrectedModel, u: Array, smooth: Ar
     b = np.concatenate([np.diff(residual[run]) for run in table.runs])
     typical = 5.0 * np.median(np.abs(b)) + 1e-12
     kept = np.abs(b) < typical
-    power = float(a[kept] @ a[kept])
-    return power > 0.0 and float(a[kept] @ b[kept]) > 0.5 * power
+    power, doubt = float(a[kept] @ a[kept]), float(np.std(b[kept]))
+    return power > 0.0 and float(a[kept] @ b[kept]) > max(0.5 * power, SURELY * doubt * np.sqrt(power))

@@ -1,103 +1,229 @@
-"""The input's own error: local straight lines through the record, as wide as the record allows."""
+"""The input's own error: local lines and parabolas through the record, as wide as the record allows."""
+
+from math import comb
 
 import numpy as np
 
 from fingervision.domain.compiled import compiled_as_written
 from fingervision.domain.effect import Array
 
-WINDOWS = (241, 121, 61, 41, 27, 19, 13, 9, 7, 5)
+LINES = (241, 121, 61, 41, 27, 19, 13, 9, 7, 5)
+PARABOLAS = (121, 61, 41, 27, 19, 13, 9, 7)
+"""Samples of the windows that are tried; a stage that swings runs straight for too few of them."""
+PLACES = 5
+"""Places of a sample in its window, from one end to the other."""
+CHI_SIGMAS, END_SIGMAS, TREND_SIGMAS = 2.5, 3.0, 1.0
+"""Limits on a window's rest: in all, at its ends, and along the next higher power, which would bend unseen."""
+CHOSEN = 1.4
+"""By how much the parabola that looks best is worse than it looks: errors over claims of sines with noise."""
+RESOLVED_MM = 1e-7
+"""Differences of recorded inputs below this are the file's last digits."""
+ORDERS = (3, 4, 5, 6)
+MANY = 100
+"""Samples below which several estimates scatter so much that the smallest is too small."""
+NORMAL_MEDIAN = 0.6745
+"""Median of a standard normal variable's absolute value."""
+LINE = 9
+"""Samples of the lines about which a record on a grid scatters."""
+ROUNDED = 1.5
+"""Times the scatter of rounding above which there is noise as well."""
+STANDING = 0.1
+"""Share of samples that repeat the one before, in a record that an encoder made of a slow motion or a hold."""
+FEWEST_SINGLE = 3
+"""Single steps that tell an encoder from set points in round numbers."""
+CURVED_SIGMAS = 2.0
+"""Above which a parabola's curvature counts against a straight line."""
 
 
 def input_sigma(input_mm: Array, runs: tuple[slice, ...]) -> tuple[float, float]:
     """Estimate the standard uncertainty of one recorded input and the encoder's step, from the record itself.
 
-    A stage moves at constant speed nearly always, so third differences are noise; their median resists reversals.
+    Differences of high order are noise: a motion's own vanish, sooner where it is straight than where it swings, so
+    that the smallest estimate is the best. Their median resists reversals.
 
     Returns
     -------
     sigma_mm, step_mm : float
         The step is 0 where the values do not lie on a grid.
     """
-    third = np.concatenate([np.diff(input_mm[run], 3) for run in runs] or [np.zeros(1)])
-    sigma = float(np.median(np.abs(third)) / 0.6745 / np.sqrt(20.0)) if third.size else 0.0
-    values = np.unique(np.round(input_mm, 9))
-    steps = np.diff(values)
-    step = 0.0
-    if steps.size and values.size < 0.7 * input_mm.size:
-        smallest = float(np.min(steps[steps > 1e-7])) if np.any(steps > 1e-7) else 0.0
-        if smallest > 0.0 and np.all(np.abs(steps / smallest - np.round(steps / smallest)) < 0.02):
-            step = smallest
+    orders = ORDERS if input_mm.size >= MANY else ORDERS[:1]
+    sigma = min(_sigma_by_differences(input_mm, runs, order) for order in orders)
+    step = _grid(input_mm)
+    # Rounding that is finer than the noise is no encoder's: it averages out with the noise.
+    if step < sigma or not _rounds(input_mm, runs, step):
+        step = 0.0
     if step > 0.0:
-        sigma = max(sigma, step / np.sqrt(12.0))
-    return (sigma if sigma > 1e-7 * np.ptp(input_mm) else 0.0), step
+        # Roundings that alternate have large third differences, curved motions scatter about lines.
+        sigma, rounding = min(sigma, _scatter(input_mm, runs)), step / float(np.sqrt(12.0))
+        sigma = sigma if sigma > ROUNDED * rounding else rounding
+    return (sigma if 1e-7 * np.ptp(input_mm) < sigma < np.inf else 0.0), step
+
+
+def _sigma_by_differences(input_mm: Array, runs: tuple[slice, ...], order: int) -> float:
+    differences = np.concatenate([np.diff(input_mm[run], order) for run in runs])
+    gain = float(np.sqrt(comb(2 * order, order)))
+    return float(np.median(np.abs(differences))) / NORMAL_MEDIAN / gain if differences.size else np.inf
+
+
+def _scatter(input_mm: Array, runs: tuple[slice, ...]) -> float:
+    """Give the median standard deviation about lines through `LINE` samples; 0 where no run has so many."""
+    x = np.arange(LINE) - 0.5 * (LINE - 1)
+    found = [np.zeros(0)]
+    for run in runs:
+        if run.stop - run.start >= LINE:
+            windows = np.lib.stride_tricks.sliding_window_view(input_mm[run], LINE)
+            rest = windows - windows.mean(axis=1, keepdims=True) - (windows @ x)[:, None] * x / (x @ x)
+            found.append(np.sum(rest**2, axis=1) / (LINE - 2))
+    variances = np.concatenate(found)
+    return float(np.sqrt(np.median(variances))) if variances.size else 0.0
+
+
+def _grid(input_mm: Array) -> float:
+    """Give the distance of the lines of a grid on which all values lie; 0 where there is none."""
+    steps = np.diff(np.unique(np.round(input_mm, 9)))
+    # Where every sample is several lines on, the steps differ by single ones.
+    lines = np.concatenate([steps, np.diff(np.unique(steps))])
+    lines = lines[lines > RESOLVED_MM]
+    step = float(np.min(lines, initial=np.inf))
+    return step if np.all(np.abs(steps / step - np.round(steps / step)) < 0.02) and lines.size else 0.0
+
+
+def _rounds(input_mm: Array, runs: tuple[slice, ...], step_mm: float) -> bool:
+    """Whether a motion was rounded to a grid: it stands still on it, or its speed seems to change by single steps.
+
+    Set points in round numbers lie on a grid as well, but go from one to the next in equal steps.
+    """
+    if step_mm == 0.0:
+        return False
+    single = 0
+    for run in runs:
+        moves = np.diff(input_mm[run]) / step_mm
+        single += int(np.sum((np.abs(np.abs(np.diff(moves)) - 1.0) < 0.1) & (np.abs(moves[1:]) > 1.5)))
+    stands = np.concatenate([np.abs(np.diff(input_mm[run])) < 0.1 * step_mm for run in runs])
+    return bool(np.mean(stands) > STANDING or single >= FEWEST_SINGLE)
 
 
 @compiled_as_written
-def _lines(time_s: Array, input_mm: Array, sigma: float, windows: Array) -> tuple[Array, Array]:
+def _polynomial(
+    time_s: Array, values: Array, at: int, low: int, high: int, degree: int, sigma: float, rounded: bool
+) -> tuple[float, float, float, float, bool]:
+    """Fit a polynomial to a window by orthogonal polynomials (Forsythe 1957).
+
+    Returns
+    -------
+    value, leverage : float
+        Of the polynomial at sample `at`: the leverage is its variance over that of one sample.
+    top : float
+        Coefficient of its highest power; 0 where that is not significant.
+    missed : float
+        What a unit of the next higher power would add at `at`, and the polynomial not show.
+    passes : bool
+        Whether the rest is noise of standard deviation `sigma`.
+    """
+    count = high - low
+    middle = 0.5 * (time_s[low] + time_s[high - 1])
+    rest = values[low:high].copy()
+    before, now = np.zeros(count), np.ones(count)
+    value, leverage, top, norm_before = 0.0, 0.0, 0.0, 1.0
+    for power in range(degree + 2):
+        norm, along, shift = 0.0, 0.0, 0.0
+        for j in range(count):
+            norm += now[j] * now[j]
+            along += rest[j] * now[j]
+            shift += (time_s[low + j] - middle) * now[j] * now[j]
+        if power > degree:
+            chi = 0.0
+            for j in range(count):
+                chi += rest[j] * rest[j]
+            freedom = count - degree - 1
+            ends = max(np.max(np.abs(rest[:3])), np.max(np.abs(rest[-3:])))
+            passes = (
+                chi / sigma**2 <= freedom + CHI_SIGMAS * np.sqrt(2.0 * freedom)
+                and ends <= END_SIGMAS * sigma
+                and abs(along) <= TREND_SIGMAS * sigma * np.sqrt(norm)
+            )
+            if rounded:
+                # Where each sample is a whole number of steps on, all are rounded alike, and no mean shows it.
+                leverage += max(0.0, 1.0 - chi / sigma**2 / freedom)
+            return value, leverage, top, now[at - low], passes
+        coefficient = along / norm
+        value += coefficient * now[at - low]
+        leverage += now[at - low] ** 2 / norm
+        top = coefficient if abs(coefficient) * np.sqrt(norm) > CURVED_SIGMAS * sigma else 0.0
+        shift /= norm
+        ratio = norm / norm_before if power > 0 else 0.0
+        for j in range(count):
+            rest[j] -= coefficient * now[j]
+            ahead = (time_s[low + j] - middle - shift) * now[j] - ratio * before[j]
+            before[j] = now[j]
+            now[j] = ahead
+        norm_before = norm
+    return value, leverage, top, 0.0, False
+
+
+@compiled_as_written
+def _local_polynomials(
+    time_s: Array, input_mm: Array, sigma: float, rounded: bool, lines: Array, parabolas: Array
+) -> tuple[Array, Array]:
     count = input_mm.size
     smooth, leverage = input_mm.copy(), np.ones(count)
-    inside = np.zeros(count)
     for i in range(count):
-        for width in windows:
-            # A window that ends at the sample reaches up to a reversal without rounding it.
-            for place in range(5):
-                m = int(width)
-                low = i - (place * (m - 1)) // 4
-                high = low + m
-                if low < 0 or high > count:
-                    continue
-                t0 = 0.0
-                u0 = 0.0
-                for j in range(low, high):
-                    t0 += time_s[j]
-                    u0 += input_mm[j]
-                t0 /= m
-                u0 /= m
-                stt = 0.0
-                stu = 0.0
-                for j in range(low, high):
-                    stt += (time_s[j] - t0) ** 2
-                    stu += (time_s[j] - t0) * input_mm[j]
-                weight = 1.0 / m + (time_s[i] - t0) ** 2 / stt
-                depth = min(i - low, high - 1 - i)
-                if weight >= leverage[i] and depth <= inside[i]:
-                    continue
-                slope = stu / stt
-                reach = 0.5 * (time_s[high - 1] - time_s[low])
-                chi = 0.0
-                bend = 0.0
-                norm = 0.0
-                ends = 0.0
-                for j in range(low, high):
-                    e = input_mm[j] - u0 - slope * (time_s[j] - t0)
-                    x = (time_s[j] - t0) / reach
-                    chi += e * e
-                    bend += e * (x * x - 1.0 / 3.0)
-                    norm += (x * x - 1.0 / 3.0) ** 2
-                    if j < low + 3 or j >= high - 3:
-                        ends = max(ends, abs(e))
-                dof = m - 2
-                fits = chi / sigma**2 <= dof + 2.5 * np.sqrt(2.0 * dof) and ends <= 3.0 * sigma
-                if fits and abs(bend) <= 2.0 * sigma * np.sqrt(norm):
-                    inside[i] = max(inside[i], depth)
-                    if weight < leverage[i]:
-                        smooth[i] = u0 + slope * (time_s[i] - t0)
-                        leverage[i] = weight
-    # A stage comes to its speed in no time only on paper: a corner rounded by less than the noise passes every test
-    # above, so that at a line's end nothing but the samples beyond it vouch for the line.
-    return smooth, np.maximum(leverage, 1.0 / (1.0 + inside))
+        # A line's last sample has nothing beyond it that vouches for the line: corners are rounded by less than shows.
+        least = min(1, i, count - 1 - i)
+        inside, curvature, bent_value, bent_leverage = 0, 0.0, 0.0, 1.0
+        for degree in (2, 1):
+            widths = parabolas if degree == 2 else lines
+            for width in widths:
+                if 1.0 / width >= (bent_leverage if degree == 2 else leverage[i]):
+                    break
+                for place in range(PLACES):
+                    low = i - (place * (width - 1)) // (PLACES - 1)
+                    high = low + width
+                    depth = min(i - low, high - 1 - i)
+                    if low < 0 or high > count or depth < least:
+                        continue
+                    value, weight, top, missed, passes = _polynomial(
+                        time_s, input_mm, i, low, high, degree, sigma, rounded
+                    )
+                    if not passes:
+                        continue
+                    inside = max(inside, depth)
+                    if degree == 2 and CHOSEN * weight < bent_leverage:
+                        bent_value, bent_leverage, curvature = value, CHOSEN * weight, top
+                    elif degree == 1:
+                        # What the widest parabola bends away from this line counts as its error.
+                        weight += (curvature * missed / sigma) ** 2
+                        if weight < leverage[i]:
+                            smooth[i], leverage[i] = value, weight
+        if bent_leverage < leverage[i]:
+            smooth[i], leverage[i] = bent_value, bent_leverage
+        leverage[i] = max(leverage[i], 1.0 / (1.0 + inside))
+    return smooth, leverage
 
 
-def smoothed(input_mm: Array, time_s: Array, runs: tuple[slice, ...], sigma_mm: float) -> tuple[Array, Array]:
+def smoothed(
+    input_mm: Array, time_s: Array, runs: tuple[slice, ...], sigma_mm: float, step_mm: float
+) -> tuple[Array, Array]:
     """Smooth the record within its runs.
+
+    Parameters
+    ----------
+    input_mm, time_s : ndarray of float, shape (n,)
+        The record.
+    runs : tuple of slice
+        Samples of each run.
+    sigma_mm, step_mm : float
+        As `input_sigma` gives them.
 
     Returns
     -------
     input_mm, leverage : ndarray of float, shape (n,)
-        The remaining variance of each value is `leverage * sigma_mm**2`; 1 where no line passed.
+        The remaining variance of each value is `leverage * sigma_mm**2`; 1 where nothing passed.
     """
     out, leverage = input_mm.copy(), np.ones_like(input_mm)
     for run in runs:
         if run.stop - run.start >= 5:
-            out[run], leverage[run] = _lines(time_s[run], input_mm[run], sigma_mm, np.array(WINDOWS, dtype=np.float64))
+            out[run], leverage[run] = _local_polynomials(
+                time_s[run], input_mm[run], sigma_mm, step_mm > 0.0, np.array(LINES), np.array(PARABOLAS)
+            )
     return out, leverage

@@ -1,0 +1,64 @@
+"""What smoothing leaves of the recorded input's error, and what it claims to leave, both as shares of its variance.
+
+    PYTHONPATH=. python tests/benchmarks/input_smoothing.py --records 200 --seed 2
+
+The motions, noises and encoders are those of the hidden-effect benchmark.
+"""
+
+import argparse
+from collections import defaultdict
+from itertools import pairwise
+
+import numpy as np
+
+from fingervision.diagnosis.smooth_input import input_sigma, smoothed
+from tests.benchmarks.hidden.design import Kind, draw_design
+from tests.benchmarks.hidden.gripper_table import draw_table
+from tests.benchmarks.hidden.noise import draw_noise, rounded
+
+KINDS: tuple[Kind, ...] = ("rich", "ordinary", "poor")
+SINE = 2
+"""Every fourth run of a rich design, from this one on, swings."""
+
+
+def main() -> None:
+    """Draw records, smooth them, print the table."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--records", type=int, default=200)
+    parser.add_argument("--seed", type=int, default=2)
+    asked = parser.parse_args()
+    rng = np.random.default_rng(asked.seed)
+    left: dict[tuple[str, str, str], list[tuple[float, float]]] = defaultdict(list)
+    drawn = 0
+    while drawn < asked.records:
+        kind = KINDS[drawn % len(KINDS)]
+        table, inputs = draw_table(rng, with_force=False)
+        design = draw_design(rng, kind, inputs)
+        slope = float(np.mean(np.abs(table.slope(np.linspace(inputs.lower_mm, inputs.upper_mm, 21)))))
+        noise = draw_noise(rng, len(design.motions), slope, inputs.width_mm)
+        if noise.input_variance_mm2 == 0.0:
+            continue
+        drawn += 1
+        times = [np.arange(0.0, motion.duration_s, 1.0 / design.rate_hz) for motion in design.motions]
+        ends = np.cumsum([0, *(time.size for time in times)])
+        runs = tuple(slice(a, b) for a, b in pairwise(ends))
+        true = np.concatenate([motion.at(time) for motion, time in zip(design.motions, times, strict=True)])
+        recorded = rounded(true + noise.input_mm * rng.standard_normal(true.size), noise.encoder_step_mm)
+        sigma, step = input_sigma(recorded, runs)
+        if sigma == 0.0:
+            continue
+        found, leverage = smoothed(recorded, np.concatenate(times), runs, sigma, step)
+        error = (found - true) ** 2 / noise.input_variance_mm2
+        claim = leverage * sigma**2 / noise.input_variance_mm2
+        for index, run in enumerate(runs):
+            motion = "sine" if kind == "rich" and index % 4 == SINE else "lines"
+            row = (kind, motion, "encoder" if noise.encoder_step_mm else "noise")
+            left[row] += zip(error[run].tolist(), claim[run].tolist(), strict=True)
+    print("design    motion  error     left  claimed  samples")
+    for row, values in sorted(left.items()):
+        mean = np.mean(values, axis=0)
+        print(f"{row[0]:<9} {row[1]:<7} {row[2]:<8} {mean[0]:5.2f} {mean[1]:8.2f} {len(values):8d}")
+
+
+if __name__ == "__main__":
+    main()
