@@ -10,7 +10,7 @@ from fingervision.diagnosis.explanation import Explanation, Problem
 from fingervision.diagnosis.measuring_chain import MeasuringChain, admissible
 from fingervision.diagnosis.noise import Noise, gate, white_noise, without_input
 from fingervision.diagnosis.noise_short import noise_of_short_runs
-from fingervision.diagnosis.noise_spectrum import noise_by_spectrum
+from fingervision.diagnosis.noise_spectrum import LEAST_RUN, noise_by_spectrum
 from fingervision.diagnosis.smooth_input import input_sigma, smoothed
 from fingervision.diagnosis.whitening import RunOffsets, Whitener
 from fingervision.domain.effect import REZEROED, Array, Effect, Flags, History
@@ -26,6 +26,10 @@ STAYING = 0.2
 """Leverage below which neighbours share so many samples that they share the error too."""
 DOUBTFUL = 2.0
 """Standard uncertainties beyond which a number of the drawing is doubtful."""
+FEWEST_STANDING = 60
+"""Samples in all during which the stage must stand for the noise to be taken from them."""
+STANDING_SHARE = 1e-3
+"""Share of the input's range within which a stage stands."""
 SURELY = 3.0
 """Standard errors by which the gap must follow the input's unrest before that is taken for motion."""
 SHORT = 100
@@ -129,11 +133,21 @@ class BenchData:
         groups = [slice(0, together), *(slice(k, k + 1) for k in range(together, len(parts)))]
         if max(run.stop - run.start for run in history.runs) < SHORT_RUN:
             return noise_of_short_runs(parts, history.runs, aside, floors, explained=explained)
-        return tuple(
-            noise
-            for g in groups
-            for noise in noise_by_spectrum(parts[g], history.runs, rate_hz, aside[g], floors[g], explained=explained)
-        )
+
+        def over(stretches: tuple[slice, ...]) -> tuple[Noise, ...]:
+            return tuple(
+                noise
+                for g in groups
+                for noise in noise_by_spectrum(parts[g], stretches, rate_hz, aside[g], floors[g], explained=explained)
+            )
+
+        everywhere = over(history.runs)
+        standing = () if explained else standing_still(history)
+        if sum(hold.stop - hold.start for hold in standing) < FEWEST_STANDING:
+            return everywhere
+        # What nothing explains yet moves with the stage and passes for noise; where the stage stands, less of it does.
+        holds = over(standing)
+        return holds if holds[0].total_mm < everywhere[0].total_mm else everywhere
 
     def redrawn(self, problem: Problem, explanation: Explanation) -> "BenchData":
         """Refit the drawing's uncertain numbers beside an explanation, and predict with them from now on."""
@@ -258,6 +272,21 @@ def _rezeroed(table: MeasuredTable) -> tuple[bool, ...]:
     """Which runs came after a re-zeroing, by their names; empty where all did: no run shows the zero before."""
     flags = tuple(REZEROED in name.split() for name in table.run_names)
     return flags if any(flags) and not all(flags) else ()
+
+
+def standing_still(history: History) -> tuple[slice, ...]:
+    """Stretches of at least `LEAST_RUN` samples in which the stage stands, to within the recorded input's error."""
+    reach = max(3.0 * history.input_sigma_mm, STANDING_SHARE * history.input_span_mm)
+    found: list[slice] = []
+    for run in history.runs:
+        begin, low, high = run.start, np.inf, -np.inf
+        for i, value in enumerate(history.input_mm[run].tolist(), run.start):
+            low, high = min(low, value), max(high, value)
+            if high - low > reach:
+                found.append(slice(begin, i))
+                begin, low, high = i, value, value
+        found.append(slice(begin, run.stop))
+    return tuple(stretch for stretch in found if stretch.stop - stretch.start >= LEAST_RUN)
 
 
 def _within(input_mm: Array, runs: tuple[slice, ...], samples: int, reach_mm: float) -> Flags:

@@ -1,12 +1,12 @@
 """How much one more effect gains from noise alone: draws of the null, refitted as the data are."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
 from scipy.signal import lfilter
 
-from fingervision.diagnosis.explanation import Explanation, Problem, fit
+from fingervision.diagnosis.explanation import MANY_STEPS, Explanation, Problem, fit
 from fingervision.diagnosis.signatures import Signatures, tangents
 from fingervision.domain.effect import Array
 
@@ -121,6 +121,17 @@ def noise_alone(problem: Problem, base: Explanation, rng: np.random.Generator) -
     return replace(problem, chain=replace(problem.chain, history=shaken)), np.asarray(truth + noise)
 
 
+def jumps_astray(problem: Problem, names: tuple[str, ...]) -> bool:
+    """Whether an explanation jumps at inputs that are not known well: one jump moves, and with it all that follow."""
+    unsure = problem.whitener.passing_mm.any() or problem.whitener.input_mm.any()
+    return bool(unsure) and any(parameter.rugged for _, parameter in problem.parameters(names))
+
+
+def rare(values: Sequence[float]) -> float:
+    """Estimate the quantile of a maximum that is exceeded once in 66 draws, from a few."""
+    return float(np.mean(values)) + GUMBEL * float(np.std(values))
+
+
 def _of_pictures(problem: Problem, rng: np.random.Generator) -> Array:
     """Draw the noise of the pictures alone, channels stacked; shape (m,), in mm."""
     out = []
@@ -165,9 +176,12 @@ def exceeds_noise(
     found: list[float] = []
     quantile = 0.0
     doubt = noise_doubt(problem)
-    for _ in range(DRAWS if problem.chain.history.input_mm.size <= LONG else LONG_DRAWS):
+    # Jumps that went astray have to be found again as thoroughly as the measurement's were.
+    astray = jumps_astray(problem, base.names)
+    steps, draws = (MANY_STEPS, FEWEST) if astray else (5, DRAWS)
+    for _ in range(draws if problem.chain.history.input_mm.size <= LONG else min(draws, LONG_DRAWS)):
         shaken, target = noise_alone(problem, base, rng)
-        alone = fit(shaken, base.names, base.values, target=target, iterations=5)
+        alone = fit(shaken, base.names, base.values, target=target, iterations=steps)
         along = tangents(problem, alone) if alone.names else None
         gain, coefficient = atoms.gains(alone.residual, problem.offsets, problem.offsets.metric(alone.sigma_mm), along)
         above = np.where((gain > 0.0) & ~np.isin(owner, base.names), gain - asking, -np.inf)
@@ -181,17 +195,17 @@ def exceeds_noise(
                 name = atoms.names[top]
                 starts.append({**alone.values, name: atoms.begin(top, float(coefficient[top]))})
                 above[owner == name] = -np.inf
-        luck = float(np.exp(doubt * rng.standard_normal()))
+        # What jumps leave that went astray is noise of a level of its own, in the measurement and in every draw.
+        luck = base.score / alone.score if astray else float(np.exp(doubt * rng.standard_normal()))
         fits = [fit(shaken, tuple(start), start, target=target, iterations=6) for start in starts]
         found.append(
             max(max(0.0, alone.score - e.score) * luck - price(thresholds, base, e.names) for e in fits)
             if fits
             else -min(thresholds.values(), default=0.0)
         )
-        spread = float(np.std(found))
-        quantile = float(np.mean(found)) + GUMBEL * spread
+        quantile = rare(found)
         # The quantile's own error is that of a mean and of GUMBEL standard deviations together.
-        error = spread * float(np.sqrt((1.0 + 0.5 * GUMBEL**2) / len(found)))
+        error = float(np.std(found)) * float(np.sqrt((1.0 + 0.5 * GUMBEL**2) / len(found)))
         if len(found) >= FEWEST and abs(excess - quantile) > SURELY * error:
             break
     return excess > max(quantile, 0.0)

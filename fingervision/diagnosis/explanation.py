@@ -1,6 +1,6 @@
 """Fitting an explanation: effects inside the measuring chain, refitted jointly by generalised least squares."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,7 +14,7 @@ Point = dict[str, dict[str, float]]
 AT_BOUND = 1e-6
 SCANS = ((0.06, 241), (0.012, 13), (0.003, 13))
 """Relative half-widths, and values, of the scans of a parameter in which the prediction jumps. The first is for a
-thorough search of a single effect: with hundreds of jumps in a record the right size has a basin a thousandth wide."""
+thorough search: with hundreds of jumps in a record the right size has a basin a thousandth wide."""
 MANY_STEPS = 20
 FORM_SHARE = 0.02
 """By how much of what an effect changes the catalogue's form of it is typically off."""
@@ -197,7 +197,7 @@ def fit(
             cost = _length(residual, residual, offsets, metric)
         if gained < 0.02 + 1e-5 * cost and step_number > 0:
             break
-    thorough = len(order) == 1 and iterations >= MANY_STEPS
+    thorough = iterations >= MANY_STEPS
     for i, (_, parameter) in enumerate(listed):
         for width, count in SCANS[not thorough :] if parameter.rugged else ():
             for value in np.clip(x[i] * (1.0 + width * np.linspace(-1.0, 1.0, count)), lower[i], upper[i]):
@@ -215,3 +215,25 @@ def fit(
     if free.any():
         covariance[np.ix_(free, free)] = np.linalg.pinv(normal[np.ix_(free, free)])
     return Explanation(order, settings(x), cost + penalty, residual, covariance, int(free.sum()), spread)
+
+
+def scan(
+    problem: Problem, base: Explanation, name: str, starts: Sequence[Mapping[str, float]]
+) -> tuple[dict[str, float], float]:
+    """Try one more effect beside an explanation as it stands.
+
+    Returns
+    -------
+    start : dict
+        The best of `starts`.
+    score : float
+        With it, without any refit.
+    """
+    predicted = [problem.chain.stacked({**base.values, name: start}) for start in starts]
+    residual = problem.measured[:, None] - problem.whitener.columns(np.stack(predicted, axis=1))[0]
+    shared = problem.offsets.design.T @ residual
+    metric = problem.offsets.metric(base.sigma_mm)
+    length = np.einsum("ij,ij->j", residual, residual) - np.einsum("ij,ij->j", shared, metric @ shared)
+    best = int(np.argmin(length))
+    before = _length(base.residual, base.residual, problem.offsets, metric)
+    return dict(starts[best]), base.score - before + float(length[best])

@@ -11,8 +11,12 @@ INDISTINGUISHABLE = 9.0
 FREEDOM = 4.0
 """Degrees of freedom of Student's t for the physical priors: a typical size is itself known roughly only, so that far
 beyond it surprise grows slowly (Lange, Little & Taylor 1989)."""
-ADMISSIBLE = 21.0
-"""Chi-square by which a true explanation 9 away can come out worse, at 95 %: 9 + 1.96 * 2 * sqrt(9)."""
+SURELY = 2.05
+"""Standard deviations: what is true is lost in one table of fifty."""
+SPARE = 3.0
+"""Chi-square that the best explanation takes from the noise beyond what the truth would."""
+ADMISSIBLE = 15.0
+"""Chi-square by which one that is 4 away from the truth comes out worse at most: 4 + SURELY * 2 * sqrt(4) + SPARE."""
 
 
 def indistinguishable(
@@ -30,13 +34,15 @@ def indistinguishable(
         near = _squared(problem, target - problem.whitened(other.values), metric)
         if near > 400.0 and other.score - best.score > 200.0:
             return
+        worse = other.score - best.score
         distance = near if near < INDISTINGUISHABLE else _distance(problem, best, other, best.sigma_mm)
-        if distance >= INDISTINGUISHABLE and other.score - best.score < ADMISSIBLE:
+        if distance >= INDISTINGUISHABLE and worse < ADMISSIBLE:
             distance = min(distance, _distance(problem, other, best, best.sigma_mm))
         distances[other.names] = distance
         # One that leaves the data nearly as badly off as no effect at all explains nothing: the runs' scatter hides it.
         idle = nothing.score - other.score < 0.3 * (nothing.score - best.score)
-        if distance < INDISTINGUISHABLE and not idle and other.score - best.score < ADMISSIBLE:
+        close = distance < INDISTINGUISHABLE and not idle and worse < ADMISSIBLE
+        if close or worse < _least_refuted(distance):
             members.append(other)
 
     for other in pool:
@@ -48,6 +54,15 @@ def indistinguishable(
             if odds(problem, pair, rows) < most:
                 join(pair)
     return [m for m in members if not any(set(o.names) < set(m.names) for o in members)], distances
+
+
+def _least_refuted(distance: float) -> float:
+    """Chi-square by which an explanation must come out worse than another before the data refute that it is true.
+
+    If it is, the other leaves `distance` more than it, with a standard deviation of 2 sqrt(distance) (Cox 1961). Two
+    that these data could tell apart are both kept where the data happen to speak for neither.
+    """
+    return -distance + SURELY * 2.0 * float(np.sqrt(distance)) + SPARE
 
 
 def _distance(problem: Problem, truth: Explanation, other: Explanation, sigma_mm: tuple[float, ...]) -> float:

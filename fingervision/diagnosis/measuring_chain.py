@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -14,7 +15,7 @@ from fingervision.effects import catalogue
 Settings = Mapping[str, Values]
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class MeasuringChain:
     """A model with its history; effects switched on act in the catalogue's order.
 
@@ -35,11 +36,16 @@ class MeasuringChain:
     fixed: Settings
     midline_mm: float = 0.0
 
+    @cached_property
+    def effects(self) -> Mapping[str, Effect]:
+        """The catalogue in its order, as this model obeys it."""
+        laws = own_laws(self.model)
+        return {name: obeyed(effect, laws.get(name)) for name, effect in catalogue().items()}
+
     def respond(self, settings: Settings) -> Response:
         """Run the chain; an effect named in `settings` replaces a fixed one of the same name."""
         acting = {**self.fixed, **settings}
-        laws = own_laws(self.model)
-        order = [obeyed(effect, laws.get(name)) for name, effect in catalogue().items() if name in acting]
+        order = [effect for name, effect in self.effects.items() if name in acting]
         input_mm = self.history.input_mm
         points: list[PointEffect] = []
         for effect in order:

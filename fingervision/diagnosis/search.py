@@ -5,18 +5,22 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fingervision.diagnosis.bootstrap import exceeds_noise, linear_thresholds, price
-from fingervision.diagnosis.explanation import FORM_SHARE, Explanation, Problem, fit
+from fingervision.diagnosis.bootstrap import LONG, exceeds_noise, jumps_astray, linear_thresholds, price
+from fingervision.diagnosis.explanation import FORM_SHARE, Explanation, Problem, fit, scan
 from fingervision.diagnosis.indistinguishable import beside_foretold, indistinguishable, odds
 from fingervision.diagnosis.input_error import below_the_input
 from fingervision.diagnosis.signatures import Signatures, signatures, tangents
-from fingervision.diagnosis.unexplained import SMALL_SHARE, imitated, unexplained
+from fingervision.diagnosis.unexplained import SMALL_SHARE, imitated, shapes_of, unexplained
 from fingervision.domain.report import Verdict
 
 Progress = Callable[[float], None]
 TRIPLE_SHARE = 0.15
 """A third effect needs evidence of its own: three effects bend to almost anything."""
 PAIRS_REFITTED = 60
+SCANNED = 6
+"""Explanations beside which an effect that jumps is tried at all its sizes: where it jumps depends on the others."""
+LEAST_GAIN = 4.0
+"""Chi-square that an effect's signature must take for a refit to be tried."""
 SUSPECTS = 2
 """Explanations of the measurement that are tried on every draw of noise as well."""
 CLEARLY = 2.5
@@ -63,15 +67,20 @@ def _extended(
     """Add each effect to each base: starts from signatures on what the base leaves, then joint refits."""
     owner = np.array(atoms.names)
     planned: list[tuple[float, Explanation, str, dict[str, float]]] = []
-    for base in bases:
+    scanned = SCANNED if problem.chain.history.input_mm.size <= LONG else 1
+    for place, base in enumerate(bases):
         metric = problem.offsets.metric(base.sigma_mm)
         gain, coefficient = atoms.gains(base.residual, problem.offsets, metric, tangents(problem, base))
         for name in problem.effects:
             mine = np.flatnonzero(owner == name)
             if name in base.names or not mine.size:
                 continue
+            if place < scanned and any(parameter.rugged for _, parameter in problem.parameters((name,))):
+                start, score = scan(problem, base, name, [atoms.starts[k] for k in mine])
+                if base.score - score > LEAST_GAIN:
+                    planned.append((score, base, name, start))
             k = int(mine[np.argmax(gain[mine])])
-            if gain[k] > 4.0:
+            if gain[k] > LEAST_GAIN:
                 planned.append((base.score - float(gain[k]), base, name, atoms.begin(k, float(coefficient[k]))))
     planned.sort(key=lambda plan: plan[0])
     found: dict[tuple[str, ...], Explanation] = {}
@@ -147,7 +156,7 @@ def search(
     thresholds = linear_thresholds(problem, atoms.names, atoms.columns, nothing.sigma_mm, rng)
     progress(0.3)
     best, peers = nothing, [nothing]
-    pairs, foreign = [], None
+    pairs, foreign, shape, shapes = [], None, None, shapes_of(problem)
 
     def is_evidence(base: Explanation, found: list[Explanation]) -> bool:
         asked = {e.names: price(thresholds, base, e.names) for e in found}
@@ -156,7 +165,7 @@ def search(
             return False
         gained = base.score - ranked[0].score
         least = asked[ranked[0].names]
-        if gained <= least or gained > CLEARLY * least:
+        if gained <= least or (gained > CLEARLY * least and not jumps_astray(problem, base.names)):
             return gained > least
         suspects = [
             {name: e.values[name] for name in e.names if name not in base.names}
@@ -173,15 +182,19 @@ def search(
             best, peers = _choose(pairs[:6], samples), pairs
             triples = _extended(problem, atoms, pairs[:3], 24, lambda share: progress(0.7 + 0.1 * share))
             if triples and _added(problem, best, triples[0]) > TRIPLE_SHARE and is_evidence(best, triples):
-                foreign = imitated(problem, triples[0], [nothing, *bases, *pairs[:3]])
+                foreign = imitated(problem, shapes, triples[0], [nothing, *bases, *pairs[:3]])
                 if foreign is None:
                     best, peers = _choose(triples[:6], samples), triples
+        if len(best.names) <= 2:
+            parts = [e for e in singles if e.names[0] in best.names] if len(best.names) == 2 else []
+            shape = imitated(problem, shapes, best, [nothing, *parts, *singles[: len(parts)]])
     if forced:
-        best, foreign = _insisted(problem, forced, [*singles, *pairs], singles, samples), None
+        best, foreign, shape = _insisted(problem, forced, [*singles, *pairs], singles, samples), None, None
     progress(0.82)
-    words, left = unexplained(problem, best, rng)
+    words, left = unexplained(problem, shapes, best, rng)
     # What is small beside all that was explained is left over, whether probes found it or a third effect.
     words = foreign if words is None and left is None else words
+    words = shape if words is None else words
     progress(0.9)
     alternatives, distances = (
         ([best], {})

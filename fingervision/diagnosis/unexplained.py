@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from fingervision.diagnosis.bootstrap import linear_thresholds
-from fingervision.diagnosis.explanation import Explanation, Problem
+from fingervision.diagnosis.bootstrap import FEWEST, jumps_astray, linear_thresholds, noise_alone, rare
+from fingervision.diagnosis.explanation import MANY_STEPS, Explanation, Problem, fit
 from fingervision.diagnosis.indistinguishable import choices
 from fingervision.diagnosis.input_error import below_the_input
 from fingervision.diagnosis.probes import Probes, probes
@@ -20,7 +20,8 @@ STAND_INS = 2
 """Probes that may take the place of several effects: a bump's width lies between two of the grid."""
 
 
-def _probes(problem: Problem) -> Probes:
+def shapes_of(problem: Problem) -> Probes:
+    """Build the probes for a problem; fewer for a long record."""
     history = problem.chain.history
     return probes(history, problem.whitener, 2400 if history.input_mm.size <= LONG else 800)
 
@@ -56,17 +57,25 @@ def _explained(problem: Problem, found: Explanation) -> float:
     return float(changed @ changed - shared @ problem.offsets.metric(found.sigma_mm) @ shared)
 
 
-def imitated(problem: Problem, several: Explanation, fewer: list[Explanation]) -> str | None:
-    """What several effects only imitate, in words; None where they are the reason themselves.
+def imitated(problem: Problem, shapes: Probes, found: Explanation, fewer: list[Explanation]) -> str | None:
+    """What effects only imitate, in words; None where they are the reason themselves.
 
-    Three effects bend to almost anything. Unless they explain the data far better than one or two generic shapes beside
-    fewer effects, each at the price of its amplitude and of the choice among all shapes (`choices`), they are not the
-    reason.
+    Three effects bend to almost anything, and have to explain the data far better than generic shapes do; one or two
+    are imitations only where the shapes are far better, by more than their own form may be off.
+
+    Parameters
+    ----------
+    found : Explanation
+        The effects.
+    fewer : list of Explanation
+        Explanations of fewer effects, beside which one or two shapes are tried, each at the price of its amplitude and
+        of the choice among all shapes (`choices`).
     """
-    shapes = _probes(problem)
     columns, rows = shapes.columns, int(problem.measured.size)
     each = float(np.log(rows)) + 2.0 * float(np.log(columns.shape[1]))
-    least = several.bic(rows) + choices(problem, several) + VERY_STRONG
+    several = len(found.names) > 2
+    ahead = VERY_STRONG if several else -max(VERY_STRONG, SMALL_SHARE**2 * _explained(problem, found))
+    least = found.bic(rows) + choices(problem, found) + ahead
     best = None
     for base in fewer:
         taken = np.zeros((rows, 0))
@@ -83,14 +92,28 @@ def imitated(problem: Problem, several: Explanation, fewer: list[Explanation]) -
     return best
 
 
-def unexplained(problem: Problem, best: Explanation, rng: np.random.Generator) -> tuple[str | None, str | None]:
+def _of_jumps_astray(problem: Problem, columns: Array, best: Explanation, rng: np.random.Generator) -> float:
+    """Give the largest gain of a probe where the recorded input's errors alone move the jumps."""
+    most = []
+    for _ in range(FEWEST):
+        shaken, target = noise_alone(problem, best, rng)
+        alone = fit(shaken, best.names, best.values, target=target, iterations=MANY_STEPS)
+        gains = _gains(shaken, columns, alone, np.zeros((target.size, 0)))[0]
+        most.append(float(np.max(gains)))
+    return rare(most)
+
+
+def unexplained(
+    problem: Problem, shapes: Probes, best: Explanation, rng: np.random.Generator
+) -> tuple[str | None, str | None]:
     """Test the largest of many probes; returns what is unknown, or what is left over but small."""
-    shapes = _probes(problem)
     gain, dot, norm = _gains(problem, shapes.columns, best, np.zeros((problem.measured.size, 0)))
     usable = norm > 0.0
     family = ("probe",) * int(usable.sum())
     threshold = linear_thresholds(problem, family, shapes.columns[:, usable], best.sigma_mm, rng).get("probe", np.inf)
     top = int(np.argmax(gain))
+    if gain[top] > threshold and jumps_astray(problem, best.names):
+        threshold = max(threshold, _of_jumps_astray(problem, shapes.columns, best, rng))
     if gain[top] <= threshold:
         return None, None
     words = f"{shapes.words[top]} ({np.sqrt(gain[top]):.1f} sigma)"

@@ -3,6 +3,7 @@
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
+from functools import cached_property
 from types import MappingProxyType
 
 import numpy as np
@@ -28,7 +29,7 @@ class Stage(StrEnum):
     CAMERA = "camera"
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class History:
     """The samples that a chain runs over: what an effect may know besides the signal it acts on.
 
@@ -81,18 +82,18 @@ class History:
             raise ValueError(message)
         return self.time_s
 
-    @property
+    @cached_property
     def clock_s(self) -> Array:
         """Time since the table's first sample, shape (n,)."""
         return np.asarray(self.times - self.times.min(), dtype=np.float64)
 
-    @property
+    @cached_property
     def sample_time_s(self) -> float:
         """Median time between neighbouring samples of a run."""
         steps = np.concatenate([np.diff(self.times[run]) for run in self.runs])
         return float(np.median(steps)) if steps.size else 1.0
 
-    @property
+    @cached_property
     def input_span_mm(self) -> float:
         """Range of the recorded input."""
         return float(np.ptp(self.input_mm))

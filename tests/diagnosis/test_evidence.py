@@ -13,7 +13,7 @@ from fingervision.diagnosis.bootstrap import QUANTILE, linear_thresholds
 from fingervision.diagnosis.explanation import Explanation, Problem, fit
 from fingervision.diagnosis.probes import probes
 from fingervision.diagnosis.signatures import signatures
-from fingervision.diagnosis.unexplained import imitated
+from fingervision.diagnosis.unexplained import imitated, shapes_of
 from fingervision.storage.measured_table import read_measured_table
 from fingervision.storage.model_toml import read_model
 
@@ -70,7 +70,7 @@ def test_noise_lifts_some_family_over_its_threshold_as_seldom_as_stated(tmp_path
 
 def test_three_effects_that_imitate_a_kink_give_way_to_it(tmp_path: Path) -> None:
     problem = problem_of(tmp_path, 0.3 * np.abs(stroke()))
-    words = imitated(problem, *several_and_fewer(problem))
+    words = imitated(problem, shapes_of(problem), *several_and_fewer(problem))
     assert words is not None
     assert "kink" in words
 
@@ -79,7 +79,7 @@ def test_three_effects_that_are_there_imitate_nothing(tmp_path: Path) -> None:
     problem = problem_of(tmp_path, np.zeros(SAMPLES))
     there = problem.measured + problem.whitened(FORMS) - problem.whitened({})
     problem = replace(problem, measured=there)
-    assert imitated(problem, *several_and_fewer(problem)) is None
+    assert imitated(problem, shapes_of(problem), *several_and_fewer(problem)) is None
 
 
 def test_waves_are_told_in_seconds_also_where_each_run_begins_at_zero(tmp_path: Path) -> None:
