@@ -42,7 +42,9 @@ def indistinguishable(
         # One that leaves the data nearly as badly off as no effect at all explains nothing: the runs' scatter hides it.
         idle = nothing.score - other.score < 0.3 * (nothing.score - best.score)
         close = distance < INDISTINGUISHABLE and not idle and worse < ADMISSIBLE
-        if close or worse < _least_refuted(distance):
+        # More effects fit better whatever is true.
+        unrefuted = len(other.names) <= len(best.names) and worse < _least_refuted(distance)
+        if close or unrefuted:
             members.append(other)
 
     for other in pool:

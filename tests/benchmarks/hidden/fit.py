@@ -14,6 +14,7 @@ from tests.benchmarks.hidden.weights import Weights
 Array = NDArray[np.float64]
 Curve = tuple[Array, Array, Array]
 """Gap, midline and force at the samples."""
+STEP = 1e-4
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -58,11 +59,20 @@ def fit(problem: Problem, target: Curve, chosen: list[Candidate], start: list[Ar
         return dict(zip(names, np.split(np.clip(z * scale, lower, upper), cuts), strict=True))
 
     inside = np.clip(np.concatenate(start), lower + 1e-6 * (upper - lower), upper - 1e-6 * (upper - lower)) / scale
+
+    def jacobian(z: Array) -> Array:
+        # Steps are shares of the start, not of where the search is: a search that crosses zero would stand still there.
+        base = problem.residual(target, effects_of(z))
+        steps = STEP * np.maximum(1.0, np.abs(z))
+        steps = np.where(z + steps > upper / scale, -steps, steps)
+        moved = (z + step * axis for step, axis in zip(steps, np.eye(z.size), strict=True))
+        return np.stack([problem.residual(target, effects_of(at)) - base for at in moved], axis=1) / steps
+
     done = least_squares(
         lambda z: problem.residual(target, effects_of(z)),
         inside,
+        jac=jacobian,
         bounds=(lower / scale, upper / scale),
-        diff_step=1e-4,
         max_nfev=evaluations,
         xtol=1e-7,
         ftol=1e-7,

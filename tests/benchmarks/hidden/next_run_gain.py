@@ -6,17 +6,18 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tests.benchmarks.hidden.catalogue_chain import Samples
+from tests.benchmarks.hidden.catalogue_chain import Samples, respond
 from tests.benchmarks.hidden.diagnose_adapter import Answer
 from tests.benchmarks.hidden.experiment import Experiment, first_columns, measured
 from tests.benchmarks.hidden.explanations import known_effects, problem_of
-from tests.benchmarks.hidden.fit import Curve, Problem, fit
+from tests.benchmarks.hidden.fit import Curve, Fit, Problem, fit
 from tests.benchmarks.hidden.plant import Trace
 from tests.benchmarks.hidden.recipe import drive_recipe
 from tests.benchmarks.hidden.reported_effects import reported_effects
 from tests.benchmarks.hidden.table_cache import JudgedTable
 
 Array = NDArray[np.float64]
+GROSS_SIGMAS = 6.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -104,6 +105,20 @@ def gain_that_came(table: JudgedTable, answer: Answer) -> Gain | None:
     return Gain(*promise, min(b - a for a, b in zip(before, after, strict=True)))
 
 
+def _without_gross_errors(problem: Problem, target: Curve, found: Fit) -> Curve:
+    """Put what is expected in the place of samples that lie too far from it."""
+    expected = respond(problem.model, problem.at, found.effects)
+    shift = np.median(target[1] - expected[1])
+    gap, midline = target[0] - expected[0], target[1] - expected[1] - shift
+    weights = problem.weights
+    gap_sd, midline_sd = (
+        np.hypot(sd, share * weights.run_offset_mm)
+        for sd, share in ((weights.gap_sd_mm, np.sqrt(2.0)), (weights.midline_sd_mm, np.sqrt(0.5)))
+    )
+    gross = (np.abs(gap) > GROSS_SIGMAS * gap_sd) | (np.abs(midline) > GROSS_SIGMAS * midline_sd)
+    return np.where(gross, expected[0], target[0]), np.where(gross, expected[1] + shift, target[1]), target[2]
+
+
 def _advantage(
     table: JudgedTable,
     answer: Answer,
@@ -115,12 +130,17 @@ def _advantage(
     """Chi-square by which what is hidden fits noisy runs better than each rival."""
     known = known_effects(table.experiment, problem)
     reported = reported_effects(answer.report, known)
-    distances = []
+    distances: list[float] = []
     for names in (own, *rivals):
         chosen = [c for c in known if c.name in names]
         begins = [[c.starts[k * (len(c.starts) - 1) // 3] for c in chosen] for k in range(4)]
         for values in (table.judgement.effects, reported):
             if names == frozenset(values):
                 begins.append([values[c.name] for c in chosen])  # noqa: PERF401 - reads as the loop it is
-        distances.append(min(fit(problem, target, chosen, begin, 80).distance for begin in begins))
+        best = min((fit(problem, target, chosen, begin, 80) for begin in begins), key=lambda found: found.distance)
+        if not distances:
+            # Gross errors are seen beside what is hidden, and say nothing about its rivals.
+            target = _without_gross_errors(problem, target, best)
+            best = fit(problem, target, chosen, [best.effects[c.name] for c in chosen], 80)
+        distances.append(best.distance)
     return [rival - distances[0] for rival in distances[1:]]
