@@ -83,11 +83,11 @@ def _promised(
                 break
     j, k = separated
     pair = ("+".join(listed[j].names), "+".join(listed[k].names))
-    words = f"{plan.name}: it separates {' from '.join(pair)} by an expected chi-square of {promised.gain:.0f}"
+    words = f"{plan.name}: it separates {' from '.join(pair)} by an expected chi-square of {promised.stated:.0f}"
     leading = "+".join(listed[0].names)
     apart = [e for i, e in enumerate(listed) if i and plan.apart(0, i) >= WORTH]
     also = ["+".join(e.names) for e in apart if separated != (0, listed.index(e))]
     left = ["+".join(e.names) for e in members[1:] if all(e is not one for one in apart)]
     words += f", and {leading} from {', '.join(also)}" if also else ""
     words += f"; no protocol tried separates {leading} from {', '.join(left)}." if left else "."
-    return NextRun(plan.name, tuple(plan.steps), promised.gain, promised.interval, pair, words)
+    return NextRun(plan.name, tuple(plan.steps), promised.stated, promised.interval, pair, words)

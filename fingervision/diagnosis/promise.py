@@ -32,17 +32,23 @@ class Promise:
     """A run's gain in chi-square: the one most likely to be kept, the interval that holds what comes, that likelihood.
 
     Either explanation may be true, and often the two foretell different gains: a median would lie between them, where
-    nothing comes.
+    nothing comes. `modest` is the most likely one below `MODERATE`.
     """
 
     gain: float
     kept: float
+    modest: float
     interval: tuple[float, float]
 
     @property
     def sound(self) -> bool:
         """Whether the promise is moderate, or else likely to be kept."""
         return self.gain < MODERATE or self.kept >= SURELY
+
+    @property
+    def stated(self) -> float:
+        """What may be relied on."""
+        return self.gain if self.sound else self.modest
 
 
 def promise(
@@ -92,21 +98,22 @@ def promise(
             # A run after a re-zeroing is offset by as much as both runs together then say.
             sigma_mm = None if rezeroed else _offsets(first, pair[true], rng)
             after = run.score(target, pair[other], starts, sigma_mm) - run.score(target, pair[true], [values], sigma_mm)
-            gains.append(after - (_score(first, pair[other]) - _score(first, pair[true])))
+            known = sigma_mm if first.offsets.runs > 1 else None
+            gains.append(after - (_score(first, pair[other], known) - _score(first, pair[true], known)))
             chances.append(odds[true] / len(truths))
     mean = np.maximum(np.array(gains), 0.0)
     drawn = mean[rng.choice(mean.size, NOISES, p=np.array(chances) / sum(chances))]
     come = drawn + 2.0 * np.sqrt(drawn) * rng.standard_normal(NOISES)
     low, high = np.quantile(come, (0.5 - 0.5 * PROMISED, 0.5 + 0.5 * PROMISED))
-    return Promise(*surest(come), interval=(float(low), float(high)))
+    return Promise(*surest(come), surest(come, MODERATE)[0], (float(low), float(high)))
 
 
-def surest(come: Array) -> tuple[float, float]:
-    """The gain that what comes is most often near to, and how often; the median where nothing is gained."""
+def surest(come: Array, below: float = np.inf) -> tuple[float, float]:
+    """The gain, below a limit, that most of what comes is near to, and how much of it; the median where none comes."""
     come = np.sort(come)
-    named = come[come > 0.0]
+    named = come[(come > 0.0) & (come < below)]
     if named.size == 0:
-        return float(np.median(come)), 0.0
+        return min(float(np.median(come)), below), 0.0
     counts = np.searchsorted(come, KEPT[1] * named, "right") - np.searchsorted(come, KEPT[0] * named, "left")
     best = int(np.argmax(counts))
     return float(named[best]), float(counts[best] / come.size)
@@ -116,17 +123,17 @@ def _offsets(problem: Problem, explanation: Explanation, rng: np.random.Generato
     """Spread of the runs' offsets, one a channel: where there is one run only, a draw from its prior.
 
     None at all in half of the draws, for nothing need be re-zeroed before the run; else the half-Cauchy prior by which
-    a diagnosis of both runs will judge them (`RunOffsets.spread`).
+    a diagnosis of both runs will judge them (`RunOffsets.spread`). Where there are more, a draw from what they say.
     """
     if problem.offsets.runs > 1:
-        return explanation.sigma_mm
+        return problem.offsets.drawn_spread(problem.measured - problem.whitened(explanation.values), rng)
     share = abs(rng.standard_cauchy()) if rng.random() < REZEROED else 0.0
     return tuple(share * scale for scale in problem.offsets.scales_mm)
 
 
-def _score(problem: Problem, explanation: Explanation) -> float:
-    """Chi-square of an explanation refitted to the data alone."""
-    sigma = explanation.sigma_mm
+def _score(problem: Problem, explanation: Explanation, sigma_mm: tuple[float, ...] | None) -> float:
+    """Chi-square of an explanation refitted to the data alone, with its own spread of the runs unless one is given."""
+    sigma = explanation.sigma_mm if sigma_mm is None else sigma_mm
     return fit(problem, explanation.names, explanation.values, sigma_mm=sigma, iterations=REFITTED).score
 
 

@@ -207,6 +207,16 @@ class RunOffsets:
             total -= 2.0 * float(np.log(np.sum(width * np.exp(-0.5 * (cost - cost.min())))))
         return total
 
+    def drawn_spread(self, residual: Array, rng: np.random.Generator) -> tuple[float, ...]:
+        """Draw the spreads from what a residual leaves open; one a channel, in mm. A few runs leave much open."""
+        width = np.gradient(SPREADS)
+        out = []
+        for scale, determinant, gain in self._tried(residual):
+            cost = determinant - gain
+            weight = width * np.exp(-0.5 * (cost - cost.min()))
+            out.append(scale * float(rng.choice(SPREADS, p=weight / weight.sum())))
+        return tuple(out)
+
     def _tried(self, residual: Array) -> list[tuple[float, Array, Array]]:
         """For each channel its scale, and at all spreads the penalty and the chi-square that offsets take."""
         shares = self.design.T @ residual

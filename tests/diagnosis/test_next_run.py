@@ -144,6 +144,10 @@ def test_the_promise_is_where_gains_come_and_not_between_two_that_may_come() -> 
     assert 70.0 < gain < 130.0
     assert kept == pytest.approx(0.65, abs=0.01)
     assert surest(np.array([-3.0, -2.0, -1.0])) == (-2.0, 0.0)
+    small = 20.0 + rng.standard_normal(200)
+    gain, kept = surest(np.concatenate([likely, small]), 75.0)
+    assert gain == pytest.approx(20.0, abs=5.0)
+    assert kept == pytest.approx(200 / 850, abs=0.01)
 
 
 def test_only_a_stop_that_was_not_seen_goes_on_with_the_range(tmp_path: Path) -> None:

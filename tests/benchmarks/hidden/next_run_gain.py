@@ -133,10 +133,12 @@ def _advantage(
     distances: list[float] = []
     for names in (own, *rivals):
         chosen = [c for c in known if c.name in names]
-        begins = [[c.starts[k * (len(c.starts) - 1) // 3] for c in chosen] for k in range(4)]
-        for values in (table.judgement.effects, reported):
-            if names == frozenset(values):
-                begins.append([values[c.name] for c in chosen])  # noqa: PERF401 - reads as the loop it is
+        # What a rival shares with the truth or the answer stands near where it stands there: a period is hard to find.
+        begins = [
+            [values.get(c.name, c.starts[k * (len(c.starts) - 1) // 3]) for c in chosen]
+            for values in ({}, table.judgement.effects, reported)
+            for k in range(4)
+        ]
         best = min((fit(problem, target, chosen, begin, 80) for begin in begins), key=lambda found: found.distance)
         if not distances:
             # Gross errors are seen beside what is hidden, and say nothing about its rivals.
