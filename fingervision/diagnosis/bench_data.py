@@ -10,8 +10,8 @@ from fingervision.diagnosis.explanation import Explanation, Problem
 from fingervision.diagnosis.measuring_chain import MeasuringChain, admissible
 from fingervision.diagnosis.noise import Noise, gate, white_noise, without_input
 from fingervision.diagnosis.noise_short import noise_of_short_runs
-from fingervision.diagnosis.noise_spectrum import LEAST_RUN, noise_by_spectrum
-from fingervision.diagnosis.smooth_input import input_sigma, smoothed
+from fingervision.diagnosis.noise_spectrum import noise_by_spectrum
+from fingervision.diagnosis.recorded_input import RecordedInput, standing_still
 from fingervision.diagnosis.whitening import RunOffsets, Whitener
 from fingervision.domain.effect import REZEROED, Array, Effect, Flags, History
 from fingervision.domain.errors import FingervisionError
@@ -20,18 +20,10 @@ from fingervision.domain.model import PhysicalModel
 from fingervision.domain.response import Response
 from fingervision.models.corrected import CorrectedModel
 
-HELD_SAMPLES, SLOW_SAMPLES = 15, 5
-"""Samples over which a stage that stands, or turns back, stays on one encoder step or two."""
-STAYING = 0.2
-"""Leverage below which neighbours share so many samples that they share the error too."""
 DOUBTFUL = 2.0
 """Standard uncertainties beyond which a number of the drawing is doubtful."""
 FEWEST_STANDING = 60
 """Samples in all during which the stage must stand for the noise to be taken from them."""
-STANDING_SHARE = 1e-3
-"""Share of the input's range within which a stage stands."""
-SURELY = 3.0
-"""Standard errors by which the gap must follow the input's unrest before that is taken for motion."""
 SHORT = 100
 """Samples below which nothing is set aside before something was explained."""
 SHORT_RUN = 60
@@ -52,12 +44,8 @@ class BenchData:
         The model over the smoothed input.
     stacked_mm : ndarray of float, shape (m,)
         Measured gap, then midline where there is one.
-    input_error_mm : ndarray of float, shape (n,)
-        What the input's remaining error does to the gap.
-    input_stays : ndarray of bool, shape (n,)
-        Where that error stays from sample to sample; elsewhere it is another one at each.
-    input_samples : float
-        Samples over which it stays.
+    recorded : RecordedInput
+        What is known of the input.
     effects : dict
         Effects that the data can show.
     excluded : dict
@@ -74,9 +62,7 @@ class BenchData:
     model: CorrectedModel
     chain: MeasuringChain
     stacked_mm: Array
-    input_error_mm: Array
-    input_stays: Flags
-    input_samples: float
+    recorded: RecordedInput
     effects: dict[str, Effect]
     excluded: dict[str, str]
     distrusted: Flags
@@ -106,16 +92,16 @@ class BenchData:
         noises = self._noises(parts, aside, floors, degrees, explained=explained)
         if history.both_edges:
             aside[0] = aside[1] = aside[0] | aside[1]
-        error = self.input_error_mm
-        if np.median(error) < 0.1 * noises[0].total_mm / np.sqrt(max(self.input_samples, 1.0)) and not np.any(
+        error = self.recorded.error_mm
+        if np.median(error) < 0.1 * noises[0].total_mm / np.sqrt(max(self.recorded.samples, 1.0)) and not np.any(
             error > 0.3 * noises[0].total_mm
         ):
             error = np.zeros_like(error)
-        passing = np.where(self.input_stays, 0.0, error)
+        passing = np.where(self.recorded.stays, 0.0, error)
         noises = (without_input(noises[0], passing), *noises[1:])
         drawing = self.refit.columns if self.refit.moved else None
         whitener = Whitener(
-            history, noises, np.concatenate(aside), error - passing, self.input_samples, passing, drawing
+            history, noises, np.concatenate(aside), error - passing, self.recorded.samples, passing, drawing
         )
         return Problem(self.chain, whitener.one(self.aim_mm), whitener, RunOffsets.of(whitener), self.effects)
 
@@ -211,28 +197,24 @@ def prepare(table: MeasuredTable, model: CorrectedModel, without: frozenset[str]
             "simulate the missing inputs, or leave those rows out."
         )
     notes = list(table.notes)
-    sigma, step = (0.0, 0.0) if table.time_s is None else input_sigma(u, table.runs)
+    recorded = RecordedInput.of(table, model)
     if table.midline_mm is None:
         notes.append("only the gap was measured: what moves both fingers together cannot show.")
-    smooth, leverage = u, np.zeros_like(u)
-    if sigma > 0.0 and table.time_s is not None:
-        smooth, leverage = smoothed(u, table.time_s, table.runs, sigma, step)
-        if _is_motion(table, model, u, smooth):
-            notes.append("the input's unrest shows in the gap as well: it is real motion and was not smoothed.")
-            smooth, leverage, sigma, step = u, np.zeros_like(u), 0.0, 0.0
+    if recorded.is_motion:
+        notes.append("the input's unrest shows in the gap as well: it is real motion and was not smoothed.")
     zero = model.base.respond(np.zeros(1)).gap_mm[0]
     opening = model.base.respond(u).gap_mm - zero
     bare_force = model.base.respond(np.zeros(1)).force_n
     history = History(
-        input_mm=smooth,
+        input_mm=recorded.smooth_mm,
         time_s=table.time_s,
         runs=table.runs,
         rest_gap_mm=float(zero),
         opening_mm=float(np.max(np.abs(opening))),
         closing_mm=float(max(0.0, -np.min(opening))),
         shared_clock=table.shared_clock,
-        input_sigma_mm=sigma,
-        input_step_mm=step,
+        input_sigma_mm=recorded.sigma_mm,
+        input_step_mm=recorded.step_mm,
         both_edges=table.midline_mm is not None,
         force=table.force_n is not None and bare_force is not None,
         rezeroed=_rezeroed(table),
@@ -246,66 +228,16 @@ def prepare(table: MeasuredTable, model: CorrectedModel, without: frozenset[str]
         stacked = np.concatenate([table.gap_mm, table.midline_mm])
     if history.force and table.force_n is not None:
         stacked = np.concatenate([stacked, table.force_n])
-    reach = 1e-3 * (high - low)
-    slope = np.abs(model.base.respond(smooth + reach).gap_mm - model.base.respond(smooth - reach).gap_mm) / (
-        2.0 * reach
-    )
-    held = _within(u, table.runs, HELD_SAMPLES, 1.01 * step)
-    samples = 1.0 / float(np.median(leverage)) if np.median(leverage) > 0.0 else 1.0
-    stays = leverage < STAYING
-    if step > 0.0:
-        samples = max(samples, HELD_SAMPLES)
-        stays = held | _within(u, table.runs, SLOW_SAMPLES, 2.01 * step)
-    error = slope * sigma * np.sqrt(leverage)
     able, excluded = admissible(history, without, model.base)
     distrusted, reasons = distrusted_rows(table, model.base, float(zero))
     notes += reasons
     refit = DrawingRefit(np.zeros((stacked.size, 0)), {})
     if isinstance(model.base, PhysicalModel) and model.base.uncertain:
         refit = tangent(chain, model.base, {})
-    return BenchData(
-        table, model, chain, stacked, error, stays, max(samples, 1.0), able, excluded, distrusted, tuple(notes), refit
-    )
+    return BenchData(table, model, chain, stacked, recorded, able, excluded, distrusted, tuple(notes), refit)
 
 
 def _rezeroed(table: MeasuredTable) -> tuple[bool, ...]:
     """Which runs came after a re-zeroing, by their names; empty where all did: no run shows the zero before."""
     flags = tuple(REZEROED in name.split() for name in table.run_names)
     return flags if any(flags) and not all(flags) else ()
-
-
-def standing_still(history: History) -> tuple[slice, ...]:
-    """Stretches of at least `LEAST_RUN` samples in which the stage stands, to within the recorded input's error."""
-    reach = max(3.0 * history.input_sigma_mm, STANDING_SHARE * history.input_span_mm)
-    found: list[slice] = []
-    for run in history.runs:
-        begin, low, high = run.start, np.inf, -np.inf
-        for i, value in enumerate(history.input_mm[run].tolist(), run.start):
-            low, high = min(low, value), max(high, value)
-            if high - low > reach:
-                found.append(slice(begin, i))
-                begin, low, high = i, value, value
-        found.append(slice(begin, run.stop))
-    return tuple(stretch for stretch in found if stretch.stop - stretch.start >= LEAST_RUN)
-
-
-def _within(input_mm: Array, runs: tuple[slice, ...], samples: int, reach_mm: float) -> Flags:
-    """Where the input stays within a reach over so many samples; nowhere where the reach is 0."""
-    out = np.zeros(input_mm.size, dtype=bool)
-    for run in runs:
-        if reach_mm > 0.0 and run.stop - run.start > samples:
-            padded = np.pad(input_mm[run], samples // 2, mode="edge")
-            out[run] = np.ptp(np.lib.stride_tricks.sliding_window_view(padded, samples), axis=1) < reach_mm
-    return out
-
-
-def _is_motion(table: MeasuredTable, model: CorrectedModel, u: Array, smooth: Array) -> bool:
-    """Whether the gap follows the input's unrest: the regression's slope is then one, otherwise zero."""
-    expected = model.base.respond(u).gap_mm - model.base.respond(smooth).gap_mm
-    residual = table.gap_mm - model.base.respond(smooth).gap_mm
-    a = np.concatenate([np.diff(expected[run]) for run in table.runs])
-    b = np.concatenate([np.diff(residual[run]) for run in table.runs])
-    typical = 5.0 * np.median(np.abs(b)) + 1e-12
-    kept = np.abs(b) < typical
-    power, doubt = float(a[kept] @ a[kept]), float(np.std(b[kept]))
-    return power > 0.0 and float(a[kept] @ b[kept]) > max(0.5 * power, SURELY * doubt * np.sqrt(power))

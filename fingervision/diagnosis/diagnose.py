@@ -229,7 +229,7 @@ def _beyond(bench: BenchData, best: Explanation) -> tuple[str, ...]:
 
 
 def _input_dominates(bench: BenchData, problem: Problem) -> tuple[str, ...]:
-    error = float(np.median(bench.input_error_mm))
+    error = float(np.median(bench.recorded.error_mm))
     if error > problem.whitener.noises[0].total_mm:
         return (f"the recorded input's own error ({error:.2g} mm of gap) is larger than the measurement's.",)
     return ()

@@ -1,15 +1,17 @@
 """Which effects: singles, pairs and triples, refitted in the chain; thresholds from a bootstrap of the null."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
-from fingervision.diagnosis.bootstrap import LONG, exceeds_noise, jumps_astray, linear_thresholds, price
+from fingervision.diagnosis.bootstrap import LONG
+from fingervision.diagnosis.evidence import Evidence
 from fingervision.diagnosis.explanation import FORM_SHARE, Explanation, Problem, fit, scan
 from fingervision.diagnosis.indistinguishable import beside_foretold, indistinguishable, odds
 from fingervision.diagnosis.input_error import below_the_input
 from fingervision.diagnosis.signatures import Signatures, signatures, tangents
+from fingervision.diagnosis.smallest_seen import smallest_seen
 from fingervision.diagnosis.unexplained import SMALL_SHARE, imitated, shapes_of, unexplained
 from fingervision.domain.report import Verdict
 
@@ -21,10 +23,6 @@ SCANNED = 6
 """Explanations beside which an effect that jumps is tried at all its sizes: where it jumps depends on the others."""
 LEAST_GAIN = 4.0
 """Chi-square that an effect's signature must take for a refit to be tried."""
-SUSPECTS = 2
-"""Explanations of the measurement that are tried on every draw of noise as well."""
-CLEARLY = 2.5
-"""Times the linear threshold above which a gain needs no bootstrap to be judged."""
 SHORT = 100
 """Samples below which the noise is estimated beside single effects only."""
 
@@ -153,35 +151,19 @@ def search(
     nothing = problem.nothing()
     samples = max(2, int(problem.measured.size))
     singles = _singles(problem, atoms, 20)
-    thresholds = linear_thresholds(problem, atoms.names, atoms.columns, nothing.sigma_mm, rng)
+    evidence = Evidence.of(problem, atoms, nothing, rng)
     progress(0.3)
     best, peers = nothing, [nothing]
     pairs, foreign, shape, shapes = [], None, None, shapes_of(problem)
 
-    def is_evidence(base: Explanation, found: list[Explanation]) -> bool:
-        asked = {e.names: price(thresholds, base, e.names) for e in found}
-        ranked = sorted(found, key=lambda e: e.score + asked[e.names])
-        if not ranked:
-            return False
-        gained = base.score - ranked[0].score
-        least = asked[ranked[0].names]
-        if gained <= least or (gained > CLEARLY * least and not jumps_astray(problem, base.names)):
-            return gained > least
-        suspects = [
-            {name: e.values[name] for name in e.names if name not in base.names}
-            for e in ranked[:SUSPECTS]
-            if set(base.names) <= set(e.names)
-        ]
-        return exceeds_noise(gained - least, problem, atoms, thresholds, base, suspects, rng)
-
-    if singles and (is_evidence(nothing, singles) or forced):
+    if singles and (evidence.speaks_for(singles, nothing) or forced):
         best, peers = _simplest(singles[:6], samples, nothing), singles
         bases = singles[:14]
         pairs = _extended(problem, atoms, bases, PAIRS_REFITTED, lambda share: progress(0.3 + 0.4 * share))
-        if pairs and _added(problem, best, pairs[0]) > SMALL_SHARE and is_evidence(best, pairs):
+        if pairs and _added(problem, best, pairs[0]) > SMALL_SHARE and evidence.speaks_for(pairs, best):
             best, peers = _choose(pairs[:6], samples), pairs
             triples = _extended(problem, atoms, pairs[:3], 24, lambda share: progress(0.7 + 0.1 * share))
-            if triples and _added(problem, best, triples[0]) > TRIPLE_SHARE and is_evidence(best, triples):
+            if triples and _added(problem, best, triples[0]) > TRIPLE_SHARE and evidence.speaks_for(triples, best):
                 foreign = imitated(problem, shapes, triples[0], [nothing, *bases, *pairs[:3]])
                 if foreign is None:
                     best, peers = _choose(triples[:6], samples), triples
@@ -218,7 +200,7 @@ def search(
         tuple(singles),
         words,
         left,
-        _smallest(problem, atoms, nothing, thresholds),
+        smallest_seen(problem, atoms, nothing, evidence.thresholds),
         distances,
         problem,
     )
@@ -234,33 +216,3 @@ def _insisted(
         return _choose(holding, samples) if able else problem.nothing()
     begin = {e.names[0]: e.values[e.names[0]] for e in singles if e.names[0] in able}
     return fit(problem, tuple(begin), begin, iterations=20)
-
-
-def _smallest(
-    problem: Problem, atoms: Signatures, nothing: Explanation, thresholds: Mapping[str, float]
-) -> dict[str, dict[str, object]]:
-    """State the size of each effect that this data would have shown."""
-    metric = problem.offsets.metric(nothing.sigma_mm)
-    shared = problem.offsets.design.T @ atoms.columns
-    norm = np.einsum("ij,ij->j", atoms.columns, atoms.columns) - np.einsum("ij,ij->j", shared, metric @ shared)
-    out: dict[str, dict[str, object]] = {}
-    for name in problem.effects:
-        if name not in thresholds:
-            continue
-        needed = float(np.sqrt(thresholds[name])) + 1.645
-        amplitudes = {p.name: p for _, p in problem.parameters((name,)) if p.neutral is not None}
-        sizes: list[tuple[float, str]] = []
-        for k in (k for k, owner in enumerate(atoms.names) if owner == name and norm[k] > 0.0):
-            grow = atoms.grows[k]
-            if grow is not None:
-                sizes.append((abs(grow[2]) * needed / float(np.sqrt(norm[k])), grow[0]))
-            elif norm[k] > needed**2:
-                sizes += [
-                    (abs(atoms.starts[k][p.name] - (p.neutral or 0.0)), p.name)
-                    for p in amplitudes.values()
-                    if atoms.starts[k][p.name] != p.neutral
-                ]
-        if sizes:
-            size, parameter = min(sizes)
-            out[name] = {"parameter": parameter, "size": size, "unit": amplitudes[parameter].unit}
-    return out
