@@ -10,10 +10,12 @@ from numpy.typing import NDArray
 
 from fingervision.diagnosis.bench_data import prepare
 from fingervision.diagnosis.bootstrap import QUANTILE, linear_thresholds
-from fingervision.diagnosis.explanation import Explanation, Problem, fit
+from fingervision.diagnosis.explanation import Explanation, Problem, fit, scan
 from fingervision.diagnosis.probes import probes
 from fingervision.diagnosis.signatures import signatures
 from fingervision.diagnosis.unexplained import imitated, shapes_of
+from fingervision.effects.play_operator import play
+from fingervision.effects.stick_slip import stick
 from fingervision.storage.measured_table import read_measured_table
 from fingervision.storage.model_toml import read_model
 
@@ -22,6 +24,7 @@ EDGE_MM = 0.01
 SAMPLES = 160
 SEED = 5
 DRAWS = 1000
+KINK = 0.1
 FORMS = {
     "encoder_cyclic_error": {"amplitude_mm": 0.02, "period_mm": 0.5, "phase_rad": 0.0},
     "lever_ratio_error": {"ratio": 0.01},
@@ -80,6 +83,59 @@ def test_three_effects_that_are_there_imitate_nothing(tmp_path: Path) -> None:
     there = problem.measured + problem.whitened(FORMS) - problem.whitened({})
     problem = replace(problem, measured=there)
     assert imitated(problem, shapes_of(problem), *several_and_fewer(problem)) is None
+
+
+def test_one_effect_that_imitates_a_kink_gives_way_to_it(tmp_path: Path) -> None:
+    problem = problem_of(tmp_path, KINK * np.maximum(stroke() - 0.1, 0.0))
+    alone = fit(problem, ("large_deflection",), FORMS, iterations=30)
+    words = imitated(problem, shapes_of(problem), alone, [problem.nothing()])
+    assert words is not None
+    assert "kink" in words
+
+
+@pytest.mark.parametrize("name", FORMS)
+def test_one_effect_that_is_there_imitates_nothing(tmp_path: Path, name: str) -> None:
+    problem = problem_of(tmp_path, np.zeros(SAMPLES))
+    there = problem.measured + problem.whitened({name: FORMS[name]}) - problem.whitened({})
+    problem = replace(problem, measured=there)
+    alone = fit(problem, (name,), FORMS, iterations=30)
+    assert imitated(problem, shapes_of(problem), alone, [problem.nothing()]) is None
+
+
+def jerking(folder: Path, jump_mm: float, play_mm: float) -> Path:
+    """A stage with play that moves in jumps between two stands; the record is known exactly."""
+    rng = np.random.default_rng(SEED)
+    rate_hz, stand = 10.0, 80
+    way = np.concatenate([np.linspace(0.0, 0.5, 150), np.full(stand, 0.5), np.linspace(0.5, -0.3, 220)])
+    u = np.concatenate([way, np.full(stand, -0.3), np.linspace(-0.3, 0.1, 120)])
+    t = np.arange(u.size) / rate_hz
+    jumped = stick(play(u, play_mm), jump_mm)
+    left, right = (side * (2.0 + 3.5 * jumped) + EDGE_MM * rng.standard_normal(u.size) for side in (-1, 1))
+    lines = [f"{t[k]},{u[k]},{right[k] - left[k]},{left[k]},{right[k]}" for k in range(u.size)]
+    (folder / "measured.csv").write_text("time_s,input_mm,gap_mm,left_mm,right_mm\n" + "\n".join(lines) + "\n")
+    (folder / "sim.csv").write_text("input_mm,gap_mm\n-0.6,-0.2\n0.6,8.2\n")
+    return folder
+
+
+def test_jumps_are_no_noise_where_the_stage_stands(tmp_path: Path) -> None:
+    folder = jerking(tmp_path, 0.03, 0.0)
+    bench = prepare(read_measured_table(folder / "measured.csv"), read_model(folder / "sim.csv"))
+    problem = bench.problem(bench.stacked_mm - bench.chain.stacked({}), 0, explained=False)
+    assert problem.whitener.noises[0].total_mm == pytest.approx(np.sqrt(2.0) * EDGE_MM, rel=0.25)
+
+
+def test_a_jump_is_tried_where_the_play_lets_it_come(tmp_path: Path) -> None:
+    folder = jerking(tmp_path, 0.03, 0.02)
+    bench = prepare(read_measured_table(folder / "measured.csv"), read_model(folder / "sim.csv"))
+    problem = bench.problem(bench.stacked_mm - bench.chain.stacked({}), 0, explained=False)
+    sizes = [{"jump_mm": float(size)} for size in np.geomspace(0.005, 0.1, 200)]
+    beside, alone = (
+        scan(problem, fit(problem, tuple(values), values, iterations=0), "stick_slip", sizes)
+        for values in ({"backlash": {"play_mm": 0.02}}, {})
+    )
+    assert beside[0]["jump_mm"] == pytest.approx(0.03, rel=0.02)
+    assert abs(alone[0]["jump_mm"] / 0.03 - 1.0) > 0.1
+    assert beside[1] < 0.2 * alone[1]
 
 
 def test_waves_are_told_in_seconds_also_where_each_run_begins_at_zero(tmp_path: Path) -> None:
