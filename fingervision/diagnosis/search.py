@@ -7,7 +7,7 @@ import numpy as np
 
 from fingervision.diagnosis.bootstrap import LONG
 from fingervision.diagnosis.evidence import Evidence
-from fingervision.diagnosis.explanation import Explanation, Problem, fit, scan
+from fingervision.diagnosis.explanation import FORM_SHARE, Explanation, Problem, fit, scan
 from fingervision.diagnosis.indistinguishable import beside_foretold, indistinguishable, odds
 from fingervision.diagnosis.input_error import below_the_input
 from fingervision.diagnosis.signatures import Signatures, signatures, tangents
@@ -106,22 +106,15 @@ def _choose(candidates: list[Explanation], samples: int) -> Explanation:
     return min(candidates, key=lambda explanation: explanation.bic(samples))
 
 
-def _simplest(found: list[Explanation], samples: int, nothing: Explanation, singles: list[Explanation]) -> Explanation:
-    """Choose the simpler form where a richer one in its place gains no more than forms deviate.
+def _simplest(singles: list[Explanation], samples: int, nothing: Explanation) -> Explanation:
+    """Choose one effect, the simpler form where the richer one gains no more than forms deviate.
 
     Such a difference is the forms' own fault, and no reason to choose a resonance for a delay that falls between two
     samples.
     """
-    best = _choose(found, samples)
-    alone = {e.names: e for e in (nothing, *singles)}
-    simpler = []
-    for other in found:
-        common = tuple(name for name in best.names if name in other.names)
-        exchanged = other.free < best.free and len(other.names) == len(best.names) == len(common) + 1
-        if exchanged and common in alone:
-            explained = alone[common].score - best.score
-            if other.score - best.score < SMALL_SHARE**2 * explained:
-                simpler.append(other)
+    best = _choose(singles, samples)
+    within = FORM_SHARE**2 * (nothing.score - best.score)
+    simpler = [e for e in singles if e.free < best.free and e.score - best.score < within]
     return min(simpler, key=lambda explanation: explanation.score, default=best)
 
 
@@ -164,11 +157,11 @@ def search(
     pairs, foreign, shape, shapes = [], None, None, shapes_of(problem)
 
     if singles and (evidence.speaks_for(singles, nothing) or forced):
-        best, peers = _simplest(singles[:6], samples, nothing, singles), singles
+        best, peers = _simplest(singles[:6], samples, nothing), singles
         bases = singles[:14]
         pairs = _extended(problem, atoms, bases, PAIRS_REFITTED, lambda share: progress(0.3 + 0.4 * share))
         if pairs and _added(problem, best, pairs[0]) > SMALL_SHARE and evidence.speaks_for(pairs, best):
-            best, peers = _simplest(pairs[:6], samples, nothing, singles), pairs
+            best, peers = _choose(pairs[:6], samples), pairs
             triples = _extended(problem, atoms, pairs[:3], 24, lambda share: progress(0.7 + 0.1 * share))
             if triples and _added(problem, best, triples[0]) > TRIPLE_SHARE and evidence.speaks_for(triples, best):
                 foreign = imitated(problem, shapes, triples[0], [nothing, *bases, *pairs[:3]])
