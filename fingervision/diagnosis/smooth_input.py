@@ -27,8 +27,8 @@ LINE = 9
 """Samples of the lines about which a record on a grid scatters."""
 ROUNDED = 1.5
 """Times the scatter of rounding above which there is noise as well."""
-STANDING = 0.1
-"""Share of samples that repeat the one before, in a record that an encoder made of a slow motion or a hold."""
+HALTING = 0.5
+"""Changes of speed by a single step over samples that moved: a slow motion halts between an encoder's steps."""
 FEWEST_SINGLE = 3
 """Single steps that tell an encoder from set points in round numbers."""
 CURVED_SIGMAS = 2.0
@@ -95,12 +95,15 @@ def _rounds(input_mm: Array, runs: tuple[slice, ...], step_mm: float) -> bool:
     """
     if step_mm == 0.0:
         return False
-    single = 0
+    fast, halting, moved = 0, 0, 0
     for run in runs:
-        moves = np.diff(input_mm[run]) / step_mm
-        single += int(np.sum((np.abs(np.abs(np.diff(moves)) - 1.0) < 0.1) & (np.abs(moves[1:]) > 1.5)))
-    stands = np.concatenate([np.abs(np.diff(input_mm[run])) < 0.1 * step_mm for run in runs])
-    return bool(np.mean(stands) > STANDING or single >= FEWEST_SINGLE)
+        moves = np.abs(np.diff(input_mm[run])) / step_mm
+        single = np.abs(np.abs(np.diff(input_mm[run], 2)) / step_mm - 1.0) < 0.1
+        several = moves[1:] > 1.5
+        fast += int(np.sum(single & several))
+        halting += int(np.sum(single & ~several))
+        moved += int(np.sum(moves > 0.5))
+    return fast >= FEWEST_SINGLE or halting >= max(FEWEST_SINGLE, HALTING * moved)
 
 
 @compiled_as_written
