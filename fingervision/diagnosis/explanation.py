@@ -12,12 +12,14 @@ from fingervision.domain.parameter import Parameter
 
 Point = dict[str, dict[str, float]]
 AT_BOUND = 1e-6
-SCANS = ((0.06, 241), (0.012, 13), (0.003, 13))
+SCANS = ((0.06, 241), (0.012, 13), (0.003, 13), (0.0006, 25))
 """Relative half-widths, and values, of the scans of a parameter in which the prediction jumps. The first is for a
-thorough search: with hundreds of jumps in a record the right size has a basin a thousandth wide."""
+thorough search: with a thousand jumps in a record the right size has a basin some ten-thousandths wide."""
 MANY_STEPS = 20
 FORM_SHARE = 0.02
 """By how much of what an effect changes the catalogue's form of it is typically off."""
+SMALL_SHARE = 0.05
+"""What the catalogue's form leaves over of the truth's is a few per cent of what was explained, no second name."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

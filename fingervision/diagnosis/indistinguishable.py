@@ -4,10 +4,12 @@ from math import comb
 
 import numpy as np
 
-from fingervision.diagnosis.explanation import Explanation, Problem, fit
+from fingervision.diagnosis.explanation import MANY_STEPS, SMALL_SHARE, Explanation, Problem, fit
 from fingervision.domain.effect import Array
 
-INDISTINGUISHABLE = 9.0
+INDISTINGUISHABLE = 12.0
+"""Chi-square below which two explanations are not told apart. What is 4 from the truth must be told, and the estimate
+from which it is measured stands off the truth itself, by a standard deviation and a half: (sqrt(4) + 1.5)^2."""
 FREEDOM = 4.0
 """Degrees of freedom of Student's t for the physical priors: a typical size is itself known roughly only, so that far
 beyond it surprise grows slowly (Lange, Little & Taylor 1989)."""
@@ -17,6 +19,10 @@ SPARE = 3.0
 """Chi-square that the best explanation takes from the noise beyond what the truth would."""
 ADMISSIBLE = 15.0
 """Chi-square by which one that is 4 away from the truth comes out worse at most: 4 + SURELY * 2 * sqrt(4) + SPARE."""
+IDLE_SHARE = 0.3
+"""Of what the best explanation gains: what gains less explains nothing."""
+PLAIN = 50.0
+"""Chi-square beyond which a richer form has shown itself, however little that is of all that is explained."""
 
 
 def indistinguishable(
@@ -34,17 +40,25 @@ def indistinguishable(
         near = _squared(problem, target - problem.whitened(other.values), metric)
         if near > 400.0 and other.score - best.score > 200.0:
             return
+        distance = near
+        if near >= INDISTINGUISHABLE:
+            imitation = _imitation(problem, best, other, best.sigma_mm)
+            distance = imitation.score
+            if distance < INDISTINGUISHABLE and other.score - best.score >= ADMISSIBLE:
+                # What can look like the best explains the data nearly as well: the search had stopped on its way.
+                again = fit(problem, other.names, imitation.values, iterations=MANY_STEPS)
+                other = min(other, again, key=lambda explanation: explanation.score)
         worse = other.score - best.score
-        distance = near if near < INDISTINGUISHABLE else _distance(problem, best, other, best.sigma_mm)
         if distance >= INDISTINGUISHABLE and worse < ADMISSIBLE:
-            distance = min(distance, _distance(problem, other, best, best.sigma_mm))
+            distance = min(distance, _imitation(problem, other, best, best.sigma_mm).score)
         distances[other.names] = distance
-        # One that leaves the data nearly as badly off as no effect at all explains nothing: the runs' scatter hides it.
-        idle = nothing.score - other.score < 0.3 * (nothing.score - best.score)
+        # One that leaves the data nearly as badly off as no effect at all explains nothing: the runs' scatter hides it,
+        # and what parameters gain of the noise is nothing either (Akaike 1974).
+        idle = _net(nothing, other) < IDLE_SHARE * _net(nothing, best)
         close = distance < INDISTINGUISHABLE and not idle and worse < ADMISSIBLE
         # More effects fit better whatever is true.
         unrefuted = len(other.names) <= len(best.names) and worse < _least_refuted(distance)
-        if close or unrefuted:
+        if close or unrefuted or _simpler_form(problem, nothing, best, other):
             members.append(other)
 
     for other in pool:
@@ -58,6 +72,26 @@ def indistinguishable(
     return [m for m in members if not any(set(o.names) < set(m.names) for o in members)], distances
 
 
+def _net(nothing: Explanation, explanation: Explanation) -> float:
+    """Gain beyond what its free parameters take from noise."""
+    return nothing.score - explanation.score - 2.0 * explanation.free
+
+
+def _simpler_form(problem: Problem, nothing: Explanation, best: Explanation, other: Explanation) -> bool:
+    """Whether the best may owe its lead to its richer form alone, which contains what the other predicts.
+
+    A delay's form fails where the stage turns between two samples, and a resonance that is damped well rounds corners
+    as well. Forms deviate by so much; where the lead is plain, the richer form is seen for what it is.
+    """
+    worse = other.score - best.score
+    return (
+        len(other.names) == len(best.names)
+        and other.free < best.free
+        and worse < min(PLAIN, SMALL_SHARE**2 * (nothing.score - best.score))
+        and _imitation(problem, other, best, best.sigma_mm).score < INDISTINGUISHABLE
+    )
+
+
 def _least_refuted(distance: float) -> float:
     """Chi-square by which an explanation must come out worse than another before the data refute that it is true.
 
@@ -67,13 +101,13 @@ def _least_refuted(distance: float) -> float:
     return -distance + SURELY * 2.0 * float(np.sqrt(distance)) + SPARE
 
 
-def _distance(problem: Problem, truth: Explanation, other: Explanation, sigma_mm: tuple[float, ...]) -> float:
-    """D_jk: squared whitened distance of one explanation's prediction to another, over the other's parameters.
+def _imitation(problem: Problem, truth: Explanation, other: Explanation, sigma_mm: tuple[float, ...]) -> Explanation:
+    """Fit one explanation to what another predicts; the score is D_jk, the squared whitened distance that remains.
 
     Both directions count run offsets with the best explanation's spread: a worse one would hide its fault in them.
     """
     target = problem.whitened(truth.values)
-    return fit(problem, other.names, other.values, target=target, sigma_mm=sigma_mm, iterations=12).score
+    return fit(problem, other.names, other.values, target=target, sigma_mm=sigma_mm, iterations=12)
 
 
 def _squared(problem: Problem, whitened: Array, metric: Array) -> float:

@@ -11,7 +11,6 @@ import numpy as np
 
 from fingervision.diagnosis.bench_data import BenchData
 from fingervision.diagnosis.explanation import Explanation
-from fingervision.diagnosis.indistinguishable import INDISTINGUISHABLE
 from fingervision.diagnosis.search import Findings
 from fingervision.domain.effect import PointEffect
 from fingervision.domain.reference_slot import ReferenceSlot
@@ -21,6 +20,8 @@ from fingervision.effects import catalogue
 
 # What acts on a slot at rest in the middle of the picture as it does on a gap, whatever the time and the opening.
 SHOWN = ("scale_error", "lens_distortion", "edge_bias")
+# Chi-square a slot by which another explanation foretells it better: three standard uncertainties.
+REFUTED = 9.0
 # Step of a parameter, in its standard uncertainties, for what its uncertainty does to a slot.
 STEP = 0.1
 
@@ -46,9 +47,9 @@ def told_by_slots(bench: BenchData, found: Findings) -> tuple[Findings, tuple[st
     costs = [sum(_surprise(bench, e, slot) for slot in slots) for e in members]
     said = tuple(_sentence(bench, members[int(np.argmin(costs))], slot) for slot in slots)
     least = min(costs)
-    if found.verdict is not Verdict.AMBIGUOUS or least >= INDISTINGUISHABLE * len(slots):
+    if found.verdict is not Verdict.AMBIGUOUS or least >= REFUTED * len(slots):
         return found, said
-    left = [e for e, cost in zip(members, costs, strict=True) if cost - least < INDISTINGUISHABLE]
+    left = [e for e, cost in zip(members, costs, strict=True) if cost - least < REFUTED]
     if len(left) == len(members):
         return found, said
     dropped = " and ".join("+".join(e.names) for e in members if e not in left)
@@ -93,7 +94,7 @@ def _u_mm(bench: BenchData, explanation: Explanation, slot: ReferenceSlot) -> fl
 
 def _sentence(bench: BenchData, explanation: Explanation, slot: ReferenceSlot) -> str:
     expected_mm = seen_mm(bench, explanation.values, slot.size_mm)
-    fits = "as" if _surprise(bench, explanation, slot) < INDISTINGUISHABLE else "but"
+    fits = "as" if _surprise(bench, explanation, slot) < REFUTED else "but"
     answer = "+".join(explanation.names) or "the model"
     return (
         f"the reference slot of {slot.size_mm:g} mm measures {slot.measured_mm:.4f} mm, {fits} {answer} foretells "

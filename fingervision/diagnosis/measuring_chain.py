@@ -29,18 +29,22 @@ class MeasuringChain:
         Effects that are part of the model (a corrected model).
     midline_mm : float
         Where the fingers' middle stands in the picture: camera effects act about the image centre.
+    curved : bool
+        Whether stage and fingers went along curves between two samples, as a delay shows, or along straight lines.
     """
 
     model: Model
     history: History
     fixed: Settings
     midline_mm: float = 0.0
+    curved: bool = False
 
     @cached_property
     def effects(self) -> Mapping[str, Effect]:
         """The catalogue in its order, as this model obeys it."""
         laws = own_laws(self.model)
-        return {name: obeyed(effect, laws.get(name)) for name, effect in catalogue().items()}
+        effects = {name: obeyed(effect, laws.get(name)) for name, effect in catalogue().items()}
+        return {name: _along_curves(effect) for name, effect in effects.items()} if self.curved else effects
 
     def respond(self, settings: Settings) -> Response:
         """Run the chain; an effect named in `settings` replaces a fixed one of the same name."""
@@ -87,6 +91,14 @@ def obeyed(effect: Effect, law: PhysicalLaw | None) -> Effect:
         return searched if isinstance(searched, str) else (*searched, *law.adds)
 
     return replace(effect, act=law.act, narrow=narrow, foretold=law.foretold)
+
+
+def _along_curves(effect: Effect) -> Effect:
+    if isinstance(effect, DriveEffect) and effect.act_curved is not None:
+        return replace(effect, act=effect.act_curved)
+    if isinstance(effect, PointEffect) and effect.act_curved is not None:
+        return replace(effect, act=effect.act_curved)
+    return effect
 
 
 def admissible(history: History, without: frozenset[str], model: Model) -> tuple[dict[str, Effect], dict[str, str]]:

@@ -1,27 +1,31 @@
 """Noise of one channel, white plus a first-order autoregression, and the outliers that are no part of it."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.stats import binom
+from scipy.stats import hypergeom
 
 from fingervision.domain.effect import Array, Flags
 
 LEAST_SHARE = 0.1
 """Of a residual's variance that is the picture's own at least."""
-PLACES, ENDS = 20, (3, 5, 8)
+PLACES, ENDS = 20, (2, 3, 5, 8)
 """Parts of the input's range that are looked at, and how many samples at either end of it: stops act there."""
-RARE, BY_CHANCE = 0.005, 1e-3
-"""The share of gross errors that is nothing unusual, and how seldom they may crowd in any one part by chance."""
+BY_CHANCE = 2e-3
+"""How seldom as many gross errors may crowd in any one part by chance."""
 
 
 @dataclass(frozen=True, slots=True)
 class Noise:
-    """Standard deviations of the white and the correlated part, and the correlation of neighbouring samples."""
+    """Standard deviations of the white and the correlated part, and the correlation of neighbouring samples.
+
+    `slow_doubt` is the standard uncertainty of the logarithm of the power where it is slow.
+    """
 
     white_mm: float
     correlated_mm: float
     correlation: float
+    slow_doubt: float = 0.0
 
     @property
     def total_mm(self) -> float:
@@ -69,7 +73,7 @@ def _at_one_place(out: Flags, input_mm: Array) -> Flags:
     ends = [part for count in ENDS for part in (order[:count], order[-count:])]
     parts = [*np.array_split(order, min(PLACES, out.size)), *ends]
     for part in parts:
-        by_chance = binom.sf(out[part].sum() - 1, part.size, max(float(out.mean()), RARE))
+        by_chance = hypergeom.sf(out[part].sum() - 1, out.size, int(out.sum()), part.size)
         there[part] |= by_chance < BY_CHANCE / len(parts)
     return there
 
@@ -105,4 +109,4 @@ def without_input(noise: Noise, input_mm: Array) -> Noise:
     """
     share = 1.0 - float(np.mean(input_mm**2)) / noise.total_mm**2
     scale = float(np.sqrt(max(share, LEAST_SHARE)))
-    return Noise(scale * noise.white_mm, scale * noise.correlated_mm, noise.correlation)
+    return replace(noise, white_mm=scale * noise.white_mm, correlated_mm=scale * noise.correlated_mm)

@@ -9,7 +9,9 @@ SLOW, SLOW_EXPLAINED = 0.04, 0.02
 """Cycles per sample below which structure of the gripper may hide, before and after something was explained."""
 TAPERED = 1.94
 """Neighbouring ordinates under Hann's taper share so much that this many count as one."""
-CORRELATIONS = tuple(float(phi) for phi in np.linspace(0.05, 0.95, 19))
+CORRELATIONS = tuple(float(phi) for phi in np.linspace(0.05, 0.95, 46))
+SLOWEST = 2.0 * np.pi * np.array([0.01])
+"""Where a gripper's effects have their power: some turns in a hundred samples each."""
 LINE = 9.0
 """A periodogram value this many times its expectation is a line, not noise."""
 LEAST_RUN = 24
@@ -45,14 +47,15 @@ def noise_by_spectrum(
     powers = [_powers(residual, runs, out, slow) for residual, out in zip(residuals_mm, aside, strict=True)]
     use = [np.ones(angle.size, dtype=bool) for _ in powers]
     for _ in range(3):
-        variances, share, phi = _likeliest(angle, powers, use)
+        variances, share, phi, doubt = _likeliest(angle, powers, use)
         expected = _shape(angle, share, phi)
         keep = [power < LINE * variance * expected for power, variance in zip(powers, variances, strict=True)]
         if all(np.array_equal(new, old) for new, old in zip(keep, use, strict=True)):
             break
         use = keep
     scales = [max(float(np.sqrt(v)), floor, 1e-9) for v, floor in zip(variances, floors_mm, strict=True)]
-    return tuple(Noise(scale * float(np.sqrt(1.0 - share)), scale * float(np.sqrt(share)), phi) for scale in scales)
+    white, correlated = float(np.sqrt(1.0 - share)), float(np.sqrt(share))
+    return tuple(Noise(scale * white, scale * correlated, phi, doubt) for scale in scales)
 
 
 def _used(count: int, slow: float) -> Flags:
@@ -87,7 +90,7 @@ def _shape(angle: Array, share: float, phi: float) -> Array:
     return np.asarray(1.0 - share + share * correlated, dtype=np.float64)
 
 
-def _likeliest(angle: Array, powers: list[Array], use: list[Flags]) -> tuple[list[float], float, float]:
+def _likeliest(angle: Array, powers: list[Array], use: list[Flags]) -> tuple[list[float], float, float, float]:
     """Weigh white noise, an autoregression, and both together against each other.
 
     A mixture fitted where there is none finds correlation below the frequencies that are used, and with it noise
@@ -100,15 +103,24 @@ def _likeliest(angle: Array, powers: list[Array], use: list[Flags]) -> tuple[lis
         Of one sample, by channel.
     share, correlation : float
         The correlated part's share of it, and the correlation of its neighbouring samples.
+    slow_doubt : float
+        Standard uncertainty of the logarithm of the power at `SLOWEST`, over all kinds.
     """
 
     def variance(power: Array, kept: Flags, form: Array) -> float:
         return max(float(np.mean(power[kept] / form[kept])), 1e-24)
 
+    def slowest(share: float, phi: float, form: Array) -> float:
+        levels = [np.log(variance(power, kept, form)) for power, kept in zip(powers, use, strict=True)]
+        return float(np.mean(levels)) + float(np.log(_shape(SLOWEST, share, phi)[0]))
+
     mixed = [(share, phi) for share in np.linspace(0.1, 0.9, 9) for phi in CORRELATIONS]
-    found = []
+    found: list[tuple[float, float, float]] = []
+    costs: list[float] = []
+    prior: list[float] = []
+    slow: list[float] = []
     for kind in ([(0.0, 0.0)], [(1.0, phi) for phi in CORRELATIONS], mixed):
-        costs = []
+        begin = len(costs)
         for share, phi in kind:
             form = _shape(angle, share, phi)
             parts = [
@@ -116,9 +128,17 @@ def _likeliest(angle: Array, powers: list[Array], use: list[Flags]) -> tuple[lis
                 for power, kept in zip(powers, use, strict=True)
             ]
             costs.append(float(sum(parts)))
-        weight = np.exp(-(np.array(costs) - min(costs)) / TAPERED)
+            slow.append(slowest(share, phi, form))
+            prior.append(1.0 / len(kind))
+        own = np.array(costs[begin:])
+        weight = np.exp(-(own - own.min()) / TAPERED)
         share, phi = np.average(np.array(kind), axis=0, weights=weight)
-        found.append((-min(costs) / TAPERED + float(np.log(np.mean(weight))), min(float(share), 1.0), float(phi)))
+        found.append((-own.min() / TAPERED + float(np.log(np.mean(weight))), min(float(share), 1.0), float(phi)))
     _, share, phi = max(found)
     form = _shape(angle, share, phi)
-    return [variance(power, kept, form) for power, kept in zip(powers, use, strict=True)], share, max(phi, 1e-3)
+    likely = np.array(prior) * np.exp(-(np.array(costs) - min(costs)) / TAPERED)
+    order = np.argsort(slow)
+    reached = np.cumsum(likely[order]) / likely.sum()
+    low, high = np.interp((0.159, 0.841), reached, np.array(slow)[order])
+    doubt = 0.5 * float(high - low)
+    return [variance(power, kept, form) for power, kept in zip(powers, use, strict=True)], share, max(phi, 1e-3), doubt

@@ -8,6 +8,7 @@ import numpy as np
 from fingervision.diagnosis.bench_data import BenchData
 from fingervision.diagnosis.explanation import Explanation, Point, Problem, fit
 from fingervision.diagnosis.known_slots import told_by_slots
+from fingervision.diagnosis.path_between import along_likelier_path
 from fingervision.diagnosis.posterior import settled
 from fingervision.diagnosis.search import Findings, Progress, search
 
@@ -55,6 +56,10 @@ def refitted_search(bench: BenchData, rng: np.random.Generator, forced: frozense
         Told the share that is done.
     """
     found, said = told_by_slots(bench, search(partial(_problem, bench), rng, forced, progress))
+    likelier = along_likelier_path(bench, found.problem, found.best)
+    if likelier is not bench:
+        bench = likelier
+        found, said = told_by_slots(bench, search(partial(_problem, bench), rng, forced, progress))
     if not bench.refit.moved:
         best, posterior = settled(found.problem, found.best, rng)
         return Refitted(_with_notes(bench, said), _with_best(found, best), posterior)

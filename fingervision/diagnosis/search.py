@@ -7,18 +7,19 @@ import numpy as np
 
 from fingervision.diagnosis.bootstrap import LONG
 from fingervision.diagnosis.evidence import Evidence
-from fingervision.diagnosis.explanation import FORM_SHARE, Explanation, Problem, fit, scan
+from fingervision.diagnosis.explanation import FORM_SHARE, SMALL_SHARE, Explanation, Problem, fit, scan
 from fingervision.diagnosis.indistinguishable import beside_foretold, indistinguishable, odds
 from fingervision.diagnosis.input_error import below_the_input
 from fingervision.diagnosis.signatures import Signatures, signatures, tangents
 from fingervision.diagnosis.smallest_seen import smallest_seen
-from fingervision.diagnosis.unexplained import SMALL_SHARE, imitated, shapes_of, unexplained
+from fingervision.diagnosis.unexplained import imitated, shapes_of, unexplained
 from fingervision.domain.report import Verdict
 
 Progress = Callable[[float], None]
 TRIPLE_SHARE = 0.15
 """A third effect needs evidence of its own: three effects bend to almost anything."""
 PAIRS_REFITTED = 60
+SWAPS_REFITTED = 24
 SCANNED = 6
 """Explanations beside which an effect that jumps is tried at all its sizes: where it jumps depends on the others."""
 LEAST_GAIN = 4.0
@@ -94,6 +95,23 @@ def _extended(
     )
 
 
+def _swapped(problem: Problem, atoms: Signatures, pairs: list[Explanation]) -> list[Explanation]:
+    """Try every other effect beside each half of the best pair, where the pair has put it.
+
+    Alone it had stood elsewhere: fitted to what two effects do, it ends far out in a valley out of which no joint
+    search finds its way.
+    """
+    if not pairs:
+        return pairs
+    best = pairs[0]
+    halves = [fit(problem, (name,), {name: best.values[name]}, iterations=0) for name in best.names]
+    found = {pair.names: pair for pair in pairs}
+    for pair in _extended(problem, atoms, halves, SWAPS_REFITTED, lambda _: None):
+        if pair.names not in found or pair.score < found[pair.names].score:
+            found[pair.names] = pair
+    return sorted(found.values(), key=lambda explanation: explanation.score)
+
+
 def _added(problem: Problem, smaller: Explanation, larger: Explanation) -> float:
     """Size of what the larger explanation adds, as a share of all that it changes in the prediction, in mm."""
     bare, before, after = (problem.chain.stacked(values) for values in ({}, smaller.values, larger.values))
@@ -160,7 +178,9 @@ def search(
         best, peers = _simplest(singles[:6], samples, nothing), singles
         bases = singles[:14]
         pairs = _extended(problem, atoms, bases, PAIRS_REFITTED, lambda share: progress(0.3 + 0.4 * share))
-        if pairs and _added(problem, best, pairs[0]) > SMALL_SHARE and evidence.speaks_for(pairs, best):
+        pairs = _swapped(problem, atoms, pairs)
+        # Beside a simpler form a second effect would gain what the richest has gained already.
+        if pairs and _added(problem, singles[0], pairs[0]) > SMALL_SHARE and evidence.speaks_for(pairs, singles[0]):
             best, peers = _choose(pairs[:6], samples), pairs
             triples = _extended(problem, atoms, pairs[:3], 24, lambda share: progress(0.7 + 0.1 * share))
             if triples and _added(problem, best, triples[0]) > TRIPLE_SHARE and evidence.speaks_for(triples, best):

@@ -3,15 +3,14 @@
 import numpy as np
 
 from fingervision.diagnosis.bootstrap import FEWEST, jumps_astray, linear_thresholds, noise_alone, rare
-from fingervision.diagnosis.explanation import MANY_STEPS, Explanation, Problem, fit
+from fingervision.diagnosis.explanation import MANY_STEPS, SMALL_SHARE, Explanation, Problem, fit
 from fingervision.diagnosis.indistinguishable import choices
 from fingervision.diagnosis.input_error import below_the_input
+from fingervision.diagnosis.overtones import overtones
 from fingervision.diagnosis.probes import Probes, probes
 from fingervision.diagnosis.signatures import tangents
 from fingervision.domain.effect import Array
 
-SMALL_SHARE = 0.05
-"""What the catalogue's form leaves over of the truth's is a few per cent of what was explained, no second name."""
 LONG = 4000
 """Samples above which fewer probes must do."""
 VERY_STRONG = 10.0
@@ -107,7 +106,8 @@ def unexplained(
     problem: Problem, shapes: Probes, best: Explanation, rng: np.random.Generator
 ) -> tuple[str | None, str | None]:
     """Test the largest of many probes; returns what is unknown, or what is left over but small."""
-    gain, dot, norm = _gains(problem, shapes.columns, best, np.zeros((problem.measured.size, 0)))
+    own = overtones(problem, best)
+    gain, dot, norm = _gains(problem, shapes.columns, best, own.columns)
     usable = norm > 0.0
     family = ("probe",) * int(usable.sum())
     threshold = linear_thresholds(problem, family, shapes.columns[:, usable], best.sigma_mm, rng).get("probe", np.inf)
@@ -115,7 +115,7 @@ def unexplained(
     if gain[top] > threshold and jumps_astray(problem, best.names):
         threshold = max(threshold, _of_jumps_astray(problem, shapes.columns, best, rng))
     if gain[top] <= threshold:
-        return None, None
+        return None, own.words if own.gain > threshold else None
     words = f"{shapes.words[top]} ({np.sqrt(gain[top]):.1f} sigma)"
     size_mm = abs(float(dot[top])) / float(norm[top]) * shapes.rms[top]
     if below_the_input(problem, size_mm):

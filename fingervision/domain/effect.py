@@ -167,13 +167,22 @@ class Effect:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DriveEffect(Effect):
-    """An effect on what the mechanism receives: `act(input_mm, history, values)` gives the input after it."""
+    """An effect on what the mechanism receives: `act(input_mm, history, values)` gives the input after it.
+
+    `act_curved` is the same law where the stage went along curves between two samples instead of straight lines; None
+    where that makes no difference.
+    """
 
     act: DriveAct
+    act_curved: DriveAct | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PointEffect(Effect):
-    """An effect of the mechanism or camera: `act(response, history, values)` gives the points after it."""
+    """An effect of the mechanism or camera: `act(response, history, values)` gives the points after it.
+
+    `act_curved` as in `DriveEffect`.
+    """
 
     act: PointAct
+    act_curved: PointAct | None = None

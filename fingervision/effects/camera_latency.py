@@ -2,23 +2,28 @@
 
 from dataclasses import replace
 
-import numpy as np
-
 from fingervision.domain.effect import History, PointEffect, Stage, Values
 from fingervision.domain.parameter import Parameter
 from fingervision.domain.response import Response
+from fingervision.effects.late import late
 
 
 def act(response: Response, history: History, values: Values) -> Response:
     """Apply the effect: frames are stamped late."""
+    return _stamped(response, history, values, curved=False)
+
+
+def act_curved(response: Response, history: History, values: Values) -> Response:
+    """Apply the effect to points that went along curves between the frames."""
+    return _stamped(response, history, values, curved=True)
+
+
+def _stamped(response: Response, history: History, values: Values, *, curved: bool) -> Response:
     if values["delay_s"] == 0.0:
         return response
-    left_mm, right_mm = np.empty_like(response.left_mm), np.empty_like(response.right_mm)
-    for run in history.runs:
-        time_s = history.times[run]
-        late_s = time_s - values["delay_s"]
-        left_mm[run] = np.interp(late_s, time_s, response.left_mm[run])
-        right_mm[run] = np.interp(late_s, time_s, response.right_mm[run])
+    left_mm, right_mm = (
+        late(edge_mm, history, values["delay_s"], curved=curved) for edge_mm in (response.left_mm, response.right_mm)
+    )
     return replace(response, left_mm=left_mm, right_mm=right_mm)
 
 
@@ -33,4 +38,5 @@ EFFECT = PointEffect(
     parameters=(Parameter("delay_s", "s", 0.0, 1.0, "delay", starts=8, logarithmic=True),),
     needs_times=True,
     act=act,
+    act_curved=act_curved,
 )

@@ -1,18 +1,18 @@
 """The mechanism is late behind the recorded input."""
 
-import numpy as np
-
 from fingervision.domain.effect import Array, DriveEffect, History, Stage, Values
 from fingervision.domain.parameter import Parameter
+from fingervision.effects.late import late
 
 
 def act(input_mm: Array, history: History, values: Values) -> Array:
     """Apply the effect: the mechanism is late behind the recorded input."""
-    out = np.empty_like(input_mm)
-    for run in history.runs:
-        time_s = history.times[run]
-        out[run] = np.interp(time_s - values["delay_s"], time_s, input_mm[run])
-    return out
+    return late(input_mm, history, values["delay_s"])
+
+
+def act_curved(input_mm: Array, history: History, values: Values) -> Array:
+    """Apply the effect to a stage that went along curves between the recorded inputs."""
+    return late(input_mm, history, values["delay_s"], curved=True)
 
 
 EFFECT = DriveEffect(
@@ -27,4 +27,5 @@ EFFECT = DriveEffect(
     needs_times=True,
     memory=True,
     act=act,
+    act_curved=act_curved,
 )

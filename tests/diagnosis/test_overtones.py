@@ -1,0 +1,53 @@
+"""A screw's harmonics belong to the screw as long as they are small."""
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from fingervision.diagnosis.diagnose import diagnose
+from fingervision.domain.report import DiagnosisReport, Verdict
+from fingervision.storage.measured_table import read_measured_table
+from fingervision.storage.model_toml import read_model
+
+SEED = 3
+EDGE_MM, AMPLITUDE_MM, PERIOD_MM = 0.003, 0.012, 0.31
+SHARE_PERCENT, PROBED = 2.0, 0.1
+"""The share is linear in what is left, the amplitude was fitted without it; probes have ten periods in an octave."""
+
+
+def screwed(folder: Path, harmonic: float) -> DiagnosisReport:
+    """Two runs there and back on a screw whose second harmonic is a share of its first."""
+    rng = np.random.default_rng(SEED)
+    lines = []
+    for run, speed in enumerate((0.05, 0.1)):
+        count = int(1.6 / speed * 12)
+        u = 0.4 - np.abs(np.linspace(-0.8, 0.8, count))
+        angle = 2.0 * np.pi * u / PERIOD_MM
+        driven = u + AMPLITUDE_MM * (np.sin(angle + 0.4) + harmonic * np.sin(2.0 * angle + 1.9))
+        left, right = (side * (2.0 + 3.5 * driven) + EDGE_MM * rng.standard_normal(count) for side in (-1, 1))
+        lines += [f"{run},{k / 12},{u[k]},{right[k] - left[k]},{left[k]},{right[k]}" for k in range(count)]
+    (folder / "measured.csv").write_text("run,time_s,input_mm,gap_mm,left_mm,right_mm\n" + "\n".join(lines) + "\n")
+    (folder / "sim.csv").write_text("input_mm,gap_mm\n-0.6,-0.2\n0.6,8.2\n")
+    return diagnose(read_measured_table(folder / "measured.csv"), read_model(folder / "sim.csv")).report
+
+
+@pytest.mark.parametrize("harmonic", [0.0, 0.08, 0.18])
+def test_a_small_harmonic_is_no_second_name(tmp_path: Path, harmonic: float) -> None:
+    report = screwed(tmp_path, harmonic)
+    assert report.verdict is Verdict.NAMED
+    assert report.alternatives == (("encoder_cyclic_error",),)
+    assert ("harmonic of order 2" in report.remaining) == (harmonic > 0.0)
+    if harmonic > 0.0:
+        told = re.search(r"(\d+) % of its first", report.remaining)
+        assert told is not None
+        assert float(told[1]) == pytest.approx(100.0 * harmonic, abs=SHARE_PERCENT)
+
+
+def test_a_large_harmonic_is_told(tmp_path: Path) -> None:
+    report = screwed(tmp_path, 0.6)
+    assert report.verdict is Verdict.UNKNOWN
+    told = re.search(r"a wave over the input with a period of ([\d.]+) mm", report.unknown or "")
+    assert told is not None
+    assert float(told[1]) == pytest.approx(0.5 * PERIOD_MM, rel=PROBED)
