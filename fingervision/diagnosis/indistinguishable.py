@@ -4,6 +4,7 @@ from math import comb
 
 import numpy as np
 
+from fingervision.diagnosis.bootstrap import noise_doubt
 from fingervision.diagnosis.explanation import MANY_STEPS, SMALL_SHARE, Explanation, Problem, fit
 from fingervision.domain.effect import Array
 
@@ -33,6 +34,8 @@ def indistinguishable(
     target = problem.whitened(best.values)
     metric = problem.offsets.metric(best.sigma_mm)
     rows = max(2, int(problem.measured.size - problem.whitener.aside.sum()))
+    # Where the noise is known badly, so is every difference that is measured by it.
+    admissible = ADMISSIBLE * (1.0 + noise_doubt(problem))
 
     def join(other: Explanation) -> None:
         if other.names == best.names or any(set(m.names) <= set(other.names) for m in members):
@@ -44,18 +47,18 @@ def indistinguishable(
         if near >= INDISTINGUISHABLE:
             imitation = _imitation(problem, best, other, best.sigma_mm)
             distance = imitation.score
-            if distance < INDISTINGUISHABLE and other.score - best.score >= ADMISSIBLE:
+            if distance < INDISTINGUISHABLE and other.score - best.score >= admissible:
                 # What can look like the best explains the data nearly as well: the search had stopped on its way.
                 again = fit(problem, other.names, imitation.values, iterations=MANY_STEPS)
                 other = min(other, again, key=lambda explanation: explanation.score)
         worse = other.score - best.score
-        if distance >= INDISTINGUISHABLE and worse < ADMISSIBLE:
+        if distance >= INDISTINGUISHABLE and worse < admissible:
             distance = min(distance, _imitation(problem, other, best, best.sigma_mm).score)
         distances[other.names] = distance
         # One that leaves the data nearly as badly off as no effect at all explains nothing: the runs' scatter hides it,
         # and what parameters gain of the noise is nothing either (Akaike 1974).
         idle = _net(nothing, other) < IDLE_SHARE * _net(nothing, best)
-        close = distance < INDISTINGUISHABLE and not idle and worse < ADMISSIBLE
+        close = distance < INDISTINGUISHABLE and not idle and worse < admissible
         # More effects fit better whatever is true.
         unrefuted = len(other.names) <= len(best.names) and worse < _least_refuted(distance)
         if close or unrefuted or _simpler_form(problem, nothing, best, other):
