@@ -33,11 +33,11 @@ def command(measured: Path, model_path: Path, out: Path, seed: int, kind: str, a
     from fingervision.diagnosis.report_figure import residual_figure
     from fingervision.storage.measured_table import read_measured_table
     from fingervision.storage.model_toml import read_model
-    from fingervision.storage.out_folder import make_out_folder, out_folder
+    from fingervision.storage.out_folder import new_out_folder, out_folder
 
     table, model = read_measured_table(measured), read_model(model_path, kind)
-    make_out_folder(out)
-    found = compare(table, model, seed=seed)
+    with new_out_folder(out):
+        found = compare(table, model, seed=seed)
     document = found.document()
     with out_folder(out):
         (out / "compare.json").write_text(json.dumps(document, indent=2, allow_nan=False) + "\n", encoding="utf-8")

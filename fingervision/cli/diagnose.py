@@ -51,7 +51,7 @@ def command(
     from fingervision.effects import catalogue
     from fingervision.storage.measured_table import read_measured_table
     from fingervision.storage.model_toml import read_model
-    from fingervision.storage.out_folder import make_out_folder, out_folder
+    from fingervision.storage.out_folder import new_out_folder, out_folder
 
     for name in (*forced, *without):
         if name not in catalogue():
@@ -61,8 +61,8 @@ def command(
     if set(forced) & set(without):
         raise UsageError(f"An effect must be forced or left out, but {', '.join(set(forced) & set(without))} is both.")
     table, model = read_measured_table(measured), read_model(model_path, kind)
-    make_out_folder(out)
-    with click.progressbar(length=1000, label="diagnosing", file=sys.stderr, hidden=not sys.stderr.isatty()) as bar:
+    bar = click.progressbar(length=1000, label="diagnosing", file=sys.stderr, hidden=not sys.stderr.isatty())
+    with new_out_folder(out), bar:
         done = diagnose(
             table,
             model,

@@ -224,11 +224,13 @@ def prepare(table: MeasuredTable, model: CorrectedModel, without: frozenset[str]
     stacked = table.gap_mm
     if table.midline_mm is not None:
         bare: Response = chain.respond({})
-        chain = replace(chain, midline_mm=float(np.median(table.midline_mm - bare.midline_mm)))
+        stands_mm = float(np.median(table.midline_mm - bare.midline_mm))
+        seen_mm = float(np.median(bare.midline_mm)) + stands_mm
+        chain = replace(chain, midline_mm=stands_mm, seen_midline_mm=seen_mm)
         stacked = np.concatenate([table.gap_mm, table.midline_mm])
     if history.force and table.force_n is not None:
         stacked = np.concatenate([stacked, table.force_n])
-    able, excluded = admissible(history, without, model.base)
+    able, excluded = admissible(chain.effects, history, without)
     distrusted, reasons = distrusted_rows(table, model.base, float(zero))
     notes += reasons
     refit = DrawingRefit(np.zeros((stacked.size, 0)), {})

@@ -29,6 +29,9 @@ class MeasuringChain:
         Effects that are part of the model (a corrected model).
     midline_mm : float
         Where the fingers' middle stands in the picture: camera effects act about the image centre.
+    seen_midline_mm : float or None
+        Where the camera sees the middle, on the median: a camera that moves it had it elsewhere before. None where
+        `midline_mm` is known from elsewhere.
     curved : bool
         Whether stage and fingers went along curves between two samples, as a delay shows, or along straight lines.
     """
@@ -37,6 +40,7 @@ class MeasuringChain:
     history: History
     fixed: Settings
     midline_mm: float = 0.0
+    seen_midline_mm: float | None = None
     curved: bool = False
 
     @cached_property
@@ -58,12 +62,21 @@ class MeasuringChain:
             elif isinstance(effect, PointEffect):
                 points.append(effect)
         response = self.model.respond(input_mm)
-        camera = False
+        cameras = [effect for effect in points if effect.stage == "camera"]
         for effect in points:
-            if effect.stage == "camera" and not camera:
-                response, camera = response.shifted(self.midline_mm), True
-            response = effect.act(response, self.history, acting[effect.name])
-        return response if camera else response.shifted(self.midline_mm)
+            if effect.stage != "camera":
+                response = effect.act(response, self.history, acting[effect.name])
+
+        def seen(midline_mm: float) -> Response:
+            picture = response.shifted(midline_mm)
+            for effect in cameras:
+                picture = effect.act(picture, self.history, acting[effect.name])
+            return picture
+
+        first = seen(self.midline_mm)
+        if not cameras or self.seen_midline_mm is None:
+            return first
+        return seen(self.midline_mm + self.seen_midline_mm - float(np.median(first.midline_mm)))
 
     def stacked(self, settings: Settings) -> Array:
         """Gap, and where they were measured midline and force, one after the other; shape (channels * n,)."""
@@ -101,13 +114,13 @@ def _along_curves(effect: Effect) -> Effect:
     return effect
 
 
-def admissible(history: History, without: frozenset[str], model: Model) -> tuple[dict[str, Effect], dict[str, str]]:
+def admissible(
+    effects: Mapping[str, Effect], history: History, without: frozenset[str]
+) -> tuple[dict[str, Effect], dict[str, str]]:
     """Effects that these data can show, and the reasons for leaving out the others."""
     able: dict[str, Effect] = {}
     excluded: dict[str, str] = {}
-    laws = own_laws(model)
-    for name, entry in catalogue().items():
-        effect = obeyed(entry, laws.get(name))
+    for name, effect in effects.items():
         searched = effect.search(history)
         if name in without:
             excluded[name] = "left out by request"

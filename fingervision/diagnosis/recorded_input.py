@@ -4,8 +4,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from fingervision.diagnosis.input_noise import input_sigma
 from fingervision.diagnosis.noise_spectrum import LEAST_RUN
-from fingervision.diagnosis.smooth_input import input_sigma, smoothed
+from fingervision.diagnosis.smooth_input import smoothed
 from fingervision.domain.effect import Array, Flags, History
 from fingervision.domain.measured_table import MeasuredTable
 from fingervision.models.corrected import CorrectedModel

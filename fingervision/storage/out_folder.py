@@ -31,3 +31,16 @@ def make_out_folder(path: Path) -> None:
     """Make it before a long work begins, which would be lost where it cannot be made."""
     with out_folder(path):
         pass
+
+
+@contextmanager
+def new_out_folder(path: Path) -> Iterator[None]:
+    """Make it before the block's long work, and take it away again where that fails and leaves it empty."""
+    was_there = path.exists()
+    make_out_folder(path)
+    try:
+        yield
+    except BaseException:
+        if not was_there and not any(path.iterdir()):
+            path.rmdir()
+        raise

@@ -4,9 +4,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from click.testing import CliRunner
 
+from fingervision.cli import cli
 from fingervision.diagnosis.bench_data import prepare
-from fingervision.domain.errors import FingervisionError
+from fingervision.domain.errors import ExitCode, FingervisionError
 from fingervision.storage.measured_table import read_measured_table
 from fingervision.storage.model_toml import read_model
 from fingervision.storage.simulation_table import read_simulation_table
@@ -72,3 +74,17 @@ def test_exchanged_edges_and_times_that_run_backwards_are_mended_and_said(tmp_pa
     assert any("backwards" in note for note in table.notes)
     assert np.all(np.diff(table.input_mm) > 0.0)
     assert np.all(table.gap_mm > 0.0)
+
+
+@pytest.mark.parametrize("command", ["diagnose", "compare"])
+def test_a_refused_table_leaves_no_empty_folder(tmp_path: Path, command: str) -> None:
+    table = write(tmp_path, "input_mm,gap_mm\n" + GOOD)
+    model, out = write(tmp_path, "input_mm,gap_mm\n0,4\n0.5,7.8", "sim.csv"), tmp_path / "out"
+    asked = [command, str(table), "--model", str(model), "--out", str(out)]
+    refused = CliRunner().invoke(cli, asked)
+    assert isinstance(refused.exception, FingervisionError)
+    assert "must lie within the model's" in str(refused.exception)
+    assert not out.exists()
+    out.mkdir()
+    assert CliRunner().invoke(cli, asked).exit_code != ExitCode.DONE
+    assert out.exists()

@@ -71,6 +71,20 @@ def with_play(u: Array, time: Array) -> tuple[Array, Array]:
     return halves(on_grid(np.array(stage)))
 
 
+def test_a_tilted_camera_is_all_there_is_where_the_gripper_stands_far_off_the_picture_s_centre(tmp_path: Path) -> None:
+    # The tilt moves the middle as well, by 30 um: taken for where it stands, that would be a scale besides.
+    def tilted(u: Array, time: Array) -> tuple[Array, Array]:
+        left, right = (edge / (1.0 + 0.012 * edge) for edge in halves(on_grid(u)))
+        return left, right
+
+    report = bench(tmp_path, tilted)
+    assert report.alternatives == (("camera_tilt",),)
+    (tilt,) = report.effects
+    value = tilt.parameters["k_per_mm"]
+    assert value.u is not None
+    assert value.value == pytest.approx(0.012, abs=SIGMAS * value.u)
+
+
 def test_nothing_hidden_agrees_and_says_what_would_have_shown(tmp_path: Path) -> None:
     report = bench(tmp_path, lambda u, t: halves(on_grid(u)))
     assert report.verdict is Verdict.AGREES

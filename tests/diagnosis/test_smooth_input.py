@@ -6,7 +6,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from fingervision.diagnosis.smooth_input import input_sigma, smoothed
+from fingervision.diagnosis.input_noise import input_sigma
+from fingervision.diagnosis.smooth_input import smoothed
 
 Array = NDArray[np.float64]
 RATE_HZ = 8.0

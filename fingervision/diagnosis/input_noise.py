@@ -1,0 +1,95 @@
+"""The recorded input's own noise, and the encoder's step, from the record itself."""
+
+from math import comb
+
+import numpy as np
+
+from fingervision.domain.effect import Array
+
+RESOLVED_MM = 1e-7
+"""Differences of recorded inputs below this are the file's last digits."""
+ORDERS = (3, 4, 5, 6)
+"""Differences that are taken: the first in which a stroke at one speed vanishes with its acceleration, and above."""
+MANY = 100
+"""Samples below which several estimates scatter so much that the smallest is too small."""
+NORMAL_MEDIAN = 0.6745
+"""Median of a standard normal variable's absolute value."""
+LINE = 9
+"""Samples of the lines about which a record on a grid scatters."""
+ROUNDED = 1.5
+"""Times the scatter of rounding above which there is noise as well."""
+HALTING = 0.5
+"""Changes of speed by a single step over samples that moved: a slow motion halts between an encoder's steps."""
+FEWEST_SINGLE = 3
+"""Single steps that tell an encoder from set points in round numbers."""
+
+
+def input_sigma(input_mm: Array, runs: tuple[slice, ...]) -> tuple[float, float]:
+    """Estimate the standard uncertainty of one recorded input and the encoder's step, from the record itself.
+
+    Differences of high order are noise: a motion's own vanish, sooner where it is straight than where it swings, so
+    that the smallest estimate is the best. Their median resists reversals.
+
+    Returns
+    -------
+    sigma_mm, step_mm : float
+        The step is 0 where the values do not lie on a grid.
+    """
+    orders = ORDERS if input_mm.size >= MANY else ORDERS[:1]
+    sigma = min(_sigma_by_differences(input_mm, runs, order) for order in orders)
+    step = _grid(input_mm)
+    # Rounding that is finer than the noise is no encoder's: it averages out with the noise.
+    if step < sigma or not _rounds(input_mm, runs, step):
+        step = 0.0
+    if step > 0.0:
+        # Roundings that alternate have large third differences, curved motions scatter about lines.
+        sigma, rounding = min(sigma, _scatter(input_mm, runs)), step / float(np.sqrt(12.0))
+        sigma = sigma if sigma > ROUNDED * rounding else rounding
+    return (sigma if 1e-7 * np.ptp(input_mm) < sigma < np.inf else 0.0), step
+
+
+def _sigma_by_differences(input_mm: Array, runs: tuple[slice, ...], order: int) -> float:
+    differences = np.concatenate([np.diff(input_mm[run], order) for run in runs])
+    gain = float(np.sqrt(comb(2 * order, order)))
+    return float(np.median(np.abs(differences))) / NORMAL_MEDIAN / gain if differences.size else np.inf
+
+
+def _scatter(input_mm: Array, runs: tuple[slice, ...]) -> float:
+    """Give the median standard deviation about lines through `LINE` samples; 0 where no run has so many."""
+    x = np.arange(LINE) - 0.5 * (LINE - 1)
+    found = [np.zeros(0)]
+    for run in runs:
+        if run.stop - run.start >= LINE:
+            windows = np.lib.stride_tricks.sliding_window_view(input_mm[run], LINE)
+            rest = windows - windows.mean(axis=1, keepdims=True) - (windows @ x)[:, None] * x / (x @ x)
+            found.append(np.sum(rest**2, axis=1) / (LINE - 2))
+    variances = np.concatenate(found)
+    return float(np.sqrt(np.median(variances))) if variances.size else 0.0
+
+
+def _grid(input_mm: Array) -> float:
+    """Give the distance of the lines of a grid on which all values lie; 0 where there is none."""
+    steps = np.diff(np.unique(np.round(input_mm, 9)))
+    # Where every sample is several lines on, the steps differ by single ones.
+    lines = np.concatenate([steps, np.diff(np.unique(steps))])
+    lines = lines[lines > RESOLVED_MM]
+    step = float(np.min(lines, initial=np.inf))
+    return step if np.all(np.abs(steps / step - np.round(steps / step)) < 0.02) and lines.size else 0.0
+
+
+def _rounds(input_mm: Array, runs: tuple[slice, ...], step_mm: float) -> bool:
+    """Whether a motion was rounded to a grid: it stands still on it, or its speed seems to change by single steps.
+
+    Set points in round numbers lie on a grid as well, but go from one to the next in equal steps.
+    """
+    if step_mm == 0.0:
+        return False
+    fast, halting, moved = 0, 0, 0
+    for run in runs:
+        moves = np.abs(np.diff(input_mm[run])) / step_mm
+        single = np.abs(np.abs(np.diff(input_mm[run], 2)) / step_mm - 1.0) < 0.1
+        several = moves[1:] > 1.5
+        fast += int(np.sum(single & several))
+        halting += int(np.sum(single & ~several))
+        moved += int(np.sum(moves > 0.5))
+    return fast >= FEWEST_SINGLE or halting >= max(FEWEST_SINGLE, HALTING * moved)
