@@ -10,7 +10,7 @@ from fingervision.diagnosis.explanation import MANY_STEPS, Explanation, Problem,
 from fingervision.diagnosis.signatures import Signatures, tangents
 from fingervision.domain.effect import Array
 
-QUANTILE = 0.975
+QUANTILE = 0.98
 DRAWS, LONG_DRAWS, FEWEST = 40, 20, 10
 SURELY = 3.0
 """Standard errors of the quantile beyond which no further draw would change the answer."""
@@ -28,19 +28,19 @@ GUMBEL = float(-np.log(-np.log(QUANTILE)) - np.euler_gamma) * float(np.sqrt(6.0)
 
 
 def noise_doubt(problem: Problem) -> float:
-    """Relative standard uncertainty of the noise's power where it is slow, as an autoregression estimates it.
+    """Relative standard uncertainty of the noise's power where it is slow, of the channel that is known worst.
 
-    The power at zero frequency goes with (1 + rho) / (1 - rho), and rho is known to sqrt((1 - rho^2) / n): together
-    2 / sqrt((1 - rho^2) n). A spectrum that is fitted without its slowest part (`noise_by_spectrum`) knows it worse.
+    The power at zero frequency goes with (1 + rho) / (1 - rho), and an autoregression knows rho to
+    sqrt((1 - rho^2) / n): together 2 / sqrt((1 - rho^2) n). A spectrum that is fitted without its slowest part knows
+    the power there worse (`noise_by_spectrum`).
     """
     rows = max(2, problem.chain.history.input_mm.size - 2)
     parts = []
     for noise in problem.whitener.noises:
         share = noise.correlated_mm**2 / noise.total_mm**2
         rho = noise.correlation
-        parts.append((2.0 + share * 4.0 * rho**2 / (1.0 - rho**2)) / rows)
-    spectrum = np.mean([noise.slow_doubt**2 for noise in problem.whitener.noises])
-    return float(np.sqrt(max(np.mean(parts), spectrum)))
+        parts.append((2.0 + share * 4.0 * rho**2 / (1.0 - rho**2)) / rows + noise.slow_doubt**2)
+    return float(np.sqrt(max(parts)))
 
 
 def linear_thresholds(
@@ -129,7 +129,7 @@ def jumps_astray(problem: Problem, names: tuple[str, ...]) -> bool:
 
 
 def rare(values: Sequence[float]) -> float:
-    """Estimate the quantile of a maximum that is exceeded once in 40 draws, from a few."""
+    """Estimate the quantile of a maximum that is exceeded once in 50 draws, from a few."""
     return float(np.mean(values)) + GUMBEL * float(np.std(values))
 
 

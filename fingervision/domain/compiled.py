@@ -1,6 +1,7 @@
 """Loops that are compiled to machine code, kept on disk from one run to the next."""
 
 from collections.abc import Callable
+from contextlib import suppress
 from functools import cache
 from pathlib import Path
 from typing import Any, TypeVar, cast
@@ -41,5 +42,7 @@ def _forget_old(source: Path, kept: Path) -> None:
     """Throw away what is kept of a file if any file beside it is newer: Numba looks at the file itself alone."""
     newest = max(path.stat().st_mtime for path in source.parent.glob("*.py"))
     for index in kept.glob(f"{source.stem}.*.nbi"):
-        if index.stat().st_mtime < newest:
-            index.unlink(missing_ok=True)
+        # Another process that begins at the same time throws it away as well.
+        with suppress(FileNotFoundError):
+            if index.stat().st_mtime < newest:
+                index.unlink()

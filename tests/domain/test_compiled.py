@@ -75,3 +75,12 @@ def test_what_is_compiled_as_written_takes_its_sums_in_turn() -> None:
     # Each small number is lost beside the large one before it; vectors would add them to each other first.
     values = np.tile([1e16, 1.0, -1e16, 1.0], 64)
     assert in_turn(values) == float(np.cumsum(values)[-1])
+
+
+def test_what_another_process_has_just_thrown_away_does_not_matter(tmp_path: Path) -> None:
+    _package(tmp_path, 2.0)
+    assert _run(tmp_path) == ["2.0", "0"]
+    (found,) = (tmp_path / "kept" / "__pycache__").glob("user.user-*.nbi")
+    # It is listed, and gone when it is looked at.
+    found.with_name(found.name.replace("user-", "gone-")).symlink_to(tmp_path / "nowhere")
+    assert _run(tmp_path) == ["2.0", "1"]
