@@ -95,25 +95,21 @@ class Problem:
         """Judge parameters as they are: chi-square with the best run offsets, plus those offsets' penalty."""
         residual = self.measured - self.whitened(settings)
         sigma, penalty = self.offsets.spread(residual)
-        return _length(residual, residual, self.offsets, self.offsets.metric(sigma)) + penalty
+        return self.offsets.squared(residual, self.offsets.metric(sigma)) + penalty
 
     def cost(self, settings: Mapping[str, Mapping[str, float]]) -> float:
         """-2 log of the posterior, up to a constant: the score over all spreads of the runs instead of at the best."""
         residual = self.measured - self.whitened(settings)
         sigma, penalty = self.offsets.spread(residual)
         metric = self.offsets.metric(sigma)
-        return _length(residual, residual, self.offsets, metric) + penalty + self.offsets.doubt(residual)
+        return self.offsets.squared(residual, metric) + penalty + self.offsets.doubt(residual)
 
     def nothing(self) -> Explanation:
         """Judge the model as it is."""
         residual = self.measured - self.whitened({})
         sigma, penalty = self.offsets.spread(residual)
-        score = _length(residual, residual, self.offsets, self.offsets.metric(sigma)) + penalty
+        score = self.offsets.squared(residual, self.offsets.metric(sigma)) + penalty
         return Explanation((), {}, score, residual, np.zeros((0, 0)), 0, sigma)
-
-
-def _length(a: Array, b: Array, offsets: RunOffsets, metric: Array) -> float:
-    return float(a @ b - (offsets.design.T @ a) @ metric @ (offsets.design.T @ b))
 
 
 def fit(
@@ -160,7 +156,7 @@ def fit(
     residual = aim - problem.whitened(settings(x))
     spread = sigma_mm if sigma_mm is not None else offsets.spread(residual)[0]
     metric = offsets.metric(spread)
-    cost = _length(residual, residual, offsets, metric)
+    cost = offsets.squared(residual, metric)
     damping = 1e-3
     normal, free = np.zeros((x.size, x.size)), np.ones(x.size, dtype=bool)
     for step_number in range(iterations):
@@ -187,7 +183,7 @@ def fit(
             trial[free] += np.linalg.lstsq(part + damping * np.diag(np.diag(part)), gradient[free], rcond=1e-12)[0]
             trial = np.clip(trial, lower, upper)
             rest = aim - problem.whitened(settings(trial))
-            new = _length(rest, rest, offsets, metric)
+            new = offsets.squared(rest, metric)
             if new < cost:
                 gained = cost - new
                 x, residual, cost, damping = trial, rest, new, max(damping / 10.0, 1e-7)
@@ -196,7 +192,7 @@ def fit(
         if sigma_mm is None and len(problem.chain.history.runs) > 1:
             spread = offsets.spread(residual)[0]
             metric = offsets.metric(spread)
-            cost = _length(residual, residual, offsets, metric)
+            cost = offsets.squared(residual, metric)
         if gained < 0.02 + 1e-5 * cost and step_number > 0:
             break
     thorough = iterations >= MANY_STEPS
@@ -206,13 +202,13 @@ def fit(
                 trial = x.copy()
                 trial[i] = value
                 rest = aim - problem.whitened(settings(trial))
-                new = _length(rest, rest, offsets, metric)
+                new = offsets.squared(rest, metric)
                 if new < cost:
                     x, residual, cost = trial, rest, new
     penalty = 0.0
     if sigma_mm is None:
         spread, penalty = offsets.spread(residual)
-        cost = _length(residual, residual, offsets, offsets.metric(spread))
+        cost = offsets.squared(residual, offsets.metric(spread))
     covariance = np.zeros_like(normal)
     if free.any():
         covariance[np.ix_(free, free)] = np.linalg.pinv(normal[np.ix_(free, free)])
@@ -237,5 +233,5 @@ def scan(
     metric = problem.offsets.metric(base.sigma_mm)
     length = np.einsum("ij,ij->j", residual, residual) - np.einsum("ij,ij->j", shared, metric @ shared)
     best = int(np.argmin(length))
-    before = _length(base.residual, base.residual, problem.offsets, metric)
+    before = problem.offsets.squared(base.residual, metric)
     return dict(starts[best]), base.score - before + float(length[best])

@@ -6,7 +6,6 @@ import numpy as np
 
 from fingervision.diagnosis.bootstrap import noise_doubt
 from fingervision.diagnosis.explanation import MANY_STEPS, SMALL_SHARE, Explanation, Problem, fit
-from fingervision.domain.effect import Array
 
 INDISTINGUISHABLE = 12.0
 """Chi-square below which two explanations are not told apart. What is 4 from the truth must be told, and the estimate
@@ -40,7 +39,7 @@ def indistinguishable(
     def join(other: Explanation) -> None:
         if other.names == best.names or any(set(m.names) <= set(other.names) for m in members):
             return
-        near = _squared(problem, target - problem.whitened(other.values), metric)
+        near = problem.offsets.squared(target - problem.whitened(other.values), metric)
         if near > 400.0 and other.score - best.score > 200.0:
             return
         distance = near
@@ -111,12 +110,6 @@ def _imitation(problem: Problem, truth: Explanation, other: Explanation, sigma_m
     """
     target = problem.whitened(truth.values)
     return fit(problem, other.names, other.values, target=target, sigma_mm=sigma_mm, iterations=12)
-
-
-def _squared(problem: Problem, whitened: Array, metric: Array) -> float:
-    """Squared length of a whitened difference once run offsets are allowed."""
-    shared = problem.offsets.design.T @ whitened
-    return float(whitened @ whitened - shared @ metric @ shared)
 
 
 def beside_foretold(problem: Problem, members: list[Explanation]) -> list[Explanation]:

@@ -52,8 +52,7 @@ def _gains(problem: Problem, columns: Array, found: Explanation, taken: Array) -
 def _explained(problem: Problem, found: Explanation) -> float:
     """Squared whitened length of what an explanation changes; what offsets of the runs undo again does not count."""
     changed = problem.whitened(found.values) - problem.whitened({})
-    shared = problem.offsets.design.T @ changed
-    return float(changed @ changed - shared @ problem.offsets.metric(found.sigma_mm) @ shared)
+    return problem.offsets.squared(changed, problem.offsets.metric(found.sigma_mm))
 
 
 def imitated(problem: Problem, shapes: Probes, found: Explanation, fewer: list[Explanation]) -> str | None:

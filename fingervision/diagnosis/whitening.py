@@ -171,6 +171,11 @@ class RunOffsets:
         prior += [MIDLINE_FREE_MM] * int(self.midline) + [1.0] * self.drawn
         return np.asarray(np.linalg.inv(self.gram + np.diag(1.0 / np.array(prior) ** 2)), dtype=np.float64)
 
+    def squared(self, whitened: Array, metric: Array) -> float:
+        """Squared length of a whitened column once the offsets of a metric are allowed."""
+        shared = self.design.T @ whitened
+        return float(whitened @ whitened - shared @ metric @ shared)
+
     def spread(self, residual: Array) -> tuple[tuple[float, ...], float]:
         """Estimate the spreads from a whitened residual by marginal likelihood.
 
