@@ -1,13 +1,16 @@
 """Sets: what these data cannot tell apart, however the search came upon it."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from fingervision.diagnosis.compare import compare
 from fingervision.diagnosis.diagnose import diagnose
-from fingervision.domain.report import DiagnosisReport
+from fingervision.domain.parameter import Estimate
+from fingervision.domain.report import DiagnosisReport, Verdict
 from fingervision.storage.measured_table import read_measured_table
 from fingervision.storage.model_toml import read_model
 
@@ -61,6 +64,15 @@ def test_a_delay_is_told_from_a_resonance_however_the_stage_went_between_two_sam
 ) -> None:
     sets = answered(tmp_path, late_s=late_s, straight=straight).alternatives
     assert set(sets) == {("drive_lag",), ("camera_latency",)}
+
+
+def test_a_model_with_the_delay_disagrees_nowhere(tmp_path: Path) -> None:
+    answered(tmp_path, late_s=0.03)
+    model = read_model(tmp_path / "sim.csv")
+    late = replace(model, effects={"drive_lag": {"delay_s": Estimate(0.03, 0.0003, "s")}})
+    table = read_measured_table(tmp_path / "measured.csv")
+    assert diagnose(table, late).report.verdict is Verdict.AGREES
+    assert compare(table, late).places == ()
 
 
 def test_an_arc_beside_another_effect_is_found_from_where_the_pair_puts_it(tmp_path: Path) -> None:
