@@ -30,7 +30,7 @@ def command(measured: Path, model_path: Path, out: Path, seed: int, kind: str, a
     import json
 
     from fingervision.diagnosis.compare import compare
-    from fingervision.diagnosis.report_figure import residual_figure
+    from fingervision.diagnosis.report.residual_figure import residual_figure
     from fingervision.storage.measured_table import read_measured_table
     from fingervision.storage.model_toml import read_model
     from fingervision.storage.out_folder import new_out_folder, out_folder

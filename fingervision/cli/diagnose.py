@@ -46,8 +46,8 @@ def command(
     import sys
     from difflib import get_close_matches
 
-    from fingervision.diagnosis.answer_files import PAGE, write_answer
     from fingervision.diagnosis.diagnose import diagnose
+    from fingervision.diagnosis.report.answer_files import PAGE, write_answer
     from fingervision.effects import catalogue
     from fingervision.storage.measured_table import read_measured_table
     from fingervision.storage.model_toml import read_model

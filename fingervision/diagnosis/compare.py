@@ -5,10 +5,10 @@ from itertools import pairwise
 
 import numpy as np
 
-from fingervision.diagnosis.bench_data import BenchData, prepare
 from fingervision.diagnosis.diagnose import by_channel, places
-from fingervision.diagnosis.path_between import along_likelier_path
-from fingervision.diagnosis.unseen_runs import rms_mm
+from fingervision.diagnosis.inference.cross_validation import rms_mm
+from fingervision.diagnosis.input.intersample_interpolation import along_likelier_path
+from fingervision.diagnosis.input.observations import BenchData, prepare
 from fingervision.domain.effect import Array, History
 from fingervision.domain.measured_table import MeasuredTable
 from fingervision.domain.report import Place

@@ -5,15 +5,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fingervision.diagnosis.bench_data import BenchData, prepare
-from fingervision.diagnosis.explanation import Explanation, Problem
-from fingervision.diagnosis.force_hint import force_hint
-from fingervision.diagnosis.next_run import next_run
-from fingervision.diagnosis.other_evidence import other_evidence
-from fingervision.diagnosis.refitted_search import refitted_search
-from fingervision.diagnosis.search import Findings, Progress
-from fingervision.diagnosis.unseen_runs import rms_mm, unseen_rms_mm
-from fingervision.diagnosis.where import where
+from fingervision.diagnosis.design.further_evidence import other_evidence
+from fingervision.diagnosis.design.next_run import next_run
+from fingervision.diagnosis.inference.cross_validation import rms_mm, unseen_rms_mm
+from fingervision.diagnosis.inference.hypothesis_fit import Explanation, Problem
+from fingervision.diagnosis.inference.refitted_search import refitted_search
+from fingervision.diagnosis.inference.search import Findings, Progress
+from fingervision.diagnosis.input.observations import BenchData, prepare
+from fingervision.diagnosis.report.force_hint import force_hint
+from fingervision.diagnosis.report.residual_localization import where
 from fingervision.domain.effect import Array
 from fingervision.domain.measured_table import MeasuredTable
 from fingervision.domain.parameter import Estimate

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import numpy as np
 
-from fingervision.diagnosis.answer_files import NEXT_RUN, PAGE, write_answer
 from fingervision.diagnosis.diagnose import Diagnosis, diagnose
+from fingervision.diagnosis.report.answer_files import NEXT_RUN, PAGE, write_answer
 from fingervision.domain.report import DiagnosisReport, Verdict
 from fingervision.effects import catalogue
 from fingervision.measuring.rehearsal import rehearse

@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from fingervision.diagnosis.bench_data import prepare
-from fingervision.diagnosis.bootstrap import QUANTILE, linear_thresholds
-from fingervision.diagnosis.explanation import Explanation, Problem, fit, scan
-from fingervision.diagnosis.probes import probes
-from fingervision.diagnosis.signatures import signatures
-from fingervision.diagnosis.unexplained import imitated, shapes_of
+from fingervision.diagnosis.inference.hypothesis_fit import Explanation, Problem, fit, scan
+from fingervision.diagnosis.inference.model_adequacy import imitated, shapes_of
+from fingervision.diagnosis.inference.null_bootstrap import QUANTILE, linear_thresholds
+from fingervision.diagnosis.inference.probe_basis import probes
+from fingervision.diagnosis.inference.signatures import signatures
+from fingervision.diagnosis.input.observations import prepare
 from fingervision.effects.play_operator import play
 from fingervision.effects.stick_slip import stick
 from fingervision.storage.measured_table import read_measured_table

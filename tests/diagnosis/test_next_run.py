@@ -6,15 +6,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from fingervision.diagnosis.bench_data import BenchData, prepare
-from fingervision.diagnosis.explanation import Explanation, Problem, fit
-from fingervision.diagnosis.next_run import next_run
-from fingervision.diagnosis.noise_short import drawn_noises
-from fingervision.diagnosis.other_evidence import EVIDENCE, other_evidence
-from fingervision.diagnosis.posterior import draws
-from fingervision.diagnosis.promise import promise, surest
-from fingervision.diagnosis.run_choice import NEEDED
-from fingervision.diagnosis.second_run import SecondRun
+from fingervision.diagnosis.design.augmented_dataset import SecondRun
+from fingervision.diagnosis.design.expected_gain import promise, surest
+from fingervision.diagnosis.design.experiment_design import NEEDED
+from fingervision.diagnosis.design.further_evidence import EVIDENCE, other_evidence
+from fingervision.diagnosis.design.next_run import next_run
+from fingervision.diagnosis.inference.hypothesis_fit import Explanation, Problem, fit
+from fingervision.diagnosis.inference.posterior import draws
+from fingervision.diagnosis.input.observations import BenchData, prepare
+from fingervision.diagnosis.noise.restricted_likelihood import drawn_noises
 from fingervision.domain.effect import Array
 from fingervision.effects import catalogue
 from fingervision.storage.measured_table import read_measured_table

@@ -5,9 +5,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from fingervision.diagnosis.bench_data import prepare
-from fingervision.diagnosis.explanation import Explanation, Problem, fit
-from fingervision.diagnosis.posterior import settled
+from fingervision.diagnosis.inference.hypothesis_fit import Explanation, Problem, fit
+from fingervision.diagnosis.inference.posterior import settled
+from fingervision.diagnosis.input.observations import prepare
 from fingervision.storage.measured_table import read_measured_table
 from fingervision.storage.model_toml import read_model
 

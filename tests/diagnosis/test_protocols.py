@@ -3,7 +3,14 @@
 import numpy as np
 import pytest
 
-from fingervision.diagnosis.protocols import SAMPLES_A_STROKE, driven, measured_ends, protocols, repeated, rounding_s
+from fingervision.diagnosis.design.protocols import (
+    SAMPLES_A_STROKE,
+    driven,
+    measured_ends,
+    protocols,
+    repeated,
+    rounding_s,
+)
 
 STEP_S = 0.1
 

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from fingervision.diagnosis.compare import rough
-from fingervision.diagnosis.noise import Noise
-from fingervision.diagnosis.where import where
+from fingervision.diagnosis.noise.noise_model import Noise
+from fingervision.diagnosis.report.residual_localization import where
 from fingervision.domain.effect import Array, History
 
 NOISE_MM = 0.001

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from fingervision.diagnosis.measuring_chain import MeasuringChain
+from fingervision.diagnosis.inference.measuring_chain import MeasuringChain
 from fingervision.domain.effect import Effect, History
 from fingervision.effects import catalogue
 from fingervision.models.table import TableModel

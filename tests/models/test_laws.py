@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from fingervision.diagnosis.measuring_chain import MeasuringChain, obeyed
+from fingervision.diagnosis.inference.measuring_chain import MeasuringChain, obeyed
 from fingervision.domain.effect import History
 from fingervision.domain.errors import FingervisionError
 from fingervision.domain.gripper import Gripper

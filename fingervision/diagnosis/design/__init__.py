@@ -1,0 +1,1 @@
+"""Design of the next run: which experiment would separate what these data leave open."""

@@ -1,0 +1,132 @@
+"""A run that might follow the data: both together as one problem, with what the run would show put behind the data."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from fingervision.diagnosis.inference.hypothesis_fit import Explanation, Point, Problem, fit
+from fingervision.diagnosis.inference.uncertain_dimensions import tangent
+from fingervision.diagnosis.input.observations import BenchData
+from fingervision.diagnosis.noise.whitening import RunOffsets, Whitener
+from fingervision.domain.effect import Array, Flags, History
+from fingervision.domain.model import PhysicalModel
+
+PAUSE_S = 30.0
+"""Time between the data and the run: starting, saving."""
+AT_END = 1e-3
+"""Share of its range within which a parameter lies at the end; a stop a hundredth inside it was seen."""
+REFITTED = 8
+"""Steps of a refit."""
+Settings = Mapping[str, Mapping[str, float]]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SecondRun:
+    """Data, and a run behind them that has not been made.
+
+    Parameters
+    ----------
+    first : Problem
+        The data.
+    both : Problem
+        The data and the run; its `measured` means nothing.
+    data_mm : ndarray of float, shape (channels * n,)
+        What was measured, as an explanation's prediction is fitted to it.
+    channels : int
+        Gap, then midline and force where they were measured.
+    """
+
+    first: Problem
+    both: Problem
+    data_mm: Array
+    channels: int
+
+    @classmethod
+    def of(cls, bench: BenchData, first: Problem, input_mm: Array, *, rezeroed: bool = False) -> "SecondRun":
+        """Put a run behind the data: same noise, later on the same clock; the stage may be re-zeroed before it."""
+        old = bench.chain.history
+        n, more = old.input_mm.size, input_mm.size
+        time = float(old.times.max()) + PAUSE_S + old.sample_time_s * np.arange(more)
+        history: History = replace(
+            old,
+            input_mm=np.concatenate([old.input_mm, input_mm]),
+            time_s=np.concatenate([old.times, time]),
+            runs=(*old.runs, slice(n, n + more)),
+            rezeroed=(*(old.rezeroed or (False,) * len(old.runs)), rezeroed or any(old.rezeroed)),
+        )
+        count = len(bench.channels)
+        whitener, drawn = first.whitener, bench.model.base
+        chain = replace(first.chain, history=history)
+
+        def longer(values: Array) -> Array:
+            return np.concatenate([values, np.full(more, float(np.median(values)))])
+
+        aside: Flags = _behind(whitener.aside.astype(np.float64), np.zeros(count * more), count) > 0.0
+        both = Whitener(
+            history,
+            whitener.noises,
+            aside,
+            longer(whitener.input_mm),
+            whitener.input_samples,
+            longer(whitener.passing_mm),
+            tangent(chain, drawn, bench.refit.moved).columns
+            if bench.refit.moved and isinstance(drawn, PhysicalModel)
+            else None,
+        )
+        joined = replace(
+            first, chain=chain, whitener=both, measured=np.zeros(count * (n + more)), offsets=RunOffsets.of(both)
+        )
+        return cls(first, joined, bench.aim_mm, count)
+
+    @property
+    def input_mm(self) -> Array:
+        """Input of the run alone."""
+        return self.both.chain.history.input_mm[self.first.chain.history.input_mm.size :]
+
+    def moved(self, names: tuple[str, ...], values: Settings) -> Point:
+        """Values within the bounds of both: a stop that was not seen lies at the range's end, wherever that is."""
+        out: Point = {name: dict(values[name]) for name in names}
+        for (name, was), (_, now) in zip(self.first.parameters(names), self.both.parameters(names), strict=True):
+            near = AT_END * (was.upper - was.lower)
+            value = values[name][was.name]
+            if was.lower != now.lower and value <= was.lower + near:
+                out[name][was.name] = now.lower
+            elif was.upper != now.upper and value >= was.upper - near:
+                out[name][was.name] = now.upper
+        return out
+
+    def distance(
+        self,
+        truth: Settings,
+        rival: Explanation,
+        *,
+        sigma_mm: tuple[float, ...] | None = None,
+        iterations: int = REFITTED,
+    ) -> float:
+        """D_jk with both runs: a prediction against the rival, offsets of the runs profiled or of a given spread."""
+        target = self.both.whitened(self.moved(tuple(truth), truth))
+        start = self.moved(rival.names, rival.values)
+        return fit(self.both, rival.names, start, target=target, sigma_mm=sigma_mm, iterations=iterations).score
+
+    def expected(self, truth: Settings) -> Array:
+        """The data as they were measured, and behind them what the run would show without noise; whitened."""
+        shown = self.both.chain.stacked(self.moved(tuple(truth), truth)).reshape(self.channels, -1)
+        new = shown[:, self.data_mm.size // self.channels :]
+        return self.both.whitener.one(_behind(self.data_mm, new.ravel(), self.channels))
+
+    def score(
+        self, target: Array, explanation: Explanation, starts: Sequence[Settings], sigma_mm: tuple[float, ...] | None
+    ) -> float:
+        """Chi-square of an explanation refitted to a target, the best of several searches; offsets as in `distance`."""
+        names = explanation.names
+        begins = [self.moved(names, start) for start in starts]
+        tries = [
+            fit(self.both, names, begin, target=target, sigma_mm=sigma_mm, iterations=REFITTED) for begin in begins
+        ]
+        return min(found.score for found in tries)
+
+
+def _behind(old: Array, new: Array, channels: int) -> Array:
+    """Put the channels of a run behind those of the data; each stacked, shape (channels * n,)."""
+    return np.concatenate([old.reshape(channels, -1), new.reshape(channels, -1)], axis=1).ravel()

@@ -1,0 +1,143 @@
+"""What a run will be worth: the chi-square that it puts between two explanations, whichever of them is true."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from fingervision.diagnosis.design.augmented_dataset import REFITTED, SecondRun
+from fingervision.diagnosis.inference.hypothesis_fit import Explanation, Point, Problem, fit
+from fingervision.diagnosis.input.observations import BenchData
+from fingervision.diagnosis.noise.noise_posterior import problems_of_drawn_noise
+from fingervision.domain.effect import Array
+
+TRUTHS = 16
+"""Draws of either explanation's parameters, each with a noise of its own."""
+MANY_SAMPLES, FEW_TRUTHS = 6000, 4
+FURTHER = 2
+"""Further starts of a rival's refit: one search may stand still beside the place where it imitates the truth."""
+NOISES = 4000
+"""Draws of what the run's noise adds."""
+PROMISED = 0.95
+REZEROED = 0.5
+"""Chance that the run is offset against the data."""
+KEPT = (0.7, 1.3)
+"""Gain that came over the gain that was promised, where a promise is kept."""
+MODERATE, SURELY = 75.0, 0.8
+"""A larger promise is sound only where it is as likely as this to be kept."""
+
+
+@dataclass(frozen=True, slots=True)
+class Promise:
+    """A run's gain in chi-square: the one most likely to be kept, the interval that holds what comes, that likelihood.
+
+    Either explanation may be true, and often the two foretell different gains: a median would lie between them, where
+    nothing comes. `modest` is the most likely one below `MODERATE`.
+    """
+
+    gain: float
+    kept: float
+    modest: float
+    interval: tuple[float, float]
+
+    @property
+    def sound(self) -> bool:
+        """Whether the promise is moderate, or else likely to be kept."""
+        return self.gain < MODERATE or self.kept >= SURELY
+
+    @property
+    def stated(self) -> float:
+        """What may be relied on."""
+        return self.gain if self.sound else self.modest
+
+
+def promise(
+    bench: BenchData,
+    problem: Problem,
+    input_mm: Array,
+    pair: tuple[Explanation, Explanation],
+    odds: tuple[float, float],
+    found: tuple[Sequence[Point], Sequence[Point]],
+    rng: np.random.Generator,
+    *,
+    rezeroed: bool = False,
+) -> Promise:
+    """Foretell the gain from the data as they were measured: the posterior's predictive distribution.
+
+    A truth and a noise are drawn from what the data leave open, the run is driven with it, and both explanations are
+    refitted to the data and the run together. The run's own noise adds 2 sqrt(gain) to the difference of two
+    chi-squares.
+
+    Parameters
+    ----------
+    bench, problem : BenchData, Problem
+        The data.
+    input_mm : ndarray of float, shape (k,)
+        The run.
+    pair : tuple of Explanation
+        What is to be told apart.
+    odds : tuple of float
+        How likely either is by the data; together 1.
+    found : tuple of sequences of dict
+        Draws of either one's parameters.
+    rng : numpy Generator
+        For the noise.
+    rezeroed : bool
+        Whether the stage is re-zeroed before the run.
+    """
+    count = TRUTHS if problem.chain.history.input_mm.size + input_mm.size <= MANY_SAMPLES else FEW_TRUTHS
+    gains: list[float] = []
+    chances: list[float] = []
+    for true, other in ((0, 1), (1, 0)):
+        starts = [pair[other].values, *_spread(found[other], FURTHER)]
+        truths = _spread(found[true], count)
+        noisy = problems_of_drawn_noise(bench, problem, pair[true], len(truths), rng)
+        for values, first in zip(truths, noisy, strict=True):
+            run = SecondRun.of(bench, first, input_mm, rezeroed=rezeroed)
+            target = run.expected(values)
+            # A run after a re-zeroing is offset by as much as both runs together then say.
+            sigma_mm = None if rezeroed else _offsets(first, pair[true], rng)
+            after = run.score(target, pair[other], starts, sigma_mm) - run.score(target, pair[true], [values], sigma_mm)
+            known = sigma_mm if first.offsets.runs > 1 else None
+            gains.append(after - (_score(first, pair[other], known) - _score(first, pair[true], known)))
+            chances.append(odds[true] / len(truths))
+    mean = np.maximum(np.array(gains), 0.0)
+    drawn = mean[rng.choice(mean.size, NOISES, p=np.array(chances) / sum(chances))]
+    come = drawn + 2.0 * np.sqrt(drawn) * rng.standard_normal(NOISES)
+    low, high = np.quantile(come, (0.5 - 0.5 * PROMISED, 0.5 + 0.5 * PROMISED))
+    return Promise(*surest(come), surest(come, MODERATE)[0], (float(low), float(high)))
+
+
+def surest(come: Array, below: float = np.inf) -> tuple[float, float]:
+    """The gain, below a limit, that most of what comes is near to, and how much of it; the median where none comes."""
+    come = np.sort(come)
+    named = come[(come > 0.0) & (come < below)]
+    if named.size == 0:
+        return min(float(np.median(come)), below), 0.0
+    counts = np.searchsorted(come, KEPT[1] * named, "right") - np.searchsorted(come, KEPT[0] * named, "left")
+    best = int(np.argmax(counts))
+    return float(named[best]), float(counts[best] / come.size)
+
+
+def _offsets(problem: Problem, explanation: Explanation, rng: np.random.Generator) -> tuple[float, ...]:
+    """Spread of the runs' offsets, one a channel: where there is one run only, a draw from its prior.
+
+    None at all in half of the draws, for nothing need be re-zeroed before the run; else the half-Cauchy prior by which
+    a diagnosis of both runs will judge them (`RunOffsets.spread`). Where there are more, a draw from what they say.
+    """
+    if problem.offsets.runs > 1:
+        return problem.offsets.drawn_spread(problem.measured - problem.whitened(explanation.values), rng)
+    share = abs(rng.standard_cauchy()) if rng.random() < REZEROED else 0.0
+    return tuple(share * scale for scale in problem.offsets.scales_mm)
+
+
+def _score(problem: Problem, explanation: Explanation, sigma_mm: tuple[float, ...] | None) -> float:
+    """Chi-square of an explanation refitted to the data alone, with its own spread of the runs unless one is given."""
+    sigma = explanation.sigma_mm if sigma_mm is None else sigma_mm
+    return fit(problem, explanation.names, explanation.values, sigma_mm=sigma, iterations=REFITTED).score
+
+
+def _spread(points: Sequence[Point], count: int) -> Sequence[Point]:
+    """Pick so many, evenly from a walk."""
+    step = max(1, len(points) // count)
+    return points[step // 2 :: step]

@@ -1,0 +1,212 @@
+"""Which run: every protocol judged by how much of what is open it settles, and in how much of the rig's time."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from math import ceil
+
+import numpy as np
+
+from fingervision.diagnosis.design.augmented_dataset import PAUSE_S, REFITTED, SecondRun
+from fingervision.diagnosis.design.protocols import (
+    REZERO,
+    SAMPLES_A_STROKE,
+    Step,
+    driven,
+    protocols,
+    repeated,
+    rounding_s,
+)
+from fingervision.diagnosis.design.static_checks import WORTH
+from fingervision.diagnosis.inference.ambiguity_set import surprise
+from fingervision.diagnosis.inference.hypothesis_fit import Explanation, Problem, fit
+from fingervision.diagnosis.input.observations import BenchData
+from fingervision.domain.effect import Array
+
+REZERO_MIN = 1.5
+"""Minutes that re-zeroing takes."""
+MOST_MIN, MOST_SAMPLES = 8.0, 6000
+"""A run of more would be another experiment."""
+NEEDED, BARELY = 30.0, 20.0
+"""Gain that settles a pair: 9, and what noise and the parameters' uncertainty take of it; and what will just do."""
+MOST_TRUTHS, MOST_RIVALS = 4, 8
+COMPARED = 6
+"""Pairs among which the one is sought that gains least."""
+WITHIN = 1.5
+"""A pair is told apart within a run where known offsets of the runs would raise the gain by no more than this."""
+LIKELY = 0.02
+"""Odds to the likeliest explanation above which another may be the truth that the run is chosen for."""
+SCREENED = 4
+"""Steps of a rival's refit where many runs are compared."""
+SMALLER = ((0.65, SAMPLES_A_STROKE), (0.4, SAMPLES_A_STROKE), (0.65, 6), (0.4, 6), (0.25, 6), (0.12, 6))
+"""Shares of the range, and samples that a stroke has at least, that are tried one after the other."""
+ALIKE = 0.03
+"""Difference in what is settled below which another run will do as well."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class OpenSet:
+    """What the data cannot tell apart.
+
+    Parameters
+    ----------
+    members : list of Explanation
+        The leading one first.
+    odds : ndarray of float, shape (members,)
+        How likely each is by the data; together 1.
+    before : ndarray of float, shape (truths, members)
+        Distance of each truth's prediction to each member as it is; the truths are the first members.
+    """
+
+    members: list[Explanation]
+    odds: Array
+    before: Array
+
+    @property
+    def truths(self) -> int:
+        """How many members the run is chosen for, each as the truth."""
+        return len(self.before)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class RunPlan:
+    """A run with what it adds to the distance of each truth to each member."""
+
+    name: str
+    steps: list[Step]
+    times: int
+    input_mm: Array
+    gains: Array
+    minutes: float
+
+    @property
+    def uneven(self) -> float:
+        """How much more is gained where one of two explanations is true than where the other is, at the worst.
+
+        Such a gain could only be promised with so wide an interval.
+        """
+        ahead, back = (np.maximum(g, 1.0) for g in (self.gains[0, 1 : self.gains.shape[0]], self.gains[1:, 0]))
+        return float(np.max(np.maximum(ahead / back, back / ahead), initial=1.0))
+
+    def apart(self, j: int, k: int) -> float:
+        """Gain between two members, the first a truth: of the two that might be true, the one that shows less."""
+        back = self.gains[k, j] if k < len(self.gains) else np.inf
+        return float(min(self.gains[j, k], back))
+
+    def pairs(self) -> list[tuple[int, int]]:
+        """Pairs that are told apart, those that are told apart least first."""
+        truths, members = self.gains.shape
+        found = [(j, k) for j in range(truths) for k in range(j + 1, members) if self.apart(j, k) >= WORTH]
+        return sorted(found, key=lambda pair: self.apart(*pair))
+
+    def worst(self, floor: float) -> float:
+        """Least gain of the pairs that gain so much at all; nothing where none does."""
+        settled = self.gains[(self.gains >= floor) & np.isfinite(self.gains)]
+        return float(settled.min()) if settled.size else 0.0
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class RunChoice:
+    """Proposes runs for a table and what it leaves open."""
+
+    bench: BenchData
+    problem: Problem
+    open: OpenSet
+
+    @property
+    def step_s(self) -> float:
+        """Time between samples."""
+        return self.bench.chain.history.sample_time_s
+
+    def planned(self, name: str, steps: list[Step], iterations: int, times: int = 1) -> RunPlan | None:
+        """Judge a run; None where it is too long."""
+        history = self.bench.chain.history
+        inputs = driven(steps, self.step_s, rounding_s(self.bench.table.input_mm, self.step_s, history.runs))
+        if inputs.size > MOST_SAMPLES:
+            return None
+        rezeroed = REZERO in steps
+        run = SecondRun.of(self.bench, self.problem, inputs, rezeroed=rezeroed)
+        gains = np.full(self.open.before.shape, np.inf)
+        for j, truth in enumerate(self.open.members[: self.open.truths]):
+            for k, rival in enumerate(self.open.members):
+                if j != k:
+                    apart = run.distance(truth.values, rival, iterations=iterations)
+                    gains[j, k] = max(0.0, apart - self.open.before[j, k])
+        minutes = (PAUSE_S + inputs.size * self.step_s) / 60.0 + REZERO_MIN * rezeroed
+        return RunPlan(name, steps, times, inputs, gains, minutes)
+
+    def settled(self, gains: Array, needed: float = NEEDED) -> float:
+        """Share of what is open that gains settle, each truth by its odds."""
+        part = np.where(np.isfinite(gains), np.minimum(gains / needed, 1.0), 0.0)
+        odds = self.open.odds[: self.open.truths]
+        return float(odds @ part.sum(axis=1) / odds.sum() / max(1, len(self.open.members) - 1))
+
+    def shown(self, run: RunPlan, second: SecondRun, j: int, k: int) -> float:
+        """Gain to expect between two members, the likelier one true, where runs are not offset against each other."""
+        if REZERO in run.steps:
+            return run.apart(j, k)
+        true, other = (j, k) if self.open.odds[j] >= self.open.odds[k] or k >= self.open.truths else (k, j)
+        truth, rival = self.open.members[true], self.open.members[other]
+        return second.distance(truth.values, rival, sigma_mm=rival.sigma_mm) - float(self.open.before[true, other])
+
+    def least(self, run: RunPlan) -> tuple[float, tuple[int, int]] | None:
+        """Find the pair that gains least of those that are told apart, and what it gains; None without any.
+
+        Pairs that are told apart within the run come first: what rests on the run's offset against the data may be
+        taken for a re-zeroing.
+        """
+        second = SecondRun.of(self.bench, self.problem, run.input_mm, rezeroed=REZERO in run.steps)
+        found = [(self.shown(run, second, *pair), pair) for pair in run.pairs()[:COMPARED]]
+        within = [each for each in found if each[0] < WITHIN * run.apart(*each[1])]
+        return min(within or found, default=None)
+
+    def best(self, ends: tuple[float, float]) -> RunPlan | None:
+        """Choose the protocol, and how often it is driven, that settles most; of alike ones the cheapest."""
+        found: list[tuple[float, float, int, RunPlan]] = []
+        for name, steps in protocols(*ends, self.step_s):
+            once = self.planned(name, steps, SCREENED)
+            if once is None:
+                continue
+            most = max(1, int(min((MOST_MIN - PAUSE_S / 60.0) / once.minutes, MOST_SAMPLES / once.input_mm.size)))
+            times = max(1, ceil(NEEDED / max(once.worst(NEEDED / most), NEEDED / most)))
+            found.append((self.settled(times * once.gains), times * once.minutes * once.uneven, times, once))
+        if not found:
+            return None
+        top = max(settled for settled, *_ in found)
+        _, _, times, once = min((each for each in found if each[0] >= top - ALIKE), key=lambda each: each[1])
+        return self.planned(once.name, repeated(once.steps, times), REFITTED, times)
+
+    def smaller(self, plan: RunPlan) -> Iterator[RunPlan]:
+        """Drive the same less often, then over less of the range and with fewer samples, while it settles what it did.
+
+        Small motions are kinder to the gripper, and what a large one gains beyond need rests on the explanations' forms
+        more than on what was measured.
+        """
+        low, high = float(plan.input_mm.min()), float(plan.input_mm.max())
+        half, middle = 0.5 * (high - low), 0.5 * (low + high)
+        least = self.settled(plan.gains, BARELY) - ALIKE
+        tries = [(plan.times // 2**k, 1.0, SAMPLES_A_STROKE) for k in range(1, plan.times.bit_length())]
+        tries += [(1, *less) for less in SMALLER]
+        for times, share, samples in tries:
+            ends = middle - share * half, middle + share * half
+            named = dict(protocols(*ends, self.step_s, samples))
+            less = self.planned(plan.name, repeated(named[plan.name], times), REFITTED, times)
+            if less is not None and self.settled(less.gains, BARELY) >= least:
+                yield less
+
+
+def open_set(problem: Problem, members: list[Explanation]) -> OpenSet:
+    """Order the members by what the data say of them; the leading one stays first."""
+    rows = max(2, int(problem.measured.size - problem.whitener.aside.sum()))
+    cost = {id(e): e.bic(rows) + surprise(problem, e) for e in members}
+    best, others = members[0], sorted(members[1:], key=lambda e: cost[id(e)])[:MOST_RIVALS]
+    listed = [best, *others]
+    costs = np.array([cost[id(e)] for e in listed])
+    odds = np.exp(-0.5 * (costs - costs.min()))
+    truths = 1 + int(np.count_nonzero(odds[1:MOST_TRUTHS] >= LIKELY))
+    before = np.zeros((truths, len(listed)))
+    for j, truth in enumerate(listed[:truths]):
+        target = problem.whitened(truth.values)
+        for k, rival in enumerate(listed):
+            if j != k:
+                before[j, k] = fit(problem, rival.names, rival.values, target=target, iterations=REFITTED).score
+    return OpenSet(listed, odds / odds.sum(), before)

@@ -1,0 +1,93 @@
+"""The next run: the protocol that separates what is open, by expected distance per minute (Atkinson & Fedorov 1975)."""
+
+import numpy as np
+
+from fingervision.diagnosis.design.expected_gain import MODERATE, Promise, promise
+from fingervision.diagnosis.design.experiment_design import RunChoice, RunPlan, open_set
+from fingervision.diagnosis.design.protocols import REZERO, measured_ends
+from fingervision.diagnosis.design.static_checks import WORTH, without_motion
+from fingervision.diagnosis.inference.hypothesis_fit import Explanation, Point, Problem
+from fingervision.diagnosis.inference.posterior import draws
+from fingervision.diagnosis.input.observations import BenchData
+from fingervision.domain.report import NextRun
+
+
+def next_run(
+    bench: BenchData,
+    problem: Problem,
+    members: list[Explanation],
+    found: tuple[Point, ...],
+    rng: np.random.Generator,
+) -> NextRun | None:
+    """Choose the run that settles most of what is open, in the least of the rig's time.
+
+    Runs within the range that was measured come first: beyond it an explanation's form is not proven, and neither is
+    a promise that rests on it. The promise is for the pair that the run separates least.
+
+    Parameters
+    ----------
+    members : list of Explanation
+        What this data cannot tell apart, the leading one first.
+    found : tuple of dict
+        Draws of the leading one's parameters.
+    rng : numpy Generator
+        For the promise's interval.
+
+    Returns
+    -------
+    NextRun or None
+        None where nothing is open, or nothing that can be driven would separate it.
+    """
+    if len(members) < 2:
+        return None
+    special = without_motion(bench, problem, members[0], members[1:])
+    if bench.chain.history.time_s is None:
+        return special
+    choose = RunChoice(bench, problem, open_set(problem, members))
+    plan = choose.best(measured_ends(bench.table.input_mm, bench.model.input_range_mm))
+    if plan is None or plan.worst(WORTH) == 0.0:
+        plan = choose.best(bench.model.input_range_mm)
+    if plan is None or plan.worst(WORTH) == 0.0:
+        return special
+    return _promised(choose, plan, members, found, rng) or special
+
+
+def _promised(
+    choose: RunChoice, plan: RunPlan, members: list[Explanation], found: tuple[Point, ...], rng: np.random.Generator
+) -> NextRun | None:
+    """State what a run will gain, and make it smaller where nobody could rely on so large a promise."""
+    listed, odds = choose.open.members, choose.open.odds
+    walks: dict[int, tuple[Point, ...]] = {0: found}
+
+    def stated(run: RunPlan, pair: tuple[int, int]) -> Promise:
+        j, k = pair
+        for each in pair:
+            if each not in walks:
+                walks[each] = draws(choose.problem, listed[each], rng)
+        share = float(odds[j] / (odds[j] + odds[k]))
+        both, chance, drawn = (listed[j], listed[k]), (share, 1.0 - share), (walks[j], walks[k])
+        rezeroed = REZERO in run.steps
+        return promise(choose.bench, choose.problem, run.input_mm, both, chance, drawn, rng, rezeroed=rezeroed)
+
+    worst = choose.least(plan)
+    if worst is None:
+        return None
+    separated = worst[1]
+    promised = stated(plan, separated)
+    for less in choose.smaller(plan) if not promised.sound else ():
+        worst = choose.least(less)
+        if worst is not None and worst[0] < MODERATE:
+            again = stated(less, worst[1])
+            if again.sound:
+                plan, separated, promised = less, worst[1], again
+                break
+    j, k = separated
+    pair = ("+".join(listed[j].names), "+".join(listed[k].names))
+    words = f"{plan.name}: it separates {' from '.join(pair)} by an expected chi-square of {promised.stated:.0f}"
+    leading = "+".join(listed[0].names)
+    apart = [e for i, e in enumerate(listed) if i and plan.apart(0, i) >= WORTH]
+    also = ["+".join(e.names) for e in apart if separated != (0, listed.index(e))]
+    left = ["+".join(e.names) for e in members[1:] if all(e is not one for one in apart)]
+    words += f", and {leading} from {', '.join(also)}" if also else ""
+    words += f"; no protocol tried separates {leading} from {', '.join(left)}." if left else "."
+    return NextRun(plan.name, tuple(plan.steps), promised.stated, promised.interval, pair, words)

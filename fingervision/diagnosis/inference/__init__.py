@@ -1,0 +1,1 @@
+"""From a whitened residual to a verdict: hypothesis fits, significance, ambiguity set, model adequacy."""

@@ -1,0 +1,158 @@
+"""Sets: every minimal explanation that these data cannot tell apart from the best."""
+
+from math import comb
+
+import numpy as np
+
+from fingervision.diagnosis.inference.hypothesis_fit import MANY_STEPS, SMALL_SHARE, Explanation, Problem, fit
+from fingervision.diagnosis.inference.null_bootstrap import noise_doubt
+
+INDISTINGUISHABLE = 12.0
+"""Chi-square below which two explanations are not told apart. What is 4 from the truth must be told, and the estimate
+from which it is measured stands off the truth itself, by a standard deviation and a half: (sqrt(4) + 1.5)^2."""
+FREEDOM = 4.0
+"""Degrees of freedom of Student's t for the physical priors: a typical size is itself known roughly only, so that far
+beyond it surprise grows slowly (Lange, Little & Taylor 1989)."""
+SURELY = 2.05
+"""Standard deviations: what is true is lost in one table of fifty."""
+SPARE = 3.0
+"""Chi-square that the best explanation takes from the noise beyond what the truth would."""
+ADMISSIBLE = 15.0
+"""Chi-square by which one that is 4 away from the truth comes out worse at most: 4 + SURELY * 2 * sqrt(4) + SPARE."""
+IDLE_SHARE = 0.3
+"""Of what the best explanation gains: what gains less explains nothing."""
+PLAIN = 50.0
+"""Chi-square beyond which a richer form has shown itself, however little that is of all that is explained."""
+
+
+def indistinguishable(
+    problem: Problem, best: Explanation, nothing: Explanation, pool: list[Explanation], pairs: list[Explanation]
+) -> tuple[list[Explanation], dict[tuple[str, ...], float]]:
+    """Collect every minimal explanation that cannot be told apart from the best."""
+    members, distances = [best], {}
+    target = problem.whitened(best.values)
+    metric = problem.offsets.metric(best.sigma_mm)
+    rows = max(2, int(problem.measured.size - problem.whitener.aside.sum()))
+    # Where the noise is known badly, so is every difference that is measured by it.
+    admissible = ADMISSIBLE * (1.0 + noise_doubt(problem))
+
+    def join(other: Explanation) -> None:
+        if other.names == best.names or any(set(m.names) <= set(other.names) for m in members):
+            return
+        near = problem.offsets.squared(target - problem.whitened(other.values), metric)
+        if near > 400.0 and other.score - best.score > 200.0:
+            return
+        distance = near
+        if near >= INDISTINGUISHABLE:
+            imitation = _imitation(problem, best, other, best.sigma_mm)
+            distance = imitation.score
+            if distance < INDISTINGUISHABLE and other.score - best.score >= admissible:
+                # What can look like the best explains the data nearly as well: the search had stopped on its way.
+                again = fit(problem, other.names, imitation.values, iterations=MANY_STEPS)
+                other = min(other, again, key=lambda explanation: explanation.score)
+        worse = other.score - best.score
+        if distance >= INDISTINGUISHABLE and worse < admissible:
+            distance = min(distance, _imitation(problem, other, best, best.sigma_mm).score)
+        distances[other.names] = distance
+        # One that leaves the data nearly as badly off as no effect at all explains nothing: the runs' scatter hides it,
+        # and what parameters gain of the noise is nothing either (Akaike 1974).
+        idle = _net(nothing, other) < IDLE_SHARE * _net(nothing, best)
+        close = distance < INDISTINGUISHABLE and not idle and worse < admissible
+        # More effects fit better whatever is true.
+        unrefuted = len(other.names) <= len(best.names) and worse < _least_refuted(distance)
+        if close or unrefuted or _simpler_form(problem, nothing, best, other):
+            members.append(other)
+
+    for other in pool:
+        join(other)
+    if len(best.names) == 1:
+        # Two effects beside one, only where every single one that would do is physically the greater surprise.
+        most = min(odds(problem, member, rows) for member in members)
+        for pair in pairs:
+            if odds(problem, pair, rows) < most:
+                join(pair)
+    return [m for m in members if not any(set(o.names) < set(m.names) for o in members)], distances
+
+
+def _net(nothing: Explanation, explanation: Explanation) -> float:
+    """Gain beyond what its free parameters take from noise."""
+    return nothing.score - explanation.score - 2.0 * explanation.free
+
+
+def _simpler_form(problem: Problem, nothing: Explanation, best: Explanation, other: Explanation) -> bool:
+    """Whether the best may owe its lead to its richer form alone, which contains what the other predicts.
+
+    A delay's form fails where the stage turns between two samples, and a resonance that is damped well rounds corners
+    as well. Forms deviate by so much; where the lead is plain, the richer form is seen for what it is.
+    """
+    worse = other.score - best.score
+    return (
+        len(other.names) == len(best.names)
+        and other.free < best.free
+        and worse < min(PLAIN, SMALL_SHARE**2 * (nothing.score - best.score))
+        and _imitation(problem, other, best, best.sigma_mm).score < INDISTINGUISHABLE
+    )
+
+
+def _least_refuted(distance: float) -> float:
+    """Chi-square by which an explanation must come out worse than another before the data refute that it is true.
+
+    If it is, the other leaves `distance` more than it, with a standard deviation of 2 sqrt(distance) (Cox 1961). Two
+    that these data could tell apart are both kept where the data happen to speak for neither.
+    """
+    return -distance + SURELY * 2.0 * float(np.sqrt(distance)) + SPARE
+
+
+def _imitation(problem: Problem, truth: Explanation, other: Explanation, sigma_mm: tuple[float, ...]) -> Explanation:
+    """Fit one explanation to what another predicts; the score is D_jk, the squared whitened distance that remains.
+
+    Both directions count run offsets with the best explanation's spread: a worse one would hide its fault in them.
+    """
+    target = problem.whitened(truth.values)
+    return fit(problem, other.names, other.values, target=target, sigma_mm=sigma_mm, iterations=12)
+
+
+def beside_foretold(problem: Problem, members: list[Explanation]) -> list[Explanation]:
+    """Drop what only imitates an effect that came just as the drawing foretells it: that would be a coincidence.
+
+    An end stop at the very input at which the drawn fingers meet is the drawn fingers' contact.
+    """
+
+    def foretold(explanation: Explanation, name: str) -> bool:
+        ranges, values = problem.effects[name].foretold, explanation.values[name]
+        return bool(ranges) and all(low <= values[key] <= high for key, (low, high) in ranges.items())
+
+    def imitates(other: Explanation, member: Explanation) -> bool:
+        own, theirs = set(member.names) - set(other.names), set(other.names) - set(member.names)
+        return (
+            bool(own and theirs)
+            and len(member.names) <= len(other.names)
+            and all(foretold(member, name) for name in own)
+            and not any(foretold(other, name) for name in theirs)
+        )
+
+    return [other for other in members if not any(imitates(other, member) for member in members)]
+
+
+def odds(problem: Problem, explanation: Explanation, rows: int) -> float:
+    """-2 log of the posterior odds: BIC, the parameters' surprise, and the price of having had a choice."""
+    return explanation.bic(rows) + surprise(problem, explanation) + choices(problem, explanation)
+
+
+def choices(problem: Problem, explanation: Explanation) -> float:
+    """-2 log of the prior share of one explanation among all of as many effects.
+
+    There are so many more pairs than single effects that some pair fits well by chance; all numbers of effects are
+    taken for equally likely beforehand (extended BIC, Chen & Chen 2008).
+    """
+    return 2.0 * float(np.log(comb(len(problem.effects), len(explanation.names))))
+
+
+def surprise(problem: Problem, explanation: Explanation) -> float:
+    """-2 log of the physical priors' density at the parameters over that at their middle."""
+    return sum(
+        (FREEDOM + 1.0) * float(np.log1p(((value - (p.neutral or 0.0)) / p.typical) ** 2 / FREEDOM))
+        for name, p in problem.parameters(explanation.names)
+        if p.typical is not None
+        for value in [explanation.values[name][p.name]]
+    )

@@ -1,0 +1,54 @@
+"""Disagreement on runs that the fit did not see, and on those that it saw."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from fingervision.diagnosis.inference.hypothesis_fit import Explanation, Problem, fit
+from fingervision.diagnosis.input.observations import BenchData
+from fingervision.diagnosis.noise.whitening import RunOffsets
+from fingervision.domain.effect import Array
+
+
+def rms_mm(residual_mm: Array, samples: int, edges: bool) -> float:
+    """RMS over left and right where both exist, else over the gap; the midline's constant removed.
+
+    Parameters
+    ----------
+    residual_mm : ndarray of float, shape (channels * samples,)
+        Gap, then midline.
+    samples : int
+        Rows of one channel.
+    edges : bool
+        Whether the second channel is the midline.
+    """
+    gap = residual_mm[:samples]
+    if not edges:
+        return float(np.sqrt(np.mean(gap**2)))
+    midline = residual_mm[samples : 2 * samples]
+    midline = midline - np.mean(midline)
+    return float(np.sqrt(np.mean(0.25 * gap**2 + midline**2)))
+
+
+def unseen_rms_mm(bench: BenchData, problem: Problem, best: Explanation) -> tuple[float | None, float | None]:
+    """Leave each run out of the fit in turn and predict it; before and after, None with one run."""
+    history = bench.chain.history
+    n, channels = history.input_mm.size, len(bench.channels)
+    if len(history.runs) < 2:
+        return None, None
+    before = bench.stacked_mm - bench.chain.stacked({})
+    after = before.copy()
+    for run in history.runs:
+        if not best.names:
+            break
+        hidden = problem.whitener.aside.copy()
+        for channel in range(channels):
+            hidden[channel * n + run.start : channel * n + run.stop] = True
+        whitener = replace(problem.whitener, aside=hidden)
+        rest = replace(problem, whitener=whitener, measured=whitener.one(bench.aim_mm), offsets=RunOffsets.of(whitener))
+        fitted = fit(rest, best.names, best.values, sigma_mm=best.sigma_mm, iterations=6)
+        residual = bench.stacked_mm - bench.chain.stacked(fitted.values)
+        for channel in range(channels):
+            rows = slice(channel * n + run.start, channel * n + run.stop)
+            after[rows] = residual[rows]
+    return rms_mm(before, n, history.both_edges), rms_mm(after, n, history.both_edges)

@@ -1,0 +1,41 @@
+"""What these data would have shown: the smallest size of each effect."""
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from fingervision.diagnosis.inference.hypothesis_fit import Explanation, Problem
+from fingervision.diagnosis.inference.signatures import Signatures
+
+SEEN_SIGMAS = 1.645
+"""Standard deviations above the threshold: nineteen of twenty effects of that size are seen."""
+
+
+def smallest_seen(
+    problem: Problem, atoms: Signatures, nothing: Explanation, thresholds: Mapping[str, float]
+) -> dict[str, dict[str, object]]:
+    """State the size of each effect that this data would have shown."""
+    metric = problem.offsets.metric(nothing.sigma_mm)
+    shared = problem.offsets.design.T @ atoms.columns
+    norm = np.einsum("ij,ij->j", atoms.columns, atoms.columns) - np.einsum("ij,ij->j", shared, metric @ shared)
+    out: dict[str, dict[str, object]] = {}
+    for name in problem.effects:
+        if name not in thresholds:
+            continue
+        needed = float(np.sqrt(thresholds[name])) + SEEN_SIGMAS
+        amplitudes = {p.name: p for _, p in problem.parameters((name,)) if p.neutral is not None}
+        sizes: list[tuple[float, str]] = []
+        for k in (k for k, owner in enumerate(atoms.names) if owner == name and norm[k] > 0.0):
+            grow = atoms.grows[k]
+            if grow is not None:
+                sizes.append((abs(grow[2]) * needed / float(np.sqrt(norm[k])), grow[0]))
+            elif norm[k] > needed**2:
+                sizes += [
+                    (abs(atoms.starts[k][p.name] - (p.neutral or 0.0)), p.name)
+                    for p in amplitudes.values()
+                    if atoms.starts[k][p.name] != p.neutral
+                ]
+        if sizes:
+            size, parameter = min(sizes)
+            out[name] = {"parameter": parameter, "size": size, "unit": amplitudes[parameter].unit}
+    return out

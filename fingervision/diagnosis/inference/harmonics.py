@@ -1,0 +1,67 @@
+"""Overtones: a screw's error has harmonics, which the catalogue's sine has not; small ones are no second name."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from fingervision.diagnosis.inference.hypothesis_fit import Explanation, Problem
+from fingervision.domain.effect import Array
+
+PERIODIC = "encoder_cyclic_error"
+ORDERS = (2, 3)
+LARGEST = 0.25
+"""Share of the first harmonic beyond which another is a cause of its own."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Overtones:
+    """What the named screw's own harmonics may take from what is left.
+
+    Parameters
+    ----------
+    columns : ndarray of float, shape (m, k)
+        Whitened changes of the prediction, sine and cosine of each order.
+    words : str
+        The strongest of them.
+    gain : float
+        Chi-square that they take.
+    """
+
+    columns: Array
+    words: str = ""
+    gain: float = 0.0
+
+
+def overtones(problem: Problem, best: Explanation) -> Overtones:
+    """Fit the harmonics of a named cyclic error; none where they are too large to be its own.
+
+    Parameters
+    ----------
+    problem : Problem
+        Data and observation model.
+    best : Explanation
+        What was named.
+    """
+    none = Overtones(np.zeros((problem.measured.size, 0)))
+    if PERIODIC not in best.names:
+        return none
+    chain, history = problem.chain, problem.chain.history
+    amplitude_mm, period_mm = (best.values[PERIODIC][name] for name in ("amplitude_mm", "period_mm"))
+    base = chain.stacked(best.values)
+    waves = []
+    for order in ORDERS:
+        phase = 2.0 * np.pi * order * history.input_mm / period_mm
+        for wave in (np.sin(phase), np.cos(phase)):
+            moved = replace(history, input_mm=history.input_mm + LARGEST * amplitude_mm * wave)
+            waves.append(replace(chain, history=moved).stacked(best.values) - base)
+    columns = problem.whitener.columns(np.stack(waves, axis=1))[0]
+    metric = problem.offsets.metric(best.sigma_mm)
+    bent = columns - problem.offsets.design @ (metric @ (problem.offsets.design.T @ columns))
+    taken = bent.T @ best.residual
+    share = np.linalg.pinv(columns.T @ bent) @ taken
+    sizes = LARGEST * np.hypot(share[0::2], share[1::2])
+    if np.max(sizes) > LARGEST:
+        return none
+    strongest = int(np.argmax(sizes))
+    words = f"the screw's harmonic of order {ORDERS[strongest]}, {100.0 * sizes[strongest]:.0f} % of its first"
+    return Overtones(columns, words, float(share @ taken))

@@ -1,0 +1,237 @@
+"""Fitting an explanation: effects inside the measuring chain, refitted jointly by generalised least squares."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from fingervision.diagnosis.inference.measuring_chain import MeasuringChain
+from fingervision.diagnosis.noise.whitening import RunOffsets, Whitener
+from fingervision.domain.effect import Array, Effect
+from fingervision.domain.parameter import Parameter
+
+Point = dict[str, dict[str, float]]
+AT_BOUND = 1e-6
+SCANS = ((0.06, 241), (0.012, 13), (0.003, 13), (0.0006, 25))
+"""Relative half-widths, and values, of the scans of a parameter in which the prediction jumps. The first is for a
+thorough search: with a thousand jumps in a record the right size has a basin some ten-thousandths wide."""
+MANY_STEPS = 20
+FORM_SHARE = 0.02
+"""By how much of what an effect changes the catalogue's form of it is typically off."""
+SMALL_SHARE = 0.05
+"""What the catalogue's form leaves over of the truth's is a few per cent of what was explained, no second name."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Explanation:
+    """Effects with their parameters, and how well they explain a target.
+
+    Parameters
+    ----------
+    names : tuple of str
+        Effects, in the order of the chain.
+    values : mapping of str to mapping of str to float
+        Estimates.
+    score : float
+        Chi-square with run offsets allowed for, plus the offsets' own penalty.
+    residual : ndarray of float, shape (m,)
+        Whitened target minus prediction.
+    covariance : ndarray of float, shape (p, p)
+        Of the parameters in their order; zero rows for those at a bound.
+    free : int
+        Parameters that are not at a bound.
+    sigma_mm : tuple of float
+        Spread of the run offsets under this explanation, one a channel.
+    """
+
+    names: tuple[str, ...]
+    values: Mapping[str, Mapping[str, float]]
+    score: float
+    residual: Array
+    covariance: Array
+    free: int
+    sigma_mm: tuple[float, ...]
+
+    def bic(self, samples: int) -> float:
+        """Schwarz's criterion: score plus the price of the free parameters."""
+        return self.score + self.free * float(np.log(samples))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Problem:
+    """Everything an explanation is judged by.
+
+    Parameters
+    ----------
+    chain : MeasuringChain
+        Model and history.
+    measured : ndarray of float, shape (m,)
+        Whitened measurement, channels stacked.
+    whitener, offsets
+        The observation model.
+    effects : mapping of str to Effect
+        Those that the data can show.
+    """
+
+    chain: MeasuringChain
+    measured: Array
+    whitener: Whitener
+    offsets: RunOffsets
+    effects: Mapping[str, Effect]
+
+    def parameters(self, names: tuple[str, ...]) -> list[tuple[str, Parameter]]:
+        """List the parameters of some effects with the bounds that the data leave."""
+        found: list[tuple[str, Parameter]] = []
+        for name in names:
+            searched = self.effects[name].search(self.whitener.history)
+            found += [(name, parameter) for parameter in searched if not isinstance(parameter, str)]
+        return found
+
+    def whitened(self, settings: Mapping[str, Mapping[str, float]]) -> Array:
+        """Predict and whiten; shape (m,)."""
+        return self.whitener.one(self.chain.stacked(settings))
+
+    def score(self, settings: Mapping[str, Mapping[str, float]]) -> float:
+        """Judge parameters as they are: chi-square with the best run offsets, plus those offsets' penalty."""
+        residual = self.measured - self.whitened(settings)
+        sigma, penalty = self.offsets.spread(residual)
+        return self.offsets.squared(residual, self.offsets.metric(sigma)) + penalty
+
+    def cost(self, settings: Mapping[str, Mapping[str, float]]) -> float:
+        """-2 log of the posterior, up to a constant: the score over all spreads of the runs instead of at the best."""
+        residual = self.measured - self.whitened(settings)
+        sigma, penalty = self.offsets.spread(residual)
+        metric = self.offsets.metric(sigma)
+        return self.offsets.squared(residual, metric) + penalty + self.offsets.doubt(residual)
+
+    def nothing(self) -> Explanation:
+        """Judge the model as it is."""
+        residual = self.measured - self.whitened({})
+        sigma, penalty = self.offsets.spread(residual)
+        score = self.offsets.squared(residual, self.offsets.metric(sigma)) + penalty
+        return Explanation((), {}, score, residual, np.zeros((0, 0)), 0, sigma)
+
+
+def fit(
+    problem: Problem,
+    names: tuple[str, ...],
+    start: Mapping[str, Mapping[str, float]],
+    *,
+    target: Array | None = None,
+    sigma_mm: tuple[float, ...] | None = None,
+    iterations: int = 12,
+) -> Explanation:
+    """Fit effects jointly by a bounded Levenberg-Marquardt search (Marquardt 1963).
+
+    Parameters
+    ----------
+    problem : Problem
+        Data and observation model.
+    names : tuple of str
+        Effects.
+    start : mapping
+        Where to begin.
+    target : ndarray of float, shape (m,), or None
+        Whitened curve to explain; None for the measurement.
+    sigma_mm : tuple of float or None
+        Spread of run offsets; None to profile it.
+    iterations : int
+        Steps at most.
+    """
+    aim = problem.measured if target is None else target
+    order = tuple(name for name in problem.effects if name in names)
+    listed = problem.parameters(order)
+    lower = np.array([parameter.lower for _, parameter in listed])
+    upper = np.array([parameter.upper for _, parameter in listed])
+    span = upper - lower
+    x = np.clip(np.array([start[name][parameter.name] for name, parameter in listed]), lower, upper)
+    offsets = problem.offsets
+
+    def settings(at: Array) -> Point:
+        out: Point = {name: {} for name in order}
+        for (name, parameter), value in zip(listed, at, strict=True):
+            out[name][parameter.name] = float(value)
+        return out
+
+    residual = aim - problem.whitened(settings(x))
+    spread = sigma_mm if sigma_mm is not None else offsets.spread(residual)[0]
+    metric = offsets.metric(spread)
+    cost = offsets.squared(residual, metric)
+    damping = 1e-3
+    normal, free = np.zeros((x.size, x.size)), np.ones(x.size, dtype=bool)
+    for step_number in range(iterations):
+        base = problem.chain.stacked(settings(x))
+        columns = np.empty((base.size, x.size))
+        steps = np.maximum(1e-4 * np.abs(x), 1e-6 * np.minimum(span, 10.0 * np.abs(x) + 1e-2))
+        for i in range(x.size):
+            step = steps[i] if x[i] + steps[i] <= upper[i] else -steps[i]
+            moved = x.copy()
+            moved[i] += step
+            columns[:, i] = (problem.chain.stacked(settings(moved)) - base) / step
+        jacobian = problem.whitener.columns(columns)[0]
+        shared = offsets.design.T @ jacobian
+        normal = jacobian.T @ jacobian - shared.T @ metric @ shared
+        gradient = jacobian.T @ residual - shared.T @ metric @ (offsets.design.T @ residual)
+        low, high = x <= lower + AT_BOUND * span, x >= upper - AT_BOUND * span
+        free = ~((low & (gradient <= 0.0)) | (high & (gradient >= 0.0))) & (np.diag(normal) > 1e-12)
+        if not free.any():
+            break
+        part = normal[np.ix_(free, free)]
+        gained = 0.0
+        for _ in range(5):
+            trial = x.copy()
+            trial[free] += np.linalg.lstsq(part + damping * np.diag(np.diag(part)), gradient[free], rcond=1e-12)[0]
+            trial = np.clip(trial, lower, upper)
+            rest = aim - problem.whitened(settings(trial))
+            new = offsets.squared(rest, metric)
+            if new < cost:
+                gained = cost - new
+                x, residual, cost, damping = trial, rest, new, max(damping / 10.0, 1e-7)
+                break
+            damping *= 8.0
+        if sigma_mm is None and len(problem.chain.history.runs) > 1:
+            spread = offsets.spread(residual)[0]
+            metric = offsets.metric(spread)
+            cost = offsets.squared(residual, metric)
+        if gained < 0.02 + 1e-5 * cost and step_number > 0:
+            break
+    thorough = iterations >= MANY_STEPS
+    for i, (_, parameter) in enumerate(listed):
+        for width, count in SCANS[not thorough :] if parameter.rugged else ():
+            for value in np.clip(x[i] * (1.0 + width * np.linspace(-1.0, 1.0, count)), lower[i], upper[i]):
+                trial = x.copy()
+                trial[i] = value
+                rest = aim - problem.whitened(settings(trial))
+                new = offsets.squared(rest, metric)
+                if new < cost:
+                    x, residual, cost = trial, rest, new
+    penalty = 0.0
+    if sigma_mm is None:
+        spread, penalty = offsets.spread(residual)
+        cost = offsets.squared(residual, offsets.metric(spread))
+    covariance = np.zeros_like(normal)
+    if free.any():
+        covariance[np.ix_(free, free)] = np.linalg.pinv(normal[np.ix_(free, free)])
+    return Explanation(order, settings(x), cost + penalty, residual, covariance, int(free.sum()), spread)
+
+
+def scan(
+    problem: Problem, base: Explanation, name: str, starts: Sequence[Mapping[str, float]]
+) -> tuple[dict[str, float], float]:
+    """Try one more effect beside an explanation as it stands.
+
+    Returns
+    -------
+    start : dict
+        The best of `starts`.
+    score : float
+        With it, without any refit.
+    """
+    predicted = [problem.chain.stacked({**base.values, name: start}) for start in starts]
+    residual = problem.measured[:, None] - problem.whitener.columns(np.stack(predicted, axis=1))[0]
+    shared = problem.offsets.design.T @ residual
+    metric = problem.offsets.metric(base.sigma_mm)
+    length = np.einsum("ij,ij->j", residual, residual) - np.einsum("ij,ij->j", shared, metric @ shared)
+    best = int(np.argmin(length))
+    before = problem.offsets.squared(base.residual, metric)
+    return dict(starts[best]), base.score - before + float(length[best])

@@ -1,0 +1,124 @@
+"""The gate of *unknown*: structure that the best explanation leaves, found by generic probes."""
+
+import numpy as np
+
+from fingervision.diagnosis.inference.ambiguity_set import choices
+from fingervision.diagnosis.inference.harmonics import overtones
+from fingervision.diagnosis.inference.hypothesis_fit import MANY_STEPS, SMALL_SHARE, Explanation, Problem, fit
+from fingervision.diagnosis.inference.null_bootstrap import FEWEST, jumps_astray, linear_thresholds, noise_alone, rare
+from fingervision.diagnosis.inference.probe_basis import Probes, probes
+from fingervision.diagnosis.inference.signatures import tangents
+from fingervision.diagnosis.input.input_uncertainty import below_the_input
+from fingervision.domain.effect import Array
+
+LONG = 4000
+"""Samples above which fewer probes must do."""
+VERY_STRONG = 10.0
+"""Evidence on the scale of BIC (Kass & Raftery 1995)."""
+STAND_INS = 2
+"""Probes that may take the place of several effects: a bump's width lies between two of the grid."""
+
+
+def shapes_of(problem: Problem) -> Probes:
+    """Build the probes for a problem; fewer for a long record."""
+    history = problem.chain.history
+    return probes(history, problem.whitener, 2400 if history.input_mm.size <= LONG else 800)
+
+
+def _gains(problem: Problem, columns: Array, found: Explanation, taken: Array) -> tuple[Array, Array, Array]:
+    """Chi-square that each column takes from what an explanation and the columns already taken leave.
+
+    Returns
+    -------
+    gain, dot, norm : ndarray of float, shape (k,)
+        `dot / norm` is the column's coefficient; both are zero where nothing new is left of the column.
+    """
+    offsets, metric = problem.offsets, problem.offsets.metric(found.sigma_mm)
+    moved = columns - offsets.design @ (metric @ (offsets.design.T @ columns))
+    dot = moved.T @ found.residual
+    norm = np.einsum("ij,ij->j", columns, moved)
+    moves = np.hstack([tangents(problem, found), taken]) if found.names else taken
+    if moves.shape[1]:
+        bent = moves - offsets.design @ (metric @ (offsets.design.T @ moves))
+        cross = bent.T @ columns
+        inverse = np.linalg.pinv(moves.T @ bent)
+        dot = dot - cross.T @ (inverse @ (bent.T @ found.residual))
+        norm = norm - np.einsum("ij,ij->j", cross, inverse @ cross)
+    usable = norm > 1e-3 * np.maximum(np.einsum("ij,ij->j", columns, columns), 1e-12)
+    dot, norm = np.where(usable, dot, 0.0), np.where(usable, norm, 0.0)
+    return np.where(usable, dot**2 / np.where(usable, norm, 1.0), 0.0), dot, norm
+
+
+def _explained(problem: Problem, found: Explanation) -> float:
+    """Squared whitened length of what an explanation changes; what offsets of the runs undo again does not count."""
+    changed = problem.whitened(found.values) - problem.whitened({})
+    return problem.offsets.squared(changed, problem.offsets.metric(found.sigma_mm))
+
+
+def imitated(problem: Problem, shapes: Probes, found: Explanation, fewer: list[Explanation]) -> str | None:
+    """What effects only imitate, in words; None where they are the reason themselves.
+
+    Three effects bend to almost anything, and have to explain the data far better than generic shapes do; one or two
+    are imitations only where the shapes are far better, by more than their own form may be off.
+
+    Parameters
+    ----------
+    found : Explanation
+        The effects.
+    fewer : list of Explanation
+        Explanations of fewer effects, beside which one or two shapes are tried, each at the price of its amplitude and
+        of the choice among all shapes (`choices`).
+    """
+    columns, rows = shapes.columns, int(problem.measured.size)
+    each = float(np.log(rows)) + 2.0 * float(np.log(columns.shape[1]))
+    several = len(found.names) > 2
+    ahead = VERY_STRONG if several else -max(VERY_STRONG, SMALL_SHARE**2 * _explained(problem, found))
+    least = found.bic(rows) + choices(problem, found) + ahead
+    best = None
+    for base in fewer:
+        taken = np.zeros((rows, 0))
+        cost = base.bic(rows) + choices(problem, base)
+        words: list[str] = []
+        for _ in range(STAND_INS):
+            gain = _gains(problem, columns, base, taken)[0]
+            top = int(np.argmax(gain))
+            taken = np.hstack([taken, columns[:, top : top + 1]])
+            words.append(f"{shapes.words[top]} ({np.sqrt(gain[top]):.1f} sigma)")
+            cost += each - float(gain[top])
+            if cost < least:
+                least, best = cost, " and ".join(words)
+    return best
+
+
+def _of_jumps_astray(problem: Problem, columns: Array, best: Explanation, rng: np.random.Generator) -> float:
+    """Give the largest gain of a probe where the recorded input's errors alone move the jumps."""
+    most = []
+    for _ in range(FEWEST):
+        shaken, target = noise_alone(problem, best, rng)
+        alone = fit(shaken, best.names, best.values, target=target, iterations=MANY_STEPS)
+        gains = _gains(shaken, columns, alone, np.zeros((target.size, 0)))[0]
+        most.append(float(np.max(gains)))
+    return rare(most)
+
+
+def unexplained(
+    problem: Problem, shapes: Probes, best: Explanation, rng: np.random.Generator
+) -> tuple[str | None, str | None]:
+    """Test the largest of many probes; returns what is unknown, or what is left over but small."""
+    own = overtones(problem, best)
+    gain, dot, norm = _gains(problem, shapes.columns, best, own.columns)
+    usable = norm > 0.0
+    family = ("probe",) * int(usable.sum())
+    threshold = linear_thresholds(problem, family, shapes.columns[:, usable], best.sigma_mm, rng).get("probe", np.inf)
+    top = int(np.argmax(gain))
+    if gain[top] > threshold and jumps_astray(problem, best.names):
+        threshold = max(threshold, _of_jumps_astray(problem, shapes.columns, best, rng))
+    if gain[top] <= threshold:
+        return None, own.words if own.gain > threshold else None
+    words = f"{shapes.words[top]} ({np.sqrt(gain[top]):.1f} sigma)"
+    size_mm = abs(float(dot[top])) / float(norm[top]) * shapes.rms[top]
+    if below_the_input(problem, size_mm):
+        return None, words
+    if best.names and gain[top] < SMALL_SHARE**2 * _explained(problem, best):
+        return None, words
+    return words, None

@@ -1,0 +1,212 @@
+"""How much one more effect gains from noise alone: draws of the null, refitted as the data are."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+from scipy.signal import lfilter
+
+from fingervision.diagnosis.inference.hypothesis_fit import MANY_STEPS, Explanation, Problem, fit
+from fingervision.diagnosis.inference.signatures import Signatures, tangents
+from fingervision.domain.effect import Array
+
+QUANTILE = 0.98
+DRAWS, LONG_DRAWS, FEWEST = 40, 20, 10
+SURELY = 3.0
+"""Standard errors of the quantile beyond which no further draw would change the answer."""
+LONG = 6000
+"""Samples above which fewer draws must do."""
+OWN_QUANTILE = 0.95
+"""Of what one family takes from noise: as far out as so many draws tell."""
+LINEAR_DRAWS = 300
+REFIT_MARGIN = 0.2
+"""Share at most by which the threshold of linear signatures is raised for all that refitting finds between them."""
+REFITTED = 2
+"""Effects of each draw that are refitted: those whose signatures take the most of it."""
+GUMBEL = float(-np.log(-np.log(QUANTILE)) - np.euler_gamma) * float(np.sqrt(6.0)) / float(np.pi)
+"""Standard deviations from the mean of a maximum's distribution (Gumbel 1958) to its quantile."""
+
+
+def noise_doubt(problem: Problem) -> float:
+    """Relative standard uncertainty of the noise's power where it is slow, of the channel that is known worst.
+
+    The power at zero frequency goes with (1 + rho) / (1 - rho), and an autoregression knows rho to
+    sqrt((1 - rho^2) / n): together 2 / sqrt((1 - rho^2) n). A spectrum that is fitted without its slowest part knows
+    the power there worse (`noise_by_spectrum`).
+    """
+    rows = max(2, problem.chain.history.input_mm.size - 2)
+    parts = []
+    for noise in problem.whitener.noises:
+        share = noise.correlated_mm**2 / noise.total_mm**2
+        rho = noise.correlation
+        parts.append((2.0 + share * 4.0 * rho**2 / (1.0 - rho**2)) / rows + noise.slow_doubt**2)
+    return float(np.sqrt(max(parts)))
+
+
+def linear_thresholds(
+    problem: Problem, names: tuple[str, ...], columns: Array, sigma: tuple[float, ...], rng: np.random.Generator
+) -> dict[str, float]:
+    """Gains above which noise alone lifts any family's best column once in so many tables.
+
+    A family of many shapes takes more from noise than a single column does; under one threshold for all it would be
+    raised for all. So each family is measured against its own upper tail, and the largest excess of all is what must be
+    rare: the families have equal shares in the false claims (Beran 1988).
+
+    Parameters
+    ----------
+    names : tuple of str, length k
+        Family of each column.
+    columns : ndarray of float, shape (m, k)
+        Whitened signatures or probes.
+    sigma : tuple of float
+        Spread of the run offsets, one a channel.
+    """
+    offsets, metric = problem.offsets, problem.offsets.metric(sigma)
+    kept = columns if columns.shape[0] <= 6000 else columns[:: columns.shape[0] // 4000]
+    noise = rng.standard_normal((kept.shape[0], LINEAR_DRAWS))
+    if kept.shape[0] == columns.shape[0]:
+        shared = offsets.design.T @ columns
+        prior = np.array([sigma[c] for c in range(offsets.channels) for _ in range(offsets.runs)])
+        noise += offsets.design[:, : prior.size] @ (prior[:, None] * rng.standard_normal((prior.size, LINEAR_DRAWS)))
+        noise -= offsets.design @ (metric @ (offsets.design.T @ noise))
+        norm = np.einsum("ij,ij->j", columns, columns) - np.einsum("ij,ij->j", shared, metric @ shared)
+    else:
+        norm = np.einsum("ij,ij->j", kept, kept)
+    usable = norm > 1e-9
+    owner = np.array(names)
+    # The noise itself is estimated, from as many samples as there are.
+    doubt = np.exp(noise_doubt(problem) * rng.standard_normal(LINEAR_DRAWS))
+    margin = 1.0 + min(REFIT_MARGIN, 3.0 * float(np.sqrt(2.0 / columns.shape[0])))
+    tail, excess = {}, np.full(LINEAR_DRAWS, -np.inf)
+    for name in dict.fromkeys(names):
+        mine = usable & (owner == name)
+        if not mine.any():
+            continue
+        gains = np.max((kept.T[mine] @ noise) ** 2 / norm[mine, None], axis=0) * doubt
+        # Refitting finds what lies between the shapes of the grid; a single column has no shape.
+        gains = gains * margin + 1.5 if mine.sum() > 1 else gains
+        tail[name] = float(np.quantile(gains, OWN_QUANTILE))
+        excess = np.maximum(excess, gains - tail[name])
+    beyond = float(np.quantile(excess, QUANTILE))
+    return {name: own + beyond for name, own in tail.items()}
+
+
+def noise_alone(problem: Problem, base: Explanation, rng: np.random.Generator) -> tuple[Problem, Array]:
+    """Draw a measurement in which `base` is the whole truth.
+
+    Returns
+    -------
+    shaken : Problem
+        With a recorded input that holds other errors. They are in the input that every effect acts on, so that some
+        effects seem to take them out again: a delay of part of a sample averages two of them, a stop cuts the largest.
+    target : ndarray of float, shape (m,)
+        Whitened measurement.
+    """
+    offsets, whitener = problem.offsets, problem.whitener
+    truth = problem.whitened(base.values)
+    spread = np.repeat(base.sigma_mm, offsets.runs) * rng.standard_normal(offsets.channels * offsets.runs)
+    truth = truth + offsets.design[:, : spread.size] @ spread
+    if not (whitener.passing_mm.any() or whitener.input_mm.any()):
+        noise = np.where(whitener.aside, 0.0, rng.standard_normal(problem.measured.size))
+        return problem, np.asarray(truth + noise)
+    history, samples = problem.chain.history, problem.chain.history.input_mm.size
+    reach = 1e-3 * history.input_span_mm
+    ends = [replace(history, input_mm=history.input_mm + way) for way in (-reach, reach)]
+    low, high = (replace(problem.chain, history=end).stacked(base.values)[:samples] for end in ends)
+    slope = np.maximum(np.abs(high - low) / (2.0 * reach), 1e-9)
+    stays = float(np.exp(-2.0 / max(whitener.input_samples, 0.04)))
+    staying = np.concatenate([_autoregression(stays, run.stop - run.start, rng) for run in history.runs])
+    error = (whitener.passing_mm * rng.standard_normal(samples) + whitener.input_mm * staying) / slope
+    shaken = replace(history, input_mm=history.input_mm + error)
+    noise = whitener.one(_of_pictures(problem, rng))
+    return replace(problem, chain=replace(problem.chain, history=shaken)), np.asarray(truth + noise)
+
+
+def jumps_astray(problem: Problem, names: tuple[str, ...]) -> bool:
+    """Whether an explanation jumps at inputs that are not known well: one jump moves, and with it all that follow."""
+    unsure = problem.whitener.passing_mm.any() or problem.whitener.input_mm.any()
+    return bool(unsure) and any(parameter.rugged for _, parameter in problem.parameters(names))
+
+
+def rare(values: Sequence[float]) -> float:
+    """Estimate the quantile of a maximum that is exceeded once in 50 draws, from a few."""
+    return float(np.mean(values)) + GUMBEL * float(np.std(values))
+
+
+def _of_pictures(problem: Problem, rng: np.random.Generator) -> Array:
+    """Draw the noise of the pictures alone, channels stacked; shape (m,), in mm."""
+    out = []
+    for noise in problem.whitener.noises:
+        for run in problem.chain.history.runs:
+            count = run.stop - run.start
+            white = noise.white_mm * rng.standard_normal(count)
+            out.append(white + noise.correlated_mm * _autoregression(noise.correlation, count, rng))
+    return np.concatenate(out)
+
+
+def _autoregression(phi: float, count: int, rng: np.random.Generator) -> Array:
+    """First-order autoregression of unit variance; shape (count,)."""
+    start = phi * rng.standard_normal(1)
+    shocks = np.sqrt(1.0 - phi**2) * rng.standard_normal(count)
+    return np.asarray(lfilter([1.0], [1.0, -phi], shocks, zi=start)[0], dtype=np.float64)
+
+
+def price(thresholds: Mapping[str, float], base: Explanation, names: tuple[str, ...]) -> float:
+    """What more effects than `base` has must gain at least; what offsets of the runs imitate wholly never can."""
+    return max(thresholds.get(name, np.inf) for name in names if name not in base.names)
+
+
+def exceeds_noise(
+    excess: float,
+    problem: Problem,
+    atoms: Signatures,
+    thresholds: Mapping[str, float],
+    base: Explanation,
+    suspects: list[dict[str, Mapping[str, float]]],
+    rng: np.random.Generator,
+) -> bool:
+    """Whether an excess over the thresholds is above the quantile of what any further effect has where there is none.
+
+    Linear signatures on their grid of shapes take less from noise than the refitted effects do: a period finds its
+    best place between two of the grid, an end stop the samples that it suits. So each draw is fitted with `base`,
+    extended by the likeliest effects, and refitted, as the measurement was. `suspects` are what the measurement itself
+    speaks for, with parameters: they are tried on every draw.
+    """
+    owner = np.array(atoms.names)
+    asking = np.array([thresholds.get(name, np.inf) for name in atoms.names])
+    found: list[float] = []
+    quantile = 0.0
+    doubt = noise_doubt(problem)
+    # Jumps that went astray have to be found again as thoroughly as the measurement's were.
+    astray = jumps_astray(problem, base.names)
+    steps, draws = (MANY_STEPS, FEWEST) if astray else (5, DRAWS)
+    for _ in range(draws if problem.chain.history.input_mm.size <= LONG else min(draws, LONG_DRAWS)):
+        shaken, target = noise_alone(problem, base, rng)
+        alone = fit(shaken, base.names, base.values, target=target, iterations=steps)
+        along = tangents(problem, alone) if alone.names else None
+        gain, coefficient = atoms.gains(alone.residual, problem.offsets, problem.offsets.metric(alone.sigma_mm), along)
+        above = np.where((gain > 0.0) & ~np.isin(owner, base.names), gain - asking, -np.inf)
+        starts = [{**alone.values, **suspect} for suspect in suspects]
+        asked = [name for suspect in suspects for name in suspect]
+        for _ in range(len(asked) + REFITTED):
+            # What the measurement speaks for first, wherever it suits this draw; then what suits the draw best.
+            among = owner == asked.pop(0) if asked else np.ones(owner.size, dtype=bool)
+            top = int(np.argmax(np.where(among, above, -np.inf)))
+            if np.isfinite(above[top]) and among[top]:
+                name = atoms.names[top]
+                starts.append({**alone.values, name: atoms.begin(top, float(coefficient[top]))})
+                above[owner == name] = -np.inf
+        # What jumps leave that went astray is noise of a level of its own, in the measurement and in every draw.
+        luck = base.score / alone.score if astray else float(np.exp(doubt * rng.standard_normal()))
+        fits = [fit(shaken, tuple(start), start, target=target, iterations=6) for start in starts]
+        found.append(
+            max(max(0.0, alone.score - e.score) * luck - price(thresholds, base, e.names) for e in fits)
+            if fits
+            else -min(thresholds.values(), default=0.0)
+        )
+        quantile = rare(found)
+        # The quantile's own error is that of a mean and of GUMBEL standard deviations together.
+        error = float(np.std(found)) * float(np.sqrt((1.0 + 0.5 * GUMBEL**2) / len(found)))
+        if len(found) >= FEWEST and abs(excess - quantile) > SURELY * error:
+            break
+    return excess > max(quantile, 0.0)

@@ -1,0 +1,190 @@
+"""What the data leave open about an explanation's parameters: draws from their posterior within the bounds."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from fingervision.diagnosis.inference.hypothesis_fit import FORM_SHARE, Explanation, Point, Problem
+from fingervision.diagnosis.inference.null_bootstrap import noise_doubt
+from fingervision.domain.effect import Array
+from fingervision.domain.parameter import Parameter
+
+EVALUATED = 1e6
+"""Samples that a whole walk may predict: a long table's likelihood is close to a normal one and needs few steps."""
+LEAST_STEPS, MOST_STEPS = 200, 1200
+LEARNT = 150
+"""After so many steps the local walk takes its widths from where it has been (Haario, Saksman & Tamminen 2001)."""
+FREEDOM = 5.0
+"""Degrees of freedom of the independent proposals: tails that the posterior's do not outreach."""
+SCALES = (0.02, 0.1, 0.4, 1.2)
+"""Steps of the local walk over the curvature's widths: one of them suits where the curvature misleads."""
+JUMPS = 0.01
+"""Relative width that the walk begins with where the prediction jumps."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Coordinates:
+    """Where the walk goes: reciprocals of reaches and periods, logarithms of times, else the parameters themselves.
+
+    In these a likelihood that is long and bent in the parameters is nearly a parabola.
+    """
+
+    listed: tuple[tuple[str, Parameter], ...]
+
+    def of(self, values: Mapping[str, Mapping[str, float]]) -> Array:
+        """Parameters to coordinates; shape (p,)."""
+        return np.array([_forth(parameter, values[name][parameter.name]) for name, parameter in self.listed])
+
+    def at(self, coordinates: Array) -> Point:
+        """Coordinates to parameters, held within the bounds."""
+        out: Point = {}
+        for (name, parameter), x in zip(self.listed, coordinates, strict=True):
+            value = _back(parameter, float(x))
+            out.setdefault(name, {})[parameter.name] = float(np.clip(value, parameter.lower, parameter.upper))
+        return out
+
+    @property
+    def bounds(self) -> tuple[Array, Array]:
+        """Lower and upper, each of shape (p,)."""
+        ends = [sorted((_forth(p, p.lower), _forth(p, p.upper))) for _, p in self.listed]
+        return np.array([low for low, _ in ends]), np.array([high for _, high in ends])
+
+
+def _forth(parameter: Parameter, value: float) -> float:
+    if parameter.lower > 0.0 and parameter.reciprocal:
+        return 1.0 / value
+    if parameter.lower > 0.0 and parameter.logarithmic:
+        return float(np.log(value))
+    return value
+
+
+def _back(parameter: Parameter, x: float) -> float:
+    if parameter.lower > 0.0 and parameter.reciprocal:
+        return 1.0 / max(x, 1e-300)
+    if parameter.lower > 0.0 and parameter.logarithmic:
+        return float(np.exp(x))
+    return x
+
+
+def _curvature(problem: Problem, explanation: Explanation, walk: _Coordinates, best: Array, step: Array) -> Array:
+    """Half the score's second derivatives, shape (p, p), from differences of the prediction over `step`."""
+    upper = walk.bounds[1]
+    base = problem.whitened(explanation.values)
+    columns = []
+    for i in range(best.size):
+        moved = best.copy()
+        moved[i] += step[i] if best[i] + step[i] <= upper[i] else -step[i]
+        columns.append((problem.whitened(walk.at(moved)) - base) / (moved[i] - best[i]))
+    jacobian = np.stack(columns, axis=1)
+    shared = problem.offsets.design.T @ jacobian
+    return np.asarray(jacobian.T @ jacobian - shared.T @ problem.offsets.metric(explanation.sigma_mm) @ shared)
+
+
+def _widths(problem: Problem, explanation: Explanation, walk: _Coordinates, best: Array) -> Array:
+    """Covariance of the curvature within the bounds, shape (p, p): the scale of the walk's steps."""
+    lower, upper = walk.bounds
+    span = upper - lower
+    rugged = np.array([parameter.rugged for _, parameter in walk.listed])
+    step = np.maximum(1e-4 * np.abs(best), 1e-6 * span)
+    covariance = np.diag(span**2)
+    for _ in range(2):
+        # The difference is taken again over the width that it gave: a play's prediction is no smooth function.
+        normal = _curvature(problem, explanation, walk, best, step) + np.diag(1.0 / span**2)
+        covariance = np.asarray(np.linalg.inv(normal), dtype=np.float64)
+        step = np.clip(np.sqrt(np.diag(covariance)), 1e-9 * span, 0.1 * span)
+    # What jumps has no derivative; the walk has to find its width from a hundredth of its size downwards.
+    covariance[rugged] = 0.0
+    covariance[:, rugged] = 0.0
+    covariance[rugged, rugged] = (JUMPS * best[rugged]) ** 2
+    return covariance
+
+
+def draws(problem: Problem, explanation: Explanation, rng: np.random.Generator) -> tuple[Point, ...]:
+    """Walk through the posterior under flat priors within the bounds (Metropolis et al. 1953; Tierney 1994).
+
+    Curvature at the best fit knows neither the bounds nor likelihoods that are not parabolas: a fraction at zero is
+    not known exactly, and the size of a jump has no derivative at all. Independent proposals from the curvature take
+    turns with local steps of several sizes, so that either kind is reached. The walk goes over all spreads of the runs'
+    offsets, and over all levels of the noise, which is no better known than `noise_doubt` says: that gives the
+    posterior Student's tails (Box & Tiao 1973).
+
+    Returns
+    -------
+    tuple of dict
+        Parameters, as an explanation's `values`.
+    """
+    walk = _Coordinates(tuple(problem.parameters(explanation.names)))
+    best = walk.of(explanation.values)
+    lower, upper = walk.bounds
+    covariance = _widths(problem, explanation, walk, best)
+    root = np.linalg.cholesky(covariance + 1e-12 * np.diag(np.diag(covariance)))
+    inverse = np.linalg.inv(root)
+
+    def far(at: Array) -> float:
+        """Log of the independent proposals' density, up to a constant."""
+        z = inverse @ (at - best)
+        return -0.5 * (FREEDOM + best.size) * float(np.log1p(z @ z / FREEDOM))
+
+    level = 2.0 / noise_doubt(problem) ** 2
+    least = problem.cost(explanation.values)
+
+    def cost(at: Array) -> float:
+        return level * float(np.log1p(max((problem.cost(walk.at(at)) - least) / level, -0.5)))
+
+    now, score = best, 0.0
+    kept: list[Array] = []
+    local = root
+    for count in range(int(np.clip(EVALUATED / problem.chain.history.input_mm.size, LEAST_STEPS, MOST_STEPS))):
+        ahead, alone = rng.standard_normal(best.size), bool(count % 2)
+        if count and count % LEARNT == 0:
+            seen = np.atleast_2d(np.cov(np.array(kept).T))
+            local = np.linalg.cholesky(seen + 1e-4 * np.diag(np.diag(covariance)))
+        if alone:
+            trial = best + root @ ahead / np.sqrt(rng.chisquare(FREEDOM) / FREEDOM)
+        else:
+            trial = now + SCALES[int(rng.integers(len(SCALES)))] * 2.4 / np.sqrt(best.size) * (local @ ahead)
+        luck = np.log(rng.random())
+        if np.all(trial >= lower) and np.all(trial <= upper):
+            new = cost(trial)
+            if luck < 0.5 * (score - new) + (far(now) - far(trial) if alone else 0.0):
+                now, score = trial, new
+        kept.append(now)
+    return tuple(walk.at(at) for at in kept)
+
+
+def settled(
+    problem: Problem, explanation: Explanation, rng: np.random.Generator
+) -> tuple[Explanation, tuple[Point, ...]]:
+    """Give an explanation the spread of its posterior, and where the best fit lies at a bound also its middle.
+
+    A best fit at a bound is a corner of what the data allow: the middle predicts better.
+
+    Returns
+    -------
+    explanation : Explanation
+        Its covariance is the mean square of the draws about its values. The form of an effect is off by `FORM_SHARE`,
+        in as many independent shapes as the catalogue tells apart: so much noise besides. The size of a jump is known
+        no better than the recorded input in which it is seen.
+    found : tuple of dict
+        The draws.
+    """
+    if not explanation.names:
+        return explanation, ({},)
+    found = draws(problem, explanation, rng)
+    walk = _Coordinates(tuple(problem.parameters(explanation.names)))
+    values, score = explanation.values, explanation.score
+    if explanation.free < len(walk.listed):
+        middle = walk.at(np.mean([walk.of(point) for point in found], axis=0))
+        worse = problem.score(middle)
+        if worse - score < len(walk.listed):
+            values, score = middle, worse
+    rows = [[point[name][p.name] - values[name][p.name] for name, p in walk.listed] for point in found]
+    away = np.array(rows)
+    residual = problem.measured - problem.whitened(values)
+    covariance = away.T @ away / len(found)
+    explained = max(0.0, problem.cost({}) - problem.cost(values))
+    covariance *= 1.0 + FORM_SHARE**2 * explained / len(problem.effects)
+    rugged = np.array([parameter.rugged for _, parameter in walk.listed])
+    covariance[rugged, rugged] += problem.chain.history.input_sigma_mm**2
+    return replace(explanation, values=values, score=score, residual=residual, covariance=covariance), found

@@ -1,0 +1,108 @@
+"""Probes: generic shapes that no catalogue names, for structure that no effect explains."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from fingervision.diagnosis.noise.whitening import Whitener
+from fingervision.domain.effect import Array, History
+
+SPAN = 5
+"""Samples over which a speed is taken."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Probes:
+    """Whitened unit shapes and what each would be called; columns of shape (m, k), RMS before whitening."""
+
+    words: tuple[str, ...]
+    columns: Array
+    rms: Array
+
+
+def _speed(input_mm: Array, time_s: Array) -> Array:
+    """Slope over `SPAN` samples: neighbours' differences hold the input's errors, which the residual holds too."""
+    if input_mm.size <= SPAN:
+        return np.full(input_mm.size, float(np.ptp(input_mm)) / max(float(np.ptp(time_s)), 1e-9))
+    ahead = np.minimum(np.arange(input_mm.size) + SPAN // 2 + 1, input_mm.size - 1)
+    behind = np.maximum(np.arange(input_mm.size) - SPAN // 2 - 1, 0)
+    around = np.stack([input_mm[ahead], input_mm[np.maximum(ahead - 1, 0)]]).mean(axis=0)
+    back = np.stack([input_mm[behind], input_mm[np.minimum(behind + 1, input_mm.size - 1)]]).mean(axis=0)
+    return np.asarray((around - back) / (time_s[ahead] - time_s[behind]), dtype=np.float64)
+
+
+def probes(history: History, whitener: Whitener, most: int) -> Probes:
+    """Build steps, bumps, waves and slopes over time and input, direction and run; in gap, midline, left and right.
+
+    Parameters
+    ----------
+    most : int
+        Columns at most; finer shapes are thinned out beyond it.
+    """
+    n, u = history.input_mm.size, history.input_mm
+    shapes: list[tuple[str, Array]] = []
+    low, span = float(u.min()), history.input_span_mm
+    fine = max(6, min(40, n // 8))
+    places = 2 - int(np.floor(np.log10(span)))
+    for k in range(1, fine):
+        at = low + span * k / fine
+        there = f"input {round(at, places):.3g} mm"
+        shapes.append((f"a step at {there}", (u > at).astype(float)))
+        shapes.append((f"a kink at {there}", np.maximum(u - at, 0.0)))
+        shapes += [
+            (f"a bump about {2 * width:.2g} mm wide near {there}", np.exp(-0.5 * ((u - at) / width) ** 2))
+            for width in (span / fine, span / 12.0)
+        ]
+    for cycles in np.arange(1.0, min(60.0, n / 6.0), 0.5):
+        phase = 2.0 * np.pi * cycles * (u - low) / span
+        label = f"a wave over the input with a period of {span / cycles:.3g} mm"
+        shapes += [(label, np.sin(phase)), (label, np.cos(phase))]
+    if history.time_s is not None:
+        t = history.clock_s if history.shared_clock else np.concatenate([np.arange(n)[run] for run in history.runs]) / n
+        begin, length = float(t.min()), max(float(np.ptp(t)), 1e-9)
+        # Without a shared clock t counts samples, as shares of the table.
+        length_s = length if history.shared_clock else length * n * history.sample_time_s
+        for k in range(1, fine):
+            at = begin + length * k / fine
+            label = f"{at:.3g} s" if history.shared_clock else f"{100 * k / fine:.0f} % of the table"
+            shapes.append((f"a step at {label}", (t > at).astype(float)))
+            shapes.append((f"a bump at {label}", np.exp(-0.5 * ((t - at) / (length / fine)) ** 2)))
+        for cycles in np.arange(1.0, min(120.0, n / 6.0), 0.5):
+            phase = 2.0 * np.pi * cycles * (t - begin) / length
+            label = f"a wave over time with a period of {length_s / cycles:.3g} s"
+            shapes += [(label, np.sin(phase)), (label, np.cos(phase))]
+        speed = np.concatenate([_speed(u[run], history.times[run]) for run in history.runs])
+        sense = np.sign(np.where(np.abs(speed) > 0.1 * np.max(np.abs(speed)), speed, 0.0))
+        shapes += [
+            ("a difference between opening and closing", sense),
+            ("another slope opening than closing", sense * (u - low)),
+            ("something that follows the speed", speed),
+        ]
+        for index, run in enumerate(history.runs):
+            mask = np.zeros(n)
+            mask[run] = np.linspace(-1.0, 1.0, run.stop - run.start)
+            shapes.append((f"a drift within run {index + 1}", mask))
+    for index, run in enumerate(history.runs):
+        if len(history.runs) > 1:
+            mask = np.zeros(n)
+            mask[run] = u[run] - np.mean(u[run])
+            shapes.append((f"another slope in run {index + 1}", mask))
+    shapes += [(f"curvature of order {k} over the input", ((u - low) / span) ** k) for k in (2, 3, 4)]
+    channels = [(1.0, 0.0, 0.0, "the gap")]
+    if history.both_edges:
+        channels += [
+            (0.0, 1.0, 0.0, "the midline"),
+            (-1.0, 0.5, 0.0, "the left edge"),
+            (1.0, 0.5, 0.0, "the right edge"),
+        ]
+    if history.force:
+        channels.append((0.0, 0.0, 1.0, "the force"))
+    shapes = shapes[:: max(1, len(shapes) * len(channels) // most)]
+    words, columns = [], []
+    for gap, midline, force, channel in channels:
+        for label, shape in shapes:
+            parts = [gap * shape, midline * shape] if history.both_edges else [gap * shape]
+            columns.append(np.concatenate([*parts, *([force * shape] if history.force else [])]))
+            words.append(f"{label} in {channel}")
+    raw = np.stack(columns, axis=1)
+    return Probes(tuple(words), whitener.columns(raw)[0], np.sqrt(np.mean(raw**2, axis=0)))

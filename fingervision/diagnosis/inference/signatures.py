@@ -1,0 +1,120 @@
+"""Signatures: what each effect, at each of its starting values, would add to the prediction of the real chain."""
+
+from dataclasses import dataclass
+from itertools import product
+
+import numpy as np
+
+from fingervision.diagnosis.inference.hypothesis_fit import Explanation, Problem
+from fingervision.diagnosis.noise.whitening import RunOffsets
+from fingervision.domain.effect import Array
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Signatures:
+    """Whitened columns with the parameters that made them.
+
+    Parameters
+    ----------
+    names : tuple of str, length k
+        Effect of each column.
+    starts : tuple of dict, length k
+        Parameters of each column.
+    grows : tuple of (str, float, float) or None, length k
+        Parameter that scales the column nearly linearly with its neutral value and step; None where none does.
+    columns : ndarray of float, shape (m, k)
+        Whitened difference to the model without the effect.
+    """
+
+    names: tuple[str, ...]
+    starts: tuple[dict[str, float], ...]
+    grows: tuple[tuple[str, float, float, float, float] | None, ...]
+    columns: Array
+
+    def gains(
+        self, residual: Array, offsets: RunOffsets, metric: Array, along: Array | None = None
+    ) -> tuple[Array, Array]:
+        """Chi-square that each column alone would take from a residual, and its coefficient; shape (k,).
+
+        Parameters
+        ----------
+        along : ndarray of float, shape (m, p), or None
+            Columns that are refitted alongside and projected out.
+        """
+        shared = offsets.design.T @ self.columns
+        weighted = residual - offsets.design @ (metric @ (offsets.design.T @ residual))
+        dot = self.columns.T @ weighted
+        norm = np.einsum("ij,ij->j", self.columns, self.columns) - np.einsum("ij,ij->j", shared, metric @ shared)
+        full = norm.copy()
+        if along is not None and along.shape[1]:
+            moved = along - offsets.design @ (metric @ (offsets.design.T @ along))
+            cross = moved.T @ self.columns
+            inverse = np.linalg.pinv(along.T @ moved)
+            dot = dot - cross.T @ (inverse @ (moved.T @ residual))
+            norm = norm - np.einsum("ij,ij->j", cross, inverse @ cross)
+        usable = norm > 1e-6 * np.maximum(full, 1e-12)
+        coefficient = np.where(usable, dot / np.where(usable, norm, 1.0), 0.0)
+        allowed = usable & self._in_bounds(coefficient)
+        return np.where(allowed, coefficient * dot, 0.0), coefficient
+
+    def _in_bounds(self, coefficient: Array) -> Array:
+        out = np.zeros(coefficient.size, dtype=bool)
+        for i, grow in enumerate(self.grows):
+            if grow is None:
+                out[i] = 0.2 < coefficient[i] < 3.0
+            else:
+                _, neutral, step, lower, upper = grow
+                value = neutral + coefficient[i] * step
+                out[i] = lower - 0.3 * (upper - lower) <= value <= upper + 0.3 * (upper - lower) and (
+                    lower < neutral or value >= neutral
+                )
+        return out
+
+    def begin(self, index: int, coefficient: float) -> dict[str, float]:
+        """Parameters to start a search from, the amplitude scaled by the coefficient."""
+        start, grow = dict(self.starts[index]), self.grows[index]
+        if grow is not None:
+            name, neutral, step, lower, upper = grow
+            start[name] = float(np.clip(neutral + coefficient * step, lower, upper))
+        return start
+
+
+def signatures(problem: Problem) -> Signatures:
+    """Switch every effect on at every starting value, in the real chain."""
+    bare = problem.chain.stacked({})
+    names, starts, grows, columns = [], [], [], []
+    for name in problem.effects:
+        listed = [parameter for _, parameter in problem.parameters((name,))]
+        shapes = [p for p in listed if p.neutral is None]
+        amplitudes = [p for p in listed if p.neutral is not None]
+        for shape in product(*(p.starting_values() for p in shapes)):
+            fixed = {p.name: float(value) for p, value in zip(shapes, shape, strict=True)}
+            fixed |= {p.name: float(p.neutral) for p in amplitudes if p.neutral is not None}
+            tried: list[tuple[dict[str, float], tuple[str, float, float, float, float] | None]] = [(fixed, None)]
+            for p in amplitudes:
+                for value in p.starting_values():
+                    neutral = float(p.neutral) if p.neutral is not None else 0.0
+                    linear = (p.name, neutral, float(value) - neutral, p.lower, p.upper) if p.starts == 1 else None
+                    tried.append(({**fixed, p.name: float(value)}, linear))
+            for start, grow in tried:
+                column = problem.chain.stacked({name: start}) - bare
+                if np.max(np.abs(column)) > 1e-12:
+                    names.append(name)
+                    starts.append(start)
+                    grows.append(grow)
+                    columns.append(column)
+    whitened = problem.whitener.columns(np.stack(columns, axis=1))[0]
+    return Signatures(tuple(names), tuple(starts), tuple(grows), whitened)
+
+
+def tangents(problem: Problem, explanation: Explanation) -> Array:
+    """Whitened derivatives of an explanation's prediction by its parameters; shape (m, p)."""
+    base = problem.chain.stacked(explanation.values)
+    columns = []
+    for name, parameter in problem.parameters(explanation.names):
+        value = explanation.values[name][parameter.name]
+        step = 1e-3 * max(abs(value), 1e-3 * min(parameter.upper - parameter.lower, 1.0))
+        step = step if value + step <= parameter.upper else -step
+        moved = {**explanation.values, name: {**explanation.values[name], parameter.name: value + step}}
+        columns.append((problem.chain.stacked(moved) - base) / step)
+    return problem.whitener.columns(np.stack(columns, axis=1))[0]

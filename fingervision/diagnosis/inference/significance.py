@@ -1,0 +1,58 @@
+"""Whether a gain is evidence for more effects, or what noise gives them."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from fingervision.diagnosis.inference.hypothesis_fit import Explanation, Problem
+from fingervision.diagnosis.inference.null_bootstrap import exceeds_noise, jumps_astray, linear_thresholds, price
+from fingervision.diagnosis.inference.signatures import Signatures
+
+SUSPECTS = 2
+"""Explanations of the measurement that are tried on every draw of noise as well."""
+CLEARLY = 2.5
+"""Times the linear threshold above which a gain needs no bootstrap to be judged."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Evidence:
+    """What gains are judged by.
+
+    Parameters
+    ----------
+    problem, atoms
+        The data, and the effects' signatures.
+    thresholds : mapping of str to float
+        Chi-square that each effect must gain at least.
+    rng : numpy Generator
+        For draws of noise.
+    """
+
+    problem: Problem
+    atoms: Signatures
+    thresholds: Mapping[str, float]
+    rng: np.random.Generator
+
+    @classmethod
+    def of(cls, problem: Problem, atoms: Signatures, nothing: Explanation, rng: np.random.Generator) -> "Evidence":
+        """Take the thresholds from noise alone."""
+        columns, sigma = atoms.columns, nothing.sigma_mm
+        return cls(problem, atoms, linear_thresholds(problem, atoms.names, columns, sigma, rng), rng)
+
+    def speaks_for(self, found: list[Explanation], base: Explanation) -> bool:
+        """Whether the best of some explanations gains more over `base` than noise would give it."""
+        asked = {e.names: price(self.thresholds, base, e.names) for e in found}
+        ranked = sorted(found, key=lambda e: e.score + asked[e.names])
+        if not ranked:
+            return False
+        gained = base.score - ranked[0].score
+        least = asked[ranked[0].names]
+        if gained <= least or (gained > CLEARLY * least and not jumps_astray(self.problem, base.names)):
+            return gained > least
+        suspects = [
+            {name: e.values[name] for name in e.names if name not in base.names}
+            for e in ranked[:SUSPECTS]
+            if set(base.names) <= set(e.names)
+        ]
+        return exceeds_noise(gained - least, self.problem, self.atoms, self.thresholds, base, suspects, self.rng)

@@ -1,0 +1,110 @@
+"""The recorded input: smoothed as far as its error is random, and what the rest of that error does to the gap."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from fingervision.diagnosis.input.encoder import input_sigma
+from fingervision.diagnosis.input.local_polynomial_smoothing import smoothed
+from fingervision.diagnosis.noise.spectrum import LEAST_RUN
+from fingervision.domain.effect import Array, Flags, History
+from fingervision.domain.measured_table import MeasuredTable
+from fingervision.models.corrected import CorrectedModel
+
+HELD_SAMPLES, SLOW_SAMPLES = 15, 5
+"""Samples over which a stage that stands, or turns back, stays on one encoder step or two."""
+STAYING = 0.2
+"""Leverage below which neighbours share so many samples that they share the error too."""
+STANDING_SHARE = 1e-3
+"""Share of the input's range within which a stage stands."""
+SURELY = 3.0
+"""Standard errors by which the gap must follow the input's unrest before that is taken for motion."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class RecordedInput:
+    """What is known of the input.
+
+    Parameters
+    ----------
+    smooth_mm : ndarray of float, shape (n,)
+        The record, smoothed.
+    sigma_mm, step_mm : float
+        Standard uncertainty of one recorded value, and the encoder's step; 0 where there is none.
+    error_mm : ndarray of float, shape (n,)
+        What the error that is left does to the gap.
+    stays : ndarray of bool, shape (n,)
+        Where that error stays from sample to sample; elsewhere it is another one at each.
+    samples : float
+        Samples over which it stays.
+    is_motion : bool
+        Whether the record's unrest shows in the gap as well, and was left as it is.
+    """
+
+    smooth_mm: Array
+    sigma_mm: float
+    step_mm: float
+    error_mm: Array
+    stays: Flags
+    samples: float
+    is_motion: bool
+
+    @classmethod
+    def of(cls, table: MeasuredTable, model: CorrectedModel) -> "RecordedInput":
+        """Smooth a table's record, unless the gap follows its unrest."""
+        u = table.input_mm
+        still = np.zeros(u.size, dtype=bool)
+        sigma, step = (0.0, 0.0) if table.time_s is None else input_sigma(u, table.runs)
+        if sigma == 0.0 or table.time_s is None:
+            return cls(u, 0.0, 0.0, np.zeros(u.size), still, 1.0, is_motion=False)
+        smooth, leverage = smoothed(u, table.time_s, table.runs, sigma, step)
+        if _is_motion(table, model, smooth):
+            return cls(u, 0.0, 0.0, np.zeros(u.size), still, 1.0, is_motion=True)
+        samples, stays = 1.0 / float(np.median(leverage)), leverage < STAYING
+        if step > 0.0:
+            samples = max(samples, HELD_SAMPLES)
+            stays = _within(u, table.runs, HELD_SAMPLES, 1.01 * step) | _within(
+                u, table.runs, SLOW_SAMPLES, 2.01 * step
+            )
+        low, high = model.input_range_mm
+        reach = 1e-3 * (high - low)
+        ahead, behind = (model.base.respond(smooth + way).gap_mm for way in (reach, -reach))
+        slope = np.abs(ahead - behind) / (2.0 * reach)
+        return cls(smooth, sigma, step, slope * sigma * np.sqrt(leverage), stays, samples, is_motion=False)
+
+
+def standing_still(history: History) -> tuple[slice, ...]:
+    """Stretches of at least `LEAST_RUN` samples in which the stage stands, to within the recorded input's error."""
+    reach = max(3.0 * history.input_sigma_mm, STANDING_SHARE * history.input_span_mm)
+    found: list[slice] = []
+    for run in history.runs:
+        begin, low, high = run.start, np.inf, -np.inf
+        for i, value in enumerate(history.input_mm[run].tolist(), run.start):
+            low, high = min(low, value), max(high, value)
+            if high - low > reach:
+                found.append(slice(begin, i))
+                begin, low, high = i, value, value
+        found.append(slice(begin, run.stop))
+    return tuple(stretch for stretch in found if stretch.stop - stretch.start >= LEAST_RUN)
+
+
+def _within(input_mm: Array, runs: tuple[slice, ...], samples: int, reach_mm: float) -> Flags:
+    """Where the input stays within a reach over so many samples; nowhere where the reach is 0."""
+    out = np.zeros(input_mm.size, dtype=bool)
+    for run in runs:
+        if reach_mm > 0.0 and run.stop - run.start > samples:
+            padded = np.pad(input_mm[run], samples // 2, mode="edge")
+            out[run] = np.ptp(np.lib.stride_tricks.sliding_window_view(padded, samples), axis=1) < reach_mm
+    return out
+
+
+def _is_motion(table: MeasuredTable, model: CorrectedModel, smooth: Array) -> bool:
+    """Whether the gap follows the input's unrest: the regression's slope is then one, otherwise zero."""
+    expected = model.base.respond(table.input_mm).gap_mm - model.base.respond(smooth).gap_mm
+    residual = table.gap_mm - model.base.respond(smooth).gap_mm
+    a = np.concatenate([np.diff(expected[run]) for run in table.runs])
+    b = np.concatenate([np.diff(residual[run]) for run in table.runs])
+    typical = 5.0 * np.median(np.abs(b)) + 1e-12
+    kept = np.abs(b) < typical
+    power, doubt = float(a[kept] @ a[kept]), float(np.std(b[kept]))
+    return power > 0.0 and float(a[kept] @ b[kept]) > max(0.5 * power, SURELY * doubt * np.sqrt(power))

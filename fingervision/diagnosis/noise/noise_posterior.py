@@ -1,0 +1,55 @@
+"""The noise is estimated, and may be another: draws of what it is, for predictions that depend on it."""
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+
+from fingervision.diagnosis.inference.hypothesis_fit import Explanation, Problem
+from fingervision.diagnosis.inference.null_bootstrap import noise_doubt
+from fingervision.diagnosis.input.observations import SHORT_RUN, BenchData
+from fingervision.diagnosis.noise.noise_model import Noise, without_input
+from fingervision.diagnosis.noise.restricted_likelihood import drawn_noises
+from fingervision.diagnosis.noise.whitening import RunOffsets
+
+
+def problems_of_drawn_noise(
+    bench: BenchData, problem: Problem, explanation: Explanation, count: int, rng: np.random.Generator
+) -> Iterator[Problem]:
+    """Yield the problem with so many draws of its noise.
+
+    Short runs know neither level nor correlation well: both are drawn from their posterior, given what an explanation
+    leaves over. Of long ones the power is drawn, where it is slow.
+
+    Parameters
+    ----------
+    bench : BenchData
+        Measurement and model.
+    problem : Problem
+        With the noise as it was estimated.
+    explanation : Explanation
+        What is taken out of the measurement to see its noise.
+    count : int
+        Draws.
+    rng : numpy Generator
+        For the draws.
+    """
+    for noises in _noises(bench, problem, explanation, count, rng):
+        whitener = replace(problem.whitener, noises=noises)
+        yield replace(problem, whitener=whitener, measured=whitener.one(bench.aim_mm), offsets=RunOffsets.of(whitener))
+
+
+def _noises(
+    bench: BenchData, problem: Problem, explanation: Explanation, count: int, rng: np.random.Generator
+) -> list[tuple[Noise, ...]]:
+    history, whitener = problem.chain.history, problem.whitener
+    if history.time_s is None or max(run.stop - run.start for run in history.runs) >= SHORT_RUN:
+        factors = np.exp(0.5 * noise_doubt(problem) * rng.standard_normal(count))
+        return [
+            tuple(Noise(f * n.white_mm, f * n.correlated_mm, n.correlation) for n in whitener.noises)
+            for f in factors.tolist()
+        ]
+    channels = len(whitener.noises)
+    residuals = np.split(bench.aim_mm - bench.chain.stacked(explanation.values), channels)
+    drawn = drawn_noises(residuals, history.runs, np.split(whitener.aside, channels), count, rng)
+    return [(without_input(gap, whitener.passing_mm), *others) for gap, *others in drawn]

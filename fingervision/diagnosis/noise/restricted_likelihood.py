@@ -1,0 +1,116 @@
+"""The noise of short records: first-order autoregressions by restricted likelihood (Patterson & Thompson 1971)."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from fingervision.diagnosis.noise.noise_model import Noise
+from fingervision.domain.effect import Array, Flags
+
+WHITE = 0.5
+"""Prior share of white noise, where noise is drawn: frames that know nothing of each other are the ordinary case."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Likelihood:
+    """Restricted likelihood of autoregressions.
+
+    Parameters
+    ----------
+    grid : ndarray of float, shape (k,)
+        Correlations.
+    cost : ndarray of float, shape (channels, k)
+        -2 log likelihood with the best level.
+    spread_mm : ndarray of float, shape (channels, k)
+        That level.
+    rows : ndarray of int, shape (channels,)
+        Degrees of freedom.
+    """
+
+    grid: Array
+    cost: Array
+    spread_mm: Array
+    rows: Array
+
+
+def _likelihood(residuals_mm: list[Array], runs: tuple[slice, ...], aside: list[Flags]) -> _Likelihood:
+    """Take a straight line out of each run, and try every correlation."""
+    grid = np.linspace(0.0, 0.95, 39)
+    cost = np.empty((len(residuals_mm), grid.size))
+    spread = np.empty_like(cost)
+    degrees = np.empty(len(residuals_mm))
+    for channel, (residual, out) in enumerate(zip(residuals_mm, aside, strict=True)):
+        for k, rho in enumerate(grid):
+            total, rows, determinants = 0.0, 0, 0.0
+            for run in runs:
+                place = np.flatnonzero(~out[run])
+                if place.size < 4:
+                    continue
+                line = np.stack([np.ones(place.size), place - place.mean(), residual[run][place]], axis=1)
+                keep = rho ** np.diff(place, prepend=place[0] - 1000)
+                root = np.sqrt(1.0 - keep**2)
+                white = line / root[:, None]
+                white[1:] -= (keep / root)[1:, None] * line[:-1]
+                normal = white[:, :2].T @ white[:, :2]
+                rest = white[:, 2] - white[:, :2] @ np.linalg.solve(normal, white[:, :2].T @ white[:, 2])
+                total += float(rest @ rest)
+                rows += place.size - 2
+                determinants += 2.0 * float(np.sum(np.log(root))) + float(np.log(np.linalg.det(normal)))
+            rows = max(rows, 1)
+            degrees[channel] = rows
+            spread[channel, k] = np.sqrt(total / rows)
+            cost[channel, k] = rows * np.log(max(total, 1e-300) / rows) + determinants
+    return _Likelihood(grid, cost, spread, degrees)
+
+
+def noise_of_short_runs(
+    residuals_mm: list[Array], runs: tuple[slice, ...], aside: list[Flags], floors_mm: list[float], *, explained: bool
+) -> tuple[Noise, ...]:
+    """Fit channels that share one correlation, each at its own level.
+
+    Too few samples for a spectrum, and taken for white they would let every slow effect claim what is noise. The
+    channels are drawn from the same pictures, so one correlation serves them all: its posterior mean under a flat
+    prior. Before anything is explained, the channel that is correlated least gives it, since an effect can only add.
+
+    Parameters
+    ----------
+    residuals_mm, aside : list of ndarray, shape (n,)
+        By channel.
+    runs : tuple of slice
+        Samples of each run; each has a straight line of its own taken out.
+    floors_mm : list of float
+        The measurement's own random part, by channel.
+    explained : bool
+        Whether effects have been taken out.
+    """
+    known = _likelihood(residuals_mm, runs, aside)
+    weight = np.exp(-0.5 * (known.cost - known.cost.min(axis=1, keepdims=True)))
+    if explained:
+        weight = np.prod(weight, axis=0, keepdims=True)
+    rho = float(np.min(weight @ known.grid / weight.sum(axis=1)))
+    scales = [float(np.interp(rho, known.grid, row)) for row in known.spread_mm]
+    return tuple(
+        Noise(1e-3 * scale, scale, max(rho, 1e-3))
+        for scale in (max(s, floor, 1e-9) for s, floor in zip(scales, floors_mm, strict=True))
+    )
+
+
+def drawn_noises(
+    residuals_mm: list[Array], runs: tuple[slice, ...], aside: list[Flags], count: int, rng: np.random.Generator
+) -> list[tuple[Noise, ...]]:
+    """Draw what the noise of short runs may be, from its posterior; a noise a channel, `count` times.
+
+    The channels share one correlation, which is none at all with a probability of `WHITE` before the data are seen; the
+    level follows the scaled inverse chi-square distribution of a variance.
+    """
+    known = _likelihood(residuals_mm, runs, aside)
+    cost = known.cost.sum(axis=0)
+    prior = np.full(known.grid.size, (1.0 - WHITE) / (known.grid.size - 1))
+    prior[0] = WHITE
+    weight = prior * np.exp(-0.5 * (cost - cost.min()))
+    out = []
+    for k in rng.choice(known.grid.size, count, p=weight / weight.sum()):
+        scales = known.spread_mm[:, k] * np.sqrt(known.rows / rng.chisquare(known.rows))
+        rho = max(float(known.grid[k]), 1e-3)
+        out.append(tuple(Noise(1e-3 * scale, float(scale), rho) for scale in scales))
+    return out

@@ -1,0 +1,144 @@
+"""The noise of long records by Whittle's likelihood (Whittle 1953), where slow structure cannot reach it."""
+
+import numpy as np
+
+from fingervision.diagnosis.noise.noise_model import Noise
+from fingervision.domain.effect import Array, Flags
+
+SLOW, SLOW_EXPLAINED = 0.04, 0.02
+"""Cycles per sample below which structure of the gripper may hide, before and after something was explained."""
+TAPERED = 1.94
+"""Neighbouring ordinates under Hann's taper share so much that this many count as one."""
+CORRELATIONS = tuple(float(phi) for phi in np.linspace(0.05, 0.95, 46))
+SLOWEST = 2.0 * np.pi * np.array([0.01])
+"""Where a gripper's effects have their power: some turns in a hundred samples each."""
+LINE = 9.0
+"""A periodogram value this many times its expectation is a line, not noise."""
+LEAST_RUN = 24
+"""Samples below which a run is left out."""
+
+
+def noise_by_spectrum(
+    residuals_mm: list[Array],
+    runs: tuple[slice, ...],
+    rate_hz: float,
+    aside: list[Flags],
+    floors_mm: list[float],
+    *,
+    explained: bool,
+) -> tuple[Noise, ...]:
+    """Fit channels that share one spectrum's shape, each at its own level.
+
+    Parameters
+    ----------
+    residuals_mm, aside : list of ndarray, shape (n,)
+        Measured minus predicted, and outliers, by channel.
+    runs : tuple of slice
+        Samples of each run.
+    rate_hz : float
+        Sample rate: nothing below 1 Hz is used where that is below `SLOW`.
+    floors_mm : list of float
+        The measurement's own random part, by channel.
+    explained : bool
+        Whether effects have been taken out.
+    """
+    slow = min(1.0 / rate_hz, SLOW_EXPLAINED if explained else SLOW)
+    angle = np.concatenate([_angles(run.stop - run.start, slow) for run in runs])
+    powers = [_powers(residual, runs, out, slow) for residual, out in zip(residuals_mm, aside, strict=True)]
+    use = [np.ones(angle.size, dtype=bool) for _ in powers]
+    for _ in range(3):
+        variances, share, phi, doubt = _likeliest(angle, powers, use)
+        expected = _shape(angle, share, phi)
+        keep = [power < LINE * variance * expected for power, variance in zip(powers, variances, strict=True)]
+        if all(np.array_equal(new, old) for new, old in zip(keep, use, strict=True)):
+            break
+        use = keep
+    scales = [max(float(np.sqrt(v)), floor, 1e-9) for v, floor in zip(variances, floors_mm, strict=True)]
+    white, correlated = float(np.sqrt(1.0 - share)), float(np.sqrt(share))
+    return tuple(Noise(scale * white, scale * correlated, phi, doubt) for scale in scales)
+
+
+def _used(count: int, slow: float) -> Flags:
+    frequency = np.fft.rfftfreq(count)
+    return np.asarray((frequency > max(slow, 2.5 / count)) & (count >= LEAST_RUN))
+
+
+def _angles(count: int, slow: float) -> Array:
+    return np.asarray(2.0 * np.pi * np.fft.rfftfreq(count)[_used(count, slow)])
+
+
+def _powers(residual: Array, runs: tuple[slice, ...], aside: Flags, slow: float) -> Array:
+    """Periodogram of each run, one after the other, a straight line taken out; outliers are bridged."""
+    powers = []
+    for run in runs:
+        values, bad = residual[run].copy(), aside[run]
+        count = values.size
+        good = np.flatnonzero(~bad)
+        if good.size:
+            values[bad] = np.interp(np.flatnonzero(bad), good, values[good])
+        if count >= LEAST_RUN:
+            line = np.polynomial.Polynomial.fit(np.arange(count), values, 1)
+            taper = np.hanning(count + 2)[1:-1]
+            power = np.abs(np.fft.rfft((values - line(np.arange(count))) * taper)) ** 2 / np.sum(taper**2)
+            powers.append(power[_used(count, slow)])
+    return np.concatenate(powers)
+
+
+def _shape(angle: Array, share: float, phi: float) -> Array:
+    """Spectrum of unit variance, `share` of it correlated by `phi` from sample to sample; shape (m,)."""
+    correlated = (1.0 - phi**2) / (1.0 + phi**2 - 2.0 * phi * np.cos(angle))
+    return np.asarray(1.0 - share + share * correlated, dtype=np.float64)
+
+
+def _likeliest(angle: Array, powers: list[Array], use: list[Flags]) -> tuple[list[float], float, float, float]:
+    """Weigh white noise, an autoregression, and both together against each other.
+
+    A mixture fitted where there is none finds correlation below the frequencies that are used, and with it noise
+    three times too large for whatever is slow; so the three kinds are equally likely beforehand, and the likeliest
+    kind answers with its posterior mean.
+
+    Returns
+    -------
+    variances : list of float
+        Of one sample, by channel.
+    share, correlation : float
+        The correlated part's share of it, and the correlation of its neighbouring samples.
+    slow_doubt : float
+        Standard uncertainty of the logarithm of the power at `SLOWEST`, over all kinds.
+    """
+
+    def variance(power: Array, kept: Flags, form: Array) -> float:
+        return max(float(np.mean(power[kept] / form[kept])), 1e-24)
+
+    def slowest(share: float, phi: float, form: Array) -> float:
+        levels = [np.log(variance(power, kept, form)) for power, kept in zip(powers, use, strict=True)]
+        return float(np.mean(levels)) + float(np.log(_shape(SLOWEST, share, phi)[0]))
+
+    mixed = [(share, phi) for share in np.linspace(0.1, 0.9, 9) for phi in CORRELATIONS]
+    found: list[tuple[float, float, float]] = []
+    costs: list[float] = []
+    prior: list[float] = []
+    slow: list[float] = []
+    for kind in ([(0.0, 0.0)], [(1.0, phi) for phi in CORRELATIONS], mixed):
+        begin = len(costs)
+        for share, phi in kind:
+            form = _shape(angle, share, phi)
+            parts = [
+                kept.sum() * np.log(variance(power, kept, form)) + np.sum(np.log(form[kept]))
+                for power, kept in zip(powers, use, strict=True)
+            ]
+            costs.append(float(sum(parts)))
+            slow.append(slowest(share, phi, form))
+            prior.append(1.0 / len(kind))
+        own = np.array(costs[begin:])
+        weight = np.exp(-(own - own.min()) / TAPERED)
+        share, phi = np.average(np.array(kind), axis=0, weights=weight)
+        found.append((-own.min() / TAPERED + float(np.log(np.mean(weight))), min(float(share), 1.0), float(phi)))
+    _, share, phi = max(found)
+    form = _shape(angle, share, phi)
+    likely = np.array(prior) * np.exp(-(np.array(costs) - min(costs)) / TAPERED)
+    order = np.argsort(slow)
+    reached = np.cumsum(likely[order]) / likely.sum()
+    low, high = np.interp((0.159, 0.841), reached, np.array(slow)[order])
+    doubt = 0.5 * float(high - low)
+    return [variance(power, kept, form) for power, kept in zip(powers, use, strict=True)], share, max(phi, 1e-3), doubt

@@ -1,0 +1,242 @@
+"""Whitening: correlated, unequal noise turned into unit white noise by a Kalman filter's innovations (Kalman 1960)."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from fingervision.diagnosis.noise.noise_model import Noise
+from fingervision.domain.compiled import compiled_as_written
+from fingervision.domain.effect import Array, Flags, History
+
+SPREADS = np.concatenate([[0.0], np.geomspace(0.01, 1e4, 121)])
+"""Spreads of the runs that are tried, over the noise."""
+MIDLINE_FREE_MM = 1e3
+"""Prior spread of the midline's constant: large enough to be free."""
+
+
+@compiled_as_written
+def _innovations(
+    columns: Array, time: Array, white: Array, p1: float, lag1: float, h: Array, p2: float, lag2: float
+) -> tuple[Array, float]:
+    # States: the edge's correlated noise and the smoothed input's error, both Ornstein-Uhlenbeck.
+    n, k = columns.shape
+    out = np.zeros((n, k))
+    a = np.zeros((2, k))
+    c11, c12, c22 = p1, 0.0, p2
+    logdet = 0.0
+    for i in range(n):
+        if i > 0:
+            f1 = np.exp(-(time[i] - time[i - 1]) * lag1)
+            f2 = np.exp(-(time[i] - time[i - 1]) * lag2)
+            c11 = f1 * f1 * c11 + p1 * (1.0 - f1 * f1)
+            c12 = f1 * f2 * c12
+            c22 = f2 * f2 * c22 + p2 * (1.0 - f2 * f2)
+            for j in range(k):
+                a[0, j] *= f1
+                a[1, j] *= f2
+        if white[i] < 0.0:
+            continue
+        g1, g2 = c11 + c12 * h[i], c12 + c22 * h[i]
+        s = g1 + h[i] * g2 + white[i]
+        root = np.sqrt(s)
+        logdet += np.log(s)
+        for j in range(k):
+            e = columns[i, j] - a[0, j] - h[i] * a[1, j]
+            out[i, j] = e / root
+            a[0, j] += g1 / s * e
+            a[1, j] += g2 / s * e
+        c11 -= g1 * g1 / s
+        c12 -= g1 * g2 / s
+        c22 -= g2 * g2 / s
+    return out, logdet
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Whitener:
+    """The observation model's covariance, ready to be divided out; channels are stacked gap, midline, force.
+
+    Parameters
+    ----------
+    history : History
+        Runs and times.
+    noises : tuple of Noise
+        One a channel.
+    aside : ndarray of bool, shape (channels * n,)
+        Outliers: they count as not measured.
+    input_mm : ndarray of float, shape (n,)
+        Standard deviation that an error of the input which stays gives the gap; 0 where there is none.
+    input_samples : float
+        Samples over which it stays.
+    passing_mm : ndarray of float, shape (n,)
+        The same of errors that are another at each sample.
+    drawing : ndarray of float, shape (channels * n, p), or None
+        What one standard uncertainty of each uncertain number of the gripper's drawing does to the prediction.
+    """
+
+    history: History
+    noises: tuple[Noise, ...]
+    aside: Flags
+    input_mm: Array
+    input_samples: float
+    passing_mm: Array
+    drawing: Array | None = None
+
+    def columns(self, columns: Array) -> tuple[Array, float]:
+        """Whiten columns of shape (channels * n, k); also the logarithm of the covariance's determinant."""
+        n = self.history.input_mm.size
+        clock = self.history.time_s
+        step = 1.0 if clock is None else max(self.history.sample_time_s, 1e-9)
+        time = np.arange(n, dtype=np.float64) if clock is None else clock / step
+        out, total = np.empty_like(columns), 0.0
+        for channel, noise in enumerate(self.noises):
+            white = noise.white_mm**2 + (self.passing_mm**2 if channel == 0 else np.zeros(n))
+            part = slice(channel * n, (channel + 1) * n)
+            white[self.aside[part]] = -1.0
+            lag1 = -np.log(max(noise.correlation, 1e-6))
+            share = self.input_mm if channel == 0 else np.zeros(n)
+            lag2 = 50.0 if self.input_samples <= 1.0 else 2.0 / self.input_samples
+            for run in self.history.runs:
+                rows = slice(part.start + run.start, part.start + run.stop)
+                out[rows], logdet = _innovations(
+                    np.ascontiguousarray(columns[rows]),
+                    time[run],
+                    white[run],
+                    noise.correlated_mm**2,
+                    lag1,
+                    share[run],
+                    1.0,
+                    lag2,
+                )
+                total += logdet
+        return out, total
+
+    def one(self, column: Array) -> Array:
+        """Whiten one column of shape (channels * n,)."""
+        return self.columns(column[:, None])[0][:, 0]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class RunOffsets:
+    """What is refitted beside every explanation: re-zeroing between runs, the midline's constant, the drawing.
+
+    Re-zeroing is a zero-mean random effect per channel; the constant is free; an uncertain number of the drawing is a
+    random effect of its own uncertainty.
+
+    Parameters
+    ----------
+    design : ndarray of float, shape (m, columns)
+        Whitened columns: one a run and channel, then the midline's constant, then the drawing's uncertain numbers.
+    channels : int
+        Gap, then midline and force where they were measured.
+    runs : int
+        Number of runs.
+    midline : bool
+        Whether the second channel is the midline, whose constant is free.
+    scales_mm : tuple of float
+        Noise of each channel.
+    drawn : int
+        How many numbers of the drawing are uncertain.
+    """
+
+    design: Array
+    gram: Array
+    channels: int
+    runs: int
+    midline: bool
+    scales_mm: tuple[float, ...]
+    drawn: int = 0
+
+    @classmethod
+    def of(cls, whitener: Whitener) -> "RunOffsets":
+        """Build the columns for a whitener."""
+        history, channels = whitener.history, len(whitener.noises)
+        n, runs = history.input_mm.size, len(history.runs)
+        free = int(history.both_edges)
+        columns = np.zeros((channels * n, channels * runs + free))
+        for channel in range(channels):
+            for index, run in enumerate(history.runs):
+                columns[channel * n + run.start : channel * n + run.stop, channel * runs + index] = 1.0
+        if free:
+            columns[n : 2 * n, -1] = 1.0
+        drawn = 0 if whitener.drawing is None else whitener.drawing.shape[1]
+        if whitener.drawing is not None:
+            columns = np.hstack([columns, whitener.drawing])
+        design = whitener.columns(columns)[0]
+        scales = tuple(noise.total_mm for noise in whitener.noises)
+        return cls(design, design.T @ design, channels, runs, bool(free), scales, drawn)
+
+    def metric(self, sigma_mm: tuple[float, ...]) -> Array:
+        """Return G with r^T r - (Z^T r)^T G (Z^T r) the squared length once offsets of these spreads are allowed."""
+        prior = [max(sigma_mm[channel], 1e-9) for channel in range(self.channels) for _ in range(self.runs)]
+        prior += [MIDLINE_FREE_MM] * int(self.midline) + [1.0] * self.drawn
+        return np.asarray(np.linalg.inv(self.gram + np.diag(1.0 / np.array(prior) ** 2)), dtype=np.float64)
+
+    def squared(self, whitened: Array, metric: Array) -> float:
+        """Squared length of a whitened column once the offsets of a metric are allowed."""
+        shared = self.design.T @ whitened
+        return float(whitened @ whitened - shared @ metric @ shared)
+
+    def spread(self, residual: Array) -> tuple[tuple[float, ...], float]:
+        """Estimate the spreads from a whitened residual by marginal likelihood.
+
+        A half-Cauchy prior of one edge noise's scale (Gelman 2006) keeps two runs from turning every common offset
+        into scatter. With one run the spread is zero.
+
+        Returns
+        -------
+        sigma_mm : tuple of float
+            One a channel.
+        penalty : float
+            -2 log of determinant and prior, to be added to chi-square.
+        """
+        if self.runs == 1:
+            return (0.0,) * self.channels, 0.0
+        out, total = [], 0.0
+        for scale, determinant, gain in self._tried(residual):
+            best = int(np.argmin(determinant - gain))
+            out.append(scale * float(SPREADS[best]))
+            total += float(determinant[best])
+        return tuple(out), total
+
+    def doubt(self, residual: Array) -> float:
+        """-2 log of how much more probable a residual is over all spreads than at the best of them, to be added.
+
+        A few runs hardly tell their spread: parameters that act like an offset are known with Student's tails only.
+        """
+        if self.runs == 1:
+            return 0.0
+        width = np.gradient(SPREADS)
+        total = 0.0
+        for _, determinant, gain in self._tried(residual):
+            cost = determinant - gain
+            total -= 2.0 * float(np.log(np.sum(width * np.exp(-0.5 * (cost - cost.min())))))
+        return total
+
+    def drawn_spread(self, residual: Array, rng: np.random.Generator) -> tuple[float, ...]:
+        """Draw the spreads from what a residual leaves open; one a channel, in mm. A few runs leave much open."""
+        width = np.gradient(SPREADS)
+        out = []
+        for scale, determinant, gain in self._tried(residual):
+            cost = determinant - gain
+            weight = width * np.exp(-0.5 * (cost - cost.min()))
+            out.append(scale * float(rng.choice(SPREADS, p=weight / weight.sum())))
+        return tuple(out)
+
+    def _tried(self, residual: Array) -> list[tuple[float, Array, Array]]:
+        """For each channel its scale, and at all spreads the penalty and the chi-square that offsets take."""
+        shares = self.design.T @ residual
+        if self.drawn:
+            # What the drawing's numbers explain is no scatter between runs.
+            inner = self.gram[-self.drawn :, -self.drawn :] + np.eye(self.drawn)
+            shares = shares - self.gram[:, -self.drawn :] @ np.linalg.solve(inner, shares[-self.drawn :])
+        found = []
+        for channel in range(self.channels):
+            z = np.maximum(np.diag(self.gram)[channel * self.runs : (channel + 1) * self.runs], 1e-12)
+            mean = shares[channel * self.runs : (channel + 1) * self.runs] / z
+            if channel == 1 and self.midline:
+                mean = mean - np.sum(mean * z) / np.sum(z)
+            scale = self.scales_mm[channel]
+            spread = (scale * SPREADS)[:, None] ** 2 * z
+            gain = np.sum(mean**2 * z * spread / (1.0 + spread), axis=1)
+            found.append((scale, np.sum(np.log1p(spread), axis=1) + 2.0 * np.log1p(SPREADS**2), gain))
+        return found

@@ -1,0 +1,39 @@
+"""The files of an answer: the page, the report, the corrected model, the next run."""
+
+from pathlib import Path
+
+from fingervision.diagnosis.diagnose import Diagnosis
+from fingervision.diagnosis.report.report_page import report_page
+from fingervision.domain.parameter import Estimate
+from fingervision.models.corrected import CorrectedModel
+from fingervision.storage.model_toml import write_model
+from fingervision.storage.recipe_toml import write_recipe
+from fingervision.storage.report_json import report_document, write_report
+
+PAGE, REPORT, MODEL, NEXT_RUN = "report.html", "report.json", "model.toml", "next_run.toml"
+
+
+def write_answer(out: Path, done: Diagnosis, model: CorrectedModel) -> dict[str, object]:
+    """Write them into a folder, in the place of an earlier answer's, and give what report.json holds.
+
+    Parameters
+    ----------
+    out : Path
+        A folder that is there.
+    done : Diagnosis
+        The answer.
+    model : CorrectedModel
+        What was diagnosed, with the effects that it has already.
+    """
+    report = done.report
+    effects: dict[str, dict[str, Estimate]] = {name: dict(values) for name, values in model.effects.items()}
+    effects |= {effect.name: dict(effect.parameters) for effect in report.effects}
+    write_model(out / MODEL, Path(model.base_path), effects, model.kind)
+    if report.next_run is None:
+        (out / NEXT_RUN).unlink(missing_ok=True)
+    else:
+        write_recipe(out / NEXT_RUN, report.next_run.name, report.next_run.steps)
+    document = report_document(report, MODEL, NEXT_RUN if report.next_run else None)
+    write_report(out / REPORT, document)
+    (out / PAGE).write_text(report_page(done), encoding="utf-8")
+    return document

@@ -1,0 +1,39 @@
+"""What a force column would tell apart: a drawn gripper knows the force of every explanation of a gap."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from fingervision.diagnosis.inference.hypothesis_fit import Explanation
+from fingervision.diagnosis.input.observations import BenchData
+from fingervision.domain.model import PhysicalModel
+
+SEEN = 0.002
+"""Of the largest force: what any force sensor repeats to, averaged over a run."""
+
+
+def force_hint(bench: BenchData, alternatives: tuple[Explanation, ...]) -> tuple[str, ...]:
+    """Say which explanations of the same gap differ in force, where the force was not measured.
+
+    Parameters
+    ----------
+    bench : BenchData
+        Measurement and model.
+    alternatives : tuple of Explanation
+        What the data cannot tell apart, the best first.
+    """
+    if bench.chain.history.force or len(alternatives) < 2 or not isinstance(bench.model.base, PhysicalModel):
+        return ()
+    chain = replace(bench.chain, history=replace(bench.chain.history, force=True))
+    n = chain.history.input_mm.size
+    forces = [chain.stacked(explanation.values)[-n:] for explanation in alternatives]
+    largest = float(np.max(np.abs(forces[0])))
+    apart = [float(np.sqrt(np.mean((force - forces[0]) ** 2))) for force in forces[1:]]
+    told = ["+".join(e.names) for e, by in zip(alternatives[1:], apart, strict=True) if by > SEEN * largest]
+    if not told:
+        return ()
+    least = min(by for by in apart if by > SEEN * largest)
+    return (
+        f"measure force_n too: {'+'.join(alternatives[0].names)} differs from {', '.join(told)} "
+        f"by {least:.2g} N (RMS) of {largest:.2g} N.",
+    )

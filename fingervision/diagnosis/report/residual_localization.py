@@ -1,0 +1,173 @@
+"""Where measurement and model disagree: regions whose residual cannot be noise, each said once, in a sentence."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from fingervision.diagnosis.noise.noise_model import Noise
+from fingervision.domain.effect import Array, Flags, History
+from fingervision.domain.report import Place
+
+BINS = 16
+ENDS = 200
+"""Ends of a region that are tried on either side."""
+DRAWS = 200
+QUANTILE = 0.99
+MOST = 8
+"""Places told; what is left after these is too little to point at."""
+SMALL = 0.05
+"""Significance of a place beside the first one's, below which it is a seam that the first one left."""
+NEAR = 0.85
+"""Places this near to the sharpest in significance are as sharp: the plainest of them is told."""
+SHARES = {
+    "gap": {"gap": 1.0, "left": -0.5, "right": 0.5},
+    "midline": {"midline": 1.0, "left": 1.0, "right": 1.0},
+    "left": {"left": 1.0, "gap": -1.0, "midline": 0.5},
+    "right": {"right": 1.0, "gap": 1.0, "midline": 0.5},
+    "force": {"force": 1.0},
+}
+"""What a shift of one channel is in the others, plainest channel first."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Axis:
+    """A variable that the residual is looked at over: name, unit, values, and the samples in parts along it."""
+
+    name: str
+    unit: str
+    values: Array
+    parts: tuple[np.ndarray[tuple[int], np.dtype[np.intp]], ...]
+
+    def scores(self, residual: Array, sd: float) -> Array:
+        """Sum of the residual over each part, in its own standard deviations."""
+        return np.array([residual[p].sum() / (sd * np.sqrt(p.size)) for p in self.parts])
+
+    def inside(self, residual: Array, first: int, last: int) -> np.ndarray[tuple[int], np.dtype[np.intp]]:
+        """Samples from part `first` to `last`, their ends moved within the parts there to where the sum is largest."""
+        order = np.concatenate(self.parts)
+        total = np.concatenate([[0.0], np.cumsum(residual[order])])
+        bounds = np.concatenate([[0], np.cumsum([p.size for p in self.parts])])
+        begin, end = (
+            np.unique(np.linspace(bounds[max(0, k - 1)], bounds[min(k + 1, len(self.parts))], ENDS).astype(np.intp))
+            for k in (first, last + 1)
+        )
+        length = end[None, :] - begin[:, None]
+        sums = np.where(length > 0, np.abs(total[end] - total[begin][:, None]) / np.sqrt(np.maximum(length, 1)), 0.0)
+        i, j = np.unravel_index(np.argmax(sums), sums.shape)
+        return np.asarray(order[begin[i] : end[j]])
+
+
+def _scan(score: Array) -> tuple[Array, Array, Array]:
+    """Largest absolute sum over a stretch, in standard deviations, and the stretch; shapes (...,) of (..., n)."""
+    n = score.shape[-1]
+    total = np.concatenate([np.zeros((*score.shape[:-1], 1)), np.cumsum(score, axis=-1)], axis=-1)
+    first, end = np.triu_indices(n + 1, 1)
+    sums = np.abs(total[..., end] - total[..., first]) / np.sqrt(end - first)
+    best = np.argmax(sums, axis=-1)
+    return np.max(sums, axis=-1), first[best], end[best] - 1
+
+
+def _axes(history: History, aside: Flags) -> list[Axis]:
+    """Input (both ways, opening, closing), time and speed, plainest first."""
+    n = history.input_mm.size
+    variables: list[tuple[str, str, Array, Flags]] = [("input", "mm", history.input_mm, np.ones(n, dtype=bool))]
+    if history.time_s is not None:
+        speed = np.concatenate([np.gradient(history.input_mm[run], history.times[run]) for run in history.runs])
+        still = 0.05 * np.max(np.abs(speed))
+        variables += [
+            ("input, opening", "mm", history.input_mm, speed > still),
+            ("input, closing", "mm", history.input_mm, speed < -still),
+        ]
+        if history.shared_clock:
+            variables.append(("time", "s", history.clock_s, np.ones(n, dtype=bool)))
+        variables.append(("speed", "mm/s", speed, np.ones(n, dtype=bool)))
+    axes = []
+    for name, unit, values, used in variables:
+        rows = np.flatnonzero(used & ~aside)
+        if rows.size >= 4 and np.ptp(values[rows]) > 0.0:
+            order = rows[np.argsort(values[rows], kind="stable")]
+            axes.append(Axis(name, unit, values, tuple(np.array_split(order, min(BINS, order.size)))))
+    return axes
+
+
+def _words(place: Place, axis: Axis, everywhere: bool, runs: str) -> str:
+    if everywhere:
+        span = "everywhere"
+    elif place.start == place.end:
+        span = f"at {place.start:.3g} {axis.unit}"
+    else:
+        span = f"between {place.start:.3g} and {place.end:.3g} {axis.unit}"
+    what = ("larger", "smaller") if place.channel in ("gap", "force") else ("farther right", "farther left")
+    return (
+        f"over the {axis.name}, {span}, the {place.channel} is {abs(place.size):.3g} {place.unit} "
+        f"{what[0] if place.size > 0.0 else what[1]} than simulated, {place.sigma:.0f} sigma{runs}"
+    )
+
+
+def _standard_deviations(noises: Mapping[str, Noise]) -> dict[str, float]:
+    """By channel, of one sample of a mean over many: correlated noise averages out less well."""
+    out = {}
+    for channel, noise in noises.items():
+        stretch = (1.0 + noise.correlation) / (1.0 - noise.correlation)
+        out[channel] = float(np.sqrt(noise.white_mm**2 + noise.correlated_mm**2 * stretch))
+    if "midline" in out:
+        out["left"] = out["right"] = float(np.hypot(0.5 * out["gap"], out["midline"]))
+    return out
+
+
+def where(
+    residual_mm: Mapping[str, Array],
+    noises: Mapping[str, Noise],
+    history: History,
+    aside: Flags,
+    rng: np.random.Generator,
+) -> tuple[Place, ...]:
+    """Find the regions over input (both ways, opening, closing), time and speed whose residual cannot be noise.
+
+    A disagreement shows in several channels and over several variables. It is told where it is sharpest, then taken
+    out of all channels, and what is left is looked at again.
+
+    Parameters
+    ----------
+    residual_mm : dict of ndarray of float, shape (n,)
+        Measured minus predicted, by channel.
+    noises : dict of Noise
+        Of gap and, where they were measured, midline and force.
+    history : History
+        Input and times.
+    aside : ndarray of bool, shape (n,)
+        Outliers.
+    rng : numpy Generator
+        For the threshold of the maximum over all stretches.
+    """
+    axes = _axes(history, aside)
+    sd = _standard_deviations(noises)
+    rest = {channel: residual_mm[channel].copy() for channel in SHARES if channel in residual_mm}
+    null = _scan(rng.standard_normal((DRAWS, len(axes) * len(rest), BINS)))[0]
+    # One threshold for the largest of all channels and variables: a table without a disagreement names none.
+    limit = float(np.quantile(null.max(axis=1), QUANTILE)) if axes else np.inf
+    places: list[Place] = []
+    while len(places) < MOST:
+        found: list[tuple[str, Axis, float, int, int]] = []
+        for channel in rest:
+            for axis in axes:
+                largest, begin, end = _scan(axis.scores(rest[channel], sd[channel]))
+                found.append((channel, axis, float(largest), int(begin), int(end)))
+        sharpest = max((entry[2] for entry in found), default=0.0)
+        if sharpest <= max(limit, SMALL * places[0].sigma if places else 0.0):
+            break
+        channel, axis, sigma, first, last = next(entry for entry in found if entry[2] >= NEAR * sharpest)
+        inside = axis.inside(rest[channel], first, last)
+        size = float(np.mean(rest[channel][inside]))
+        low, high = float(axis.values[inside].min()), float(axis.values[inside].max())
+        of = len(history.runs)
+        runs = sum(bool(np.isin(np.arange(run.start, run.stop), inside).any()) for run in history.runs)
+        among = "" if of == 1 else ", in all runs" if runs == of else f", in {runs} of {of} runs"
+        place = Place(channel, axis.name, low, high, size, "N" if channel == "force" else "mm", sigma, "")
+        everywhere = inside.size == sum(p.size for p in axis.parts)
+        places.append(replace(place, words=_words(place, axis, everywhere, among)))
+        for other, share in SHARES[channel].items():
+            if other in rest:
+                rest[other][inside] -= share * size
+    return tuple(places)
