@@ -152,7 +152,7 @@ def _unit(channel: str) -> str:
 
 
 def _named(found: Findings) -> tuple[NamedEffect, ...]:
-    listed = found.problem.parameters(found.best.names)
+    listed = [entry for entry in found.problem.parameters(found.best.names) if entry[1].run is None]
     root = np.sqrt(np.maximum(np.diag(found.best.covariance), 0.0))
     out = []
     for name in found.best.names:

@@ -5,6 +5,8 @@ from scipy.interpolate import Akima1DInterpolator
 
 from fingervision.domain.effect import Array, History
 
+LONGEST_S = 1.0
+"""Longest delay of the catalogue."""
 FEWEST = 4
 """Samples of a run that draw a curve."""
 
@@ -36,3 +38,13 @@ def late(signal: Array, history: History, delay_s: float, *, curved: bool = Fals
         else:
             out[run] = np.interp(ago_s, time_s, own)
     return out
+
+
+def over_before_reading(history: History) -> str | None:
+    """Say why no delay can show: every reading was taken when it was over; None where it can."""
+    if history.dwell_s <= LONGEST_S:
+        return None
+    return (
+        f"the stage is taken to have stood for {history.dwell_s:.3g} s or longer before each reading, "
+        f"and a delay of at most {LONGEST_S:g} s is over by then"
+    )

@@ -1,6 +1,6 @@
 """The opening goes on moving under a held input."""
 
-from fingervision.domain.effect import History, PointEffect, Stage, Values
+from fingervision.domain.effect import History, PointEffect, Stage, Values, start_key
 from fingervision.domain.parameter import Parameter
 from fingervision.domain.response import Response
 from fingervision.effects.low_pass import low_pass
@@ -15,9 +15,11 @@ def act(response: Response, history: History, values: Values) -> Response:
     for tau_s in TAUS_S:
         fraction = values[f"fraction_{tau_s}s"]
         if fraction != 0.0:
-            for run in history.runs:
+            for index, run in enumerate(history.runs):
+                # What was held before the run is somewhere within the openings of the record.
+                relaxed_mm = opening_mm[run][0] + values.get(start_key(index), 0.0) * history.opening_mm
                 crept_mm[run] -= fraction * (
-                    opening_mm[run] - low_pass(opening_mm[run], history.times[run], float(tau_s))
+                    opening_mm[run] - low_pass(opening_mm[run], history.times[run], float(tau_s), relaxed_mm)
                 )
     return response.with_gap(history.rest_gap_mm + crept_mm)
 
@@ -38,5 +40,6 @@ EFFECT = PointEffect(
     ),
     needs_times=True,
     memory=True,
+    start="opening to which the body had relaxed before, beside the first one, in largest openings",
     act=act,
 )

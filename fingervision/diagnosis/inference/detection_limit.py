@@ -23,7 +23,7 @@ def smallest_seen(
         if name not in thresholds:
             continue
         needed = float(np.sqrt(thresholds[name])) + SEEN_SIGMAS
-        amplitudes = {p.name: p for _, p in problem.parameters((name,)) if p.neutral is not None}
+        amplitudes = {p.name: p for _, p in problem.parameters((name,)) if p.neutral is not None and p.run is None}
         sizes: list[tuple[float, str]] = []
         for k in (k for k, owner in enumerate(atoms.names) if owner == name and norm[k] > 0.0):
             grow = atoms.grows[k]

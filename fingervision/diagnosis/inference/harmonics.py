@@ -1,6 +1,6 @@
 """Overtones: a screw's error has harmonics, which the catalogue's sine has not; small ones are no second name."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -52,8 +52,8 @@ def overtones(problem: Problem, best: Explanation) -> Overtones:
     for order in ORDERS:
         phase = 2.0 * np.pi * order * history.input_mm / period_mm
         for wave in (np.sin(phase), np.cos(phase)):
-            moved = replace(history, input_mm=history.input_mm + LARGEST * amplitude_mm * wave)
-            waves.append(replace(chain, history=moved).stacked(best.values) - base)
+            moved = chain.with_input(history.input_mm + LARGEST * amplitude_mm * wave)
+            waves.append(moved.stacked(best.values) - base)
     columns = problem.whitener.columns(np.stack(waves, axis=1))[0]
     metric = problem.offsets.metric(best.sigma_mm)
     bent = columns - problem.offsets.design @ (metric @ (problem.offsets.design.T @ columns))

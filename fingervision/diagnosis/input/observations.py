@@ -3,13 +3,17 @@
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fingervision.diagnosis.inference.hypothesis_fit import Explanation, Problem
 from fingervision.diagnosis.inference.measuring_chain import MeasuringChain, admissible
 from fingervision.diagnosis.inference.uncertain_dimensions import BENT, DrawingRefit, estimated, tangent, with_moved
-from fingervision.diagnosis.input.recorded_input import RecordedInput, standing_still
+from fingervision.diagnosis.input.path import dwell_s, input_path, readings_at_rest
+from fingervision.diagnosis.input.path import recorded as recorded_rows
+from fingervision.diagnosis.input.recorded_input import AT_REST_SHARE, RecordedInput, standing_still
 from fingervision.diagnosis.input.row_screening import distrusted_rows
 from fingervision.diagnosis.noise.noise_model import Noise, gate, white_noise, without_input
+from fingervision.diagnosis.noise.replicates import PureError, pure_error, resolution, visits
 from fingervision.diagnosis.noise.restricted_likelihood import noise_of_short_runs
 from fingervision.diagnosis.noise.spectrum import noise_by_spectrum
 from fingervision.diagnosis.noise.whitening import RunOffsets, Whitener
@@ -68,6 +72,7 @@ class BenchData:
     distrusted: Flags
     notes: tuple[str, ...]
     refit: DrawingRefit
+    repeats: NDArray[np.intp] | None = None
 
     @property
     def aim_mm(self) -> Array:
@@ -114,6 +119,10 @@ class BenchData:
             return tuple(
                 white_noise(part, out, floor, degrees) for part, out, floor in zip(parts, aside, floors, strict=True)
             )
+        if self.repeats is not None:
+            repeated = self._noises_of_repeats(aside, floors)
+            if repeated is not None:
+                return repeated
         rate_hz = 1.0 / history.sample_time_s
         together = 2 if history.both_edges and explained else 1
         groups = [slice(0, together), *(slice(k, k + 1) for k in range(together, len(parts)))]
@@ -135,6 +144,29 @@ class BenchData:
         holds = over(standing)
         return holds if holds[0].total_mm < everywhere[0].total_mm else everywhere
 
+    def measured_pure_errors(self, aside: list[Flags]) -> list[PureError] | None:
+        """Scatter of repeats of each channel, of readings at rest; None where too little repeats."""
+        history = self.chain.history
+        if self.repeats is None or history.time_s is None:
+            return None
+        parts = np.split(self.stacked_mm - self.chain.stacked({}), len(self.channels))
+        clock = history.clock_s if history.shared_clock else np.arange(history.input_mm.size, dtype=np.float64)
+        found = [pure_error(part, clock, self.repeats, out) for part, out in zip(parts, aside, strict=True)]
+        kept = [error for error in found if error is not None]
+        return kept if len(kept) == len(found) else None
+
+    def _noises_of_repeats(self, aside: list[Flags], floors: list[float]) -> tuple[Noise, ...] | None:
+        """Take the scatter of repeats for the noise: readings seconds apart are no samples of one fast process."""
+        errors = self.measured_pure_errors(aside)
+        if errors is None:
+            return None
+        digits = resolution(self.table.gap_mm) / float(np.sqrt(12.0))
+        # The doubt of a standard deviation's square is sqrt(2 / degrees).
+        return tuple(
+            Noise(max(error.sd_mm, floor, digits, 1e-9), 0.0, 0.0, float(np.sqrt(2.0 / error.degrees)))
+            for error, floor in zip(errors, floors, strict=True)
+        )
+
     def redrawn(self, problem: Problem, explanation: Explanation) -> "BenchData":
         """Refit the drawing's uncertain numbers beside an explanation, and predict with them from now on."""
         drawn = self.model.base
@@ -143,7 +175,7 @@ class BenchData:
         moved, known = estimated(self.refit, problem, explanation)
         model = with_moved(drawn, moved)
         rest_mm = float(model.respond(np.zeros(1)).gap_mm[0])
-        chain = replace(self.chain, model=model, history=replace(self.chain.history, rest_gap_mm=rest_mm))
+        chain = replace(self.chain, model=model).with_rest_gap(rest_mm)
         return replace(self, chain=chain, refit=replace(tangent(chain, drawn, moved), known=known))
 
     def straight(self, drawn: "BenchData", problem: Problem) -> bool:
@@ -218,9 +250,11 @@ def prepare(table: MeasuredTable, model: CorrectedModel, without: frozenset[str]
         both_edges=table.midline_mm is not None,
         force=table.force_n is not None and bare_force is not None,
         rezeroed=_rezeroed(table),
+        dwell_s=dwell_s(table),
     )
+    path = input_path(table, history, recorded.along_mm, commanded=recorded.commanded)
     fixed = {name: {key: e.value for key, e in values.items()} for name, values in model.effects.items()}
-    chain = MeasuringChain(model.base, history, fixed)
+    chain = MeasuringChain(model.base, history, fixed, path=path)
     stacked = table.gap_mm
     if table.midline_mm is not None:
         bare: Response = chain.respond({})
@@ -236,7 +270,12 @@ def prepare(table: MeasuredTable, model: CorrectedModel, without: frozenset[str]
     refit = DrawingRefit(np.zeros((stacked.size, 0)), {})
     if isinstance(model.base, PhysicalModel) and model.base.uncertain:
         refit = tangent(chain, model.base, {})
-    return BenchData(table, model, chain, stacked, recorded, able, excluded, distrusted, tuple(notes), refit)
+    repeats = None
+    if np.mean(readings_at_rest(table)) > AT_REST_SHARE:
+        rows = np.arange(u.size) if table.path is None else table.path.rows
+        along_mm, _, along_runs = recorded_rows(table)
+        repeats = visits(along_mm, along_runs, rows)
+    return BenchData(table, model, chain, stacked, recorded, able, excluded, distrusted, tuple(notes), refit, repeats)
 
 
 def _rezeroed(table: MeasuredTable) -> tuple[bool, ...]:
