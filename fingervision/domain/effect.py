@@ -61,6 +61,8 @@ class History:
         Which runs came after a re-zeroing of the stage that others came before; empty where none did.
     dwell_s : float
         Shortest time for which the stage stood before it was read; 0 where it was read on its way.
+    commanded : bool
+        Whether the input is a command that keeps its value until it jumps.
     """
 
     input_mm: Array
@@ -76,6 +78,7 @@ class History:
     force: bool = False
     rezeroed: tuple[bool, ...] = ()
     dwell_s: float = 0.0
+    commanded: bool = False
 
     @property
     def times(self) -> Array:
@@ -159,6 +162,8 @@ class Effect:
     start : str
         What the state of an effect with memory is at a run's start, in words; empty where it is known. Such a start is
         a nuisance of its run: a number from -1 to 1 under the key `start_key(run)`.
+    curve : bool
+        Whether its form is a curve that is estimated as a whole; its parameters then only describe the curve.
     narrow : callable or None
         Bounds that follow from the data: `narrow(history)` gives the parameters to search, or the reason why
         these data cannot show the effect.
@@ -180,6 +185,7 @@ class Effect:
     needs_force: bool = False
     memory: bool = False
     start: str = ""
+    curve: bool = False
     narrow: Callable[[History], "tuple[Parameter, ...] | str"] | None = None
     foretold: Mapping[str, tuple[float, float]] = field(default_factory=lambda: MappingProxyType({}))
 

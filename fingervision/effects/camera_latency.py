@@ -5,7 +5,7 @@ from dataclasses import replace
 from fingervision.domain.effect import History, PointEffect, Stage, Values
 from fingervision.domain.parameter import Parameter
 from fingervision.domain.response import Response
-from fingervision.effects.late import late, over_before_reading
+from fingervision.effects.late import delay_that_shows, late
 
 
 def act(response: Response, history: History, values: Values) -> Response:
@@ -29,7 +29,7 @@ def _stamped(response: Response, history: History, values: Values, *, curved: bo
 
 def narrow(history: History) -> tuple[Parameter, ...] | str:
     """Bound the parameters by what these data can show."""
-    return over_before_reading(history) or EFFECT.parameters
+    return delay_that_shows(history, EFFECT.parameters[0])
 
 
 EFFECT = PointEffect(

@@ -2,7 +2,7 @@
 
 from fingervision.domain.effect import Array, DriveEffect, History, Stage, Values
 from fingervision.domain.parameter import Parameter
-from fingervision.effects.late import late, over_before_reading
+from fingervision.effects.late import delay_that_shows, late
 
 
 def act(input_mm: Array, history: History, values: Values) -> Array:
@@ -17,7 +17,7 @@ def act_curved(input_mm: Array, history: History, values: Values) -> Array:
 
 def narrow(history: History) -> tuple[Parameter, ...] | str:
     """Bound the parameters by what these data can show."""
-    return over_before_reading(history) or EFFECT.parameters
+    return delay_that_shows(history, EFFECT.parameters[0])
 
 
 EFFECT = DriveEffect(

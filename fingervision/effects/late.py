@@ -1,12 +1,13 @@
 """A signal some time ago."""
 
+from dataclasses import replace
+
 import numpy as np
 from scipy.interpolate import Akima1DInterpolator
 
 from fingervision.domain.effect import Array, History
+from fingervision.domain.parameter import Parameter
 
-LONGEST_S = 1.0
-"""Longest delay of the catalogue."""
 FEWEST = 4
 """Samples of a run that draw a curve."""
 
@@ -40,11 +41,14 @@ def late(signal: Array, history: History, delay_s: float, *, curved: bool = Fals
     return out
 
 
-def over_before_reading(history: History) -> str | None:
-    """Say why no delay can show: every reading was taken when it was over; None where it can."""
-    if history.dwell_s <= LONGEST_S:
-        return None
+def delay_that_shows(history: History, delay: Parameter) -> tuple[Parameter, ...] | str:
+    """Bound a delay by what the data can show: none where every reading was taken when it was over.
+
+    Under step commands the prediction changes in jumps as the delay passes from one sample to the next.
+    """
+    if history.dwell_s <= delay.upper:
+        return (replace(delay, rugged=history.commanded),)
     return (
         f"the stage is taken to have stood for {history.dwell_s:.3g} s or longer before each reading, "
-        f"and a delay of at most {LONGEST_S:g} s is over by then"
+        f"and a delay of at most {delay.upper:g} s is over by then"
     )

@@ -6,6 +6,9 @@ from fingervision.domain.response import Response
 from fingervision.effects.low_pass import low_pass
 
 TAUS_S = (1, 4, 16, 64)
+SLOWER = 2.0
+"""Times the dwell before a reading that a time constant must be to show: the dwell is taken for half of the time
+between two readings, and what relaxes faster than between them depends on when the stage arrived."""
 
 
 def act(response: Response, history: History, values: Values) -> Response:
@@ -13,7 +16,7 @@ def act(response: Response, history: History, values: Values) -> Response:
     opening_mm = response.gap_mm - history.rest_gap_mm
     crept_mm = opening_mm.copy()
     for tau_s in TAUS_S:
-        fraction = values[f"fraction_{tau_s}s"]
+        fraction = values.get(f"fraction_{tau_s}s", 0.0)
         if fraction != 0.0:
             for index, run in enumerate(history.runs):
                 # What was held before the run is somewhere within the openings of the record.
@@ -22,6 +25,14 @@ def act(response: Response, history: History, values: Values) -> Response:
                     opening_mm[run] - low_pass(opening_mm[run], history.times[run], float(tau_s), relaxed_mm)
                 )
     return response.with_gap(history.rest_gap_mm + crept_mm)
+
+
+def narrow(history: History) -> tuple[Parameter, ...] | str:
+    """Leave out what relaxes within the time in which the stage arrived and waited: nobody knows when it came."""
+    kept = tuple(p for p, tau_s in zip(EFFECT.parameters, TAUS_S, strict=True) if tau_s >= SLOWER * history.dwell_s)
+    if not kept:
+        return f"the stage stood for {history.dwell_s:.3g} s or longer before each reading: creep is over by then"
+    return kept
 
 
 EFFECT = PointEffect(
@@ -41,5 +52,6 @@ EFFECT = PointEffect(
     needs_times=True,
     memory=True,
     start="opening to which the body had relaxed before, beside the first one, in largest openings",
+    narrow=narrow,
     act=act,
 )

@@ -9,11 +9,15 @@ from pathlib import Path
 from fingervision.domain.errors import FingervisionError
 from fingervision.domain.parameter import Estimate
 from fingervision.effects import catalogue
+from fingervision.effects.position_error_map import curve_points, curve_values
 from fingervision.models.corrected import CorrectedModel
 from fingervision.models.kinds import kinds
 from fingervision.models.physical_gripper import PhysicalGripper
 from fingervision.storage.gripper_toml import read_gripper
 from fingervision.storage.simulation_table import read_simulation_table
+
+POINTS = "points"
+"""Key of the curve of a map of position errors: pairs of input and error, in mm."""
 
 
 def read_model(path: Path, kind: str = "lumped") -> CorrectedModel:
@@ -39,10 +43,14 @@ def read_model(path: Path, kind: str = "lumped") -> CorrectedModel:
     effects: dict[str, Mapping[str, Estimate]] = dict(base.effects)
     for entry in document.get("effect", []):
         try:
-            effects[str(entry["name"])] = {
+            parameters = dict(entry["parameters"])
+            points = [(float(at), float(error)) for at, error in parameters.pop(POINTS, [])]
+            stated = {
                 name: Estimate(float(value["value"]), float(value["u"]) if "u" in value else None)
-                for name, value in entry["parameters"].items()
+                for name, value in parameters.items()
             }
+            curve = curve_values([at for at, _ in points], [error for _, error in points])
+            effects[str(entry["name"])] = stated | {name: Estimate(value, None) for name, value in curve.items()}
         except (KeyError, TypeError, ValueError) as error:
             raise FingervisionError(
                 f"An effect in {path} must have a name and parameters like play_mm = {{ value = 0.01, u = 0.001 }}, "
@@ -86,7 +94,15 @@ def write_model(
     lines = ["schema = 1", f'base = "{base}"', *([f'kind = "{kind}"'] if kind else [])]
     for name, parameters in effects.items():
         lines += ["", "[[effect]]", f'name = "{name}"', "[effect.parameters]"]
+        inputs, errors = curve_points({key: estimate.value for key, estimate in parameters.items()})
+        if inputs.size:
+            pairs = ", ".join(
+                f"[{at!r}, {error!r}]" for at, error in zip(inputs.tolist(), errors.tolist(), strict=True)
+            )
+            lines.append(f"{POINTS} = [{pairs}]")
         for key, estimate in parameters.items():
+            if key.startswith("point_"):
+                continue
             u = "" if estimate.u is None else f", u = {estimate.u!r}"
             lines.append(f"{key} = {{ value = {estimate.value!r}{u} }}")
     path.write_text("\n".join(lines) + "\n", encoding="utf-8")

@@ -76,6 +76,10 @@ class Problem:
         The observation model.
     effects : mapping of str to Effect
         Those that the data can show.
+    form_share : float
+        Share of what is explained that the form of an effect may leave over, as a ratio of amplitudes.
+    stalled : frozenset of str
+        Effects for which readings that stand at an end of the range speak.
     """
 
     chain: MeasuringChain
@@ -83,6 +87,8 @@ class Problem:
     whitener: Whitener
     offsets: RunOffsets
     effects: Mapping[str, Effect]
+    form_share: float = SMALL_SHARE
+    stalled: frozenset[str] = frozenset()
 
     def parameters(self, names: tuple[str, ...]) -> list[tuple[str, Parameter]]:
         """List the parameters of some effects with the bounds that the data leave."""

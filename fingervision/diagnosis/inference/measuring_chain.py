@@ -145,6 +145,6 @@ def admissible(
             excluded[name] = "left out by request"
         elif isinstance(searched, str):
             excluded[name] = searched
-        else:
+        elif not effect.curve:  # a curve is estimated as a whole beside the others
             able[name] = effect
     return able, excluded

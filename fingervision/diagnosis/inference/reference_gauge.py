@@ -14,7 +14,6 @@ from fingervision.diagnosis.inference.search import Findings
 from fingervision.diagnosis.input.observations import BenchData
 from fingervision.domain.effect import PointEffect
 from fingervision.domain.reference_slot import ReferenceSlot
-from fingervision.domain.report import Verdict
 from fingervision.domain.response import Response
 from fingervision.effects import catalogue
 
@@ -47,16 +46,15 @@ def told_by_slots(bench: BenchData, found: Findings) -> tuple[Findings, tuple[st
     costs = [sum(_surprise(bench, e, slot) for slot in slots) for e in members]
     said = tuple(_sentence(bench, members[int(np.argmin(costs))], slot) for slot in slots)
     least = min(costs)
-    if found.verdict is not Verdict.AMBIGUOUS or least >= REFUTED * len(slots):
+    if found.unknown is not None or len(members) < 2 or least >= REFUTED * len(slots):
         return found, said
     left = [e for e, cost in zip(members, costs, strict=True) if cost - least < REFUTED]
     if len(left) == len(members):
         return found, said
     dropped = " and ".join("+".join(e.names) for e in members if e not in left)
     best = min(left, key=lambda e: e.score + costs[members.index(e)])
-    verdict = Verdict.NAMED if len(left) == 1 else Verdict.AMBIGUOUS
     others = [e for e in left if e is not best]
-    told = replace(found, best=best, alternatives=(best, *others), verdict=verdict)
+    told = replace(found, best=best, alternatives=(best, *others))
     return told, (*said, f"that rules out {dropped}.")
 
 

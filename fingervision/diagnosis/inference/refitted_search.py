@@ -6,11 +6,20 @@ from functools import partial
 import numpy as np
 
 from fingervision.diagnosis.inference.hypothesis_fit import Explanation, Point, Problem, fit
+from fingervision.diagnosis.inference.position_map import (
+    LEAST_GAIN,
+    NAME,
+    PositionMap,
+    likeliest_map,
+    why_no_map,
+)
 from fingervision.diagnosis.inference.posterior import settled
 from fingervision.diagnosis.inference.reference_gauge import told_by_slots
 from fingervision.diagnosis.inference.search import Findings, Progress, search
+from fingervision.diagnosis.inference.verdict import standing_of, without_passengers
 from fingervision.diagnosis.input.intersample_interpolation import along_likelier_path
 from fingervision.diagnosis.input.observations import BenchData
+from fingervision.diagnosis.noise.whitening import RunOffsets
 
 MOST_SEARCHES = 3
 """The second is nearly always the last, and none is needed where the drawing's numbers act along a straight line."""
@@ -41,8 +50,14 @@ def _problem(bench: BenchData, explanation: Explanation | None) -> Problem:
     return bench.problem(bench.stacked_mm - bench.chain.stacked(values), free, explained=explanation is not None)
 
 
-def refitted_search(bench: BenchData, rng: np.random.Generator, forced: frozenset[str], progress: Progress) -> Refitted:
-    """Search; where a drawing's numbers are uncertain, redraw it and search again until neither changes the other.
+def refitted_search(
+    bench: BenchData,
+    rng: np.random.Generator,
+    forced: frozenset[str],
+    without: frozenset[str],
+    progress: Progress,
+) -> Refitted:
+    """Search, stage by stage: between samples, beside a map of position errors, beside a redrawn gripper.
 
     Parameters
     ----------
@@ -50,36 +65,147 @@ def refitted_search(bench: BenchData, rng: np.random.Generator, forced: frozense
         Measurement and model.
     rng : numpy Generator
         For the bootstrap and the posterior.
-    forced : frozenset of str
-        Effects that the user insists on.
+    forced, without : frozenset of str
+        Effects that the user insists on, or rules out.
     progress : callable
         Told the share that is done.
     """
-    found, said = told_by_slots(bench, search(partial(_problem, bench), rng, forced, progress))
-    likelier = along_likelier_path(bench, found.problem, found.best)
-    if likelier is not bench:
-        bench = likelier
-        found, said = told_by_slots(bench, search(partial(_problem, bench), rng, forced, progress))
-    if not bench.refit.moved:
-        best, posterior = settled(found.problem, found.best, rng)
-        return Refitted(_with_notes(bench, said), _with_best(found, best), posterior)
+    look = _Look(rng, forced, progress)
+    state = look.again(bench)
+    likelier = along_likelier_path(state.bench, state.found.problem, state.found.best)
+    if likelier is not state.bench:
+        state = look.again(likelier)
+    state = _over_the_ends(state, look)
+    if NAME not in without:
+        state = _beside_map(state, look)
+    state = _without_scatter(state, look)
+    return _settled(_beside_drawing(state, look), rng)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Searched:
+    """A search that was made: measurement and model, what was found, and what slots of known width said."""
+
+    bench: BenchData
+    found: Findings
+    said: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Look:
+    """How searches are made."""
+
+    rng: np.random.Generator
+    forced: frozenset[str]
+    progress: Progress
+
+    def again(self, bench: BenchData) -> _Searched:
+        """Search once more."""
+        found, said = told_by_slots(bench, search(partial(_problem, bench), self.rng, self.forced, self.progress))
+        return _Searched(bench, found, said)
+
+
+def _over_the_ends(state: _Searched, look: _Look) -> _Searched:
+    """Search along a path with overshoots, and keep it where an effect with memory then explains the data better."""
+    bench = state.bench.with_overshoots()
+    if bench is state.bench:
+        return state
+    found = state.found
+    with_memory = [name for name, effect in found.problem.effects.items() if effect.memory]
+    over = replace(found.problem, chain=bench.chain)
+    tried = [e for e in found.singles if e.names[0] in with_memory]
+    if not tried:
+        return state
+    straight = min(e.score for e in tried)
+    turned = min(fit(over, e.names, e.values, iterations=20).score for e in tried)
+    return look.again(bench) if turned < straight - LEAST_GAIN else state
+
+
+def _beside_map(state: _Searched, look: _Look) -> _Searched:
+    """Search beside a map of position errors, and keep what is found where it is the far likelier explanation.
+
+    The map competes only where something remains that the other effects do not explain, and at the price of its
+    freedom; where an effect with a few numbers does as well, it stays.
+    """
+    history, found = state.bench.chain.history, state.found
+    reason = why_no_map(history, state.bench.chain.path)
+    asked = NAME in look.forced
+    if reason is not None:
+        excluded = {**state.bench.excluded, NAME: reason}
+        return replace(state, bench=replace(state.bench, excluded=excluded))
+    if not asked and found.unknown is None and found.left_over is None:
+        return state
+    first, gain = likeliest_map(found.problem, found.best)
+    if gain < LEAST_GAIN and found.best.names:
+        # What was named may itself stand for a part of the map.
+        first, gain = likeliest_map(found.problem, found.nothing)
+    if gain < LEAST_GAIN and not asked:
+        return state
+    beside = look.again(replace(state.bench, position_map=first))
+    plain = replace(beside.found.problem, offsets=_offsets_without_map(beside.found.problem, first))
+    second, _ = likeliest_map(plain, _left(plain, beside.found.best))
+    beside = look.again(replace(beside.bench, position_map=second))
+    plain = replace(beside.found.problem, offsets=_offsets_without_map(beside.found.problem, second))
+    rows = max(2, int(plain.measured.size - plain.whitener.aside.sum()))
+    rival = fit(plain, found.best.names, found.best.values, iterations=20) if found.best.names else plain.nothing()
+    gained = rival.bic(rows) - beside.found.best.bic(rows) - second.price
+    return beside if asked or gained > LEAST_GAIN else state
+
+
+def _without_scatter(state: _Searched, look: _Look) -> _Searched:
+    """Search once more for what offsets of the runs had taken, where much of the disagreement still stands.
+
+    A constant that is left in every run is structure: runs that are off by the same amount share no accident.
+    """
+    if len(state.bench.chain.history.runs) < 2:
+        return state
+    stands = standing_of(state.bench, state.found)
+    if stands.is_little and (state.found.best.names or state.bench.position_map is not None or stands.is_noise):
+        return state
+    again = look.again(replace(state.bench, runs_scatter=False))
+    return again if standing_of(again.bench, again.found).after_mm < stands.after_mm else state
+
+
+def _left(problem: Problem, explanation: Explanation) -> Explanation:
+    """Judge an explanation as it stands by another observation model."""
+    residual = problem.measured - problem.whitened(explanation.values)
+    return replace(explanation, residual=residual, sigma_mm=problem.offsets.spread(residual)[0])
+
+
+def _offsets_without_map(problem: Problem, position_map: PositionMap) -> RunOffsets:
+    drawing = problem.whitener.drawing
+    count = position_map.coefficients.size
+    kept = None if drawing is None or drawing.shape[1] == count else drawing[:, count:]
+    return RunOffsets.of(replace(problem.whitener, drawing=kept))
+
+
+def _beside_drawing(state: _Searched, look: _Look) -> _Searched:
+    """Redraw a gripper whose numbers are uncertain, and search again until neither changes the other."""
+    if not state.bench.refit.moved:
+        return state
     for _ in range(MOST_SEARCHES - 1):
-        nearer = bench.redrawn(found.problem, found.best)
-        straight = nearer.straight(bench, found.problem)
-        bench = nearer
+        nearer = state.bench.redrawn(state.found.problem, state.found.best)
+        straight = nearer.straight(state.bench, state.found.problem)
+        state = replace(state, bench=nearer)
         if straight:
             break
-        found, said = told_by_slots(bench, search(partial(_problem, bench), rng, forced, progress))
-    found = replace(found, problem=_problem(bench, found.best))
+        state = look.again(state.bench)
+    found = replace(state.found, problem=_problem(state.bench, state.found.best))
     refit = fit(found.problem, found.best.names, found.best.values, iterations=20) if found.best.names else found.best
-    best, posterior = settled(found.problem, refit, rng)
+    return replace(state, found=_with_best(found, refit))
+
+
+def _settled(state: _Searched, rng: np.random.Generator) -> Refitted:
+    """Drop what only rides along, estimate the map, and give every parameter its posterior."""
+    bench, found = state.bench, without_passengers(state.bench, state.found)
+    best, posterior = settled(found.problem, found.best, rng)
     found = _with_best(found, best)
-    bench = bench.redrawn(found.problem, best if best.names else found.problem.nothing())
-    return Refitted(_with_notes(bench, said), replace(found, problem=_problem(bench, best)), posterior)
-
-
-def _with_notes(bench: BenchData, said: tuple[str, ...]) -> BenchData:
-    return replace(bench, notes=(*bench.notes, *said))
+    if bench.position_map is not None:
+        bench = replace(bench, position_map=bench.position_map.refitted(found.problem, best, len(bench.refit.moved)))
+    if bench.refit.moved:
+        bench = bench.redrawn(found.problem, best if best.names else found.problem.nothing())
+        found = replace(found, problem=_problem(bench, best))
+    return Refitted(replace(bench, notes=(*bench.notes, *state.said)), found, posterior)
 
 
 def _with_best(found: Findings, best: Explanation) -> Findings:

@@ -15,10 +15,14 @@ AT_REST_REVISITED_S = 1.0
 """The same where the rows come back to exactly the same inputs: these are set-points and no samples of a motion."""
 REVISITED_SHARE = 0.5
 """Share of the rows whose exact input stands in another row too, above which a record is one of set-points."""
+OVERSHOOT = 0.5
+"""Overshoot beyond an outermost target, over the distance of its neighbour: any larger than the play is as good."""
 ARRIVED = 0.5
 """Share of the time between two readings after which the stage has arrived at the later one's input."""
-JUMP_SHARE = 1e-4
-"""Share of a sample's time in which a command jumps: much less than any effect resolves."""
+FINE_STEPS = 8
+"""Points of the path a sample after a command's jump, which takes one of them: so finely a delay places it."""
+FINE_S = 1.5
+"""Time after a jump for which the path is so fine: longer than the longest delay of the catalogue."""
 
 
 def readings_at_rest(table: MeasuredTable) -> Flags:
@@ -54,7 +58,27 @@ def _revisits(input_mm: Array, runs: tuple[slice, ...]) -> bool:
     return float(np.sum(counts[counts > 1])) > REVISITED_SHARE * visits.size
 
 
-def input_path(table: MeasuredTable, history: History, along_mm: Array, *, commanded: bool) -> InputPath | None:
+def turning_readings(table: MeasuredTable) -> NDArray[np.intp]:
+    """Rows of the path that were read at rest at the input of the row before, where the stage turns back.
+
+    ISO 230-2 cycles read the outermost target twice: the stage runs over beyond it in between, and comes back from
+    the other side.
+    """
+    input_mm, _, runs = recorded(table)
+    rest = readings_at_rest(table)
+    found = []
+    for run in runs:
+        for i in range(run.start + 2, run.stop - 1):
+            if not rest[i] or input_mm[i] != input_mm[i - 1]:
+                continue
+            if (input_mm[i - 1] - input_mm[i - 2]) * (input_mm[i + 1] - input_mm[i]) < 0.0:
+                found.append(i)
+    return np.array(found, dtype=np.intp)
+
+
+def input_path(
+    table: MeasuredTable, history: History, along_mm: Array, *, commanded: bool, overshoots: bool = False
+) -> InputPath | None:
     """Lay out the path that effects with memory follow.
 
     Parameters
@@ -67,6 +91,8 @@ def input_path(table: MeasuredTable, history: History, along_mm: Array, *, comma
         Smoothed input of every recorded row.
     commanded : bool
         Whether the input is a command that keeps its value until it jumps.
+    overshoots : bool
+        Whether the stage ran over beyond its targets where it turned between two readings of the same one.
 
     Returns
     -------
@@ -80,6 +106,7 @@ def input_path(table: MeasuredTable, history: History, along_mm: Array, *, comma
     rest = readings_at_rest(table)
     if table.path is None and not commanded and not rest.any():
         return None
+    over = set(turning_readings(table).tolist()) if overshoots else set[int]()
     owner_of = np.full(along_mm.size, -1, dtype=np.intp)
     owner_of[rows] = np.arange(rows.size)
     inputs: list[float] = []
@@ -88,17 +115,25 @@ def input_path(table: MeasuredTable, history: History, along_mm: Array, *, comma
     place = np.zeros(along_mm.size, dtype=np.intp)
     path_runs: list[slice] = []
     for run in runs:
-        begin = len(inputs)
+        begin, jumped_s = len(inputs), -np.inf
         for i in range(run.start, run.stop):
             step_s = time_s[i] - time_s[i - 1] if i > run.start else 0.0
+            if i in over:
+                inputs.append(along_mm[i] + OVERSHOOT * (along_mm[i - 1] - along_mm[i - 2]))
+                times.append(time_s[i - 1] + 0.5 * ARRIVED * step_s)
+                owners.append(-1)
             if rest[i]:
                 inputs.append(along_mm[i])
                 times.append(time_s[i - 1] + ARRIVED * step_s)
                 owners.append(int(owner_of[i]))
-            elif commanded and i > run.start and along_mm[i] != along_mm[i - 1]:
-                inputs.append(along_mm[i - 1])
-                times.append(time_s[i] - JUMP_SHARE * step_s)
-                owners.append(int(owner_of[i - 1]))
+            elif commanded and i > run.start:
+                jumps = along_mm[i] != along_mm[i - 1]
+                jumped_s = time_s[i] if jumps else jumped_s
+                if jumps or time_s[i] - jumped_s < FINE_S:
+                    # A command holds its value until the sample at which it stands changed.
+                    inputs += [along_mm[i - 1]] * (FINE_STEPS - 1)
+                    times += [time_s[i - 1] + step_s * k / FINE_STEPS for k in range(1, FINE_STEPS)]
+                    owners += [int(owner_of[i - 1])] * (FINE_STEPS - 1)
             place[i] = len(inputs)
             inputs.append(along_mm[i])
             times.append(time_s[i])

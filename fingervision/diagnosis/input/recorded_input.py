@@ -1,6 +1,7 @@
 """The recorded input: smoothed as far as its error is random, and what the rest of that error does to the gap."""
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -110,6 +111,27 @@ def standing_still(history: History) -> tuple[slice, ...]:
                 begin, low, high = i, value, value
         found.append(slice(begin, run.stop))
     return tuple(stretch for stretch in found if stretch.stop - stretch.start >= LEAST_RUN)
+
+
+def scatter_in_holds(history: History, residual_mm: Array) -> float:
+    """Standard deviation of a residual within the second halves of holds, when the stage has settled; in mm.
+
+    Parameters
+    ----------
+    history : History
+        Input and runs.
+    residual_mm : ndarray of float, shape (n,)
+        Of one channel.
+    """
+    total, degrees = 0.0, 0
+    for run in history.runs:
+        borders = [run.start, *(run.start + 1 + np.flatnonzero(np.diff(history.input_mm[run]))), run.stop]
+        for begin, end in pairwise(borders):
+            settled = residual_mm[begin + (end - begin) // 2 : end]
+            if settled.size >= 2:
+                total += float(np.sum((settled - settled.mean()) ** 2))
+                degrees += settled.size - 1
+    return float(np.sqrt(total / degrees)) if degrees else np.inf
 
 
 def _within(input_mm: Array, runs: tuple[slice, ...], samples: int, reach_mm: float) -> Flags:

@@ -71,6 +71,8 @@ class Whitener:
         The same of errors that are another at each sample.
     drawing : ndarray of float, shape (channels * n, p), or None
         What one standard uncertainty of each uncertain number of the gripper's drawing does to the prediction.
+    runs_scatter : bool
+        Whether the runs may be offset against each other by chance.
     """
 
     history: History
@@ -80,6 +82,7 @@ class Whitener:
     input_samples: float
     passing_mm: Array
     drawing: Array | None = None
+    runs_scatter: bool = True
 
     def columns(self, columns: Array) -> tuple[Array, float]:
         """Whiten columns of shape (channels * n, k); also the logarithm of the covariance's determinant."""
@@ -136,6 +139,8 @@ class RunOffsets:
         Noise of each channel.
     drawn : int
         How many numbers of the drawing are uncertain.
+    scatter : bool
+        Whether runs may be offset against each other by chance.
     """
 
     design: Array
@@ -145,6 +150,7 @@ class RunOffsets:
     midline: bool
     scales_mm: tuple[float, ...]
     drawn: int = 0
+    scatter: bool = True
 
     @classmethod
     def of(cls, whitener: Whitener) -> "RunOffsets":
@@ -163,7 +169,7 @@ class RunOffsets:
             columns = np.hstack([columns, whitener.drawing])
         design = whitener.columns(columns)[0]
         scales = tuple(noise.total_mm for noise in whitener.noises)
-        return cls(design, design.T @ design, channels, runs, bool(free), scales, drawn)
+        return cls(design, design.T @ design, channels, runs, bool(free), scales, drawn, whitener.runs_scatter)
 
     def metric(self, sigma_mm: tuple[float, ...]) -> Array:
         """Return G with r^T r - (Z^T r)^T G (Z^T r) the squared length once offsets of these spreads are allowed."""
@@ -189,7 +195,7 @@ class RunOffsets:
         penalty : float
             -2 log of determinant and prior, to be added to chi-square.
         """
-        if self.runs == 1:
+        if self.runs == 1 or not self.scatter:
             return (0.0,) * self.channels, 0.0
         out, total = [], 0.0
         for scale, determinant, gain in self._tried(residual):
@@ -203,7 +209,7 @@ class RunOffsets:
 
         A few runs hardly tell their spread: parameters that act like an offset are known with Student's tails only.
         """
-        if self.runs == 1:
+        if self.runs == 1 or not self.scatter:
             return 0.0
         width = np.gradient(SPREADS)
         total = 0.0
