@@ -27,6 +27,8 @@ MINUS = "\N{MINUS SIGN}"
 MATRIX = re.compile(
     r"(?P<side>[^\d\s_]+)_?(?P<cycle>\d+)_(?P<quantity>(?:position|deviation)_(?:mm|um))", re.IGNORECASE
 )
+FORWARD = {"forward", "forwards", "fwd"}
+"""Words that say along the axis to one author and towards its zero to another."""
 UNSIDED = "cycle"
 SMALLEST_TRAVEL = 0.05
 """Range of the positions over that of the targets below which they are deviations under a wrong name."""
@@ -97,17 +99,16 @@ def read_iso230_table(path: Path) -> Iso230Rows | None:
     readings, words = _readings(path, listed, kinds[0], cells)
     _check_quantity(path, readings, kinds[0])
     rows, assumed = approach_path(readings)
-    below = sorted({word for word in words if SIDES[word] > 0})
-    said = f" ({', '.join(below)})" if below and below != ["up"] else ""
     notes = [
         f"Read as an ISO 230-2 table: {len({r.target_mm for r in readings})} targets, "
         f"{len({(r.run, r.cycle) for r in readings})} cycles; input = target, gap = "
         f"{'position' if kinds[0].startswith('position') else 'target + deviation'}."
     ]
-    if said:
+    if words & FORWARD:
         notes.append(
-            f"The first direction{said} was taken as approached from below, the input increasing. Some published "
-            "reports mean the approach from above by it: if the reversal comes out with the wrong sign, exchange them."
+            f"The direction {sorted(words & FORWARD)[0]} was taken as the approach from below, the input increasing. "
+            "Some published reports mean the approach from above by it: if the reversal comes out with the wrong sign, "
+            "exchange the directions."
         )
     return Iso230Rows(rows, (*notes, *assumed))
 

@@ -174,10 +174,13 @@ def _sentence(report: PositioningReport, symbol: str, value: float) -> str:
     causes = []
     for effect in report.without:
         share = report.share_mm(effect, symbol)
-        # A share is told by what the figure would be without the effect: that is true whatever else there is.
-        if share is not None and abs(share) > TOLD * abs(value):
-            part = "of it is" if share * value > 0.0 else "more would stand without"
-            causes.append(f"{_um(abs(share))} um {part} {effect}")
+        if share is None or abs(share) <= TOLD * abs(value):
+            continue
+        if 0.0 < share * value <= value**2:
+            causes.append(f"{_um(abs(share))} um of it is {effect}")
+        else:
+            # It hides a part of the figure, or others hide a part of it: what would stand without it is true always.
+            causes.append(f"without {effect} it would be {_um(value - share)} um")
     words += f"; {', '.join(causes)}" if causes else ""
     rest = None if report.after is None else report.after.figures[symbol].value_mm
     return words + (f"; {_um(rest)} um remain after the answer." if rest is not None else ".")
