@@ -13,12 +13,8 @@ from hypothesis import strategies as st
 
 from fingervision.diagnosis.input.repeated_targets import RepeatedTargets
 from fingervision.diagnosis.report.positioning_accuracy import positioning_accuracy
-from fingervision.diagnosis.report.positioning_report import (
-    positioning_document,
-    positioning_report,
-    positioning_rows,
-    positioning_words,
-)
+from fingervision.diagnosis.report.positioning_report import effect_changes, positioning_report
+from fingervision.diagnosis.report.positioning_words import positioning_document, positioning_rows, positioning_words
 
 RIGS = Path(__file__).parents[3] / "shared" / "real" / "rigs"
 DIGIT = 0.5e-5
@@ -251,6 +247,17 @@ def test_shares_name_the_cause() -> None:
     assert "thermal_drift" in words[1]
     assert "position_error_map" not in words[1]
     assert all("remain" in sentence for sentence in words)
+
+
+def test_the_change_of_an_effect_is_taken_beside_the_others() -> None:
+    def predict(acting: dict[str, dict[str, float]]) -> np.ndarray:
+        scale = acting.get("scale", {"ratio": 1.0})["ratio"]
+        return scale * (np.arange(3.0) + acting.get("offset", {"mm": 0.0})["mm"])
+
+    changes = effect_changes(predict, {"scale": {"ratio": 2.0}, "offset": {"mm": 1.0}})
+    assert np.allclose(changes["scale"], [1.0, 2.0, 3.0])
+    assert np.allclose(changes["offset"], 2.0)
+    assert effect_changes(predict, {}) == {}
 
 
 def test_what_is_written_is_whole() -> None:
