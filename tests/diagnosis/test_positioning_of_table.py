@@ -1,15 +1,26 @@
 """From a table as it is read, with its model, to the figures of a published report and the causes of each."""
 
 import csv
+import json
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from fingervision.diagnosis.diagnose import diagnose
 from fingervision.diagnosis.input.repeated_targets import NoRepeatedTargets
+from fingervision.diagnosis.report.positioning_figures import DEFINITIONS
+from fingervision.diagnosis.report.positioning_of_bench import (
+    positioning_html,
+    positioning_of_bench,
+    positioning_section,
+)
 from fingervision.diagnosis.report.positioning_of_table import MODEL, positioning_of_table
 from fingervision.diagnosis.report.positioning_report import PositioningReport
 from fingervision.diagnosis.report.positioning_words import positioning_document, positioning_words
+from fingervision.storage.iso230_table import read_iso230_table
+from fingervision.storage.measured_table import read_measured_table
+from fingervision.storage.model_toml import read_model
 
 RIGS = Path(__file__).parents[3] / "shared" / "real" / "rigs"
 PATH = np.tile(np.concatenate([[-0.5], np.arange(5.0), [4.5], np.arange(5.0)[::-1]]), 5)
@@ -79,7 +90,9 @@ def test_a_gripper_is_compared_with_its_model() -> None:
     assert found.reference == "model"
     assert found.measured.value_mm("E") == pytest.approx(0.02)
     assert found.after.value_mm("E") == pytest.approx(0.0, abs=1e-12)
-    assert "not of the axis alone" in positioning_document(found)["deviation"]
+    document = positioning_document(found)
+    assert document["reference"] == "model"
+    assert "not of the axis alone" in document["notes"][0]
     assert "as play makes it" in positioning_words(found)[0]
 
 
@@ -115,3 +128,37 @@ def test_a_sweep_has_no_figures_and_says_why() -> None:
     found = positioning_of_table(inputs, ones, (slice(0, 60),), None, inputs, lambda _: inputs, {})
     assert isinstance(found, NoRepeatedTargets)
     assert "motion" in found.reason
+
+
+def test_a_diagnosed_table_of_targets_tells_the_play(tmp_path: Path) -> None:
+    # Seven targets, five cycles, 20 um of play and 1 um of scatter, told as targets, cycles and directions.
+    rng = np.random.default_rng(8)
+    lines = ["target_mm,cycle,direction,deviation_um"]
+    for cycle in range(1, 6):
+        for side, word in ((1, "up"), (-1, "down")):
+            lines += [f"{t},{cycle},{word},{-10.0 * side + rng.normal():.3f}" for t in np.linspace(-3.0, 3.0, 7)]
+    targets, rows, model = (tmp_path / name for name in ("targets.csv", "measured.csv", "simulation.csv"))
+    targets.write_text("\n".join(lines) + "\n")
+    model.write_text("input_mm,gap_mm\n-4,-4\n4,4\n")
+    cells = read_iso230_table(targets).cells()
+    rows.write_text("\n".join([",".join(cells), *(",".join(row) for row in zip(*cells.values(), strict=True))]) + "\n")
+    done = diagnose(read_measured_table(rows), read_model(model))
+    answer = {e.name: {name: known.value for name, known in e.parameters.items()} for e in done.report.effects}
+    found = positioning_of_bench(done.bench, answer)
+    assert found.cycles == (5, 5)
+    assert found.measured.value_mm("B_mean") == pytest.approx(-0.02, abs=0.001)
+    # Ranges over fourteen means of five readings, and scatter: 1 um each; five standard deviations.
+    assert found.measured.value_mm("E") == pytest.approx(0.02, abs=0.005)
+    assert found.share_mm("backlash", "B_mean") == pytest.approx(-0.02, abs=0.002)
+    assert "backlash" in found.without
+    section = json.loads(json.dumps(positioning_section(found), allow_nan=False))
+    assert section["figures"]["R"]["value"] == found.measured.value_mm("R")
+    page = positioning_html(found)
+    assert all(symbol in page for symbol in DEFINITIONS)
+
+
+def test_a_table_without_targets_has_a_section_with_the_reason() -> None:
+    section = positioning_section(NoRepeatedTargets("the inputs do not repeat"))
+    assert section["figures"] is None
+    assert section["reason"] == "the inputs do not repeat"
+    assert positioning_html(NoRepeatedTargets("the inputs do not repeat")) is None

@@ -1,11 +1,11 @@
-"""The positioning figures of a diagnosis: what report.json and report.html tell beside the answer."""
+"""Positioning figures of a measured table beside its model, and what report.json and report.html tell of them."""
 
 from html import escape
 
 import numpy as np
 
-from fingervision.diagnosis.diagnose import Diagnosis
 from fingervision.diagnosis.inference.measuring_chain import Settings
+from fingervision.diagnosis.input.observations import BenchData
 from fingervision.diagnosis.input.repeated_targets import NoRepeatedTargets
 from fingervision.diagnosis.report.positioning_of_table import positioning_of_table
 from fingervision.diagnosis.report.positioning_report import PositioningReport
@@ -19,28 +19,30 @@ from fingervision.diagnosis.report.positioning_words import (
 from fingervision.domain.effect import Array
 
 
-def positioning_of_diagnosis(done: Diagnosis) -> PositioningReport | NoRepeatedTargets:
-    """Positioning figures of a diagnosed table, or why it has none.
+def positioning_of_bench(bench: BenchData, answer: Settings) -> PositioningReport | NoRepeatedTargets:
+    """Positioning figures of a measured table beside its model and an answer, or why it has none.
 
     Parameters
     ----------
-    done : Diagnosis
-        The answer with measurement and model.
+    bench : BenchData
+        Measurement and model.
+    answer : Settings
+        Everything that was found: the effects with their parameters and start states, and the curve of a map.
     """
-    chain = done.bench.chain
-    history = chain.history
-    rows = history.input_mm.size
+    table, rows = bench.table, bench.table.input_mm.size
 
     def predict_mm(acting: Settings) -> Array:
-        return np.asarray(chain.stacked(acting)[:rows], dtype=np.float64)
+        return np.asarray(bench.chain.stacked(acting)[:rows], dtype=np.float64)
 
-    answer = {
-        effect.name: {name: estimate.value for name, estimate in effect.parameters.items()}
-        for effect in done.report.effects
-    }
-    measured = np.ones(rows, dtype=bool)
-    gap_mm = done.bench.stacked_mm[:rows]
-    return positioning_of_table(history.input_mm, measured, history.runs, history.time_s, gap_mm, predict_mm, answer)
+    if table.path is None:
+        path = (table.input_mm, np.ones(rows, dtype=bool), table.runs, table.time_s)
+    else:
+        measured = np.zeros(table.path.input_mm.size, dtype=bool)
+        measured[table.path.rows] = True
+        path = (table.path.input_mm, measured, table.path.runs, table.path.time_s)
+    if table.time_s is None:
+        return NoRepeatedTargets("the table has no time_s, and without times the order of rows means nothing")
+    return positioning_of_table(*path, table.gap_mm, predict_mm, answer)
 
 
 def positioning_section(found: PositioningReport | NoRepeatedTargets) -> dict[str, object]:

@@ -18,9 +18,13 @@ NAMES = {
     "A": "Accuracy",
 }
 REFERENCES = {
-    "target": "target",
-    "model": "that of the model: figures of the axis beside the model, not of the axis alone",
+    "target": "Deviations are measured gap minus recorded input, less a constant.",
+    "model": "Deviations are measured minus simulated gap: figures of what the model lacks, not of the axis alone.",
 }
+SHARES = (
+    "A share is the figure minus the figure with the effect's predicted change taken out. Figures are ranges and "
+    "maxima: shares need not add up."
+)
 SIDES = {"up": "approached from below", "down": "approached from above"}
 
 
@@ -41,7 +45,7 @@ def positioning_document(report: PositioningReport) -> dict[str, object]:
         }
     return {
         "standard": STANDARD,
-        "deviation": f"measured gap minus {REFERENCES[report.reference]}",
+        "reference": report.reference,
         "up": SIDES["up"],
         "down": SIDES["down"],
         "targets_count": len(report.measured.targets),
@@ -58,7 +62,7 @@ def positioning_document(report: PositioningReport) -> dict[str, object]:
             for target in report.measured.targets
         ],
         "words": list(positioning_words(report)),
-        "notes": [*report.assumed, *report.measured.notes],
+        "notes": list(positioning_notes(report)),
     }
 
 
@@ -77,6 +81,12 @@ def positioning_rows(report: PositioningReport) -> tuple[list[str], list[list[st
             cells += [_um(report.share_mm(effect, symbol)) for effect in effects]
         rows.append([symbol, *cells, figure.definition])
     return head, rows
+
+
+def positioning_notes(report: PositioningReport) -> tuple[str, ...]:
+    """What deviations and shares are, what was assumed of the cycle, what the standard asks for and the table lacks."""
+    shares = (SHARES,) if report.without else ()
+    return (REFERENCES[report.reference], *shares, *report.assumed, *report.measured.notes)
 
 
 def positioning_words(report: PositioningReport) -> tuple[str, ...]:
@@ -105,7 +115,7 @@ def _sentence(report: PositioningReport, symbol: str, value: float) -> str:
         share = report.share_mm(effect, symbol)
         if share is None or abs(share) <= TOLD * abs(value):
             continue
-        if 0.0 < share * value <= value**2:
+        if 0.0 < share * value <= (1.0 + TOLD) * value**2:
             causes.append(f"{_um(abs(share))} um of it is {effect}")
         else:
             # It hides a part of the figure, or others hide a part of it: what would stand without it is true always.
