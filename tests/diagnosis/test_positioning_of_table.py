@@ -127,7 +127,7 @@ def test_a_sweep_has_no_figures_and_says_why() -> None:
     ones = np.ones(60, dtype=bool)
     found = positioning_of_table(inputs, ones, (slice(0, 60),), None, inputs, lambda _: inputs, {})
     assert isinstance(found, NoRepeatedTargets)
-    assert "motion" in found.reason
+    assert "do not gather" in found.reason
 
 
 def test_a_diagnosed_table_of_targets_tells_the_play(tmp_path: Path) -> None:

@@ -19,8 +19,8 @@ its in-position window, which is a small part of any spacing that somebody tests
 WIDEST = 0.2
 """Range of the inputs at one target, of the distance to the next. Wider, and a reading could belong to either."""
 MOST_TARGETS = 200
-"""ISO 230-2 asks for 5 targets a metre; with 200, five cycles are 2000 rests. More are the steps of an encoder that a
-motion ran over."""
+"""ISO 230-2 asks for 5 targets a metre; with 200, five cycles are 2000 rests. More places are samples of a motion, or
+the steps of an encoder that it ran over."""
 SHORTEST_REST_S = 0.3
 """Median time from one visit to the next below which the stage was in motion: to move, arrive and stand takes a stage
 a few tenths of a second, and the standard asks for rest."""
@@ -61,9 +61,13 @@ class NoRepeatedTargets:
 
 @dataclass(frozen=True, slots=True)
 class _Visit:
-    """Consecutive rows of the path at one target: rows with a reading, and the inputs before and after (None: none)."""
+    """Consecutive rows of the path at one target: rows with a reading, and the inputs before and after (None: none).
+
+    `places` are all rows, with those whose reading is missing.
+    """
 
     target: int
+    places: tuple[int, ...]
     rows: tuple[int, ...]
     before_mm: float | None
     after_mm: float | None
@@ -132,7 +136,7 @@ def repeated_targets(
 
 
 def _targets(inputs: Array) -> tuple[Array, float] | NoRepeatedTargets:
-    """Targets in ascending order, and the largest distance of an input from its target."""
+    """Targets in ascending order, and the distance from its target within which an input is at it."""
     ordered = np.sort(inputs)
     if ordered.size < 4 or ordered[0] == ordered[-1]:
         return NoRepeatedTargets("there are fewer than four readings, or the input never changes")
@@ -140,20 +144,23 @@ def _targets(inputs: Array) -> tuple[Array, float] | NoRepeatedTargets:
     floor = 1e-9 * float(ordered[-1] - ordered[0])
     steps = np.maximum(np.diff(ordered), floor)
     falling = np.sort(steps)[::-1]
-    ratios = falling[:-1] / falling[1:]
+    # No more targets than half the readings can have two: among smaller steps a chance pair makes a large ratio.
+    most = min(MOST_TARGETS, ordered.size // 2)
+    ratios = (falling[:-1] / falling[1:])[: most - 1]
     last = int(np.argmax(ratios))
     if ratios[last] < SPACING_RATIO:
-        return NoRepeatedTargets("the inputs do not repeat: they lie evenly, as in a continuous motion")
+        return NoRepeatedTargets(
+            "the inputs do not gather at targets: none is visited again, or readings were taken on the way"
+        )
     parts = np.split(ordered, np.flatnonzero(steps >= falling[last]) + 1)
     if len(parts) < FEWEST_TARGETS:
         return NoRepeatedTargets(f"only {len(parts)} different targets were measured, and {FEWEST_TARGETS} are needed")
-    if len(parts) > MOST_TARGETS:
-        return NoRepeatedTargets(f"{len(parts)} different inputs are samples of a motion, not targets")
     centres = np.array([part.mean() for part in parts])
     halfwidth = max(max(abs(part[0] - c), abs(part[-1] - c)) for part, c in zip(parts, centres, strict=True))
     if max(np.ptp(part) for part in parts) > WIDEST * float(np.min(np.diff(centres))):
         return NoRepeatedTargets("the inputs scatter too widely about the places where they gather to be set-points")
-    return centres, float(halfwidth) + floor
+    # Rows without a reading scatter as much, and one of them may lie a little farther off than any that has one.
+    return centres, 2.0 * float(halfwidth) + floor
 
 
 def _visits(input_mm: Array, measured: Flags, run: slice, centres: Array, halfwidth: float) -> list[_Visit]:
@@ -169,10 +176,11 @@ def _visits(input_mm: Array, measured: Flags, run: slice, centres: Array, halfwi
             continue
         before = float(path[start - 1]) if start else None
         after = float(path[end]) if end < path.size else None
-        rows = tuple(int(row) for row in run.start + np.arange(start, end) if measured[row])
+        places = tuple(range(run.start + int(start), run.start + int(end)))
+        rows = tuple(row for row in places if measured[row])
         target = int(at[start])
         side = 0 if before is None else int(np.sign(centres[target] - before))
-        out.append(_Visit(target, rows, before, after, side))
+        out.append(_Visit(target, places, rows, before, after, side))
     return out
 
 
@@ -187,23 +195,27 @@ def _seconds_between(visits: Sequence[_Visit], time_s: Array, runs: Sequence[sli
 def _ends(visits: list[_Visit], centres: Array) -> tuple[list[_Visit], tuple[str, ...]]:
     """Split the pairs of readings at the ends of the range, and give runs that begin there their side."""
     last = centres.size - 1
-    inner = [len(visit.rows) for visit in visits if 0 < visit.target < last and visit.rows]
+    inner = [len(visit.places) for visit in visits if 0 < visit.target < last]
     usual = int(np.median(inner)) if inner else 0
     beyond = {0: -1, last: 1}
     turns = [
         visit
         for visit in visits
-        if visit.direction == beyond.get(visit.target) and _goes_back(visit, centres[visit.target]) and visit.rows
+        if visit.direction == beyond.get(visit.target) and _goes_back(visit, centres[visit.target])
     ]
-    paired = bool(turns) and usual > 0 and all(len(visit.rows) == 2 * usual for visit in turns)
+    pairs = sum(len(visit.places) == 2 * usual for visit in turns)
+    paired = usual > 0 and pairs > len(turns) / 2
     ways = {int(np.sign(v.after_mm - centres[v.target])) for v in visits if v.after_mm is not None}
     one_way = len(ways) == 1
     out: list[_Visit] = []
     began_beyond = False
     for visit in visits:
         if paired and any(visit is turn for turn in turns):
-            out.append(replace(visit, rows=visit.rows[:usual]))
-            out.append(replace(visit, rows=visit.rows[usual:], direction=-visit.direction))
+            # A turn of another number of rows lacks some, and which of its rows came first is not known.
+            whole = len(visit.places) == 2 * usual
+            for part, side in ((visit.places[:usual], 1), (visit.places[usual:], -1)):
+                rows = tuple(row for row in visit.rows if row in part)
+                out.append(replace(visit, places=part, rows=rows, direction=side * visit.direction if whole else 0))
         elif not visit.direction and visit.after_mm is not None and (paired or one_way) and visit.target in beyond:
             away = int(np.sign(visit.after_mm - centres[visit.target]))
             began_beyond |= away == -beyond[visit.target]
@@ -220,7 +232,7 @@ def _ends(visits: list[_Visit], centres: Array) -> tuple[list[_Visit], tuple[str
         notes.append("Runs that begin at an end target were taken to have come from beyond it.")
     unknown = sum(len(visit.rows) for visit in out if not visit.direction)
     if unknown:
-        notes.append(f"{unknown} readings at the start of a run were left out: their side of approach is not known.")
+        notes.append(f"{unknown} readings were left out: from which side their target was approached is not known.")
     return out, tuple(notes)
 
 
