@@ -2,12 +2,16 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 
 NOMINAL_S = 30.0
 """Time from one row to the next where a table has none. A published log of a stage against a laser has 28.5 s from
 reading to reading: move, settle, average. Effects of a second and less are then rightly taken for unseen."""
+SWAPPED = 0.75
+"""Share of the moves from target to target that go against the stated direction, above which the directions stand the
+wrong way round. Right, hardly any do: the way back of cycles in one direction, one in as many as there are targets."""
 LONGEST_OVERSHOOT_MM = 0.5
 """Longest way beyond a target: the largest play that the catalogue knows. Shorter where the targets lie closer, so that
 no target is approached over a longer way than its neighbours."""
@@ -53,6 +57,18 @@ def approach_path(readings: Sequence[Reading]) -> tuple[tuple[PathRow, ...], tup
         What was assumed, a sentence each.
     """
     timed = all(reading.time_s is not None for reading in readings)
+    notes = []
+    against, moves = _against(
+        sorted(readings, key=lambda reading: (reading.run, _time(reading)) if timed else ("", 0.0))
+    )
+    if against > SWAPPED * moves:
+        came = f"{against} of {moves} moves from target to target go against the stated direction"
+        if timed:
+            readings = [replace(reading, side=-reading.side) for reading in readings]
+            notes.append(f"By the times {came}: the directions were taken as swapped, and exchanged.")
+        elif len({reading.side for reading in readings}) > 1:
+            # A table of one side may well be sorted by its targets.
+            notes.append(f"In the order of the rows {came}: are the directions swapped?")
     targets = np.unique([reading.target_mm for reading in readings])
     closest = float(np.min(np.diff(targets))) if targets.size > 1 else LONGEST_OVERSHOOT_MM
     beyond = min(LONGEST_OVERSHOOT_MM, closest)
@@ -64,7 +80,6 @@ def approach_path(readings: Sequence[Reading]) -> tuple[tuple[PathRow, ...], tup
         path, times = _with_overshoots(ordered, beyond, timed)
         added += len(path) - len(ordered)
         rows += [replace(row, time_s=time) for row, time in zip(path, times, strict=True)]
-    notes = []
     if not timed:
         notes.append(
             "The table has no times: within a cycle, targets approached from below were taken in ascending order, then "
@@ -77,6 +92,12 @@ def approach_path(readings: Sequence[Reading]) -> tuple[tuple[PathRow, ...], tup
             "needs that the stage came from there."
         )
     return tuple(rows), tuple(notes)
+
+
+def _against(ordered: Sequence[Reading]) -> tuple[int, int]:
+    """Moves to another target that go against the direction stated there, and all moves."""
+    moves = [(b.target_mm - a.target_mm) * b.side for a, b in pairwise(ordered) if a.run == b.run]
+    return sum(move < 0.0 for move in moves), sum(move != 0.0 for move in moves)
 
 
 def _time(reading: Reading) -> float:

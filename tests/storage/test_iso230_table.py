@@ -140,6 +140,36 @@ def test_times_give_the_order_and_stay(tmp_path: Path) -> None:
     assert not any("no times" in note for note in read.notes)
 
 
+def travelled(words: tuple[str, str], *, timed: bool) -> str:
+    """Three cycles in the order of travel, 20 um of play, with the words for up and down."""
+    lines, time = ["target_mm,cycle,direction,position_mm" + ",time_s" * timed], 0.0
+    for cycle in (1, 2, 3):
+        for side, word in zip((1, -1), words, strict=True):
+            for target in TARGETS[::side]:
+                lines.append(f"{target},{cycle},{word},{target - 0.01 * side}" + f",{time}" * timed)
+                time += 28.5
+    return "\n".join(lines)
+
+
+def test_directions_against_the_times_are_exchanged_and_told(tmp_path: Path) -> None:
+    right, wrong = (
+        read_iso230_table(write(tmp_path, travelled(words, timed=True)))
+        for words in (("up", "down"), ("backward", "forward"))
+    )
+    assert wrong.rows == right.rows
+    assert any("taken as swapped, and exchanged" in note for note in wrong.notes)
+    assert not any("swapped" in note for note in right.notes)
+
+
+def test_directions_against_the_order_of_rows_are_asked_about(tmp_path: Path) -> None:
+    for words, asked in ((("up", "down"), False), (("down", "up"), True)):
+        read = read_iso230_table(write(tmp_path, travelled(words, timed=False)))
+        assert any("are the directions swapped?" in note for note in read.notes) == asked
+    # Sorted by target, or shuffled, the order says nothing.
+    for text in (long_form(), long_form(shuffled=True), matrix(), stacked()):
+        assert not any("swapped" in note for note in read_iso230_table(write(tmp_path, text)).notes)
+
+
 def test_runs_cycles_without_numbers_and_missing_readings(tmp_path: Path) -> None:
     lines = ["run,target_mm,cycle,direction,deviation_mm,u_random_mm"]
     for run in ("cold", "warm"):
