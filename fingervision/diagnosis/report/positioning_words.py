@@ -22,8 +22,8 @@ REFERENCES = {
     "model": "Deviations are measured minus simulated gap: figures of what the model lacks, not of the axis alone.",
 }
 SHARES = (
-    "A share is the figure minus the figure with the effect's predicted change taken out. Figures are ranges and "
-    "maxima: shares need not add up."
+    "Shares are the best explanation's: the figure minus the figure with the effect's predicted change taken out. "
+    "Figures are ranges and maxima: shares need not add up."
 )
 SIDES = {"up": "approached from below", "down": "approached from above"}
 
@@ -144,7 +144,8 @@ def _visits(visits: Visits | None) -> dict[str, float | None] | None:
 
 def _um(value_mm: float | None) -> str:
     """Micrometres to a hundredth: the last digit that published reports print."""
-    return "-" if value_mm is None else f"{1e3 * value_mm:.2f}"
+    # Adding zero takes the sign from what rounds to zero.
+    return "-" if value_mm is None else f"{round(1e3 * value_mm, 2) + 0.0:.2f}"
 
 
 def _interval(figure: Figure) -> str:
