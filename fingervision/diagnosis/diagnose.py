@@ -16,8 +16,11 @@ from fingervision.diagnosis.inference.refitted_search import refitted_search
 from fingervision.diagnosis.inference.search import Findings, Progress
 from fingervision.diagnosis.inference.verdict import standing, verdict
 from fingervision.diagnosis.input.observations import BenchData, prepare
+from fingervision.diagnosis.input.repeated_targets import NoRepeatedTargets
 from fingervision.diagnosis.noise.replicates import PureError
 from fingervision.diagnosis.report.force_hint import force_hint
+from fingervision.diagnosis.report.positioning_of_bench import positioning_of_bench
+from fingervision.diagnosis.report.positioning_report import PositioningReport
 from fingervision.diagnosis.report.residual_localization import where
 from fingervision.diagnosis.report.sentences import answer, input_dominates, outliers, remaining, rows_beyond_model
 from fingervision.domain.effect import Array
@@ -40,12 +43,15 @@ class Diagnosis:
         Measurement and model.
     before_mm, after_mm : ndarray of float, shape (channels * n,)
         Measured minus predicted, without and with the answer.
+    positioning : PositioningReport or NoRepeatedTargets
+        Figures of ISO 230-2 where the table repeats its targets.
     """
 
     report: DiagnosisReport
     bench: BenchData
     before_mm: Array
     after_mm: Array
+    positioning: PositioningReport | NoRepeatedTargets
 
 
 def by_channel(bench: BenchData, stacked: Array) -> dict[str, Array]:
@@ -170,7 +176,7 @@ def diagnose(
         seconds=time.perf_counter() - begin,
     )
     progress(1.0)
-    return Diagnosis(report, bench, before, after)
+    return Diagnosis(report, bench, before, after, positioning_of_bench(bench, _values(bench, found)))
 
 
 def _values(bench: BenchData, found: Findings) -> Settings:

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from fingervision.domain.errors import FingervisionError
 from fingervision.domain.measured_table import MeasuredTable, RecordedPath
 from fingervision.storage.csv_columns import number, read_columns
+from fingervision.storage.iso230_table import read_iso230_table
 from fingervision.storage.reference_slots import slots_beside
 
 FEWEST_ROWS = 5
@@ -24,7 +25,8 @@ def read_measured_table(path: Path) -> MeasuredTable:
         In a sentence: columns missing, cells that are no numbers, fewer than five rows, an input or a gap that
         never changes, times that repeat within a run.
     """
-    cells = read_columns(path, ("input_mm", "gap_mm"), (*NUMBERS[2:], "run"))
+    targets = read_iso230_table(path)
+    cells = read_columns(path, ("input_mm", "gap_mm"), (*NUMBERS[2:], "run")) if targets is None else targets.cells()
     values = {
         name: [number(path, name, row, cell) for row, cell in enumerate(cells[name])]
         for name in NUMBERS
@@ -43,7 +45,7 @@ def read_measured_table(path: Path) -> MeasuredTable:
     kept = [row for row in range(total) if all(values[name][row] is not None for name in needed)]
     on_path = [row for row in range(total) if all(values[name][row] is not None for name in needed if name in PATH)]
     on_path = on_path if "time_s" in values else kept
-    notes = _left_out(total, len(kept), len(on_path) - len(kept))
+    notes = _left_out(total, len(kept), len(on_path) - len(kept)) if targets is None else list(targets.notes)
     if len(kept) < FEWEST_ROWS:
         raise FingervisionError(
             f"{path} must have at least {FEWEST_ROWS} rows with an input and a gap, but has {len(kept)}: measure more."

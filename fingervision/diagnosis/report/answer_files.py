@@ -3,6 +3,7 @@
 from pathlib import Path
 
 from fingervision.diagnosis.diagnose import Diagnosis
+from fingervision.diagnosis.report.positioning_of_bench import positioning_section
 from fingervision.diagnosis.report.report_page import report_page
 from fingervision.domain.parameter import Estimate
 from fingervision.effects.position_error_map import curve_values
@@ -37,6 +38,7 @@ def write_answer(out: Path, done: Diagnosis, model: CorrectedModel) -> dict[str,
     else:
         write_recipe(out / NEXT_RUN, report.next_run.name, report.next_run.steps)
     document = report_document(report, MODEL, NEXT_RUN if report.next_run else None)
+    document["iso230"] = positioning_section(done.positioning)
     write_report(out / REPORT, document)
     (out / PAGE).write_text(report_page(done), encoding="utf-8")
     return document
