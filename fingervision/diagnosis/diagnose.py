@@ -30,6 +30,9 @@ from fingervision.domain.report import DiagnosisReport, Disagreement, NamedEffec
 from fingervision.effects import catalogue
 from fingervision.models.corrected import CorrectedModel
 
+MEMBERS_SEPARATED = 5
+"""Explanations, best first, that the next run is designed to separate: the time it takes grows with their square."""
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Diagnosis:
@@ -137,7 +140,7 @@ def diagnose(
     errors = bench.measured_pure_errors(np.split(found.problem.whitener.aside, len(bench.channels)))
     members = tuple(e for e in found.alternatives if e.names)
     alternatives = tuple(_with_map(e.names, mapped=mapped) for e in members) or (((NAME,),) if mapped else ())
-    proposal = next_run(bench, found.problem, list(members), refitted.posterior, rng)
+    proposal = next_run(bench, found.problem, list(members[:MEMBERS_SEPARATED]), refitted.posterior, rng)
     report = DiagnosisReport(
         verdict=decided,
         sentence=answer(decided, unknown, effects, alternatives, disagreement),

@@ -74,6 +74,11 @@ class PositionMap:
         described = {"rms_mm": float(np.sqrt(np.mean(self.curve_mm**2))), "length_mm": self.length_mm.value}
         return described | curve_values(self.nodes_mm.tolist(), self.curve_mm.tolist())
 
+    def is_like(self, other: "PositionMap") -> bool:
+        """Whether size and length are within what either leaves open."""
+        pairs = ((self.rms_mm, other.rms_mm), (self.length_mm, other.length_mm))
+        return all(abs(np.log(one.value / two.value)) < max(one.u or 0.0, 1e-12) / one.value for one, two in pairs)
+
     def refitted(self, problem: Problem, explanation: Explanation, behind: int) -> "PositionMap":
         """Estimate the curve beside an explanation; `behind` random effects stand behind the map's in the problem."""
         offsets = problem.offsets

@@ -4,6 +4,7 @@ from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
+from scipy.stats import t as student
 
 from fingervision.diagnosis.inference.hypothesis_fit import Explanation, Point, Problem, fit
 from fingervision.diagnosis.inference.position_map import (
@@ -21,6 +22,11 @@ from fingervision.diagnosis.input.intersample_interpolation import along_likelie
 from fingervision.diagnosis.input.observations import BenchData
 from fingervision.diagnosis.noise.whitening import RunOffsets
 
+BY_ACCIDENT = 1e-3
+"""Probability by which the runs' offsets have a mean so far from zero by accident (Student's t), below which they share
+a cause."""
+LOWERED = 0.9
+"""Times what stands that an answer with such a cause must leave at most."""
 MOST_SEARCHES = 3
 """The second is nearly always the last, and none is needed where the drawing's numbers act along a straight line."""
 
@@ -78,7 +84,7 @@ def refitted_search(
     state = _over_the_ends(state, look)
     if NAME not in without:
         state = _beside_map(state, look)
-    state = _without_scatter(state, look)
+    state = _common_offset(state, look)
     return _settled(_beside_drawing(state, look), rng)
 
 
@@ -99,9 +105,10 @@ class _Look:
     forced: frozenset[str]
     progress: Progress
 
-    def again(self, bench: BenchData) -> _Searched:
-        """Search once more."""
-        found, said = told_by_slots(bench, search(partial(_problem, bench), self.rng, self.forced, self.progress))
+    def again(self, bench: BenchData, known: Explanation | None = None) -> _Searched:
+        """Search once more, the noise estimated beside what is known already."""
+        found = search(partial(_problem, bench), self.rng, self.forced, self.progress, known)
+        found, said = told_by_slots(bench, found)
         return _Searched(bench, found, said)
 
 
@@ -141,29 +148,40 @@ def _beside_map(state: _Searched, look: _Look) -> _Searched:
         first, gain = likeliest_map(found.problem, found.nothing)
     if gain < LEAST_GAIN and not asked:
         return state
-    beside = look.again(replace(state.bench, position_map=first))
+    beside = look.again(replace(state.bench, position_map=first), found.best)
     plain = replace(beside.found.problem, offsets=_offsets_without_map(beside.found.problem, first))
     second, _ = likeliest_map(plain, _left(plain, beside.found.best))
-    beside = look.again(replace(beside.bench, position_map=second))
-    plain = replace(beside.found.problem, offsets=_offsets_without_map(beside.found.problem, second))
+    if first.is_like(second):
+        second = first
+    else:
+        beside = look.again(replace(beside.bench, position_map=second), beside.found.best)
+        plain = replace(beside.found.problem, offsets=_offsets_without_map(beside.found.problem, second))
     rows = max(2, int(plain.measured.size - plain.whitener.aside.sum()))
     rival = fit(plain, found.best.names, found.best.values, iterations=20) if found.best.names else plain.nothing()
     gained = rival.bic(rows) - beside.found.best.bic(rows) - second.price
     return beside if asked or gained > LEAST_GAIN else state
 
 
-def _without_scatter(state: _Searched, look: _Look) -> _Searched:
-    """Search once more for what offsets of the runs had taken, where much of the disagreement still stands.
+def _common_offset(state: _Searched, look: _Look) -> _Searched:
+    """Search once more for a constant that the runs share, where their offsets had taken it.
 
-    A constant that is left in every run is structure: runs that are off by the same amount share no accident.
+    Runs that are off by nearly the same amount share a cause and no accident: they may then be offset against each
+    other by no more than they depart from their mean.
     """
-    if len(state.bench.chain.history.runs) < 2:
+    runs = len(state.bench.chain.history.runs)
+    found = state.found
+    if runs < 2 or max(found.best.sigma_mm) == 0.0:
         return state
-    stands = standing_of(state.bench, state.found)
-    if stands.is_little and (state.found.best.names or state.bench.position_map is not None or stands.is_noise):
+    offsets = found.problem.offsets
+    means = (offsets.metric(found.best.sigma_mm) @ (offsets.design.T @ found.best.residual))[:runs]
+    scatter = float(np.std(means, ddof=1))
+    chance = 2.0 * float(student.sf(abs(means.mean()) / max(scatter / np.sqrt(runs), 1e-300), runs - 1))
+    stands = standing_of(state.bench, found)
+    if chance > BY_ACCIDENT and stands.is_little:
         return state
-    again = look.again(replace(state.bench, runs_scatter=False))
-    return again if standing_of(again.bench, again.found).after_mm < stands.after_mm else state
+    again = look.again(replace(state.bench, runs_scatter_mm=scatter), found.best)
+    lower = standing_of(again.bench, again.found).after_mm
+    return again if lower < LOWERED * stands.after_mm else state
 
 
 def _left(problem: Problem, explanation: Explanation) -> Explanation:

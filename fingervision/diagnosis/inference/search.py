@@ -27,6 +27,11 @@ LEAST_GAIN = 4.0
 PART_OF_UNKNOWN = 9.0
 """Times what still stands, in chi-square, that a part must explain to be told beside *unknown*: it then leaves a
 third of it, as RMS."""
+COMPLETE = 0.05
+"""Share of what stands beyond the noise, in chi-square, that a complete explanation leaves: forms that only bend to
+what an effect's form leaves over take less of it."""
+STEPS_HIDDEN = 0.5
+"""Steps of the encoder within which an effect is not told from its roundings."""
 BASES = 14
 """Single effects to which a second one is added."""
 SHORT = 100
@@ -124,6 +129,23 @@ def _added(problem: Problem, smaller: Explanation, larger: Explanation) -> float
     return float(np.linalg.norm(after - before) / max(1e-12, float(np.linalg.norm(after - bare))))
 
 
+def _within_a_step(problem: Problem, explanation: Explanation) -> bool:
+    """Whether an effect moves the gap nowhere by more than an encoder's step does: roundings at an end look so."""
+    history = problem.chain.history
+    if history.input_step_mm == 0.0:
+        return False
+    reach = 0.5 * history.input_step_mm
+    low, high = (problem.chain.with_input(history.input_mm + way).stacked({}) for way in (-reach, reach))
+    change = problem.chain.stacked(explanation.values) - problem.chain.stacked({})
+    return bool(np.max(np.abs(change)) < STEPS_HIDDEN * float(np.max(np.abs(high - low))))
+
+
+def _completes(state: "_State", smaller: Explanation, larger: Explanation) -> bool:
+    """Whether the larger explanation takes nearly all that the smaller one left, as a true one does."""
+    rows = state.values - int(state.problem.whitener.aside.sum())
+    return larger.score - rows < COMPLETE * (smaller.score - rows)
+
+
 def _choose(candidates: list[Explanation], samples: int) -> Explanation:
     return min(candidates, key=lambda explanation: explanation.bic(samples))
 
@@ -145,6 +167,7 @@ def search(
     rng: np.random.Generator,
     forced: frozenset[str],
     progress: Progress,
+    known: Explanation | None = None,
 ) -> Findings:
     """Find the explanation, the others that cannot be told apart from it, and what remains.
 
@@ -160,8 +183,10 @@ def search(
         Effects that the user insists on.
     progress : callable
         Told the share that is done.
+    known : Explanation or None
+        Found by an earlier search of the same measurement: the noise is estimated beside it.
     """
-    state = _one_effect(_noise_known(bench_problem), rng, forced)
+    state = _one_effect(_noise_known(bench_problem, known), rng, forced)
     progress(0.3)
     state = _two_effects(state, lambda share: progress(0.3 + 0.4 * share))
     state = _three_effects(state, lambda share: progress(0.7 + 0.1 * share))
@@ -218,8 +243,12 @@ class _State:
         return self.evidence is not None and self.evidence.speaks_for(found, base)
 
 
-def _noise_known(bench_problem: Callable[[Explanation | None], Problem]) -> _State:
-    """Estimate the noise beside the likeliest explanation of a first, rough search."""
+def _noise_known(bench_problem: Callable[[Explanation | None], Problem], known: Explanation | None) -> _State:
+    """Estimate the noise beside what is known, or beside the likeliest explanation of a first, rough search."""
+    if known is not None:
+        problem = bench_problem(known)
+        nothing = problem.nothing()
+        return _State(problem, signatures(problem), nothing, nothing, [nothing], shapes_of(problem))
     problem = bench_problem(None)
     atoms = signatures(problem)
     rough = _singles(problem, atoms, 4)
@@ -236,7 +265,8 @@ def _noise_known(bench_problem: Callable[[Explanation | None], Problem]) -> _Sta
 
 def _one_effect(state: _State, rng: np.random.Generator, forced: frozenset[str]) -> _State:
     """Fit every effect alone; the simplest that is as good as the best stands, if noise would not give so much."""
-    singles = _singles(state.problem, state.atoms, 20)
+    problem = state.problem
+    singles = [e for e in _singles(problem, state.atoms, 20) if not _within_a_step(problem, e)]
     evidence = Evidence.of(state.problem, state.atoms, state.nothing, rng)
     state = replace(state, singles=singles, evidence=evidence)
     if not singles:
@@ -259,7 +289,10 @@ def _two_effects(state: _State, progress: Progress) -> _State:
     pairs = _swapped(problem, state.atoms, pairs)
     state = replace(state, pairs=pairs)
     # Beside a simpler form a second effect would gain what the richest has gained already.
-    if pairs and _added(problem, singles[0], pairs[0]) > SMALL_SHARE and state.speaks_for(pairs, singles[0]):
+    if not pairs:
+        return state
+    large = _added(problem, singles[0], pairs[0]) > SMALL_SHARE or _completes(state, singles[0], pairs[0])
+    if large and state.speaks_for(pairs, singles[0]):
         return replace(state, best=_choose(pairs[:6], state.values), peers=pairs)
     return state
 
@@ -271,9 +304,10 @@ def _three_effects(state: _State, progress: Progress) -> _State:
     problem, pairs = state.problem, state.pairs
     triples = _extended(problem, state.atoms, pairs[:3], 24, progress)
     state = replace(state, triples=triples)
-    if not triples or _added(problem, state.best, triples[0]) <= TRIPLE_SHARE:
+    if not triples:
         return state
-    if not state.speaks_for(triples, state.best):
+    large = _added(problem, state.best, triples[0]) > TRIPLE_SHARE or _completes(state, state.best, triples[0])
+    if not large or not state.speaks_for(triples, state.best):
         return state
     imitation = imitated(problem, state.shapes, triples[0], [state.nothing, *state.singles[:BASES], *pairs[:3]])
     if imitation is not None:

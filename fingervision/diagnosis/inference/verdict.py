@@ -9,6 +9,7 @@ from fingervision.diagnosis.inference.hypothesis_fit import Explanation, Problem
 from fingervision.diagnosis.inference.search import Findings
 from fingervision.diagnosis.input.observations import BenchData
 from fingervision.diagnosis.input.recorded_input import scatter_in_holds
+from fingervision.diagnosis.noise.replicates import resolution
 from fingervision.domain.effect import Array
 from fingervision.domain.report import Verdict
 
@@ -80,7 +81,9 @@ def standing(bench: BenchData, problem: Problem, before_mm: Array, after_mm: Arr
     if history.commanded:
         # What the stage does after each jump is no noise, and passes for it in the spectrum.
         parts = np.split(after_mm, len(bench.channels))
-        noises = [min(noise, scatter_in_holds(history, part)) for noise, part in zip(noises, parts, strict=True)]
+        digits = resolution(bench.table.gap_mm) / float(np.sqrt(12.0))
+        settled = [max(scatter_in_holds(history, part), digits) for part in parts]
+        noises = [min(noise, scatter or noise) for noise, scatter in zip(noises, settled, strict=True)]
     error = np.hypot(problem.whitener.input_mm, problem.whitener.passing_mm)[~aside]
     gap2 = noises[0] ** 2 + float(np.mean(error**2)) if error.size else noises[0] ** 2
     noise = float(np.sqrt(0.25 * gap2 + noises[1] ** 2)) if both else float(np.sqrt(gap2))

@@ -80,7 +80,7 @@ class BenchData:
     refit: DrawingRefit
     repeats: NDArray[np.intp] | None = None
     position_map: PositionMap | None = None
-    runs_scatter: bool = True
+    runs_scatter_mm: float = np.inf
 
     @property
     def aim_mm(self) -> Array:
@@ -131,7 +131,7 @@ class BenchData:
             self.recorded.samples,
             passing,
             drawing,
-            self.runs_scatter,
+            self.runs_scatter_mm,
         )
         share = SMALL_SHARE if self.measured_pure_errors(aside) is None else FORM_SHARE_OF_RIGS
         offsets = RunOffsets.of(whitener)
