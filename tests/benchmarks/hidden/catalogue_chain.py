@@ -1,7 +1,8 @@
 """The catalogue's definitions, written anew from effects.md: what each effect does to a simulation at the samples.
 
-The judge's own implementation. Every effect is a function of its parameters in the order of the table in effects.md;
-recursions start each run at rest at its first sample.
+The judge's own implementation. Every effect is a function of its parameters in the order of the table in effects.md.
+Effects with memory start each run where nobody saw them: `RUN_START` (plays and sliders) and `CREEP_START` stand beside
+the effects, one number in -1..1 a run; without them the play is centred, the sliders relaxed, creep settled.
 """
 
 from dataclasses import dataclass
@@ -12,6 +13,12 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 CREEP_TAU_S = np.array([1.0, 4.0, 16.0, 64.0])
+RUN_START, CREEP_START = "run_start", "creep_start"
+WITH_START = {"backlash": RUN_START, "friction_hysteresis": RUN_START, "viscoelastic_creep": CREEP_START}
+"""Effects whose start is a nuisance, and under which key it stands."""
+MAP = "position_error_map"
+MAP_WAVES = np.arange(2, 14)
+"""Half waves over the travel of the judge's map of position errors; the tool's is a Gaussian process."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -48,6 +55,7 @@ class Simulated:
     midline_mm: Array
     force_n: Array | None
     placement_mm: float = 0.0
+    travel_mm: tuple[float, float] = (0.0, 1.0)
 
     @property
     def rest_gap_mm(self) -> float:
@@ -56,9 +64,18 @@ class Simulated:
 
 
 def extended(
-    input_mm: Array, gap_mm: Array, midline_mm: Array, force_n: Array | None, placement_mm: float = 0.0
+    input_mm: Array,
+    gap_mm: Array,
+    midline_mm: Array,
+    force_n: Array | None,
+    placement_mm: float = 0.0,
+    travel_mm: tuple[float, float] | None = None,
 ) -> Simulated:
-    """Add the far rows: slope of a line through the last quarter of the rows there."""
+    """Add the far rows: slope of a line through the last quarter of the rows there.
+
+    `travel_mm` are the ends over which a map of position errors has neither mean nor line; the table's by default.
+    """
+    travel = travel_mm or (float(input_mm[0]), float(input_mm[-1]))
     quarter = max(2, len(input_mm) // 4)
     far = 10.0 * np.ptp(input_mm)
 
@@ -68,16 +85,42 @@ def extended(
         return np.concatenate([[values[0] - first * far], values, [values[-1] + last * far]])
 
     u = np.concatenate([[input_mm[0] - far], input_mm, [input_mm[-1] + far]])
-    return Simulated(u, grown(gap_mm), grown(midline_mm), None if force_n is None else grown(force_n), placement_mm)
+    force = None if force_n is None else grown(force_n)
+    return Simulated(u, grown(gap_mm), grown(midline_mm), force, placement_mm, travel)
+
+
+def map_errors(u: Array, travel_mm: tuple[float, float], heights_mm: Array) -> Array:
+    """Map of position errors at inputs: half waves, each without its straight line over the travel."""
+    even = np.linspace(0.0, 1.0, 201)
+    z = np.clip((u - travel_mm[0]) / (travel_mm[1] - travel_mm[0]), -0.1, 1.1)
+    out = np.zeros_like(u)
+    for k, height in zip(MAP_WAVES, heights_mm, strict=True):
+        line = np.polyfit(even, np.cos(np.pi * k * even), 1)
+        out += height * (np.cos(np.pi * k * z) - np.polyval(line, z))
+    return out
 
 
 @njit(cache=True)
-def play(u: Array, starts: NDArray[np.int64], full_width: float) -> Array:
-    """Play operator, centred at each run's start."""
+def limited(u: Array, t: Array, starts: NDArray[np.int64], speed: float) -> Array:
+    """Follows at most at a speed."""
+    out = np.empty_like(u)
+    for r in range(starts.size - 1):
+        place = u[starts[r]]
+        out[starts[r]] = place
+        for i in range(starts[r] + 1, starts[r + 1]):
+            way = speed * (t[i] - t[i - 1])
+            place = min(max(u[i], place - way), place + way)
+            out[i] = place
+    return out
+
+
+@njit(cache=True)
+def play(u: Array, starts: NDArray[np.int64], full_width: float, begin: Array) -> Array:
+    """Play operator; at each run's start the place is `begin` half widths beside the input."""
     out = np.empty_like(u)
     half = 0.5 * full_width
     for r in range(starts.size - 1):
-        place = u[starts[r]]
+        place = u[starts[r]] + begin[r] * half
         for i in range(starts[r], starts[r + 1]):
             place = min(max(place, u[i] - half), u[i] + half)
             out[i] = place
@@ -98,12 +141,16 @@ def jump(u: Array, starts: NDArray[np.int64], size: float) -> Array:
 
 
 @njit(cache=True)
-def sliders(u: Array, starts: NDArray[np.int64], fraction: float, reach: float) -> Array:
-    """Eight elastic sliders of reach k / 8."""
+def sliders(u: Array, starts: NDArray[np.int64], fraction: float, reach: float, begin: Array) -> Array:
+    """Eight elastic sliders of reach k / 8; at each run's start each is strained by -`begin` times its reach.
+
+    The sign is that of the play: -1 stands where upward motion has left it.
+    """
     out = np.empty_like(u)
     e = np.zeros(8)
     for r in range(starts.size - 1):
-        e[:] = 0.0
+        for k in range(8):
+            e[k] = -begin[r] * reach * (k + 1) / 8
         for i in range(starts[r], starts[r + 1]):
             mean = 0.0
             for k in range(8):
@@ -116,11 +163,17 @@ def sliders(u: Array, starts: NDArray[np.int64], fraction: float, reach: float) 
 
 
 @njit(cache=True)
-def low_pass(o: Array, t: Array, starts: NDArray[np.int64], tau: float) -> Array:
-    """First order, exact for an input linear between samples, relaxed at each run's start."""
+def low_pass(o: Array, t: Array, starts: NDArray[np.int64], tau: float, begin: Array) -> Array:
+    """First order, exact for an input linear between samples.
+
+    At each run's start relaxed where `begin` is 0, at the least or largest of all values where it is -1 or 1.
+    """
     out = np.empty_like(o)
+    least, largest = np.min(o), np.max(o)
     for r in range(starts.size - 1):
-        out[starts[r]] = o[starts[r]]
+        first = o[starts[r]]
+        room = largest - first if begin[r] > 0 else first - least
+        out[starts[r]] = first + begin[r] * room
         for i in range(starts[r] + 1, starts[r + 1]):
             dt = t[i] - t[i - 1]
             fade = np.exp(-dt / tau)
@@ -155,13 +208,20 @@ def oscillator(o: Array, t: Array, starts: NDArray[np.int64], frequency_hz: floa
 
 
 Effects = dict[str, Array]
-"""Parameters of the effects that act, by name; arrays in the order of effects.md."""
+"""Parameters of the effects that act, by name; arrays in the order of effects.md. The starts may stand among them."""
+
+
+def without_starts(acting: Effects) -> Effects:
+    """The effects alone."""
+    return {name: values for name, values in acting.items() if name not in (RUN_START, CREEP_START)}
 
 
 def respond(model: Simulated, at: Samples, acting: Effects) -> tuple[Array, Array, Array]:
     """Gap, midline and force at the samples, with the effects acting in the catalogue's order."""
     u = at.input_mm
     zero = np.zeros(1)
+    centred = np.zeros(len(at.starts) - 1)
+    begin = acting.get(RUN_START, centred)
     if "drive_lag" in acting:
         u = at.late(u, acting["drive_lag"][0])
     u = (u + acting.get("input_offset", zero)[0]) * (1 + acting.get("input_scale", zero)[0])
@@ -171,12 +231,16 @@ def respond(model: Simulated, at: Samples, acting: Effects) -> tuple[Array, Arra
     if "end_stop" in acting:
         upper, lower = acting["end_stop"]
         u = np.clip(u, lower, upper)
+    if MAP in acting:
+        u = u + map_errors(u, model.travel_mm, acting[MAP])
+    if "slew_limit" in acting:
+        u = limited(u, at.run_time_s, at.starts, acting["slew_limit"][0])
     if "backlash" in acting:
-        u = play(u, at.starts, acting["backlash"][0])
+        u = play(u, at.starts, acting["backlash"][0], begin)
     if "stick_slip" in acting:
         u = jump(u, at.starts, acting["stick_slip"][0])
     if "friction_hysteresis" in acting:
-        u = sliders(u, at.starts, *acting["friction_hysteresis"])
+        u = sliders(u, at.starts, *acting["friction_hysteresis"], begin)
     rest = model.rest_gap_mm
     o = (np.interp(u, model.input_mm, model.gap_mm) - rest) * (1 + acting.get("lever_ratio_error", zero)[0])
     midline = model.placement_mm + np.interp(u, model.input_mm, model.midline_mm)
@@ -185,7 +249,7 @@ def respond(model: Simulated, at: Samples, acting: Effects) -> tuple[Array, Arra
         o = reach * np.sin(o / reach) + cross * reach * (1 - np.cos(o / reach))
     if "viscoelastic_creep" in acting:
         o = o - sum(
-            share * (o - low_pass(o, at.run_time_s, at.starts, tau))
+            share * (o - low_pass(o, at.run_time_s, at.starts, tau, acting.get(CREEP_START, centred)))
             for share, tau in zip(acting["viscoelastic_creep"], CREEP_TAU_S, strict=True)
         )
     if "structural_resonance" in acting:

@@ -8,22 +8,37 @@ from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
 from tests.benchmarks.hidden.candidates import Candidate
-from tests.benchmarks.hidden.catalogue_chain import Effects, Samples, Simulated, respond
+from tests.benchmarks.hidden.catalogue_chain import (
+    CREEP_START,
+    WITH_START,
+    Effects,
+    Samples,
+    Simulated,
+    respond,
+    without_starts,
+)
 from tests.benchmarks.hidden.weights import Weights
 
 Array = NDArray[np.float64]
 Curve = tuple[Array, Array, Array]
 """Gap, midline and force at the samples."""
 STEP = 1e-4
+AT_AN_END = 0.97
+"""A start that is tried: at an end of its room, and yet inside."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Fit:
-    """Effects at their best, and how far they stay away."""
+    """Effects at their best, the starts of the runs among them, and how far they stay away."""
 
     names: tuple[str, ...]
     effects: Effects
     distance: float
+
+    @property
+    def alone(self) -> Effects:
+        """The effects without the starts of the runs."""
+        return without_starts(self.effects)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -45,25 +60,72 @@ class Problem:
         return float(r @ r)
 
 
-def fit(problem: Problem, target: Curve, chosen: list[Candidate], start: list[Array], evaluations: int = 60) -> Fit:
-    """Best parameters of all chosen effects together, inside the chain, from one start."""
-    sizes = [len(c.lower) for c in chosen]
+def fit(
+    problem: Problem,
+    target: Curve,
+    chosen: list[Candidate],
+    start: list[Array],
+    evaluations: int = 60,
+    *,
+    begun: Effects | None = None,
+    creep_starts: bool = False,
+) -> Fit:
+    """Best parameters of all chosen effects together, inside the chain, from one start.
+
+    Where the runs start is fitted along: for plays and sliders always, for creep where `creep_starts` says so. `begun`
+    may hold starts to begin with. After the search each run's start is tried at both ends and in the middle, and the
+    search goes on from there where that is better.
+    """
+    left = frozenset[str]() if creep_starts else frozenset({CREEP_START})
+    keys = sorted({WITH_START[c.name] for c in chosen if c.name in WITH_START} - left)
+    runs = len(problem.at.starts) - 1
+    before = begun or {}
+    first = {key: before.get(key, np.zeros(runs)) for key in keys}
+    found = _search(problem, target, chosen, start, first, evaluations)
+    for key in keys:
+        tried = dict(found.effects)
+        least = found.distance
+        for run in range(runs):
+            for place in (-AT_AN_END, 0.0, AT_AN_END):
+                moved = tried[key].copy()
+                moved[run] = place
+                distance = problem.distance(target, tried | {key: moved})
+                if distance < least:
+                    least, tried = distance, tried | {key: moved}
+        if least < found.distance - 0.5:
+            begin = [tried[c.name] for c in chosen]
+            found = _search(problem, target, chosen, begin, {k: tried[k] for k in keys}, evaluations)
+    return found
+
+
+def _search(
+    problem: Problem, target: Curve, chosen: list[Candidate], start: list[Array], starts: Effects, evaluations: int
+) -> Fit:
+    """Least squares over the parameters of the chosen effects and the starts of the runs."""
+    count = sum(len(c.lower) for c in chosen)
+    nuisances = sum(values.size for values in starts.values())
+    sizes = [len(c.lower) for c in chosen] + [values.size for values in starts.values()]
     cuts = np.cumsum(sizes)[:-1]
-    lower = np.concatenate([c.lower for c in chosen]) if chosen else np.zeros(0)
-    upper = np.concatenate([c.upper for c in chosen]) if chosen else np.zeros(0)
+    lower = np.concatenate([*(c.lower for c in chosen), -np.ones(nuisances)])
+    upper = np.concatenate([*(c.upper for c in chosen), np.ones(nuisances)])
     names = tuple(c.name for c in chosen)
-    scale = np.maximum(np.concatenate([np.abs(s) for s in start]), 1e-3 * (upper - lower))
+    labels = (*names, *starts)
+    begin = np.concatenate([*start, *starts.values()])
+    scale = np.maximum(np.abs(begin), 1e-3 * (upper - lower))
+    scale[count:] = 1.0
     scale = np.minimum(scale, upper - lower)
 
     def effects_of(z: Array) -> Effects:
-        return dict(zip(names, np.split(np.clip(z * scale, lower, upper), cuts), strict=True))
+        return dict(zip(labels, np.split(np.clip(z * scale, lower, upper), cuts), strict=True))
 
-    inside = np.clip(np.concatenate(start), lower + 1e-6 * (upper - lower), upper - 1e-6 * (upper - lower)) / scale
+    inside = np.clip(begin, lower + 1e-6 * (upper - lower), upper - 1e-6 * (upper - lower)) / scale
+    # A start moves the curve in proportion to the play: a step of 1e-3 of its room is no less smooth.
+    share = np.where(np.arange(begin.size) < count, STEP, 10 * STEP)
 
     def jacobian(z: Array) -> Array:
         # Steps are shares of the start, not of where the search is: a search that crosses zero would stand still there.
         base = problem.residual(target, effects_of(z))
-        steps = STEP * np.maximum(1.0, np.abs(z))
+        steps = share * np.maximum(1.0, np.abs(z))
         steps = np.where(z + steps > upper / scale, -steps, steps)
         moved = (z + step * axis for step, axis in zip(steps, np.eye(z.size), strict=True))
         return np.stack([problem.residual(target, effects_of(at)) - base for at in moved], axis=1) / steps
@@ -166,7 +228,9 @@ def enlarged(candidate: Candidate, starts: list[Array], share: Array) -> Array:
             begin = np.array([reach, square * reach])
         case "finger_contact":
             begin = np.array([starts[0][0], 1 - 0.8 * share[0]])
-        case "backlash" | "stick_slip" | "end_stop" | "structural_resonance":
+        case "position_error_map":
+            begin = np.array(starts).T @ share
+        case "slew_limit" | "backlash" | "stick_slip" | "end_stop" | "structural_resonance":
             begin = starts[0]
         case _:
             begin = starts[0].copy()

@@ -11,9 +11,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from tests.benchmarks.hidden.catalogue_chain import Effects, respond
+from tests.benchmarks.hidden.catalogue_chain import MAP, RUN_START, Effects, respond
 from tests.benchmarks.hidden.experiment import Experiment
-from tests.benchmarks.hidden.explanations import Search, search_of
+from tests.benchmarks.hidden.explanations import Search, more_beginnings, search_of
 from tests.benchmarks.hidden.fit import Curve, Fit, fit
 
 Array = NDArray[np.float64]
@@ -63,6 +63,13 @@ class Judgement:
     nearest: dict[str, float]
     outside: bool
     rival: float = 0.0
+    run_start: tuple[float, ...] = ()
+    """Where plays and sliders start each run in the catalogue's form of what is hidden."""
+
+    @property
+    def acting(self) -> Effects:
+        """The hidden effects in the catalogue's form, with their starts."""
+        return self.effects | ({RUN_START: np.array(self.run_start)} if self.run_start else {})
 
 
 def own_fit(search: Search, experiment: Experiment, target: Curve) -> Fit:
@@ -82,6 +89,8 @@ def own_fit(search: Search, experiment: Experiment, target: Curve) -> Fit:
                 h.parameters.get("upper_mm", candidate.upper[0]),
                 h.parameters.get("lower_mm", candidate.lower[1]),
             ]
+        if h.name == MAP:
+            begin = [0.0] * len(candidate.names)
         if h.name == "viscoelastic_creep":
             share = [h.parameters[f"share_{k}"] for k in range(5)]
             begin = [share[0], share[1] + share[2], share[3] + share[4], 0.01]
@@ -146,9 +155,40 @@ def judge(experiment: Experiment) -> Judgement:
     if nothing < FAR:
         may, must = ([*may, *must], [frozenset()]) if nothing < NEAR else ([*may, frozenset()], must)
     nearest = dict(sorted(nearest.items(), key=lambda item: item[1])[:12])
+    starts = tuple(float(v) for v in own.effects.get(RUN_START, np.zeros(0)))
     return Judgement(
-        tuple(must), tuple(may), nothing, own.distance, own.effects, nearest, outside=False, rival=float(rival)
-    )
+        tuple(must), tuple(may), nothing, own.distance, own.alone, nearest,
+        outside=False, rival=float(rival), run_start=starts,
+    )  # fmt: skip
+
+
+def admitted(experiment: Experiment, judgement: Judgement, names: frozenset[str]) -> bool:
+    """Whether an explanation that the judge did not list may be in the set all the same.
+
+    It is fitted by itself, with creep that is not relaxed at the runs' starts and with a map of position errors:
+    freedoms of the definitions that the judge's own list leaves out. What contains the truth is no alternative.
+    """
+    search, target = search_of(experiment, experiment.traces(), known_input=False, with_map=MAP in names)
+    chosen = [c for c in search.known if c.name in names]
+    contains = frozenset(judgement.effects) < names
+    if len(chosen) != len(names) or not chosen or contains or len(names) > 2:
+        return False
+    own = Fit(tuple(judgement.effects), judgement.acting, judgement.own)
+    form = respond(search.problem.model, search.problem.at, own.effects)
+    signal = search.signal(form)
+    groups = [
+        next((g for _, (g,) in search.library.left_over(signal, 1) if search.library.owner[g] == k), None)
+        for k, c in enumerate(search.known)
+        if c in chosen
+    ]
+    begins = [[own.effects.get(c.name, c.starts[k * (len(c.starts) - 1) // 2]) for c in chosen] for k in range(3)]
+    if None not in groups:
+        begins.append(search.library.begin(search.known, tuple(int(g) for g in groups if g is not None), signal))
+    if len(chosen) == 1:
+        begins += [[start] for start in more_beginnings(chosen[0])]
+    fits = (fit(search.problem, form, chosen, begin, 60, begun=own.effects, creep_starts=True) for begin in begins)
+    best = min(fits, key=lambda found: found.distance)
+    return _verdict(search, form, best, own, target) is not None
 
 
 def _foldable(must: list[frozenset[str]]) -> tuple[list[frozenset[str]], list[frozenset[str]]]:
@@ -169,7 +209,8 @@ def _among(search: Search, form: Curve, singles: list[Fit], own: Fit) -> list[Fi
             continue
         chosen = [c for c in search.known if c.name in found.names]
         if found.distance - own.distance < max(400.0, 0.3 * own.distance):
-            found = fit(search.problem, form, chosen, [found.effects[c.name] for c in chosen], 40)
+            begin = [found.effects[c.name] for c in chosen]
+            found = fit(search.problem, form, chosen, begin, 40, begun=found.effects)
         again.append(replace(found, names=tuple(found.names)))
     return again
 
@@ -184,11 +225,12 @@ def _verdict(search: Search, form: Curve, found: Fit, own: Fit, target: Curve) -
             return None
         # The other way round: from the explanation at its estimate to the truth's form.
         other = respond(search.problem.model, search.problem.at, found.effects)
-        back = fit(search.problem, other, chosen, [own.effects[c.name] for c in chosen], 40)
+        back = fit(search.problem, other, chosen, [own.effects[c.name] for c in chosen], 40, begun=own.effects)
         if search.cautious(other, back.effects) > FAR:
             return None
         return False
     folded = any(
         LIMITING.get(a, set()) & set(own.names) or a in LIMITING.get(b, set()) for a in found.names for b in own.names
     )
-    return bool(search.sure.distance(form, found.effects) < NEAR and not folded)
+    priced = MAP in found.names and MAP not in own.names
+    return bool(search.sure.distance(form, found.effects) < NEAR and not folded and not priced)

@@ -44,6 +44,7 @@ def _written(judgement: Judgement) -> str:
         "nearest": judgement.nearest,
         "outside": judgement.outside,
         "rival": judgement.rival,
+        "run_start": list(judgement.run_start),
     }
     return json.dumps(right, indent=1)
 
@@ -53,6 +54,7 @@ def _read(text: str) -> Judgement:
     right["must"] = tuple(frozenset(names) for names in right["must"])
     right["may"] = tuple(frozenset(names) for names in right["may"])
     right["effects"] = {name: np.array(values) for name, values in right["effects"].items()}
+    right["run_start"] = tuple(right.get("run_start", ()))
     return Judgement(**right)
 
 

@@ -131,7 +131,7 @@ def driven(path: Path, acting: Effects, start: Array) -> Array:
     if "friction_hysteresis" in acting:
         fraction, reach = acting["friction_hysteresis"]
         # A slider that lets go at a strain is what is left of the input beside a play of that half width.
-        strains = u - places(path, u, reach * np.arange(1, 9) / 8, -start)
+        strains = u - places(path, u, reach * np.arange(1, 9) / 8, start)
         u = u - fraction * strains.mean(axis=0)
     return u
 
