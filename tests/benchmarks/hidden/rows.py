@@ -29,16 +29,7 @@ ROWS = {
         Row("start_poor", ("poor",), 1, False, (1.0, 3.0), (*WITH_START, *OFFSETS), free_start=True),
         Row("start_pair", ("rich",), 2, False, (3.0,), WITH_START, BESIDE, free_start=True),
         Row("map", ("rich", "ordinary"), 1, False, (1.0, 3.0), (MAP,)),
-        Row(
-            "map_pair",
-            ("rich",),
-            2,
-            False,
-            (3.0,),
-            ("position_error_map",),
-            (*WITH_START, "drive_lag"),
-            free_start=True,
-        ),
+        Row("map_pair", ("rich",), 2, False, (3.0,), (MAP,), (*WITH_START, "drive_lag"), free_start=True),
         Row("slew", ("rich",), 1, False, (1.0, 3.0), ("slew_limit",)),
     )
 }

@@ -56,7 +56,7 @@ class Judge:
         away = target - rig.simulation.gap(u)
         size = max(float(np.sqrt(np.mean(away**2))), rig.noise_mm)
         pieces = KNOTS_AT_REST if rig.path.at_rest else KNOTS_MOVING
-        return cls(rig, candidates(rig, size), target, sd, _map_columns(u, slope, pieces))
+        return cls(rig, candidates(rig, size), target, sd, _map_columns(u, slope, pieces, moving=not rig.path.at_rest))
 
     def _white(self, values: Array) -> Array:
         z = values / self.sd_mm if values.ndim == 1 else values / self.sd_mm[:, None]
@@ -158,15 +158,22 @@ class Judge:
         return Nearest(effects, self._cost(rest, effects, at), at)
 
 
-def _map_columns(u_mm: Array, slope: Array, pieces: int) -> Array:
+def _map_columns(u_mm: Array, slope: Array, pieces: int, *, moving: bool) -> Array:
+    """Splines without the straight line that they have over the travel, or over the places that are read at rest."""
     low, high = float(u_mm.min()), float(u_mm.max())
-    if high - low < 1e-12 or len(np.unique(u_mm)) < 4:
+    places = np.unique(u_mm)
+    if high - low < 1e-12 or places.size < 4:
         return np.zeros((u_mm.size, 1))
+    if moving:
+        places = np.linspace(low, high, 400)
     knots = np.concatenate([[low] * 3, np.linspace(low, high, pieces + 1), [high] * 3])
-    columns = BSpline.design_matrix(np.clip(u_mm, low, high), knots, 3).toarray()
-    z = (u_mm - low) / (high - low)
-    line = np.stack([np.ones_like(z), z], axis=1)
-    bent = columns - line @ np.linalg.lstsq(line, columns, rcond=None)[0]
+
+    def splines(at_mm: Array) -> Array:
+        return np.asarray(BSpline.design_matrix(np.clip(at_mm, low, high), knots, 3).toarray())
+
+    def line(at_mm: Array) -> Array:
+        return np.stack([np.ones_like(at_mm), (at_mm - low) / (high - low)], axis=1)
+
+    bent = splines(u_mm) - line(u_mm) @ np.linalg.lstsq(line(places), splines(places), rcond=None)[0]
     left, sizes, _ = np.linalg.svd(bent, full_matrices=False)
-    kept = left[:, sizes > 1e-9 * sizes[0]]
-    return np.asarray(slope[:, None] * kept)
+    return np.asarray(slope[:, None] * left[:, sizes > 1e-9 * sizes[0]])
