@@ -8,7 +8,8 @@ from numpy.typing import NDArray
 from tests.benchmarks.hidden.candidates import Candidate, candidates
 from tests.benchmarks.hidden.catalogue_chain import MAP, Effects, Samples, extended, respond
 from tests.benchmarks.hidden.experiment import Experiment, edges
-from tests.benchmarks.hidden.fit import Curve, Fit, Library, Problem, fit
+from tests.benchmarks.hidden.fit import Curve, Fit, Problem, fit
+from tests.benchmarks.hidden.linear_signatures import Library
 from tests.benchmarks.hidden.plant import Trace
 from tests.benchmarks.hidden.weights import Weights
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from tests.benchmarks.hidden.catalogue_chain import MAP, RUN_START, Effects, respond
 from tests.benchmarks.hidden.experiment import Experiment
-from tests.benchmarks.hidden.explanations import Search, more_beginnings, search_of
+from tests.benchmarks.hidden.explanations import Search, search_of
 from tests.benchmarks.hidden.fit import Curve, Fit, fit
 
 Array = NDArray[np.float64]
@@ -132,7 +132,7 @@ def judge(experiment: Experiment) -> Judgement:
     for found in _among(search, form, singles, own):
         nearest["+".join(found.names)] = round(found.distance, 2)
         rival = min(rival, search.problem.distance(target, found.effects) - own.distance)
-        verdict = _verdict(search, form, found, own, target)
+        verdict = verdict_on(search, form, found, own, target)
         if verdict is None:
             continue
         surely_single |= set(found.names) if verdict else set()
@@ -145,7 +145,7 @@ def judge(experiment: Experiment) -> Judgement:
         nearest["+".join(found.names)] = round(found.distance, 2)
         if len(own.names) == 2:
             rival = min(rival, search.problem.distance(target, found.effects) - own.distance)
-        verdict = _verdict(search, form, found, own, target)
+        verdict = verdict_on(search, form, found, own, target)
         if verdict is not None:
             # A pair against a single effect: the tool's order of preference may drop it.
             sure = verdict and len(own.names) == 2
@@ -160,35 +160,6 @@ def judge(experiment: Experiment) -> Judgement:
         tuple(must), tuple(may), nothing, own.distance, own.alone, nearest,
         outside=False, rival=float(rival), run_start=starts,
     )  # fmt: skip
-
-
-def admitted(experiment: Experiment, judgement: Judgement, names: frozenset[str]) -> bool:
-    """Whether an explanation that the judge did not list may be in the set all the same.
-
-    It is fitted by itself, with creep that is not relaxed at the runs' starts and with a map of position errors:
-    freedoms of the definitions that the judge's own list leaves out. What contains the truth is no alternative.
-    """
-    search, target = search_of(experiment, experiment.traces(), known_input=False, with_map=MAP in names)
-    chosen = [c for c in search.known if c.name in names]
-    contains = frozenset(judgement.effects) < names
-    if len(chosen) != len(names) or not chosen or contains or len(names) > 2:
-        return False
-    own = Fit(tuple(judgement.effects), judgement.acting, judgement.own)
-    form = respond(search.problem.model, search.problem.at, own.effects)
-    signal = search.signal(form)
-    groups = [
-        next((g for _, (g,) in search.library.left_over(signal, 1) if search.library.owner[g] == k), None)
-        for k, c in enumerate(search.known)
-        if c in chosen
-    ]
-    begins = [[own.effects.get(c.name, c.starts[k * (len(c.starts) - 1) // 2]) for c in chosen] for k in range(3)]
-    if None not in groups:
-        begins.append(search.library.begin(search.known, tuple(int(g) for g in groups if g is not None), signal))
-    if len(chosen) == 1:
-        begins += [[start] for start in more_beginnings(chosen[0])]
-    fits = (fit(search.problem, form, chosen, begin, 60, begun=own.effects, creep_starts=True) for begin in begins)
-    best = min(fits, key=lambda found: found.distance)
-    return _verdict(search, form, best, own, target) is not None
 
 
 def _foldable(must: list[frozenset[str]]) -> tuple[list[frozenset[str]], list[frozenset[str]]]:
@@ -215,7 +186,7 @@ def _among(search: Search, form: Curve, singles: list[Fit], own: Fit) -> list[Fi
     return again
 
 
-def _verdict(search: Search, form: Curve, found: Fit, own: Fit, target: Curve) -> bool | None:
+def verdict_on(search: Search, form: Curve, found: Fit, own: Fit, target: Curve) -> bool | None:
     """True where the explanation must be in the set, False where it may, None where it must not."""
     away = search.cautious(form, found.effects)
     excess = search.problem.distance(target, found.effects) - own.distance

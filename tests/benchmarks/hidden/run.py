@@ -15,7 +15,7 @@ import shutil
 import time
 import traceback
 from concurrent.futures import as_completed
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass
 from pathlib import Path
 
 import numpy as np
@@ -26,7 +26,6 @@ from tests.benchmarks.hidden.diagnose_adapter import Answer, diagnose, read_repo
 from tests.benchmarks.hidden.explanations import known_effects, problem_of
 from tests.benchmarks.hidden.ideal import ideal
 from tests.benchmarks.hidden.next_run_gain import Gain, gain_that_came
-from tests.benchmarks.hidden.oracle import Judgement, admitted
 from tests.benchmarks.hidden.peer_bic import greedy_bic
 from tests.benchmarks.hidden.peer_sindy import e_sindy
 from tests.benchmarks.hidden.recipe import NotDrivenError
@@ -34,11 +33,11 @@ from tests.benchmarks.hidden.reported_effects import reported_effects
 from tests.benchmarks.hidden.rows import ROWS
 from tests.benchmarks.hidden.score import Mark, intervals, mark, row_lines
 from tests.benchmarks.hidden.table_cache import JudgedTable, draw_table_of_row
+from tests.benchmarks.hidden.unforeseen import widened
 from tests.benchmarks.hidden.unseen_run import unseen_error_ratio
 from tests.benchmarks.workers import workers
 
 METHODS = ("diagnose", "ideal", "bic", "sindy", "gp")
-LINE = frozenset({"input_offset", "rest_gap_error", "edge_bias", "input_scale", "lever_ratio_error", "scale_error"})
 PEERS = {"bic": greedy_bic, "sindy": e_sindy}
 
 
@@ -90,21 +89,6 @@ def marked(task: Task) -> dict[str, object]:
     return result
 
 
-def widened(table: JudgedTable, answer: Answer, hidden: frozenset[str]) -> Judgement:
-    """The judgement, with what the answer gives and the judge did not list, but admits when it is asked."""
-    judgement = table.judgement
-    if not hidden or answer.verdict not in ("named", "ambiguous"):
-        return judgement
-    listed = {*judgement.must, *judgement.may}
-    more = []
-    for names in dict.fromkeys(answer.sets):
-        # A map has no line over its travel; the tool's, over other weights, may have one.
-        bare = names - LINE if MAP in hidden & names else names
-        if names not in listed and (bare in listed or admitted(table.experiment, judgement, names)):
-            more.append(names)
-    return replace(judgement, may=(*judgement.may, *more))
-
-
 def work(task: Task) -> dict[str, object]:
     """Draw, ask, mark; a plain dictionary, so that it can be kept."""
     row, folder = ROWS[task.row], task.folder
@@ -113,8 +97,7 @@ def work(task: Task) -> dict[str, object]:
     if task.method == "gp":
         return {"unseen": unseen_error_ratio(table, None)} if row.hidden else {}
     answer = _ask(table, task.method)
-    table = replace(table, judgement=widened(table, answer, hidden))
-    given = mark(row, table.judgement, answer, hidden)
+    given = mark(row, widened(table, answer, hidden), answer, hidden)
     result: dict[str, object] = {"mark": asdict(given), "verdict": answer.verdict, "seconds": answer.seconds}
     result |= {"sets": ["+".join(sorted(s)) for s in answer.sets], "hidden": "+".join(sorted(hidden))}
     result["folder"] = str(folder)

@@ -6,7 +6,8 @@ from pathlib import Path
 
 import numpy as np
 
-from tests.benchmarks.hidden.experiment import Experiment, Row, draw_experiment, write
+from tests.benchmarks.hidden.experiment import Experiment, Row, draw_experiment
+from tests.benchmarks.hidden.experiment_files import write
 from tests.benchmarks.hidden.oracle import NEAR, Judgement, judge
 
 FORM_SHARE = 0.003
