@@ -18,7 +18,7 @@ RUN_START, CREEP_START = "run_start", "creep_start"
 WITH_START = {"backlash": RUN_START, "friction_hysteresis": RUN_START, "viscoelastic_creep": CREEP_START}
 """Effects whose start is a nuisance, and under which key it stands."""
 MAP = "position_error_map"
-MAP_WAVES = np.arange(2, 14)
+MAP_WAVES = np.arange(1, 15)
 """Half waves over the travel of the judge's map of position errors; the tool's is a Gaussian process."""
 
 

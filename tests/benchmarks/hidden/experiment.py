@@ -191,7 +191,7 @@ def _draw(rng: np.random.Generator, row: Row, seed: int) -> Experiment:
     names = [n for n in among if n != "hinge_stiffness_error" and not (design.time_restarts and n in CLOCKED)]
     if with_force and row.hidden and not row.names:
         names = ["hinge_stiffness_error"]
-    if row.hidden > len(names):
+    if row.hidden > len(names) + len(row.beside):
         raise NotDrawnError("Force tables hide one effect.")
     hidden = []
     picked = [str(name) for name in rng.choice(names, 1 if row.beside else row.hidden, replace=False)]
