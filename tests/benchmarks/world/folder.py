@@ -91,7 +91,7 @@ def truth_of(rig: Rig, judge: Judge, right: RightAnswers, numbers: dict[str, obj
     bare = rig.gap_mm[rig.read] - rig.simulation.gap(rig.input_mm[rig.read])
     core = [sorted(c) for c in right.core]
     alternatives = [{"core": core, "also_allowed": sorted(right.allowed), "reason": "what acts in the drawn rig"}]
-    must_not = ["agrees"] if right.nothing > FAR else []
+    must_not = ["agrees"] if right.nothing > FAR and not rig.may_agree else []
     if right.nothing <= FAR and core:
         alternatives.append({"core": [], "also_allowed": sorted(right.allowed), "reason": "too small to be seen"})
     if rig.wrong_sign:
@@ -118,6 +118,7 @@ def truth_of(rig: Rig, judge: Judge, right: RightAnswers, numbers: dict[str, obj
         "needed": sorted(right.needed),
         "exact_forms": rig.exact_forms and not rig.outside,
         "wrong_sign": rig.wrong_sign,
+        "may_refuse": rig.may_refuse,
         "noise_mm": rig.noise_mm,
         "distance_of_nothing": right.nothing,
         "distance_of_truth": right.own,

@@ -9,7 +9,7 @@ import numpy as np
 from tests.benchmarks.world.candidates import MAP
 from tests.benchmarks.world.draw import drawn
 from tests.benchmarks.world.nearest import Judge
-from tests.benchmarks.world.right_answers import FAR, LAGS, threshold
+from tests.benchmarks.world.right_answers import LAGS, threshold
 
 LEFT_SHARE, LEFT_NOISES = 0.05, 3.0
 """The issue: no name may leave more than 5 % of the disagreement or 3 times the noise, whichever is larger."""
@@ -51,6 +51,11 @@ class Mark:
     sizes: dict[str, bool] = field(default_factory=dict)
 
 
+def _turned(angle_rad: float) -> float:
+    """An angle within half a turn of zero."""
+    return float((angle_rad + np.pi) % (2 * np.pi) - np.pi)
+
+
 class Marker:
     """Marks answers about one drawn table; an unforeseen set is fitted to the truth before it is called wrong."""
 
@@ -88,10 +93,10 @@ class Marker:
         known = self.allowed.union(self.names, *self.core)
         return bool(names) and names <= known
 
-    def mark(self, report: dict[str, Any] | None) -> Mark:
-        """Mark a report."""
+    def mark(self, report: dict[str, Any] | None, exit_code: int | None = 0) -> Mark:
+        """Mark a report; where there is none, exit code 1 says that the tool refused with a sentence."""
         if report is None:
-            return Mark("no report")
+            return Mark("right" if exit_code == 1 and self.truth.get("may_refuse") else "no report")
         verdict = report["verdict"]
         names = verdict in ("named", "ambiguous")
         best = frozenset(e["name"] for e in report["effects"])
@@ -111,11 +116,15 @@ class Marker:
                 for key, p in effect["parameters"].items():
                     true = self.truth["sizes"].get(key)
                     if true is not None:
-                        found[key] = abs(float(p["value"]) - true["value"]) <= true["tolerance"]
+                        away, room = float(p["value"]) - true["value"], true["tolerance"]
+                        if key == "phase_rad":
+                            # A phase has no size of its own: 15 % of a radian.
+                            away, room = _turned(away), max(room, 0.15)
+                        found[key] = abs(away) <= room
         return found
 
     def _result(self, verdict: str, sets: list[frozenset[str]]) -> str:
-        seen = float(self.truth["distance_of_nothing"]) > FAR
+        seen = "agrees" in self.truth["must_not"]
         if not self.truth["hidden"] and not self.truth["outside_structure"]:
             return "right" if verdict == "agrees" else "claim"
         if verdict == "agrees":
@@ -151,6 +160,6 @@ class Marker:
                     continue
                 miss = float(p["value"]) - float(true[effect["name"]][key])
                 if key == "phase_rad":
-                    miss = float((miss + np.pi) % (2 * np.pi) - np.pi)
+                    miss = _turned(miss)
                 found[f"{effect['name']}.{key}"] = miss / float(p["u"])
         return found

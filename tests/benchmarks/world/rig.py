@@ -113,6 +113,10 @@ class Rig:
         What is turned round in the table: `directions`, `input` or `gap`.
     exact_forms : bool
         Whether the drawn parameters are those of the catalogue's definitions, so that intervals may be held to them.
+    may_refuse : bool
+        Whether a sentence and no report is a right answer.
+    may_agree : bool
+        Whether `agrees` is right although something is there: it could be a large reading noise.
     note : str
         What a reader of the folder should know.
     """
@@ -134,6 +138,8 @@ class Rig:
     outside: str | None = None
     wrong_sign: str | None = None
     exact_forms: bool = True
+    may_refuse: bool = False
+    may_agree: bool = False
     note: str = ""
     names: frozenset[str] = field(init=False)
 

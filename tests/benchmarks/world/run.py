@@ -24,6 +24,7 @@ from tests.benchmarks.world.marks import COVERAGE_FACTOR, Marker
 from tests.benchmarks.world.rows.catalogue import ROWS
 
 Result = dict[str, Any]
+NAMES = ("named", "ambiguous")
 
 
 def work(row: str, seed: int, index: int, tables: Path, answers: Path, again: bool, kept_only: bool) -> Result | None:
@@ -35,7 +36,7 @@ def work(row: str, seed: int, index: int, tables: Path, answers: Path, again: bo
     answer = ask(folder, out, again=again)
     truth = json.loads((folder / "truth.json").read_text(encoding="utf-8"))
     report = answer["report"]
-    mark = Marker(truth).mark(report)
+    mark = Marker(truth).mark(report, answer["exit_code"])
     said = "no report" if report is None else report["verdict"]
     sets = [] if report is None else [[e["name"] for e in report["effects"]], *(report.get("alternatives") or [])]
     return {
@@ -63,6 +64,10 @@ def row_lines(row: str, found: list[Result]) -> list[str]:
             lines.append(f"    {title}: exact or set with the truth {count(few, 'exact', 'set', 'right')}, exact "
                          f"{count(few, 'exact').hits}, part {count(few, 'part').hits}, unknown "
                          f"{count(few, 'unknown').hits}")  # fmt: skip
+    bar = [r for r in inside if r["row"] == "encoder_bar"]
+    if bar:
+        among = sum(any("backlash" in s.split("+") for s in r["sets"]) and r["verdict"] in NAMES for r in bar)
+        lines.append(f"    encoder_bar: backlash named or in the set {Rate(among, len(bar))}")
     if inside:
         lines.append(f"    wrong {count(inside, 'wrong')}; false agrees {count(inside, 'false agrees')}")
     if outside:

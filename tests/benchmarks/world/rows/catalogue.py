@@ -6,6 +6,7 @@ import numpy as np
 
 from tests.benchmarks.world.rig import Rig
 from tests.benchmarks.world.rows import (
+    bad_input,
     commands_with_steps,
     encoder_jitter,
     end_stop,
@@ -38,4 +39,5 @@ ROWS: dict[str, Callable[[np.random.Generator], Rig]] = {
     "ripple": ripple.draw,
     "outside": outside.draw,
     "wrong_sign": wrong_sign.draw,
+    "bad_input": bad_input.draw,
 }
