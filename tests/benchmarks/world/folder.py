@@ -120,6 +120,7 @@ def truth_of(rig: Rig, judge: Judge, right: RightAnswers, numbers: dict[str, obj
         "wrong_sign": rig.wrong_sign,
         "may_refuse": rig.may_refuse,
         "noise_mm": rig.noise_mm,
+        "noise_with_input_mm": float(np.sqrt(np.mean(judge.sd_mm**2))),
         "distance_of_nothing": right.nothing,
         "distance_of_truth": right.own,
     }

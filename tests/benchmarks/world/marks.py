@@ -140,11 +140,11 @@ class Marker:
             return "set"
         return "part" if any(self.part(s) for s in sets) else "wrong"
 
-    @staticmethod
-    def _leaves(report: dict[str, Any]) -> bool:
+    def _leaves(self, report: dict[str, Any]) -> bool:
         d = report["disagreement"]
-        before, after, noise = (float(d[k] or 0.0) for k in ("before_rms_mm", "after_rms_mm", "noise_rms_mm"))
-        return after > max(LEFT_SHARE * before, LEFT_NOISES * noise)
+        before, after = (float(d[k] or 0.0) for k in ("before_rms_mm", "after_rms_mm"))
+        # The noise that the table has, not the one that the report takes what it left for.
+        return after > max(LEFT_SHARE * before, LEFT_NOISES * float(self.truth["noise_with_input_mm"]))
 
     def _deviations(self, report: dict[str, Any], names: bool) -> dict[str, float]:
         said = frozenset(e["name"] for e in report["effects"])
