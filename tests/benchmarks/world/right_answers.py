@@ -72,6 +72,9 @@ def right_answers(rig: Rig) -> tuple[RightAnswers, Judge]:
     allowed: set[str] = set()
     if MAP in rig.names or rig.outside:
         allowed |= OFFSETS | RATIOS
+    if rig.run_gain:
+        # The gains of a few runs have a mean of their own.
+        allowed |= RATIOS
     if rig.outside:
         allowed |= BESIDE_OUTSIDE
     needed = set(rig.names)
