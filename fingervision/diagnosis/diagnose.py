@@ -108,7 +108,8 @@ def diagnose(
     mistake = gross_mistake(bench)
     refitted = refitted_search(bench, rng, forced, without, progress)
     bench, found = refitted.bench, refitted.found
-    mistake = mistake or swapped_directions(bench, found.problem)
+    if mistake is None and (found.unknown is not None or not found.best.names):
+        mistake = swapped_directions(bench, found.problem)
     if mistake is not None and mistake.blocks:
         nothing = found.problem.nothing()
         found = replace(found, best=nothing, alternatives=(), unknown=mistake.words.rstrip("."), left_over=None)

@@ -6,6 +6,7 @@ import numpy as np
 
 from fingervision.diagnosis.inference.hypothesis_fit import Problem
 from fingervision.diagnosis.input.observations import BenchData
+from fingervision.diagnosis.noise.whitening import RunOffsets
 from fingervision.domain.effect import Array
 from fingervision.effects.play_operator import play
 
@@ -23,6 +24,8 @@ SWAPPED_SIGMAS = 6.0
 what any other effect's leftover leaves there."""
 SWAPPED_SHARE = 0.5
 """Share of the disagreement's square that a leading play must explain: the rest may be other effects'."""
+LEAST_NORM = 1e-6
+"""Share of a play's shape that an offset and a ratio must leave for it to be told from them."""
 WIDTHS = 25
 """Widths of the play that are tried."""
 
@@ -80,33 +83,40 @@ def swapped_directions(bench: BenchData, problem: Problem) -> Finding | None:
     constant = np.ones(n)
     line = bench.chain.history.input_mm - bench.chain.history.input_mm.mean()
     beside = np.stack([slope * np.tile(shape, slope.size // n) for shape in (constant, line)], axis=1)
+    whitened = problem.whitener.columns(beside)[0]
+    alone = _without(residual, whitened, offsets, metric)
     best: tuple[float, float, float] | None = None
     for width in history.input_span_mm * np.geomspace(1e-5, 0.3, WIDTHS):
         lag = np.empty_like(history.input_mm)
         for run in history.runs:
             first = np.sign(np.diff(history.input_mm[run])[np.flatnonzero(np.diff(history.input_mm[run]))[:1]].sum())
             lag[run] = play(history.input_mm[run], width, -float(first)) - history.input_mm[run]
-        column = slope * np.tile(lag[rows], slope.size // n)
-        fitted = problem.whitener.columns(np.column_stack([column, beside]))[0]
-        moved = fitted - offsets.design @ (metric @ (offsets.design.T @ fitted))
-        gram = fitted.T @ moved
-        coefficient = np.linalg.lstsq(gram, moved.T @ residual, rcond=1e-10)[0]
-        gain = float(coefficient @ (moved.T @ residual))
-        doubt = float(np.sqrt(max(np.linalg.pinv(gram)[0, 0], 1e-300)))
-        if best is None or gain > best[0]:
-            best = gain, float(coefficient[0]) * width, float(coefficient[0]) / doubt
+        column = problem.whitener.one(slope * np.tile(lag[rows], slope.size // n))
+        own = _without(column, whitened, offsets, metric)
+        norm = offsets.squared(own, metric)
+        if norm > LEAST_NORM * max(float(column @ column), 1e-300):
+            moved = own - offsets.design @ (metric @ (offsets.design.T @ own))
+            coefficient = float(moved @ residual) / norm
+            if best is None or coefficient**2 * norm > best[0]:
+                best = coefficient**2 * norm, coefficient * width, coefficient * float(np.sqrt(norm))
     if best is None:
         return None
     gain, size_mm, sigmas = best
-    left = offsets.squared(residual, metric) - gain
-    scatter = float(np.sqrt(max(left / max(1, residual.size), 1.0)))
-    if size_mm > 0.0 or sigmas > -SWAPPED_SIGMAS * scatter or gain < SWAPPED_SHARE * (gain + left):
+    stands = offsets.squared(alone, metric)
+    scatter = float(np.sqrt(max((stands - gain) / max(1, residual.size), 1.0)))
+    if sigmas > -SWAPPED_SIGMAS * scatter or gain < SWAPPED_SHARE * stands:
         return None
     return Finding(
         f"at reversals the gap leads the input by {1e3 * abs(size_mm):.3g} um instead of lagging behind it, which no "
         "mechanism does: are the directions swapped, or the sign of the gap's error?",
         blocks=True,
     )
+
+
+def _without(values: Array, columns: Array, offsets: RunOffsets, metric: Array) -> Array:
+    """Take columns out of whitened values; shape as given."""
+    moved = columns - offsets.design @ (metric @ (offsets.design.T @ columns))
+    return np.asarray(values - columns @ np.linalg.lstsq(moved.T @ columns, moved.T @ values, rcond=1e-10)[0])
 
 
 def _later(bench: BenchData) -> list[Array]:

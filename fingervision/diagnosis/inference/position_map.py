@@ -19,8 +19,11 @@ from fingervision.effects.position_error_map import covariance, curve_values, wi
 NAME = "position_error_map"
 SET_POINTS = 60
 """Different inputs up to which each is a node of the curve; above, nodes are spread evenly."""
-NODES = 41
-"""Of a curve over many inputs: shapes down to a twentieth of the range."""
+NODES = 13
+"""Of a curve over many inputs: about as many targets as an error map is tabulated at."""
+SMOOTH = 0.1
+"""Shortest length of a map over the range: what changes faster repeats with a period, or is no property of the place
+that anybody could have measured beforehand."""
 PASSES = 1.8
 """Travel over range from which on each place was passed twice: an error seen once is not known to repeat."""
 LENGTHS, SIZES = 10, 25
@@ -126,7 +129,8 @@ def likeliest_map(problem: Problem, explanation: Explanation) -> tuple[PositionM
     moved = white - offsets.design @ (metric @ (offsets.design.T @ white))
     gram, aim = white.T @ moved, moved.T @ explanation.residual
     spacing = float(np.median(np.diff(nodes_mm)))
-    lengths = np.geomspace(spacing, max(history.input_span_mm, 2.0 * spacing), LENGTHS)
+    shortest = spacing if nodes_mm.size < NODES else SMOOTH * history.input_span_mm
+    lengths = np.geomspace(shortest, max(history.input_span_mm, 2.0 * shortest), LENGTHS)
     scale = 1.0 / max(float(np.sqrt(np.trace(gram) / nodes_mm.size)), 1e-300)
     sizes = scale * np.geomspace(0.1, 1e4, SIZES)
     gains = np.empty((LENGTHS, SIZES))

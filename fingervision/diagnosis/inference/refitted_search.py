@@ -140,7 +140,7 @@ def _beside_map(state: _Searched, look: _Look) -> _Searched:
     if reason is not None:
         excluded = {**state.bench.excluded, NAME: reason}
         return replace(state, bench=replace(state.bench, excluded=excluded))
-    if not asked and found.unknown is None and found.left_over is None:
+    if not asked and found.unknown is None:
         return state
     first, gain = likeliest_map(found.problem, found.best)
     if gain < LEAST_GAIN and found.best.names:

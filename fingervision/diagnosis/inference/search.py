@@ -30,7 +30,7 @@ third of it, as RMS."""
 COMPLETE = 0.05
 """Share of what stands beyond the noise, in chi-square, that a complete explanation leaves: forms that only bend to
 what an effect's form leaves over take less of it."""
-STEPS_HIDDEN = 0.5
+STEPS_HIDDEN = 1.0
 """Steps of the encoder within which an effect is not told from its roundings."""
 BASES = 14
 """Single effects to which a second one is added."""
@@ -306,12 +306,13 @@ def _three_effects(state: _State, progress: Progress) -> _State:
     state = replace(state, triples=triples)
     if not triples:
         return state
-    large = _added(problem, state.best, triples[0]) > TRIPLE_SHARE or _completes(state, state.best, triples[0])
-    if not large or not state.speaks_for(triples, state.best):
+    large = _added(problem, state.best, triples[0]) > TRIPLE_SHARE
+    if not (large or _completes(state, state.best, triples[0])) or not state.speaks_for(triples, state.best):
         return state
     imitation = imitated(problem, state.shapes, triples[0], [state.nothing, *state.singles[:BASES], *pairs[:3]])
     if imitation is not None:
-        return replace(state, imitation=imitation)
+        # Where it changes little, what the third effect imitates is left over, and the gate will tell it.
+        return replace(state, imitation=imitation) if large else state
     return replace(state, best=_choose(triples[:6], state.values), peers=triples)
 
 

@@ -4,6 +4,7 @@ from math import comb
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.stats import norm
 
 from fingervision.domain.effect import Array
 
@@ -26,6 +27,10 @@ CLUSTERED = 0.5
 normal jitter of sigma it is exp(-2 (pi sigma / step)^2), 0.5 at a jitter of 0.19 steps."""
 EXACT = 1.0 - 1e-6
 """The same above which there is no jitter and nothing to be taken out."""
+ON_LINE, EXACT_SHARE = 1e-3, 0.2
+"""Share of a step within which a value lies exactly on a line, and share of such values that jitter does not give."""
+BETWEEN = 0.4
+"""Distance from the lines, in steps, that jitter seldom reaches and values on no lines have in a fifth of the cases."""
 FEWEST_LINES = 8
 """Lines that a record must cross for their distance to be told."""
 BEYOND_CHANCE = 4.0
@@ -95,7 +100,14 @@ def on_lines(input_mm: Array, runs: tuple[slice, ...]) -> Array:
     if np.abs(peak[best]) > EXACT:
         return input_mm
     step, shift = 1.0 / around[best], float(np.angle(peak[best])) / (2.0 * np.pi)
-    return np.asarray((np.round(input_mm / step - shift) + shift) * step)
+    snapped = np.asarray((np.round(input_mm / step - shift) + shift) * step)
+    jitter = np.abs(values - (np.round(values / step - shift) + shift) * step) / step
+    sigma = float(np.sqrt(-2.0 * np.log(np.abs(peak[best])))) / (2.0 * np.pi)
+    between = 2.0 * float(norm.sf(BETWEEN / sigma))
+    # Equal steps of a motion lie on lines exactly, and what is between them is no jitter.
+    if np.mean(jitter < ON_LINE) > EXACT_SHARE or np.mean(jitter > BETWEEN) > 1.5 * between + 0.005:
+        return input_mm
+    return snapped
 
 
 def _characteristic(values: Array, frequency: Array) -> NDArray[np.complex128]:
