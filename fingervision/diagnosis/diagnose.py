@@ -5,9 +5,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from fingervision.diagnosis.design.further_evidence import other_evidence
+from fingervision.diagnosis.design.further_evidence import further_evidence
 from fingervision.diagnosis.design.next_run import next_run
-from fingervision.diagnosis.inference.cross_validation import rms_mm, unseen_rms_mm
+from fingervision.diagnosis.inference.cross_validation import left_out_rms_mm, rms_mm
 from fingervision.diagnosis.inference.hypothesis_fit import Problem
 from fingervision.diagnosis.inference.measuring_chain import Settings
 from fingervision.diagnosis.inference.plausibility import gross_mistake, swapped_directions
@@ -15,11 +15,11 @@ from fingervision.diagnosis.inference.position_map import NAME
 from fingervision.diagnosis.inference.refitted_search import refitted_search
 from fingervision.diagnosis.inference.search import Findings, Progress
 from fingervision.diagnosis.inference.verdict import standing, verdict
-from fingervision.diagnosis.input.observations import BenchData, prepare
+from fingervision.diagnosis.input.observations import Observations, prepare
 from fingervision.diagnosis.input.repeated_targets import NoRepeatedTargets
 from fingervision.diagnosis.noise.replicates import PureError
 from fingervision.diagnosis.report.force_hint import force_hint
-from fingervision.diagnosis.report.positioning_of_bench import positioning_of_bench
+from fingervision.diagnosis.report.positioning_of_data import positioning_of_data
 from fingervision.diagnosis.report.positioning_report import PositioningReport
 from fingervision.diagnosis.report.residual_localization import where
 from fingervision.diagnosis.report.sentences import answer, input_dominates, outliers, remaining, rows_beyond_model
@@ -42,7 +42,7 @@ class Diagnosis:
     ----------
     report : DiagnosisReport
         The answer.
-    bench : BenchData
+    data : Observations
         Measurement and model.
     before_mm, after_mm : ndarray of float, shape (channels * n,)
         Measured minus predicted, without and with the answer.
@@ -51,31 +51,31 @@ class Diagnosis:
     """
 
     report: DiagnosisReport
-    bench: BenchData
+    data: Observations
     before_mm: Array
     after_mm: Array
     positioning: PositioningReport | NoRepeatedTargets
 
 
-def by_channel(bench: BenchData, stacked: Array) -> dict[str, Array]:
+def by_channel(data: Observations, stacked: Array) -> dict[str, Array]:
     """Split a stacked residual into gap and, where they were measured, left, right and midline."""
-    n = bench.chain.history.input_mm.size
+    n = data.chain.history.input_mm.size
     gap = stacked[:n]
     out = {"gap": gap}
-    if bench.chain.history.both_edges:
+    if data.chain.history.both_edges:
         midline = stacked[n : 2 * n] - np.median(stacked[n : 2 * n])
         out |= {"left": midline - 0.5 * gap, "right": midline + 0.5 * gap, "midline": midline}
-    if bench.chain.history.force:
+    if data.chain.history.force:
         out["force"] = stacked[-n:]
     return out
 
 
-def places(bench: BenchData, problem: Problem, residual: Array, rng: np.random.Generator) -> tuple[Place, ...]:
+def places(data: Observations, problem: Problem, residual: Array, rng: np.random.Generator) -> tuple[Place, ...]:
     """Say where a residual cannot be noise."""
-    noises = dict(zip(bench.channels, problem.whitener.noises, strict=True))
-    n = bench.chain.history.input_mm.size
+    noises = dict(zip(data.channels, problem.whitener.noises, strict=True))
+    n = data.chain.history.input_mm.size
     aside = problem.whitener.aside[:n]
-    return where(by_channel(bench, residual), noises, bench.chain.history, aside, rng)
+    return where(by_channel(data, residual), noises, data.chain.history, aside, rng)
 
 
 def diagnose(
@@ -104,50 +104,50 @@ def diagnose(
     """
     begin = time.perf_counter()
     rng = np.random.default_rng(seed)
-    bench = prepare(table, model, without)
-    mistake = gross_mistake(bench)
-    refitted = refitted_search(bench, rng, forced, without, progress)
-    bench, found = refitted.bench, refitted.found
+    data = prepare(table, model, without)
+    mistake = gross_mistake(data)
+    refitted = refitted_search(data, rng, forced, without, progress)
+    data, found = refitted.data, refitted.found
     if mistake is None and (found.unknown is not None or not found.best.names):
-        mistake = swapped_directions(bench, found.problem)
+        mistake = swapped_directions(data, found.problem)
     if mistake is not None and mistake.blocks:
         nothing = found.problem.nothing()
         found = replace(found, best=nothing, alternatives=(), unknown=mistake.words.rstrip("."), left_over=None)
-        bench = replace(bench, position_map=None)
-    before = bench.stacked_mm - bench.chain.stacked({})
-    after = bench.stacked_mm - bench.chain.stacked(_values(bench, found))
-    stands = standing(bench, found.problem, before, after)
+        data = replace(data, position_map=None)
+    before = data.stacked_mm - data.chain.stacked({})
+    after = data.stacked_mm - data.chain.stacked(_values(data, found))
+    stands = standing(data, found.problem, before, after)
     if stands.after_mm > stands.before_mm:
         # What makes the disagreement larger explains nothing.
         found = replace(found, best=found.problem.nothing(), alternatives=())
-        bench = replace(bench, position_map=None)
-        after, stands = before, standing(bench, found.problem, before, before)
-    mapped = bench.position_map is not None
+        data = replace(data, position_map=None)
+        after, stands = before, standing(data, found.problem, before, before)
+    mapped = data.position_map is not None
     decided, unknown = verdict(found, mapped=mapped, stands=stands)
-    history, best = bench.chain.history, found.best
+    history, best = data.chain.history, found.best
     n, edges = history.input_mm.size, history.both_edges
-    unseen = unseen_rms_mm(bench, found.problem, best)
+    unseen = left_out_rms_mm(data, found.problem, best)
     channels = {
         name: {
             f"before_rms_{_unit(name)}": float(np.sqrt(np.mean(a**2))),
             f"after_rms_{_unit(name)}": float(np.sqrt(np.mean(b**2))),
         }
-        for (name, a), b in zip(by_channel(bench, before).items(), by_channel(bench, after).values(), strict=True)
+        for (name, a), b in zip(by_channel(data, before).items(), by_channel(data, after).values(), strict=True)
     }
     noises = [noise.total_mm for noise in found.problem.whitener.noises]
     noise_rms = float(np.sqrt(0.25 * noises[0] ** 2 + noises[1] ** 2)) if edges else noises[0]
     disagreement = Disagreement(rms_mm(before, n, edges), rms_mm(after, n, edges), noise_rms, *unseen, channels)
-    effects = _named(bench, found)
-    errors = bench.measured_pure_errors(np.split(found.problem.whitener.aside, len(bench.channels)))
+    effects = _named(data, found)
+    errors = data.measured_pure_errors(np.split(found.problem.whitener.aside, len(data.channels)))
     members = tuple(e for e in found.alternatives if e.names)
     alternatives = tuple(_with_map(e.names, mapped=mapped) for e in members) or (((NAME,),) if mapped else ())
-    proposal = next_run(bench, found.problem, list(members[:MEMBERS_SEPARATED]), refitted.posterior, rng)
+    proposal = next_run(data, found.problem, list(members[:MEMBERS_SEPARATED]), refitted.posterior, rng)
     report = DiagnosisReport(
         verdict=decided,
         sentence=answer(decided, unknown, effects, alternatives, disagreement),
         effects=effects,
         alternatives=alternatives,
-        where=places(bench, found.problem, before, rng),
+        where=places(data, found.problem, before, rng),
         disagreement=disagreement,
         explained_share=stands.explained_share,
         standing_share=stands.share,
@@ -156,8 +156,8 @@ def diagnose(
         unknown=unknown,
         remaining=remaining(stands, found.left_over, best.sigma_mm),
         next_run=proposal,
-        excluded=tuple({"name": name, "reason": reason} for name, reason in bench.excluded.items()),
-        outliers=outliers(bench, found.problem, after),
+        excluded=tuple({"name": name, "reason": reason} for name, reason in data.excluded.items()),
+        outliers=outliers(data, found.problem, after),
         runners_up=tuple(
             {
                 "effects": list(e.names),
@@ -168,26 +168,26 @@ def diagnose(
             if e.names != best.names
         ),
         notes=(
-            *bench.notes,
-            *bench.refitted(),
+            *data.notes,
+            *data.refitted(),
             *(() if mistake is None else (mistake.words,)),
             *_trend(errors),
-            *force_hint(bench, found.alternatives),
-            *other_evidence(found.alternatives),
-            *rows_beyond_model(bench, best),
-            *input_dominates(bench, found.problem),
+            *force_hint(data, found.alternatives),
+            *further_evidence(found.alternatives),
+            *rows_beyond_model(data, best),
+            *input_dominates(data, found.problem),
         ),
         seconds=time.perf_counter() - begin,
     )
     progress(1.0)
-    return Diagnosis(report, bench, before, after, positioning_of_bench(bench, _values(bench, found)))
+    return Diagnosis(report, data, before, after, positioning_of_data(data, _values(data, found)))
 
 
-def _values(bench: BenchData, found: Findings) -> Settings:
+def _values(data: Observations, found: Findings) -> Settings:
     """Everything that was found: the effects, and the curve of a map."""
-    if bench.position_map is None:
+    if data.position_map is None:
         return found.best.values
-    return {**found.best.values, NAME: bench.position_map.values()}
+    return {**found.best.values, NAME: data.position_map.values()}
 
 
 def _with_map(names: tuple[str, ...], *, mapped: bool) -> tuple[str, ...]:
@@ -208,7 +208,7 @@ def _unit(channel: str) -> str:
     return "n" if channel == "force" else "mm"
 
 
-def _named(bench: BenchData, found: Findings) -> tuple[NamedEffect, ...]:
+def _named(data: Observations, found: Findings) -> tuple[NamedEffect, ...]:
     listed = [entry for entry in found.problem.parameters(found.best.names) if entry[1].run is None]
     root = np.sqrt(np.maximum(np.diag(found.best.covariance), 0.0))
     out = {}
@@ -225,11 +225,9 @@ def _named(bench: BenchData, found: Findings) -> tuple[NamedEffect, ...]:
         still = {p.name: Estimate(p.neutral or 0.0, None, p.unit) for p in effect.parameters if p.name not in known}
         ordered = {p.name: {**known, **still}[p.name] for p in effect.parameters}
         out[name] = NamedEffect(name, str(effect.stage), {**ordered, **known})
-    curve = bench.position_map
+    curve = data.position_map
     if curve is not None:
-        rms_mm = curve.values()["rms_mm"]
-        relative = (curve.rms_mm.u or 0.0) / curve.rms_mm.value
-        described = {"rms_mm": Estimate(rms_mm, rms_mm * relative, "mm"), "length_mm": curve.length_mm}
+        described = {"rms_mm": curve.rms_mm, "length_mm": curve.length_mm}
         points = tuple(zip(curve.nodes_mm.tolist(), curve.curve_mm.tolist(), strict=True))
         out[NAME] = NamedEffect(NAME, str(catalogue()[NAME].stage), described, points)
     return tuple(out[name] for name in catalogue() if name in out)

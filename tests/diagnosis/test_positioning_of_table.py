@@ -10,9 +10,9 @@ import pytest
 from fingervision.diagnosis.diagnose import diagnose
 from fingervision.diagnosis.input.repeated_targets import NoRepeatedTargets
 from fingervision.diagnosis.report.positioning_figures import DEFINITIONS
-from fingervision.diagnosis.report.positioning_of_bench import (
+from fingervision.diagnosis.report.positioning_of_data import (
     positioning_html,
-    positioning_of_bench,
+    positioning_of_data,
     positioning_section,
 )
 from fingervision.diagnosis.report.positioning_of_table import MODEL, positioning_of_table
@@ -144,7 +144,7 @@ def test_a_diagnosed_table_of_targets_tells_the_play(tmp_path: Path) -> None:
     rows.write_text("\n".join([",".join(cells), *(",".join(row) for row in zip(*cells.values(), strict=True))]) + "\n")
     done = diagnose(read_measured_table(rows), read_model(model))
     answer = {e.name: {name: known.value for name, known in e.parameters.items()} for e in done.report.effects}
-    found = positioning_of_bench(done.bench, answer)
+    found = positioning_of_data(done.data, answer)
     assert found.cycles == (5, 5)
     assert found.measured.value_mm("B_mean") == pytest.approx(-0.02, abs=0.001)
     # Ranges over fourteen means of five readings, and scatter: 1 um each; five standard deviations.

@@ -7,7 +7,7 @@ import numpy as np
 
 from fingervision.diagnosis.inference.hypothesis_fit import Explanation, Point, Problem, fit
 from fingervision.diagnosis.inference.uncertain_dimensions import tangent
-from fingervision.diagnosis.input.observations import BenchData
+from fingervision.diagnosis.input.observations import Observations
 from fingervision.diagnosis.noise.whitening import RunOffsets, Whitener
 from fingervision.domain.effect import Array, Flags, History, InputPath
 from fingervision.domain.model import PhysicalModel
@@ -22,7 +22,7 @@ Settings = Mapping[str, Mapping[str, float]]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class SecondRun:
+class AugmentedDataset:
     """Data, and a run behind them that has not been made.
 
     Parameters
@@ -43,9 +43,9 @@ class SecondRun:
     channels: int
 
     @classmethod
-    def of(cls, bench: BenchData, first: Problem, input_mm: Array, *, rezeroed: bool = False) -> "SecondRun":
+    def of(cls, data: Observations, first: Problem, input_mm: Array, *, rezeroed: bool = False) -> "AugmentedDataset":
         """Put a run behind the data: same noise, later on the same clock; the stage may be re-zeroed before it."""
-        old = bench.chain.history
+        old = data.chain.history
         n, more = old.input_mm.size, input_mm.size
         time = float(old.times.max()) + PAUSE_S + old.sample_time_s * np.arange(more)
         history: History = replace(
@@ -55,8 +55,8 @@ class SecondRun:
             runs=(*old.runs, slice(n, n + more)),
             rezeroed=(*(old.rezeroed or (False,) * len(old.runs)), rezeroed or any(old.rezeroed)),
         )
-        count = len(bench.channels)
-        whitener, drawn = first.whitener, bench.model.base
+        count = len(data.channels)
+        whitener, drawn = first.whitener, data.model.base
         chain = replace(first.chain, history=history, path=_longer(first.chain.path, history, n))
 
         def longer(values: Array) -> Array:
@@ -70,14 +70,14 @@ class SecondRun:
             longer(whitener.input_mm),
             whitener.input_samples,
             longer(whitener.passing_mm),
-            tangent(chain, drawn, bench.refit.moved).columns
-            if bench.refit.moved and isinstance(drawn, PhysicalModel)
+            tangent(chain, drawn, data.refit.moved).columns
+            if data.refit.moved and isinstance(drawn, PhysicalModel)
             else None,
         )
         joined = replace(
             first, chain=chain, whitener=both, measured=np.zeros(count * (n + more)), offsets=RunOffsets.of(both)
         )
-        return cls(first, joined, bench.aim_mm, count)
+        return cls(first, joined, data.aim_mm, count)
 
     @property
     def input_mm(self) -> Array:

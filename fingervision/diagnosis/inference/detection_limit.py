@@ -11,7 +11,7 @@ SEEN_SIGMAS = 1.645
 """Standard deviations above the threshold: nineteen of twenty effects of that size are seen."""
 
 
-def smallest_seen(
+def detection_limits(
     problem: Problem, atoms: Signatures, nothing: Explanation, thresholds: Mapping[str, float]
 ) -> dict[str, dict[str, object]]:
     """State the size of each effect that this data would have shown."""

@@ -3,7 +3,7 @@
 import numpy as np
 
 from fingervision.diagnosis.inference.ambiguity_set import choices
-from fingervision.diagnosis.inference.harmonics import overtones
+from fingervision.diagnosis.inference.harmonics import harmonics
 from fingervision.diagnosis.inference.hypothesis_fit import MANY_STEPS, Explanation, Problem, fit
 from fingervision.diagnosis.inference.null_bootstrap import FEWEST, jumps_astray, linear_thresholds, noise_alone, rare
 from fingervision.diagnosis.inference.probe_basis import Probes, probes
@@ -123,11 +123,11 @@ def _of_jumps_astray(problem: Problem, columns: Array, best: Explanation, rng: n
     return rare(most)
 
 
-def unexplained(
+def remaining_structure(
     problem: Problem, shapes: Probes, best: Explanation, rng: np.random.Generator
 ) -> tuple[str | None, str | None]:
     """Test the largest of many probes; returns what is unknown, or what is left over but small."""
-    own = overtones(problem, best)
+    own = harmonics(problem, best)
     gain, dot, norm = _gains(problem, shapes.columns, best, own.columns)
     usable = norm > 0.0
     family = ("probe",) * int(usable.sum())

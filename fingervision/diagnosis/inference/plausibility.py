@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fingervision.diagnosis.inference.hypothesis_fit import Problem
-from fingervision.diagnosis.input.observations import BenchData
+from fingervision.diagnosis.input.observations import Observations
 from fingervision.diagnosis.noise.whitening import RunOffsets
 from fingervision.domain.effect import Array
 from fingervision.effects.play_operator import play
@@ -38,13 +38,13 @@ class Finding:
     blocks: bool
 
 
-def gross_mistake(bench: BenchData) -> Finding | None:
+def gross_mistake(data: Observations) -> Finding | None:
     """Compare the measured motion with the predicted one as a whole: sign, unit, and whether they have to do at all."""
-    gap, predicted = bench.table.gap_mm, bench.chain.respond({}).gap_mm
+    gap, predicted = data.table.gap_mm, data.chain.respond({}).gap_mm
     if np.ptp(predicted) == 0.0:
         return None
     # Ranks and quantiles resist rows that are wrong; a stage that follows late is looked at as late as it may be.
-    order = max((_order(gap, late) for late in _later(bench)), key=abs)
+    order = max((_order(gap, late) for late in _later(data)), key=abs)
     way, predicted_way = (float(np.diff(np.quantile(values, ENDS))[0]) for values in (gap, predicted))
     if order < -LEAST_CORRELATION:
         return Finding(
@@ -68,20 +68,20 @@ def gross_mistake(bench: BenchData) -> Finding | None:
     return None
 
 
-def swapped_directions(bench: BenchData, problem: Problem) -> Finding | None:
+def swapped_directions(data: Observations, problem: Problem) -> Finding | None:
     """Look for a play with the wrong sign: at reversals the gap leads the input instead of lagging behind it."""
-    history = bench.chain.history if bench.chain.path is None else bench.chain.path.history
-    rows = np.arange(history.input_mm.size) if bench.chain.path is None else bench.chain.path.rows
+    history = data.chain.history if data.chain.path is None else data.chain.path.history
+    rows = np.arange(history.input_mm.size) if data.chain.path is None else data.chain.path.rows
     if history.time_s is None:
         return None
     residual = problem.nothing().residual
     offsets, metric = problem.offsets, problem.offsets.metric(problem.nothing().sigma_mm)
     reach = 1e-3 * history.input_span_mm
-    n = bench.chain.history.input_mm.size
-    low, high = (bench.chain.with_input(bench.chain.history.input_mm + way).stacked({}) for way in (-reach, reach))
+    n = data.chain.history.input_mm.size
+    low, high = (data.chain.with_input(data.chain.history.input_mm + way).stacked({}) for way in (-reach, reach))
     slope = (high - low) / (2.0 * reach)
     constant = np.ones(n)
-    line = bench.chain.history.input_mm - bench.chain.history.input_mm.mean()
+    line = data.chain.history.input_mm - data.chain.history.input_mm.mean()
     beside = np.stack([slope * np.tile(shape, slope.size // n) for shape in (constant, line)], axis=1)
     whitened = problem.whitener.columns(beside)[0]
     alone = _without(residual, whitened, offsets, metric)
@@ -119,11 +119,11 @@ def _without(values: Array, columns: Array, offsets: RunOffsets, metric: Array) 
     return np.asarray(values - columns @ np.linalg.lstsq(moved.T @ columns, moved.T @ values, rcond=1e-10)[0])
 
 
-def _later(bench: BenchData) -> list[Array]:
+def _later(data: Observations) -> list[Array]:
     """Predicted gap for a stage that follows at once, and by up to a second later."""
-    if "drive_lag" not in bench.effects:
-        return [bench.chain.respond({}).gap_mm]
-    return [bench.chain.respond({"drive_lag": {"delay_s": delay_s}}).gap_mm for delay_s in DELAYS_S]
+    if "drive_lag" not in data.effects:
+        return [data.chain.respond({}).gap_mm]
+    return [data.chain.respond({"drive_lag": {"delay_s": delay_s}}).gap_mm for delay_s in DELAYS_S]
 
 
 def _order(gap: Array, predicted: Array) -> float:

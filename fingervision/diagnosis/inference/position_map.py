@@ -47,7 +47,7 @@ class PositionMap:
     columns_mm : ndarray of float, shape (channels * n, k)
         What each of these numbers does to the prediction.
     rms_mm, length_mm : Estimate
-        Size and length of the process.
+        Root mean square of the curve once it is estimated, of the process before; and the process's length.
     price : float
         Logarithm of the determinant and of the choice of size and length, on the scale of chi-square.
     coefficients : ndarray of float, shape (k,)
@@ -74,7 +74,7 @@ class PositionMap:
 
     def values(self) -> dict[str, float]:
         """Values of the effect: size, length and points."""
-        described = {"rms_mm": float(np.sqrt(np.mean(self.curve_mm**2))), "length_mm": self.length_mm.value}
+        described = {"rms_mm": self.rms_mm.value, "length_mm": self.length_mm.value}
         return described | curve_values(self.nodes_mm.tolist(), self.curve_mm.tolist())
 
     def is_like(self, other: "PositionMap") -> bool:
@@ -84,10 +84,15 @@ class PositionMap:
 
     def refitted(self, problem: Problem, explanation: Explanation, behind: int) -> "PositionMap":
         """Estimate the curve beside an explanation; `behind` random effects stand behind the map's in the problem."""
-        offsets = problem.offsets
-        best = offsets.metric(explanation.sigma_mm) @ (offsets.design.T @ explanation.residual)
-        end = best.size - behind
-        return replace(self, coefficients=best[end - self.coefficients.size : end])
+        metric = problem.offsets.metric(explanation.sigma_mm)
+        best = metric @ (problem.offsets.design.T @ explanation.residual)
+        own = slice(best.size - behind - self.coefficients.size, best.size - behind)
+        curve = self.root_mm @ best[own]
+        rms = float(np.sqrt(np.mean(curve**2)))
+        # Derivative of the root mean square by the curve, over the curve's posterior covariance.
+        slope = self.root_mm.T @ (curve / (curve.size * max(rms, 1e-300)))
+        u = float(np.sqrt(max(float(slope @ metric[own, own] @ slope), 0.0)))
+        return replace(self, coefficients=best[own], rms_mm=Estimate(rms, u, "mm"))
 
 
 def why_no_map(history: History, path: InputPath | None) -> str | None:
@@ -173,7 +178,8 @@ def _estimate(value: float, logarithms: Array, weight: Array) -> Estimate:
 
 def _nodes(history: History) -> Array:
     near = max(1e-6 * history.input_span_mm, 1e-300)
-    places = np.unique(np.round(history.input_mm / near)) * near
+    _, first = np.unique(np.round(history.input_mm / near), return_index=True)
+    places = history.input_mm[first]
     if places.size <= SET_POINTS:
         return np.asarray(places)
     return np.linspace(float(places[0]), float(places[-1]), NODES)

@@ -15,11 +15,11 @@ from fingervision.diagnosis.inference.position_map import (
     why_no_map,
 )
 from fingervision.diagnosis.inference.posterior import settled
-from fingervision.diagnosis.inference.reference_gauge import told_by_slots
+from fingervision.diagnosis.inference.reference_gauge import consistent_with_gauges
 from fingervision.diagnosis.inference.search import Findings, Progress, search
 from fingervision.diagnosis.inference.verdict import standing_of, without_passengers
-from fingervision.diagnosis.input.intersample_interpolation import along_likelier_path
-from fingervision.diagnosis.input.observations import BenchData
+from fingervision.diagnosis.input.intersample_interpolation import likelier_interpolation
+from fingervision.diagnosis.input.observations import Observations
 from fingervision.diagnosis.noise.whitening import RunOffsets
 
 BY_ACCIDENT = 1e-3
@@ -37,7 +37,7 @@ class Refitted:
 
     Parameters
     ----------
-    bench : BenchData
+    data : Observations
         Measurement and model; the drawing's uncertain numbers stand where they explain the most.
     found : Findings
         What the search found.
@@ -45,19 +45,19 @@ class Refitted:
         Draws of the best explanation's parameters.
     """
 
-    bench: BenchData
+    data: Observations
     found: Findings
     posterior: tuple[Point, ...]
 
 
-def _problem(bench: BenchData, explanation: Explanation | None) -> Problem:
+def _problem_of(data: Observations, explanation: Explanation | None) -> Problem:
     values = {} if explanation is None else explanation.values
     free = 0 if explanation is None else explanation.free
-    return bench.problem(bench.stacked_mm - bench.chain.stacked(values), free, explained=explanation is not None)
+    return data.problem(data.stacked_mm - data.chain.stacked(values), free, explained=explanation is not None)
 
 
 def refitted_search(
-    bench: BenchData,
+    data: Observations,
     rng: np.random.Generator,
     forced: frozenset[str],
     without: frozenset[str],
@@ -67,7 +67,7 @@ def refitted_search(
 
     Parameters
     ----------
-    bench : BenchData
+    data : Observations
         Measurement and model.
     rng : numpy Generator
         For the bootstrap and the posterior.
@@ -77,9 +77,9 @@ def refitted_search(
         Told the share that is done.
     """
     look = _Look(rng, forced, progress)
-    state = look.again(bench)
-    likelier = along_likelier_path(state.bench, state.found.problem, state.found.best)
-    if likelier is not state.bench:
+    state = look.again(data)
+    likelier = likelier_interpolation(state.data, state.found.problem, state.found.best)
+    if likelier is not state.data:
         state = look.again(likelier)
     state = _over_the_ends(state, look)
     if NAME not in without:
@@ -92,7 +92,7 @@ def refitted_search(
 class _Searched:
     """A search that was made: measurement and model, what was found, and what slots of known width said."""
 
-    bench: BenchData
+    data: Observations
     found: Findings
     said: tuple[str, ...]
 
@@ -105,27 +105,26 @@ class _Look:
     forced: frozenset[str]
     progress: Progress
 
-    def again(self, bench: BenchData, known: Explanation | None = None) -> _Searched:
+    def again(self, data: Observations, known: Explanation | None = None) -> _Searched:
         """Search once more, the noise estimated beside what is known already."""
-        found = search(partial(_problem, bench), self.rng, self.forced, self.progress, known)
-        found, said = told_by_slots(bench, found)
-        return _Searched(bench, found, said)
+        found = search(partial(_problem_of, data), self.rng, self.forced, self.progress, known)
+        found, said = consistent_with_gauges(data, found)
+        return _Searched(data, found, said)
 
 
 def _over_the_ends(state: _Searched, look: _Look) -> _Searched:
     """Search along a path with overshoots, and keep it where an effect with memory then explains the data better."""
-    bench = state.bench.with_overshoots()
-    if bench is state.bench:
+    data = state.data.with_overshoots()
+    if data is state.data:
         return state
     found = state.found
     with_memory = [name for name, effect in found.problem.effects.items() if effect.memory]
-    over = replace(found.problem, chain=bench.chain)
+    over = replace(found.problem, chain=data.chain)
     tried = [e for e in found.singles if e.names[0] in with_memory]
-    if not tried:
-        return state
-    straight = min(e.score for e in tried)
-    turned = min(fit(over, e.names, e.values, iterations=20).score for e in tried)
-    return look.again(bench) if turned < straight - LEAST_GAIN else state
+    straight = min(e.score for e in [found.nothing, *tried])
+    refits = [fit(over, e.names, e.values, iterations=20).score for e in tried]
+    turned = min([over.nothing().score, *refits])
+    return look.again(data) if turned < straight - LEAST_GAIN else state
 
 
 def _beside_map(state: _Searched, look: _Look) -> _Searched:
@@ -134,12 +133,12 @@ def _beside_map(state: _Searched, look: _Look) -> _Searched:
     The map competes only where something remains that the other effects do not explain, and at the price of its
     freedom; where an effect with a few numbers does as well, it stays.
     """
-    history, found = state.bench.chain.history, state.found
-    reason = why_no_map(history, state.bench.chain.path)
+    history, found = state.data.chain.history, state.found
+    reason = why_no_map(history, state.data.chain.path)
     asked = NAME in look.forced
     if reason is not None:
-        excluded = {**state.bench.excluded, NAME: reason}
-        return replace(state, bench=replace(state.bench, excluded=excluded))
+        excluded = {**state.data.excluded, NAME: reason}
+        return replace(state, data=replace(state.data, excluded=excluded))
     if not asked and found.unknown is None:
         return state
     first, gain = likeliest_map(found.problem, found.best)
@@ -148,13 +147,13 @@ def _beside_map(state: _Searched, look: _Look) -> _Searched:
         first, gain = likeliest_map(found.problem, found.nothing)
     if gain < LEAST_GAIN and not asked:
         return state
-    beside = look.again(replace(state.bench, position_map=first), found.best)
+    beside = look.again(replace(state.data, position_map=first), found.best)
     plain = replace(beside.found.problem, offsets=_offsets_without_map(beside.found.problem, first))
     second, _ = likeliest_map(plain, _left(plain, beside.found.best))
     if first.is_like(second):
         second = first
     else:
-        beside = look.again(replace(beside.bench, position_map=second), beside.found.best)
+        beside = look.again(replace(beside.data, position_map=second), beside.found.best)
         plain = replace(beside.found.problem, offsets=_offsets_without_map(beside.found.problem, second))
     rows = max(2, int(plain.measured.size - plain.whitener.aside.sum()))
     rival = fit(plain, found.best.names, found.best.values, iterations=20) if found.best.names else plain.nothing()
@@ -168,7 +167,7 @@ def _common_offset(state: _Searched, look: _Look) -> _Searched:
     Runs that are off by nearly the same amount share a cause and no accident: they may then be offset against each
     other by no more than they depart from their mean.
     """
-    runs = len(state.bench.chain.history.runs)
+    runs = len(state.data.chain.history.runs)
     found = state.found
     if runs < 2 or max(found.best.sigma_mm) == 0.0:
         return state
@@ -176,11 +175,11 @@ def _common_offset(state: _Searched, look: _Look) -> _Searched:
     means = (offsets.metric(found.best.sigma_mm) @ (offsets.design.T @ found.best.residual))[:runs]
     scatter = float(np.std(means, ddof=1))
     chance = 2.0 * float(student.sf(abs(means.mean()) / max(scatter / np.sqrt(runs), 1e-300), runs - 1))
-    stands = standing_of(state.bench, found)
+    stands = standing_of(state.data, found)
     if chance > BY_ACCIDENT and stands.is_little:
         return state
-    again = look.again(replace(state.bench, runs_scatter_mm=scatter), found.best)
-    lower = standing_of(again.bench, again.found).after_mm
+    again = look.again(replace(state.data, runs_scatter_mm=scatter), found.best)
+    lower = standing_of(again.data, again.found).after_mm
     return again if lower < LOWERED * stands.after_mm else state
 
 
@@ -199,31 +198,31 @@ def _offsets_without_map(problem: Problem, position_map: PositionMap) -> RunOffs
 
 def _beside_drawing(state: _Searched, look: _Look) -> _Searched:
     """Redraw a gripper whose numbers are uncertain, and search again until neither changes the other."""
-    if not state.bench.refit.moved:
+    if not state.data.refit.moved:
         return state
     for _ in range(MOST_SEARCHES - 1):
-        nearer = state.bench.redrawn(state.found.problem, state.found.best)
-        straight = nearer.straight(state.bench, state.found.problem)
-        state = replace(state, bench=nearer)
+        nearer = state.data.redrawn(state.found.problem, state.found.best)
+        straight = nearer.straight(state.data, state.found.problem)
+        state = replace(state, data=nearer)
         if straight:
             break
-        state = look.again(state.bench)
-    found = replace(state.found, problem=_problem(state.bench, state.found.best))
+        state = look.again(state.data)
+    found = replace(state.found, problem=_problem_of(state.data, state.found.best))
     refit = fit(found.problem, found.best.names, found.best.values, iterations=20) if found.best.names else found.best
     return replace(state, found=_with_best(found, refit))
 
 
 def _settled(state: _Searched, rng: np.random.Generator) -> Refitted:
     """Drop what only rides along, estimate the map, and give every parameter its posterior."""
-    bench, found = state.bench, without_passengers(state.bench, state.found)
+    data, found = state.data, without_passengers(state.data, state.found)
     best, posterior = settled(found.problem, found.best, rng)
     found = _with_best(found, best)
-    if bench.position_map is not None:
-        bench = replace(bench, position_map=bench.position_map.refitted(found.problem, best, len(bench.refit.moved)))
-    if bench.refit.moved:
-        bench = bench.redrawn(found.problem, best if best.names else found.problem.nothing())
-        found = replace(found, problem=_problem(bench, best))
-    return Refitted(replace(bench, notes=(*bench.notes, *state.said)), found, posterior)
+    if data.position_map is not None:
+        data = replace(data, position_map=data.position_map.refitted(found.problem, best, len(data.refit.moved)))
+    if data.refit.moved:
+        data = data.redrawn(found.problem, best if best.names else found.problem.nothing())
+        found = replace(found, problem=_problem_of(data, best))
+    return Refitted(replace(data, notes=(*data.notes, *state.said)), found, posterior)
 
 
 def _with_best(found: Findings, best: Explanation) -> Findings:

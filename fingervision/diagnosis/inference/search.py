@@ -5,10 +5,10 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from fingervision.diagnosis.inference.ambiguity_set import beside_foretold, indistinguishable, odds
-from fingervision.diagnosis.inference.detection_limit import smallest_seen
+from fingervision.diagnosis.inference.ambiguity_set import ambiguity_set, beside_foretold, odds
+from fingervision.diagnosis.inference.detection_limit import detection_limits
 from fingervision.diagnosis.inference.hypothesis_fit import FORM_SHARE, SMALL_SHARE, Explanation, Problem, fit, scan
-from fingervision.diagnosis.inference.model_adequacy import imitated, shapes_of, unexplained
+from fingervision.diagnosis.inference.model_adequacy import imitated, remaining_structure, shapes_of
 from fingervision.diagnosis.inference.null_bootstrap import LONG
 from fingervision.diagnosis.inference.probe_basis import Probes
 from fingervision.diagnosis.inference.signatures import Signatures, signatures, tangents
@@ -163,7 +163,7 @@ def _simplest(singles: list[Explanation], samples: int, nothing: Explanation) ->
 
 
 def search(
-    bench_problem: Callable[[Explanation | None], Problem],
+    problem_beside: Callable[[Explanation | None], Problem],
     rng: np.random.Generator,
     forced: frozenset[str],
     progress: Progress,
@@ -175,7 +175,7 @@ def search(
 
     Parameters
     ----------
-    bench_problem : callable
+    problem_beside : callable
         Gives the problem with the noise estimated on an explanation's residual.
     rng : numpy Generator
         For the bootstrap of the null.
@@ -186,7 +186,7 @@ def search(
     known : Explanation or None
         Found by an earlier search of the same measurement: the noise is estimated beside it.
     """
-    state = _one_effect(_noise_known(bench_problem, known), rng, forced)
+    state = _one_effect(_noise_known(problem_beside, known), rng, forced)
     progress(0.3)
     state = _two_effects(state, lambda share: progress(0.3 + 0.4 * share))
     state = _three_effects(state, lambda share: progress(0.7 + 0.1 * share))
@@ -243,13 +243,13 @@ class _State:
         return self.evidence is not None and self.evidence.speaks_for(found, base)
 
 
-def _noise_known(bench_problem: Callable[[Explanation | None], Problem], known: Explanation | None) -> _State:
+def _noise_known(problem_beside: Callable[[Explanation | None], Problem], known: Explanation | None) -> _State:
     """Estimate the noise beside what is known, or beside the likeliest explanation of a first, rough search."""
     if known is not None:
-        problem = bench_problem(known)
+        problem = problem_beside(known)
         nothing = problem.nothing()
         return _State(problem, signatures(problem), nothing, nothing, [nothing], shapes_of(problem))
-    problem = bench_problem(None)
+    problem = problem_beside(None)
     atoms = signatures(problem)
     rough = _singles(problem, atoms, 4)
     # A pair fitted to a few samples takes their noise with it, which would then be estimated too small.
@@ -257,7 +257,7 @@ def _noise_known(bench_problem: Callable[[Explanation | None], Problem], known: 
     pairs = _extended(problem, atoms, rough[:3], 16, lambda _: None) if many else []
     first = [*rough[:1], *pairs[:1]]
     if first:
-        problem = bench_problem(min(first, key=lambda e: e.bic(problem.measured.size)))
+        problem = problem_beside(min(first, key=lambda e: e.bic(problem.measured.size)))
         atoms = signatures(problem)
     nothing = problem.nothing()
     return _State(problem, atoms, nothing, nothing, [nothing], shapes_of(problem))
@@ -328,7 +328,7 @@ def _without_imitations(state: _State) -> _State:
 
 def _gated(state: _State, rng: np.random.Generator) -> _State:
     """Test what the best explanation leaves with generic probes."""
-    unknown, left_over = unexplained(state.problem, state.shapes, state.best, rng)
+    unknown, left_over = remaining_structure(state.problem, state.shapes, state.best, rng)
     # What is small beside all that was explained is left over, whether probes found it or a third effect.
     if unknown is None and left_over is None:
         unknown = state.imitation
@@ -341,7 +341,7 @@ def _findings(state: _State, forced: frozenset[str]) -> Findings:
     alternatives, distances = [best], dict[tuple[str, ...], float]()
     if best.names and not forced:
         pool = [*state.singles, *state.peers] if len(best.names) > 1 else state.singles
-        alternatives, distances = indistinguishable(problem, best, nothing, pool, state.pairs)
+        alternatives, distances = ambiguity_set(problem, best, nothing, pool, state.pairs)
     alternatives = beside_foretold(problem, alternatives)
     best = min(alternatives, key=lambda e: odds(problem, e, state.values)) if best.names else best
     alternatives.sort(key=lambda e: e is not best)
@@ -350,7 +350,9 @@ def _findings(state: _State, forced: frozenset[str]) -> Findings:
         if nothing.score - best.score < PART_OF_UNKNOWN * stands:
             best = nothing
         alternatives = [best] if best.names else []
-    smallest = {} if state.evidence is None else smallest_seen(problem, state.atoms, nothing, state.evidence.thresholds)
+    smallest = (
+        {} if state.evidence is None else detection_limits(problem, state.atoms, nothing, state.evidence.thresholds)
+    )
     return Findings(
         best=best,
         alternatives=tuple(alternatives),

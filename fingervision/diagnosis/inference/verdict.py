@@ -7,7 +7,7 @@ from scipy.stats import f as fisher
 
 from fingervision.diagnosis.inference.hypothesis_fit import Explanation, Problem, fit
 from fingervision.diagnosis.inference.search import Findings
-from fingervision.diagnosis.input.observations import BenchData
+from fingervision.diagnosis.input.observations import Observations
 from fingervision.diagnosis.input.recorded_input import scatter_in_holds
 from fingervision.diagnosis.noise.replicates import resolution
 from fingervision.domain.effect import Array
@@ -72,16 +72,16 @@ class Standing:
         return float(fisher.sf(ratio, self.rows, self.noise_degrees)) > LACK_OF_FIT
 
 
-def standing(bench: BenchData, problem: Problem, before_mm: Array, after_mm: Array) -> Standing:
+def standing(data: Observations, problem: Problem, before_mm: Array, after_mm: Array) -> Standing:
     """Judge residuals; `before_mm` and `after_mm` of shape (channels * n,)."""
-    history = bench.chain.history
+    history = data.chain.history
     n, both = history.input_mm.size, history.both_edges
     aside = problem.whitener.aside[:n]
     noises = [noise.total_mm for noise in problem.whitener.noises]
     if history.commanded:
         # What the stage does after each jump is no noise, and passes for it in the spectrum.
-        parts = np.split(after_mm, len(bench.channels))
-        digits = resolution(bench.table.gap_mm) / float(np.sqrt(12.0))
+        parts = np.split(after_mm, len(data.channels))
+        digits = resolution(data.table.gap_mm) / float(np.sqrt(12.0))
         settled = [max(scatter_in_holds(history, part), digits) for part in parts]
         noises = [min(noise, scatter or noise) for noise, scatter in zip(noises, settled, strict=True)]
     error = np.hypot(problem.whitener.input_mm, problem.whitener.passing_mm)[~aside]
@@ -95,7 +95,7 @@ def standing(bench: BenchData, problem: Problem, before_mm: Array, after_mm: Arr
         midline = _without_scatter(residual[n : 2 * n], history.runs)[~aside]
         return float(np.sqrt(np.mean(0.25 * gap**2 + (midline - midline.mean()) ** 2)))
 
-    errors = bench.measured_pure_errors(np.split(problem.whitener.aside, len(bench.channels)))
+    errors = data.measured_pure_errors(np.split(problem.whitener.aside, len(data.channels)))
     degrees = None if errors is None else min(error.degrees for error in errors)
     return Standing(rms(before_mm), rms(after_mm), noise, int(np.sum(~aside)), degrees)
 
@@ -109,16 +109,16 @@ def _without_scatter(values: Array, runs: tuple[slice, ...]) -> Array:
     return out
 
 
-def standing_of(bench: BenchData, found: Findings) -> Standing:
+def standing_of(data: Observations, found: Findings) -> Standing:
     """Judge what a search leaves, a map of position errors taken out to first order."""
-    before = bench.stacked_mm - bench.chain.stacked({})
-    left = before if not found.best.names else bench.stacked_mm - bench.chain.stacked(found.best.values)
-    if bench.position_map is not None:
-        left = left - bench.position_map.refitted(found.problem, found.best, len(bench.refit.moved)).fitted_mm
-    return standing(bench, found.problem, before, left)
+    before = data.stacked_mm - data.chain.stacked({})
+    left = before if not found.best.names else data.stacked_mm - data.chain.stacked(found.best.values)
+    if data.position_map is not None:
+        left = left - data.position_map.refitted(found.problem, found.best, len(data.refit.moved)).fitted_mm
+    return standing(data, found.problem, before, left)
 
 
-def without_passengers(bench: BenchData, found: Findings) -> Findings:
+def without_passengers(data: Observations, found: Findings) -> Findings:
     """Drop effects that explain less than what still stands: they may only imitate a part of it.
 
     Where structure remains beside several effects, a further one is fitted to that structure as well as to its own.
@@ -128,7 +128,7 @@ def without_passengers(bench: BenchData, found: Findings) -> Findings:
         best = found.best
         less = min((_without(found, name) for name in best.names), key=lambda explanation: explanation.score)
         fewer = replace(found, best=less, alternatives=(less,))
-        needed = standing_of(bench, fewer).after_mm > NEEDED * standing_of(bench, found).after_mm
+        needed = standing_of(data, fewer).after_mm > NEEDED * standing_of(data, found).after_mm
         if less.score - best.score > best.score - rows or needed:
             break
         found = fewer

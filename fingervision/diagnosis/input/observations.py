@@ -8,11 +8,12 @@ from numpy.typing import NDArray
 from fingervision.diagnosis.inference.hypothesis_fit import SMALL_SHARE, Explanation, Problem
 from fingervision.diagnosis.inference.measuring_chain import MeasuringChain, admissible
 from fingervision.diagnosis.inference.position_map import PositionMap
+from fingervision.diagnosis.inference.signatures import start_patterns
 from fingervision.diagnosis.inference.uncertain_dimensions import BENT, DrawingRefit, estimated, tangent, with_moved
 from fingervision.diagnosis.input.path import dwell_s, input_path, readings_at_rest, turning_readings
 from fingervision.diagnosis.input.path import recorded as recorded_rows
 from fingervision.diagnosis.input.recorded_input import AT_REST_SHARE, RecordedInput, standing_still
-from fingervision.diagnosis.input.row_screening import distrusted_rows
+from fingervision.diagnosis.input.row_screening import screened_rows
 from fingervision.diagnosis.input.stalled_ends import stalled_ends
 from fingervision.diagnosis.noise.noise_model import Noise, gate, white_noise, without_input
 from fingervision.diagnosis.noise.replicates import PureError, pure_error, resolution, visits
@@ -43,7 +44,7 @@ OUTLIER_SIGMAS, RAW_SIGMAS = 4.5, 7.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class BenchData:
+class Observations:
     """A measured table beside a model.
 
     Parameters
@@ -194,7 +195,7 @@ class BenchData:
             for error, floor in zip(errors, floors, strict=True)
         )
 
-    def with_overshoots(self) -> "BenchData":
+    def with_overshoots(self) -> "Observations":
         """Let the stage run over where it turned between two readings of the same target; itself where it did not."""
         if not turning_readings(self.table).size:
             return self
@@ -206,7 +207,7 @@ class BenchData:
         )
         return replace(self, chain=replace(self.chain, path=path), notes=(*self.notes, said))
 
-    def redrawn(self, problem: Problem, explanation: Explanation) -> "BenchData":
+    def redrawn(self, problem: Problem, explanation: Explanation) -> "Observations":
         """Refit the drawing's uncertain numbers beside an explanation, and predict with them from now on."""
         drawn = self.model.base
         if not (self.refit.moved and isinstance(drawn, PhysicalModel)):
@@ -217,7 +218,7 @@ class BenchData:
         chain = replace(self.chain, model=model).with_rest_gap(rest_mm)
         return replace(self, chain=chain, refit=replace(tangent(chain, drawn, moved), known=known))
 
-    def straight(self, drawn: "BenchData", problem: Problem) -> bool:
+    def straight(self, drawn: "Observations", problem: Problem) -> bool:
         """Whether the tangent at other numbers of the drawing foretold this prediction, to within the noise."""
         bent = self.chain.stacked({}) - drawn.chain.stacked({})
         bent -= drawn.refit.columns @ (
@@ -244,7 +245,7 @@ class BenchData:
         return tuple(out)
 
 
-def prepare(table: MeasuredTable, model: CorrectedModel, without: frozenset[str] = frozenset()) -> BenchData:
+def prepare(table: MeasuredTable, model: CorrectedModel, without: frozenset[str] = frozenset()) -> Observations:
     """Put a measured table beside a model.
 
     Raises
@@ -304,8 +305,9 @@ def prepare(table: MeasuredTable, model: CorrectedModel, without: frozenset[str]
         stacked = np.concatenate([table.gap_mm, table.midline_mm])
     if history.force and table.force_n is not None:
         stacked = np.concatenate([stacked, table.force_n])
+    chain = _with_starts(chain, stacked)
     able, excluded = admissible(chain.effects, history, without)
-    distrusted, reasons = distrusted_rows(table, model.base, float(zero))
+    distrusted, reasons = screened_rows(table, model.base, float(zero))
     notes += reasons
     refit = DrawingRefit(np.zeros((stacked.size, 0)), {})
     if isinstance(model.base, PhysicalModel) and model.base.uncertain:
@@ -315,7 +317,21 @@ def prepare(table: MeasuredTable, model: CorrectedModel, without: frozenset[str]
         rows = np.arange(u.size) if table.path is None else table.path.rows
         along_mm, _, along_runs = recorded_rows(table)
         repeats = visits(along_mm, along_runs, rows)
-    return BenchData(table, model, chain, stacked, recorded, able, excluded, distrusted, tuple(notes), refit, repeats)
+    return Observations(
+        table, model, chain, stacked, recorded, able, excluded, distrusted, tuple(notes), refit, repeats
+    )
+
+
+def _with_starts(chain: MeasuringChain, stacked_mm: Array) -> MeasuringChain:
+    """Let the effects that the model has begin each run where that suits the measurement best: nobody stated it."""
+    catalogued = chain.effects
+    for name in [name for name in chain.fixed if catalogued[name].start]:
+        tried = [
+            replace(chain, fixed={**chain.fixed, name: {**chain.fixed[name], **pattern}})
+            for pattern in start_patterns(chain.history)
+        ]
+        chain = min(tried, key=lambda one: float(np.sum((stacked_mm - one.stacked({})) ** 2)))
+    return chain
 
 
 def _rezeroed(table: MeasuredTable) -> tuple[bool, ...]:

@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from fingervision.diagnosis.diagnose import Diagnosis
-from fingervision.diagnosis.report.positioning_of_bench import positioning_section
+from fingervision.diagnosis.report.positioning_of_data import positioning_section
 from fingervision.diagnosis.report.report_page import report_page
 from fingervision.domain.parameter import Estimate
 from fingervision.effects.position_error_map import curve_values

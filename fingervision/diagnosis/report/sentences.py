@@ -4,7 +4,7 @@ import numpy as np
 
 from fingervision.diagnosis.inference.hypothesis_fit import Explanation, Problem
 from fingervision.diagnosis.inference.verdict import Standing
-from fingervision.diagnosis.input.observations import BenchData
+from fingervision.diagnosis.input.observations import Observations
 from fingervision.domain.effect import Array
 from fingervision.domain.report import Disagreement, NamedEffect, Verdict
 
@@ -64,35 +64,35 @@ def remaining(stands: Standing, left_over: str | None, scatter_mm: tuple[float, 
     return words + "."
 
 
-def outliers(bench: BenchData, problem: Problem, after: Array) -> tuple[str, ...]:
+def outliers(data: Observations, problem: Problem, after: Array) -> tuple[str, ...]:
     """Say how many rows were set aside, and in a short table which rows lie off."""
-    n = bench.chain.history.input_mm.size
+    n = data.chain.history.input_mm.size
     aside = np.flatnonzero(problem.whitener.aside[:n])
     out = [f"{aside.size} of {n} samples were set aside as outliers."] if aside.size else []
     if n <= FEW_ROWS:
         gap = after[:n] - np.median(after[:n])
         scale = 1.4826 * float(np.median(np.abs(gap)))
         out += [
-            f"the row at input {bench.table.input_mm[i]:g} mm lies {gap[i]:+.3g} mm off the others "
+            f"the row at input {data.table.input_mm[i]:g} mm lies {gap[i]:+.3g} mm off the others "
             f"({'set aside' if i in aside else 'kept'})."
             for i in np.flatnonzero(np.abs(gap) > ODD_SIGMAS * scale)
         ]
     return tuple(out)
 
 
-def rows_beyond_model(bench: BenchData, best: Explanation) -> tuple[str, ...]:
+def rows_beyond_model(data: Observations, best: Explanation) -> tuple[str, ...]:
     """Say for how many rows the model was extended beyond its inputs."""
-    low, high = bench.model.input_range_mm
-    u = bench.chain.history.input_mm
+    low, high = data.model.input_range_mm
+    u = data.chain.history.input_mm
     moved = u + best.values.get("input_offset", {}).get("offset_mm", 0.0)
     moved = moved * (1.0 + best.values.get("input_scale", {}).get("ratio", 0.0))
     rows = int(np.sum((moved < low) | (moved > high)))
     return (f"for {rows} rows the model was extended by a straight line beyond its inputs.",) if rows else ()
 
 
-def input_dominates(bench: BenchData, problem: Problem) -> tuple[str, ...]:
+def input_dominates(data: Observations, problem: Problem) -> tuple[str, ...]:
     """Say so where the recorded input's own error is the larger part of the noise."""
-    error = float(np.median(bench.recorded.error_mm))
+    error = float(np.median(data.recorded.error_mm))
     if error > problem.whitener.noises[0].total_mm:
         return (f"the recorded input's own error ({error:.2g} mm of gap) is larger than the measurement's.",)
     return ()

@@ -5,7 +5,7 @@ from html import escape
 import numpy as np
 
 from fingervision.diagnosis.inference.measuring_chain import Settings
-from fingervision.diagnosis.input.observations import BenchData
+from fingervision.diagnosis.input.observations import Observations
 from fingervision.diagnosis.input.repeated_targets import NoRepeatedTargets
 from fingervision.diagnosis.report.positioning_of_table import positioning_of_table
 from fingervision.diagnosis.report.positioning_report import PositioningReport
@@ -19,20 +19,20 @@ from fingervision.diagnosis.report.positioning_words import (
 from fingervision.domain.effect import Array
 
 
-def positioning_of_bench(bench: BenchData, answer: Settings) -> PositioningReport | NoRepeatedTargets:
+def positioning_of_data(data: Observations, answer: Settings) -> PositioningReport | NoRepeatedTargets:
     """Positioning figures of a measured table beside its model and an answer, or why it has none.
 
     Parameters
     ----------
-    bench : BenchData
+    data : Observations
         Measurement and model.
     answer : Settings
         Everything that was found: the effects with their parameters and start states, and the curve of a map.
     """
-    table, rows = bench.table, bench.table.input_mm.size
+    table, rows = data.table, data.table.input_mm.size
 
     def predict_mm(acting: Settings) -> Array:
-        return np.asarray(bench.chain.stacked(acting)[:rows], dtype=np.float64)
+        return np.asarray(data.chain.stacked(acting)[:rows], dtype=np.float64)
 
     if table.path is None:
         path = (table.input_mm, np.ones(rows, dtype=bool), table.runs, table.time_s)
