@@ -48,7 +48,7 @@ def plane_compliance(
         e = sym_grad(u)
         return plate_mm * ddot(E / (1.0 + nu) * e + E * nu / (1.0 - nu**2) * eye(trace(e), 2), sym_grad(v))
 
-    s = _stations(along, block_mm)
+    s = _stations(notch, along, block_mm)
     mesh = skfem.MeshQuad2.from_mesh(skfem.MeshQuad.init_tensor(s, np.linspace(-0.5, 0.5, across + 1)))
     placed = _shaped(notch, mesh.doflocs, block_mm)
     basis = skfem.Basis(skfem.MeshQuad2(placed, mesh.t), skfem.ElementVector(skfem.ElementQuad2()), intorder=5)
@@ -64,7 +64,7 @@ def solid_compliance(notch: Notch, material: Material, along: int = 24, across: 
     notch, material
         As in `plane_compliance`.
     along, across, through : int
-        Number of bricks along the notch, across it in the plane, and through the plate.
+        Number of bricks along the notch, across it in the plane, and through the plate, close together at its faces.
 
     Returns
     -------
@@ -80,9 +80,9 @@ def solid_compliance(notch: Notch, material: Material, along: int = 24, across: 
 
     mesh = skfem.MeshHex2.from_mesh(
         skfem.MeshHex.init_tensor(
-            _stations(along, 0.0),
+            _stations(notch, along, 0.0),
             np.linspace(-0.5, 0.5, across + 1),
-            notch.plate_mm * np.linspace(-0.5, 0.5, through + 1),
+            0.5 * notch.plate_mm * np.sin(0.5 * np.pi * np.linspace(-1.0, 1.0, through + 1)),
         )
     )
     placed = _shaped(notch, mesh.doflocs, 0.0)
@@ -91,9 +91,9 @@ def solid_compliance(notch: Notch, material: Material, along: int = 24, across: 
     return _end_compliance(K.tocsc(), basis, notch.half_length_mm, 3)
 
 
-def _stations(along: int, block_mm: float) -> Array:
+def _stations(notch: Notch, along: int, block_mm: float) -> Array:
     """Stations of the elements: angles of x = a sin(angle) within the notch, beyond it the blocks."""
-    inside = np.linspace(-np.pi / 2, np.pi / 2, along + 1)
+    inside = np.arcsin(np.clip(notch.stations_mm(along) / notch.half_length_mm, -1.0, 1.0))
     if block_mm == 0.0:
         return inside
     outside = np.pi / 2 + np.linspace(0.0, 1.0, 13)[1:] ** 1.5
