@@ -10,7 +10,7 @@ import numpy as np
 
 from fingervision.domain.errors import FingervisionError
 from fingervision.domain.gripper import Gripper, Hinge, Lever, Links, PointMm
-from fingervision.models.planar_region import Ellipse, PlanarRegion, Polygon, Shape, bar, box
+from fingervision.models.planar_region import Ellipse, Loop, PlanarRegion, Polygon, Shape, bar, box
 
 _ON = 1e-6
 """Of the height: how far beside a face material and void are looked for."""
@@ -73,7 +73,10 @@ def check_outline(gripper: Gripper, origin: str = "the drawing") -> None:
         not part them, or the clamp, the drive face or the tip's inner face is no face of the body.
     """
     region = half_region(gripper)
-    outer = sum(loop.area_mm2 > 0.0 for loop in region.loops)
+    try:
+        outer = sum(loop.area_mm2 > 0.0 for loop in region.loops)
+    except FingervisionError as error:
+        raise FingervisionError(f"In {origin}: {error}") from error
     if outer != 1:
         raise FingervisionError(
             f"The right half in {origin} must be one body, but the links and notches leave {outer} pieces; "
@@ -114,13 +117,25 @@ def _check_hinge(gripper: Gripper, number: int, origin: str) -> None:
     # Saw through the neck from disc to disc: the half must fall in two.
     (xa, ya), (xb, yb) = centres
     saw = bar(xa, ya, xb, yb, _SLIT * hinge.thickness_mm)
-    pieces = sum(loop.area_mm2 > 0.0 for loop in PlanarRegion((*region.steps, (False, saw))).loops)
-    if pieces != 2:
+    pieces = [loop for loop in PlanarRegion((*region.steps, (False, saw))).loops if loop.area_mm2 > 0.0]
+    apart = _ON * gripper.body.height_mm
+    x0, x1, y0, _ = links.pillar_and_root_mm
+    foot = (0.5 * (x0 + x1), y0 + apart) if number == 1 else (apart, gripper.lever.drive_mm[1])
+    tip = (gripper.tip_corner_mm[0] + apart, gripper.measuring_point_mm[1])
+    parted = any(_encloses(piece, foot) and not _encloses(piece, tip) for piece in pieces)
+    if len(pieces) != 2 or not parted:
+        end = "clamp" if number == 1 else "drive"
         raise FingervisionError(
-            f"Hinge {number} in {origin} must be all that holds the two sides of its link together, but beside the "
+            f"Hinge {number} in {origin} must be all that joins the {end} to the tip, but beside the "
             f"neck of {hinge.thickness_mm:g} mm at ({x:g}, {y:g}) mm other material does; check "
             f"lever.hinge{number}_mm, lever.hinge{number}_axis_deg and hinge.radius_mm against the link that it cuts."
         )
+
+
+def _encloses(loop: Loop, point: PointMm) -> bool:
+    along = [curve.at(np.linspace(curve.t0, curve.t1, 33))[:, :-1] for curve in loop.curves]
+    corners = tuple((float(x), float(y)) for x, y in np.concatenate(along, axis=1).T)
+    return bool(Polygon(corners).holds(np.array(point)[:, None])[0])
 
 
 def _check_faces(gripper: Gripper, region: PlanarRegion, origin: str) -> None:

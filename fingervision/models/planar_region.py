@@ -89,6 +89,18 @@ class Ellipse:
 Shape = Polygon | Ellipse
 
 
+def crosses_itself(corners_mm: tuple[Point, ...]) -> bool:
+    """Whether two sides of a polygon that are no neighbours meet."""
+    sides = Polygon(corners_mm).curves()
+    count = len(sides)
+    return any(
+        crossings(sides[i], sides[j])
+        for i in range(count)
+        for j in range(i + 2, count)
+        if not (i == 0 and j == count - 1)
+    )
+
+
 def bar(x0: float, y0: float, x1: float, y1: float, width_mm: float) -> Polygon:
     """Return a straight bar about the line between two points."""
     length = float(np.hypot(x1 - x0, y1 - y0))

@@ -12,6 +12,7 @@ from typing import Any
 from fingervision.domain.errors import FingervisionError
 from fingervision.domain.gripper import Body, Gripper, Hinge, Lever, Links, Material
 from fingervision.models.gripper_outline import check_outline, check_stated_size
+from fingervision.models.planar_region import crosses_itself
 
 _SECTIONS: Mapping[str, type] = MappingProxyType(
     {"material": Material, "body": Body, "hinge": Hinge, "lever": Lever, "links": Links}
@@ -213,6 +214,11 @@ def _check_links(gripper: Gripper, origin: str) -> None:
     if len(set(links.tip_polygon_mm)) < len(links.tip_polygon_mm):
         raise FingervisionError(
             f"links.tip_polygon_mm in {origin} must be different points, but one stands there twice."
+        )
+    if crosses_itself(links.tip_polygon_mm):
+        raise FingervisionError(
+            f"links.tip_polygon_mm in {origin} must go round the tip without crossing itself, but two of its sides "
+            "cross; put its points in order."
         )
     if not gripper.tip_corner_mm[1] > gripper.tip_heel_mm[1]:
         raise FingervisionError(

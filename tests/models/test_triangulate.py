@@ -121,7 +121,7 @@ def manufactured_errors(body_mm: float) -> tuple[float, float]:
     K = plate.stiffness_n_mm
     moved[free] = splu(K[free][:, free].tocsc()).solve((load - K @ moved)[free])
     found = basis.interpolate(moved)
-    x = basis.global_coordinates().value
+    x = np.asarray(basis.global_coordinates())
     l2 = np.sqrt(np.sum(np.sum((np.asarray(found) - exact(x)) ** 2, axis=0) * basis.dx))
     h1 = np.sqrt(np.sum(np.sum((found.grad - slopes(x)) ** 2, axis=(0, 1)) * basis.dx))
     return float(l2), float(h1)
