@@ -22,11 +22,12 @@ Examples:
   fingervision model gripper.toml --kind all --drive drive.csv --out model
   fingervision model gripper.toml --kind finite_element --large-rotation --contact --mesh --out model
   fingervision model gripper.toml --kind lumped --vary hinge.thickness_mm=0.6:1.4:9
+  fingervision model mechanism.toml --large-rotation --mesh --out model
 """
 
 
 @click.command(epilog=_EPILOG)
-@click.argument("gripper_toml", metavar="GRIPPER.toml", type=click.Path(path_type=Path))
+@click.argument("gripper_toml", metavar="DRAWING.toml", type=click.Path(path_type=Path))
 @click.option("--kind", type=click.Choice(_KINDS), default="all", show_default=True, help="Which model.")
 @click.option("--drive", type=click.Path(path_type=Path), help="drive.csv with the inputs to answer.")
 @click.option(
@@ -55,7 +56,8 @@ def command(
     """Predict gap, force, stress and vibration from a drawing, by one model or all of them.
 
     Writes models.csv, simulation.csv (in a folder per model with --kind all), models.png (the paper's Figure 9, with
-    differences) and deformed.png (with finite elements).
+    differences) and deformed.png (with finite elements). A mechanism drawn by bodies (mechanism.toml) is answered by
+    finite elements: mechanism.csv, deformed.png.
     """
     from fingervision.cli._model_report import loaded_rows, print_table, say_what_limits, write_table
     from fingervision.domain.errors import FingervisionError
@@ -64,8 +66,16 @@ def command(
     from fingervision.models.kinds import build_model, kinds
     from fingervision.models.physics import LINEAR, Physics
     from fingervision.storage.gripper_toml import read_gripper
+    from fingervision.storage.mechanism_toml import is_mechanism
     from fingervision.storage.simulation_csv import write_simulation
 
+    if is_mechanism(gripper_toml):
+        from fingervision.cli._mechanism import predict
+
+        predict(
+            gripper_toml, kind, drive, out, large_rotation=large_rotation, contact=contact, mesh=mesh, as_json=as_json
+        )
+        return
     gripper = read_gripper(gripper_toml)
     if vary:
         from fingervision.cli._model_sweep import sweep

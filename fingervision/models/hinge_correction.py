@@ -133,6 +133,9 @@ def _bricks(t_over_r: float, b_over_t: float) -> tuple[float, ...]:
     narrow = table[:, :1, :]
     shares = (1.0 - table / narrow) / _POISSON**2
     mixed = np.where(np.isin(np.arange(6), (_X, _Y, _ABOUT_Z)), shares, np.log(table))
+    if t_over_r < _T_OVER_R[0]:
+        # What counts is the width over the length that bends, sqrt(t R).
+        b_over_t *= np.sqrt(t_over_r / _T_OVER_R[0])
     at = np.log(np.clip(t_over_r, _T_OVER_R[0], _T_OVER_R[-1]))
     row = PchipInterpolator(np.log(_T_OVER_R), mixed, axis=0)(at)
     curves = PchipInterpolator(np.log(_B_OVER_T), row, axis=0)

@@ -1,13 +1,14 @@
 """How large triangles may be: a share of the material's width where it is thin, and no faster growth than a slope."""
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.distance import cdist
+from scipy.spatial import cKDTree
 
 from fingervision.models.outline_curves import Curve
-from fingervision.models.planar_region import PlanarRegion
+from fingervision.models.planar_region import PlanarRegion, sharp_corners_mm
 
 Array = NDArray[np.float64]
 
@@ -16,6 +17,8 @@ _GROWTH = 0.3
 _OF_RADIUS = 0.35
 """Edge length over radius of curvature at most: the sagitta is 1.5 % of the radius, and the quadratic edge follows the
 arc to 1e-5 of it."""
+_CLASS = 1.3
+"""Ratio of edge lengths within a class of points, of which the nearest is looked up."""
 _SMALLEST = 1e-4
 """Of the body's size: nothing is meshed finer."""
 _ALONG_NOTCH = 6.0
@@ -25,8 +28,6 @@ _FIRST_SAMPLES = 24
 _AT_CORNER = 0.2
 """Of the neighbouring edge length, at corners that turn into the body: stress is singular there, and triangles as large
 as elsewhere would leave the force of the paper's sample 0.1 % too high."""
-_TURNS_IN = -0.2
-"""Sine of the turn to the right beyond which a corner turns into the body."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,8 +50,18 @@ class SizeField:
 
     def at(self, points: Array) -> Array:
         """Edge length at points, shape (2, n)."""
-        nearest = (cdist(points.T, self.points_mm) * _GROWTH + self.edge_mm).min(axis=1)
-        return np.asarray(np.minimum(self.body_mm, nearest))
+        wanted = np.full(points.shape[1], self.body_mm)
+        for tree, edge in self._classes:
+            way, place = tree.query(points.T, distance_upper_bound=self.body_mm / _GROWTH)
+            found = np.isfinite(way)
+            wanted[found] = np.minimum(wanted[found], edge[place[found]] + _GROWTH * way[found])
+        return wanted
+
+    @cached_property
+    def _classes(self) -> list[tuple[cKDTree, Array]]:
+        """Points of nearly the same edge length, so that the nearest of each class is the one that counts."""
+        rank = np.floor(np.log(self.edge_mm / self.edge_mm.min()) / np.log(_CLASS)).astype(int)
+        return [(cKDTree(self.points_mm[rank == r]), self.edge_mm[rank == r]) for r in np.unique(rank)]
 
 
 def size_field(region: PlanarRegion, across: float, body_mm: float) -> SizeField:
@@ -75,21 +86,19 @@ def size_field(region: PlanarRegion, across: float, body_mm: float) -> SizeField
         size = _sizes(curve, t, others, across, body_mm, region.size_mm)
         # Samples as close as the triangles are small, so that a long leaf is fine over its whole length.
         length = _lengths(curve, t)
+        # A short edge beside long ones must be led up to.
+        size = np.clip(np.minimum(size, length[-1]), _SMALLEST * region.size_mm, body_mm)
         count = int(min(2000.0, np.ceil(np.sum(np.diff(length) / np.minimum(size[1:], size[:-1])))))
         if count > _FIRST_SAMPLES:
             t = np.interp(np.linspace(0.0, length[-1], count), length, t)
-            size = _sizes(curve, t, others, across, body_mm, region.size_mm)
+            size = _sizes(curve, t, others, across, min(body_mm, length[-1]), region.size_mm)
         points.append(curve.at(t).T)
         sizes.append(size)
-    for loop in region.loops:
-        for before, after in zip(loop.curves, loop.curves[1:] + loop.curves[:1], strict=True):
-            a, b = before.direction(np.array([before.t1]))[:, 0], after.direction(np.array([after.t0]))[:, 0]
-            if a[0] * b[1] - a[1] * b[0] < _TURNS_IN:
-                corner = after.start_mm
-                near = [float(s[np.argmin(np.hypot(*(p - corner).T))]) for p, s in zip(points, sizes, strict=True)
-                        if np.hypot(*(p - corner).T).min() < _SMALLEST * region.size_mm]  # fmt: skip
-                points.append(corner[None, :])
-                sizes.append(np.array([_AT_CORNER * min([body_mm, *near])]))
+    for corner in sharp_corners_mm(region):
+        near = [float(s[np.argmin(np.hypot(*(p - corner).T))]) for p, s in zip(points, sizes, strict=True)
+                if np.hypot(*(p - corner).T).min() < _SMALLEST * region.size_mm]  # fmt: skip
+        points.append(corner[None, :])
+        sizes.append(np.array([_AT_CORNER * min([body_mm, *near])]))
     at, edge = np.concatenate(points), np.concatenate(sizes)
     thin = edge < body_mm
     return _thinned(at[thin], edge[thin], body_mm)

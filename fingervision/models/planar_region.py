@@ -19,6 +19,8 @@ Point = tuple[float, float]
 
 _BESIDE = 1e-6
 """Of the body's size: how far beside a piece its two sides are looked at. Finer details than this do not exist."""
+_TURNS_IN = -0.2
+"""Sine of the turn to the right beyond which a corner turns into the body."""
 _SAME = 1e-8
 """Of the body's size: corners closer than this are one."""
 
@@ -202,6 +204,17 @@ class PlanarRegion:
                 piece = pieces[place]
                 kept.append(piece if on_left[place] else piece.part(piece.t1, piece.t0))
         return kept
+
+
+def sharp_corners_mm(region: PlanarRegion) -> list[Array]:
+    """Corners that turn into the body without a radius: stress is singular there."""
+    found = []
+    for loop in region.loops:
+        for before, after in zip(loop.curves, loop.curves[1:] + loop.curves[:1], strict=True):
+            a, b = before.direction(np.array([before.t1]))[:, 0], after.direction(np.array([after.t0]))[:, 0]
+            if a[0] * b[1] - a[1] * b[0] < _TURNS_IN:
+                found.append(after.start_mm)
+    return found
 
 
 def _box_mm(curve: Curve) -> tuple[Array, Array]:

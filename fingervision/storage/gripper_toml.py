@@ -61,8 +61,19 @@ def gripper_from_tables(tables: Mapping[str, Any], origin: str) -> Gripper:
     """Build a checked drawing from the five tables of `gripper.toml`; `origin` is named in errors."""
     _refuse_unknown(tables, _SECTIONS, origin, "section")
     uncertainties: dict[str, float] = {}
+    parts = _read_sections(tables, _SECTIONS, origin, uncertainties)
+    gripper = Gripper(**parts, uncertainties=MappingProxyType(uncertainties))
+    _check(gripper, origin)
+    check_outline(gripper, origin)
+    check_stated_size(gripper, origin)
+    return gripper
+
+
+def _read_sections(
+    tables: Mapping[str, Any], sections: Mapping[str, type], origin: str, uncertainties: dict[str, float]
+) -> dict[str, Any]:
     parts: dict[str, Any] = {}
-    for section, record in _SECTIONS.items():
+    for section, record in sections.items():
         table = tables.get(section)
         if not isinstance(table, dict):
             raise FingervisionError(f"{origin} must have a section [{section}], but has none.")
@@ -74,11 +85,7 @@ def gripper_from_tables(tables: Mapping[str, Any], origin: str) -> Gripper:
                 raise FingervisionError(f"{origin} must state {section}.{name}, but does not.")
             values[name] = _value(table[name], f"{section}.{name}", origin, uncertainties)
         parts[section] = record(**values)
-    gripper = Gripper(**parts, uncertainties=MappingProxyType(uncertainties))
-    _check(gripper, origin)
-    check_outline(gripper, origin)
-    check_stated_size(gripper, origin)
-    return gripper
+    return parts
 
 
 def _refuse_unknown(given: Mapping[str, Any], known: Mapping[str, Any], origin: str, kind: str) -> None:
@@ -143,17 +150,13 @@ def _numbers(raw: Any, count: int, name: str, origin: str) -> tuple[float, ...]:
 
 
 def _check(gripper: Gripper, origin: str) -> None:
-    material, body, hinge, lever, links = (
-        gripper.material,
+    check_material(gripper.material, origin)
+    body, hinge, lever, links = (
         gripper.body,
         gripper.hinge,
         gripper.lever,
         gripper.links,
     )
-    if material.poisson_ratio >= 0.5:
-        raise FingervisionError(
-            f"material.poisson_ratio in {origin} must be below 0.5, but is {material.poisson_ratio:g}."
-        )
     if body.height_mm < _METRES_BELOW_MM * hinge.thickness_mm or body.measured_below_tip_mm >= body.height_mm:
         raise FingervisionError(
             f"body.height_mm in {origin} must be larger than the hinges and the measuring height, "
@@ -170,7 +173,6 @@ def _check(gripper: Gripper, origin: str) -> None:
     _must_meet("lever.drive_mm", lever.drive_mm, "hinge 2 less (l4, l3)", drawn, origin)
     _must_meet("links.shuttle_from_mm", links.shuttle_from_mm, "lever.drive_mm", lever.drive_mm, origin)
     _check_links(gripper, origin)
-    _check_material(gripper, origin)
     inner_mm = gripper.tip_corner_mm[0]
     if abs(2.0 * inner_mm - body.rest_gap_mm) > _MEET_MM:
         raise FingervisionError(
@@ -179,9 +181,18 @@ def _check(gripper: Gripper, origin: str) -> None:
         )
 
 
-def _check_material(gripper: Gripper, origin: str) -> None:
-    """Ask about a modulus that cannot be in MPa beside the yield stress."""
-    material = gripper.material
+def read_material(tables: Mapping[str, Any], origin: str) -> Material:
+    """Read the section [material], the same in every drawing."""
+    section: Mapping[str, type] = {"material": Material}
+    return _read_sections({"material": tables.get("material")}, section, origin, {})["material"]  # type: ignore[no-any-return]
+
+
+def check_material(material: Material, origin: str) -> None:
+    """Refuse Poisson's ratios that no material has, and ask about a modulus that cannot be in MPa."""
+    if material.poisson_ratio >= 0.5:
+        raise FingervisionError(
+            f"material.poisson_ratio in {origin} must be below 0.5, but is {material.poisson_ratio:g}."
+        )
     strain = material.yield_mpa / material.youngs_modulus_mpa
     if not _LEAST_YIELD_STRAIN <= strain <= _MOST_YIELD_STRAIN:
         guess = "GPa" if strain > _MOST_YIELD_STRAIN else "Pa"
