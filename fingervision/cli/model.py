@@ -37,6 +37,7 @@ Examples:
               help="Hinge compliance: beam theory corrected by finite elements, or beam theory alone.")  # fmt: skip
 @click.option("--large-rotation", is_flag=True, help="Equilibrium in the deformed shape (not for stiffness_matrix).")
 @click.option("--contact", is_flag=True, help="Fingers touch and stop (not for stiffness_matrix).")
+@click.option("--modes", type=click.IntRange(1, 40), help="How many natural modes of each family to write and draw.")
 @click.option("--mesh", is_flag=True, help="Draw the mesh of the finite elements to mesh.png.")
 @click.option("--vary", multiple=True, metavar="NAME=A:B:N", help="Table over one number of the drawing, N values from "
               "A to B; several make a grid. Writes vary.csv and vary.png, by the lumped model.")  # fmt: skip
@@ -49,6 +50,7 @@ def command(
     hinge: str,
     large_rotation: bool,
     contact: bool,
+    modes: int | None,
     mesh: bool,
     vary: tuple[str, ...],
     as_json: bool,
@@ -119,6 +121,10 @@ def command(
     _draw(gripper_toml.stem, gripper, inputs, models, answers, out, mesh=mesh)
     write_table(rows, out / "models.csv")
     print_table(rows, as_json=as_json)
+    if modes is not None:
+        from fingervision.cli._model_modes import write_modes
+
+        write_modes(models, modes, gripper_toml.stem, out, as_json=as_json)
     for sentence in disagreements(figures):
         click.echo(f"Warning: {sentence}", err=True)
     say_what_limits(gripper, models, figures, inputs, physics, as_json=as_json)

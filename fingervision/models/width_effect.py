@@ -19,7 +19,8 @@ Array = NDArray[np.float64]
 
 SHARE_UNCERTAINTY = 0.05
 """Of w, standard. Bending is within 0.42 % of bricks between elastic blocks for width over thickness 1 to 20 and t / R
-0.0125 to 0.5 (`tests/benchmarks/models_width.py`), which is 0.04 of w at nu = 0.34. Of the force it is 0.05 nu^2, 0.6 %."""
+0.0125 to 0.5 (`tests/benchmarks/models_width.py`), which is 0.04 of w at nu = 0.34. Of the force it is 0.05 nu^2,
+0.6 %."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -167,3 +167,16 @@ def test_what_cannot_be_swept_is_refused(tmp_path: Path, text: str, sentence: st
     with pytest.raises(FingervisionError, match=sentence):
         run(GRIPPER, "--vary", text, "--out", tmp_path)
     assert not (tmp_path / "vary.csv").exists()
+
+
+def test_modes_are_written_and_drawn(tmp_path: Path) -> None:
+    given = drive(tmp_path / "drive.csv", [0.0, 1.0])
+    run(GRIPPER, "--modes", "2", "--drive", given, "--out", tmp_path)
+    with (tmp_path / "modes.csv").open() as file:
+        rows = list(csv.DictReader(file))
+    assert len(rows) == 2 * 3 * 2
+    found = {(row["kind"], row["family"], row["number"]): float(row["frequency_hz"]) for row in rows}
+    # Plane stress has 44.6 and 357.9 Hz; the width of the hinges adds half its 2.6 % of force to the first.
+    assert found["finite_element", "drive free", "1"] == pytest.approx(44.6 * 1.013, rel=0.005)
+    assert found["finite_element", "drive held", "1"] == pytest.approx(357.9, rel=0.01)
+    assert (tmp_path / "modes.png").read_bytes().startswith(b"\x89PNG")
