@@ -12,11 +12,11 @@ import av
 from fingervision.domain.errors import FingervisionError, UsageError
 from fingervision.domain.frame import Coding, Frame, LostFrame
 from fingervision.domain.status import Status
-from fingervision.frames.damage import DamageTrail
+from fingervision.frames.damage import DamageTrail, Picture
 from fingervision.frames.luma import luma
 from fingervision.frames.received import OwnPacket, Received
 from fingervision.frames.source import Description, Wish
-from fingervision.frames.video_file import SPOKEN_DAMAGE, STRICT
+from fingervision.frames.spoken_damage import STRICT, Heard, listening
 
 STARTS = ("rtsp://", "http://", "https://")
 # A camera that answers no sooner is not there; one that has been silent for so long is cut off.
@@ -91,6 +91,7 @@ class NetworkStream:
         self._stream = self._container.streams.video[0]
         codec = self._stream.codec_context
         codec.options = STRICT
+        DamageTrail.prepare(codec)
         codec.thread_count = 1  # threads of frames would each keep one back
         if codec.width < 1 or codec.height < 1:
             self._container.close()
@@ -122,21 +123,20 @@ class NetworkStream:
         numbers, trail = count(), DamageTrail()
         last_s: float | None = None
         waiting: list[OwnPacket] = []
-        level = av.logging.get_level()
-        av.logging.set_level(av.logging.ERROR)
         try:
-            with av.logging.Capture(local=False) as log:
+            with listening(self._stream.codec_context.name) as heard:
                 for packet, arrived_s in self._packets():
                     waiting.append(self._own(packet, arrived_s))
+                    if said := heard.of_file():
+                        trail.hole(f"Data of the stream were lost ({said}).")
                     trail.enters(packet)
-                    for tick, found in self._decoded(packet, trail, log):
+                    for tick, found in self._decoded(packet, trail, heard):
                         time_s = self._time_s(tick, arrived_s)
                         item = self._item(next(numbers), time_s, found, last_s)
                         last_s = time_s
                         yield Received(item, arrived_s, tuple(waiting))
                         waiting.clear()
         finally:
-            av.logging.set_level(level)
             self._container.close()
 
     def close(self) -> None:
@@ -158,10 +158,7 @@ class NetworkStream:
     def _cut(self, why: str) -> str:
         return f"The stream {self.name} is cut off ({why})."
 
-    def _decoded(
-        self, packet: "av.Packet[av.VideoStream]", trail: DamageTrail, log: list[tuple[int, str, str]]
-    ) -> Iterator[tuple[int | None, av.VideoFrame | str]]:
-        log.clear()
+    def _decoded(self, packet: "av.Packet[av.VideoStream]", trail: DamageTrail, heard: Heard) -> Iterator[Picture]:
         try:
             pictures = packet.decode()
         except av.FFmpegError as error:
@@ -169,12 +166,10 @@ class NetworkStream:
             if self.description.coding is not Coding.INTERFRAME:
                 yield packet.pts, f"It could not be decoded ({error.strerror})."
             return
-        codec = self._stream.codec_context.name
-        said = [
-            words for _, speaker, words in log if speaker == codec and words.startswith(SPOKEN_DAMAGE.get(codec, ()))
-        ]
+        finally:
+            said = heard.of_picture()
         if said:
-            trail.breaks(f"It arrived damaged ({said[0].strip()}).")
+            trail.breaks(f"It arrived damaged ({said}).")
         for picture in pictures:
             yield from trail.leaves(picture)
 
