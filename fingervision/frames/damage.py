@@ -45,6 +45,15 @@ class DamageTrail:
         """Note that the packet that went in last could not be decoded, or not be found whole."""
         self._broken.setdefault(self._last, why)
 
+    def fails(self, why: str) -> Iterator[Picture]:
+        """Note that the packet that went in last, a picture by itself, gives none; its place is taken now."""
+        self.breaks(why)
+        own = [entry for entry in self._entered if entry[1] == self._last]
+        for entry in own:
+            self._entered.remove(entry)
+            heapq.heapify(self._entered)
+        yield own[0][0] if own else None, why
+
     def hole(self, why: str) -> None:
         """Note that something is missing between the packet that went in last, whose end may be hurt, and the next."""
         self.breaks(why)

@@ -10,7 +10,7 @@ from fingervision.frames.avi_places import AviPlaces
 from fingervision.frames.cut_off import cut_off
 from fingervision.frames.damage import DamageTrail, Picture
 from fingervision.frames.spoken_damage import Heard, listening
-from fingervision.frames.told_times import EvenRow
+from fingervision.frames.transport_stream import TransportLosses
 
 MISSING = "Bytes are damaged or missing in the file"
 
@@ -31,22 +31,18 @@ def pictures(container: av.container.InputContainer, stream: av.VideoStream, pat
         Pictures with their ticks in order of presentation, or what happened instead of one.
     """
     trail = DamageTrail()
-    packets, last_end_s, was_corrupt = 0, None, False
-    row = EvenRow() if container.format.name == "mpegts" else None
+    packets, last_end_s = 0, None
+    losses = TransportLosses(container.format.name)
     with listening(stream.codec_context.name) as heard:
         for read in _read(container, stream, path, heard):
             packet = read.packet
             yield from _before(read, trail)
             if packet.size:
                 packets += 1
-                if row is not None and packet.dts is not None and row.leaps(packet.dts):
-                    trail.hole("Frames are missing in the file before it.")
-                    yield None, "Frames are missing in the file here: the times leave an even row."
+                if leap := losses.before(packet, trail):
+                    yield None, leap
                 trail.enters(packet)
-                if row is not None and (packet.pts is None or was_corrupt):
-                    # Pictures are cut out of the stream after its damage was marked: the mark may be one too early.
-                    trail.breaks("It is incomplete in the file.")
-                was_corrupt = packet.is_corrupt
+                losses.behind(packet, trail)
                 if packet.pts is not None and packet.time_base is not None:
                     last_end_s = max(last_end_s or 0.0, float((packet.pts + (packet.duration or 0)) * packet.time_base))
             if read.hole:

@@ -1,5 +1,6 @@
 """Network cameras: rtsp:// and http:// streams through PyAV, with the camera's own packets kept."""
 
+import io
 import re
 from collections.abc import Iterator
 from itertools import count
@@ -17,6 +18,7 @@ from fingervision.frames.luma import luma
 from fingervision.frames.received import OwnPacket, Received
 from fingervision.frames.source import Description, Wish
 from fingervision.frames.spoken_damage import STRICT, Heard, listening
+from fingervision.frames.transport_stream import TransportLosses
 
 STARTS = ("rtsp://", "http://", "https://")
 # A camera that answers no sooner is not there; one that has been silent for so long is cut off.
@@ -27,6 +29,8 @@ OPTIONS = {"rtsp_transport": "tcp", "fflags": "nobuffer", "flags": "low_delay", 
 INTRAFRAME_CODECS = frozenset({"mjpeg", "png"})
 # In these formats pictures follow one another without times.
 WITHOUT_TIMES = frozenset({"mpjpeg", "mjpeg", "jpeg_pipe", "image2pipe", "h264", "hevc"})
+# What FFmpeg warns of when a network lost something: sequence numbers that are missing, a picture without its end.
+LOST_ON_THE_WAY = ("RTP: missed", "max delay reached", "Packet corrupt", "Continuity check failed")
 LOSSLESS_CODECS = frozenset({"png", "rawvideo", "ffv1"})
 
 
@@ -87,8 +91,10 @@ class NetworkStream:
         if not self._container.streams.video or self._container.streams.video[0].codec_context is None:
             self._container.close()
             raise FingervisionError(f"The stream {self.name} must hold a video that can be decoded, but has none.")
-        self.template: av.VideoStream | None = self._container.streams.video[0]
         self._stream = self._container.streams.video[0]
+        # How the stream is coded, in a container of our own: a recording may begin after the camera's is closed.
+        self._kept = av.open(io.BytesIO(), "w", format="matroska")
+        self.template: av.VideoStream | None = self._kept.add_stream_from_template(self._stream)
         codec = self._stream.codec_context
         codec.options = STRICT
         DamageTrail.prepare(codec)
@@ -121,15 +127,18 @@ class NetworkStream:
     def received(self) -> Iterator[Received]:
         """Frames with the packets that they came in."""
         numbers, trail = count(), DamageTrail()
+        losses = TransportLosses(self._container.format.name)
         last_s: float | None = None
         waiting: list[OwnPacket] = []
         try:
-            with listening(self._stream.codec_context.name) as heard:
+            with listening(self._stream.codec_context.name, LOST_ON_THE_WAY) as heard:
                 for packet, arrived_s in self._packets():
                     waiting.append(self._own(packet, arrived_s))
                     if said := heard.of_file():
                         trail.hole(f"Data of the stream were lost ({said}).")
+                    losses.before(packet, trail)
                     trail.enters(packet)
+                    losses.behind(packet, trail)
                     for tick, found in self._decoded(packet, trail, heard):
                         time_s = self._time_s(tick, arrived_s)
                         item = self._item(next(numbers), time_s, found, last_s)
@@ -162,9 +171,11 @@ class NetworkStream:
         try:
             pictures = packet.decode()
         except av.FFmpegError as error:
-            trail.breaks(f"It could not be decoded ({error.strerror}).")
-            if self.description.coding is not Coding.INTERFRAME:
-                yield packet.pts, f"It could not be decoded ({error.strerror})."
+            why = f"It could not be decoded ({error.strerror})."
+            if self.description.coding is Coding.INTERFRAME:
+                trail.breaks(why)
+            else:
+                yield from trail.fails(why)
             return
         finally:
             said = heard.of_picture()

@@ -25,33 +25,43 @@ class Heard:
     ----------
     decoder : str
         Name of the decoder; who else speaks is the container.
+    warnings : tuple of str
+        Beginnings of the container's warnings that speak of damage too.
     """
 
     decoder: str
+    warnings: tuple[str, ...] = ()
     log: list[tuple[int, str, str]] = field(default_factory=list)
 
     def of_picture(self) -> str:
         """Take what the decoder said, its first sentence; empty where it said nothing."""
-        said = [words.strip() for _, speaker, words in self.log if speaker == self.decoder]
+        said = [
+            words.strip() for level, speaker, words in self.log if speaker == self.decoder and level <= av.logging.ERROR
+        ]
         said = [words for words in said if words and not words.startswith(HARMLESS)]
         self.log.clear()
         return said[0].rstrip(".") if said else ""
 
     def of_file(self) -> str:
         """Take what the container said and leave what the decoder said."""
-        said = [words.strip() for _, speaker, words in self.log if speaker not in (self.decoder, *HELPERS)]
+        said = [
+            words.strip()
+            for level, speaker, words in self.log
+            if speaker not in (self.decoder, *HELPERS)
+            and (level <= av.logging.ERROR or words.startswith(self.warnings))
+        ]
         self.log[:] = [entry for entry in self.log if entry[1] == self.decoder]
         return said[0].rstrip(".") if said else ""
 
 
 @contextmanager
-def listening(decoder: str) -> Iterator[Heard]:
+def listening(decoder: str, warnings: tuple[str, ...] = ()) -> Iterator[Heard]:
     """Listen to what FFmpeg says of errors, and keep it off the user's screen."""
     before = av.logging.get_level()
-    av.logging.set_level(av.logging.ERROR)
+    av.logging.set_level(av.logging.WARNING if warnings else av.logging.ERROR)
     try:
         # Slices are decoded by threads of FFmpeg's own, so not this thread alone.
         with av.logging.Capture(local=False) as log:
-            yield Heard(decoder, log)
+            yield Heard(decoder, warnings, log)
     finally:
         av.logging.set_level(before)

@@ -1,6 +1,6 @@
 """A recording goes in; the gap over time, its summary and its figure come out."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import ExitStack, closing
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -18,6 +18,7 @@ from fingervision.frames.ahead import decoded_ahead
 from fingervision.frames.source import Description, FrameSource
 from fingervision.measuring.asked_to_stop import asked_to_stop
 from fingervision.measuring.gap_figure import draw_gap
+from fingervision.measuring.marked import marked
 from fingervision.measuring.other_camera import other_camera
 from fingervision.measuring.output_folder import OutputFolder, claimed
 from fingervision.measuring.overlay_video import OverlayVideo
@@ -27,6 +28,7 @@ from fingervision.measuring.series import GapSeries
 from fingervision.measuring.step_pictures import write_steps
 from fingervision.measuring.summary import summarise
 from fingervision.storage.gaps_csv import GapsCsv
+from fingervision.storage.lost_frames import lost_frames
 from fingervision.storage.recorded_camera import recorded_camera
 from fingervision.storage.summary_json import write_summary
 from fingervision.vision.pipeline import Settings, measure_frame
@@ -156,6 +158,7 @@ def measure(source: FrameSource, task: Task, out: Path, on_progress: Progress | 
         description = replace(description, notes=(words, *description.notes))
     folder = claimed(out, description.files)
     frame_size_px = (description.width_px, description.height_px)
+    marks = lost_frames(description.files)
     row_maker = RowMaker(task.scale, frame_size_px, task.drive, task.drive_offset_s)
     series = GapSeries()
     stopped = False
@@ -176,7 +179,7 @@ def measure(source: FrameSource, task: Task, out: Path, on_progress: Progress | 
         stack.callback(hand_over)
         handed_over_at = monotonic()
         try:
-            for item, outcome in _outcomes(source, task):
+            for item, outcome in _outcomes(marked(source, marks) if marks else source, task):
                 result = Result(item.index, item.time_s, outcome)
                 pending.append(result)
                 if video is not None and isinstance(item, Frame):
@@ -207,7 +210,7 @@ def measure(source: FrameSource, task: Task, out: Path, on_progress: Progress | 
 
 
 def _outcomes(
-    source: FrameSource, task: Task
+    source: Iterable[Frame | LostFrame], task: Task
 ) -> Iterator[tuple[Frame | LostFrame, GapMeasurement | NoGap | LostFrame]]:
     """Every frame with what it says; the decoder runs ahead and is stopped when this is."""
     with closing(decoded_ahead(source)) as frames:
