@@ -158,13 +158,23 @@ class Page:
         try:
             await page.accept()
             acknowledged = asyncio.Event()
-            sending = asyncio.create_task(self._send(page, acknowledged))
+            tasks = [asyncio.create_task(self._send(page, acknowledged))]
+            tasks.append(asyncio.create_task(self._receive(page, acknowledged)))
             try:
-                await self._receive(page, acknowledged)
+                # When either ends, however it ends, the page is let go, and connects anew if it is still there.
+                done, _ = await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
             finally:
-                sending.cancel()
-                with contextlib.suppress(asyncio.CancelledError, WebSocketDisconnect, RuntimeError):
-                    await sending
+                for task in tasks:
+                    task.cancel()
+                await asyncio.gather(*tasks, return_exceptions=True)
+            failed = next((error for task in done if (error := task.exception()) is not None), None)
+            if failed is not None and not isinstance(failed, WebSocketDisconnect):
+                silent = isinstance(failed, TimeoutError)
+                why = "The page did not answer." if silent else f"Sending failed ({type(failed).__name__})."
+                if not silent:
+                    self._session.say("page", f"{why} The page connects again.")
+                with contextlib.suppress(RuntimeError, WebSocketDisconnect):
+                    await page.close(TRY_AGAIN_LATER, why)
         finally:
             self._pages -= 1
 
