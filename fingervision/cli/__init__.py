@@ -2,7 +2,9 @@
 
 import importlib
 import pkgutil
+import signal
 import sys
+from contextlib import suppress
 
 import click
 
@@ -37,6 +39,9 @@ def cli() -> None:
 
 def main() -> None:
     """Run the command line; a foreseen error is one sentence and an exit code, never a traceback."""
+    # Who is asked to terminate (by a scheduler, at shut-down) ends as with Ctrl-C: in order, and with a sentence.
+    with suppress(ValueError):  # not in a thread
+        signal.signal(signal.SIGTERM, signal.default_int_handler)
     try:
         cli(standalone_mode=True)
     except FingervisionError as error:

@@ -31,7 +31,7 @@ def pictures(container: av.container.InputContainer, stream: av.VideoStream, pat
         Pictures with their ticks in order of presentation, or what happened instead of one.
     """
     trail = DamageTrail()
-    packets, last_end_s = 0, None
+    packets, last_end_s, at_end = 0, None, ""
     losses = TransportLosses(container.format.name)
     with listening(stream.codec_context.name) as heard:
         for read in _read(container, stream, path, heard):
@@ -45,6 +45,7 @@ def pictures(container: av.container.InputContainer, stream: av.VideoStream, pat
                 losses.behind(packet, trail)
                 if packet.pts is not None and packet.time_base is not None:
                     last_end_s = max(last_end_s or 0.0, float((packet.pts + (packet.duration or 0)) * packet.time_base))
+            at_end = at_end or read.at_end
             if read.hole:
                 trail.breaks(f"{MISSING} behind it ({read.hole}).")
             yield from _decoded(packet, trail, heard)
@@ -57,8 +58,8 @@ def pictures(container: av.container.InputContainer, stream: av.VideoStream, pat
                 return
     yield from trail.rest()
     missing = cut_off(container, stream, packets, last_end_s)
-    if missing:
-        yield None, missing
+    if missing or at_end:
+        yield None, missing or f"{MISSING} at its end ({at_end})."
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -79,6 +80,8 @@ class _Read:
         What is wrong between it and the next one; empty where nothing is.
     end : str
         Why there is no next one, where that is damage.
+    at_end : str
+        What the container said when there was none: that the file is cut off, mostly.
     """
 
     packet: "av.Packet[av.VideoStream]"
@@ -87,6 +90,7 @@ class _Read:
     is_placed: bool
     hole: str = ""
     end: str = ""
+    at_end: str = ""
 
 
 def _read(container: av.container.InputContainer, stream: av.VideoStream, path: Path, heard: Heard) -> Iterator[_Read]:
@@ -116,7 +120,8 @@ def _read(container: av.container.InputContainer, stream: av.VideoStream, path: 
             else:
                 packet.pts, packet.dts = None if packet.pts is None else packet.pts + number - packet.dts, number
         if before is not None:
-            yield replace(before, hole=hole, end=end)
+            is_last = (packet is None or not packet.size) and not end
+            yield replace(before, hole="" if is_last else hole, end=end, at_end=hole if is_last else "")
         if packet is None:
             return
         before = _Read(packet, missing, loses_count, places is not None)

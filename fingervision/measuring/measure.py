@@ -1,7 +1,7 @@
 """A recording goes in; the gap over time, its summary and its figure come out."""
 
 from collections.abc import Callable, Iterable, Iterator
-from contextlib import ExitStack, closing
+from contextlib import ExitStack, closing, contextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from time import monotonic
@@ -27,8 +27,10 @@ from fingervision.measuring.scale import Scale
 from fingervision.measuring.series import GapSeries
 from fingervision.measuring.step_pictures import write_steps
 from fingervision.measuring.summary import summarise
+from fingervision.storage.folder_lock import FolderLock
 from fingervision.storage.gaps_csv import GapsCsv
 from fingervision.storage.lost_frames import lost_frames
+from fingervision.storage.out_folder import make_out_folder
 from fingervision.storage.recorded_camera import recorded_camera
 from fingervision.storage.summary_json import write_summary
 from fingervision.vision.pipeline import Settings, measure_frame
@@ -152,8 +154,13 @@ def measure(source: FrameSource, task: Task, out: Path, on_progress: Progress | 
     FingervisionError
         The results cannot be written, or the scale is for other frames. The rows until then are in gaps.csv.
     """
+    _check(task, source.description)
+    with _held(out):
+        return _measured(source, task, out, on_progress)
+
+
+def _measured(source: FrameSource, task: Task, out: Path, on_progress: Progress | None) -> Measured:
     description = source.description
-    _check(task, description)
     if words := other_camera(task.scale, recorded_camera(description.files)):
         description = replace(description, notes=(words, *description.notes))
     folder = claimed(out, description.files)
@@ -207,6 +214,17 @@ def measure(source: FrameSource, task: Task, out: Path, on_progress: Progress | 
             f"but is {task.steps_frame}; the gaps are in {folder.gaps}."
         )
     return Measured(folder, series, summary, stopped)
+
+
+@contextmanager
+def _held(out: Path) -> Iterator[None]:
+    """Keep other measurements out of the folder meanwhile: each would replace what the other wrote."""
+    make_out_folder(out)
+    lock = FolderLock(out)
+    try:
+        yield
+    finally:
+        lock.remove()
 
 
 def _outcomes(
