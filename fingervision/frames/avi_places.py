@@ -9,6 +9,7 @@ it does not say, frames are counted as long as one chunk follows another without
 Source: Microsoft, AVI RIFF File Reference (chunks, LIST, idx1).
 """
 
+import re
 import struct
 from pathlib import Path
 from typing import BinaryIO
@@ -23,6 +24,7 @@ CHUNKS_BETWEEN = 64
 HEADER_BYTES = 8
 ENTRY = np.dtype([("id", "S4"), ("flags", "<u4"), ("offset", "<u4"), ("size", "<u4")])
 KINDS = (b"dc", b"db")
+KNOWN_CHUNK = re.compile(rb"\d\d(dc|db|wb|tx|pc|iv)|ix\d\d|rec ")
 
 
 class AviPlaces:
@@ -130,6 +132,10 @@ def _index(file: BinaryIO, tag: bytes, begin: int) -> tuple[NDArray[np.int64], N
     stated = int.from_bytes(tail[at + 4 : at + 8], "little")
     count = min(stated, len(tail) - at - 8) // ENTRY.itemsize
     entries = np.frombuffer(tail, ENTRY, count, at + 8)
+    if not all(map(KNOWN_CHUNK.fullmatch, entries["id"].tolist())) or np.any(
+        np.diff(entries["offset"].astype(int)) <= 0
+    ):
+        return nothing, nothing  # a damaged index would tell wrong numbers
     chosen = entries[np.isin(entries["id"], [tag + kind for kind in KINDS])]
     offsets = chosen["offset"].astype(np.int64)
     # Offsets count from the word `movi`; some programs count from the beginning of the file.

@@ -20,6 +20,10 @@ from fingervision.frames.source import Description, Wish
 from fingervision.frames.spoken_damage import STRICT, Heard, listening
 from fingervision.frames.transport_stream import TransportLosses
 
+# Names that cameras give to what nobody else shall know: password, pwd, token, key, auth, user, loginpas and the like.
+SECRET_PARAMETERS = re.compile(
+    r"([?&;][^=&;#]*(?:pass|pwd|psw|pw|token|key|secret|auth|user|usr|login)[^=&;#]*=)[^&;#]*", re.I
+)
 STARTS = ("rtsp://", "http://", "https://")
 # A camera that answers no sooner is not there; one that has been silent for so long is cut off.
 OPEN_TIMEOUT_S, READ_TIMEOUT_S = 5.0, 2.0
@@ -41,7 +45,9 @@ def accepts(name: str) -> bool:
 
 def without_password(name: str) -> str:
     """Give the address as it may be shown and kept: a camera's password belongs in neither page nor run."""
-    return re.sub(r"^(\w+://[^/@:]*):[^/@]*@", r"\1:***@", name)
+    # A password may hold `/` and `@`: what stands before the last @ is who asks, not where.
+    shown = re.sub(r"^(\w+://[^/@:?#]*):.*@", r"\1:***@", name)
+    return SECRET_PARAMETERS.sub(r"\1***", shown)
 
 
 def open_frames(name: str, wish: Wish) -> "NetworkStream":

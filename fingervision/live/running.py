@@ -14,6 +14,7 @@ from typing import TextIO
 from fingervision.domain.errors import ExitCode, FingervisionError
 from fingervision.live.capture import Capture
 from fingervision.live.choices import Choices
+from fingervision.live.guard import LOOPBACK_NAMES
 from fingervision.live.outlet import Outlet
 from fingervision.live.server import Page, bound
 from fingervision.live.session import Session
@@ -60,6 +61,12 @@ def run(capture: Capture, choices: Choices, out: Path, showing: Showing) -> None
     except FingervisionError:
         capture.source.close()
         raise
+    if page is not None and showing.host not in LOOPBACK_NAMES:
+        session.say(
+            "network",
+            "The page is served beyond this machine, over plain HTTP: who can listen to the network "
+            "can read it and its token. Use it on a bench's own network alone, or through an SSH tunnel.",
+        )
     out_there, said = Outlet(sys.stdout), Outlet(sys.stderr)
     on_terminal = is_terminal(sys.stderr)
     session.on_message.append(lambda message: told(message, said, in_place=on_terminal))
@@ -106,7 +113,8 @@ def run(capture: Capture, choices: Choices, out: Path, showing: Showing) -> None
 def _announce(page: Page, outlet: Outlet) -> None:
     outlet.put(f"The live view is at {page.address}  (Ctrl-C ends it)\n")
     if is_terminal(sys.stdout):
-        webbrowser.open(page.address)
+        # Everybody on this machine sees what stands on a command line: the browser gets a file of this user's alone.
+        webbrowser.open(page.door().as_uri())
 
 
 def is_terminal(stream: TextIO | None) -> bool:

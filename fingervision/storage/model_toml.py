@@ -1,5 +1,6 @@
 """model.toml, a corrected model; and the choice of reader for every kind of model file."""
 
+import json
 import os
 import tomllib
 from collections.abc import Mapping
@@ -15,9 +16,21 @@ from fingervision.models.physical_gripper import PhysicalGripper
 from fingervision.storage.gripper_toml import read_gripper
 from fingervision.storage.simulation_table import read_simulation_table
 
+# A fit that ends at a bound may be beyond it by rounding.
+BOUND_SLACK = 1e-6
 
-def read_model(path: Path, kind: str = "lumped") -> CorrectedModel:
+
+def read_model(path: Path, kind: str = "lumped", inside: tuple[Path, ...] = ()) -> CorrectedModel:
     """Read a simulation table or a gripper (without effects), or a corrected model.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    kind : str
+        Kind of model that a gripper becomes.
+    inside : tuple of Path
+        Corrected models that this one is the base of.
 
     Raises
     ------
@@ -28,22 +41,29 @@ def read_model(path: Path, kind: str = "lumped") -> CorrectedModel:
         table = read_simulation_table(path)
         return CorrectedModel(table.name, table, str(path), table.input_range_mm, {})
     try:
-        document = tomllib.loads(path.read_text(encoding="utf-8"))
+        document = tomllib.loads(path.read_text(encoding="utf-8-sig"))
     except FileNotFoundError:
         raise FingervisionError(f"There is no model {path}.") from None
     except (tomllib.TOMLDecodeError, UnicodeDecodeError, OSError) as error:
         raise FingervisionError(f"{path} must be a TOML file, but could not be read: {error}.") from error
     if "base" not in document:
         return _gripper(path, kind)
-    base = read_model(path.parent / str(document["base"]), str(document.get("kind", kind)))
+    place = path.resolve()
+    if place in inside:
+        raise FingervisionError(f"The base of {path} must be another model, but leads back to itself: mend `base`.")
+    kind = str(document.get("kind", kind))
+    base = read_model(path.parent / str(document["base"]), kind, (*inside, place))
     effects: dict[str, Mapping[str, Estimate]] = dict(base.effects)
-    for entry in document.get("effect", []):
+    entries = document.get("effect", [])
+    if not isinstance(entries, list):
+        raise FingervisionError(f"The effects in {path} must be [[effect]] tables, but `effect` is {entries}: mend it.")
+    for entry in entries:
         try:
             effects[str(entry["name"])] = {
                 name: Estimate(float(value["value"]), float(value["u"]) if "u" in value else None)
                 for name, value in entry["parameters"].items()
             }
-        except (KeyError, TypeError, ValueError) as error:
+        except (KeyError, TypeError, ValueError, AttributeError, OverflowError) as error:
             raise FingervisionError(
                 f"An effect in {path} must have a name and parameters like play_mm = {{ value = 0.01, u = 0.001 }}, "
                 f"but is {entry}: mend it."
@@ -66,6 +86,19 @@ def _check(name: str, values: Mapping[str, Estimate], path: Path) -> None:
             f"The effect {name} in {path} must state {', '.join(wanted)}, but {', '.join(missing)} is not there "
             f"(it states {', '.join(values) or 'nothing'}): add it."
         )
+    for parameter in catalogue()[name].parameters:
+        estimate = values[parameter.name]
+        slack = BOUND_SLACK * (parameter.upper - parameter.lower)
+        if not parameter.lower - slack <= estimate.value <= parameter.upper + slack:
+            raise FingervisionError(
+                f"{parameter.name} of the effect {name} in {path} must be {parameter.lower:g} to {parameter.upper:g}, "
+                f"but is {estimate.value:g}: mend it."
+            )
+        if estimate.u is not None and not 0.0 <= estimate.u < float("inf"):
+            raise FingervisionError(
+                f"The u of {parameter.name} of the effect {name} in {path} must be a number from 0, but is "
+                f"{estimate.u:g}: mend it, or leave it out."
+            )
 
 
 def _gripper(path: Path, kind: str) -> CorrectedModel:
@@ -83,7 +116,7 @@ def write_model(
 ) -> None:
     """Write a corrected model; the base is named relative to the file."""
     base = Path(os.path.relpath(base_path.resolve(), path.parent.resolve())).as_posix()
-    lines = ["schema = 1", f'base = "{base}"', *([f'kind = "{kind}"'] if kind else [])]
+    lines = ["schema = 1", f"base = {json.dumps(base, ensure_ascii=False)}", *([f'kind = "{kind}"'] if kind else [])]
     for name, parameters in effects.items():
         lines += ["", "[[effect]]", f'name = "{name}"', "[effect.parameters]"]
         for key, estimate in parameters.items():
