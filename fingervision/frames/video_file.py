@@ -121,7 +121,8 @@ class VideoFile:
 
     def _opened(self) -> av.container.InputContainer:
         try:
-            return av.open(self.name)
+            # FFmpeg takes what stands before a colon for a protocol: 12:30:05.mp4 is a file.
+            return av.open(f"file:{self.name}")
         except (av.FFmpegError, OSError) as error:
             raise FingervisionError(_not_a_video(self.name, error)) from error
 

@@ -154,6 +154,11 @@ def measure(source: FrameSource, task: Task, out: Path, on_progress: Progress | 
     FingervisionError
         The results cannot be written, or the scale is for other frames. The rows until then are in gaps.csv.
     """
+    if hasattr(source, "received"):
+        raise UsageError(
+            f"measure needs a recording, which ends, but {source.description.name} is a camera, which does not: record "
+            f"it with `fingervision live {source.description.name} --no-page --out runs`."
+        )
     _check(task, source.description)
     with _held(out):
         return _measured(source, task, out, on_progress)
@@ -174,12 +179,14 @@ def _measured(source: FrameSource, task: Task, out: Path, on_progress: Progress 
         table = stack.enter_context(GapsCsv(folder.gaps, task.drive_columns))
         video = stack.enter_context(OverlayVideo(folder.overlay, description)) if task.overlay else None
         pending: list[Result] = []
+        driven: set[bool] = set()
 
         def hand_over() -> None:
             results = pending.copy()
             pending.clear()
             rows = row_maker.rows(results)
             series.add(results, rows)
+            driven.update(row.input_mm is not None for row in rows)
             table.add(rows)
 
         # Before the table is closed, whatever ends the loop.
@@ -208,6 +215,11 @@ def _measured(source: FrameSource, task: Task, out: Path, on_progress: Progress 
     draw_gap(folder.figure, series)
     summary = summarise(description, _in_words(task), task.scale, task.scale_file, series, complete=not stopped)
     write_summary(folder.summary, summary)
+    if task.drive is not None and driven == {False} and not stopped:
+        raise FingervisionError(
+            f"No frame lies within the drive's times ({task.drive.time_s[0]:g} to {task.drive.time_s[-1]:g} s, shifted "
+            f"by {task.drive_offset_s:g} s), so no row of {folder.gaps} has an input: give --drive-offset-s."
+        )
     if task.steps_frame is not None and not folder.steps.exists() and not stopped:
         raise UsageError(
             f"--steps must be the number of a frame that can be read, 0 to {series.frames - 1}, "

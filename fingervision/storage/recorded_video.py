@@ -51,7 +51,7 @@ class RecordedVideo:
         self._last_tick = -1
         place = path.with_name(f".{path.name}.part") if keep else path
         try:
-            self._container = av.open(str(place), "w", format="mp4", options=dict(CONTAINER))
+            self._container = av.open(f"file:{place}", "w", format="mp4", options=dict(CONTAINER))
             if keep:
                 self._keep(keep)
                 place.replace(path)
@@ -106,7 +106,7 @@ class RecordedVideo:
             raise self._failed(error) from error
 
     def _keep(self, frames: int) -> None:
-        with av.open(str(self._path)) as old:
+        with av.open(f"file:{self._path}") as old:
             stream = old.streams.video[0]
             self._stream_of(stream.codec_context.width, stream.codec_context.height, str(stream.codec_context.pix_fmt))
             kept = 0
@@ -183,7 +183,7 @@ def frames_in(path: Path) -> int:
     """Count the whole frames of a recording that may have broken off; 0 where there is none."""
     count = 0
     try:
-        with av.open(str(path)) as container:
+        with av.open(f"file:{path}") as container:
             for packet in container.demux(container.streams.video[0]):
                 count += packet.pts is not None and packet.size > 0
     except (av.FFmpegError, OSError, IndexError):
