@@ -100,7 +100,9 @@ class RunFolder:
             raise failure
 
     def _finish(self) -> None:
-        self._about["sha256"] = {VIDEO: self._files.sha256(VIDEO)}
+        # Without a frame there is no video.
+        there = (self.path / VIDEO).exists()
+        self._about["sha256"] = {VIDEO: self._files.sha256(VIDEO)} if there else {}
         self._about["frames"] = self.frames
         self._files.write_about(self._about, complete=True)
 

@@ -11,6 +11,7 @@ from typing import Any
 
 from fingervision.domain.errors import FingervisionError
 from fingervision.domain.gripper import Body, Gripper, Hinge, Lever, Links, Material
+from fingervision.storage.finite import is_number
 
 _SECTIONS: Mapping[str, type] = MappingProxyType(
     {"material": Material, "body": Body, "hinge": Hinge, "lever": Lever, "links": Links}
@@ -41,7 +42,7 @@ def read_gripper(path: Path) -> Gripper:
         raise FingervisionError(f"{path} must be TOML in UTF-8, but is not: {error.reason}.") from error
     try:
         tables = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
+    except (ValueError, RecursionError) as error:  # also numbers of thousands of digits, and tables without end
         raise FingervisionError(f"{path} must be TOML, but is not: {error}.") from error
     return gripper_from_tables(tables, str(path))
 
@@ -105,7 +106,7 @@ def _value(raw: Any, name: str, origin: str, uncertainties: dict[str, float]) ->
 
 
 def _number(raw: Any, name: str, origin: str) -> float:
-    if isinstance(raw, bool) or not isinstance(raw, int | float) or not math.isfinite(raw):
+    if not is_number(raw):
         raise FingervisionError(f"{name} in {origin} must be a finite number, but is {raw!r}.")
     return float(raw)
 

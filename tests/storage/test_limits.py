@@ -1,5 +1,6 @@
 """Sizes and values that no bench has are refused in a sentence, before anything is made of them."""
 
+import re
 import struct
 import zlib
 from pathlib import Path
@@ -9,8 +10,11 @@ import pytest
 from fingervision.domain.errors import FingervisionError
 from fingervision.effects import catalogue
 from fingervision.frames.image_file import PNG_SIGNATURE, UnreadableImageError, read_image
+from fingervision.storage.calibration_json import read_calibration
+from fingervision.storage.gripper_toml import read_gripper
 from fingervision.storage.measured_table import MOST_RUNS, read_measured_table
 from fingervision.storage.model_toml import read_model
+from fingervision.storage.recipe_toml import read_recipe, write_recipe
 
 SIMULATION = "input_mm,gap_mm\n0,1\n1,2\n"
 
@@ -83,3 +87,24 @@ def test_a_picture_that_states_more_pixels_than_any_camera_has_is_never_decoded(
         (tmp_path / name).write_bytes(content)
         with pytest.raises(UnreadableImageError, match="million"):
             read_image(tmp_path / name)
+
+
+@pytest.mark.parametrize("number", ["9" * 400, "9" * 5000, "[" * 3000], ids=["400 digits", "5000 digits", "brackets"])
+def test_a_number_without_end_is_a_sentence_in_every_document(tmp_path: Path, number: str) -> None:
+    top = Path(__file__).parents[2] / "sample_frames"
+    for name, read, key in (
+        ("paper/gripper.toml", read_gripper, re.compile(r"(_mm = )[\d.]+")),
+        ("opening/calibration.json", read_calibration, re.compile(r'("px_per_mm": )[\d.]+')),
+    ):
+        path = tmp_path / Path(name).name
+        path.write_text(key.sub(rf"\g<1>{number}", (top / name).read_text(encoding="utf-8"), count=1), encoding="utf-8")
+        with pytest.raises(FingervisionError):
+            read(path)
+    with pytest.raises(FingervisionError):
+        read_model(model(tmp_path, f"play_mm = {{ value = {number} }}"))
+
+
+def test_a_recipes_name_may_hold_quotes(tmp_path: Path) -> None:
+    step = {"kind": "move", "to_mm": 0.3, "speed_mm_s": 0.5}
+    write_recipe(tmp_path / "recipe.toml", 'two "speeds" \\ one', [step])
+    assert read_recipe(tmp_path / "recipe.toml").name == 'two "speeds" \\ one'
