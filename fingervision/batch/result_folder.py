@@ -44,8 +44,8 @@ class Record:
         Time that it took.
     digest : Digest
         Its line of the table and its small picture.
-    tables : mapping of str to str
-        Hashes of its tables, by file name.
+    tables : mapping of str to (int, int, str)
+        Size, time of change and hash of its tables, by file name.
     """
 
     input: str
@@ -56,7 +56,7 @@ class Record:
     words: str
     seconds: float
     digest: Digest
-    tables: Mapping[str, str] = field(default_factory=dict)
+    tables: Mapping[str, tuple[int, int, str]] = field(default_factory=dict)
 
 
 def read_record(folder: Path) -> Record | None:
@@ -101,8 +101,8 @@ def write_record(folder: Path, place: Path, record: Record) -> None:
     replace_text(folder / RECORD, json.dumps(held, allow_nan=False) + "\n")
 
 
-def hashes_of_tables(folder: Path) -> dict[str, str]:
-    """Hash every table of a result, by file name.
+def states_of_tables(folder: Path) -> dict[str, tuple[int, int, str]]:
+    """Size, time of change (ns) and hash of every table of a result, by file name.
 
     Raises
     ------
@@ -112,18 +112,26 @@ def hashes_of_tables(folder: Path) -> dict[str, str]:
     found = {}
     for path in sorted(folder.iterdir()):
         if path.suffix in TABLES and path.name != RECORD and path.is_file():
-            with path.open("rb") as file:
-                found[path.name] = hashlib.file_digest(file, "sha256").hexdigest()
+            stat = path.stat()
+            found[path.name] = (stat.st_size, stat.st_mtime_ns, _hash(path))
     return found
 
 
 def is_whole(folder: Path, record: Record) -> bool:
-    """Whether a result's tables are there as they were written."""
+    """Whether a result's tables are there as they were written; read only where their time of change is another."""
     try:
-        there = hashes_of_tables(folder)
-    except OSError:
+        for name, (size, changed_ns, content) in record.tables.items():
+            stat = (folder / name).stat()
+            if stat.st_size != size or (stat.st_mtime_ns != changed_ns and _hash(folder / name) != content):
+                return False
+    except (OSError, ValueError):
         return False
-    return all(there.get(name) == found for name, found in record.tables.items())
+    return True
+
+
+def _hash(path: Path) -> str:
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
 
 
 def replace_text(path: Path, text: str) -> None:

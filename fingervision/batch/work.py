@@ -11,11 +11,11 @@ from fingervision.batch.fingerprint import content_hash, is_settled, stamp_of
 from fingervision.batch.reduction import reduction_of
 from fingervision.batch.result_folder import (
     Record,
-    hashes_of_tables,
     is_whole,
     new_part,
     publish,
     read_record,
+    states_of_tables,
     write_record,
 )
 from fingervision.batch.task import Outcome, Perform, Task, failure
@@ -89,7 +89,7 @@ def _brought(task: Task, perform: Perform, part: Path, started: float) -> Outcom
         words=words,
         seconds=seconds,
         digest=digest,
-        tables=hashes_of_tables(part),
+        tables=states_of_tables(part),
     )
     write_record(part, task.folder, record)
     publish(part, task.folder, record)
