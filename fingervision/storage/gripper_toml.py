@@ -13,6 +13,7 @@ from fingervision.domain.errors import FingervisionError
 from fingervision.domain.gripper import Body, Gripper, Hinge, Lever, Links, Material
 from fingervision.models.gripper_outline import check_outline, check_stated_size
 from fingervision.models.planar_region import crosses_itself
+from fingervision.storage.finite import is_number
 
 _SECTIONS: Mapping[str, type] = MappingProxyType(
     {"material": Material, "body": Body, "hinge": Hinge, "lever": Lever, "links": Links}
@@ -52,7 +53,7 @@ def read_gripper(path: Path) -> Gripper:
         raise FingervisionError(f"{path} must be TOML in UTF-8, but is not: {error.reason}.") from error
     try:
         tables = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
+    except (ValueError, RecursionError) as error:  # also numbers of thousands of digits, and tables without end
         raise FingervisionError(f"{path} must be TOML, but is not: {error}.") from error
     return gripper_from_tables(tables, str(path))
 
@@ -125,7 +126,7 @@ def _value(raw: Any, name: str, origin: str, uncertainties: dict[str, float]) ->
 
 
 def _number(raw: Any, name: str, origin: str) -> float:
-    if isinstance(raw, bool) or not isinstance(raw, int | float) or (isinstance(raw, float) and not math.isfinite(raw)):
+    if not is_number(raw):
         raise FingervisionError(f"{name} in {origin} must be a finite number, but is {raw!r}.")
     try:
         value = float(raw)

@@ -13,6 +13,9 @@ from fingervision.storage.reference_slots import slots_beside
 
 FEWEST_ROWS = 5
 PATH = ("input_mm", "time_s")
+# Each run has constants of its own in the fit, whose matrices grow with rows times runs: 1000 runs of 20 000 rows are
+# 160 MB, and no bench records more in a day.
+MOST_RUNS = 1000
 NUMBERS = ("input_mm", "gap_mm", "time_s", "left_mm", "right_mm", "u_gap_mm", "u_random_mm", "force_n")
 
 
@@ -56,6 +59,12 @@ def read_measured_table(path: Path) -> MeasuredTable:
         if all(values[name][row] is not None for row in kept)
     }
     names = [cells["run"][row] for row in kept] if "run" in cells else [""] * len(kept)
+    count = len(set(names))
+    if count > MOST_RUNS:
+        raise FingervisionError(
+            f"{path} must have at most {MOST_RUNS} runs, but has {count} in {len(kept)} rows: does the run column "
+            "number the rows? Leave it out, or give fewer runs at once."
+        )
     time = column.get("time_s")
     if time is not None and "run" not in cells and np.any(np.diff(time) < 0.0):
         notes.append("times run backwards and there is no run column: rows were sorted by time as one run.")
@@ -141,7 +150,9 @@ def _runs(
 ) -> tuple[NDArray[np.intp], tuple[slice, ...], tuple[str, ...]]:
     """Order of the rows, runs by their first time (or smallest input), so that no name decides anything."""
     key = inputs if time is None else time
-    groups = {name: [row for row in range(len(names)) if names[row] == name] for name in dict.fromkeys(names)}
+    groups: dict[str, list[int]] = {}
+    for row, name in enumerate(names):
+        groups.setdefault(name, []).append(row)
     ordered = sorted(groups.items(), key=lambda item: (min(key[item[1]]), float(np.sum(inputs[item[1]]))))
     order: list[int] = []
     runs: list[slice] = []
