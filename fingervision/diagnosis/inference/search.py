@@ -30,6 +30,9 @@ third of it, as RMS."""
 COMPLETE = 0.05
 """Share of what stands beyond the noise, in chi-square, that a complete explanation leaves: forms that only bend to
 what an effect's form leaves over take less of it."""
+FEW_ROWS = 0.1
+"""Share of the rows on which a stop or a contact acts that only the ends of strokes speak for; what acts on more is
+averaged over many roundings."""
 STEPS_HIDDEN = 1.0
 """Steps of the encoder within which an effect is not told from its roundings."""
 BASES = 14
@@ -130,14 +133,16 @@ def _added(problem: Problem, smaller: Explanation, larger: Explanation) -> float
 
 
 def _within_a_step(problem: Problem, explanation: Explanation) -> bool:
-    """Whether an effect moves the gap nowhere by more than an encoder's step does: roundings at an end look so."""
+    """Whether an effect acts on a few rows, by less than an encoder's step: roundings at the end of a stroke look so."""
     history = problem.chain.history
     if history.input_step_mm == 0.0:
         return False
     reach = 0.5 * history.input_step_mm
     low, high = (problem.chain.with_input(history.input_mm + way).stacked({}) for way in (-reach, reach))
     change = problem.chain.stacked(explanation.values) - problem.chain.stacked({})
-    return bool(np.max(np.abs(change)) < STEPS_HIDDEN * float(np.max(np.abs(high - low))))
+    largest = float(np.max(np.abs(change)))
+    few = float(np.mean(np.abs(change) > 0.1 * largest)) < FEW_ROWS
+    return few and largest < STEPS_HIDDEN * float(np.max(np.abs(high - low)))
 
 
 def _completes(state: "_State", smaller: Explanation, larger: Explanation) -> bool:
