@@ -133,7 +133,7 @@ def _added(problem: Problem, smaller: Explanation, larger: Explanation) -> float
 
 
 def _within_a_step(problem: Problem, explanation: Explanation) -> bool:
-    """Whether an effect acts on a few rows, by less than an encoder's step: roundings at the end of a stroke look so."""
+    """Whether an effect acts on a few rows by less than an encoder's step: roundings at the end of a stroke do."""
     history = problem.chain.history
     if history.input_step_mm == 0.0:
         return False
