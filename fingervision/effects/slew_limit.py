@@ -8,12 +8,13 @@ from fingervision.domain.compiled import compiled_as_written
 from fingervision.domain.effect import Array, DriveEffect, History, Stage, Values
 from fingervision.domain.parameter import Parameter
 
-SLOWEST_SHARE = 0.05
-"""Share of the moving samples that are slower than what is called the slowest motion: ends of strokes are slower."""
+SLOWEST_SHARE, FASTEST_SHARE = 0.05, 0.98
+"""Share of the moving samples that are slower than what is called the slowest motion, and than the fastest: the ends of
+strokes are slower, and errors of the recorded input make single samples seem faster."""
 JUMP_RANGE = 0.01
 """Lowest speed that is searched under step commands, over the fastest one that they ask for."""
-APART = 1.2
-"""Fastest over slowest motion above which a limit between them shows."""
+APART = 1.5
+"""Fastest over slowest motion above which a limit between them is told from a record of one speed and its errors."""
 
 
 @compiled_as_written
@@ -55,11 +56,11 @@ def narrow(history: History) -> tuple[Parameter, ...] | str:
     if not steady.size and not jumps.size:
         return "the input never moves between two samples"
     fastest = float(np.max(np.concatenate([steady, jumps])))
-    slowest = float(np.quantile(steady, SLOWEST_SHARE)) if steady.size else JUMP_RANGE * fastest
-    if fastest < APART * slowest:
+    slowest, fast = np.quantile(steady, (SLOWEST_SHARE, FASTEST_SHARE)) if steady.size else (JUMP_RANGE * fastest, 0.0)
+    if max(float(fast), float(np.max(jumps, initial=0.0))) < APART * slowest:
         return f"the input moves at one speed only, about {fastest:.3g} mm/s: a limit below it would follow nothing"
     (speed_limit,) = EFFECT.parameters
-    return (replace(speed_limit, lower=slowest, upper=fastest, neutral=fastest),)
+    return (replace(speed_limit, lower=float(slowest), upper=fastest, neutral=fastest),)
 
 
 EFFECT = DriveEffect(
