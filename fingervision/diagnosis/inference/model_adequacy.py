@@ -1,5 +1,7 @@
 """The gate of *unknown*: structure that the best explanation leaves, found by generic probes."""
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from fingervision.diagnosis.inference.ambiguity_set import choices
@@ -27,7 +29,25 @@ def shapes_of(problem: Problem) -> Probes:
     return probes(history, problem.whitener, 2400 if history.input_mm.size <= LONG else 800)
 
 
-def _gains(problem: Problem, columns: Array, found: Explanation, taken: Array) -> tuple[Array, Array, Array]:
+@dataclass(frozen=True, slots=True, eq=False)
+class _Basis:
+    """Whitened columns, shape (m, k), with their squared lengths and what run offsets share with them."""
+
+    columns: Array
+    squares: Array
+    shared: Array
+
+    @classmethod
+    def of(cls, problem: Problem, columns: Array) -> "_Basis":
+        """Work out once what every look at the columns needs."""
+        return cls(columns, np.einsum("ij,ij->j", columns, columns), problem.offsets.design.T @ columns)
+
+    def beside_offsets(self, metric: Array) -> Array:
+        """Squared lengths once the offsets of a metric are allowed; shape (k,)."""
+        return np.asarray(self.squares - np.einsum("ij,ij->j", self.shared, metric @ self.shared))
+
+
+def _gains(problem: Problem, basis: _Basis, found: Explanation, taken: Array) -> tuple[Array, Array, Array]:
     """Chi-square that each column takes from what an explanation and the columns already taken leave.
 
     Returns
@@ -36,9 +56,9 @@ def _gains(problem: Problem, columns: Array, found: Explanation, taken: Array) -
         `dot / norm` is the column's coefficient; both are zero where nothing new is left of the column.
     """
     offsets, metric = problem.offsets, problem.offsets.metric(found.sigma_mm)
-    moved = columns - offsets.design @ (metric @ (offsets.design.T @ columns))
-    dot = moved.T @ found.residual
-    norm = np.einsum("ij,ij->j", columns, moved)
+    columns = basis.columns
+    dot = columns.T @ (found.residual - offsets.design @ (metric @ (offsets.design.T @ found.residual)))
+    norm = basis.beside_offsets(metric)
     moves = np.hstack([tangents(problem, found), taken]) if found.names else taken
     if moves.shape[1]:
         bent = moves - offsets.design @ (metric @ (offsets.design.T @ moves))
@@ -46,7 +66,7 @@ def _gains(problem: Problem, columns: Array, found: Explanation, taken: Array) -
         inverse = np.linalg.pinv(moves.T @ bent)
         dot = dot - cross.T @ (inverse @ (bent.T @ found.residual))
         norm = norm - np.einsum("ij,ij->j", cross, inverse @ cross)
-    usable = norm > 1e-3 * np.maximum(np.einsum("ij,ij->j", columns, columns), 1e-12)
+    usable = norm > 1e-3 * np.maximum(basis.squares, 1e-12)
     dot, norm = np.where(usable, dot, 0.0), np.where(usable, norm, 0.0)
     return np.where(usable, dot**2 / np.where(usable, norm, 1.0), 0.0), dot, norm
 
@@ -73,8 +93,8 @@ def imitated(problem: Problem, shapes: Probes, found: Explanation, fewer: list[E
     """
     several = len(found.names) > 2
     columns, rows = shapes.columns, int(problem.measured.size)
-    if several:
-        columns = np.where(_is_an_effect_itself(problem, found, columns), 0.0, columns)
+    basis = _Basis.of(problem, columns)
+    barred = _is_an_effect_itself(problem, found, basis) if several else np.zeros(columns.shape[1], dtype=bool)
     each = float(np.log(rows)) + 2.0 * float(np.log(columns.shape[1]))
     ahead = VERY_STRONG if several else -max(VERY_STRONG, problem.form_share**2 * _explained(problem, found))
     least = found.bic(rows) + choices(problem, found) + ahead
@@ -84,7 +104,7 @@ def imitated(problem: Problem, shapes: Probes, found: Explanation, fewer: list[E
         cost = base.bic(rows) + choices(problem, base)
         words: list[str] = []
         for _ in range(STAND_INS):
-            gain = _gains(problem, columns, base, taken)[0]
+            gain = np.where(barred, 0.0, _gains(problem, basis, base, taken)[0])
             top = int(np.argmax(gain))
             taken = np.hstack([taken, columns[:, top : top + 1]])
             words.append(f"{shapes.words[top]} ({np.sqrt(gain[top]):.1f} sigma)")
@@ -94,31 +114,30 @@ def imitated(problem: Problem, shapes: Probes, found: Explanation, fewer: list[E
     return best
 
 
-def _is_an_effect_itself(problem: Problem, found: Explanation, columns: Array) -> Flags:
+def _is_an_effect_itself(problem: Problem, found: Explanation, basis: _Basis) -> Flags:
     """Mark probes that are the very shape that one of the effects has; shape (k,).
 
     Of readings at rest a play is nothing but a difference between the directions: such a probe explains nothing else.
     """
     whole = problem.whitened(found.values)
-    own = np.zeros(columns.shape[1], dtype=bool)
+    metric = problem.offsets.metric(found.sigma_mm)
+    norm = np.maximum(basis.beside_offsets(metric), 1e-12)
+    own = np.zeros(norm.size, dtype=bool)
     for name in found.names:
         others = {other: found.values[other] for other in found.names if other != name}
         shape = whole - problem.whitened(others)
-        metric = problem.offsets.metric(found.sigma_mm)
         moved = shape - problem.offsets.design @ (metric @ (problem.offsets.design.T @ shape))
-        shared = problem.offsets.design.T @ columns
-        norm = np.einsum("ij,ij->j", columns, columns) - np.einsum("ij,ij->j", shared, metric @ shared)
-        own |= (columns.T @ moved) ** 2 > SAME_SHAPE**2 * np.maximum(norm, 1e-12) * float(shape @ moved)
+        own |= (basis.columns.T @ moved) ** 2 > SAME_SHAPE**2 * norm * float(shape @ moved)
     return own
 
 
 def _of_jumps_astray(problem: Problem, columns: Array, best: Explanation, rng: np.random.Generator) -> float:
     """Give the largest gain of a probe where the recorded input's errors alone move the jumps."""
-    most = []
+    most, basis = [], _Basis.of(problem, columns)
     for _ in range(FEWEST):
         shaken, target = noise_alone(problem, best, rng)
         alone = fit(shaken, best.names, best.values, target=target, iterations=MANY_STEPS)
-        gains = _gains(shaken, columns, alone, np.zeros((target.size, 0)))[0]
+        gains = _gains(shaken, basis, alone, np.zeros((target.size, 0)))[0]
         most.append(float(np.max(gains)))
     return rare(most)
 
@@ -128,7 +147,7 @@ def remaining_structure(
 ) -> tuple[str | None, str | None]:
     """Test the largest of many probes; returns what is unknown, or what is left over but small."""
     own = harmonics(problem, best)
-    gain, dot, norm = _gains(problem, shapes.columns, best, own.columns)
+    gain, dot, norm = _gains(problem, _Basis.of(problem, shapes.columns), best, own.columns)
     usable = norm > 0.0
     family = ("probe",) * int(usable.sum())
     threshold = linear_thresholds(problem, family, shapes.columns[:, usable], best.sigma_mm, rng).get("probe", np.inf)
