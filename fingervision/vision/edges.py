@@ -72,6 +72,8 @@ class EdgePoints:
         Half-length of the window along each line.
     marks : (EdgeMark, EdgeMark)
         What each inner flank shows that a blurred step does not; nothing where the window holds both edges.
+    inside : (float, float)
+        Level of each finger beside its inner flank.
     """
 
     lines: ProfileLines
@@ -84,9 +86,10 @@ class EdgePoints:
     is_clipped: NDArray[np.bool_]
     reach_px: int
     marks: tuple[EdgeMark, EdgeMark]
+    inside: tuple[float, float]
 
 
-def fit_edges(upright: GreyImage, lines: ProfileLines) -> EdgePoints:
+def fit_edges(upright: GreyImage, lines: ProfileLines, light: Floats, top_level: int) -> EdgePoints:
     """Sub-pixel position of the edge on every line of two fingers.
 
     Parameters
@@ -95,30 +98,40 @@ def fit_edges(upright: GreyImage, lines: ProfileLines) -> EdgePoints:
         Grey levels, seen with the tips up.
     lines : ProfileLines
         Where to look.
+    light : ndarray of float, shape (levels,)
+        Light of every grey level, on the levels' own scale.
+    top_level : int
+        End of the scale.
 
     Returns
     -------
     EdgePoints
         One point a line.
     """
-    blur = _first_blur(upright, lines)
+    blur = _first_blur(upright, lines, light)
     filters = edge_filters(reach_for(blur))
-    position = _first_position(_levels(upright, lines, filters.reach_px))
+    position = _first_position(_levels(upright, lines, light, filters.reach_px))
     # Where the coarse outline lies a pixel off, the window follows the edge: what finds must not sway what measures.
     lines = replace(lines, coarse=lines.coarse + lines.outward * np.floor(position).astype(np.intp))
-    levels = _levels(upright, lines, filters.reach_px)
-    return _fit(levels, lines, blur, filters, float(np.iinfo(upright.dtype).max))
+    levels = _levels(upright, lines, light, filters.reach_px)
+    return _fit(levels, lines, blur, filters, float(top_level))
 
 
-def _levels(upright: GreyImage, lines: ProfileLines, reach: int) -> Floats:
-    return _gather(upright, IS_ROW, lines.fixed, lines.coarse, lines.outward, reach)
+def _levels(upright: GreyImage, lines: ProfileLines, light: Floats, reach: int) -> Floats:
+    return _gather(upright, light, IS_ROW, lines.fixed, lines.coarse, lines.outward, reach)
 
 
 @compiled
 def _gather(
-    upright: GreyImage, is_row: NDArray[np.bool_], fixed: Ints, coarse: Ints, outward: Ints, reach: int
+    upright: GreyImage,
+    light: Floats,
+    is_row: NDArray[np.bool_],
+    fixed: Ints,
+    coarse: Ints,
+    outward: Ints,
+    reach: int,
 ) -> Floats:
-    """Grey levels from inside to outside, `reach` pixels to either side of the coarse edge, shape (2, n, pixels).
+    """Light from inside to outside, `reach` pixels to either side of the coarse edge, shape (2, n, pixels).
 
     Beyond the picture's border the last pixel is repeated: what is cut off there is a finger's inside or the ground.
     """
@@ -129,17 +142,23 @@ def _gather(
             for j in range(2 * reach + 1):
                 at = coarse[k, i] + outward[k, i] * (j - reach)
                 if is_row[i]:
-                    values[k, i, j] = upright[fixed[k, i], min(max(at, 0), columns - 1)]
+                    values[k, i, j] = light[upright[fixed[k, i], min(max(at, 0), columns - 1)]]
                 else:
-                    values[k, i, j] = upright[min(max(at, 0), rows - 1), fixed[k, i]]
+                    values[k, i, j] = light[upright[min(max(at, 0), rows - 1), fixed[k, i]]]
     return values
 
 
-def _first_blur(upright: GreyImage, lines: ProfileLines) -> float:
+def _first_blur(upright: GreyImage, lines: ProfileLines, light: Floats) -> float:
     """Blur of the edges from the steepest place of some of the flanks' rows, robustly."""
     some = slice(0, INNER, FIRST_LOOK)
     levels = _gather(
-        upright, IS_ROW[some], lines.fixed[:, some], lines.coarse[:, some], lines.outward[:, some], FIRST_REACH_PX
+        upright,
+        light,
+        IS_ROW[some],
+        lines.fixed[:, some],
+        lines.coarse[:, some],
+        lines.outward[:, some],
+        FIRST_REACH_PX,
     )
     shares = _steepest_shares(levels)[lines.weight[:, some] > 0]
     if not len(shares):
@@ -223,7 +242,14 @@ def _fit(levels: Floats, lines: ProfileLines, blur_px: float, filters: EdgeFilte
         _shaped(_clipped(levels.reshape(-1, pixels), position, look.sigma, top_level)),
         filters.reach_px,
         marks,
+        (_inside(levels[0], lines.weight[0]), _inside(levels[1], lines.weight[1])),
     )
+
+
+@compiled
+def _inside(levels: Floats, weight: Floats) -> float:
+    """Usual level at the inner end of an inner flank's lines; 0 where there is none."""
+    return middle(levels[:INNER, 0].copy()[weight[:INNER] > 0])
 
 
 def _shaped(a: NDArray[Number]) -> NDArray[Number]:
