@@ -6,7 +6,7 @@ is the Cramer-Rao bound. What all rows share is the spread, one for the flanks a
 (motion spreads a flank more than a tip). Nothing is resampled.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TypeVar
 
 import numpy as np
@@ -27,6 +27,7 @@ from fingervision.vision.edge_profile import NO_MARK, EdgeMark, edge_mark
 from fingervision.vision.facing import facing_lines, without_the_other
 from fingervision.vision.grey import GreyImage
 from fingervision.vision.median import middle
+from fingervision.vision.noise_correlation import flat_noise
 from fingervision.vision.profile_lines import INNER, IS_ROW, PLACES, ProfileLines
 
 Floats = NDArray[np.float64]
@@ -74,6 +75,10 @@ class EdgePoints:
         What each inner flank shows that a blurred step does not; nothing where the window holds both edges.
     inside : (float, float)
         Level of each finger beside its inner flank.
+    shared_lines : float
+        Neighbouring lines that share their noise.
+    noise_flat : float
+        Standard deviation of the light in the flat parts beside the edges; 0 where none is in view.
     """
 
     lines: ProfileLines
@@ -87,6 +92,8 @@ class EdgePoints:
     reach_px: int
     marks: tuple[EdgeMark, EdgeMark]
     inside: tuple[float, float]
+    shared_lines: float = 1.0
+    noise_flat: float = 0.0
 
 
 def fit_edges(upright: GreyImage, lines: ProfileLines, light: Floats, top_level: int) -> EdgePoints:
@@ -112,9 +119,10 @@ def fit_edges(upright: GreyImage, lines: ProfileLines, light: Floats, top_level:
     filters = edge_filters(reach_for(blur))
     position = _first_position(_levels(upright, lines, light, filters.reach_px))
     # Where the coarse outline lies a pixel off, the window follows the edge: what finds must not sway what measures.
-    lines = replace(lines, coarse=lines.coarse + lines.outward * np.floor(position).astype(np.intp))
+    coarse = lines.coarse + lines.outward * np.floor(position).astype(np.intp)
+    lines = ProfileLines(lines.fixed, coarse, lines.slope, lines.weight, lines.outward)
     levels = _levels(upright, lines, light, filters.reach_px)
-    return _fit(levels, lines, blur, filters, float(top_level))
+    return _fit(upright, light, levels, lines, blur, filters, float(top_level))
 
 
 def _levels(upright: GreyImage, lines: ProfileLines, light: Floats, reach: int) -> Floats:
@@ -200,7 +208,15 @@ def _first_position(levels: Floats) -> Floats:
     return position
 
 
-def _fit(levels: Floats, lines: ProfileLines, blur_px: float, filters: EdgeFilters, top_level: float) -> EdgePoints:
+def _fit(
+    upright: GreyImage,
+    light: Floats,
+    levels: Floats,
+    lines: ProfileLines,
+    blur_px: float,
+    filters: EdgeFilters,
+    top_level: float,
+) -> EdgePoints:
     """Gauss-Newton over every line's two levels and position, and the blur of flanks and tips."""
     pixels, real = levels.shape[-1], lines.weight.ravel() > 0
     shared = Lines(lines.slope.ravel(), lines.weight.ravel(), BLUR_OF_LINE)
@@ -219,15 +235,15 @@ def _fit(levels: Floats, lines: ProfileLines, blur_px: float, filters: EdgeFilte
     if facing is None:
         left, right = (
             edge_mark(
-                levels[k, rows],
-                position[k * PLACES + rows],
-                look.sigma[k * PLACES + rows],
-                look.contrast[k * PLACES + rows],
-                mean_square[k * PLACES + rows],
+                levels[k, :filled],
+                position[k * PLACES : k * PLACES + filled],
+                look.sigma[k * PLACES : k * PLACES + filled],
+                look.contrast[k * PLACES : k * PLACES + filled],
+                mean_square[k * PLACES : k * PLACES + filled],
                 noise,
                 top_level,
             )
-            for k, rows in enumerate(np.flatnonzero(inner) for inner in lines.weight[:, :INNER])
+            for k, filled in enumerate(np.count_nonzero(lines.weight[:, :INNER], axis=1).tolist())
         )
         marks = (left, right)
     u_position = np.sqrt(np.maximum(mean_square, noise_variance)) / (np.abs(look.contrast) * gain)
@@ -243,6 +259,7 @@ def _fit(levels: Floats, lines: ProfileLines, blur_px: float, filters: EdgeFilte
         filters.reach_px,
         marks,
         (_inside(levels[0], lines.weight[0]), _inside(levels[1], lines.weight[1])),
+        *flat_noise(upright, light, lines, filters, *filters.middle(blur[0])),
     )
 
 
@@ -286,6 +303,12 @@ def curvature_gain(slope: Floats, reach_sigmas: Floats) -> Floats:
 
 
 def outline_blur(edges: EdgePoints) -> Floats:
-    """Blur (sigma_e, the pixel included) that the curvature of the outline is felt through, shape (2, PLACES)."""
-    own = np.where(IS_ROW, edges.blur_px[:, :1], edges.blur_px[:, 1:])
-    return np.asarray(np.sqrt((own**2 + PIXEL_VARIANCE) * edges.curvature_gain))
+    """Blur (sigma_e, the pixel included) that the curvature of the outline is felt through, shape (2, PLACES).
+
+    Blur along the edge moves a curved edge's half-level, blur across it does not. Motion makes the two differ: what is
+    seen on the flanks is the blur across the fingers, what is seen on the tips that along them.
+    """
+    across, along = edges.blur_px[:, :1] ** 2, edges.blur_px[:, 1:] ** 2
+    steep = edges.lines.slope**2
+    own = np.where(IS_ROW, across * steep + along, across + along * steep) / (1.0 + steep)
+    return np.asarray(np.sqrt((own + PIXEL_VARIANCE) * edges.curvature_gain))

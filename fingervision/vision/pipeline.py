@@ -22,6 +22,7 @@ from fingervision.vision.fingers import CoarseFingers, find_fingers
 from fingervision.vision.gap import measure_gap
 from fingervision.vision.grey import GreyImage, to_grey, top_level
 from fingervision.vision.overlay import draw_boundary, draw_edge_points, draw_overlay, in_eight_bits
+from fingervision.vision.profile_choice import with_profile
 from fingervision.vision.profile_lines import profile_lines
 from fingervision.vision.response_shift import gap_shift_px
 from fingervision.vision.stripes import with_stripes
@@ -167,7 +168,8 @@ def _attempt(grey: GreyImage, settings: Settings, coding: Coding) -> _Attempt:
             upright = fingers.orientation.view(grey)
             light = _light(settings.response, scale, int(np.iinfo(grey.dtype).max) + 1)
             lines = profile_lines((fingers.left, fingers.right))
-            edges = with_stripes(upright, fit_edges(upright, lines, light, scale), light)
+            edges = with_profile(upright, fit_edges(upright, lines, light, scale), light, scale)
+            edges = with_stripes(upright, edges, light)
             outcome = measure_gap(fingers, edges, settings.below_tip_px, scale, light_gap, coding)
             if settings.other_response is not None and isinstance(outcome, GapMeasurement):
                 shift = gap_shift_px(outcome, edges, settings.response, settings.other_response, scale)
