@@ -11,13 +11,9 @@ from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import ndtri
 
 from fingervision.domain.compiled import compiled
 from fingervision.vision.edge_filters import (
-    LARGEST_BLUR_PX,
-    PIXEL_VARIANCE,
-    SMALLEST_BLUR_PX,
     EdgeFilters,
     Lines,
     edge_filters,
@@ -26,19 +22,16 @@ from fingervision.vision.edge_filters import (
 from fingervision.vision.edge_profile import NO_MARK, EdgeMark, edge_mark
 from fingervision.vision.facing import facing_lines, without_the_other
 from fingervision.vision.grey import GreyImage
+from fingervision.vision.line_levels import first_blur, first_position, line_levels
 from fingervision.vision.median import middle
 from fingervision.vision.noise_correlation import flat_noise
+from fingervision.vision.outline_blur import curvature_gain
 from fingervision.vision.profile_lines import INNER, IS_ROW, PLACES, ProfileLines
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int_]
 Number = TypeVar("Number", np.float64, np.bool_)
 
-# Half-length of the first look at an edge (pixels), enough for the strongest blur that is still measured; at one line
-# in so many.
-FIRST_REACH_PX, FIRST_LOOK, NEAR_MIDDLE_PX = 20, 6, 8
-# The window follows an edge so far (pixels), where its ends differ by so many grey levels at all.
-FIRST_MOVE_PX, LEAST_LEVELS = 2.0, 1e-3
 # The passes of Gauss-Newton, and whether each also refines the blur. It converges quadratically from the first look.
 BLUR_PASSES = (True, True, False)
 # Lines of each finger's flanks and of its tip share their blur: the number of that blur, for every line.
@@ -115,97 +108,14 @@ def fit_edges(upright: GreyImage, lines: ProfileLines, light: Floats, top_level:
     EdgePoints
         One point a line.
     """
-    blur = _first_blur(upright, lines, light)
+    blur = first_blur(upright, lines, light)
     filters = edge_filters(reach_for(blur))
-    position = _first_position(_levels(upright, lines, light, filters.reach_px))
+    position = first_position(line_levels(upright, lines, light, filters.reach_px))
     # Where the coarse outline lies a pixel off, the window follows the edge: what finds must not sway what measures.
     coarse = lines.coarse + lines.outward * np.floor(position).astype(np.intp)
     lines = ProfileLines(lines.fixed, coarse, lines.slope, lines.weight, lines.outward)
-    levels = _levels(upright, lines, light, filters.reach_px)
+    levels = line_levels(upright, lines, light, filters.reach_px)
     return _fit(upright, light, levels, lines, blur, filters, float(top_level))
-
-
-def _levels(upright: GreyImage, lines: ProfileLines, light: Floats, reach: int) -> Floats:
-    return _gather(upright, light, IS_ROW, lines.fixed, lines.coarse, lines.outward, reach)
-
-
-@compiled
-def _gather(
-    upright: GreyImage,
-    light: Floats,
-    is_row: NDArray[np.bool_],
-    fixed: Ints,
-    coarse: Ints,
-    outward: Ints,
-    reach: int,
-) -> Floats:
-    """Light from inside to outside, `reach` pixels to either side of the coarse edge, shape (2, n, pixels).
-
-    Beyond the picture's border the last pixel is repeated: what is cut off there is a finger's inside or the ground.
-    """
-    rows, columns = upright.shape
-    values = np.empty((fixed.shape[0], fixed.shape[1], 2 * reach + 1))
-    for k in range(fixed.shape[0]):
-        for i in range(fixed.shape[1]):
-            for j in range(2 * reach + 1):
-                at = coarse[k, i] + outward[k, i] * (j - reach)
-                if is_row[i]:
-                    values[k, i, j] = light[upright[fixed[k, i], min(max(at, 0), columns - 1)]]
-                else:
-                    values[k, i, j] = light[upright[min(max(at, 0), rows - 1), fixed[k, i]]]
-    return values
-
-
-def _first_blur(upright: GreyImage, lines: ProfileLines, light: Floats) -> float:
-    """Blur of the edges from the steepest place of some of the flanks' rows, robustly."""
-    some = slice(0, INNER, FIRST_LOOK)
-    levels = _gather(
-        upright,
-        light,
-        IS_ROW[some],
-        lines.fixed[:, some],
-        lines.coarse[:, some],
-        lines.outward[:, some],
-        FIRST_REACH_PX,
-    )
-    shares = _steepest_shares(levels)[lines.weight[:, some] > 0]
-    if not len(shares):
-        return 1.0
-    sigma = 1.0 / ndtri(0.5 + min(max(middle(shares), 0.02), 0.49))
-    return float(min(max(sigma, SMALLEST_BLUR_PX), LARGEST_BLUR_PX))
-
-
-@compiled
-def _steepest_shares(levels: Floats) -> Floats:
-    """Largest step from pixel to pixel near the middle, as a share of what lies between the ends; shape (2, n)."""
-    fingers, lines, pixels = levels.shape
-    shares = np.empty((fingers, lines))
-    for k in range(fingers):
-        for i in range(lines):
-            line = levels[k, i]
-            steepest, middle = 0.0, pixels // 2
-            for j in range(middle - NEAR_MIDDLE_PX, middle + NEAR_MIDDLE_PX + 1):
-                steepest = max(steepest, 0.5 * abs(line[j + 1] - line[j - 1]))
-            contrast = abs(line[-6:].sum() - line[:6].sum()) / 6.0
-            shares[k, i] = steepest / max(contrast, 1.0)
-    return shares
-
-
-@compiled
-def _first_position(levels: Floats) -> Floats:
-    """Where an edge between the window's two end levels would have the same mean level as the window."""
-    fingers, lines, pixels = levels.shape
-    position = np.empty((fingers, lines))
-    for k in range(fingers):
-        for i in range(lines):
-            line = levels[k, i]
-            outside = line[-3:].sum() / 3.0
-            contrast = outside - line[:3].sum() / 3.0
-            if abs(contrast) < LEAST_LEVELS:
-                contrast = LEAST_LEVELS
-            share = (outside - line.sum() / pixels) / contrast
-            position[k, i] = min(max((share - 0.5) * pixels, -FIRST_MOVE_PX), FIRST_MOVE_PX)
-    return position
 
 
 def _fit(
@@ -221,7 +131,7 @@ def _fit(
     pixels, real = levels.shape[-1], lines.weight.ravel() > 0
     shared = Lines(lines.slope.ravel(), lines.weight.ravel(), BLUR_OF_LINE)
     facing = facing_lines(lines, filters.reach_px)
-    blur, position, seen = np.full(4, blur_px), _first_position(levels).ravel(), levels
+    blur, position, seen = np.full(4, blur_px), first_position(levels).ravel(), levels
     for is_blur_free in BLUR_PASSES:
         look = filters.look(seen.reshape(-1, pixels), shared, blur, position)
         position, blur = look.position, look.blur if is_blur_free else blur
@@ -287,28 +197,3 @@ def _clipped(levels: Floats, position: Floats, sigma: Floats, top_level: float) 
             if abs(j - pixels // 2 - position[i]) < near and (levels[i, j] <= 0 or levels[i, j] >= top_level):
                 is_clipped[i] = True
     return is_clipped
-
-
-def curvature_gain(slope: Floats, reach_sigmas: Floats) -> Floats:
-    """What a fit with two free levels makes of an edge whose distance along the line is not quite straight.
-
-    Along a line that meets a curved edge at a slant of slope m, the distance to the edge is t + kappa m^2 t^2 / (2 (1 +
-    m^2)^(1/2)). Projected on the fit's own directions over a window of w standard deviations this moves the position by
-    m^2 c sigma^2 kappa / 2 across the edge, c = (1 / (4 sqrt pi) - 1 / 2w) / (1 / (2 sqrt pi) - 1 / 2w); the half-level
-    itself is moved by sigma^2 kappa / 2.
-    """
-    level = 0.5 / np.maximum(reach_sigmas, 2.5)
-    root = 0.5 / np.sqrt(np.pi)
-    return np.asarray(1.0 + slope**2 * (0.5 * root - level) / (root - level))
-
-
-def outline_blur(edges: EdgePoints) -> Floats:
-    """Blur (sigma_e, the pixel included) that the curvature of the outline is felt through, shape (2, PLACES).
-
-    Blur along the edge moves a curved edge's half-level, blur across it does not. Motion makes the two differ: what is
-    seen on the flanks is the blur across the fingers, what is seen on the tips that along them.
-    """
-    across, along = edges.blur_px[:, :1] ** 2, edges.blur_px[:, 1:] ** 2
-    steep = edges.lines.slope**2
-    own = np.where(IS_ROW, across * steep + along, across + along * steep) / (1.0 + steep)
-    return np.asarray(np.sqrt((own + PIXEL_VARIANCE) * edges.curvature_gain))
