@@ -77,6 +77,12 @@ def flat_noise(
 def _squares(fixed: Ints, coarse: Ints, weight: Floats, reach: int, rows: int, columns: int) -> NDArray[np.int64]:
     """First row and column of every square beside both inner flanks, and the side that it is on, shape (n, 3)."""
     found, count = np.empty((4 * MOST_ALONG, 3), dtype=np.int64), 0
+    left, right = -columns, 2 * columns
+    for i in range(INNER):
+        if weight[0, i] > 0.0:
+            left = max(left, coarse[0, i])
+        if weight[1, i] > 0.0:
+            right = min(right, coarse[1, i])
     for k in range(2):
         low, high = np.full(MOST_ALONG, columns), np.full(MOST_ALONG, -1)
         top = rows
@@ -96,6 +102,8 @@ def _squares(fixed: Ints, coarse: Ints, weight: Floats, reach: int, rows: int, c
                 (high[along] + reach + BEYOND_PX, GROUND if k == 0 else FINGER),
                 (low[along] - reach - BEYOND_PX - SIDE_PX + 1, FINGER if k == 0 else GROUND),
             ):
+                if side == GROUND and (start + SIDE_PX > right - reach if k == 0 else start < left + reach):
+                    continue  # the other finger's edge lies in it
                 if 0 <= start <= columns - SIDE_PX:
                     found[count, 0], found[count, 1], found[count, 2] = first, start, side
                     count += 1
