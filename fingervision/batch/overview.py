@@ -55,8 +55,14 @@ def table_text(out: Path, reduction: Reduction, outcomes: Sequence[Outcome]) -> 
         result = "" if outcome.folder is None else outcome.folder.name
         line: list[Cell] = [outcome.input, result, outcome.exit_code, outcome.words]
         line += [_shown(cells.get(name)) for name in reduction.COLUMNS]
+        line = [_no_formula(one) for one in line]
         writer.writerow([*line, f"{outcome.seconds:.3f}" if outcome.folder is not None else ""])
     return text.getvalue()
+
+
+def _no_formula(cell: Cell) -> Cell:
+    """Keep a spreadsheet from calculating a name: an apostrophe says that it is text."""
+    return f"'{cell}" if isinstance(cell, str) and cell.startswith(("=", "+", "-", "@", "\t")) else cell
 
 
 def _shown(cell: Cell) -> Cell:

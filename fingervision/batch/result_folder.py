@@ -1,6 +1,7 @@
 """The folder of one result: written beside its place, renamed into it when whole, with a record of what it is of."""
 
 import errno
+import hashlib
 import json
 import os
 import re
@@ -8,13 +9,15 @@ import shutil
 import socket
 from collections.abc import Mapping
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from uuid import uuid4
 
 from fingervision.batch.digest import Digest
 
 RECORD = "record.json"
+TABLES = (".csv", ".json", ".toml")
+"""What others read on; a picture that is missing is no result that is missing."""
 SCHEMA = 1
 PART = re.compile(r"\.(?P<name>.+)\.part~(?P<host>[^~]+)~(?P<pid>\d+)~[0-9a-f]{8}")
 
@@ -41,6 +44,8 @@ class Record:
         Time that it took.
     digest : Digest
         Its line of the table and its small picture.
+    tables : mapping of str to (int, int, str)
+        Size, time of change and hash of its tables, by file name.
     """
 
     input: str
@@ -51,6 +56,7 @@ class Record:
     words: str
     seconds: float
     digest: Digest
+    tables: Mapping[str, tuple[int, int, str]] = field(default_factory=dict)
 
 
 def read_record(folder: Path) -> Record | None:
@@ -90,8 +96,42 @@ def write_record(folder: Path, place: Path, record: Record) -> None:
             "curve": record.digest.curve,
             "caption": record.digest.caption,
         },
+        "tables": dict(record.tables),
     }
     replace_text(folder / RECORD, json.dumps(held, allow_nan=False) + "\n")
+
+
+def states_of_tables(folder: Path) -> dict[str, tuple[int, int, str]]:
+    """Size, time of change (ns) and hash of every table of a result, by file name.
+
+    Raises
+    ------
+    OSError
+        One cannot be read.
+    """
+    found = {}
+    for path in sorted(folder.iterdir()):
+        if path.suffix in TABLES and path.name != RECORD and path.is_file():
+            stat = path.stat()
+            found[path.name] = (stat.st_size, stat.st_mtime_ns, _hash(path))
+    return found
+
+
+def is_whole(folder: Path, record: Record) -> bool:
+    """Whether a result's tables are there as they were written; read only where their time of change is another."""
+    try:
+        for name, (size, changed_ns, content) in record.tables.items():
+            stat = (folder / name).stat()
+            if stat.st_size != size or (stat.st_mtime_ns != changed_ns and _hash(folder / name) != content):
+                return False
+    except (OSError, ValueError):
+        return False
+    return True
+
+
+def _hash(path: Path) -> str:
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
 
 
 def replace_text(path: Path, text: str) -> None:
@@ -132,7 +172,7 @@ def publish(part: Path, folder: Path, record: Record) -> None:
             part.rename(folder)
             return
         there = read_record(folder)
-        if there is not None and is_same(there, record):
+        if there is not None and is_same(there, record) and is_whole(folder, there):
             shutil.rmtree(part, ignore_errors=True)
             return
         if (there is None and folder.exists()) or (there is not None and there.input != record.input):

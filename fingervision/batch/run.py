@@ -11,7 +11,7 @@ from fingervision.batch.fingerprint import stamp_of
 from fingervision.batch.inputs import inputs_of
 from fingervision.batch.naming import folder_names
 from fingervision.batch.overview import write_overview
-from fingervision.batch.result_folder import Record, read_record, remove_left_parts, replace_text
+from fingervision.batch.result_folder import Record, is_whole, read_record, remove_left_parts, replace_text
 from fingervision.batch.task import Outcome, Task, failure
 from fingervision.batch.work import outcome_of
 from fingervision.domain.errors import ExitCode, FingervisionError
@@ -141,7 +141,8 @@ def planned(job: Job) -> Plan:
     for number, (name, path) in enumerate(zip(names, paths, strict=True)):
         folder, record = home[path] if path in home else (job.out / fresh[path], None)
         tasks.append(Task(job.command, name, job.arguments, folder, job.options_key))
-        if record is not None and record.options_key == job.options_key and _is_untouched(record, path):
+        same = record is not None and record.options_key == job.options_key and _is_untouched(record, path)
+        if record is not None and same and is_whole(folder, record):
             done[number] = outcome_of(name, folder, record)
     return Plan(job, tuple(tasks), done)
 

@@ -9,7 +9,15 @@ from time import perf_counter
 
 from fingervision.batch.fingerprint import content_hash, is_settled, stamp_of
 from fingervision.batch.reduction import reduction_of
-from fingervision.batch.result_folder import Record, new_part, publish, read_record, write_record
+from fingervision.batch.result_folder import (
+    Record,
+    is_whole,
+    new_part,
+    publish,
+    read_record,
+    states_of_tables,
+    write_record,
+)
 from fingervision.batch.task import Outcome, Perform, Task, failure
 
 NO_ROOM = (errno.ENOSPC, errno.EDQUOT)
@@ -58,7 +66,8 @@ def _brought(task: Task, perform: Perform, part: Path, started: float) -> Outcom
     name = os.path.abspath(source)  # noqa: PTH100 - links keep their own names
     there = read_record(task.folder)
     key = (name, content, task.options_key)
-    if exists and there is not None and (there.input, there.content, there.options_key) == key:
+    same = there is not None and (there.input, there.content, there.options_key) == key
+    if exists and there is not None and same and is_whole(task.folder, there):
         touched = replace(there, stamp=stamp if settled else None)
         if touched != there:
             write_record(task.folder, task.folder, touched)
@@ -80,6 +89,7 @@ def _brought(task: Task, perform: Perform, part: Path, started: float) -> Outcom
         words=words,
         seconds=seconds,
         digest=digest,
+        tables=states_of_tables(part),
     )
     write_record(part, task.folder, record)
     publish(part, task.folder, record)

@@ -1,8 +1,13 @@
 """The command line: one command a file, found by its file's name; thin."""
 
+import errno
 import importlib
+import os
 import pkgutil
+import signal
 import sys
+from contextlib import suppress
+from typing import NoReturn
 
 import click
 
@@ -37,6 +42,10 @@ def cli() -> None:
 
 def main() -> None:
     """Run the command line; a foreseen error is one sentence and an exit code, never a traceback."""
+    # Who is asked to terminate (by a scheduler, at shut-down) ends as with Ctrl-C: in order, and with a sentence.
+    with suppress(ValueError):  # not in a thread
+        signal.signal(signal.SIGTERM, signal.default_int_handler)
+    _mend_streams()
     try:
         cli(standalone_mode=True)
     except FingervisionError as error:
@@ -48,6 +57,46 @@ def main() -> None:
             raise
         click.echo("Aborted!", err=True)
         sys.exit(ExitCode.COULD_NOT)
+    except RuntimeError as error:
+        if "Symlink loop" not in str(error):
+            raise
+        click.echo(f"fingervision: A link leads back to itself ({error}): name a real file or folder.", err=True)
+        sys.exit(ExitCode.COULD_NOT)
+    except OSError as error:
+        # Files are their writers' to speak of; what has no name is standard output.
+        if error.filename is not None or error.errno not in (errno.ENOSPC, errno.EIO, errno.EPIPE):
+            raise
+        _give_up_output(error)
+    finally:
+        try:
+            sys.stdout.flush()
+        except OSError as error:
+            _give_up_output(error)
+
+
+def _mend_streams() -> None:
+    """Put something where a standard stream was closed, and let names pass that are not UTF-8."""
+    # A file that is opened would take the closed one's place, and FFmpeg would write its words into it.
+    while (lowest := os.open(os.devnull, os.O_RDWR)) <= 2:
+        pass
+    os.close(lowest)
+    for name, mode in (("stdin", "r"), ("stdout", "w"), ("stderr", "w")):
+        stream = getattr(sys, name)
+        if stream is None:
+            setattr(sys, name, open(os.devnull, mode, encoding="utf-8"))  # noqa: SIM115, PTH123 - open to the end
+        elif hasattr(stream, "reconfigure") and name != "stdin":
+            stream.reconfigure(errors="surrogateescape")
+
+
+def _give_up_output(error: OSError) -> NoReturn:
+    # Else Python tries again at its end, and fails with words of its own.
+    with suppress(OSError, ValueError):
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    if error.errno != errno.EPIPE:
+        click.echo(
+            f"fingervision: Standard output could not be written to its end ({error.strerror}): make room.", err=True
+        )
+    sys.exit(ExitCode.COULD_NOT)
 
 
 def _interrupted(error: BaseException | None) -> bool:

@@ -12,6 +12,8 @@ from numpy.typing import NDArray
 from fingervision.domain.response import Response
 from fingervision.models import published_table
 from fingervision.models.finite_element import FiniteElementGripper
+from fingervision.models.static_answer import contact_onset_mm
+from fingervision.models.triangulate import PlaneMesh
 
 Array = NDArray[np.float64]
 
@@ -22,12 +24,20 @@ _PUBLISHED = (
 )
 
 
-def draw_deformed(model: FiniteElementGripper, input_mm: float, path: Path) -> None:
-    """Draw both halves at one input, displacements to scale, coloured by von Mises stress."""
-    moved = input_mm * model.half.unit_displacement_mm
+def draw_deformed(model: FiniteElementGripper, input_mm: float, name: str, path: Path) -> None:
+    """Draw both halves at one input with the model's own physics, displacements to scale, coloured by stress.
+
+    Without contact, an input beyond the first touch would draw one finger through the other: the first touch is drawn.
+    """
+    onset_mm = contact_onset_mm(model.half, model.physics)
+    beyond = onset_mm is not None and not model.physics.contact and input_mm < onset_mm
+    if beyond and onset_mm is not None:
+        input_mm = onset_mm
+    moved = model.equilibria([input_mm])[0].displacement_mm
+    state = model.loaded([input_mm])[0]
     plate = model.plate
     corners = plate.corner_triangles
-    stress = plate.at_corners(plate.von_mises_mpa(moved))
+    stress = plate.at_corners(plate.von_mises_mpa(moved, large=model.physics.large_rotation))
     count = stress.size
     x, y = plate.nodes_mm[:, :count]
     deformed = x + moved[plate.x_dofs[:count]], y + moved[plate.y_dofs[:count]]
@@ -38,26 +48,42 @@ def draw_deformed(model: FiniteElementGripper, input_mm: float, path: Path) -> N
         axes.triplot(Triangulation(side * x, y, corners.T), color="0.9", linewidth=0.2)
     for side in (1.0, -1.0):
         shape = Triangulation(side * deformed[0], deformed[1], corners.T)
-        colours = axes.tripcolor(shape, stress, shading="gouraud", cmap="viridis", vmin=0.0, vmax=_top(model, input_mm))
+        top = max(state.stress_mpa, 1e-9)
+        colours = axes.tripcolor(shape, stress, shading="gouraud", cmap="viridis", vmin=0.0, vmax=top)
     axes.set_aspect("equal")
     axes.set_xlabel("x / mm")
     axes.set_ylabel("y / mm")
-    peak = model.peak_stress()
     limit_mpa = model.gripper.material.yield_mpa
+    touch = " (first touch: no contact beyond)" if beyond else ""
+    grip = f", grip {state.grip_n:.3g} N a finger" if state.grip_n > 0.0 else ""
     axes.set_title(
-        f"Input {input_mm:.3g} mm, to scale; largest stress on a notch {peak.mpa_per_mm * abs(input_mm):.3g} MPa"
-        f"\nat x = {peak.place_mm[0]:.3g}, y = {peak.place_mm[1]:.3g} mm (yield {limit_mpa:g} MPa)"
+        f"{name}: input {input_mm:.3g} mm{touch}, to scale{grip}\nlargest stress on a notch {state.stress_mpa:.3g} MPa "
+        f"at x = {state.place_mm[0]:.3g}, y = {state.place_mm[1]:.3g} mm (yield {limit_mpa:g} MPa)"
     )
     if colours is not None:
         figure.colorbar(colours, ax=axes, label="von Mises stress / MPa", shrink=0.8)
     figure.savefig(path, dpi=130)
 
 
-def _top(model: FiniteElementGripper, input_mm: float) -> float:
-    return max(model.peak_stress().mpa_per_mm * abs(input_mm), 1e-9)
+def draw_mesh(mesh: PlaneMesh, name: str, path: Path) -> None:
+    """Draw the triangles, and say how many and how good they are."""
+    figure = Figure(figsize=(7.0, 8.0), layout="constrained")
+    axes = figure.add_subplot()
+    axes.triplot(Triangulation(mesh.nodes_mm[0], mesh.nodes_mm[1], mesh.triangles[:3].T), color="0.3", linewidth=0.25)
+    axes.set_aspect("equal")
+    axes.set_xlabel("x / mm")
+    axes.set_ylabel("y / mm")
+    quality = mesh.quality()
+    axes.set_title(
+        f"{name}: {mesh.triangles.shape[1]} quadratic triangles, {2 * mesh.nodes_mm.shape[1]} unknowns\n"
+        f"quality {quality.min():.2f} at least, {quality.mean():.2f} in the mean (1: equilateral)"
+    )
+    figure.savefig(path, dpi=200)
 
 
-def draw_comparison(inputs: Array, answers: Mapping[str, Response], path: Path, *, with_published: bool) -> None:
+def draw_comparison(
+    inputs: Array, answers: Mapping[str, Response], name: str, path: Path, *, with_published: bool
+) -> None:
     """Draw the gap over the input of every model, and below it the differences.
 
     With the paper's gripper its published columns stand beside them and differences are from its experiment; otherwise
@@ -66,23 +92,23 @@ def draw_comparison(inputs: Array, answers: Mapping[str, Response], path: Path, 
     figure = Figure(figsize=(8.0, 7.5), layout="constrained")
     upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=(3, 2))
     colours = mpl.colormaps["tab10"]
-    names = list(answers)
+    kinds = list(answers)
     if with_published:
         at, reference = published_table.INPUT_MM, published_table.EXPERIMENT_MM
         title = "gap minus experiment / mm"
     else:
-        at, reference = inputs, answers[names[0]].gap_mm
-        title = f"gap minus {names[0]} / mm"
-    for place, name in enumerate(names):
-        gap = answers[name].gap_mm
-        upper.plot(inputs, gap, color=colours(place), linestyle=("-", "--", "-.")[place % 3], label=name)
+        at, reference = inputs, answers[kinds[0]].gap_mm
+        title = f"gap minus {kinds[0]} / mm"
+    for place, kind in enumerate(kinds):
+        gap = answers[kind].gap_mm
+        upper.plot(inputs, gap, color=colours(place), linestyle=("-", "--", "-.")[place % 3], label=kind)
         inside = (at >= inputs.min() - 1e-9) & (at <= inputs.max() + 1e-9)
         difference = np.interp(at[inside], inputs, gap) - reference[inside]
         lower.plot(at[inside], difference, color=colours(place), linestyle=("-", "--", "-.")[place % 3])
     if with_published:
-        for place, (name, column, marker) in enumerate(_PUBLISHED):
-            upper.plot(at, column, marker, color=colours(place + 4), label=name, markersize=5, fillstyle="none")
-            if name != "paper: experiment":
+        for place, (source, column, marker) in enumerate(_PUBLISHED):
+            upper.plot(at, column, marker, color=colours(place + 4), label=source, markersize=5, fillstyle="none")
+            if source != "paper: experiment":
                 lower.plot(at, column - reference, marker, color=colours(place + 4), markersize=5, fillstyle="none")
     upper.set_ylabel("gap / mm")
     upper.legend()
@@ -91,6 +117,6 @@ def draw_comparison(inputs: Array, answers: Mapping[str, Response], path: Path, 
     lower.set_ylabel(title)
     lower.set_xlabel("input / mm")
     lower.grid(alpha=0.3)
-    if with_published:
-        upper.set_title("One link length was chosen on the paper's Comsol slope: no validation", fontsize="medium")
+    chosen = "; one link length was chosen on the paper's Comsol slope: no validation" if with_published else ""
+    upper.set_title(f"{name}{chosen}", fontsize="medium")
     figure.savefig(path, dpi=130)

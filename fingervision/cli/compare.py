@@ -41,7 +41,7 @@ def command(measured: Path, model_path: Path, out: Path, seed: int, kind: str, a
     document = found.document()
     with out_folder(out):
         (out / "compare.json").write_text(json.dumps(document, indent=2, allow_nan=False) + "\n", encoding="utf-8")
-        (out / "compare.png").write_bytes(residual_figure(found.residual_mm, None, found.bench.chain.history))
+        (out / "compare.png").write_bytes(residual_figure(found.residual_mm, None, found.data.chain.history))
     if as_json:
         click.echo(json.dumps(document, indent=2))
         return
@@ -50,5 +50,5 @@ def command(measured: Path, model_path: Path, out: Path, seed: int, kind: str, a
         click.echo(f"  {place.words}")
     if not found.places:
         click.echo("  nowhere beyond the noise")
-    for words in (*found.bench.notes, *found.bench.refitted()):
+    for words in (*found.data.notes, *found.data.refitted()):
         click.echo(f"  note: {words}")

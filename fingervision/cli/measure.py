@@ -143,10 +143,18 @@ def _scale(calibration: Path | None, px_per_mm: float | None) -> "Scale":
 
 
 def _default_out(recording: str) -> Path:
-    """measured/<file or folder>; for a glob the folder that it looks in."""
+    """measured/<file or folder>; for a glob the folder that it looks in; with more of the path where that is taken."""
+    from fingervision.storage.summary_json import recording_of
+
     path = Path(recording)
-    name = path.resolve().name if path.exists() else path.parent.resolve().name
-    return Path("measured") / (name or "images")
+    named = path.resolve() if path.exists() else path.parent.resolve()
+    parts = [part for part in named.parts if part != named.anchor] or ["images"]
+    for depth in range(1, len(parts) + 1):
+        out = Path("measured") / "__".join(parts[-depth:])
+        of = recording_of(out)
+        if of is None or Path(of).resolve() == path.resolve():
+            return out
+    return out
 
 
 class _Bar:

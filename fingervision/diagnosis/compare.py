@@ -7,8 +7,8 @@ import numpy as np
 
 from fingervision.diagnosis.diagnose import by_channel, places
 from fingervision.diagnosis.inference.cross_validation import rms_mm
-from fingervision.diagnosis.input.intersample_interpolation import along_likelier_path
-from fingervision.diagnosis.input.observations import BenchData, prepare
+from fingervision.diagnosis.input.intersample_interpolation import likelier_interpolation
+from fingervision.diagnosis.input.observations import Observations, prepare
 from fingervision.domain.effect import Array, History
 from fingervision.domain.measured_table import MeasuredTable
 from fingervision.domain.report import Place
@@ -27,7 +27,7 @@ class Comparison:
 
     Parameters
     ----------
-    bench : BenchData
+    data : Observations
         Measurement and model.
     residual_mm : dict of ndarray of float, shape (n,)
         Measured minus predicted, by channel.
@@ -37,7 +37,7 @@ class Comparison:
         Disagreement and noise of one gap reading.
     """
 
-    bench: BenchData
+    data: Observations
     residual_mm: dict[str, Array]
     places: tuple[Place, ...]
     rms_mm: float
@@ -62,7 +62,7 @@ class Comparison:
                 }
                 for p in self.places
             ],
-            "notes": [*self.bench.notes, *self.bench.refitted()],
+            "notes": [*self.data.notes, *self.data.refitted()],
         }
 
 
@@ -96,23 +96,28 @@ def rough(residual_mm: Array, history: History) -> Array:
 
 def compare(table: MeasuredTable, model: CorrectedModel, *, seed: int = 1) -> Comparison:
     """Find where a measured table and a model disagree beyond the noise."""
-    bench = prepare(table, model)
-    residual = bench.stacked_mm - bench.chain.stacked({})
-    problem = bench.problem(residual, 0, explained=False)
+    data = prepare(table, model)
+    over = data.with_overshoots()
+    if np.sum((data.stacked_mm - over.chain.stacked({})) ** 2) < np.sum(
+        (data.stacked_mm - data.chain.stacked({})) ** 2
+    ):
+        data = over
+    residual = data.stacked_mm - data.chain.stacked({})
+    problem = data.problem(residual, 0, explained=False)
     # A delay that the model has is read as its diagnosis reads it.
-    bench = along_likelier_path(bench, problem, problem.nothing())
-    residual = bench.stacked_mm - bench.chain.stacked({})
-    for _ in range(MOST_REFITS if bench.refit.moved else 0):
-        nearer = bench.redrawn(problem, problem.nothing())
-        settled = nearer.straight(bench, problem)
-        bench = nearer
-        residual = bench.stacked_mm - bench.chain.stacked({})
-        problem = bench.problem(residual, 0, explained=False)
+    data = likelier_interpolation(data, problem, problem.nothing())
+    residual = data.stacked_mm - data.chain.stacked({})
+    for _ in range(MOST_REFITS if data.refit.moved else 0):
+        nearer = data.redrawn(problem, problem.nothing())
+        settled = nearer.straight(data, problem)
+        data = nearer
+        residual = data.stacked_mm - data.chain.stacked({})
+        problem = data.problem(residual, 0, explained=False)
         if settled:
             break
-    history = bench.chain.history
+    history = data.chain.history
     # Nothing was explained yet: what the disagreement itself does within seconds is no noise.
-    problem = bench.problem(rough(residual, history), 0, explained=False)
-    found = places(bench, problem, residual, np.random.default_rng(seed))
+    problem = data.problem(rough(residual, history), 0, explained=False)
+    found = places(data, problem, residual, np.random.default_rng(seed))
     rms = rms_mm(residual, history.input_mm.size, history.both_edges)
-    return Comparison(bench, by_channel(bench, residual), found, rms, problem.whitener.noises[0].total_mm)
+    return Comparison(data, by_channel(data, residual), found, rms, problem.whitener.noises[0].total_mm)

@@ -1,27 +1,37 @@
 """The whole loop: where they disagree, which effect is missing, how much it explains, what remains."""
 
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from fingervision.diagnosis.design.further_evidence import other_evidence
+from fingervision.diagnosis.design.further_evidence import further_evidence
 from fingervision.diagnosis.design.next_run import next_run
-from fingervision.diagnosis.inference.cross_validation import rms_mm, unseen_rms_mm
-from fingervision.diagnosis.inference.hypothesis_fit import Explanation, Problem
+from fingervision.diagnosis.inference.cross_validation import left_out_rms_mm, rms_mm
+from fingervision.diagnosis.inference.hypothesis_fit import Problem
+from fingervision.diagnosis.inference.measuring_chain import Settings
+from fingervision.diagnosis.inference.plausibility import gross_mistake, swapped_directions
+from fingervision.diagnosis.inference.position_map import NAME
 from fingervision.diagnosis.inference.refitted_search import refitted_search
 from fingervision.diagnosis.inference.search import Findings, Progress
-from fingervision.diagnosis.input.observations import BenchData, prepare
+from fingervision.diagnosis.inference.verdict import standing, verdict
+from fingervision.diagnosis.input.observations import Observations, prepare
+from fingervision.diagnosis.input.repeated_targets import NoRepeatedTargets
+from fingervision.diagnosis.noise.replicates import PureError
 from fingervision.diagnosis.report.force_hint import force_hint
+from fingervision.diagnosis.report.positioning_of_data import positioning_of_data
+from fingervision.diagnosis.report.positioning_report import PositioningReport
 from fingervision.diagnosis.report.residual_localization import where
+from fingervision.diagnosis.report.sentences import answer, input_dominates, outliers, remaining, rows_beyond_model
 from fingervision.domain.effect import Array
 from fingervision.domain.measured_table import MeasuredTable
 from fingervision.domain.parameter import Estimate
-from fingervision.domain.report import DiagnosisReport, Disagreement, NamedEffect, Place, Verdict
+from fingervision.domain.report import DiagnosisReport, Disagreement, NamedEffect, Place
+from fingervision.effects import catalogue
 from fingervision.models.corrected import CorrectedModel
 
-ODD_SIGMAS = 2.5
-"""In a table of a few rows a person wants to know of any row this far off, even where it was not set aside."""
+MEMBERS_SEPARATED = 5
+"""Explanations, best first, that the next run is designed to separate: the time it takes grows with their square."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -32,37 +42,40 @@ class Diagnosis:
     ----------
     report : DiagnosisReport
         The answer.
-    bench : BenchData
+    data : Observations
         Measurement and model.
     before_mm, after_mm : ndarray of float, shape (channels * n,)
         Measured minus predicted, without and with the answer.
+    positioning : PositioningReport or NoRepeatedTargets
+        Figures of ISO 230-2 where the table repeats its targets.
     """
 
     report: DiagnosisReport
-    bench: BenchData
+    data: Observations
     before_mm: Array
     after_mm: Array
+    positioning: PositioningReport | NoRepeatedTargets
 
 
-def by_channel(bench: BenchData, stacked: Array) -> dict[str, Array]:
+def by_channel(data: Observations, stacked: Array) -> dict[str, Array]:
     """Split a stacked residual into gap and, where they were measured, left, right and midline."""
-    n = bench.chain.history.input_mm.size
+    n = data.chain.history.input_mm.size
     gap = stacked[:n]
     out = {"gap": gap}
-    if bench.chain.history.both_edges:
+    if data.chain.history.both_edges:
         midline = stacked[n : 2 * n] - np.median(stacked[n : 2 * n])
         out |= {"left": midline - 0.5 * gap, "right": midline + 0.5 * gap, "midline": midline}
-    if bench.chain.history.force:
+    if data.chain.history.force:
         out["force"] = stacked[-n:]
     return out
 
 
-def places(bench: BenchData, problem: Problem, residual: Array, rng: np.random.Generator) -> tuple[Place, ...]:
+def places(data: Observations, problem: Problem, residual: Array, rng: np.random.Generator) -> tuple[Place, ...]:
     """Say where a residual cannot be noise."""
-    noises = dict(zip(bench.channels, problem.whitener.noises, strict=True))
-    n = bench.chain.history.input_mm.size
+    noises = dict(zip(data.channels, problem.whitener.noises, strict=True))
+    n = data.chain.history.input_mm.size
     aside = problem.whitener.aside[:n]
-    return where(by_channel(bench, residual), noises, bench.chain.history, aside, rng)
+    return where(by_channel(data, residual), noises, data.chain.history, aside, rng)
 
 
 def diagnose(
@@ -91,39 +104,60 @@ def diagnose(
     """
     begin = time.perf_counter()
     rng = np.random.default_rng(seed)
-    refitted = refitted_search(prepare(table, model, without), rng, forced, progress)
-    bench, found, best = refitted.bench, refitted.found, refitted.found.best
-    history = bench.chain.history
-    n = history.input_mm.size
-    before = bench.stacked_mm - bench.chain.stacked({})
-    after = bench.stacked_mm - bench.chain.stacked(best.values)
-    unseen = unseen_rms_mm(bench, found.problem, best)
-    noises = [noise.total_mm for noise in found.problem.whitener.noises]
-    edges = history.both_edges
-    noise_rms = float(np.sqrt(0.25 * noises[0] ** 2 + noises[1] ** 2)) if edges else noises[0]
+    data = prepare(table, model, without)
+    mistake = gross_mistake(data)
+    refitted = refitted_search(data, rng, forced, without, progress)
+    data, found = refitted.data, refitted.found
+    if mistake is None and (found.unknown is not None or not found.best.names):
+        mistake = swapped_directions(data, found.problem)
+    if mistake is not None and mistake.blocks:
+        nothing = found.problem.nothing()
+        found = replace(found, best=nothing, alternatives=(), unknown=mistake.words.rstrip("."), left_over=None)
+        data = replace(data, position_map=None)
+    before = data.stacked_mm - data.chain.stacked({})
+    after = data.stacked_mm - data.chain.stacked(_values(data, found))
+    stands = standing(data, found.problem, before, after)
+    if stands.after_mm > stands.before_mm:
+        # What makes the disagreement larger explains nothing.
+        found = replace(found, best=found.problem.nothing(), alternatives=())
+        data = replace(data, position_map=None)
+        after, stands = before, standing(data, found.problem, before, before)
+    mapped = data.position_map is not None
+    decided, unknown = verdict(found, mapped=mapped, stands=stands)
+    history, best = data.chain.history, found.best
+    n, edges = history.input_mm.size, history.both_edges
+    unseen = left_out_rms_mm(data, found.problem, best)
     channels = {
         name: {
             f"before_rms_{_unit(name)}": float(np.sqrt(np.mean(a**2))),
             f"after_rms_{_unit(name)}": float(np.sqrt(np.mean(b**2))),
         }
-        for (name, a), b in zip(by_channel(bench, before).items(), by_channel(bench, after).values(), strict=True)
+        for (name, a), b in zip(by_channel(data, before).items(), by_channel(data, after).values(), strict=True)
     }
+    noises = [noise.total_mm for noise in found.problem.whitener.noises]
+    noise_rms = float(np.sqrt(0.25 * noises[0] ** 2 + noises[1] ** 2)) if edges else noises[0]
     disagreement = Disagreement(rms_mm(before, n, edges), rms_mm(after, n, edges), noise_rms, *unseen, channels)
-    effects = _named(found)
-    proposal = next_run(bench, found.problem, [e for e in found.alternatives if e.names], refitted.posterior, rng)
+    effects = _named(data, found)
+    errors = data.measured_pure_errors(np.split(found.problem.whitener.aside, len(data.channels)))
+    members = tuple(e for e in found.alternatives if e.names)
+    alternatives = tuple(_with_map(e.names, mapped=mapped) for e in members) or (((NAME,),) if mapped else ())
+    proposal = next_run(data, found.problem, list(members[:MEMBERS_SEPARATED]), refitted.posterior, rng)
     report = DiagnosisReport(
-        verdict=found.verdict,
-        sentence=_sentence(found, effects, disagreement),
+        verdict=decided,
+        sentence=answer(decided, unknown, effects, alternatives, disagreement),
         effects=effects,
-        alternatives=tuple(e.names for e in found.alternatives if e.names),
-        where=places(bench, found.problem, before, rng),
+        alternatives=alternatives,
+        where=places(data, found.problem, before, rng),
         disagreement=disagreement,
+        explained_share=stands.explained_share,
+        standing_share=stands.share,
+        pure_error_mm=None if errors is None else errors[0].sd_mm,
         smallest_seen=found.smallest,
-        unknown=found.unknown,
-        remaining=_remaining(found, disagreement),
+        unknown=unknown,
+        remaining=remaining(stands, found.left_over, best.sigma_mm),
         next_run=proposal,
-        excluded=tuple({"name": name, "reason": reason} for name, reason in bench.excluded.items()),
-        outliers=_outliers(bench, found.problem, after),
+        excluded=tuple({"name": name, "reason": reason} for name, reason in data.excluded.items()),
+        outliers=outliers(data, found.problem, after),
         runners_up=tuple(
             {
                 "effects": list(e.names),
@@ -134,102 +168,66 @@ def diagnose(
             if e.names != best.names
         ),
         notes=(
-            *bench.notes,
-            *bench.refitted(),
-            *force_hint(bench, found.alternatives),
-            *other_evidence(found.alternatives),
-            *_beyond(bench, best),
-            *_input_dominates(bench, found.problem),
+            *data.notes,
+            *data.refitted(),
+            *(() if mistake is None else (mistake.words,)),
+            *_trend(errors),
+            *force_hint(data, found.alternatives),
+            *further_evidence(found.alternatives),
+            *rows_beyond_model(data, best),
+            *input_dominates(data, found.problem),
         ),
         seconds=time.perf_counter() - begin,
     )
     progress(1.0)
-    return Diagnosis(report, bench, before, after)
+    return Diagnosis(report, data, before, after, positioning_of_data(data, _values(data, found)))
+
+
+def _values(data: Observations, found: Findings) -> Settings:
+    """Everything that was found: the effects, and the curve of a map."""
+    if data.position_map is None:
+        return found.best.values
+    return {**found.best.values, NAME: data.position_map.values()}
+
+
+def _with_map(names: tuple[str, ...], *, mapped: bool) -> tuple[str, ...]:
+    return tuple(name for name in catalogue() if name in names or (mapped and name == NAME))
+
+
+def _trend(errors: list[PureError] | None) -> tuple[str, ...]:
+    """Say that repeats follow one another closer than they scatter: a drift, or a run-in."""
+    if errors is None or not errors[0].has_trend:
+        return ()
+    return (
+        "repeats of the same place drift or run in (neighbouring visits agree better than distant ones, by "
+        f"{errors[0].trend_sigmas:.1f} standard deviations): that was taken out of the pure error.",
+    )
 
 
 def _unit(channel: str) -> str:
     return "n" if channel == "force" else "mm"
 
 
-def _named(found: Findings) -> tuple[NamedEffect, ...]:
-    listed = found.problem.parameters(found.best.names)
+def _named(data: Observations, found: Findings) -> tuple[NamedEffect, ...]:
+    listed = [entry for entry in found.problem.parameters(found.best.names) if entry[1].run is None]
     root = np.sqrt(np.maximum(np.diag(found.best.covariance), 0.0))
-    out = []
+    out = {}
     for name in found.best.names:
-        parameters = {
+        known = {
             parameter.name: Estimate(
                 found.best.values[name][parameter.name], float(root[i]) if root[i] > 0.0 else None, parameter.unit
             )
             for i, (owner, parameter) in enumerate(listed)
             if owner == name
         }
-        out.append(NamedEffect(name, str(found.problem.effects[name].stage), parameters))
-    return tuple(out)
-
-
-def _phrase(effect: NamedEffect) -> str:
-    parts = []
-    for name, e in effect.parameters.items():
-        u = "" if e.u is None else f" +-{e.u:.2g}"
-        parts.append(f"{name} = {e.value:.4g}{u}{' ' + e.unit if e.unit else ''}")
-    return f"{effect.name} ({', '.join(parts)})"
-
-
-def _sentence(found: Findings, effects: tuple[NamedEffect, ...], d: Disagreement) -> str:
-    fall = f"the disagreement falls from {d.before_rms_mm:.3g} to {d.after_rms_mm:.3g} mm"
-    fall += f" at {d.noise_rms_mm:.2g} mm of noise"
-    what = " and ".join(_phrase(effect) for effect in effects)
-    if found.verdict is Verdict.AGREES:
-        return (
-            f"Simulation and measurement agree within the noise of {d.noise_rms_mm:.2g} mm "
-            f"(RMS disagreement {d.before_rms_mm:.3g} mm)."
-        )
-    if found.verdict is Verdict.NAMED:
-        return f"The model lacks {what}; {fall}."
-    if found.verdict is Verdict.AMBIGUOUS:
-        names = " or ".join("+".join(e.names) for e in found.alternatives)
-        return f"This data cannot tell {names} apart; with {what}, {fall}."
-    part = f" {what} explains a part; {fall}." if effects else ""
-    return f"There is structure that no effect of the catalogue explains: {found.unknown}.{part}"
-
-
-def _remaining(found: Findings, d: Disagreement) -> str:
-    beyond = float(np.sqrt(max(0.0, d.after_rms_mm**2 - d.noise_rms_mm**2)))
-    words = f"{d.after_rms_mm:.3g} mm remain, {beyond:.2g} mm of it beyond the noise from sample to sample"
-    if found.left_over is not None:
-        words += f"; the largest part, {found.left_over}, is small beside what was explained"
-    spread = found.best.sigma_mm
-    if max(spread, default=0.0) > 0.0:
-        words += f"; runs are offset against each other by {spread[0]:.2g} mm in the gap"
-    return words + "."
-
-
-def _outliers(bench: BenchData, problem: Problem, after: Array) -> tuple[str, ...]:
-    n = bench.chain.history.input_mm.size
-    aside = np.flatnonzero(problem.whitener.aside[:n])
-    out = [f"{aside.size} of {n} samples were set aside as outliers."] if aside.size else []
-    if n <= 60:
-        gap = after[:n] - np.median(after[:n])
-        scale = 1.4826 * float(np.median(np.abs(gap)))
-        out += [
-            f"the row at input {bench.table.input_mm[i]:g} mm lies {gap[i]:+.3g} mm off the others "
-            f"({'set aside' if i in aside else 'kept'})."
-            for i in np.flatnonzero(np.abs(gap) > ODD_SIGMAS * scale)
-        ]
-    return tuple(out)
-
-
-def _beyond(bench: BenchData, best: Explanation) -> tuple[str, ...]:
-    low, high = bench.model.input_range_mm
-    u = bench.chain.history.input_mm
-    moved = u + best.values.get("input_offset", {}).get("offset_mm", 0.0)
-    moved = moved * (1.0 + best.values.get("input_scale", {}).get("ratio", 0.0))
-    rows = int(np.sum((moved < low) | (moved > high)))
-    return (f"for {rows} rows the model was extended by a straight line beyond its inputs.",) if rows else ()
-
-
-def _input_dominates(bench: BenchData, problem: Problem) -> tuple[str, ...]:
-    error = float(np.median(bench.recorded.error_mm))
-    if error > problem.whitener.noises[0].total_mm:
-        return (f"the recorded input's own error ({error:.2g} mm of gap) is larger than the measurement's.",)
-    return ()
+        effect = found.problem.effects[name]
+        # What these data cannot show stays at the value at which it does nothing.
+        still = {p.name: Estimate(p.neutral or 0.0, None, p.unit) for p in effect.parameters if p.name not in known}
+        ordered = {p.name: {**known, **still}[p.name] for p in effect.parameters}
+        out[name] = NamedEffect(name, str(effect.stage), {**ordered, **known})
+    curve = data.position_map
+    if curve is not None:
+        described = {"rms_mm": curve.rms_mm, "length_mm": curve.length_mm}
+        points = tuple(zip(curve.nodes_mm.tolist(), curve.curve_mm.tolist(), strict=True))
+        out[NAME] = NamedEffect(NAME, str(catalogue()[NAME].stage), described, points)
+    return tuple(out[name] for name in catalogue() if name in out)

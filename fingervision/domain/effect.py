@@ -1,7 +1,7 @@
 """A physical effect: something that happens between the recorded input and the measured points."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from functools import cached_property
 from types import MappingProxyType
@@ -59,6 +59,10 @@ class History:
         Whether a force was measured.
     rezeroed : tuple of bool
         Which runs came after a re-zeroing of the stage that others came before; empty where none did.
+    dwell_s : float
+        Shortest time for which the stage stood before it was read; 0 where it was read on its way.
+    commanded : bool
+        Whether the input is a command that keeps its value until it jumps.
     """
 
     input_mm: Array
@@ -73,6 +77,8 @@ class History:
     both_edges: bool = True
     force: bool = False
     rezeroed: tuple[bool, ...] = ()
+    dwell_s: float = 0.0
+    commanded: bool = False
 
     @property
     def times(self) -> Array:
@@ -97,6 +103,30 @@ class History:
     def input_span_mm(self) -> float:
         """Range of the recorded input."""
         return float(np.ptp(self.input_mm))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class InputPath:
+    """The way of the input between and besides the measured rows: what effects with memory follow.
+
+    Parameters
+    ----------
+    history : History
+        The chain's history at every point of the path, of which there are m.
+    rows : ndarray of int, shape (n,)
+        Where on the path each measured row lies.
+    owner : ndarray of int, shape (m,)
+        The measured row whose recorded input a point repeats; -1 where it has its own.
+    """
+
+    history: History
+    rows: NDArray[np.intp]
+    owner: NDArray[np.intp]
+
+    def moved(self, by_mm: Array) -> "InputPath":
+        """Move the recorded inputs of the measured rows, and the points that repeat them; `by_mm` of shape (n,)."""
+        shift = np.where(self.owner >= 0, by_mm[self.owner], 0.0)
+        return replace(self, history=replace(self.history, input_mm=self.history.input_mm + shift))
 
 
 DriveAct = Callable[[Array, History, Values], Array]
@@ -128,7 +158,12 @@ class Effect:
     needs_times, needs_shared_clock, needs_edges, needs_force : bool
         Data without which the effect is excluded.
     memory : bool
-        Whether the past counts; such effects start each run at rest.
+        Whether the past counts.
+    start : str
+        What the state of an effect with memory is at a run's start, in words; empty where it is known. Such a start is
+        a nuisance of its run: a number from -1 to 1 under the key `start_key(run)`.
+    curve : bool
+        Whether its form is a curve that is estimated as a whole; its parameters then only describe the curve.
     narrow : callable or None
         Bounds that follow from the data: `narrow(history)` gives the parameters to search, or the reason why
         these data cannot show the effect.
@@ -149,6 +184,8 @@ class Effect:
     needs_edges: bool = False
     needs_force: bool = False
     memory: bool = False
+    start: str = ""
+    curve: bool = False
     narrow: Callable[[History], "tuple[Parameter, ...] | str"] | None = None
     foretold: Mapping[str, tuple[float, float]] = field(default_factory=lambda: MappingProxyType({}))
 
@@ -162,7 +199,19 @@ class Effect:
             return "the table has no left_mm and right_mm, and the gap alone does not show it"
         if self.needs_force and not history.force:
             return "the table has no force_n, and the gap hardly shows it"
-        return self.parameters if self.narrow is None else self.narrow(history)
+        found = self.parameters if self.narrow is None else self.narrow(history)
+        if isinstance(found, str) or not self.start:
+            return found
+        return (*found, *(_start(self.start, run) for run in range(len(history.runs))))
+
+
+def start_key(run: int) -> str:
+    """Name of the start state of a run among an effect's values."""
+    return f"start_{run + 1}"
+
+
+def _start(words: str, run: int) -> Parameter:
+    return Parameter(start_key(run), "", -1.0, 1.0, f"{words}, in run {run + 1}", run=run)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

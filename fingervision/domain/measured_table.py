@@ -10,6 +10,26 @@ from fingervision.domain.reference_slot import ReferenceSlot
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class RecordedPath:
+    """Every row that has an input, measured or not, runs one after the other, sorted by time within each.
+
+    Parameters
+    ----------
+    input_mm, time_s : ndarray of float, shape (m,)
+        Recorded input and times.
+    runs : tuple of slice
+        Rows of each run.
+    rows : ndarray of int, shape (n,)
+        Those that have a gap too.
+    """
+
+    input_mm: NDArray[np.float64]
+    time_s: NDArray[np.float64]
+    runs: tuple[slice, ...]
+    rows: NDArray[np.intp]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class MeasuredTable:
     """Rows of a measured table that have a value, runs one after the other, sorted by time within each.
 
@@ -33,6 +53,8 @@ class MeasuredTable:
         What the reader mended or left out, a sentence each.
     slots : tuple of ReferenceSlot
         Widths that are known, measured through the same camera.
+    path : RecordedPath or None
+        The rows with those that have an input and no gap; None where there are none of these, or no times.
     """
 
     input_mm: NDArray[np.float64]
@@ -45,6 +67,7 @@ class MeasuredTable:
     force_n: NDArray[np.float64] | None = None
     notes: tuple[str, ...] = ()
     slots: tuple[ReferenceSlot, ...] = ()
+    path: RecordedPath | None = None
 
     @property
     def shared_clock(self) -> bool:

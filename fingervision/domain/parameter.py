@@ -35,6 +35,9 @@ class Parameter:
     typical : float or None
         Physical prior: the size that a well-run bench would not exceed often. It only decides which of several
         explanations that the data cannot tell apart is named first.
+    run : int or None
+        The run whose start state this is: a nuisance that is fitted beside the effect and is no part of an answer.
+        None for a parameter of the effect itself.
     """
 
     name: str
@@ -48,6 +51,7 @@ class Parameter:
     reciprocal: bool = False
     rugged: bool = False
     typical: float | None = None
+    run: int | None = None
 
     def starting_values(self) -> NDArray[np.float64]:
         """Values from which a search sets out, inside the bounds.

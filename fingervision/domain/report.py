@@ -18,11 +18,12 @@ class Verdict(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class NamedEffect:
-    """An effect of the answer with its parameters."""
+    """An effect of the answer with its parameters; `points` is the curve of a map, input and error in mm."""
 
     name: str
     stage: str
     parameters: Mapping[str, Estimate]
+    points: tuple[tuple[float, float], ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,7 +66,11 @@ class NextRun:
 
 @dataclass(frozen=True, slots=True)
 class DiagnosisReport:
-    """The whole answer; fields as in report.json."""
+    """The whole answer; fields as in report.json.
+
+    `explained_share` is 1 - (after / before)^2, `standing_share` after / before, both of the disagreement without the
+    runs' scatter and outliers; `pure_error_mm` is the scatter of repeats of the gap, None where nothing repeats.
+    """
 
     verdict: Verdict
     sentence: str
@@ -73,6 +78,9 @@ class DiagnosisReport:
     alternatives: tuple[tuple[str, ...], ...]
     where: tuple[Place, ...]
     disagreement: Disagreement
+    explained_share: float
+    standing_share: float
+    pure_error_mm: float | None
     smallest_seen: Mapping[str, Mapping[str, object]]
     unknown: str | None
     remaining: str

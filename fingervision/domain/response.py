@@ -40,3 +40,8 @@ class Response:
     def shifted(self, by_mm: NDArray[np.float64] | float) -> "Response":
         """Both points moved together, to the right where `by_mm` is positive."""
         return replace(self, left_mm=self.left_mm + by_mm, right_mm=self.right_mm + by_mm)
+
+    def at(self, rows: NDArray[np.intp]) -> "Response":
+        """Pick samples; `rows` of shape (k,)."""
+        force_n = None if self.force_n is None else self.force_n[rows]
+        return Response(self.left_mm[rows], self.right_mm[rows], force_n)

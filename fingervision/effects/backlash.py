@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from fingervision.domain.effect import Array, DriveEffect, History, Stage, Values
+from fingervision.domain.effect import Array, DriveEffect, History, Stage, Values, start_key
 from fingervision.domain.parameter import Parameter
 from fingervision.effects.play_operator import play
 
@@ -10,8 +10,8 @@ from fingervision.effects.play_operator import play
 def act(input_mm: Array, history: History, values: Values) -> Array:
     """Apply the effect: motion reverses only after the play is taken up."""
     out = np.empty_like(input_mm)
-    for run in history.runs:
-        out[run] = play(input_mm[run], values["play_mm"])
+    for index, run in enumerate(history.runs):
+        out[run] = play(input_mm[run], values["play_mm"], values.get(start_key(index), 0.0))
     return out
 
 
@@ -20,11 +20,12 @@ EFFECT = DriveEffect(
     stage=Stage.DRIVE,
     order=60,
     words="motion reverses only after the play is taken up",
-    formula="play operator of full width play_mm, centred at the start of each run",
+    formula="play operator of full width play_mm, anywhere within it at the start of each run",
     source="Prandtl play; Visintin 1994",
     residual="two parallel branches, half the play to either side of the simulation",
     parameters=(Parameter("play_mm", "mm", 0.0, 0.5, "full width of the play", starts=8, logarithmic=True),),
     needs_times=True,
     memory=True,
+    start="where the play stands at the start, in half widths",
     act=act,
 )

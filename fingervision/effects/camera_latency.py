@@ -5,7 +5,7 @@ from dataclasses import replace
 from fingervision.domain.effect import History, PointEffect, Stage, Values
 from fingervision.domain.parameter import Parameter
 from fingervision.domain.response import Response
-from fingervision.effects.late import late
+from fingervision.effects.late import delay_that_shows, late
 
 
 def act(response: Response, history: History, values: Values) -> Response:
@@ -27,6 +27,11 @@ def _stamped(response: Response, history: History, values: Values, *, curved: bo
     return replace(response, left_mm=left_mm, right_mm=right_mm)
 
 
+def narrow(history: History) -> tuple[Parameter, ...] | str:
+    """Bound the parameters by what these data can show."""
+    return delay_that_shows(history, EFFECT.parameters[0])
+
+
 EFFECT = PointEffect(
     name="camera_latency",
     stage=Stage.CAMERA,
@@ -37,6 +42,7 @@ EFFECT = PointEffect(
     residual="proportional to the speed of the points, drifts included",
     parameters=(Parameter("delay_s", "s", 0.0, 1.0, "delay", starts=8, logarithmic=True),),
     needs_times=True,
+    narrow=narrow,
     act=act,
     act_curved=act_curved,
 )

@@ -2,7 +2,7 @@
 
 from fingervision.domain.effect import Array, DriveEffect, History, Stage, Values
 from fingervision.domain.parameter import Parameter
-from fingervision.effects.late import late
+from fingervision.effects.late import delay_that_shows, late
 
 
 def act(input_mm: Array, history: History, values: Values) -> Array:
@@ -13,6 +13,11 @@ def act(input_mm: Array, history: History, values: Values) -> Array:
 def act_curved(input_mm: Array, history: History, values: Values) -> Array:
     """Apply the effect to a stage that went along curves between the recorded inputs."""
     return late(input_mm, history, values["delay_s"], curved=True)
+
+
+def narrow(history: History) -> tuple[Parameter, ...] | str:
+    """Bound the parameters by what these data can show."""
+    return delay_that_shows(history, EFFECT.parameters[0])
 
 
 EFFECT = DriveEffect(
@@ -26,6 +31,7 @@ EFFECT = DriveEffect(
     parameters=(Parameter("delay_s", "s", 0.0, 1.0, "delay", starts=8, logarithmic=True),),
     needs_times=True,
     memory=True,
+    narrow=narrow,
     act=act,
     act_curved=act_curved,
 )

@@ -20,6 +20,8 @@ def narrow(history: History) -> tuple[Parameter, ...] | str:
     lowest_mm = max(0.0, history.rest_gap_mm - history.closing_mm)
     if history.closing_mm <= 0.0:
         return "the gripper is never closed below its rest gap"
+    if history.rest_gap_mm <= lowest_mm:
+        return "the gap at rest is not above zero, so there are no fingers that could meet"
     floor, slope = EFFECT.parameters
     return replace(floor, lower=lowest_mm, upper=history.rest_gap_mm, neutral=lowest_mm), slope
 

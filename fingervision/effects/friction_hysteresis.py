@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from fingervision.domain.effect import Array, DriveEffect, History, Stage, Values
+from fingervision.domain.effect import Array, DriveEffect, History, Stage, Values, start_key
 from fingervision.domain.parameter import Parameter
 from fingervision.effects.play_operator import play
 
@@ -12,10 +12,11 @@ from fingervision.effects.play_operator import play
 def act(input_mm: Array, history: History, values: Values) -> Array:
     """Apply the effect: a smooth loop, independent of speed."""
     out = np.empty_like(input_mm)
-    for run in history.runs:
+    for index, run in enumerate(history.runs):
+        start = values.get(start_key(index), 0.0)
         lag = np.zeros_like(input_mm[run])
         for k in range(1, 9):
-            lag += input_mm[run] - play(input_mm[run], 2.0 * values["reach_mm"] * k / 8.0)
+            lag += input_mm[run] - play(input_mm[run], 2.0 * values["reach_mm"] * k / 8.0, start)
         out[run] = input_mm[run] - values["fraction"] * lag / 8.0
     return out
 
@@ -49,6 +50,7 @@ EFFECT = DriveEffect(
     ),
     needs_times=True,
     memory=True,
+    start="how far the sliders are drawn at the start, in their reaches",
     narrow=narrow,
     act=act,
 )

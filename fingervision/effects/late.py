@@ -1,10 +1,15 @@
 """A signal some time ago."""
 
+from dataclasses import replace
+
 import numpy as np
 from scipy.interpolate import Akima1DInterpolator
 
 from fingervision.domain.effect import Array, History
+from fingervision.domain.parameter import Parameter
 
+COMMANDED_STARTS = 60
+"""Delays that are tried under step commands: each an eighth longer than the one before, which a scan spans."""
 FEWEST = 4
 """Samples of a run that draw a curve."""
 
@@ -36,3 +41,16 @@ def late(signal: Array, history: History, delay_s: float, *, curved: bool = Fals
         else:
             out[run] = np.interp(ago_s, time_s, own)
     return out
+
+
+def delay_that_shows(history: History, delay: Parameter) -> tuple[Parameter, ...] | str:
+    """Bound a delay by what the data can show: none where every reading was taken when it was over.
+
+    Under step commands the prediction changes in jumps as the delay passes from one sample to the next.
+    """
+    if history.dwell_s <= delay.upper:
+        return (replace(delay, rugged=True, starts=COMMANDED_STARTS) if history.commanded else delay,)
+    return (
+        f"the stage is taken to have stood for {history.dwell_s:.3g} s or longer before each reading, "
+        f"and a delay of at most {delay.upper:g} s is over by then"
+    )

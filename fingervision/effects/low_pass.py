@@ -7,10 +7,10 @@ from fingervision.domain.effect import Array
 
 
 @compiled_as_written
-def low_pass(signal: Array, time_s: Array, tau_s: float) -> Array:
-    """Relax one run's signal towards itself with time constant `tau_s`, at rest at the first sample; shape (n,)."""
+def low_pass(signal: Array, time_s: Array, tau_s: float, start: float) -> Array:
+    """Relax one run's signal towards itself with time constant `tau_s`, from `start` at the first sample; (n,)."""
     out = np.empty_like(signal)
-    out[0] = signal[0]
+    out[0] = start
     for i in range(1, signal.size):
         step_s = time_s[i] - time_s[i - 1]
         lag = (signal[i] - signal[i - 1]) / step_s * tau_s

@@ -1,11 +1,14 @@
 """The opening goes on moving under a held input."""
 
-from fingervision.domain.effect import History, PointEffect, Stage, Values
+from fingervision.domain.effect import History, PointEffect, Stage, Values, start_key
 from fingervision.domain.parameter import Parameter
 from fingervision.domain.response import Response
 from fingervision.effects.low_pass import low_pass
 
 TAUS_S = (1, 4, 16, 64)
+SLOWER = 2.0
+"""Times the dwell before a reading that a time constant must be to show: the dwell is taken for half of the time
+between two readings, and what relaxes faster than between them depends on when the stage arrived."""
 
 
 def act(response: Response, history: History, values: Values) -> Response:
@@ -13,13 +16,23 @@ def act(response: Response, history: History, values: Values) -> Response:
     opening_mm = response.gap_mm - history.rest_gap_mm
     crept_mm = opening_mm.copy()
     for tau_s in TAUS_S:
-        fraction = values[f"fraction_{tau_s}s"]
+        fraction = values.get(f"fraction_{tau_s}s", 0.0)
         if fraction != 0.0:
-            for run in history.runs:
+            for index, run in enumerate(history.runs):
+                # What was held before the run is somewhere within the openings of the record.
+                relaxed_mm = opening_mm[run][0] + values.get(start_key(index), 0.0) * history.opening_mm
                 crept_mm[run] -= fraction * (
-                    opening_mm[run] - low_pass(opening_mm[run], history.times[run], float(tau_s))
+                    opening_mm[run] - low_pass(opening_mm[run], history.times[run], float(tau_s), relaxed_mm)
                 )
     return response.with_gap(history.rest_gap_mm + crept_mm)
+
+
+def narrow(history: History) -> tuple[Parameter, ...] | str:
+    """Leave out what relaxes within the time in which the stage arrived and waited: nobody knows when it came."""
+    kept = tuple(p for p, tau_s in zip(EFFECT.parameters, TAUS_S, strict=True) if tau_s >= SLOWER * history.dwell_s)
+    if not kept:
+        return f"the stage stood for {history.dwell_s:.3g} s or longer before each reading: creep is over by then"
+    return kept
 
 
 EFFECT = PointEffect(
@@ -38,5 +51,7 @@ EFFECT = PointEffect(
     ),
     needs_times=True,
     memory=True,
+    start="opening to which the body had relaxed before, beside the first one, in largest openings",
+    narrow=narrow,
     act=act,
 )

@@ -15,72 +15,91 @@ class DamageTrail:
     """Follows packets into a decoder and pictures out of it.
 
     A picture that is coded as a difference hangs on those before it. After a packet that could not be decoded the
-    decoder goes on with a guess, and pictures look whole and are wrong; so everything that was coded after the broken
-    packet is damaged until a key frame. Packets and pictures are matched by their presentation times, because pictures
-    leave in another order than packets enter.
+    decoder goes on with a guess, and pictures look whole and are wrong; so everything that was coded after a broken
+    packet is damaged until a key frame that is not itself broken. Pictures leave in another order than packets enter,
+    so every packet carries its number through the decoder (FFmpeg's `copy_opaque`, see `prepare`).
     """
 
     def __init__(self) -> None:
         self._numbers = count()
         self._entered: list[tuple[int, int]] = []  # (tick, number in coded order) of packets whose picture is awaited
         self._last = -1
-        self._broken_from: int | None = None
-        self._why = ""
+        self._broken: dict[int, str] = {}  # why, by number in coded order, until a sound key frame comes after it
         self._given_up: set[int] = set()  # ticks of lost pictures since the damage
+
+    @staticmethod
+    def prepare(codec: av.CodecContext) -> None:
+        """Make a decoder, before its first packet, hand on the numbers of packets to their pictures."""
+        codec.copy_opaque = True
 
     def enters(self, packet: av.Packet[av.VideoStream]) -> None:
         """Note a packet that goes into the decoder."""
         self._last = next(self._numbers)
+        packet.opaque = self._last
         if packet.is_corrupt:
             self.breaks("It is incomplete in the file.")
         if packet.pts is not None and not packet.is_discard:
             heapq.heappush(self._entered, (packet.pts, self._last))
 
     def breaks(self, why: str) -> None:
-        """Note that the packet that went in last could not be decoded."""
-        if self._broken_from is None:
-            self._broken_from, self._why = self._last, why
+        """Note that the packet that went in last could not be decoded, or not be found whole."""
+        self._broken.setdefault(self._last, why)
+
+    def fails(self, why: str) -> Iterator[Picture]:
+        """Note that the packet that went in last, a picture by itself, gives none; its place is taken now."""
+        self.breaks(why)
+        own = [entry for entry in self._entered if entry[1] == self._last]
+        for entry in own:
+            self._entered.remove(entry)
+            heapq.heapify(self._entered)
+        yield own[0][0] if own else None, why
+
+    def hole(self, why: str) -> None:
+        """Note that something is missing between the packet that went in last, whose end may be hurt, and the next."""
+        self.breaks(why)
+        self._last = next(self._numbers)
+        self._broken[self._last] = why
+
+    def lost(self, tick: int, why: str) -> None:
+        """Note a frame that should have come now and is not there; it leaves in its turn."""
+        self.hole(why)
+        heapq.heappush(self._entered, (tick, self._last))
 
     def leaves(self, picture: av.VideoFrame) -> Iterator[Picture]:
         """Give the picture that came out, after the lost ones that should have come before it."""
         tick = picture.pts
         if tick in self._given_up:
             return  # behind damage pictures may leave too late; its place is taken
-        number = self._last
+        number = picture.opaque if isinstance(picture.opaque, int) else self._last
         while tick is not None and self._entered and self._entered[0][0] <= tick:
             early, early_number = heapq.heappop(self._entered)
             if early == tick:
-                number = early_number
                 break
-            if self._broken_from is not None:
+            if self._broken:
                 self._given_up.add(early)
                 yield early, self._words(early_number)
-        if picture.is_corrupt and self._broken_from is None:
-            self._broken_from, self._why = number, "It was decoded with errors."
-        if (
-            picture.key_frame
-            and not picture.is_corrupt
-            and self._broken_from is not None
-            and number > self._broken_from
-        ):
-            self._broken_from = None
+        if picture.is_corrupt:
+            self._broken.setdefault(number, "It was decoded with errors.")
+        if picture.key_frame and number not in self._broken:
+            self._broken = {broken: why for broken, why in self._broken.items() if broken > number}
+        if not self._broken:
             self._given_up.clear()
-        if self._hangs_on_damage(number):
-            yield tick, self._words(number)
-        else:
-            yield tick, picture
+        yield tick, self._words(number) if self._hangs_on_damage(number) else picture
 
     def rest(self) -> Iterator[Picture]:
         """Give what was still awaited behind damage when the recording ended."""
         while self._entered:
             tick, number = heapq.heappop(self._entered)
-            if self._broken_from is not None:
+            if self._broken:
                 yield tick, self._words(number)
 
     def _hangs_on_damage(self, number: int) -> bool:
-        return self._broken_from is not None and number >= self._broken_from
+        return any(broken <= number for broken in self._broken)
 
     def _words(self, number: int) -> str:
-        if self._broken_from is None or number <= self._broken_from:
-            return self._why
-        return "It is coded as a difference to a frame that is damaged."
+        own = self._broken.get(number)
+        if own is not None:
+            return own
+        if self._hangs_on_damage(number):
+            return "It is coded as a difference to a frame that is damaged."
+        return "It was lost where the recording is damaged."

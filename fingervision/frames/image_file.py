@@ -16,6 +16,8 @@ IMAGE_SUFFIXES = LOSSY_SUFFIXES | {".png", ".bmp", ".tif", ".tiff"}
 
 PNG_SIGNATURE = b"\x89PNG\r\n\x1a\n"
 JPEG_START, JPEG_END = b"\xff\xd8", b"\xff\xd9"
+# A few bytes can state any size. The largest cameras have 150 million pixels; a picture of that takes 150 MB a copy.
+MOST_PIXELS = 200_000_000
 TIFF_STARTS = (b"II*\x00", b"MM\x00*", b"II+\x00", b"MM\x00+")
 
 
@@ -56,6 +58,11 @@ def read_image(file: Path) -> Pixels:
         raise UnreadableImageError(f"{file.name} ends before its picture does.")
     elif content.startswith(TIFF_STARTS) and cv2.imcount(str(file)) > 1:
         raise UnreadableImageError(f"{file.name} holds several pictures: save each of them as a file of its own.")
+    width_px, height_px = _stated_size_px(content)
+    if width_px * height_px > MOST_PIXELS:
+        raise UnreadableImageError(
+            f"{file.name} states {width_px}x{height_px} pixels, more than {MOST_PIXELS // 10**6} million: cut it."
+        )
     pixels = _decoded(content)
     if pixels is None:
         raise UnreadableImageError(f"{file.name} is damaged or no image.")
@@ -66,6 +73,21 @@ def read_image(file: Path) -> Pixels:
     if pixels.shape[2] < 3:
         return np.ascontiguousarray(pixels[:, :, 0])
     return np.ascontiguousarray(pixels[:, :, 2::-1])
+
+
+def _stated_size_px(content: bytes) -> tuple[int, int]:
+    """Width and height that a PNG or JPEG states, before anything is made of that size; (0, 0) for other formats."""
+    if content.startswith(PNG_SIGNATURE) and len(content) >= 24:
+        width_px, height_px = struct.unpack_from(">II", content, 16)
+        return width_px, height_px
+    place = 2 if content.startswith(JPEG_START) else len(content)
+    while place + 9 < len(content) and content[place] == 0xFF:
+        kind = content[place + 1]
+        if 0xC0 <= kind <= 0xCF and kind not in (0xC4, 0xC8, 0xCC):  # start of frame (ITU-T T.81, table B.1)
+            height_px, width_px = struct.unpack_from(">HH", content, place + 5)
+            return width_px, height_px
+        place += 2 + struct.unpack_from(">H", content, place + 2)[0]
+    return 0, 0
 
 
 def _decoded(content: bytes) -> NDArray[Any] | None:

@@ -1,5 +1,6 @@
 """Network cameras: rtsp:// and http:// streams through PyAV, with the camera's own packets kept."""
 
+import io
 import re
 from collections.abc import Iterator
 from itertools import count
@@ -12,12 +13,17 @@ import av
 from fingervision.domain.errors import FingervisionError, UsageError
 from fingervision.domain.frame import Coding, Frame, LostFrame
 from fingervision.domain.status import Status
-from fingervision.frames.damage import DamageTrail
+from fingervision.frames.damage import DamageTrail, Picture
 from fingervision.frames.luma import luma
 from fingervision.frames.received import OwnPacket, Received
 from fingervision.frames.source import Description, Wish
-from fingervision.frames.video_file import SPOKEN_DAMAGE, STRICT
+from fingervision.frames.spoken_damage import STRICT, Heard, listening
+from fingervision.frames.transport_stream import TransportLosses
 
+# Names that cameras give to what nobody else shall know: password, pwd, token, key, auth, user, loginpas and the like.
+SECRET_PARAMETERS = re.compile(
+    r"([?&;][^=&;#]*(?:pass|pwd|psw|pw|token|key|secret|auth|user|usr|login)[^=&;#]*=)[^&;#]*", re.I
+)
 STARTS = ("rtsp://", "http://", "https://")
 # A camera that answers no sooner is not there; one that has been silent for so long is cut off.
 OPEN_TIMEOUT_S, READ_TIMEOUT_S = 5.0, 2.0
@@ -27,6 +33,8 @@ OPTIONS = {"rtsp_transport": "tcp", "fflags": "nobuffer", "flags": "low_delay", 
 INTRAFRAME_CODECS = frozenset({"mjpeg", "png"})
 # In these formats pictures follow one another without times.
 WITHOUT_TIMES = frozenset({"mpjpeg", "mjpeg", "jpeg_pipe", "image2pipe", "h264", "hevc"})
+# What FFmpeg warns of when a network lost something: sequence numbers that are missing, a picture without its end.
+LOST_ON_THE_WAY = ("RTP: missed", "max delay reached", "Packet corrupt", "Continuity check failed")
 LOSSLESS_CODECS = frozenset({"png", "rawvideo", "ffv1"})
 
 
@@ -37,7 +45,9 @@ def accepts(name: str) -> bool:
 
 def without_password(name: str) -> str:
     """Give the address as it may be shown and kept: a camera's password belongs in neither page nor run."""
-    return re.sub(r"^(\w+://[^/@:]*):[^/@]*@", r"\1:***@", name)
+    # A password may hold `/` and `@`: what stands before the last @ is who asks, not where.
+    shown = re.sub(r"^(\w+://[^/@:?#]*):.*@", r"\1:***@", name)
+    return SECRET_PARAMETERS.sub(r"\1***", shown)
 
 
 def open_frames(name: str, wish: Wish) -> "NetworkStream":
@@ -87,10 +97,13 @@ class NetworkStream:
         if not self._container.streams.video or self._container.streams.video[0].codec_context is None:
             self._container.close()
             raise FingervisionError(f"The stream {self.name} must hold a video that can be decoded, but has none.")
-        self.template: av.VideoStream | None = self._container.streams.video[0]
         self._stream = self._container.streams.video[0]
+        # How the stream is coded, in a container of our own: a recording may begin after the camera's is closed.
+        self._kept = av.open(io.BytesIO(), "w", format="matroska")
+        self.template: av.VideoStream | None = self._kept.add_stream_from_template(self._stream)
         codec = self._stream.codec_context
         codec.options = STRICT
+        DamageTrail.prepare(codec)
         codec.thread_count = 1  # threads of frames would each keep one back
         if codec.width < 1 or codec.height < 1:
             self._container.close()
@@ -120,23 +133,25 @@ class NetworkStream:
     def received(self) -> Iterator[Received]:
         """Frames with the packets that they came in."""
         numbers, trail = count(), DamageTrail()
+        losses = TransportLosses(self._container.format.name)
         last_s: float | None = None
         waiting: list[OwnPacket] = []
-        level = av.logging.get_level()
-        av.logging.set_level(av.logging.ERROR)
         try:
-            with av.logging.Capture(local=False) as log:
+            with listening(self._stream.codec_context.name, LOST_ON_THE_WAY) as heard:
                 for packet, arrived_s in self._packets():
                     waiting.append(self._own(packet, arrived_s))
+                    if said := heard.of_file():
+                        trail.hole(f"Data of the stream were lost ({said}).")
+                    losses.before(packet, trail)
                     trail.enters(packet)
-                    for tick, found in self._decoded(packet, trail, log):
+                    losses.behind(packet, trail)
+                    for tick, found in self._decoded(packet, trail, heard):
                         time_s = self._time_s(tick, arrived_s)
                         item = self._item(next(numbers), time_s, found, last_s)
                         last_s = time_s
                         yield Received(item, arrived_s, tuple(waiting))
                         waiting.clear()
         finally:
-            av.logging.set_level(level)
             self._container.close()
 
     def close(self) -> None:
@@ -158,23 +173,20 @@ class NetworkStream:
     def _cut(self, why: str) -> str:
         return f"The stream {self.name} is cut off ({why})."
 
-    def _decoded(
-        self, packet: "av.Packet[av.VideoStream]", trail: DamageTrail, log: list[tuple[int, str, str]]
-    ) -> Iterator[tuple[int | None, av.VideoFrame | str]]:
-        log.clear()
+    def _decoded(self, packet: "av.Packet[av.VideoStream]", trail: DamageTrail, heard: Heard) -> Iterator[Picture]:
         try:
             pictures = packet.decode()
         except av.FFmpegError as error:
-            trail.breaks(f"It could not be decoded ({error.strerror}).")
-            if self.description.coding is not Coding.INTERFRAME:
-                yield packet.pts, f"It could not be decoded ({error.strerror})."
+            why = f"It could not be decoded ({error.strerror})."
+            if self.description.coding is Coding.INTERFRAME:
+                trail.breaks(why)
+            else:
+                yield from trail.fails(why)
             return
-        codec = self._stream.codec_context.name
-        said = [
-            words for _, speaker, words in log if speaker == codec and words.startswith(SPOKEN_DAMAGE.get(codec, ()))
-        ]
+        finally:
+            said = heard.of_picture()
         if said:
-            trail.breaks(f"It arrived damaged ({said[0].strip()}).")
+            trail.breaks(f"It arrived damaged ({said}).")
         for picture in pictures:
             yield from trail.leaves(picture)
 

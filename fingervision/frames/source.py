@@ -144,6 +144,12 @@ def open_source(name: str, wish: Wish | None = None) -> FrameSource:
     FingervisionError
         No kind of source knows the name, or the one that does cannot read it.
     """
+    if not name:
+        raise UsageError("The recording must have a name, but it is empty: give a file, a folder, or a glob in quotes.")
+    if Path(name).exists() and not (Path(name).is_file() or Path(name).is_dir() or name.startswith("/dev/")):
+        raise FingervisionError(
+            f"{name} must be a file or a folder, but is a pipe or a device: save it as a file first."
+        )
     for module in kinds():
         if module.accepts(name):
             source: FrameSource = module.open_frames(name, wish or Wish())

@@ -1,7 +1,6 @@
 """Video files through PyAV: any container, the container's own times, read in sequence and never by seeking."""
 
 from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass, field
 from itertools import count
 from pathlib import Path
@@ -12,18 +11,16 @@ from fingervision.domain.errors import FingervisionError, UsageError
 from fingervision.domain.frame import Coding, Frame, LostFrame
 from fingervision.domain.status import Status
 from fingervision.frames.damage import DamageTrail
+from fingervision.frames.file_pictures import pictures
 from fingervision.frames.image_file import IMAGE_SUFFIXES
 from fingervision.frames.luma import luma
 from fingervision.frames.source import Description, Wish
+from fingervision.frames.spoken_damage import STRICT
+from fingervision.frames.told_times import believable
 
 # FFmpeg's AV_CODEC_PROP_INTRA_ONLY and AV_CODEC_PROP_LOSSY. A codec that can do both (H.264) counts as lossy, because
 # the stream does not say.
 INTRA_PROPERTY, LOSSY_PROPERTY = 1, 2
-# These decoders fill in a damaged part from the picture before, and say so in FFmpeg's log alone: beginnings of lines.
-# Codecs without a checksum (H.264) can be damaged without anybody noticing; FFV1 has one for each slice.
-SPOKEN_DAMAGE = {"ffv1": ("",), "mjpeg": ("overread", "error ")}
-# A damaged slice is an error, not a guess from the picture before it; checksums are looked at where there are any.
-STRICT = {"err_detect": "crccheck+explode"}
 
 
 def _coding(properties: int) -> Coding:
@@ -108,7 +105,8 @@ class VideoFile:
         with self._opened() as container:
             stream = _stream(container, self.name)
             stream.codec_context.options = STRICT
-            for tick, found in _pictures(container, stream):
+            DamageTrail.prepare(stream.codec_context)
+            for tick, found in believable(pictures(container, stream, Path(self.name))):
                 index = next(numbers)
                 time_s = None if tick is None or stream.time_base is None else float(tick * stream.time_base)
                 if isinstance(found, str):
@@ -123,101 +121,10 @@ class VideoFile:
 
     def _opened(self) -> av.container.InputContainer:
         try:
-            return av.open(self.name)
+            # FFmpeg takes what stands before a colon for a protocol: 12:30:05.mp4 is a file.
+            return av.open(f"file:{self.name}")
         except (av.FFmpegError, OSError) as error:
             raise FingervisionError(_not_a_video(self.name, error)) from error
-
-
-def _pictures(
-    container: av.container.InputContainer, stream: av.VideoStream
-) -> Iterator[tuple[int | None, av.VideoFrame | str]]:
-    """Pictures with their ticks in order of presentation, or what happened instead of one."""
-    trail = DamageTrail()
-    packets, last_end_s = 0, None
-    demuxed = container.demux(stream)
-    with _log_of_decoders() as log:
-        while True:
-            try:
-                packet = next(demuxed, None)
-            except av.FFmpegError as error:
-                yield from trail.rest()
-                yield None, f"The file cannot be read any further ({error.strerror})."
-                return
-            if packet is None:
-                break
-            if packet.size:
-                packets += 1
-                trail.enters(packet)
-                if packet.pts is not None and packet.time_base is not None:
-                    last_end_s = max(last_end_s or 0.0, float((packet.pts + (packet.duration or 0)) * packet.time_base))
-            log.clear()
-            try:
-                pictures = packet.decode()
-            except av.FFmpegError as error:
-                trail.breaks(f"It could not be decoded ({error.strerror}).")
-                continue
-            if log and (said := _spoken_damage(stream.codec_context.name, log)):
-                trail.breaks(f"It is damaged in the file ({said}).")
-            for picture in pictures:
-                yield from trail.leaves(picture)
-    yield from trail.rest()
-    missing = _cut_off(container, stream, packets, last_end_s)
-    if missing:
-        yield None, missing
-
-
-@contextmanager
-def _log_of_decoders() -> Iterator[list[tuple[int, str, str]]]:
-    """Listen to what FFmpeg says of errors, and keep it off the user's screen."""
-    before = av.logging.get_level()
-    av.logging.set_level(av.logging.ERROR)
-    try:
-        # Slices are decoded by threads of FFmpeg's own, so not this thread alone.
-        with av.logging.Capture(local=False) as log:
-            yield log
-    finally:
-        av.logging.set_level(before)
-
-
-def _spoken_damage(codec: str, log: list[tuple[int, str, str]]) -> str:
-    """Find what a decoder says of damage; empty where it says nothing of it."""
-    for _, speaker, words in log:
-        if speaker == codec and words.startswith(SPOKEN_DAMAGE.get(codec, ())):
-            return words.strip()
-    return ""
-
-
-def _cut_off(
-    container: av.container.InputContainer, stream: av.VideoStream, packets: int, last_end_s: float | None
-) -> str | None:
-    """Say so if the file states more than it holds."""
-    kind = container.format.name
-    if "mp4" in kind and stream.frames > packets:
-        return f"The recording is cut off here: the file announces {stream.frames} frames and holds {packets}."
-    stated_s = None
-    if "matroska" in kind:
-        stated_s = _clock_s(stream.metadata.get("DURATION")) or (
-            container.duration / av.time_base if container.duration and len(container.streams) == 1 else None
-        )
-    elif "avi" in kind and stream.duration and stream.time_base:
-        stated_s = float(stream.duration * stream.time_base)
-    if stated_s is None or not stream.average_rate:
-        return None
-    # One frame and a half: containers round, and some count up to the last frame's start, others to its end.
-    if stated_s - (last_end_s or 0.0) > 1.5 / float(stream.average_rate):
-        return (
-            f"The recording is cut off here: the file announces {stated_s:.2f} s and holds {last_end_s or 0.0:.2f} s."
-        )
-    return None
-
-
-def _clock_s(clock: str | None) -> float | None:
-    """Seconds of Matroska's hours:minutes:seconds."""
-    try:
-        hours, minutes, seconds = (float(part) for part in (clock or "").split(":"))
-    except ValueError:
-        return None
-    return 3600.0 * hours + 60.0 * minutes + seconds
 
 
 def _stream(container: av.container.InputContainer, name: str) -> av.VideoStream:

@@ -3,6 +3,7 @@
 from collections import deque
 from itertools import pairwise
 from statistics import median, pstdev
+from threading import RLock
 
 # Rate and jitter are those of so many frames.
 FRAMES_LOOKED_AT = 100
@@ -21,9 +22,10 @@ FORGIVEN_SHARE = 0.02
 
 
 class Cadence:
-    """Watches the times of frames."""
+    """Watches the times of frames; one thread adds, any may ask."""
 
     def __init__(self) -> None:
+        self._lock = RLock()
         self.missing = 0
         self._times_s: deque[float] = deque(maxlen=FRAMES_LOOKED_AT)
         self._long_s: deque[float] = deque(maxlen=FRAMES_FOR_THE_PERIOD)
@@ -32,13 +34,18 @@ class Cadence:
 
     def restart(self) -> None:
         """Forget the times before a cut, which is no drop."""
-        self._times_s.clear()
-        self._long_s.clear()
-        self._lateness_s.clear()
-        self._due_s = None
+        with self._lock:
+            self._times_s.clear()
+            self._long_s.clear()
+            self._lateness_s.clear()
+            self._due_s = None
 
     def add(self, time_s: float) -> None:
         """Take in a frame's time."""
+        with self._lock:
+            self._add(time_s)
+
+    def _add(self, time_s: float) -> None:
         self._times_s.append(time_s)
         self._long_s.append(time_s)
         if len(self._times_s) < FRAMES_TO_KNOW_THE_PERIOD:
@@ -70,7 +77,8 @@ class Cadence:
     @property
     def period_s(self) -> float | None:
         """Usual time from frame to frame; None as long as it is not known."""
-        times = tuple(self._long_s)
+        with self._lock:
+            times = tuple(self._long_s)
         stride = min(FRAMES_A_STRIDE, len(times) // 2)
         if stride < 1:
             return None
@@ -80,12 +88,17 @@ class Cadence:
     @property
     def rate_hz(self) -> float | None:
         """Frames in a second, over the last hundred."""
-        if len(self._times_s) < 2 or self._times_s[-1] <= self._times_s[0]:
+        times = self._last_hundred()
+        if len(times) < 2 or times[-1] <= times[0]:
             return None
-        return (len(self._times_s) - 1) / (self._times_s[-1] - self._times_s[0])
+        return (len(times) - 1) / (times[-1] - times[0])
 
     @property
     def jitter_s(self) -> float | None:
         """Standard deviation of the time from frame to frame, over the last hundred."""
-        steps = [after - before for before, after in pairwise(self._times_s)]
+        steps = [after - before for before, after in pairwise(self._last_hundred())]
         return pstdev(steps) if len(steps) > 1 else None
+
+    def _last_hundred(self) -> tuple[float, ...]:
+        with self._lock:
+            return tuple(self._times_s)

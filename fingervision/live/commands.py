@@ -3,7 +3,6 @@
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
-from math import isfinite
 from pathlib import Path
 from typing import Any
 
@@ -22,6 +21,8 @@ from fingervision.vision.overlay import in_eight_bits
 from fingervision.vision.pipeline import steps
 
 SAVED_GAPS = "live_gaps.csv"
+GREATEST = 10**12
+"""No number that the page may ask for is larger; comparing is safe where converting is not (nan is not below it)."""
 TIPS = ("auto", *(direction.value for direction in Direction))
 
 
@@ -55,7 +56,7 @@ def obey(session: Session, request: Request) -> Answer:
     name = request.get("do")
     command = COMMANDS.get(name) if isinstance(name, str) else None
     if command is None:
-        raise UsageError(f"The page may ask for {', '.join(sorted(COMMANDS))}, but asked for {str(name)[:40]!r}.")
+        raise UsageError(f"The page may ask for {', '.join(sorted(COMMANDS))}, but asked for {shown(name)}.")
     return command(session, request)
 
 
@@ -102,7 +103,7 @@ def _region(session: Session, request: Request) -> Answer:
 def _tips(session: Session, request: Request) -> Answer:
     tips = request.get("tips")
     if tips not in TIPS:
-        raise UsageError(f"The tips must be one of {', '.join(TIPS)}, but are {str(tips)[:40]!r}.")
+        raise UsageError(f"The tips must be one of {', '.join(TIPS)}, but are {shown(tips)}.")
     session.choose(direction=None if tips == "auto" else Direction(tips))
     return Answer()
 
@@ -140,7 +141,7 @@ def _scale(session: Session, request: Request) -> Answer:
 def _calibrate(session: Session, request: Request) -> Answer:
     kind = request.get("kind")
     if kind not in ("bar", "slot"):
-        raise UsageError(f"The reference must be a bar or a slot, but is {str(kind)[:40]!r}.")
+        raise UsageError(f"The reference must be a bar or a slot, but is {shown(kind)}.")
     found = calibrated(
         _seen(session).frame, _box(request), str(kind), _number(request, "size_mm"), _number(request, "u_size_mm")
     )
@@ -190,9 +191,16 @@ def _seen(session: Session) -> Seen:
 
 def _number(request: Request, name: str) -> float:
     value = request.get(name)
-    if isinstance(value, bool) or not isinstance(value, int | float) or not isfinite(value):
-        raise UsageError(f"{name} must be a number, but is {str(value)[:40]!r}.")
-    return float(value)
+    if not isinstance(value, bool) and isinstance(value, int | float) and abs(value) <= GREATEST:
+        return float(value)
+    raise UsageError(f"{name} must be a number, but is {shown(value)}.")
+
+
+def shown(value: Any) -> str:
+    """What was asked, in as few characters as tell; a number may have more digits than can be written."""
+    if isinstance(value, int) and not isinstance(value, bool) and abs(value) > GREATEST:
+        return "too large"
+    return repr(str(value)[:40])
 
 
 def _box(request: Request) -> Region:
@@ -200,9 +208,9 @@ def _box(request: Request) -> Region:
     if not (
         isinstance(box, list)
         and len(box) == 4
-        and all(isinstance(side, int) and not isinstance(side, bool) for side in box)
+        and all(isinstance(side, int) and not isinstance(side, bool) and abs(side) <= GREATEST for side in box)
     ):
-        raise UsageError(f"The region must be four whole numbers (column, row, width, height), but is {str(box)[:60]}.")
+        raise UsageError("The region must be four whole numbers (column, row, width, height), but are not.")
     return Region(*box)
 
 

@@ -58,7 +58,8 @@ def message(session: Session, after_row: int, after_message: int, seen: Seen | N
         "messages": [[each.number, each.name, each.words] for each in said],
     }
     words = json.dumps(head, ensure_ascii=False).encode()
-    content = struct.pack(">I", len(words)) + words + (b"" if seen is None else _picture(seen))
+    picture = b"" if seen is None else _picture(seen, session.choices.zero_mm)
+    content = struct.pack(">I", len(words)) + words + picture
     return Next(content, count, max([after_message, *(each.number for each in said)]))
 
 
@@ -81,7 +82,7 @@ def _now(session: Session) -> dict[str, Any] | None:
         "u_mm": _u_mm(row),
         "has_budget": row.u_gap_mm is not None,
         "zero_mm": choices.zero_mm,
-        "verdict": choices.verdict(row.gap_mm, _u_mm(row)),
+        "verdict": choices.verdict(None if row.gap_mm is None else row.gap_mm - choices.zero_mm, _u_mm(row)),
     }
 
 
@@ -103,6 +104,8 @@ def _state(session: Session) -> dict[str, Any]:
         "exposure": session.exposure.words,
         "silent_s": session.silent_s,
         "ended": session.ended.is_set(),
+        "trouble": session.trouble,
+        "zero_mm": choices.zero_mm,
         "px_per_mm": None if scale is None else scale.px_per_mm,
         "u_px_per_mm": scale.u_px_per_mm if isinstance(scale, Calibration) else None,
         "region": None if region is None else [region.x_px, region.y_px, region.width_px, region.height_px],
@@ -114,13 +117,14 @@ def _state(session: Session) -> dict[str, Any]:
     }
 
 
-def _picture(seen: Seen) -> bytes:
+def _picture(seen: Seen, zero_mm: float) -> bytes:
     if seen.outcome is None:
         drawn = draw_overlay(seen.frame, _NOTHING, _NOTHING.words)
     else:
         row = seen.row
         words = f"{seen.frame.index}"
         if row is not None:
-            words += f"  {row.status.value}" if row.gap_mm is None else f"  gap {row.gap_mm:.4f} mm"
+            less = f" less zero {zero_mm:.4f}" if zero_mm else ""
+            words += f"  {row.status.value}" if row.gap_mm is None else f"  gap {row.gap_mm - zero_mm:.4f} mm{less}"
         drawn = draw_overlay(seen.frame, seen.outcome, words)
     return cv2.imencode(".jpg", drawn[:, :, ::-1], [cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY])[1].tobytes()

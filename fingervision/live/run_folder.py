@@ -15,6 +15,7 @@ from fingervision.frames.source import Description
 from fingervision.measuring.measure import Task
 from fingervision.storage.calibration_json import write_calibration
 from fingervision.storage.gaps_csv import GapRow, GapsCsv
+from fingervision.storage.lost_frames import LOST, LostFrames
 from fingervision.storage.recorded_video import RecordedVideo
 from fingervision.storage.run_files import CALIBRATION, EVENTS, SCHEMA, VIDEO, RunFiles
 
@@ -63,12 +64,17 @@ class RunFolder:
         if isinstance(task.scale, Calibration):
             write_calibration(task.scale, self.path / CALIBRATION)
         self._gaps = GapsCsv(self.path / GAPS)
+        self._lost = LostFrames(self.path / LOST)
         self._video = RecordedVideo(self.path / VIDEO, template)
         self._last_s = 0.0
         self.event("recording", "Recording began.")
 
     def add(self, frame: RecordedFrame) -> None:
-        """Write one frame: first its picture, then its row."""
+        """Write one frame: first the mark of a lost one, then its picture, then its row."""
+        if isinstance(frame.item, LostFrame):
+            lost_at_s = self._video.time_s(frame.item, frame.packets)
+            if lost_at_s is not None:
+                self._lost.add(lost_at_s, frame.item)
         time_s = self._video.add(frame.item, frame.packets)
         if time_s is None:
             return
@@ -85,7 +91,7 @@ class RunFolder:
         failure: FingervisionError | None = None
         with suppress(FingervisionError):
             self.event("stopped", why)
-        for end in (self._video.close, self._gaps.close, self._files.close, self._finish):
+        for end in (self._video.close, self._lost.close, self._gaps.close, self._files.close, self._finish):
             try:
                 end()
             except FingervisionError as error:
@@ -94,7 +100,9 @@ class RunFolder:
             raise failure
 
     def _finish(self) -> None:
-        self._about["sha256"] = {VIDEO: self._files.sha256(VIDEO)}
+        # Without a frame there is no video.
+        there = (self.path / VIDEO).exists()
+        self._about["sha256"] = {VIDEO: self._files.sha256(VIDEO)} if there else {}
         self._about["frames"] = self.frames
         self._files.write_about(self._about, complete=True)
 
@@ -146,5 +154,6 @@ def _about(description: Description, task: Task, began: datetime) -> dict[str, A
         },
         "video": VIDEO,
         "gaps": GAPS,
+        "lost": LOST,
         "events": EVENTS,
     }

@@ -9,10 +9,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from threading import Event
 from types import FrameType
+from typing import TextIO
 
 from fingervision.domain.errors import ExitCode, FingervisionError
 from fingervision.live.capture import Capture
 from fingervision.live.choices import Choices
+from fingervision.live.guard import LOOPBACK_NAMES
+from fingervision.live.outlet import Outlet
 from fingervision.live.server import Page, bound
 from fingervision.live.session import Session
 from fingervision.live.terminal import JsonLines, StatusLine, told
@@ -58,29 +61,48 @@ def run(capture: Capture, choices: Choices, out: Path, showing: Showing) -> None
     except FingervisionError:
         capture.source.close()
         raise
-    session.on_message.append(lambda message: told(message, sys.stderr))
+    if page is not None and showing.host not in LOOPBACK_NAMES:
+        session.say(
+            "network",
+            "The page is served beyond this machine, over plain HTTP: who can listen to the network "
+            "can read it and its token. Use it on a bench's own network alone, or through an SSH tunnel.",
+        )
+    out_there, said = Outlet(sys.stdout), Outlet(sys.stderr)
+    on_terminal = is_terminal(sys.stderr)
+    session.on_message.append(lambda message: told(message, said, in_place=on_terminal))
     for message in tuple(session.messages):
-        told(message, sys.stderr)
-    lines = JsonLines(sys.stdout) if showing.json_lines else None
-    status = StatusLine(session, sys.stdout) if page is None and lines is None else None
+        told(message, said, in_place=on_terminal)
+    lines = JsonLines(out_there) if showing.json_lines else None
+    status = (
+        StatusLine(session, out_there, in_place=is_terminal(sys.stdout)) if page is None and lines is None else None
+    )
     for listener in (lines, status):
         if listener is not None:
             session.on_row.append(listener.add)
     if showing.record:
         session.record()
-    with _until_signalled() as signalled:
-        session.start()
-        try:
-            if page is None:
-                while not (signalled.wait(0.1) or session.ended.is_set() or (lines is not None and lines.broken)):
-                    pass
-            else:
-                _announce(page, on_stdout=lines is None)
-                page.serve(signalled)
-        finally:
-            session.stop()
-            if status is not None:
-                status.end()
+    try:
+        with _until_signalled() as signalled:
+            session.start()
+            try:
+                if page is None:
+                    while not (signalled.wait(0.1) or session.ended.is_set() or out_there.broken):
+                        pass
+                else:
+                    _announce(page, out_there if lines is None else said)
+                    page.serve(signalled)
+            finally:
+                session.stop()
+                if status is not None:
+                    status.end()
+    finally:
+        broken = out_there.broken
+        out_there.close()
+        if out_there.left_out:
+            session.say("left_out", f"{out_there.left_out} lines were not printed: the reader was too slow.")
+        elif broken:
+            session.say("unread", "Nobody reads standard output any more: the live view has ended.")
+        said.close()
     if page is None and not session.history.count and session.ended.is_set():
         raise FingervisionError(f"{session.description.name} gave no frame: check the source.")
     failed = [message for message in session.messages if message.name in ("failed", "recording_failed")]
@@ -88,12 +110,19 @@ def run(capture: Capture, choices: Choices, out: Path, showing: Showing) -> None
         raise SystemExit(int(ExitCode.COULD_NOT))
 
 
-def _announce(page: Page, *, on_stdout: bool) -> None:
-    stream = sys.stdout if on_stdout else sys.stderr
-    stream.write(f"The live view is at {page.address}  (Ctrl-C ends it)\n")
-    stream.flush()
-    if sys.stdout.isatty():
-        webbrowser.open(page.address)
+def _announce(page: Page, outlet: Outlet) -> None:
+    outlet.put(f"The live view is at {page.address}  (Ctrl-C ends it)\n")
+    if is_terminal(sys.stdout):
+        # Everybody on this machine sees what stands on a command line: the browser gets a file of this user's alone.
+        webbrowser.open(page.door().as_uri())
+
+
+def is_terminal(stream: TextIO | None) -> bool:
+    """Whether a person sits there; a stream that is closed is no terminal."""
+    try:
+        return stream is not None and stream.isatty()
+    except ValueError:
+        return False
 
 
 @contextmanager

@@ -3,7 +3,9 @@
 import asyncio
 import contextlib
 import errno
+import html
 import json
+import os
 import socket
 from collections import deque
 from pathlib import Path
@@ -21,14 +23,17 @@ from starlette.websockets import WebSocket, WebSocketDisconnect
 from fingervision.domain.errors import FingervisionError, UsageError
 from fingervision.live.commands import Answer, obey, save_gaps
 from fingervision.live.guard import EVERYWHERE, POLICY_VIOLATION, Guard
+from fingervision.live.half_open import PatientProtocol
 from fingervision.live.page_token import kept_token
 from fingervision.live.preview import message
 from fingervision.live.promptness import be_prompt
 from fingervision.live.session import Seen, Session
+from fingervision.storage.out_folder import out_folder
 
 PAGE = Path(__file__).parent / "page"
 FILES = frozenset({"icon.svg", "live.js", "live.css", "uPlot.iife.min.js", "uPlot.min.css", "uPlot.LICENSE"})
 MESSAGE_BYTES, MESSAGES_A_SECOND, PAGES_AT_ONCE = 4096, 120, 4
+DOOR = ".live_page.html"
 TRY_AGAIN_LATER = 1013
 # The preview is as fast as a screen needs it; without a new picture the page hears of the state so often.
 PREVIEW_EVERY_S, STATE_EVERY_S, LOOK_EVERY_S = 0.03, 0.2, 0.01
@@ -94,13 +99,14 @@ class Page:
                 Route("/", self._index),
                 Route("/page/{name}", self._file),
                 Route("/gaps.csv", self._gaps),
-                Route("/steps/{number:int}.png", self._step),
+                Route("/steps/{number}.png", self._step),
                 WebSocketRoute("/socket", self._socket),
             ]
         )
         self._server = uvicorn.Server(
             uvicorn.Config(
                 Guard(app, host, port, token),
+                http=PatientProtocol,
                 ws="websockets-sansio",
                 ws_max_size=MESSAGE_BYTES,
                 ws_per_message_deflate=False,
@@ -112,6 +118,16 @@ class Page:
                 server_header=False,
             )
         )
+
+    def door(self) -> Path:
+        """Write a page that only this user can read, and that leads to the address."""
+        path = self._session.out.resolve() / DOOR
+        with out_folder(self._session.out):
+            path.unlink(missing_ok=True)
+            descriptor = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600)
+            with os.fdopen(descriptor, "w", encoding="utf-8") as file:
+                file.write(f'<!doctype html><meta http-equiv="refresh" content="0;url={html.escape(self.address)}">')
+        return path
 
     def serve(self, until: Event) -> None:
         """Serve until told to end."""
@@ -145,10 +161,11 @@ class Page:
         return FileResponse(path, media_type="text/csv", filename="gaps.csv")
 
     async def _step(self, request: Request) -> Response:
-        number = request.path_params["number"]
-        if not 0 <= number < len(self._steps):
+        pictures = {str(number): picture for number, (_, picture) in enumerate(self._steps)}
+        picture = pictures.get(request.path_params["number"])
+        if picture is None:
             return PlainTextResponse("There is no such picture: ask for the steps first.", 404)
-        return Response(self._steps[number][1], media_type="image/png")
+        return Response(picture, media_type="image/png")
 
     async def _socket(self, page: WebSocket) -> None:
         if self._pages >= PAGES_AT_ONCE:
@@ -158,13 +175,23 @@ class Page:
         try:
             await page.accept()
             acknowledged = asyncio.Event()
-            sending = asyncio.create_task(self._send(page, acknowledged))
+            tasks = [asyncio.create_task(self._send(page, acknowledged))]
+            tasks.append(asyncio.create_task(self._receive(page, acknowledged)))
             try:
-                await self._receive(page, acknowledged)
+                # When either ends, however it ends, the page is let go, and connects anew if it is still there.
+                done, _ = await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
             finally:
-                sending.cancel()
-                with contextlib.suppress(asyncio.CancelledError, WebSocketDisconnect, RuntimeError):
-                    await sending
+                for task in tasks:
+                    task.cancel()
+                await asyncio.gather(*tasks, return_exceptions=True)
+            failed = next((error for task in done if (error := task.exception()) is not None), None)
+            if failed is not None and not isinstance(failed, WebSocketDisconnect):
+                silent = isinstance(failed, TimeoutError)
+                why = "The page did not answer." if silent else f"Sending failed ({type(failed).__name__})."
+                if not silent:
+                    self._session.say("page", f"{why} The page connects again.")
+                with contextlib.suppress(RuntimeError, WebSocketDisconnect):
+                    await page.close(TRY_AGAIN_LATER, why)
         finally:
             self._pages -= 1
 

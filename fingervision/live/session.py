@@ -61,6 +61,10 @@ class Message:
     words: str
 
 
+MOVES_ZERO = {"scale", "below_tip_mm", "direction", "region"}
+"""After a change of these a gap is another one."""
+OVERFLOW_SAID_EVERY_S = 10.0
+
 RowListener = Callable[[GapRow, float], None]
 MessageListener = Callable[[Message], None]
 
@@ -95,6 +99,10 @@ class Session:
         self._frame_at_s = monotonic()
         self._interrupted = False
         self._recorder: Recorder | None = None
+        self._beginning = False
+        self.trouble = ""
+        """What went wrong and stays so until the user does something; shown where the eye is."""
+        self._overflowed, self._overflow_said_s = 0, float("-inf")
         self._lock = Lock()
         self._stopped = Event()
         self._thread = Thread(target=self._measure, name="measuring", daemon=True)
@@ -139,11 +147,17 @@ class Session:
         """
         with self._lock:
             measured = {"scale", "below_tip_mm", "direction", "region"} & set(changes)
-            if measured and self._recorder is not None:
+            if measured and (self._recorder is not None or self._beginning):
                 raise FingervisionError("While a run is recorded the measurement stays as it is: stop recording first.")
+            if self.choices.zero_mm and MOVES_ZERO & set(changes):
+                # A zero is a gap as it was measured then; after this it would be the gap of something else.
+                changes.setdefault("zero_mm", 0.0)
+            unzeroed = bool(self.choices.zero_mm) and changes.get("zero_mm") == 0.0 and bool(measured)
             chosen = replace(self.choices, **changes)
             chosen.check(self.description)
             self.choices = chosen
+        if unzeroed:
+            self.say("zero", "The zero is off: it was taken with another scale, height, region or direction.")
 
     def record(self) -> Path:
         """Begin a recording.
@@ -155,14 +169,24 @@ class Session:
         """
         with self._lock:
             task = self.choices.task
+            if self.ended.is_set():
+                raise FingervisionError("The source has ended, so nothing can be recorded: start again.")
             if self._recorder is not None:
                 raise FingervisionError(f"A run is being recorded already, in {self._recorder.run.path}.")
+            if self._beginning:
+                raise FingervisionError("A recording is being begun already.")
             if task is None:
                 raise FingervisionError("The scale is not known: give it before recording, so that the run has gaps.")
             if not self.description.has_times:
                 raise FingervisionError("These images have no times, which a recording needs: give --rate-hz.")
+            self._beginning = True
+        try:
+            # Not while measuring waits: a slow disk would hold it up.
             run = RunFolder(self.out, self.description, task, self.capture.source.template)
             self._recorder = Recorder(run)
+            self.trouble = ""
+        finally:
+            self._beginning = False
         self.say("recording", f"Recording to {run.path}.")
         return run.path
 
@@ -209,6 +233,7 @@ class Session:
             self._measure_all()
         except Exception as error:
             # A fault of ours must be seen by whoever looks, not end in a picture that stands still.
+            self.trouble = "Measuring has failed: start the live view again."
             self.say("failed", f"Measuring failed ({type(error).__name__}: {error}): start the live view again.")
             self.ended.set()
             raise
@@ -250,9 +275,18 @@ class Session:
                 if recorder.failure:
                     self._recorder = None
         if recorder is not None and recorder.failure:
+            self.trouble = f"Recording has ended: {recorder.failure}"
             self.say("recording_failed", recorder.failure)
+        self._say_overflow()
         for listener in self.on_row:
             listener(row, arrival.arrived_s)
+
+    def _say_overflow(self) -> None:
+        lost, now_s = self.capture.overflowed, monotonic()
+        if lost > self._overflowed and now_s - self._overflow_said_s >= OVERFLOW_SAID_EVERY_S:
+            self._overflow_said_s = now_s
+            more, self._overflowed = lost - self._overflowed, lost
+            self.say("overflowed", f"{more} frames came faster than they could be measured, and are lost.")
 
     def _row(
         self, item: Frame | LostFrame, choices: Choices

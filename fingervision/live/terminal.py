@@ -3,8 +3,8 @@
 import json
 from dataclasses import asdict
 from time import monotonic
-from typing import TextIO
 
+from fingervision.live.outlet import Outlet
 from fingervision.live.session import Message, Session
 from fingervision.storage.gaps_csv import GapRow
 
@@ -19,22 +19,17 @@ class JsonLines:
 
     Parameters
     ----------
-    stream : text stream
+    outlet : Outlet
         Standard output.
     """
 
-    def __init__(self, stream: TextIO) -> None:
-        self._stream = stream
-        self.broken = False
+    def __init__(self, outlet: Outlet) -> None:
+        self._outlet = outlet
 
     def add(self, row: GapRow, arrived_s: float) -> None:
         """Write one row."""
         cells = {name: cell for name, cell in asdict(row).items() if name not in DRIVE_COLUMNS}
-        try:
-            self._stream.write(json.dumps(cells) + "\n")
-            self._stream.flush()
-        except (BrokenPipeError, ValueError):
-            self.broken = True
+        self._outlet.put(json.dumps(cells) + "\n")
 
 
 class StatusLine:
@@ -44,13 +39,14 @@ class StatusLine:
     ----------
     session : Session
         The live measurement.
-    stream : text stream
+    outlet : Outlet
         Standard output.
+    in_place : bool
+        Whether it is a terminal.
     """
 
-    def __init__(self, session: Session, stream: TextIO) -> None:
-        self._session, self._stream = session, stream
-        self._in_place = stream.isatty()
+    def __init__(self, session: Session, outlet: Outlet, *, in_place: bool) -> None:
+        self._session, self._outlet, self._in_place = session, outlet, in_place
         self._printed_at_s = float("-inf")
 
     def add(self, row: GapRow, arrived_s: float) -> None:
@@ -59,13 +55,12 @@ class StatusLine:
             return
         self._printed_at_s = monotonic()
         line = self._line(row)
-        self._stream.write(f"{CLEARED}{line}" if self._in_place else f"{line}\n")
-        self._stream.flush()
+        self._outlet.put(f"{CLEARED}{line}" if self._in_place else f"{line}\n")
 
     def end(self) -> None:
         """Leave the line that is in place."""
         if self._in_place:
-            self._stream.write("\n")
+            self._outlet.put("\n")
 
     def _line(self, row: GapRow) -> str:
         rate_hz = self._session.cadence.rate_hz
@@ -80,8 +75,7 @@ class StatusLine:
         return f"{gap}  {row.status.value}{rate}  {dropped} dropped{'  ' + exposure if exposure else ''}"
 
 
-def told(message: Message, stream: TextIO) -> None:
+def told(message: Message, outlet: Outlet, *, in_place: bool) -> None:
     """Print a message of the session."""
     # What stands in place, and the ^C of whoever ends it, gives way.
-    stream.write(f"{CLEARED if stream.isatty() else ''}fingervision: {message.words}\n")
-    stream.flush()
+    outlet.put(f"{CLEARED if in_place else ''}fingervision: {message.words}\n")

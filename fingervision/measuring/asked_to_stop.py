@@ -1,4 +1,4 @@
-"""Ctrl-C as a question between two frames: nothing is broken off in the middle, neither a row nor compiled code."""
+"""Ctrl-C and SIGTERM as a question between two frames: neither a row nor compiled code is broken off."""
 
 import signal
 import threading
@@ -9,7 +9,7 @@ from types import FrameType
 
 @contextmanager
 def asked_to_stop() -> Iterator[threading.Event]:
-    """Note a first Ctrl-C instead of raising it; a second one is raised as ever.
+    """Note a first Ctrl-C, or request to terminate, instead of raising it; a second one is raised as ever.
 
     Where the signal is not for us (another thread than the main one, or a worker that leaves it to its parent), nothing
     is noted.
@@ -20,17 +20,22 @@ def asked_to_stop() -> Iterator[threading.Event]:
         Set from the first Ctrl-C on.
     """
     asked = threading.Event()
-    before = signal.getsignal(signal.SIGINT)
-    if threading.current_thread() is not threading.main_thread() or not callable(before):
+    before = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
+    if threading.current_thread() is not threading.main_thread() or not callable(before[signal.SIGINT]):
         yield asked
         return
 
     def note(number: int, frame: FrameType | None) -> None:
-        signal.signal(signal.SIGINT, before)
+        restore()
         asked.set()
 
-    signal.signal(signal.SIGINT, note)
+    def restore() -> None:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+    for number in before:
+        signal.signal(number, note)
     try:
         yield asked
     finally:
-        signal.signal(signal.SIGINT, before)
+        restore()

@@ -1,7 +1,7 @@
 """A recording goes in; the gap over time, its summary and its figure come out."""
 
-from collections.abc import Callable, Iterator
-from contextlib import ExitStack, closing
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import ExitStack, closing, contextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from time import monotonic
@@ -19,6 +19,7 @@ from fingervision.frames.ahead import decoded_ahead
 from fingervision.frames.source import Description, FrameSource
 from fingervision.measuring.asked_to_stop import asked_to_stop
 from fingervision.measuring.gap_figure import draw_gap
+from fingervision.measuring.marked import marked
 from fingervision.measuring.other_camera import other_camera
 from fingervision.measuring.output_folder import OutputFolder, claimed
 from fingervision.measuring.overlay_video import OverlayVideo
@@ -28,7 +29,10 @@ from fingervision.measuring.scale import Scale
 from fingervision.measuring.series import GapSeries
 from fingervision.measuring.step_pictures import write_steps
 from fingervision.measuring.summary import summarise
+from fingervision.storage.folder_lock import FolderLock
 from fingervision.storage.gaps_csv import GapsCsv
+from fingervision.storage.lost_frames import lost_frames
+from fingervision.storage.out_folder import make_out_folder
 from fingervision.storage.recorded_camera import recorded_camera
 from fingervision.storage.summary_json import write_summary
 from fingervision.vision.pipeline import Settings, measure_frame
@@ -168,8 +172,18 @@ def measure(source: FrameSource, task: Task, out: Path, on_progress: Progress | 
     FingervisionError
         The results cannot be written, or the scale is for other frames. The rows until then are in gaps.csv.
     """
+    if hasattr(source, "received"):
+        raise UsageError(
+            f"measure needs a recording, which ends, but {source.description.name} is a camera, which does not: record "
+            f"it with `fingervision live {source.description.name} --no-page --out runs`."
+        )
+    _check(task, source.description)
+    with _held(out):
+        return _measured(source, task, out, on_progress)
+
+
+def _measured(source: FrameSource, task: Task, out: Path, on_progress: Progress | None) -> Measured:
     description = source.description
-    _check(task, description)
     if words := other_camera(task.scale, recorded_camera(description.files)):
         description = replace(description, notes=(words, *description.notes))
     settings, words = task.settings_for(description.files)
@@ -177,6 +191,7 @@ def measure(source: FrameSource, task: Task, out: Path, on_progress: Progress | 
         description = replace(description, notes=(words, *description.notes))
     folder = claimed(out, description.files)
     frame_size_px = (description.width_px, description.height_px)
+    marks = lost_frames(description.files)
     row_maker = RowMaker(task.scale, frame_size_px, task.drive, task.drive_offset_s)
     series = GapSeries()
     stopped = False
@@ -185,19 +200,21 @@ def measure(source: FrameSource, task: Task, out: Path, on_progress: Progress | 
         table = stack.enter_context(GapsCsv(folder.gaps, task.drive_columns))
         video = stack.enter_context(OverlayVideo(folder.overlay, description)) if task.overlay else None
         pending: list[Result] = []
+        driven: set[bool] = set()
 
         def hand_over() -> None:
             results = pending.copy()
             pending.clear()
             rows = row_maker.rows(results)
             series.add(results, rows)
+            driven.update(row.input_mm is not None for row in rows)
             table.add(rows)
 
         # Before the table is closed, whatever ends the loop.
         stack.callback(hand_over)
         handed_over_at = monotonic()
         try:
-            for item, outcome in _outcomes(source, settings):
+            for item, outcome in _outcomes(marked(source, marks) if marks else source, settings):
                 result = Result(item.index, item.time_s, outcome)
                 pending.append(result)
                 if video is not None and isinstance(item, Frame):
@@ -221,6 +238,11 @@ def measure(source: FrameSource, task: Task, out: Path, on_progress: Progress | 
         description, _in_words(task, settings), task.scale, task.scale_file, series, complete=not stopped
     )
     write_summary(folder.summary, summary)
+    if task.drive is not None and driven == {False} and not stopped:
+        raise FingervisionError(
+            f"No frame lies within the drive's times ({task.drive.time_s[0]:g} to {task.drive.time_s[-1]:g} s, shifted "
+            f"by {task.drive_offset_s:g} s), so no row of {folder.gaps} has an input: give --drive-offset-s."
+        )
     if task.steps_frame is not None and not folder.steps.exists() and not stopped:
         raise UsageError(
             f"--steps must be the number of a frame that can be read, 0 to {series.frames - 1}, "
@@ -229,8 +251,19 @@ def measure(source: FrameSource, task: Task, out: Path, on_progress: Progress | 
     return Measured(folder, series, summary, stopped)
 
 
+@contextmanager
+def _held(out: Path) -> Iterator[None]:
+    """Keep other measurements out of the folder meanwhile: each would replace what the other wrote."""
+    make_out_folder(out)
+    lock = FolderLock(out)
+    try:
+        yield
+    finally:
+        lock.remove()
+
+
 def _outcomes(
-    source: FrameSource, settings: Settings
+    source: Iterable[Frame | LostFrame], settings: Settings
 ) -> Iterator[tuple[Frame | LostFrame, GapMeasurement | NoGap | LostFrame]]:
     """Every frame with what it says; the decoder runs ahead and is stopped when this is."""
     with closing(decoded_ahead(source)) as frames:

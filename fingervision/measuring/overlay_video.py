@@ -46,7 +46,7 @@ class OverlayVideo:
         # H.264 with halved colour needs even sides; the last column or row is repeated where they are odd.
         self._pad = ((0, description.height_px % 2), (0, description.width_px % 2), (0, 0))
         try:
-            self._container = av.open(str(path), "w", options={"movie_timescale": str(CLOCK_HZ)})
+            self._container = av.open(f"file:{path}", "w", options={"movie_timescale": str(CLOCK_HZ)})
             self._stream = self._container.add_stream("libx264", options=OPTIONS)
         except (av.FFmpegError, OSError, ValueError) as error:
             raise self._failed(error) from error

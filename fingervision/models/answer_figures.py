@@ -22,6 +22,30 @@ class PeakStress:
 
 
 @dataclass(frozen=True, slots=True)
+class LoadedState:
+    """One model's answer at one input, with all the physics that it was built with.
+
+    Parameters
+    ----------
+    input_mm, gap_mm, force_n : float
+        Input, gap, force at the drive of both halves.
+    grip_n : float
+        Force of the symmetry plane on each finger; 0 where they do not touch.
+    stress_mpa : float
+        Largest stress on a notch: von Mises's, or the nominal one of a model made of bars.
+    place_mm : (float, float)
+        Where, at rest.
+    """
+
+    input_mm: float
+    gap_mm: float
+    force_n: float
+    grip_n: float
+    stress_mpa: float
+    place_mm: PointMm
+
+
+@dataclass(frozen=True, slots=True)
 class ModelFigures:
     """One model's row of the table; what a model does not know is None.
 
@@ -39,6 +63,9 @@ class ModelFigures:
         Input at which the fingers first touch.
     swaying_modes_hz, out_of_plane_modes_hz : tuple of float
         First antisymmetric in-plane modes, the drive free to go sideways; first modes out of the plane, drive held.
+    slope_error, force_error, mode_error, out_of_plane_error : float
+        Relative model errors, as known for the kind: of the gap per input, of the force, of the frequencies in the
+        plane and out of it. Each is a bound that held for the grippers that the kind was checked on.
     """
 
     gap_per_input: float
@@ -49,3 +76,7 @@ class ModelFigures:
     contact_input_mm: float | None = None
     swaying_modes_hz: tuple[float, ...] = ()
     out_of_plane_modes_hz: tuple[float, ...] = ()
+    slope_error: float = 0.0
+    force_error: float = 0.0
+    mode_error: float = 0.0
+    out_of_plane_error: float = 0.0

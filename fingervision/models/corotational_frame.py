@@ -65,21 +65,7 @@ class CorotationalFrame:
         displacement : ndarray of float, shape (unknowns,)
             Displacements in mm and rotations in rad.
         """
-        local = displacement[self._dofs]
-        at_rest = self.nodes_mm[self.ends[:, 1]] - self.nodes_mm[self.ends[:, 0]]
-        drift = local[:, 3:5] - local[:, 0:2]
-        chord = at_rest + drift
-        length = np.hypot(chord[:, 0], chord[:, 1])
-        c, s = chord[:, 0] / length, chord[:, 1] / length
-        # The chord's turn from its own rest direction, and below its lengthening by a difference of squares, so that
-        # small motions lose no digits.
-        across = at_rest[:, 0] * drift[:, 1] - at_rest[:, 1] * drift[:, 0]
-        turned = np.arctan2(across, np.sum(at_rest * chord, axis=1))
-        natural = np.empty((len(length), 3))
-        natural[:, 0] = np.sum((2.0 * at_rest + drift) * drift, axis=1) / (length + self._length)
-        for column, rotation in ((1, local[:, 2]), (2, local[:, 5])):
-            apart = rotation - turned
-            natural[:, column] = apart - 2.0 * np.pi * np.round(apart / (2.0 * np.pi))
+        natural, c, s, length = self._deformation(displacement)
         forces = np.einsum("mij,mj->mi", self._natural, natural)
         zero = np.zeros_like(c)
         r = np.stack([-c, -s, zero, c, s, zero], axis=1)
@@ -95,6 +81,29 @@ class CorotationalFrame:
         return self._assembled(tangent), np.asarray(
             np.bincount(self._dofs.ravel(), element_force.ravel(), self.unknowns), dtype=np.float64
         )
+
+    def end_loads(self, displacement: Array) -> Array:
+        """Tension in N and moments in N mm at both ends of every element in the deformed shape, shape (m, 3)."""
+        return np.asarray(np.einsum("mij,mj->mi", self._natural, self._deformation(displacement)[0]))
+
+    def _deformation(self, displacement: Array) -> tuple[Array, Array, Array, Array]:
+        """Lengthening and end rotations from the chord, shape (m, 3); the chord's cosine, sine and length."""
+        local = displacement[self._dofs]
+        at_rest = self.nodes_mm[self.ends[:, 1]] - self.nodes_mm[self.ends[:, 0]]
+        drift = local[:, 3:5] - local[:, 0:2]
+        chord = at_rest + drift
+        length = np.hypot(chord[:, 0], chord[:, 1])
+        c, s = chord[:, 0] / length, chord[:, 1] / length
+        # The chord's turn from its own rest direction, and below its lengthening by a difference of squares, so that
+        # small motions lose no digits.
+        across = at_rest[:, 0] * drift[:, 1] - at_rest[:, 1] * drift[:, 0]
+        turned = np.arctan2(across, np.sum(at_rest * chord, axis=1))
+        natural = np.empty((len(length), 3))
+        natural[:, 0] = np.sum((2.0 * at_rest + drift) * drift, axis=1) / (length + self._length)
+        for column, rotation in ((1, local[:, 2]), (2, local[:, 5])):
+            apart = rotation - turned
+            natural[:, column] = apart - 2.0 * np.pi * np.round(apart / (2.0 * np.pi))
+        return natural, c, s, length
 
     def stiffness_n_mm(self) -> csr_matrix:
         """Linear stiffness at rest."""

@@ -68,6 +68,8 @@ class DrivenBody:
         Unknowns whose weighted sum is the motion of the measuring point across the symmetry plane.
     measured_rest_mm : float
         Its distance from the symmetry plane at rest.
+    nodal_force : callable or None
+        Displacements to internal forces alone, where that is less work than with the tangent.
     """
 
     stiffness_n_mm: csr_matrix
@@ -81,6 +83,21 @@ class DrivenBody:
     measured: Indices
     weights: Array
     measured_rest_mm: float
+    nodal_force: Callable[[Array], Array] | None = None
+
+    def internal_force_n(self, displacement: Array) -> Array:
+        """Internal forces in the deformed shape, without the tangent where the body can do without."""
+        return self.tangent(displacement)[1] if self.nodal_force is None else self.nodal_force(displacement)
+
+    @cached_property
+    def paths(self) -> dict[tuple[float, float, bool], list[Equilibrium]]:
+        """Equilibria in the deformed shape that were followed already, by first and last input and contact."""
+        return {}
+
+    @cached_property
+    def touches(self) -> dict[float, Equilibrium]:
+        """First touches in the deformed shape that were found already, by the guess."""
+        return {}
 
     @property
     def unknowns(self) -> int:

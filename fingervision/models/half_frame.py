@@ -17,7 +17,17 @@ _STIFF_JOINT = 1e-3
 """Compliance of a rigid joint relative to a square bar of its length: small, yet well conditioned."""
 
 
-def half_frame(gripper: Gripper, skeleton: Skeleton) -> DrivenBody:
+def frame_of(gripper: Gripper, skeleton: Skeleton) -> CorotationalFrame:
+    """Make the elements of a tree of members."""
+    members = skeleton.members
+    nodes = np.array([members[0].start_mm, *(member.end_mm for member in members)])
+    ends = np.array([(member.parent + 1, place + 1) for place, member in enumerate(members)])
+    compliance = np.array([_end_compliance(gripper, nodes[b] - nodes[a], place, skeleton)
+                           for place, (a, b) in enumerate(ends.tolist())])  # fmt: skip
+    return CorotationalFrame(nodes, ends, compliance)
+
+
+def half_frame(gripper: Gripper, skeleton: Skeleton, frame: CorotationalFrame | None = None) -> DrivenBody:
     """Support and drive the right half's frame.
 
     The clamp is held, the drive point moves by the input along the axis, and can neither move across it nor turn.
@@ -28,13 +38,11 @@ def half_frame(gripper: Gripper, skeleton: Skeleton) -> DrivenBody:
         The drawing.
     skeleton : Skeleton
         Its tree of members.
+    frame : CorotationalFrame or None
+        Its elements; made where None.
     """
-    members = skeleton.members
-    nodes = np.array([members[0].start_mm, *(member.end_mm for member in members)])
-    ends = np.array([(member.parent + 1, place + 1) for place, member in enumerate(members)])
-    compliance = np.array([_end_compliance(gripper, nodes[b] - nodes[a], place, skeleton)
-                           for place, (a, b) in enumerate(ends.tolist())])  # fmt: skip
-    frame = CorotationalFrame(nodes, ends, compliance)
+    frame = frame or frame_of(gripper, skeleton)
+    nodes, ends = frame.nodes_mm, frame.ends
     drive = 3 * (skeleton.drive + 1)
     held = [0, 1, 2, drive, drive + 2]
     driven = np.array([drive + 1])

@@ -59,6 +59,7 @@ def half_plate(gripper: Gripper, plate: PlaneStressPlate) -> DrivenBody:
         measured=plate.x_dofs[nodes],
         weights=weights,
         measured_rest_mm=gripper.measuring_point_mm[0],
+        nodal_force=plate.nodal_force_n,
     )
 
 

@@ -15,14 +15,21 @@ from skfem.helpers import ddot, eye, sym_grad, trace
 
 from fingervision.domain.gripper import Material
 from fingervision.models.notch import Notch
+from fingervision.models.width_effect import held_moduli
 
 Array = NDArray[np.float64]
 
 _ON = 1e-9
+_BLOCK_ELEMENTS = 12
 
 
 def plane_compliance(
-    notch: Notch, material: Material, along: int = 160, across: int = 6, block_mm: float = 0.0
+    notch: Notch,
+    material: Material,
+    along: int = 160,
+    across: int = 6,
+    block_mm: float = 0.0,
+    share: float = 0.0,
 ) -> Array:
     """Compute the in-plane compliance at the right end, x, y, rotation about z.
 
@@ -36,19 +43,22 @@ def plane_compliance(
         Number of quadratic elements.
     block_mm : float
         Length of elastic blocks as high as the notch's ends between it and the end planes; 0 for none.
+    share : float
+        Of plane strain within the notch, as `width_effect` has it.
 
     Returns
     -------
     ndarray of float, shape (3, 3)
         At the outer end of the right block.
     """
-    E, nu, plate_mm = material.youngs_modulus_mpa, material.poisson_ratio, notch.plate_mm
+    plate_mm = notch.plate_mm
 
-    def work(u: Any, v: Any, _: Any) -> Any:
+    def work(u: Any, v: Any, w: Any) -> Any:
         e = sym_grad(u)
+        E, nu = held_moduli(material, np.where(np.abs(w.x[0]) <= notch.half_length_mm, share, 0.0))
         return plate_mm * ddot(E / (1.0 + nu) * e + E * nu / (1.0 - nu**2) * eye(trace(e), 2), sym_grad(v))
 
-    s = _stations(along, block_mm)
+    s = _stations(notch, along, block_mm)
     mesh = skfem.MeshQuad2.from_mesh(skfem.MeshQuad.init_tensor(s, np.linspace(-0.5, 0.5, across + 1)))
     placed = _shaped(notch, mesh.doflocs, block_mm)
     basis = skfem.Basis(skfem.MeshQuad2(placed, mesh.t), skfem.ElementVector(skfem.ElementQuad2()), intorder=5)
@@ -56,7 +66,9 @@ def plane_compliance(
     return _end_compliance(K.tocsc(), basis, notch.half_length_mm + block_mm, 2)
 
 
-def solid_compliance(notch: Notch, material: Material, along: int = 24, across: int = 3, through: int = 4) -> Array:
+def solid_compliance(
+    notch: Notch, material: Material, along: int = 24, across: int = 3, through: int = 4, block_mm: float = 0.0
+) -> Array:
     """Compute the compliance at the right end in all six directions with quadratic bricks.
 
     Parameters
@@ -64,7 +76,9 @@ def solid_compliance(notch: Notch, material: Material, along: int = 24, across: 
     notch, material
         As in `plane_compliance`.
     along, across, through : int
-        Number of bricks along the notch, across it in the plane, and through the plate.
+        Number of bricks along the notch, across it in the plane, and through the plate, close together at its faces.
+    block_mm : float
+        As in `plane_compliance`.
 
     Returns
     -------
@@ -80,23 +94,23 @@ def solid_compliance(notch: Notch, material: Material, along: int = 24, across: 
 
     mesh = skfem.MeshHex2.from_mesh(
         skfem.MeshHex.init_tensor(
-            _stations(along, 0.0),
+            _stations(notch, along, block_mm),
             np.linspace(-0.5, 0.5, across + 1),
-            notch.plate_mm * np.linspace(-0.5, 0.5, through + 1),
+            0.5 * notch.plate_mm * np.sin(0.5 * np.pi * np.linspace(-1.0, 1.0, through + 1)),
         )
     )
-    placed = _shaped(notch, mesh.doflocs, 0.0)
+    placed = _shaped(notch, mesh.doflocs, block_mm)
     basis = skfem.Basis(skfem.MeshHex2(placed, mesh.t), skfem.ElementVector(skfem.ElementHex2()), intorder=5)
     K = skfem.BilinearForm(work).assemble(basis)
-    return _end_compliance(K.tocsc(), basis, notch.half_length_mm, 3)
+    return _end_compliance(K.tocsc(), basis, notch.half_length_mm + block_mm, 3)
 
 
-def _stations(along: int, block_mm: float) -> Array:
+def _stations(notch: Notch, along: int, block_mm: float) -> Array:
     """Stations of the elements: angles of x = a sin(angle) within the notch, beyond it the blocks."""
-    inside = np.linspace(-np.pi / 2, np.pi / 2, along + 1)
+    inside = np.arcsin(np.clip(notch.stations_mm(along) / notch.half_length_mm, -1.0, 1.0))
     if block_mm == 0.0:
         return inside
-    outside = np.pi / 2 + np.linspace(0.0, 1.0, 13)[1:] ** 1.5
+    outside = np.pi / 2 + np.linspace(0.0, 1.0, _BLOCK_ELEMENTS + 1)[1:] ** 1.5
     return np.concatenate([-outside[::-1], inside, outside])
 
 

@@ -1,59 +1,111 @@
 """Nominal stress in the hinges of a frame: bending and tension of the section that the joints' loads pass through.
 
-At the surface of a notch the stress is a few per cent higher than in a straight bar (plane stress gives 19.07 MPa/mm on
-the paper's sample, where t / R = 0.25); beam theory has no more to say.
+At the surface of a notch the stress is a few per cent higher than in a straight bar: Neuber's factors for a deep notch
+(Kerbspannungslehre, 1937; Pilkey, Peterson's Stress Concentration Factors, charts 2.10 and 2.31). A wide plate holds
+the hinge back, and what then acts across the plate lowers von Mises's stress.
 """
+
+from math import atan, sqrt
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fingervision.domain.gripper import Gripper
 from fingervision.models.answer_figures import PeakStress
-from fingervision.models.notch import notch_of
-from fingervision.models.skeleton import Skeleton
+from fingervision.models.corotational_frame import CorotationalFrame
+from fingervision.models.hinge_correction import HingeTheory, plane_strain_share
+from fingervision.models.notch import Notch, notches_of
+from fingervision.models.skeleton import Member, Skeleton
 
 Array = NDArray[np.float64]
 
+_SAMPLES = 9
+"""Along a segment: the largest stress lies beside the neck where the moment grows along the hinge."""
+_HINGES = ("hinge 1", "hinge 2")
 _PLANAR = np.ix_([0, 1, 5], [0, 1, 5])
 
 
-def peak_hinge_stress(gripper: Gripper, skeleton: Skeleton, displacement: Array) -> PeakStress:
-    """Find the largest nominal stress, |N| / (b h) + 6 |M| / (b h^2), over the joints between a hinge's segments.
+def peak_hinge_stress(
+    gripper: Gripper, skeleton: Skeleton, displacement: Array, theory: HingeTheory = HingeTheory.BEAM
+) -> PeakStress:
+    """Find the largest stress |N| / (b h) + 6 |M| / (b h^2) in the hinges, nominal or with the notch's factors.
 
     Parameters
     ----------
     gripper : Gripper
         The drawing.
     skeleton : Skeleton
-        Its tree of members, hinges cut into an even number of segments: their middle, the thinnest section, is a joint.
+        Its tree of members, hinges cut into segments.
     displacement : ndarray of float, shape (3 * (members + 1),)
-        Displacements (mm) and rotations (rad) by 1 mm of input, joint by joint, the clamp first.
+        Small displacements (mm) and rotations (rad) by some input, joint by joint, the clamp first.
+    theory : HingeTheory
+        Nominal stress of a straight bar by beam theory; von Mises's on the notch where corrected.
 
     Returns
     -------
     PeakStress
-        On the side of the section that both loads stretch or press alike.
+        At that input, on the side of the section that both loads stretch or press alike.
     """
-    notch = notch_of(gripper)
     moved = displacement.reshape(-1, 3)
-    centres = {"hinge 1": gripper.lever.hinge1_mm, "hinge 2": gripper.lever.hinge2_mm}
-    peak = PeakStress(0.0, gripper.lever.hinge1_mm)
+    loads = np.zeros((len(skeleton.members), 3))
     for place, member in enumerate(skeleton.members):
-        if member.name not in centres:
+        if member.name in _HINGES:
+            axes, start, end = _axes(member)
+            first, second = moved[member.parent + 1], moved[place + 1]
+            # The end's motion as the start's rigid motion leaves it.
+            carried = first[:2] + first[2] * np.array([start[1] - end[1], end[0] - start[0]])
+            strained = np.append(axes @ (second[:2] - carried), second[2] - first[2])
+            tension_n, shear_n, moment_n_mm = np.linalg.solve(member.compliance[_PLANAR], strained)
+            loads[place] = tension_n, moment_n_mm + shear_n * float(np.hypot(*(end - start))), moment_n_mm
+    return _peak(gripper, skeleton, loads, theory)
+
+
+def peak_in_deformed_shape(
+    gripper: Gripper, skeleton: Skeleton, frame: CorotationalFrame, displacement: Array, theory: HingeTheory
+) -> PeakStress:
+    """Find the same in the deformed shape: the loads in axes that have turned with the material."""
+    return _peak(gripper, skeleton, frame.end_loads(displacement) * np.array([1.0, -1.0, 1.0]), theory)
+
+
+def _peak(gripper: Gripper, skeleton: Skeleton, loads: Array, theory: HingeTheory) -> PeakStress:
+    """Largest stress by tension and the moments at the start and the end of every member, shape (members, 3)."""
+    lever = gripper.lever
+    first, second = notches_of(gripper)
+    hinges = {"hinge 1": (lever.hinge1_mm, first), "hinge 2": (lever.hinge2_mm, second)}
+    peak = PeakStress(0.0, lever.hinge1_mm)
+    way = np.linspace(0.0, 1.0, _SAMPLES)
+    for member, (tension_n, at_start, at_end) in zip(skeleton.members, loads.tolist(), strict=True):
+        if member.name not in hinges:
             continue
-        start, end = np.array(member.start_mm), np.array(member.end_mm)
-        along = (end - start) / np.hypot(*(end - start))
-        axes = np.array([along, [-along[1], along[0]]])
-        first, second = moved[member.parent + 1], moved[place + 1]
-        # The end's motion as the start's rigid motion leaves it.
-        carried = first[:2] + first[2] * np.array([start[1] - end[1], end[0] - start[0]])
-        strained = np.append(axes @ (second[:2] - carried), second[2] - first[2])
-        tension_n, _, moment_n_mm = np.linalg.solve(member.compliance[_PLANAR], strained)
-        height_mm = float(notch.height_mm(np.array([along @ (end - np.array(centres[member.name]))]))[0])
-        bending = 6.0 * abs(moment_n_mm) / (notch.plate_mm * height_mm**2)
-        stress = abs(tension_n) / (notch.plate_mm * height_mm) + bending
-        if stress > peak.mpa_per_mm:
-            side = np.sign(tension_n) * np.sign(moment_n_mm) or 1.0
-            x, y = end - 0.5 * side * height_mm * axes[1]
-            peak = PeakStress(float(stress), (float(x), float(y)))
+        centre, notch = hinges[member.name]
+        axes, start, end = _axes(member)
+        places = start + np.outer(way, end - start)
+        height_mm = notch.height_mm((places - np.array(centre)) @ axes[0])
+        moment_n_mm = at_start + (at_end - at_start) * way
+        factors = notch_factors(notch) if theory is HingeTheory.CORRECTED else (1.0, 1.0)
+        stress = factors[0] * abs(tension_n) / (notch.plate_mm * height_mm)
+        stress += factors[1] * 6.0 * np.abs(moment_n_mm) / (notch.plate_mm * height_mm**2)
+        if theory is HingeTheory.CORRECTED:
+            # Along the surface sigma, across the plate w nu sigma.
+            across = plane_strain_share(notch) * gripper.material.poisson_ratio
+            stress *= sqrt(1.0 - across + across**2)
+        highest = int(np.argmax(stress))
+        if stress[highest] > peak.mpa_per_mm:
+            side = np.sign(tension_n) * np.sign(moment_n_mm[highest]) or 1.0
+            x, y = places[highest] - 0.5 * side * height_mm[highest] * axes[1]
+            peak = PeakStress(float(stress[highest]), (float(x), float(y)))
     return peak
+
+
+def notch_factors(notch: Notch) -> tuple[float, float]:
+    """Neuber's stress concentration of a deep notch on both sides, in tension and in bending."""
+    ratio = 0.5 * notch.curvature_ratio  # half the neck's height over the radius of curvature
+    root, angle = sqrt(ratio), atan(sqrt(ratio))
+    tension = 2.0 * (ratio + 1.0) * root / ((ratio + 1.0) * angle + root)
+    return tension, 4.0 * ratio * root / (3.0 * (root + (ratio - 1.0) * angle))
+
+
+def _axes(member: Member) -> tuple[Array, Array, Array]:
+    start, end = np.array(member.start_mm), np.array(member.end_mm)
+    along = (end - start) / np.hypot(*(end - start))
+    return np.array([along, [-along[1], along[0]]]), start, end

@@ -1,27 +1,39 @@
 """The gripper as a chain of lumped flexures and elastic links (the paper's SimMechanics model).
 
-Each notch is cut into equal segments, each as stiff as its height in the middle makes it; with eight or more the sum
-is within 0.02 % of the integral, and what remains is beam theory's own error, which the corrected hinge mends.
+Each notch is cut into segments, close together at the neck; each has the compliance of its own integral, so that their
+sum is that of the notch to rounding, however thin. What remains is beam theory's own error, which the corrected hinge
+mends.
 """
+
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fingervision.domain.gripper import Gripper
 from fingervision.domain.response import Response
-from fingervision.models.answer_figures import ModelFigures, PeakStress
+from fingervision.models.answer_figures import LoadedState, ModelFigures, PeakStress
 from fingervision.models.covered_inputs import covered_inputs_mm
-from fingervision.models.half_frame import half_frame
+from fingervision.models.driven_body import Equilibrium
+from fingervision.models.half_frame import frame_of, half_frame
 from fingervision.models.hinge_correction import HingeTheory
-from fingervision.models.hinge_stress import peak_hinge_stress
+from fingervision.models.hinge_stress import peak_hinge_stress, peak_in_deformed_shape
 from fingervision.models.physics import LINEAR, Physics
 from fingervision.models.skeleton import skeleton_of
-from fingervision.models.static_answer import gap_per_input, symmetric_response
+from fingervision.models.static_answer import (
+    contact_onset_mm,
+    equilibria,
+    gap_per_input,
+    loaded_state,
+    symmetric_response,
+)
 
 KIND = "lumped"
 
 _SEGMENTS = 10
 _MODES = 3
+_SLOPE_ERROR, _FORCE_ERROR, _MODE_ERROR = 0.02, 0.05, 0.07
+"""Of bars joined at points, beside finite elements of other grippers (`tests/benchmarks/models_held_out.py`)."""
 
 
 class LumpedGripper:
@@ -50,8 +62,10 @@ class LumpedGripper:
     ) -> None:
         self.gripper = gripper
         self.physics = physics
+        self.theory = theory
         self.skeleton = skeleton_of(gripper, theory, segments)
-        self.half = half_frame(gripper, self.skeleton)
+        self._frame = frame_of(gripper, self.skeleton)
+        self.half = half_frame(gripper, self.skeleton, self._frame)
 
     @property
     def input_range_mm(self) -> tuple[float, float]:
@@ -68,8 +82,24 @@ class LumpedGripper:
         return symmetric_response(self.half, self.physics, input_mm)
 
     def peak_stress(self) -> PeakStress:
-        """Largest nominal stress in the hinges by 1 mm of input."""
-        return peak_hinge_stress(self.gripper, self.skeleton, self.half.unit_displacement_mm)
+        """Largest stress in the hinges by 1 mm of input, on the notch or, by beam theory, nominal."""
+        return peak_hinge_stress(self.gripper, self.skeleton, self.half.unit_displacement_mm, self.theory)
+
+    def equilibria(self, inputs_mm: Sequence[float]) -> list[Equilibrium]:
+        """Return the body at some inputs, with the physics that the model was built with."""
+        return equilibria(self.half, self.physics, inputs_mm)
+
+    def loaded(self, inputs_mm: Sequence[float]) -> list[LoadedState]:
+        """Gap, forces and largest nominal stress at some inputs, in the deformed shape where the model has it."""
+        found = []
+        for state in self.equilibria(inputs_mm):
+            moved = state.displacement_mm
+            if self.physics.large_rotation:
+                peak = peak_in_deformed_shape(self.gripper, self.skeleton, self._frame, moved, self.theory)
+            else:
+                peak = peak_hinge_stress(self.gripper, self.skeleton, moved, self.theory)
+            found.append(loaded_state(self.half, state, peak.mpa_per_mm, peak.place_mm))
+        return found
 
     def modes_hz(self, *, drive_held: bool, count: int = _MODES) -> tuple[float, ...]:
         """First symmetric in-plane natural frequencies, without the actuator's mass."""
@@ -89,8 +119,11 @@ class LumpedGripper:
             self.peak_stress(),
             self.modes_hz(drive_held=False),
             self.modes_hz(drive_held=True),
-            self.half.first_touch_mm(),
+            contact_onset_mm(self.half, self.physics),
             self.swaying_modes_hz(),
+            slope_error=_SLOPE_ERROR,
+            force_error=_FORCE_ERROR,
+            mode_error=_MODE_ERROR,
         )
 
 

@@ -1,6 +1,7 @@
 """The shape of a two-sided notch: circular, or elliptic."""
 
 from dataclasses import dataclass
+from math import inf, sqrt
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,6 +10,9 @@ from fingervision.domain.errors import FingervisionError
 from fingervision.domain.gripper import Gripper, Material
 
 Array = NDArray[np.float64]
+
+_FINE = 400
+"""Points along half a notch at which shares in its bending are counted."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,14 +29,23 @@ class Notch:
         Half axis of the ellipse across the bar; the radius again of a circular one.
     plate_mm : float
         Depth b of the bar, out of the plane.
+    web_mm : float
+        Height of the bar, where it is less than the notch's own at its ends: the notch then ends where it reaches the
+        bar's faces, short of its half axis.
     """
 
     thickness_mm: float
     half_length_mm: float
     depth_mm: float
     plate_mm: float
+    web_mm: float = inf
 
     def __post_init__(self) -> None:
+        if not self.web_mm > self.thickness_mm:
+            raise FingervisionError(
+                f"A notch must leave less than its bar's height of {self.web_mm:g} mm, but leaves "
+                f"{self.thickness_mm:g}."
+            )
         for name in ("thickness_mm", "half_length_mm", "depth_mm", "plate_mm"):
             value = getattr(self, name)
             if not value > 0.0:
@@ -48,6 +61,41 @@ class Notch:
         """Thickness over half length: t / R of a circular notch."""
         return self.thickness_mm / self.half_length_mm
 
+    @property
+    def curvature_ratio(self) -> float:
+        """Thickness over the radius of curvature at the neck: t / R of a circular notch, t c / a^2 of an elliptic."""
+        return self.thickness_mm * self.depth_mm / self.half_length_mm**2
+
+    @property
+    def reach_mm(self) -> float:
+        """How far the notch extends along the bar from its middle."""
+        share = 1.0 - 0.5 * (self.web_mm - self.thickness_mm) / self.depth_mm
+        return self.half_length_mm * sqrt(1.0 - max(share, 0.0) ** 2)
+
+    def stations_mm(self, pieces: int) -> Array:
+        """Edges of pieces along the notch, close together where it bends; shape (pieces + 1,), odd about the middle.
+
+        Half of the pieces follow the share in bending, the integral of 1 / h^3, half the length.
+        """
+        # x = a tan-like spacing near the neck: the bending part is sqrt(t R) long, and must be sampled finely.
+        fine = np.sinh(np.linspace(0.0, np.arcsinh(20.0 * self.reach_mm / self._bending_mm), _FINE))
+        x = self.reach_mm * fine / fine[-1]
+        middle = 0.5 * (x[1:] + x[:-1])
+        bending = np.concatenate([[0.0], np.cumsum(np.diff(x) / self.height_mm(middle) ** 3)])
+        share = 0.5 * bending / bending[-1] + 0.5 * x / x[-1]
+        odd = np.concatenate([-share[:0:-1], share])
+        return np.asarray(np.interp(np.linspace(-1.0, 1.0, pieces + 1), odd, np.concatenate([-x[:0:-1], x])))
+
+    @property
+    def _bending_mm(self) -> float:
+        """Length that bends: sqrt(t R), with the radius of curvature at the neck."""
+        return min(sqrt(self.thickness_mm * self.half_length_mm**2 / self.depth_mm), self.reach_mm)
+
+    @property
+    def bending_share(self) -> float:
+        """Length that bends over the half length: sqrt(t / c) of the ellipse, sqrt(t / R) of a circle; at most 1."""
+        return min(sqrt(self.thickness_mm / self.depth_mm), 1.0)
+
     def height_mm(self, x_mm: Array) -> Array:
         """Height h(x) = t + 2 c (1 - sqrt(1 - x^2 / a^2))."""
         along = np.clip(1.0 - (x_mm / self.half_length_mm) ** 2, 0.0, 1.0)
@@ -59,17 +107,28 @@ def circular_notch(radius_mm: float, thickness_mm: float, plate_mm: float) -> No
     return Notch(thickness_mm, radius_mm, radius_mm, plate_mm)
 
 
-def notch_of(gripper: Gripper) -> Notch:
-    """Take the notch that all hinges of a gripper share."""
-    return circular_notch(gripper.hinge.radius_mm, gripper.hinge.thickness_mm, gripper.body.plate_mm)
+def notches_of(gripper: Gripper) -> tuple[Notch, Notch]:
+    """Take the notches of hinge 1, in the pillar, and hinge 2, in the shuttle."""
+    hinge, links = gripper.hinge, gripper.links
+    x0, x1, _, _ = links.pillar_and_root_mm
+    first, second = (
+        Notch(hinge.thickness_mm, hinge.radius_mm, hinge.radius_mm, gripper.body.plate_mm, web_mm)
+        for web_mm in (x1 - x0, links.shuttle_width_mm)
+    )
+    return first, second
 
 
 def segment_mass_t(notch: Notch, material: Material, segments: int) -> Array:
-    """Masses of equal segments of the notch, equation (1) of the paper: density times depth times area.
+    """Masses of equal segments of the notch; see `masses_t`."""
+    return masses_t(notch, material, np.linspace(-notch.reach_mm, notch.reach_mm, segments + 1))
+
+
+def masses_t(notch: Notch, material: Material, edges_mm: Array) -> Array:
+    """Masses between stations of the notch, equation (1) of the paper: density times depth times area.
 
     The integral of h has a closed form; int sqrt(1 - s^2) ds = (s sqrt(1 - s^2) + asin s) / 2.
     """
-    edges = np.linspace(-1.0, 1.0, segments + 1)
+    edges = np.clip(edges_mm / notch.half_length_mm, -1.0, 1.0)
     under_arc = 0.5 * (edges * np.sqrt(1.0 - edges**2) + np.arcsin(edges))
     area = notch.half_length_mm * (
         (notch.thickness_mm + 2.0 * notch.depth_mm) * np.diff(edges) - 2.0 * notch.depth_mm * np.diff(under_arc)

@@ -1,4 +1,7 @@
-"""An elastic plate in plane stress: quadratic triangles, small or large displacements."""
+"""An elastic plate in plane stress: quadratic triangles, small or large displacements.
+
+Where its width holds a flexure back the law lies between plane stress and plane strain (`width_effect`).
+"""
 
 from functools import cached_property
 from typing import Any
@@ -6,11 +9,12 @@ from typing import Any
 import numpy as np
 import skfem
 from numpy.typing import NDArray
-from scipy.sparse import csr_matrix
-from skfem.helpers import ddot, dot, eye, mul, sym_grad, trace, transpose
+from scipy.sparse import coo_matrix, csr_matrix
+from skfem.helpers import dot, eye, mul, trace, transpose
 
 from fingervision.domain.gripper import Material
-from fingervision.models.mesh_outline import PlaneMesh
+from fingervision.models.triangulate import PlaneMesh
+from fingervision.models.width_effect import ConstrainedZone, held_moduli, shares_at
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
@@ -18,9 +22,9 @@ Indices = NDArray[np.int64]
 _CORNERS = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0]])
 
 
-def _stress(strain: Any, material: Material) -> Any:
+def _stress(strain: Any, moduli: Any) -> Any:
     """Plane-stress law, thickness direction free: Timoshenko and Goodier, Theory of Elasticity, chapter 2."""
-    E, nu = material.youngs_modulus_mpa, material.poisson_ratio
+    E, nu = moduli
     return E / (1.0 + nu) * strain + E * nu / (1.0 - nu**2) * eye(trace(strain), 2)
 
 
@@ -39,11 +43,18 @@ class PlaneStressPlate:
         Linear elastic; the St. Venant-Kirchhoff law in large displacements, right where strains are a few per cent.
     plate_mm : float
         Thickness.
+    zones : tuple of ConstrainedZone
+        Flexures that the width holds back; none for plane stress everywhere.
     """
 
-    def __init__(self, mesh: PlaneMesh, material: Material, plate_mm: float) -> None:
+    def __init__(
+        self, mesh: PlaneMesh, material: Material, plate_mm: float, zones: tuple[ConstrainedZone, ...] = ()
+    ) -> None:
         self.material = material
         self.plate_mm = plate_mm
+        middles = mesh.nodes_mm[:, mesh.triangles[:3]].mean(axis=1)
+        self._share = shares_at(zones, middles)[:, None]
+        self._moduli = held_moduli(material, self._share)
         self._mesh = skfem.MeshTri2(mesh.nodes_mm, mesh.triangles)
         self._element = skfem.ElementVector(skfem.ElementTriP2())
         self._basis = skfem.Basis(self._mesh, self._element, intorder=4)
@@ -70,14 +81,33 @@ class PlaneStressPlate:
         return np.vstack([self._mesh.facets[:, facets], corners + facets])
 
     @cached_property
+    def _slopes(self) -> tuple[Array, Array]:
+        """Slopes of the six shape functions at the quadrature points, shape (m, q, 2, 6), and weights, shape (m, q)."""
+        scalar = skfem.Basis(self._mesh, skfem.ElementTriP2(), intorder=4)
+        slopes = np.stack([np.asarray(shape[0].grad) for shape in scalar.basis])  # (6, 2, m, q)
+        return np.ascontiguousarray(slopes.transpose(2, 3, 1, 0)), np.asarray(scalar.dx) * self.plate_mm
+
+    @cached_property
+    def _unknowns_of(self) -> Indices:
+        """Unknowns of every triangle, first along x, then along y; shape (m, 12)."""
+        corners, edges = self._mesh.t[:3], self._mesh.t2f
+        nodes = np.vstack([corners, int(self._basis.nodal_dofs.shape[1]) + edges])
+        return np.ascontiguousarray(np.vstack([self.x_dofs[nodes], self.y_dofs[nodes]]).T)
+
+    @cached_property
+    def _law(self) -> Array:
+        """Stress (xx, yy, xy) by strain (xx, yy, twice xy) in every triangle, shape (m, 1, 3, 3)."""
+        E, nu = (np.broadcast_to(value, self._share.shape)[:, 0] for value in self._moduli)
+        law = np.zeros((E.size, 1, 3, 3))
+        law[:, 0, 0, 0] = law[:, 0, 1, 1] = E / (1.0 - nu**2)
+        law[:, 0, 0, 1] = law[:, 0, 1, 0] = nu * E / (1.0 - nu**2)
+        law[:, 0, 2, 2] = 0.5 * E / (1.0 + nu)
+        return law
+
+    @cached_property
     def stiffness_n_mm(self) -> csr_matrix:
         """Linear stiffness matrix."""
-        material, plate_mm = self.material, self.plate_mm
-
-        def work(u: Any, v: Any, _: Any) -> Any:
-            return plate_mm * ddot(_stress(sym_grad(u), material), sym_grad(v))
-
-        return csr_matrix(skfem.BilinearForm(work).assemble(self._basis))
+        return self.internal_force_n(np.zeros(self.unknowns))[0]
 
     @cached_property
     def mass_t(self) -> csr_matrix:
@@ -94,29 +124,68 @@ class PlaneStressPlate:
 
         Source: Bonet and Wood, Nonlinear Continuum Mechanics for Finite Element Analysis, chapters 6 and 9.
         """
-        material, plate_mm = self.material, self.plate_mm
-        gradient = self._basis.interpolate(displacement_mm).grad
-        deformation = gradient + eye(np.ones(gradient.shape[2:]), 2)
-        strain = 0.5 * (mul(transpose(deformation), deformation) - eye(np.ones(gradient.shape[2:]), 2))
-        stress = _stress(strain, material)
+        strains, stress = self._strained(displacement_mm)
+        slopes, weights = self._slopes
+        weighted = weights[..., None, None]
+        # The stress that is there already resists a turn: slope, stress, slope.
+        matrix = np.stack([stress[..., [0, 2]], stress[..., [2, 1]]], axis=-2) * weighted
+        turned = np.sum(np.swapaxes(slopes, 2, 3) @ (matrix @ slopes), axis=1)
+        elements = np.sum(np.swapaxes(strains, 2, 3) @ ((self._law * weighted) @ strains), axis=1)
+        elements[:, :6, :6] += turned
+        elements[:, 6:, 6:] += turned
+        unknowns = self._unknowns_of
+        rows, columns = np.repeat(unknowns, 12, axis=1), np.tile(unknowns, (1, 12))
+        shape = (self.unknowns, self.unknowns)
+        tangent = coo_matrix((elements.ravel(), (rows.ravel(), columns.ravel())), shape=shape)
+        return csr_matrix(tangent), self._collected(strains, stress)
 
-        def tangent(u: Any, v: Any, _: Any) -> Any:
-            du = _symmetric(mul(transpose(deformation), u.grad))
-            dv = _symmetric(mul(transpose(deformation), v.grad))
-            return plate_mm * (ddot(_stress(du, material), dv) + ddot(mul(u.grad, stress), v.grad))
+    def nodal_force_n(self, displacement_mm: Array) -> Array:
+        """Nodal forces of the deformed plate alone, a tenth of the work."""
+        return self._collected(*self._strained(displacement_mm))
 
-        def force(v: Any, _: Any) -> Any:
-            return plate_mm * ddot(mul(deformation, stress), v.grad)
+    def _strained(self, displacement_mm: Array) -> tuple[Array, Array]:
+        """Change of Green's strain by unknown, shape (m, q, 3, 12), and second Piola-Kirchhoff stress (m, q, 3)."""
+        slopes, _ = self._slopes
+        moved = displacement_mm[self._unknowns_of].reshape(-1, 1, 2, 6)
+        gradient = moved @ np.swapaxes(slopes, 2, 3)  # (m, q, 2, 2): row the component, column the direction
+        deformation = gradient + np.eye(2)
+        dx, dy = slopes[..., 0, :], slopes[..., 1, :]
+        strains = np.empty((*dx.shape[:2], 3, 12))
+        for component in (0, 1):
+            fx, fy = deformation[..., component, 0, None], deformation[..., component, 1, None]
+            part = strains[..., 6 * component : 6 * component + 6]
+            part[..., 0, :], part[..., 1, :], part[..., 2, :] = fx * dx, fy * dy, fx * dy + fy * dx
+        green = gradient + np.swapaxes(gradient, 2, 3) + np.swapaxes(gradient, 2, 3) @ gradient
+        strain = np.stack([0.5 * green[..., 0, 0], 0.5 * green[..., 1, 1], green[..., 0, 1]], axis=-1)
+        return strains, (self._law @ strain[..., None])[..., 0]
 
-        return skfem.BilinearForm(tangent).assemble(self._basis), skfem.LinearForm(force).assemble(self._basis)
+    def _collected(self, strains: Array, stress: Array) -> Array:
+        element = np.sum(np.swapaxes(strains, 2, 3) @ (stress * self._slopes[1][..., None])[..., None], axis=1)
+        return np.asarray(np.bincount(self._unknowns_of.ravel(), element.ravel(), self.unknowns), dtype=np.float64)
 
-    def von_mises_mpa(self, displacement_mm: Array) -> Array:
-        """Von Mises stress at the triangles' corners, shape (3, m); Cauchy stress of small displacements."""
+    def von_mises_mpa(self, displacement_mm: Array, *, large: bool = False) -> Array:
+        """Von Mises stress at the triangles' corners, shape (3, m).
+
+        Parameters
+        ----------
+        displacement_mm : ndarray of float, shape (unknowns,)
+            Displacement components.
+        large : bool
+            Cauchy stress of the deformed plate; small displacements otherwise.
+        """
         corners = skfem.Basis(self._mesh, self._element, quadrature=(_CORNERS, np.full(3, 1.0 / 6.0)))
         gradient = corners.interpolate(displacement_mm).grad
-        stress = _stress(_symmetric(gradient), self.material)
+        if large:
+            deformation = gradient + eye(np.ones(gradient.shape[2:]), 2)
+            strain = 0.5 * (mul(transpose(deformation), deformation) - eye(np.ones(gradient.shape[2:]), 2))
+            area = deformation[0, 0] * deformation[1, 1] - deformation[0, 1] * deformation[1, 0]
+            stress = mul(mul(deformation, _stress(strain, self._moduli)), transpose(deformation)) / area
+        else:
+            stress = _stress(_symmetric(gradient), self._moduli)
         sx, sy, txy = stress[0, 0], stress[1, 1], stress[0, 1]
-        return np.asarray(np.sqrt(sx**2 - sx * sy + sy**2 + 3.0 * txy**2)).T
+        sz = self._share * self.material.poisson_ratio * (sx + sy)
+        squares = (sx - sy) ** 2 + (sy - sz) ** 2 + (sz - sx) ** 2
+        return np.asarray(np.sqrt(0.5 * squares + 3.0 * txy**2)).T
 
     def at_corners(self, values: Array) -> Array:
         """Mean over the triangles that meet at each corner node; shape (number of corners,)."""

@@ -1,4 +1,4 @@
-"""The packaged mesh of the reference outline, so that the paper's sample needs no mesher."""
+"""The packaged mesh of the reference outline, so that the paper's sample is answered half a second sooner."""
 
 from dataclasses import replace
 from importlib import resources
@@ -6,7 +6,8 @@ from importlib import resources
 import numpy as np
 
 from fingervision.domain.gripper import Gripper, Hinge, Lever, Links
-from fingervision.models.mesh_outline import ElementSize, PlaneMesh, mesh_outline
+from fingervision.models.mesh_outline import ElementSize, mesh_outline
+from fingervision.models.triangulate import PlaneMesh
 
 REFERENCE_HINGE = Hinge(thickness_mm=1.0, radius_mm=4.0, web_mm=9.0)
 REFERENCE_LEVER = Lever(
@@ -56,12 +57,12 @@ def is_reference(gripper: Gripper) -> bool:
 
 
 def mesh_of(gripper: Gripper) -> PlaneMesh:
-    """Take the packaged mesh where the outline is the reference's, else one made by gmsh.
+    """Take the packaged mesh where the outline is the reference's, else make one.
 
     Raises
     ------
     FingervisionError
-        Where gmsh is needed and not installed, or the outline is no single body.
+        Where the outline is not that of a gripper.
     """
     if not is_reference(gripper):
         return mesh_outline(gripper, working_size(gripper))
@@ -71,6 +72,6 @@ def mesh_of(gripper: Gripper) -> PlaneMesh:
 
 
 def write_reference_mesh(gripper: Gripper, path: str) -> None:
-    """Make the packaged mesh again from the reference gripper; needs gmsh."""
+    """Make the packaged mesh again from the reference gripper."""
     mesh = mesh_outline(gripper, working_size(gripper))
     np.savez_compressed(path, nodes_mm=mesh.nodes_mm, triangles=mesh.triangles.astype(np.int32))

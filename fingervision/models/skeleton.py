@@ -6,6 +6,7 @@ point on its face are rigid. Against the finite elements of the reference that g
 """
 
 from dataclasses import dataclass
+from itertools import pairwise
 from math import cos, radians, sin
 
 import numpy as np
@@ -13,14 +14,16 @@ from numpy.typing import NDArray
 
 from fingervision.domain.errors import FingervisionError
 from fingervision.domain.gripper import Gripper, PointMm
-from fingervision.models.hinge_compliance import bar_compliance
-from fingervision.models.hinge_correction import HingeTheory, blocks_over_planes, bricks_over_beam, hinge_compliance
-from fingervision.models.notch import notch_of, segment_mass_t
+from fingervision.models.hinge_compliance import bar_compliance, beam_compliance
+from fingervision.models.hinge_correction import HingeTheory, hinge_compliance, hinge_ratio
+from fingervision.models.notch import masses_t, notches_of
 
 Array = NDArray[np.float64]
 
 _RIGID = np.zeros((6, 6))
 _PIECES_PER_BAR = 4
+_LEAST_BAR = 0.01
+"""Of what is left between a notch and the cross bar's axis: a bar must have some length."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -96,19 +99,21 @@ class _Tree:
         return parent
 
     def hinge(self, parent: int, start: PointMm, end: PointMm, name: str, theory: HingeTheory, segments: int) -> int:
-        material, notch = self.gripper.material, notch_of(self.gripper)
-        masses = segment_mass_t(notch, material, max(segments, 1))
+        material, notch = self.gripper.material, notches_of(self.gripper)[0 if name == "hinge 1" else 1]
+        edges = notch.stations_mm(max(segments, 1))
+        masses = masses_t(notch, material, edges)
         if segments == 0:
             whole = hinge_compliance(notch, material, theory)
             self.members.append(Member(name, parent, start, end, whole, float(masses[0]), notch.thickness_mm))
             return len(self.members) - 1
-        ratio = np.ones(6) if theory is HingeTheory.BEAM else bricks_over_beam(notch) * blocks_over_planes(notch)
-        points = np.linspace(start, end, segments + 1)
-        length = 2.0 * notch.half_length_mm / segments
-        middles = notch.half_length_mm * ((2.0 * np.arange(segments) + 1.0) / segments - 1.0)
+        ratio = hinge_ratio(notch, material, theory)
         root = np.sqrt(ratio[[0, 5, 4, 3, 4, 5]])
-        for place, height in enumerate(notch.height_mm(middles).tolist()):
-            part = root[:, None] * bar_compliance(length, height, notch.plate_mm, material) * root
+        along = (edges - edges[0]) / (edges[-1] - edges[0])
+        points = np.array(start) + np.outer(along, np.subtract(end, start))
+        for place, span in enumerate(pairwise(edges.tolist())):
+            # Each segment has its integral, so that however few and long they are, thin necks are as soft as they are.
+            part = root[:, None] * beam_compliance(notch, material, span) * root
+            height = float(notch.height_mm(np.array([0.5 * (span[0] + span[1])]))[0])
             a, b = points[place].tolist(), points[place + 1].tolist()
             self.members.append(Member(name, parent, tuple(a), tuple(b), part, float(masses[place]), height))
             parent = len(self.members) - 1
@@ -125,7 +130,8 @@ def skeleton_of(gripper: Gripper, theory: HingeTheory, segments: int, *, rigid_l
     theory : HingeTheory
         Of the hinges.
     segments : int
-        Pieces per hinge, of the height at their middle; 0 for one piece with the whole hinge's own compliance.
+        Pieces per hinge, close together at the neck, each with its own integral; 0 for one piece with the
+        whole hinge's own compliance.
     rigid_links : bool
         Whether only the hinges yield, as in the paper's equations.
 
@@ -135,19 +141,22 @@ def skeleton_of(gripper: Gripper, theory: HingeTheory, segments: int, *, rigid_l
         Where the members do not follow each other.
     """
     links, lever = gripper.links, gripper.lever
-    reach = gripper.hinge.radius_mm
+    first, second = notches_of(gripper)
     tree = _Tree(gripper)
-    lower1, upper1 = _hinge_ends(lever.hinge1_mm, lever.hinge1_axis_deg, reach)
-    lower2, upper2 = _hinge_ends(lever.hinge2_mm, lever.hinge2_axis_deg, reach)
+    lower1, upper1 = _hinge_ends(lever.hinge1_mm, lever.hinge1_axis_deg, first.reach_mm)
+    lower2, upper2 = _hinge_ends(lever.hinge2_mm, lever.hinge2_axis_deg, second.reach_mm)
     cross_y = links.cross_bar_mm[1]
     beam_low = cross_y - links.cross_bar_width_mm / 2.0
     pillar_x = lever.hinge1_mm[0]
     pillar_width = links.pillar_and_root_mm[1] - links.pillar_and_root_mm[0]
-    if not lower1[1] > links.pillar_and_root_mm[2] or not beam_low > max(upper1[1], upper2[1]):
+    if not lower1[1] > links.pillar_and_root_mm[2] or not cross_y > max(upper1[1], upper2[1]):
         raise FingervisionError(
-            f"Both hinges must lie between the clamp and the cross bar, whose lower face is at y = {beam_low:g} mm, "
-            f"but end at y = {lower1[1]:g} and {max(upper1[1], upper2[1]):g} mm: the links do not meet."
+            f"Bars and hinges can stand for the body only where both hinges lie between the clamp and the cross bar, "
+            f"whose axis is at y = {cross_y:g} mm, but they reach from y = {lower1[1]:g} to "
+            f"{max(upper1[1], upper2[1]):g} mm; take --kind finite_element."
         )
+    # A notch may reach into the cross bar: the root then begins where it ends.
+    beam_low = max(beam_low, upper1[1] + _LEAST_BAR * (cross_y - upper1[1]))
 
     def link(parent: int, start: PointMm, end: PointMm, name: str, width_mm: float) -> int:
         if rigid_links:

@@ -1,10 +1,14 @@
 """The static answer of a driven body to a list of inputs: small or large displacements, with or without contact."""
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
+from fingervision.domain.gripper import PointMm
 from fingervision.domain.response import Response
+from fingervision.models.answer_figures import LoadedState
 from fingervision.models.driven_body import DrivenBody, Equilibrium
 from fingervision.models.large_rotation import first_touch, large_path
 from fingervision.models.physics import Physics
@@ -35,6 +39,38 @@ def symmetric_response(body: DrivenBody, physics: Physics, input_mm: Array) -> R
 def gap_per_input(body: DrivenBody) -> float:
     """Millimetres of gap per millimetre of input at rest."""
     return 2.0 * (body.measured_mm(body.unit_displacement_mm) - body.measured_rest_mm)
+
+
+def equilibria(body: DrivenBody, physics: Physics, inputs_mm: Sequence[float]) -> list[Equilibrium]:
+    """Return the body at some inputs, in their order, with the physics asked for."""
+    if not physics.large_rotation:
+        return [body.equilibrium(value, contact=physics.contact) for value in inputs_mm]
+    touch_mm = body.first_touch_mm() if physics.contact else None
+    found: dict[float, Equilibrium] = {0.0: body.at_rest()}
+    for sign in (-1.0, 1.0):
+        state = body.at_rest()
+        for value in sorted((v for v in inputs_mm if v * sign > 0.0), key=abs):
+            contact = touch_mm is not None and value < _NEAR_TOUCH * touch_mm
+            if contact and state.input_mm > (touch_mm or 0.0):
+                first = first_touch(body, touch_mm or 0.0)
+                state = first if value < first.input_mm else state
+            state = large_path(body, value, start=state, contact=contact)[-1]
+            found[value] = state
+    return [found[value] for value in inputs_mm]
+
+
+def contact_onset_mm(body: DrivenBody, physics: Physics) -> float | None:
+    """Input at which the fingers first touch, in the deformed shape where that is asked for; None where never."""
+    touch_mm = body.first_touch_mm()
+    if touch_mm is None or not physics.large_rotation:
+        return touch_mm
+    return first_touch(body, touch_mm).input_mm
+
+
+def loaded_state(body: DrivenBody, state: Equilibrium, stress_mpa: float, place_mm: PointMm) -> LoadedState:
+    """Put one equilibrium's figures together."""
+    gap_mm = 2.0 * body.measured_mm(state.displacement_mm)
+    return LoadedState(state.input_mm, gap_mm, state.force_n, float(state.contact_n.sum()), stress_mpa, place_mm)
 
 
 def _right_and_force(body: DrivenBody, physics: Physics, inputs: Array) -> tuple[Array, Array]:

@@ -3,7 +3,7 @@
 import json
 from collections.abc import Mapping
 from dataclasses import asdict, fields
-from math import isclose, isfinite
+from math import isclose
 from pathlib import Path
 from typing import Any, NoReturn
 
@@ -17,6 +17,7 @@ from calib.limits import Limits
 from calib.measured_scale import Calibration, Reference, Response, ScalePart
 from calib.plane import Plane
 from fingervision.domain.errors import FingervisionError
+from fingervision.storage.finite import is_number
 
 Floats = NDArray[np.float64]
 
@@ -106,7 +107,7 @@ def read_calibration(path: Path) -> Calibration:
         There is no such file, it is from a newer schema, or it makes no sense.
     """
     try:
-        content = json.loads(path.read_text(encoding="utf-8"), parse_constant=_no_constant)
+        content = json.loads(path.read_text(encoding="utf-8-sig"), parse_constant=_no_constant)
     except FileNotFoundError:
         raise FingervisionError(
             f"There is no calibration file {path}; make one with `fingervision calibrate`."
@@ -203,8 +204,7 @@ class _Reader:
 
     def _number(self, where: Mapping[str, Any], name: str, positive: bool = False) -> float:
         value = where.get(name)
-        is_number = isinstance(value, int | float) and not isinstance(value, bool) and isfinite(value)
-        if not is_number or (positive and not value > 0):  # type: ignore[operator] # a number, as just seen
+        if not is_number(value) or (positive and not value > 0):  # type: ignore[operator] # a number, as just seen
             self._refuse(f"{name} must be a {'positive ' if positive else ''}number, but is {value!r}")
         return float(value)  # type: ignore[arg-type] # a number, as just seen
 
@@ -232,7 +232,10 @@ class _Reader:
     def _covariance(self, value: object, name: str, size: int) -> Floats:
         covariance = self._array(value, name, (size, size))
         u = np.sqrt(np.maximum(np.diag(covariance), 0.0))
-        correlation = covariance / np.maximum(np.outer(u, u), np.finfo(float).tiny)
+        with np.errstate(over="ignore"):  # refused below
+            correlation = covariance / np.maximum(np.outer(u, u), np.finfo(float).tiny)
+        if not np.all(np.isfinite(correlation)):
+            self._refuse(f"{name} must be symmetric and not negative, but is {value!r}")
         smallest = float(np.linalg.eigvalsh((correlation + correlation.T) / 2.0).min()) if covariance.any() else 0.0
         if np.any(np.diag(covariance) < 0.0) or not np.allclose(correlation, correlation.T) or smallest < -1e-6:
             self._refuse(f"{name} must be symmetric and not negative, but is {value!r}")

@@ -16,15 +16,9 @@ def read_columns(path: Path, required: tuple[str, ...], known: tuple[str, ...]) 
     FingervisionError
         The file cannot be read, is no table, or a required column is missing: with the nearest name found.
     """
-    try:
-        text = path.read_text(encoding="utf-8-sig")
-    except FileNotFoundError:
-        raise FingervisionError(f"There is no table {path}.") from None
-    except (OSError, UnicodeDecodeError) as error:
-        raise FingervisionError(f"{path} must be a CSV table in UTF-8, but could not be read: {error}.") from error
     rows = [
         (number, cells)
-        for number, cells in enumerate(csv.reader(text.splitlines()), start=1)
+        for number, cells in enumerate(_cells(path), start=1)
         if any(cell.strip() for cell in cells) and not cells[0].lstrip().startswith("#")
     ]
     if not rows:
@@ -35,7 +29,7 @@ def read_columns(path: Path, required: tuple[str, ...], known: tuple[str, ...]) 
             near = difflib.get_close_matches(name, [h for h in header if h not in (*required, *known)], n=1, cutoff=0.5)
             hint = f"rename {near[0]}, in the unit of the name" if near else "add it"
             raise FingervisionError(f"{path} must have a column {name}, but has {','.join(header)}: {hint}.")
-    for name in known:
+    for name in (*required, *known):
         if header.count(name) > 1:
             raise FingervisionError(f"{path} must have each column once, but {name} stands twice: remove one.")
     for number, cells in rows[1:]:
@@ -48,6 +42,27 @@ def read_columns(path: Path, required: tuple[str, ...], known: tuple[str, ...]) 
         for name in (*required, *known)
         if name in header
     }
+
+
+def _cells(path: Path) -> list[list[str]]:
+    if path.exists() and not path.is_file():
+        raise FingervisionError(
+            f"{path} must be a table in a file, but is a folder or a pipe: save it as a file first."
+        )
+    try:
+        text = path.read_text(encoding="utf-8-sig")
+    except FileNotFoundError:
+        raise FingervisionError(f"There is no table {path}.") from None
+    except (OSError, UnicodeDecodeError) as error:
+        raise FingervisionError(f"{path} must be a CSV table in UTF-8, but could not be read: {error}.") from error
+    reader = csv.reader(text.splitlines(keepends=True), strict=True)
+    try:
+        return list(reader)
+    except csv.Error as error:
+        raise FingervisionError(
+            f"{path} must be a CSV table, but its quotes cannot be read, by line {reader.line_num} ({error}): close or "
+            "remove the quote."
+        ) from error
 
 
 def number(path: Path, name: str, row: int, cell: str) -> float | None:

@@ -59,6 +59,10 @@ def read_drive(path: Path) -> DriveHistory:
 
 def _lines(path: Path) -> list[tuple[int, list[str]]]:
     """Rows with their line numbers; comments and empty lines left out."""
+    if path.exists() and not path.is_file():
+        raise FingervisionError(
+            f"{path} must be a table in a file, but is a folder or a pipe: save it as a file first."
+        )
     try:
         text = path.read_text(encoding="utf-8-sig")
     except FileNotFoundError:
@@ -67,11 +71,16 @@ def _lines(path: Path) -> list[tuple[int, list[str]]]:
         raise FingervisionError(f"The drive table {path} could not be read ({error.strerror}).") from error
     except UnicodeDecodeError as error:
         raise FingervisionError(f"{path} must be a CSV table in UTF-8, but is not: {error.reason}.") from error
-    return [
-        (number, next(csv.reader([line])))
-        for number, line in enumerate(text.splitlines(), start=1)
-        if line.strip() and not line.startswith("#")
-    ]
+    rows = []
+    for number, line in enumerate(text.splitlines(), start=1):
+        if line.strip() and not line.startswith("#"):
+            try:
+                rows.append((number, next(csv.reader([line], strict=True))))
+            except csv.Error as error:
+                raise FingervisionError(
+                    f"Line {number} of {path} has a quote that cannot be read ({error}): close or remove it."
+                ) from error
+    return rows
 
 
 def _number(path: Path, line: int, name: str, cell: str) -> float:

@@ -1,6 +1,7 @@
 """One program a folder: a lock that the system lets go of when the program ends, however it does."""
 
 import os
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -29,20 +30,38 @@ class FolderLock:
     """
 
     def __init__(self, path: Path) -> None:
+        self._path = path / LOCK
+        while True:
+            try:
+                self._file = os.open(self._path, os.O_RDWR | os.O_CREAT, 0o644)
+            except OSError as error:
+                raise FingervisionError(
+                    f"The folder {path} cannot be written ({error.strerror}): name another with --out."
+                ) from error
+            try:
+                if fcntl is not None:
+                    fcntl.flock(self._file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except OSError:
+                os.close(self._file)
+                raise FingervisionError(
+                    f"The folder {path} is in use by another run: wait for its end, or name another with --out."
+                ) from None
+            if self._is_there():
+                return
+            os.close(self._file)  # it was removed by the one who held it, between opening and locking
+
+    def _is_there(self) -> bool:
         try:
-            self._file = os.open(path / LOCK, os.O_RDWR | os.O_CREAT, 0o644)
-        except OSError as error:
-            raise FingervisionError(
-                f"The folder {path} cannot be written ({error.strerror}): name another with --out."
-            ) from error
-        try:
-            if fcntl is not None:
-                fcntl.flock(self._file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            return os.path.samestat(os.fstat(self._file), self._path.stat())
         except OSError:
-            os.close(self._file)
-            raise FingervisionError(
-                f"The folder {path} is in use by another run: wait for its end, or name another with --out."
-            ) from None
+            return False
+
+    def remove(self) -> None:
+        """Let go of it, and leave no file behind."""
+        if self._file >= 0:
+            with suppress(OSError):
+                self._path.unlink()
+        self.release()
 
     def release(self) -> None:
         """Let go of it."""

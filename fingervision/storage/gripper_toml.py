@@ -11,6 +11,9 @@ from typing import Any
 
 from fingervision.domain.errors import FingervisionError
 from fingervision.domain.gripper import Body, Gripper, Hinge, Lever, Links, Material
+from fingervision.models.gripper_outline import check_outline, check_stated_size
+from fingervision.models.planar_region import crosses_itself
+from fingervision.storage.finite import is_number
 
 _SECTIONS: Mapping[str, type] = MappingProxyType(
     {"material": Material, "body": Body, "hinge": Hinge, "lever": Lever, "links": Links}
@@ -19,6 +22,15 @@ _MAY_BE_ANY_SIGN = frozenset({"lever.l1_mm", "lever.l2_mm", "lever.l3_mm", "leve
                               "lever.hinge2_axis_deg", "lever.drive_face_y_mm"})  # fmt: skip
 _MEET_MM = 0.02
 _METRES_BELOW_MM = 2.0
+_LEAST_YIELD_STRAIN, _MOST_YIELD_STRAIN = 1e-4, 0.1
+"""Lead yields at 5e-4, rubber-like polymers beyond 0.1: what lies outside is a modulus in another unit."""
+_LIMITS: Mapping[str, tuple[float, float]] = MappingProxyType(
+    {"_mm": (1e-4, 1e5), "_deg": (0.0, 720.0), "_mpa": (1e-3, 1e13), "_kg_m3": (1.0, 3e4), "_ratio": (0.0, 0.5)}
+)
+"""Magnitudes by the unit at a name's end: nothing outside them is a gripper, and larger numbers overflow. Lengths from
+a tenth of a micrometre to 100 m, moduli up to ten times diamond's in Pa, which is asked
+about where the yield stress stands beside it, densities from aerogel to osmium."""
+_SPELT: Mapping[str, str] = MappingProxyType({"_mm": "mm", "_deg": "degrees", "_mpa": "MPa", "_kg_m3": "kg/m3"})
 
 
 def read_gripper(path: Path) -> Gripper:
@@ -41,7 +53,7 @@ def read_gripper(path: Path) -> Gripper:
         raise FingervisionError(f"{path} must be TOML in UTF-8, but is not: {error.reason}.") from error
     try:
         tables = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
+    except (ValueError, RecursionError) as error:  # also numbers of thousands of digits, and tables without end
         raise FingervisionError(f"{path} must be TOML, but is not: {error}.") from error
     return gripper_from_tables(tables, str(path))
 
@@ -50,8 +62,19 @@ def gripper_from_tables(tables: Mapping[str, Any], origin: str) -> Gripper:
     """Build a checked drawing from the five tables of `gripper.toml`; `origin` is named in errors."""
     _refuse_unknown(tables, _SECTIONS, origin, "section")
     uncertainties: dict[str, float] = {}
+    parts = _read_sections(tables, _SECTIONS, origin, uncertainties)
+    gripper = Gripper(**parts, uncertainties=MappingProxyType(uncertainties))
+    _check(gripper, origin)
+    check_outline(gripper, origin)
+    check_stated_size(gripper, origin)
+    return gripper
+
+
+def _read_sections(
+    tables: Mapping[str, Any], sections: Mapping[str, type], origin: str, uncertainties: dict[str, float]
+) -> dict[str, Any]:
     parts: dict[str, Any] = {}
-    for section, record in _SECTIONS.items():
+    for section, record in sections.items():
         table = tables.get(section)
         if not isinstance(table, dict):
             raise FingervisionError(f"{origin} must have a section [{section}], but has none.")
@@ -63,9 +86,7 @@ def gripper_from_tables(tables: Mapping[str, Any], origin: str) -> Gripper:
                 raise FingervisionError(f"{origin} must state {section}.{name}, but does not.")
             values[name] = _value(table[name], f"{section}.{name}", origin, uncertainties)
         parts[section] = record(**values)
-    gripper = Gripper(**parts, uncertainties=MappingProxyType(uncertainties))
-    _check(gripper, origin)
-    return gripper
+    return parts
 
 
 def _refuse_unknown(given: Mapping[str, Any], known: Mapping[str, Any], origin: str, kind: str) -> None:
@@ -105,9 +126,22 @@ def _value(raw: Any, name: str, origin: str, uncertainties: dict[str, float]) ->
 
 
 def _number(raw: Any, name: str, origin: str) -> float:
-    if isinstance(raw, bool) or not isinstance(raw, int | float) or not math.isfinite(raw):
+    if not is_number(raw):
         raise FingervisionError(f"{name} in {origin} must be a finite number, but is {raw!r}.")
-    return float(raw)
+    try:
+        value = float(raw)
+    except OverflowError:
+        raise FingervisionError(
+            f"{name} in {origin} must be a finite number, but has {len(str(raw))} digits."
+        ) from None
+    unit = next((unit for unit in _LIMITS if name.endswith(unit)), "")
+    lowest, highest = _LIMITS.get(unit, (0.0, math.inf))
+    if abs(value) > highest or 0.0 < value < lowest:
+        raise FingervisionError(
+            f"{name} in {origin} must lie between {lowest:g} and {highest:g} {_SPELT.get(unit, '')}, but is {value:g}; "
+            "check its unit."
+        )
+    return value
 
 
 def _numbers(raw: Any, count: int, name: str, origin: str) -> tuple[float, ...]:
@@ -117,17 +151,13 @@ def _numbers(raw: Any, count: int, name: str, origin: str) -> tuple[float, ...]:
 
 
 def _check(gripper: Gripper, origin: str) -> None:
-    material, body, hinge, lever, links = (
-        gripper.material,
+    check_material(gripper.material, origin)
+    body, hinge, lever, links = (
         gripper.body,
         gripper.hinge,
         gripper.lever,
         gripper.links,
     )
-    if material.poisson_ratio >= 0.5:
-        raise FingervisionError(
-            f"material.poisson_ratio in {origin} must be below 0.5, but is {material.poisson_ratio:g}."
-        )
     if body.height_mm < _METRES_BELOW_MM * hinge.thickness_mm or body.measured_below_tip_mm >= body.height_mm:
         raise FingervisionError(
             f"body.height_mm in {origin} must be larger than the hinges and the measuring height, "
@@ -137,11 +167,6 @@ def _check(gripper: Gripper, origin: str) -> None:
         raise FingervisionError(
             f"hinge.thickness_mm in {origin} must be smaller than the web that the notches cut, {hinge.web_mm:g} mm, "
             f"but is {hinge.thickness_mm:g}; a hinge cannot be thicker than its web."
-        )
-    if 2.0 * hinge.radius_mm + hinge.thickness_mm > hinge.web_mm + _MEET_MM:
-        raise FingervisionError(
-            f"The notches in {origin} must end inside the web of {hinge.web_mm:g} mm, but 2 radius + thickness is "
-            f"{2.0 * hinge.radius_mm + hinge.thickness_mm:g} mm, which cuts the body in two; reduce hinge.radius_mm."
         )
     drawn = (lever.hinge1_mm[0] - lever.l2_mm, lever.hinge1_mm[1] - lever.l1_mm)
     _must_meet("lever.hinge2_mm", lever.hinge2_mm, "hinge 1 less (l2, l1)", drawn, origin)
@@ -154,6 +179,28 @@ def _check(gripper: Gripper, origin: str) -> None:
         raise FingervisionError(
             f"The tip's inner face in {origin} must lie at half of body.rest_gap_mm, {body.rest_gap_mm / 2.0:g} mm, "
             f"but lies at {inner_mm:g} mm."
+        )
+
+
+def read_material(tables: Mapping[str, Any], origin: str) -> Material:
+    """Read the section [material], the same in every drawing."""
+    section: Mapping[str, type] = {"material": Material}
+    return _read_sections({"material": tables.get("material")}, section, origin, {})["material"]  # type: ignore[no-any-return]
+
+
+def check_material(material: Material, origin: str) -> None:
+    """Refuse Poisson's ratios that no material has, and ask about a modulus that cannot be in MPa."""
+    if material.poisson_ratio >= 0.5:
+        raise FingervisionError(
+            f"material.poisson_ratio in {origin} must be below 0.5, but is {material.poisson_ratio:g}."
+        )
+    strain = material.yield_mpa / material.youngs_modulus_mpa
+    if not _LEAST_YIELD_STRAIN <= strain <= _MOST_YIELD_STRAIN:
+        guess = "GPa" if strain > _MOST_YIELD_STRAIN else "Pa"
+        raise FingervisionError(
+            f"material.yield_mpa over material.youngs_modulus_mpa in {origin} must lie between {_LEAST_YIELD_STRAIN:g} "
+            f"and {_MOST_YIELD_STRAIN:g}, but is {material.yield_mpa:g} / {material.youngs_modulus_mpa:g} = "
+            f"{strain:.3g}; is the modulus in {guess}? Both must be in MPa."
         )
 
 
@@ -179,6 +226,11 @@ def _check_links(gripper: Gripper, origin: str) -> None:
     if len(set(links.tip_polygon_mm)) < len(links.tip_polygon_mm):
         raise FingervisionError(
             f"links.tip_polygon_mm in {origin} must be different points, but one stands there twice."
+        )
+    if crosses_itself(links.tip_polygon_mm):
+        raise FingervisionError(
+            f"links.tip_polygon_mm in {origin} must go round the tip without crossing itself, but two of its sides "
+            "cross; put its points in order."
         )
     if not gripper.tip_corner_mm[1] > gripper.tip_heel_mm[1]:
         raise FingervisionError(

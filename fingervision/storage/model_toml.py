@@ -1,23 +1,41 @@
 """model.toml, a corrected model; and the choice of reader for every kind of model file."""
 
+import json
 import os
 import tomllib
 from collections.abc import Mapping
 from difflib import get_close_matches
 from pathlib import Path
 
+import numpy as np
+
 from fingervision.domain.errors import FingervisionError
 from fingervision.domain.parameter import Estimate
 from fingervision.effects import catalogue
+from fingervision.effects.position_error_map import curve_points, curve_values
 from fingervision.models.corrected import CorrectedModel
 from fingervision.models.kinds import kinds
 from fingervision.models.physical_gripper import PhysicalGripper
 from fingervision.storage.gripper_toml import read_gripper
 from fingervision.storage.simulation_table import read_simulation_table
 
+POINTS = "points"
+"""Key of the curve of a map of position errors: pairs of input and error, in mm."""
+# A fit that ends at a bound may be beyond it by rounding.
+BOUND_SLACK = 1e-6
 
-def read_model(path: Path, kind: str = "lumped") -> CorrectedModel:
+
+def read_model(path: Path, kind: str = "lumped", inside: tuple[Path, ...] = ()) -> CorrectedModel:
     """Read a simulation table or a gripper (without effects), or a corrected model.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    kind : str
+        Kind of model that a gripper becomes.
+    inside : tuple of Path
+        Corrected models that this one is the base of.
 
     Raises
     ------
@@ -28,28 +46,40 @@ def read_model(path: Path, kind: str = "lumped") -> CorrectedModel:
         table = read_simulation_table(path)
         return CorrectedModel(table.name, table, str(path), table.input_range_mm, {})
     try:
-        document = tomllib.loads(path.read_text(encoding="utf-8"))
+        document = tomllib.loads(path.read_text(encoding="utf-8-sig"))
     except FileNotFoundError:
         raise FingervisionError(f"There is no model {path}.") from None
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError, OSError) as error:
+    except (ValueError, RecursionError, OSError) as error:
         raise FingervisionError(f"{path} must be a TOML file, but could not be read: {error}.") from error
     if "base" not in document:
         return _gripper(path, kind)
-    base = read_model(path.parent / str(document["base"]), str(document.get("kind", kind)))
+    place = path.resolve()
+    if place in inside:
+        raise FingervisionError(f"The base of {path} must be another model, but leads back to itself: mend `base`.")
+    kind = str(document.get("kind", kind))
+    base = read_model(path.parent / str(document["base"]), kind, (*inside, place))
     effects: dict[str, Mapping[str, Estimate]] = dict(base.effects)
-    for entry in document.get("effect", []):
+    entries = document.get("effect", [])
+    if not isinstance(entries, list):
+        raise FingervisionError(f"The effects in {path} must be [[effect]] tables, but `effect` is {entries}: mend it.")
+    for entry in entries:
         try:
-            effects[str(entry["name"])] = {
+            parameters = dict(entry["parameters"])
+            points = [(float(at), float(error)) for at, error in parameters.pop(POINTS, [])]
+            stated = {
                 name: Estimate(float(value["value"]), float(value["u"]) if "u" in value else None)
-                for name, value in entry["parameters"].items()
+                for name, value in parameters.items()
             }
-        except (KeyError, TypeError, ValueError) as error:
+            curve = curve_values([at for at, _ in points], [error for _, error in points])
+            effects[str(entry["name"])] = stated | {name: Estimate(value, None) for name, value in curve.items()}
+        except (KeyError, TypeError, ValueError, AttributeError, OverflowError) as error:
             raise FingervisionError(
                 f"An effect in {path} must have a name and parameters like play_mm = {{ value = 0.01, u = 0.001 }}, "
                 f"but is {entry}: mend it."
             ) from error
     for name, values in effects.items():
         _check(name, values, path)
+        _check_curve(name, values, path)
     return CorrectedModel(base.name, base.base, base.base_path, base.input_range_mm, effects, base.kind)
 
 
@@ -65,6 +95,34 @@ def _check(name: str, values: Mapping[str, Estimate], path: Path) -> None:
         raise FingervisionError(
             f"The effect {name} in {path} must state {', '.join(wanted)}, but {', '.join(missing)} is not there "
             f"(it states {', '.join(values) or 'nothing'}): add it."
+        )
+    for parameter in catalogue()[name].parameters:
+        estimate = values[parameter.name]
+        slack = BOUND_SLACK * (parameter.upper - parameter.lower)
+        if not parameter.lower - slack <= estimate.value <= parameter.upper + slack:
+            raise FingervisionError(
+                f"{parameter.name} of the effect {name} in {path} must be {parameter.lower:g} to {parameter.upper:g}, "
+                f"but is {estimate.value:g}: mend it."
+            )
+        if estimate.u is not None and not 0.0 <= estimate.u < float("inf"):
+            raise FingervisionError(
+                f"The u of {parameter.name} of the effect {name} in {path} must be a number from 0, but is "
+                f"{estimate.u:g}: mend it, or leave it out."
+            )
+
+
+def _check_curve(name: str, values: Mapping[str, Estimate], path: Path) -> None:
+    """Refuse a curve whose points are no numbers, too few, or not in the order of their inputs."""
+    inputs, errors = curve_points({key: estimate.value for key, estimate in values.items()})
+    if inputs.size and not (
+        inputs.size > 1
+        and np.all(np.isfinite(inputs))
+        and np.all(np.isfinite(errors))
+        and np.all(np.diff(inputs) > 0.0)
+    ):
+        raise FingervisionError(
+            f"{POINTS} of the effect {name} in {path} must be two or more pairs of finite numbers with rising inputs, "
+            f"but the inputs are {inputs.tolist()}: mend them."
         )
 
 
@@ -83,10 +141,18 @@ def write_model(
 ) -> None:
     """Write a corrected model; the base is named relative to the file."""
     base = Path(os.path.relpath(base_path.resolve(), path.parent.resolve())).as_posix()
-    lines = ["schema = 1", f'base = "{base}"', *([f'kind = "{kind}"'] if kind else [])]
+    lines = ["schema = 1", f"base = {json.dumps(base, ensure_ascii=False)}", *([f'kind = "{kind}"'] if kind else [])]
     for name, parameters in effects.items():
         lines += ["", "[[effect]]", f'name = "{name}"', "[effect.parameters]"]
+        inputs, errors = curve_points({key: estimate.value for key, estimate in parameters.items()})
+        if inputs.size:
+            pairs = ", ".join(
+                f"[{at!r}, {error!r}]" for at, error in zip(inputs.tolist(), errors.tolist(), strict=True)
+            )
+            lines.append(f"{POINTS} = [{pairs}]")
         for key, estimate in parameters.items():
+            if key.startswith("point_"):
+                continue
             u = "" if estimate.u is None else f", u = {estimate.u!r}"
             lines.append(f"{key} = {{ value = {estimate.value!r}{u} }}")
     path.write_text("\n".join(lines) + "\n", encoding="utf-8")

@@ -1,5 +1,6 @@
 """A recipe: what the test bed is to run, step by step."""
 
+import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
@@ -34,8 +35,11 @@ def write_recipe(
     path: Path, name: str, steps: Sequence[Mapping[str, object]], below_force_n: float = BELOW_FORCE_N
 ) -> None:
     """Write a recipe of the given steps; keys and kinds are those of the design."""
-    lines = [f"schema = {SCHEMA}", f'name = "{name}"', f"below_force_n = {below_force_n}"]
+    lines = [f"schema = {SCHEMA}", f"name = {json.dumps(name, ensure_ascii=False)}", f"below_force_n = {below_force_n}"]
     for step in steps:
         lines += ["", "[[step]]"]
-        lines += [f'{key} = "{value}"' if isinstance(value, str) else f"{key} = {value}" for key, value in step.items()]
+        lines += [
+            f"{key} = {json.dumps(value, ensure_ascii=False) if isinstance(value, str) else value}"
+            for key, value in step.items()
+        ]
     path.write_text("\n".join(lines) + "\n", encoding="utf-8")

@@ -51,7 +51,7 @@ class RecordedVideo:
         self._last_tick = -1
         place = path.with_name(f".{path.name}.part") if keep else path
         try:
-            self._container = av.open(str(place), "w", format="mp4", options=dict(CONTAINER))
+            self._container = av.open(f"file:{place}", "w", format="mp4", options=dict(CONTAINER))
             if keep:
                 self._keep(keep)
                 place.replace(path)
@@ -71,25 +71,30 @@ class RecordedVideo:
         FingervisionError
             The file cannot be written.
         """
-        if item.time_s is None:
+        self._begin(item, packets)
+        tick = self._tick(item)
+        if tick is None:
             return None
-        if self._first_s is None:
-            self._first_s = self._begins_s(item, packets)
-            if self._first_s is None:
-                return None
-        tick = round((item.time_s - self._first_s) * TICKS_PER_S)
         try:
             if self._template is not None:
                 self._copy(packets)
                 if tick < 0:  # a picture that was decoded late, from before the recording
                     return None
-            elif isinstance(item, Frame) and tick > self._last_tick:
+            elif isinstance(item, LostFrame):
+                self._last_tick = max(self._last_tick, tick)
+            elif tick > self._last_tick:
                 self._encode(item, tick)
             else:
                 return None
         except (av.FFmpegError, OSError, ValueError) as error:
             raise self._failed(error) from error
         return tick / TICKS_PER_S
+
+    def time_s(self, lost: LostFrame, packets: tuple[OwnPacket, ...]) -> float | None:
+        """Time in the recording that a lost frame, not yet added, will have; None before the recording begins."""
+        self._begin(lost, packets)
+        tick = self._tick(lost)
+        return None if tick is None or tick < 0 else tick / TICKS_PER_S
 
     def close(self) -> None:
         """Write what is held back and close."""
@@ -101,7 +106,7 @@ class RecordedVideo:
             raise self._failed(error) from error
 
     def _keep(self, frames: int) -> None:
-        with av.open(str(self._path)) as old:
+        with av.open(f"file:{self._path}") as old:
             stream = old.streams.video[0]
             self._stream_of(stream.codec_context.width, stream.codec_context.height, str(stream.codec_context.pix_fmt))
             kept = 0
@@ -121,10 +126,17 @@ class RecordedVideo:
             )
         self._first_s = 0.0
 
-    def _begins_s(self, item: Frame | LostFrame, packets: tuple[OwnPacket, ...]) -> float | None:
-        if self._template is not None:
-            return next((own.time_s for own in packets if own.is_key), None)
-        return item.time_s if isinstance(item, Frame) else None
+    def _tick(self, item: Frame | LostFrame) -> int | None:
+        if item.time_s is None or self._first_s is None:
+            return None
+        return round((item.time_s - self._first_s) * TICKS_PER_S)
+
+    def _begin(self, item: Frame | LostFrame, packets: tuple[OwnPacket, ...]) -> None:
+        if self._first_s is None and item.time_s is not None:
+            if self._template is not None:
+                self._first_s = next((own.time_s for own in packets if own.is_key), None)
+            elif isinstance(item, Frame):
+                self._first_s = item.time_s
 
     def _copy(self, packets: tuple[OwnPacket, ...]) -> None:
         assert self._first_s is not None  # noqa: S101 - set by the caller
@@ -171,7 +183,7 @@ def frames_in(path: Path) -> int:
     """Count the whole frames of a recording that may have broken off; 0 where there is none."""
     count = 0
     try:
-        with av.open(str(path)) as container:
+        with av.open(f"file:{path}") as container:
             for packet in container.demux(container.streams.video[0]):
                 count += packet.pts is not None and packet.size > 0
     except (av.FFmpegError, OSError, IndexError):

@@ -4,7 +4,7 @@ import json
 from dataclasses import asdict
 from pathlib import Path
 
-from fingervision.domain.report import DiagnosisReport
+from fingervision.domain.report import DiagnosisReport, NamedEffect
 
 
 def report_document(report: DiagnosisReport, model_path: str | None, recipe_path: str | None) -> dict[str, object]:
@@ -14,7 +14,7 @@ def report_document(report: DiagnosisReport, model_path: str | None, recipe_path
         "schema": 1,
         "verdict": str(report.verdict),
         "sentence": report.sentence,
-        "effects": [asdict(effect) for effect in report.effects],
+        "effects": [_effect(effect) for effect in report.effects],
         "alternatives": [list(names) for names in report.alternatives],
         "where": [
             {
@@ -30,6 +30,9 @@ def report_document(report: DiagnosisReport, model_path: str | None, recipe_path
             for place in report.where
         ],
         "disagreement": asdict(report.disagreement),
+        "explained_share": report.explained_share,
+        "standing_share": report.standing_share,
+        "pure_error_mm": report.pure_error_mm,
         "smallest_seen": report.smallest_seen,
         "unknown": report.unknown,
         "remaining": report.remaining,
@@ -48,6 +51,13 @@ def report_document(report: DiagnosisReport, model_path: str | None, recipe_path
         "model": model_path,
         "seconds": report.seconds,
     }
+
+
+def _effect(effect: NamedEffect) -> dict[str, object]:
+    """An effect for programs; points stand there where it has a curve."""
+    document = asdict(effect)
+    points = document.pop("points")
+    return {**document, "points": [list(point) for point in points]} if points else document
 
 
 def write_report(path: Path, document: dict[str, object]) -> None:

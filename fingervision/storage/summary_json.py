@@ -7,6 +7,7 @@ from typing import Any
 
 from fingervision.domain.errors import FingervisionError
 
+SUMMARY = "summary.json"
 SCHEMA = 1
 
 
@@ -27,7 +28,8 @@ def write_summary(path: Path, summary: Mapping[str, Any]) -> None:
     """
     part = path.with_name(f".{path.name}.part")
     try:
-        part.write_text(summary_text(summary), encoding="utf-8")
+        # A name that is not UTF-8 keeps its bytes as JSON's own escapes.
+        part.write_text(summary_text(summary), encoding="utf-8", errors="backslashreplace")
         part.replace(path)
     except OSError as error:
         part.unlink(missing_ok=True)
@@ -39,3 +41,12 @@ def write_summary(path: Path, summary: Mapping[str, Any]) -> None:
 def summary_text(summary: Mapping[str, Any]) -> str:
     """Give the summary as the file holds it."""
     return json.dumps({"schema": SCHEMA, **summary}, indent=2, allow_nan=False, ensure_ascii=False) + "\n"
+
+
+def recording_of(folder: Path) -> str | None:
+    """Name of the recording that the results in a folder are of; None where no summary says so."""
+    try:
+        name = json.loads((folder / SUMMARY).read_bytes())["recording"]["name"]
+    except (OSError, ValueError, LookupError, TypeError):
+        return None
+    return name if isinstance(name, str) else None

@@ -5,11 +5,11 @@ import re
 import tomllib
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from math import isfinite
 from pathlib import Path
 from typing import Any, NoReturn
 
 from fingervision.domain.errors import FingervisionError
+from fingervision.storage.finite import is_number
 
 
 def read_document(path: Path, what: str) -> tuple[dict[str, Any], str]:
@@ -41,7 +41,7 @@ def read_document(path: Path, what: str) -> tuple[dict[str, Any], str]:
         raise FingervisionError(f"The {what} {path} could not be read ({error.strerror}).") from error
     except UnicodeDecodeError as error:
         raise FingervisionError(f"{path} must be TOML in UTF-8, but is not: {error.reason}.") from error
-    except tomllib.TOMLDecodeError as error:
+    except (ValueError, RecursionError) as error:  # also numbers of thousands of digits, and tables without end
         raise FingervisionError(f"{path} must be TOML, but is not: {error}.") from error
 
 
@@ -118,7 +118,7 @@ class Section:
         value = self.values.get(key, default)
         if value is None:
             self.refuse(None, f"must state {key}, but does not: add it.")
-        if isinstance(value, bool) or not isinstance(value, int | float) or not isfinite(value):
+        if not is_number(value):
             self.refuse(key, f"must be a number, but is {value!r}.")
         if above is not None and not value > above:
             self.refuse(key, f"must be greater than {above:g}, but is {value:g}.")

@@ -116,6 +116,30 @@ def test_what_is_done_stays_and_what_changed_is_done_again(run: Run, copy: Path)
     assert "4 worked on" in run(*arguments, "--below-tip-mm", 0.4)[1]
 
 
+def test_a_result_whose_table_was_changed_or_deleted_is_done_again(run: Run, copy: Path) -> None:
+    arguments = ("batch", "measure", "rec/*/good*.mkv", "--out", "out", *ALONE)
+    run(*arguments)
+    changed, deleted = Path("out/good_too.mkv/gaps.csv"), Path("out/good_last.mkv/gaps.csv")
+    whole = changed.read_bytes(), deleted.read_bytes()
+    changed.write_bytes(whole[0].replace(b"ok", b"ko", 1))
+    deleted.unlink()
+    assert "2 worked on" in run(*arguments)[1]
+    assert (changed.read_bytes(), deleted.read_bytes()) == whole
+    assert "nothing to do" in run(*arguments)[1]
+
+
+def test_recordings_of_one_name_have_results_of_their_own(run: Run, copy: Path) -> None:
+    for folder in "ab":
+        assert run("measure", f"rec/{folder}/good.mkv", *SCALE)[0] == 0
+    assert run("measure", "rec/a/good.mkv", *SCALE)[0] == 0
+    names = {path.parent.name: json.loads(path.read_text())["recording"]["name"] for path in made_by_hand()}
+    assert names == {"good.mkv": "rec/a/good.mkv", "b__good.mkv": "rec/b/good.mkv"}
+
+
+def made_by_hand() -> list[Path]:
+    return list(Path("measured").glob("*/summary.json"))
+
+
 def test_the_content_of_a_calibration_counts_and_not_its_name(run: Run, copy: Path) -> None:
     sample = Path(__file__).parents[2] / "sample_frames" / "opening"
     document = json.loads((sample / "calibration.json").read_text(encoding="utf-8"))
@@ -232,7 +256,7 @@ def long_batch(recordings: Path, tmp_path: Path) -> Iterator["subprocess.Popen[s
     process.wait()
 
 
-@pytest.mark.parametrize("blow", [signal.SIGINT, signal.SIGKILL])
+@pytest.mark.parametrize("blow", [signal.SIGINT, signal.SIGTERM, signal.SIGKILL])
 def test_a_batch_that_was_stopped_goes_on(
     run: Run, recordings: Path, tmp_path: Path, long_batch: "subprocess.Popen[str]", blow: signal.Signals
 ) -> None:
@@ -240,7 +264,7 @@ def test_a_batch_that_was_stopped_goes_on(
     _, err = long_batch.communicate(timeout=PATIENCE_S)
     kept = made(tmp_path / "out")
     assert "Traceback" not in err
-    if blow is signal.SIGINT and long_batch.returncode != 0:
+    if blow is not signal.SIGKILL and long_batch.returncode != 0:
         assert long_batch.returncode == 1
         assert "Stopped by the user" in err
         assert "goes on from there" in err

@@ -1,25 +1,31 @@
-"""Print the factors of `fingervision/models/hinge_correction.py`: brick elements over beam theory, per direction."""
+"""Print the tables of `fingervision/models/hinge_correction.py`: bricks and plane stress over beam theory."""
 
 import numpy as np
 
 from fingervision.domain.gripper import Material
-from fingervision.models.hinge_compliance import beam_compliance
-from fingervision.models.hinge_solid import solid_compliance
+from fingervision.models.hinge_compliance import bar_compliance, beam_compliance
+from fingervision.models.hinge_solid import plane_compliance, solid_compliance
 from fingervision.models.notch import circular_notch
 
 MATERIAL = Material("PA2200", 1650.0, 0.34, 930.0, 48.0)
+PLANAR = [0, 1, 5]
 
 
 def main() -> None:
-    """Print one line per t / R and b / t."""
-    print("t/R b/t | x y z about-x about-y about-z")
-    for t_over_r in (0.05, 0.1, 0.25, 0.5, 0.8):
-        along = 40 if t_over_r < 0.2 else 24
-        for b_over_t in (1.0, 3.0, 10.0):
-            notch = circular_notch(1.0 / t_over_r, 1.0, b_over_t)
-            solid = np.diag(solid_compliance(notch, MATERIAL, along))
+    """Print, per t / R, plane stress and what elastic blocks add; then one line per b / t, all six directions."""
+    for t_over_r in (0.0125, 0.025, 0.05, 0.1, 0.25, 0.5, 0.8, 1.6):
+        notch, height = circular_notch(1.0, t_over_r, 1.0), 2.0 + t_over_r
+        beam = np.diag(beam_compliance(notch, MATERIAL))[PLANAR]
+        planes = np.diag(plane_compliance(notch, MATERIAL, 120, 6))
+        blocks = np.diag(plane_compliance(notch, MATERIAL, 120, 6, block_mm=2.0 * height))
+        bars = np.diag(bar_compliance(2.0 * height, height, 1.0, MATERIAL))[PLANAR]
+        added = (blocks - 2.0 * bars)[[0, 2]] / planes[[0, 2]]
+        print(f"{t_over_r:6.4f} plane / beam", np.round(planes / beam, 4), "blocks / planes", np.round(added, 4))
+        for b_over_t in (0.5, 1.0, 3.0, 10.0, 30.0, 100.0):
+            notch = circular_notch(1.0, t_over_r, t_over_r * b_over_t)
+            solid = np.diag(solid_compliance(notch, MATERIAL, 36, 3, 6))
             factors = solid / np.diag(beam_compliance(notch, MATERIAL))
-            print(t_over_r, b_over_t, "|", ", ".join(f"{factor:.4f}" for factor in factors), flush=True)
+            print(f"{t_over_r:6.4f} {b_over_t:5.1f} |", ", ".join(f"{factor:.5f}" for factor in factors), flush=True)
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""Print the seconds of the gripper's models; needs gmsh for the finite elements."""
+"""Print the seconds of the gripper's models."""
 
 import time
 from collections.abc import Callable
@@ -32,7 +32,7 @@ def main() -> None:
     unknowns: list[int] = []
 
     def solve() -> None:
-        mesh = mesh_outline(gripper, ElementSize(0.115, 1.45))
+        mesh = mesh_outline(gripper, ElementSize(0.075, 1.3))
         model = FiniteElementGripper(gripper, mesh=mesh)
         model.respond(inputs)
         unknowns.append(model.half.unknowns)

@@ -9,6 +9,7 @@ from click.testing import CliRunner
 
 from fingervision.cli import cli
 from fingervision.domain.errors import UsageError
+from fingervision.effects import catalogue
 
 SEED = 21
 KEYS = {
@@ -99,7 +100,7 @@ def test_a_misspelt_effect_is_wrong_usage_with_the_nearest() -> None:
 
 
 def test_effects_lists_all_and_draws_one(tmp_path: Path) -> None:
-    assert len(CliRunner().invoke(cli, ["effects"]).output.splitlines()) == 25
+    assert len(CliRunner().invoke(cli, ["effects"]).output.splitlines()) == len(catalogue())
     done = CliRunner().invoke(cli, ["effects", "backlash", "--figure", str(tmp_path / "play.png")])
     assert "play operator" in done.output
     assert (tmp_path / "play.png").read_bytes().startswith(b"\x89PNG")

@@ -115,7 +115,7 @@ def test_compare_refits_the_drawing_too_and_says_so(tmp_path: Path) -> None:
     measured = read_measured_table(table(CASES["link"], tmp_path, force=True))
     found = compare(measured, read_model(uncertain(tmp_path, l2_mm=0.2)))
     assert found.rms_mm < NOISE_SHARE * EDGE_MM
-    assert found.bench.refitted()[0].startswith("lever.l2_mm was refitted to 17.99")
+    assert found.data.refitted()[0].startswith("lever.l2_mm was refitted to 17.99")
 
 
 @pytest.mark.parametrize(

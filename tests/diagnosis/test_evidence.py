@@ -109,7 +109,7 @@ def jerking(folder: Path, jump_mm: float, play_mm: float) -> Path:
     way = np.concatenate([np.linspace(0.0, 0.5, 150), np.full(stand, 0.5), np.linspace(0.5, -0.3, 220)])
     u = np.concatenate([way, np.full(stand, -0.3), np.linspace(-0.3, 0.1, 120)])
     t = np.arange(u.size) / rate_hz
-    jumped = stick(play(u, play_mm), jump_mm)
+    jumped = stick(play(u, play_mm, 0.0), jump_mm)
     left, right = (side * (2.0 + 3.5 * jumped) + EDGE_MM * rng.standard_normal(u.size) for side in (-1, 1))
     lines = [f"{t[k]},{u[k]},{right[k] - left[k]},{left[k]},{right[k]}" for k in range(u.size)]
     (folder / "measured.csv").write_text("time_s,input_mm,gap_mm,left_mm,right_mm\n" + "\n".join(lines) + "\n")

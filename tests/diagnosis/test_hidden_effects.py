@@ -11,9 +11,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from tests.benchmarks.hidden.catalogue_chain import RUN_START
 from tests.benchmarks.hidden.diagnose_adapter import diagnose
 from tests.benchmarks.hidden.experiment import Experiment, Row, draw_experiment, edges, remaining_rms_mm, run_of
-from tests.benchmarks.hidden.oracle import judge
+from tests.benchmarks.hidden.explanations import search_of
+from tests.benchmarks.hidden.oracle import judge, own_fit
 from tests.benchmarks.hidden.rows import ROWS
 from tests.benchmarks.hidden.score import mark
 from tests.benchmarks.hidden.table_cache import draw_table_of_row
@@ -22,6 +24,8 @@ SEED = 5001
 BENCHMARK = Path(__file__).resolve().parents[1] / "benchmarks" / "hidden"
 RATIO_TOLERANCE = 0.025
 """Sizes are found by bisection to 2 %; the rest is rounding."""
+START_TOLERANCE = 0.1
+"""Plays that engage over 6 % of their width, and a tenth of it where a run moves by little more than the play."""
 EXACT_FORM = 1e-3
 """Chi-square that a form which is the catalogue's own may leave: the optimiser's last digit."""
 
@@ -83,6 +87,27 @@ def test_the_judge_recovers_what_is_hidden_from_a_curve_without_noise() -> None:
         assert judgement.effects[hidden.name] == pytest.approx(list(hidden.parameters.values()), rel=1e-3)
         checked += 1
     assert checked > 0
+
+
+def _first(row: str, name: str) -> Experiment:
+    drawn = (draw_experiment(seed, ROWS[row]) for seed in range(SEED, SEED + 60))
+    return next(e for e in drawn if e.plant.hidden[0].name == name)
+
+
+def test_the_judge_finds_where_a_play_starts() -> None:
+    experiment = _first("start_3", "backlash")
+    search, target = search_of(experiment, experiment.traces(), known_input=False)
+    starts = own_fit(search, experiment, target).effects[RUN_START]
+    assert starts == pytest.approx(experiment.plant.run_start, abs=START_TOLERANCE)
+
+
+def test_a_play_that_stays_engaged_belongs_to_the_set_of_an_offset() -> None:
+    experiment = _first("start_poor", "input_offset")
+    (hidden,) = experiment.plant.hidden
+    # The one run goes up, where a play that is engaged stays behind by its half.
+    behind = replace(hidden, parameters={"offset_mm": -abs(hidden.parameters["offset_mm"])})
+    judgement = judge(replace(experiment, plant=replace(experiment.plant, hidden=(behind,))))
+    assert frozenset({"backlash"}) in judgement.must
 
 
 def test_the_same_seed_gives_the_same_files(tmp_path: Path) -> None:

@@ -6,14 +6,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from fingervision.diagnosis.design.augmented_dataset import SecondRun
-from fingervision.diagnosis.design.expected_gain import promise, surest
+from fingervision.diagnosis.design.augmented_dataset import AugmentedDataset
+from fingervision.diagnosis.design.expected_gain import expected_gain, surest
 from fingervision.diagnosis.design.experiment_design import NEEDED
-from fingervision.diagnosis.design.further_evidence import EVIDENCE, other_evidence
+from fingervision.diagnosis.design.further_evidence import EVIDENCE, further_evidence
 from fingervision.diagnosis.design.next_run import next_run
 from fingervision.diagnosis.inference.hypothesis_fit import Explanation, Problem, fit
 from fingervision.diagnosis.inference.posterior import draws
-from fingervision.diagnosis.input.observations import BenchData, prepare
+from fingervision.diagnosis.input.observations import Observations, prepare
 from fingervision.diagnosis.noise.restricted_likelihood import drawn_noises
 from fingervision.domain.effect import Array
 from fingervision.effects import catalogue
@@ -34,7 +34,7 @@ def measured(u: Array, rng: np.random.Generator) -> tuple[Array, Array]:
     return left + EDGE_MM * rng.standard_normal(u.size), right + EDGE_MM * rng.standard_normal(u.size)
 
 
-def bench(folder: Path, seed: int) -> tuple[BenchData, Problem]:
+def bench(folder: Path, seed: int) -> tuple[Observations, Problem]:
     left, right = measured(ONE_WAY, np.random.default_rng(seed))
     lines = [f"{STEP_S * k},{u},{r - x},{x},{r}" for k, (u, x, r) in enumerate(zip(ONE_WAY, left, right, strict=True))]
     (folder / "measured.csv").write_text("time_s,input_mm,gap_mm,left_mm,right_mm\n" + "\n".join(lines) + "\n")
@@ -62,8 +62,8 @@ def test_what_comes_lies_in_the_promised_interval(tmp_path: Path, seed: int) -> 
     pair = both(problem)
     rng = np.random.default_rng(seed)
     found = (draws(problem, pair[0], rng), draws(problem, pair[1], rng))
-    promised = promise(data, problem, BACK, pair, (1.0, 0.0), found, rng)
-    run = SecondRun.of(data, problem, BACK)
+    promised = expected_gain(data, problem, BACK, pair, (1.0, 0.0), found, rng)
+    run = AugmentedDataset.of(data, problem, BACK)
     left, right = measured(BACK, rng)
     shown = np.stack([right - left, 0.5 * (left + right)])
     target = run.both.whitener.one(np.concatenate([data.aim_mm.reshape(2, -1), shown], axis=1).ravel())
@@ -77,7 +77,7 @@ def test_what_comes_lies_in_the_promised_interval(tmp_path: Path, seed: int) -> 
 
 def test_the_data_stay_as_they_were_and_the_run_is_as_foretold(tmp_path: Path) -> None:
     data, problem = bench(tmp_path, 1)
-    run = SecondRun.of(data, problem, BACK)
+    run = AugmentedDataset.of(data, problem, BACK)
     truth = {"assembly_asymmetry": {"share": SHARE}}
     far = run.expected(truth).reshape(2, -1) - run.both.whitened(truth).reshape(2, -1)
     n = ONE_WAY.size
@@ -104,7 +104,7 @@ def test_exact_look_alikes_get_advice_and_no_run(tmp_path: Path) -> None:
     ]
     rng = np.random.default_rng(1)
     assert next_run(data, problem, pair, draws(problem, pair[0], rng), rng) is None
-    (sentence,) = other_evidence(tuple(pair))
+    (sentence,) = further_evidence(tuple(pair))
     assert sentence.startswith("input_scale or lever_ratio_error: measure the stage's travel with a gauge")
 
 
@@ -128,13 +128,13 @@ def test_a_re_zeroed_stage_tells_its_own_offset_from_the_rest_gap(tmp_path: Path
     data, problem = bench(tmp_path, 1)
     offset = {"input_offset": {"offset_mm": 0.02}}
     moved = [
-        SecondRun.of(data, problem, BACK, rezeroed=rezeroed).both.chain.respond(offset).gap_mm[ONE_WAY.size :]
+        AugmentedDataset.of(data, problem, BACK, rezeroed=rezeroed).both.chain.respond(offset).gap_mm[ONE_WAY.size :]
         for rezeroed in (False, True)
     ]
     assert np.allclose(moved[0] - moved[1], 7.0 * 0.02)
-    again = SecondRun.of(data, problem, BACK, rezeroed=True)
+    again = AugmentedDataset.of(data, problem, BACK, rezeroed=True)
     gap = explained(problem, "rest_gap_error", offset_mm=0.14)
-    assert again.distance(offset, gap) > SecondRun.of(data, problem, BACK).distance(offset, gap) + NEEDED
+    assert again.distance(offset, gap) > AugmentedDataset.of(data, problem, BACK).distance(offset, gap) + NEEDED
 
 
 def test_the_promise_is_where_gains_come_and_not_between_two_that_may_come() -> None:
@@ -152,7 +152,7 @@ def test_the_promise_is_where_gains_come_and_not_between_two_that_may_come() -> 
 
 def test_only_a_stop_that_was_not_seen_goes_on_with_the_range(tmp_path: Path) -> None:
     data, problem = bench(tmp_path, 1)
-    run = SecondRun.of(data, problem, np.linspace(-0.5, 2.0, 40))
+    run = AugmentedDataset.of(data, problem, np.linspace(-0.5, 2.0, 40))
     (upper,) = (p.upper for where, p in problem.parameters(("end_stop",)) if p.name == "upper_mm")
     (further,) = (p.upper for where, p in run.both.parameters(("end_stop",)) if p.name == "upper_mm")
     assert further > upper

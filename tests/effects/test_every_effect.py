@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from fingervision.diagnosis.inference.measuring_chain import MeasuringChain
-from fingervision.domain.effect import Effect, History
+from fingervision.domain.effect import Effect, History, start_key
 from fingervision.effects import catalogue
+from fingervision.effects.position_error_map import curve_values
 from fingervision.models.table import TableModel
 
 ROUNDING_MM = 1e-9
@@ -18,6 +19,8 @@ NAMES = [
     "input_scale",
     "encoder_cyclic_error",
     "end_stop",
+    "position_error_map",
+    "slew_limit",
     "backlash",
     "stick_slip",
     "friction_hysteresis",
@@ -49,7 +52,8 @@ def bench() -> History:
     run = np.concatenate([up, np.full(40, 1.4), up[::-1]])
     return History(
         input_mm=np.concatenate([run, run[::-1]]),
-        time_s=0.04 * np.arange(2.0 * run.size),
+        # The second run goes at half the speed: what limits the speed of one does not limit the other's.
+        time_s=np.concatenate([0.04 * np.arange(run.size), 0.04 * run.size + 0.08 * np.arange(run.size)]),
         runs=(slice(0, run.size), slice(run.size, 2 * run.size)),
         rest_gap_mm=4.0,
         opening_mm=7.7 * 1.4,
@@ -63,12 +67,14 @@ def values(effect: Effect, history: History, *, neutral: bool) -> dict[str, floa
     assert not isinstance(searched, str)
     out = {}
     for p in searched:
-        if p.neutral is None:
+        if p.run is not None:
+            out[p.name] = 0.0
+        elif p.neutral is None:
             out[p.name] = float(p.starting_values()[0])
         else:
             out[p.name] = p.neutral if neutral else float(0.7 * p.neutral + 0.3 * p.upper)
-            if p.name == "upper_mm" and not neutral:
-                out[p.name] = 0.9 * p.upper
+            if p.neutral == p.upper and not neutral:
+                out[p.name] = 0.5 * (p.lower + p.upper) if p.name == "speed_mm_s" else 0.9 * p.upper
     if neutral and effect.name in ("large_deflection", "structural_resonance"):
         out = dict.fromkeys(out, 0.0)
     return out
@@ -141,6 +147,39 @@ def test_memory_starts_each_run_at_rest(name: str) -> None:
     bare, moved = chain.respond({}), chain.respond({name: values(catalogue()[name], bench(), neutral=False)})
     for run in bench().runs:
         assert moved.gap_mm[run][0] == pytest.approx(bare.gap_mm[run][0], abs=ROUNDING_MM)
+
+
+@pytest.mark.parametrize("start", [-1.0, -0.3, 1.0])
+def test_a_play_starts_anywhere_within_its_width_and_forgets_it_at_the_first_reversal(start: float) -> None:
+    chain, history = MeasuringChain(MODEL, bench(), {}), bench()
+    play = {"play_mm": 0.04, start_key(0): start, start_key(1): start}
+    gap = chain.respond({"backlash": play}).gap_mm
+    bare, centred = chain.respond({}).gap_mm, chain.respond({"backlash": {"play_mm": 0.04}}).gap_mm
+    for run in history.runs:
+        assert gap[run][0] - bare[run][0] == pytest.approx(7.7 * 0.02 * start, abs=ROUNDING_MM)
+        np.testing.assert_allclose(gap[run][10:], centred[run][10:], atol=ROUNDING_MM)
+
+
+def test_a_rate_limit_is_caught_up_at_its_speed_after_a_step() -> None:
+    time = np.arange(0.0, 2.0, 0.02)
+    u = np.where(time > 0.5, 1.0, 0.0)
+    history = replace(bench(), input_mm=u, time_s=time, runs=(slice(0, u.size),))
+    gap = MeasuringChain(MODEL, history, {}).respond({"slew_limit": {"speed_mm_s": 2.0}}).gap_mm
+    expected = np.clip(2.0 * (time - 0.5), 0.0, 1.0)
+    np.testing.assert_allclose(gap, 4.0 + 7.7 * expected, atol=7.7 * 2.0 * 0.02)
+    assert np.flatnonzero(gap > 11.7 - 1e-9)[0] == pytest.approx(np.flatnonzero(time >= 1.0)[0], abs=1)
+
+
+def test_a_map_adds_the_same_error_both_ways_and_holds_its_points() -> None:
+    at, errors = np.linspace(-0.5, 1.5, 9), 0.01 * np.cos(np.arange(9.0))
+    setting = {"rms_mm": 0.007, "length_mm": 0.3, **curve_values(at.tolist(), errors.tolist())}
+    chain = MeasuringChain(MODEL, bench(), {})
+    change = chain.respond({"position_error_map": setting}).gap_mm - chain.respond({}).gap_mm
+    np.testing.assert_allclose(change[:120], change[160:280][::-1], atol=ROUNDING_MM)
+    history = replace(bench(), input_mm=at, time_s=np.arange(9.0), runs=(slice(0, 9),))
+    there = MeasuringChain(MODEL, history, {})
+    moved = there.respond({"position_error_map": setting}).gap_mm - there.respond({}).gap_mm
+    np.testing.assert_allclose(moved, 7.7 * errors, atol=ROUNDING_MM)
 
 
 @pytest.mark.parametrize("name", NAMES)

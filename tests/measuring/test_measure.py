@@ -64,6 +64,19 @@ def test_the_true_gaps_come_out_in_millimetres(tmp_path: Path, direction: Direct
         assert float(row["u_random_mm"]) == pytest.approx(float(row["u_gap_px"]) / PX_PER_MM, abs=1e-6)
 
 
+def test_two_measurements_at_once_never_share_a_folder(tmp_path: Path) -> None:
+    class Second(RenderedFrames):
+        def __iter__(self) -> Iterator[Frame | LostFrame]:
+            with pytest.raises(FingervisionError, match="in use by another run"):
+                measure(rendered(opening(2)), Task(BareScale(PX_PER_MM)), tmp_path)
+            yield from super().__iter__()
+
+    first = Second(opening(3), CAMERA, np.random.default_rng(0), 25.0)
+    measured = measure(first, Task(BareScale(PX_PER_MM)), tmp_path)
+    assert len(rows_of(measured)) == 3
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["gap.png", "gaps.csv", "summary.json"]
+
+
 def test_a_region_changes_no_coordinate(tmp_path: Path) -> None:
     whole = measure(rendered(opening(2)), Task(BareScale(PX_PER_MM)), tmp_path / "whole")
     part = measure(rendered(opening(2)), Task(BareScale(PX_PER_MM), region=Region(20, 10, 200, 180)), tmp_path / "part")

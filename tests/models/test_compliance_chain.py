@@ -7,7 +7,7 @@ from fingervision.domain.gripper import Gripper
 from fingervision.models.compliance_chain import ComplianceChain
 from fingervision.models.hinge_compliance import beam_compliance
 from fingervision.models.hinge_correction import HingeTheory
-from fingervision.models.notch import notch_of
+from fingervision.models.notch import notches_of
 from fingervision.models.skeleton import skeleton_of
 from fingervision.models.stiffness_matrix import StiffnessMatrixGripper
 from fingervision.models.twist_transform import carried, turned
@@ -18,7 +18,7 @@ ROUNDING = 1e-9
 
 @given(arm=arms, angle=st.floats(-4.0, 4.0), seed=st.integers(0, 50))
 def test_transforms_keep_reciprocity_and_work(gripper: Gripper, arm: np.ndarray, angle: float, seed: int) -> None:
-    compliance = beam_compliance(notch_of(gripper), gripper.material)
+    compliance = beam_compliance(notches_of(gripper)[0], gripper.material)
     transform = carried(arm) @ turned(angle)
     moved = transform @ compliance @ transform.T
     assert moved == pytest.approx(moved.T, rel=ROUNDING, abs=ROUNDING * np.abs(moved).max())

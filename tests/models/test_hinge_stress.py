@@ -13,8 +13,8 @@ from fingervision.models.lumped import LumpedGripper
 from fingervision.models.redrawn import redrawn
 from fingervision.models.skeleton import skeleton_of
 
-NOTCH = 0.03
-"""A notch adds 3 % to the nominal stress at t / R = 0.25 (finite elements)."""
+NOTCH = 0.02
+"""Neuber's factor of a deep notch at t / R = 0.25 against finite elements, and the frame's force."""
 SEGMENTS = 1e-3
 """The frame's own answer with ten segments against forty."""
 
@@ -26,7 +26,8 @@ def test_the_thinnest_section_carries_what_finite_elements_find(
     assert peak.mpa_per_mm == pytest.approx(refined.mpa_per_mm, rel=NOTCH)
     middles = [np.array(lumped.gripper.lever.hinge1_mm), np.array(lumped.gripper.lever.hinge2_mm)]
     off = min(float(np.hypot(*(np.array(peak.place_mm) - middle))) for middle in middles)
-    assert off == pytest.approx(0.5 * lumped.gripper.hinge.thickness_mm)
+    # On the surface beside the neck: the moment grows along the hinge while the section hardly does.
+    assert off == pytest.approx(0.5 * lumped.gripper.hinge.thickness_mm, rel=0.03)
 
 
 def test_segments_converge(gripper: Gripper, lumped: LumpedGripper) -> None:

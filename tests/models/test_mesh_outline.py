@@ -1,4 +1,4 @@
-"""Meshing needs gmsh, an extra that also needs system libraries."""
+"""Meshes of grippers, made from their outlines."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -12,11 +12,6 @@ from fingervision.models.finite_element import FiniteElementGripper
 from fingervision.models.mesh_outline import ElementSize, mesh_outline
 from fingervision.models.reference_mesh import is_reference
 from fingervision.storage.gripper_toml import read_gripper
-
-try:
-    import gmsh  # noqa: F401
-except (ImportError, OSError):
-    pytest.skip("gmsh (the extra of that name, and libGLU) is absent", allow_module_level=True)
 
 MICRO = Path(__file__).parents[2] / "fingervision" / "models" / "micro_gripper.toml"
 

@@ -35,7 +35,10 @@ def test_an_uncertainty_may_stand_beside_a_number() -> None:
     ("changes", "sentence"),
     [
         ({"hinge__thickness_mm": 10.0}, "must be smaller than the web that the notches cut, 9 mm, but is 10"),
-        ({"hinge__radius_mm": 5.0}, "which cuts the body in two; reduce hinge.radius_mm"),
+        (
+            {"hinge__radius_mm": 2.0, "hinge__thickness_mm": 0.4},
+            "must open through the faces of its link, but the disc",
+        ),
         ({"material__youngs_modulus_mpa": -1.0}, "material.youngs_modulus_mpa in g must be positive, but is -1."),
         ({"material__poisson_ratio": 0.5}, "must be below 0.5, but is 0.5"),
         ({"lever__l2_mm": 18.0}, "lever.hinge2_mm in g must lie at hinge 1 less (l2, l1) = (17.5, 30), but lies at"),

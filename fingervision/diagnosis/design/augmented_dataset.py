@@ -7,9 +7,9 @@ import numpy as np
 
 from fingervision.diagnosis.inference.hypothesis_fit import Explanation, Point, Problem, fit
 from fingervision.diagnosis.inference.uncertain_dimensions import tangent
-from fingervision.diagnosis.input.observations import BenchData
+from fingervision.diagnosis.input.observations import Observations
 from fingervision.diagnosis.noise.whitening import RunOffsets, Whitener
-from fingervision.domain.effect import Array, Flags, History
+from fingervision.domain.effect import Array, Flags, History, InputPath
 from fingervision.domain.model import PhysicalModel
 
 PAUSE_S = 30.0
@@ -22,7 +22,7 @@ Settings = Mapping[str, Mapping[str, float]]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class SecondRun:
+class AugmentedDataset:
     """Data, and a run behind them that has not been made.
 
     Parameters
@@ -43,9 +43,9 @@ class SecondRun:
     channels: int
 
     @classmethod
-    def of(cls, bench: BenchData, first: Problem, input_mm: Array, *, rezeroed: bool = False) -> "SecondRun":
+    def of(cls, data: Observations, first: Problem, input_mm: Array, *, rezeroed: bool = False) -> "AugmentedDataset":
         """Put a run behind the data: same noise, later on the same clock; the stage may be re-zeroed before it."""
-        old = bench.chain.history
+        old = data.chain.history
         n, more = old.input_mm.size, input_mm.size
         time = float(old.times.max()) + PAUSE_S + old.sample_time_s * np.arange(more)
         history: History = replace(
@@ -55,9 +55,9 @@ class SecondRun:
             runs=(*old.runs, slice(n, n + more)),
             rezeroed=(*(old.rezeroed or (False,) * len(old.runs)), rezeroed or any(old.rezeroed)),
         )
-        count = len(bench.channels)
-        whitener, drawn = first.whitener, bench.model.base
-        chain = replace(first.chain, history=history)
+        count = len(data.channels)
+        whitener, drawn = first.whitener, data.model.base
+        chain = replace(first.chain, history=history, path=_longer(first.chain.path, history, n))
 
         def longer(values: Array) -> Array:
             return np.concatenate([values, np.full(more, float(np.median(values)))])
@@ -70,14 +70,14 @@ class SecondRun:
             longer(whitener.input_mm),
             whitener.input_samples,
             longer(whitener.passing_mm),
-            tangent(chain, drawn, bench.refit.moved).columns
-            if bench.refit.moved and isinstance(drawn, PhysicalModel)
+            tangent(chain, drawn, data.refit.moved).columns
+            if data.refit.moved and isinstance(drawn, PhysicalModel)
             else None,
         )
         joined = replace(
             first, chain=chain, whitener=both, measured=np.zeros(count * (n + more)), offsets=RunOffsets.of(both)
         )
-        return cls(first, joined, bench.aim_mm, count)
+        return cls(first, joined, data.aim_mm, count)
 
     @property
     def input_mm(self) -> Array:
@@ -87,7 +87,12 @@ class SecondRun:
     def moved(self, names: tuple[str, ...], values: Settings) -> Point:
         """Values within the bounds of both: a stop that was not seen lies at the range's end, wherever that is."""
         out: Point = {name: dict(values[name]) for name in names}
-        for (name, was), (_, now) in zip(self.first.parameters(names), self.both.parameters(names), strict=True):
+        before = {(name, parameter.name): parameter for name, parameter in self.first.parameters(names)}
+        for name, now in self.both.parameters(names):
+            if (name, now.name) not in before:
+                out[name][now.name] = 0.0  # the start of the new run
+                continue
+            was = before[name, now.name]
             near = AT_END * (was.upper - was.lower)
             value = values[name][was.name]
             if was.lower != now.lower and value <= was.lower + near:
@@ -130,3 +135,19 @@ class SecondRun:
 def _behind(old: Array, new: Array, channels: int) -> Array:
     """Put the channels of a run behind those of the data; each stacked, shape (channels * n,)."""
     return np.concatenate([old.reshape(channels, -1), new.reshape(channels, -1)], axis=1).ravel()
+
+
+def _longer(path: InputPath | None, history: History, first_rows: int) -> InputPath | None:
+    """Put the rows of a second run behind a path; `history` holds the rows of both."""
+    if path is None:
+        return None
+    old, new = path.history, slice(first_rows, history.input_mm.size)
+    begin, more = old.input_mm.size, history.input_mm.size - first_rows
+    both = replace(
+        history,
+        input_mm=np.concatenate([old.input_mm, history.input_mm[new]]),
+        time_s=np.concatenate([old.times, history.times[new]]),
+        runs=(*old.runs, slice(begin, begin + more)),
+    )
+    rows = np.concatenate([path.rows, np.arange(begin, begin + more)])
+    return InputPath(both, rows, np.concatenate([path.owner, np.arange(first_rows, first_rows + more)]))

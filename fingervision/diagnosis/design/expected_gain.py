@@ -5,9 +5,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fingervision.diagnosis.design.augmented_dataset import REFITTED, SecondRun
+from fingervision.diagnosis.design.augmented_dataset import REFITTED, AugmentedDataset
 from fingervision.diagnosis.inference.hypothesis_fit import Explanation, Point, Problem, fit
-from fingervision.diagnosis.input.observations import BenchData
+from fingervision.diagnosis.input.observations import Observations
 from fingervision.diagnosis.noise.noise_posterior import problems_of_drawn_noise
 from fingervision.domain.effect import Array
 
@@ -28,7 +28,7 @@ MODERATE, SURELY = 75.0, 0.8
 
 
 @dataclass(frozen=True, slots=True)
-class Promise:
+class ExpectedGain:
     """A run's gain in chi-square: the one most likely to be kept, the interval that holds what comes, that likelihood.
 
     Either explanation may be true, and often the two foretell different gains: a median would lie between them, where
@@ -51,8 +51,8 @@ class Promise:
         return self.gain if self.sound else self.modest
 
 
-def promise(
-    bench: BenchData,
+def expected_gain(
+    data: Observations,
     problem: Problem,
     input_mm: Array,
     pair: tuple[Explanation, Explanation],
@@ -61,7 +61,7 @@ def promise(
     rng: np.random.Generator,
     *,
     rezeroed: bool = False,
-) -> Promise:
+) -> ExpectedGain:
     """Foretell the gain from the data as they were measured: the posterior's predictive distribution.
 
     A truth and a noise are drawn from what the data leave open, the run is driven with it, and both explanations are
@@ -70,7 +70,7 @@ def promise(
 
     Parameters
     ----------
-    bench, problem : BenchData, Problem
+    data, problem : Observations, Problem
         The data.
     input_mm : ndarray of float, shape (k,)
         The run.
@@ -91,9 +91,9 @@ def promise(
     for true, other in ((0, 1), (1, 0)):
         starts = [pair[other].values, *_spread(found[other], FURTHER)]
         truths = _spread(found[true], count)
-        noisy = problems_of_drawn_noise(bench, problem, pair[true], len(truths), rng)
+        noisy = problems_of_drawn_noise(data, problem, pair[true], len(truths), rng)
         for values, first in zip(truths, noisy, strict=True):
-            run = SecondRun.of(bench, first, input_mm, rezeroed=rezeroed)
+            run = AugmentedDataset.of(data, first, input_mm, rezeroed=rezeroed)
             target = run.expected(values)
             # A run after a re-zeroing is offset by as much as both runs together then say.
             sigma_mm = None if rezeroed else _offsets(first, pair[true], rng)
@@ -105,7 +105,7 @@ def promise(
     drawn = mean[rng.choice(mean.size, NOISES, p=np.array(chances) / sum(chances))]
     come = drawn + 2.0 * np.sqrt(drawn) * rng.standard_normal(NOISES)
     low, high = np.quantile(come, (0.5 - 0.5 * PROMISED, 0.5 + 0.5 * PROMISED))
-    return Promise(*surest(come), surest(come, MODERATE)[0], (float(low), float(high)))
+    return ExpectedGain(*surest(come), surest(come, MODERATE)[0], (float(low), float(high)))
 
 
 def surest(come: Array, below: float = np.inf) -> tuple[float, float]:

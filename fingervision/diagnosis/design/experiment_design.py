@@ -6,7 +6,7 @@ from math import ceil
 
 import numpy as np
 
-from fingervision.diagnosis.design.augmented_dataset import PAUSE_S, REFITTED, SecondRun
+from fingervision.diagnosis.design.augmented_dataset import PAUSE_S, REFITTED, AugmentedDataset
 from fingervision.diagnosis.design.protocols import (
     REZERO,
     SAMPLES_A_STROKE,
@@ -19,7 +19,7 @@ from fingervision.diagnosis.design.protocols import (
 from fingervision.diagnosis.design.static_checks import WORTH
 from fingervision.diagnosis.inference.ambiguity_set import surprise
 from fingervision.diagnosis.inference.hypothesis_fit import Explanation, Problem, fit
-from fingervision.diagnosis.input.observations import BenchData
+from fingervision.diagnosis.input.observations import Observations
 from fingervision.domain.effect import Array
 
 REZERO_MIN = 1.5
@@ -108,23 +108,23 @@ class RunPlan:
 class RunChoice:
     """Proposes runs for a table and what it leaves open."""
 
-    bench: BenchData
+    data: Observations
     problem: Problem
     open: OpenSet
 
     @property
     def step_s(self) -> float:
         """Time between samples."""
-        return self.bench.chain.history.sample_time_s
+        return self.data.chain.history.sample_time_s
 
     def planned(self, name: str, steps: list[Step], iterations: int, times: int = 1) -> RunPlan | None:
         """Judge a run; None where it is too long."""
-        history = self.bench.chain.history
-        inputs = driven(steps, self.step_s, rounding_s(self.bench.table.input_mm, self.step_s, history.runs))
+        history = self.data.chain.history
+        inputs = driven(steps, self.step_s, rounding_s(self.data.table.input_mm, self.step_s, history.runs))
         if inputs.size > MOST_SAMPLES:
             return None
         rezeroed = REZERO in steps
-        run = SecondRun.of(self.bench, self.problem, inputs, rezeroed=rezeroed)
+        run = AugmentedDataset.of(self.data, self.problem, inputs, rezeroed=rezeroed)
         gains = np.full(self.open.before.shape, np.inf)
         for j, truth in enumerate(self.open.members[: self.open.truths]):
             for k, rival in enumerate(self.open.members):
@@ -140,7 +140,7 @@ class RunChoice:
         odds = self.open.odds[: self.open.truths]
         return float(odds @ part.sum(axis=1) / odds.sum() / max(1, len(self.open.members) - 1))
 
-    def shown(self, run: RunPlan, second: SecondRun, j: int, k: int) -> float:
+    def shown(self, run: RunPlan, second: AugmentedDataset, j: int, k: int) -> float:
         """Gain to expect between two members, the likelier one true, where runs are not offset against each other."""
         if REZERO in run.steps:
             return run.apart(j, k)
@@ -154,7 +154,7 @@ class RunChoice:
         Pairs that are told apart within the run come first: what rests on the run's offset against the data may be
         taken for a re-zeroing.
         """
-        second = SecondRun.of(self.bench, self.problem, run.input_mm, rezeroed=REZERO in run.steps)
+        second = AugmentedDataset.of(self.data, self.problem, run.input_mm, rezeroed=REZERO in run.steps)
         found = [(self.shown(run, second, *pair), pair) for pair in run.pairs()[:COMPARED]]
         within = [each for each in found if each[0] < WITHIN * run.apart(*each[1])]
         return min(within or found, default=None)

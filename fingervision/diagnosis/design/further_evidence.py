@@ -31,7 +31,7 @@ EVIDENCE = {
 }
 
 
-def other_evidence(alternatives: tuple[Explanation, ...]) -> tuple[str, ...]:
+def further_evidence(alternatives: tuple[Explanation, ...]) -> tuple[str, ...]:
     """Say what else would tell explanations apart that differ by one effect each; a sentence a pair of effects.
 
     Parameters

@@ -2,18 +2,18 @@
 
 import numpy as np
 
-from fingervision.diagnosis.design.expected_gain import MODERATE, Promise, promise
+from fingervision.diagnosis.design.expected_gain import MODERATE, ExpectedGain, expected_gain
 from fingervision.diagnosis.design.experiment_design import RunChoice, RunPlan, open_set
 from fingervision.diagnosis.design.protocols import REZERO, measured_ends
-from fingervision.diagnosis.design.static_checks import WORTH, without_motion
+from fingervision.diagnosis.design.static_checks import WORTH, static_check
 from fingervision.diagnosis.inference.hypothesis_fit import Explanation, Point, Problem
 from fingervision.diagnosis.inference.posterior import draws
-from fingervision.diagnosis.input.observations import BenchData
+from fingervision.diagnosis.input.observations import Observations
 from fingervision.domain.report import NextRun
 
 
 def next_run(
-    bench: BenchData,
+    data: Observations,
     problem: Problem,
     members: list[Explanation],
     found: tuple[Point, ...],
@@ -40,13 +40,13 @@ def next_run(
     """
     if len(members) < 2:
         return None
-    special = without_motion(bench, problem, members[0], members[1:])
-    if bench.chain.history.time_s is None:
+    special = static_check(data, problem, members[0], members[1:])
+    if data.chain.history.time_s is None:
         return special
-    choose = RunChoice(bench, problem, open_set(problem, members))
-    plan = choose.best(measured_ends(bench.table.input_mm, bench.model.input_range_mm))
+    choose = RunChoice(data, problem, open_set(problem, members))
+    plan = choose.best(measured_ends(data.table.input_mm, data.model.input_range_mm))
     if plan is None or plan.worst(WORTH) == 0.0:
-        plan = choose.best(bench.model.input_range_mm)
+        plan = choose.best(data.model.input_range_mm)
     if plan is None or plan.worst(WORTH) == 0.0:
         return special
     return _promised(choose, plan, members, found, rng) or special
@@ -59,7 +59,7 @@ def _promised(
     listed, odds = choose.open.members, choose.open.odds
     walks: dict[int, tuple[Point, ...]] = {0: found}
 
-    def stated(run: RunPlan, pair: tuple[int, int]) -> Promise:
+    def stated(run: RunPlan, pair: tuple[int, int]) -> ExpectedGain:
         j, k = pair
         for each in pair:
             if each not in walks:
@@ -67,7 +67,7 @@ def _promised(
         share = float(odds[j] / (odds[j] + odds[k]))
         both, chance, drawn = (listed[j], listed[k]), (share, 1.0 - share), (walks[j], walks[k])
         rezeroed = REZERO in run.steps
-        return promise(choose.bench, choose.problem, run.input_mm, both, chance, drawn, rng, rezeroed=rezeroed)
+        return expected_gain(choose.data, choose.problem, run.input_mm, both, chance, drawn, rng, rezeroed=rezeroed)
 
     worst = choose.least(plan)
     if worst is None:

@@ -4,7 +4,7 @@ import numpy as np
 
 from fingervision.diagnosis.design.protocols import REZERO, Step, measured_ends, protocols
 from fingervision.diagnosis.inference.hypothesis_fit import Explanation, Problem
-from fingervision.diagnosis.input.observations import BenchData
+from fingervision.diagnosis.input.observations import Observations
 from fingervision.domain.effect import PointEffect
 from fingervision.domain.report import NextRun
 from fingervision.domain.response import Response
@@ -19,7 +19,7 @@ SLOT_FRAMES, SLOT_U_MM = 10, 0.002
 """Frames averaged on a reference slot, and the standard uncertainty of its width: an ordinary gauge block's."""
 
 
-def without_motion(bench: BenchData, problem: Problem, best: Explanation, rivals: list[Explanation]) -> NextRun | None:
+def static_check(data: Observations, problem: Problem, best: Explanation, rivals: list[Explanation]) -> NextRun | None:
     """Propose what needs no other motion, for the first rival that it separates.
 
     Without times no motion can be judged by the memory of its samples, and a re-zeroing stands here; with them it is a
@@ -27,20 +27,20 @@ def without_motion(bench: BenchData, problem: Problem, best: Explanation, rivals
     """
     for rival in rivals:
         pair = (best, rival)
-        if bench.chain.history.time_s is None and sum("input_offset" in e.names for e in pair) == 1:
-            return _rezeroed(bench, problem, pair)
+        if data.chain.history.time_s is None and sum("input_offset" in e.names for e in pair) == 1:
+            return _rezeroed(data, problem, pair)
         if sum(bool(CAMERA & set(e.names)) for e in pair) == 1:
-            return _slot(bench, problem, pair)
+            return _slot(data, problem, pair)
     return None
 
 
-def _rezeroed(bench: BenchData, problem: Problem, pair: tuple[Explanation, Explanation]) -> NextRun | None:
+def _rezeroed(data: Observations, problem: Problem, pair: tuple[Explanation, Explanation]) -> NextRun | None:
     """Re-zero the stage: an offset of the input is gone after it, an offset of the gap stays."""
     offset = next(e for e in pair if "input_offset" in e.names)
-    history, offsets = bench.chain.history, problem.offsets
-    ends = measured_ends(bench.table.input_mm, bench.model.input_range_mm)
+    history, offsets = data.chain.history, problem.offsets
+    ends = measured_ends(data.table.input_mm, data.model.input_range_mm)
     steps = [REZERO, *protocols(*ends, UNTIMED_S)[0][1]]
-    moved = bench.chain.stacked({"input_offset": offset.values["input_offset"]}) - bench.chain.stacked({})
+    moved = data.chain.stacked({"input_offset": offset.values["input_offset"]}) - data.chain.stacked({})
     size = float(np.mean(moved[: history.input_mm.size]))
     known = np.diag(offsets.gram)[: offsets.runs]
     spread = float(
@@ -49,15 +49,15 @@ def _rezeroed(bench: BenchData, problem: Problem, pair: tuple[Explanation, Expla
     return _still("re-zero the stage and repeat", steps, size, spread, pair)
 
 
-def _slot(bench: BenchData, problem: Problem, pair: tuple[Explanation, Explanation]) -> NextRun | None:
+def _slot(data: Observations, problem: Problem, pair: tuple[Explanation, Explanation]) -> NextRun | None:
     """Measure a slot of known width: what the camera adds to a gap it adds to the slot, the gripper adds nothing."""
-    slot = np.full(1, round(bench.chain.history.rest_gap_mm, 1))
+    slot = np.full(1, round(data.chain.history.rest_gap_mm, 1))
     response = Response(-0.5 * slot, 0.5 * slot)
     for name in CAMERA:
         acting = next((e.values[name] for e in pair if name in e.names), None)
         effect = problem.effects.get(name)
         if acting is not None and isinstance(effect, PointEffect):
-            response = effect.act(response, bench.chain.history, acting)
+            response = effect.act(response, data.chain.history, acting)
     size = float(response.gap_mm[0] - slot[0])
     spread = float(np.hypot(problem.whitener.noises[0].total_mm / np.sqrt(SLOT_FRAMES), SLOT_U_MM))
     steps: list[Step] = [{"kind": "reference_slot", "size_mm": float(slot[0]), "u_size_mm": SLOT_U_MM}]

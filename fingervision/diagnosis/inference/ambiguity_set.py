@@ -25,7 +25,7 @@ PLAIN = 50.0
 """Chi-square beyond which a richer form has shown itself, however little that is of all that is explained."""
 
 
-def indistinguishable(
+def ambiguity_set(
     problem: Problem, best: Explanation, nothing: Explanation, pool: list[Explanation], pairs: list[Explanation]
 ) -> tuple[list[Explanation], dict[tuple[str, ...], float]]:
     """Collect every minimal explanation that cannot be told apart from the best."""

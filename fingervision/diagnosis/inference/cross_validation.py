@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from fingervision.diagnosis.inference.hypothesis_fit import Explanation, Problem, fit
-from fingervision.diagnosis.input.observations import BenchData
+from fingervision.diagnosis.input.observations import Observations
 from fingervision.diagnosis.noise.whitening import RunOffsets
 from fingervision.domain.effect import Array
 
@@ -30,13 +30,13 @@ def rms_mm(residual_mm: Array, samples: int, edges: bool) -> float:
     return float(np.sqrt(np.mean(0.25 * gap**2 + midline**2)))
 
 
-def unseen_rms_mm(bench: BenchData, problem: Problem, best: Explanation) -> tuple[float | None, float | None]:
+def left_out_rms_mm(data: Observations, problem: Problem, best: Explanation) -> tuple[float | None, float | None]:
     """Leave each run out of the fit in turn and predict it; before and after, None with one run."""
-    history = bench.chain.history
-    n, channels = history.input_mm.size, len(bench.channels)
+    history = data.chain.history
+    n, channels = history.input_mm.size, len(data.channels)
     if len(history.runs) < 2:
         return None, None
-    before = bench.stacked_mm - bench.chain.stacked({})
+    before = data.stacked_mm - data.chain.stacked({})
     after = before.copy()
     for run in history.runs:
         if not best.names:
@@ -45,9 +45,9 @@ def unseen_rms_mm(bench: BenchData, problem: Problem, best: Explanation) -> tupl
         for channel in range(channels):
             hidden[channel * n + run.start : channel * n + run.stop] = True
         whitener = replace(problem.whitener, aside=hidden)
-        rest = replace(problem, whitener=whitener, measured=whitener.one(bench.aim_mm), offsets=RunOffsets.of(whitener))
+        rest = replace(problem, whitener=whitener, measured=whitener.one(data.aim_mm), offsets=RunOffsets.of(whitener))
         fitted = fit(rest, best.names, best.values, sigma_mm=best.sigma_mm, iterations=6)
-        residual = bench.stacked_mm - bench.chain.stacked(fitted.values)
+        residual = data.stacked_mm - data.chain.stacked(fitted.values)
         for channel in range(channels):
             rows = slice(channel * n + run.start, channel * n + run.stop)
             after[rows] = residual[rows]

@@ -11,7 +11,7 @@ SEEN_SIGMAS = 1.645
 """Standard deviations above the threshold: nineteen of twenty effects of that size are seen."""
 
 
-def smallest_seen(
+def detection_limits(
     problem: Problem, atoms: Signatures, nothing: Explanation, thresholds: Mapping[str, float]
 ) -> dict[str, dict[str, object]]:
     """State the size of each effect that this data would have shown."""
@@ -23,7 +23,7 @@ def smallest_seen(
         if name not in thresholds:
             continue
         needed = float(np.sqrt(thresholds[name])) + SEEN_SIGMAS
-        amplitudes = {p.name: p for _, p in problem.parameters((name,)) if p.neutral is not None}
+        amplitudes = {p.name: p for _, p in problem.parameters((name,)) if p.neutral is not None and p.run is None}
         sizes: list[tuple[float, str]] = []
         for k in (k for k, owner in enumerate(atoms.names) if owner == name and norm[k] > 0.0):
             grow = atoms.grows[k]

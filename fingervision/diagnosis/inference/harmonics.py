@@ -1,6 +1,6 @@
-"""Overtones: a screw's error has harmonics, which the catalogue's sine has not; small ones are no second name."""
+"""Harmonics: a screw's error has harmonics, which the catalogue's sine has not; small ones are no second name."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -14,7 +14,7 @@ LARGEST = 0.25
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Overtones:
+class Harmonics:
     """What the named screw's own harmonics may take from what is left.
 
     Parameters
@@ -32,7 +32,7 @@ class Overtones:
     gain: float = 0.0
 
 
-def overtones(problem: Problem, best: Explanation) -> Overtones:
+def harmonics(problem: Problem, best: Explanation) -> Harmonics:
     """Fit the harmonics of a named cyclic error; none where they are too large to be its own.
 
     Parameters
@@ -42,7 +42,7 @@ def overtones(problem: Problem, best: Explanation) -> Overtones:
     best : Explanation
         What was named.
     """
-    none = Overtones(np.zeros((problem.measured.size, 0)))
+    none = Harmonics(np.zeros((problem.measured.size, 0)))
     if PERIODIC not in best.names:
         return none
     chain, history = problem.chain, problem.chain.history
@@ -52,8 +52,8 @@ def overtones(problem: Problem, best: Explanation) -> Overtones:
     for order in ORDERS:
         phase = 2.0 * np.pi * order * history.input_mm / period_mm
         for wave in (np.sin(phase), np.cos(phase)):
-            moved = replace(history, input_mm=history.input_mm + LARGEST * amplitude_mm * wave)
-            waves.append(replace(chain, history=moved).stacked(best.values) - base)
+            moved = chain.with_input(history.input_mm + LARGEST * amplitude_mm * wave)
+            waves.append(moved.stacked(best.values) - base)
     columns = problem.whitener.columns(np.stack(waves, axis=1))[0]
     metric = problem.offsets.metric(best.sigma_mm)
     bent = columns - problem.offsets.design @ (metric @ (problem.offsets.design.T @ columns))
@@ -64,4 +64,4 @@ def overtones(problem: Problem, best: Explanation) -> Overtones:
         return none
     strongest = int(np.argmax(sizes))
     words = f"the screw's harmonic of order {ORDERS[strongest]}, {100.0 * sizes[strongest]:.0f} % of its first"
-    return Overtones(columns, words, float(share @ taken))
+    return Harmonics(columns, words, float(share @ taken))

@@ -16,6 +16,8 @@ SCANS = ((0.06, 241), (0.012, 13), (0.003, 13), (0.0006, 25))
 """Relative half-widths, and values, of the scans of a parameter in which the prediction jumps. The first is for a
 thorough search: with a thousand jumps in a record the right size has a basin some ten-thousandths wide."""
 MANY_STEPS = 20
+START_VARIANCE = 1.0 / 3.0
+"""Variance of a start state that may be anywhere between -1 and 1."""
 FORM_SHARE = 0.02
 """By how much of what an effect changes the catalogue's form of it is typically off."""
 SMALL_SHARE = 0.05
@@ -39,9 +41,11 @@ class Explanation:
     covariance : ndarray of float, shape (p, p)
         Of the parameters in their order; zero rows for those at a bound.
     free : int
-        Parameters that are not at a bound.
+        Parameters of the effects that are not at a bound.
     sigma_mm : tuple of float
         Spread of the run offsets under this explanation, one a channel.
+    starts_price : float
+        Price of the fitted start states: twice the logarithm of prior width over posterior width, summed.
     """
 
     names: tuple[str, ...]
@@ -51,10 +55,11 @@ class Explanation:
     covariance: Array
     free: int
     sigma_mm: tuple[float, ...]
+    starts_price: float = 0.0
 
     def bic(self, samples: int) -> float:
-        """Schwarz's criterion: score plus the price of the free parameters."""
-        return self.score + self.free * float(np.log(samples))
+        """Schwarz's criterion: score plus the price of the free parameters and start states."""
+        return self.score + self.free * float(np.log(samples)) + self.starts_price
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -71,6 +76,10 @@ class Problem:
         The observation model.
     effects : mapping of str to Effect
         Those that the data can show.
+    form_share : float
+        Share of what is explained that the form of an effect may leave over, as a ratio of amplitudes.
+    stalled : frozenset of str
+        Effects for which readings that stand at an end of the range speak.
     """
 
     chain: MeasuringChain
@@ -78,6 +87,8 @@ class Problem:
     whitener: Whitener
     offsets: RunOffsets
     effects: Mapping[str, Effect]
+    form_share: float = SMALL_SHARE
+    stalled: frozenset[str] = frozenset()
 
     def parameters(self, names: tuple[str, ...]) -> list[tuple[str, Parameter]]:
         """List the parameters of some effects with the bounds that the data leave."""
@@ -86,6 +97,17 @@ class Problem:
             searched = self.effects[name].search(self.whitener.history)
             found += [(name, parameter) for parameter in searched if not isinstance(parameter, str)]
         return found
+
+    def only_run(self, column: Array, run: int | None) -> Array:
+        """Keep the rows of one run of a column of shape (m,) or all where `run` is None."""
+        if run is None or len(self.chain.history.runs) == 1:
+            return column
+        rows = self.chain.history.runs[run]
+        n = self.chain.history.input_mm.size
+        out = np.zeros_like(column)
+        for begin in range(0, column.size, n):
+            out[begin + rows.start : begin + rows.stop] = column[begin + rows.start : begin + rows.stop]
+        return out
 
     def whitened(self, settings: Mapping[str, Mapping[str, float]]) -> Array:
         """Predict and whiten; shape (m,)."""
@@ -144,7 +166,9 @@ def fit(
     lower = np.array([parameter.lower for _, parameter in listed])
     upper = np.array([parameter.upper for _, parameter in listed])
     span = upper - lower
-    x = np.clip(np.array([start[name][parameter.name] for name, parameter in listed]), lower, upper)
+    x = np.array([start[name].get(parameter.name, parameter.neutral or 0.0) for name, parameter in listed])
+    x = np.clip(x, lower, upper)
+    together = _together(listed)
     offsets = problem.offsets
 
     def settings(at: Array) -> Point:
@@ -163,11 +187,13 @@ def fit(
         base = problem.chain.stacked(settings(x))
         columns = np.empty((base.size, x.size))
         steps = np.maximum(1e-4 * np.abs(x), 1e-6 * np.minimum(span, 10.0 * np.abs(x) + 1e-2))
-        for i in range(x.size):
-            step = steps[i] if x[i] + steps[i] <= upper[i] else -steps[i]
+        for group in together:
+            step = np.where(x[group] + steps[group] <= upper[group], steps[group], -steps[group])
             moved = x.copy()
-            moved[i] += step
-            columns[:, i] = (problem.chain.stacked(settings(moved)) - base) / step
+            moved[group] += step
+            change = problem.chain.stacked(settings(moved)) - base
+            for i, by in zip(group, step, strict=True):
+                columns[:, i] = problem.only_run(change, listed[i][1].run) / by
         jacobian = problem.whitener.columns(columns)[0]
         shared = offsets.design.T @ jacobian
         normal = jacobian.T @ jacobian - shared.T @ metric @ shared
@@ -212,7 +238,20 @@ def fit(
     covariance = np.zeros_like(normal)
     if free.any():
         covariance[np.ix_(free, free)] = np.linalg.pinv(normal[np.ix_(free, free)])
-    return Explanation(order, settings(x), cost + penalty, residual, covariance, int(free.sum()), spread)
+    own = np.array([parameter.run is None for _, parameter in listed], dtype=bool)
+    starts = free & ~own
+    # A start is anywhere between -1 and 1 beforehand, with a variance of 1/3.
+    price = float(np.sum(np.log1p(np.diag(normal)[starts] * START_VARIANCE)))
+    names_of = settings(x)
+    return Explanation(order, names_of, cost + penalty, residual, covariance, int((free & own).sum()), spread, price)
+
+
+def _together(listed: list[tuple[str, Parameter]]) -> list[list[int]]:
+    """Group parameters whose derivatives one prediction gives: starts of different runs touch different rows."""
+    groups: dict[object, list[int]] = {}
+    for i, (name, parameter) in enumerate(listed):
+        groups.setdefault(i if parameter.run is None else name, []).append(i)
+    return list(groups.values())
 
 
 def scan(

@@ -6,7 +6,7 @@ from functools import cached_property
 
 import numpy as np
 
-from fingervision.domain.effect import Array, DriveEffect, Effect, History, PointEffect, Values
+from fingervision.domain.effect import Array, DriveEffect, Effect, History, InputPath, PointEffect, Values
 from fingervision.domain.model import Model, PhysicalLaw, PhysicalModel
 from fingervision.domain.parameter import Parameter
 from fingervision.domain.response import Response
@@ -34,6 +34,8 @@ class MeasuringChain:
         `midline_mm` is known from elsewhere.
     curved : bool
         Whether stage and fingers went along curves between two samples, as a delay shows, or along straight lines.
+    path : InputPath or None
+        The way between and besides the measured rows; None where the rows are all of it.
     """
 
     model: Model
@@ -42,6 +44,7 @@ class MeasuringChain:
     midline_mm: float = 0.0
     seen_midline_mm: float | None = None
     curved: bool = False
+    path: InputPath | None = None
 
     @cached_property
     def effects(self) -> Mapping[str, Effect]:
@@ -50,28 +53,44 @@ class MeasuringChain:
         effects = {name: obeyed(effect, laws.get(name)) for name, effect in catalogue().items()}
         return {name: _along_curves(effect) for name, effect in effects.items()} if self.curved else effects
 
+    def with_input(self, input_mm: Array) -> "MeasuringChain":
+        """Give the measured rows another input, and the points of the path that repeat it; `input_mm` of shape (n,)."""
+        path = None if self.path is None else self.path.moved(input_mm - self.history.input_mm)
+        return replace(self, history=replace(self.history, input_mm=input_mm), path=path)
+
+    def with_rest_gap(self, rest_gap_mm: float) -> "MeasuringChain":
+        """Set the model's gap at input zero."""
+        path = self.path
+        if path is not None:
+            path = replace(path, history=replace(path.history, rest_gap_mm=rest_gap_mm))
+        return replace(self, history=replace(self.history, rest_gap_mm=rest_gap_mm), path=path)
+
     def respond(self, settings: Settings) -> Response:
-        """Run the chain; an effect named in `settings` replaces a fixed one of the same name."""
+        """Run the chain along the path, and give the points at the measured rows.
+
+        An effect named in `settings` replaces a fixed one of the same name.
+        """
         acting = {**self.fixed, **settings}
         order = [effect for name, effect in self.effects.items() if name in acting]
-        input_mm = self.history.input_mm
+        history = self.history if self.path is None else self.path.history
+        input_mm = history.input_mm
         points: list[PointEffect] = []
         for effect in order:
             if isinstance(effect, DriveEffect):
-                input_mm = effect.act(input_mm, self.history, acting[effect.name])
+                input_mm = effect.act(input_mm, history, acting[effect.name])
             elif isinstance(effect, PointEffect):
                 points.append(effect)
         response = self.model.respond(input_mm)
         cameras = [effect for effect in points if effect.stage == "camera"]
         for effect in points:
             if effect.stage != "camera":
-                response = effect.act(response, self.history, acting[effect.name])
+                response = effect.act(response, history, acting[effect.name])
 
         def seen(midline_mm: float) -> Response:
             picture = response.shifted(midline_mm)
             for effect in cameras:
-                picture = effect.act(picture, self.history, acting[effect.name])
-            return picture
+                picture = effect.act(picture, history, acting[effect.name])
+            return picture if self.path is None else picture.at(self.path.rows)
 
         first = seen(self.midline_mm)
         if not cameras or self.seen_midline_mm is None:
@@ -126,6 +145,6 @@ def admissible(
             excluded[name] = "left out by request"
         elif isinstance(searched, str):
             excluded[name] = searched
-        else:
+        elif not effect.curve:  # a curve is estimated as a whole beside the others
             able[name] = effect
     return able, excluded

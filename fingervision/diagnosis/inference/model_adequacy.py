@@ -3,18 +3,20 @@
 import numpy as np
 
 from fingervision.diagnosis.inference.ambiguity_set import choices
-from fingervision.diagnosis.inference.harmonics import overtones
-from fingervision.diagnosis.inference.hypothesis_fit import MANY_STEPS, SMALL_SHARE, Explanation, Problem, fit
+from fingervision.diagnosis.inference.harmonics import harmonics
+from fingervision.diagnosis.inference.hypothesis_fit import MANY_STEPS, Explanation, Problem, fit
 from fingervision.diagnosis.inference.null_bootstrap import FEWEST, jumps_astray, linear_thresholds, noise_alone, rare
 from fingervision.diagnosis.inference.probe_basis import Probes, probes
 from fingervision.diagnosis.inference.signatures import tangents
 from fingervision.diagnosis.input.input_uncertainty import below_the_input
-from fingervision.domain.effect import Array
+from fingervision.domain.effect import Array, Flags
 
 LONG = 4000
 """Samples above which fewer probes must do."""
 VERY_STRONG = 10.0
 """Evidence on the scale of BIC (Kass & Raftery 1995)."""
+SAME_SHAPE = 0.9
+"""Correlation above which a probe is what an effect does itself."""
 STAND_INS = 2
 """Probes that may take the place of several effects: a bump's width lies between two of the grid."""
 
@@ -69,10 +71,12 @@ def imitated(problem: Problem, shapes: Probes, found: Explanation, fewer: list[E
         Explanations of fewer effects, beside which one or two shapes are tried, each at the price of its amplitude and
         of the choice among all shapes (`choices`).
     """
-    columns, rows = shapes.columns, int(problem.measured.size)
-    each = float(np.log(rows)) + 2.0 * float(np.log(columns.shape[1]))
     several = len(found.names) > 2
-    ahead = VERY_STRONG if several else -max(VERY_STRONG, SMALL_SHARE**2 * _explained(problem, found))
+    columns, rows = shapes.columns, int(problem.measured.size)
+    if several:
+        columns = np.where(_is_an_effect_itself(problem, found, columns), 0.0, columns)
+    each = float(np.log(rows)) + 2.0 * float(np.log(columns.shape[1]))
+    ahead = VERY_STRONG if several else -max(VERY_STRONG, problem.form_share**2 * _explained(problem, found))
     least = found.bic(rows) + choices(problem, found) + ahead
     best = None
     for base in fewer:
@@ -90,6 +94,24 @@ def imitated(problem: Problem, shapes: Probes, found: Explanation, fewer: list[E
     return best
 
 
+def _is_an_effect_itself(problem: Problem, found: Explanation, columns: Array) -> Flags:
+    """Mark probes that are the very shape that one of the effects has; shape (k,).
+
+    Of readings at rest a play is nothing but a difference between the directions: such a probe explains nothing else.
+    """
+    whole = problem.whitened(found.values)
+    own = np.zeros(columns.shape[1], dtype=bool)
+    for name in found.names:
+        others = {other: found.values[other] for other in found.names if other != name}
+        shape = whole - problem.whitened(others)
+        metric = problem.offsets.metric(found.sigma_mm)
+        moved = shape - problem.offsets.design @ (metric @ (problem.offsets.design.T @ shape))
+        shared = problem.offsets.design.T @ columns
+        norm = np.einsum("ij,ij->j", columns, columns) - np.einsum("ij,ij->j", shared, metric @ shared)
+        own |= (columns.T @ moved) ** 2 > SAME_SHAPE**2 * np.maximum(norm, 1e-12) * float(shape @ moved)
+    return own
+
+
 def _of_jumps_astray(problem: Problem, columns: Array, best: Explanation, rng: np.random.Generator) -> float:
     """Give the largest gain of a probe where the recorded input's errors alone move the jumps."""
     most = []
@@ -101,11 +123,11 @@ def _of_jumps_astray(problem: Problem, columns: Array, best: Explanation, rng: n
     return rare(most)
 
 
-def unexplained(
+def remaining_structure(
     problem: Problem, shapes: Probes, best: Explanation, rng: np.random.Generator
 ) -> tuple[str | None, str | None]:
     """Test the largest of many probes; returns what is unknown, or what is left over but small."""
-    own = overtones(problem, best)
+    own = harmonics(problem, best)
     gain, dot, norm = _gains(problem, shapes.columns, best, own.columns)
     usable = norm > 0.0
     family = ("probe",) * int(usable.sum())
@@ -119,6 +141,6 @@ def unexplained(
     size_mm = abs(float(dot[top])) / float(norm[top]) * shapes.rms[top]
     if below_the_input(problem, size_mm):
         return None, words
-    if best.names and gain[top] < SMALL_SHARE**2 * _explained(problem, best):
+    if best.names and gain[top] < problem.form_share**2 * _explained(problem, best):
         return None, words
     return words, None

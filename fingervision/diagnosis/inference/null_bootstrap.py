@@ -111,15 +111,16 @@ def noise_alone(problem: Problem, base: Explanation, rng: np.random.Generator) -
         return problem, np.asarray(truth + noise)
     history, samples = problem.chain.history, problem.chain.history.input_mm.size
     reach = 1e-3 * history.input_span_mm
-    ends = [replace(history, input_mm=history.input_mm + way) for way in (-reach, reach)]
-    low, high = (replace(problem.chain, history=end).stacked(base.values)[:samples] for end in ends)
+    low, high = (
+        problem.chain.with_input(history.input_mm + way).stacked(base.values)[:samples] for way in (-reach, reach)
+    )
     slope = np.maximum(np.abs(high - low) / (2.0 * reach), 1e-9)
     stays = float(np.exp(-2.0 / max(whitener.input_samples, 0.04)))
     staying = np.concatenate([_autoregression(stays, run.stop - run.start, rng) for run in history.runs])
     error = (whitener.passing_mm * rng.standard_normal(samples) + whitener.input_mm * staying) / slope
-    shaken = replace(history, input_mm=history.input_mm + error)
     noise = whitener.one(_of_pictures(problem, rng))
-    return replace(problem, chain=replace(problem.chain, history=shaken)), np.asarray(truth + noise)
+    shaken = problem.chain.with_input(history.input_mm + error)
+    return replace(problem, chain=shaken), np.asarray(truth + noise)
 
 
 def jumps_astray(problem: Problem, names: tuple[str, ...]) -> bool:

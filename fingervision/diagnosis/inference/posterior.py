@@ -5,8 +5,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from fingervision.diagnosis.inference.hypothesis_fit import FORM_SHARE, Explanation, Point, Problem
+from fingervision.diagnosis.inference.hypothesis_fit import FORM_SHARE, START_VARIANCE, Explanation, Point, Problem
 from fingervision.diagnosis.inference.null_bootstrap import noise_doubt
+from fingervision.diagnosis.noise.whitening import RunOffsets
 from fingervision.domain.effect import Array
 from fingervision.domain.parameter import Parameter
 
@@ -19,6 +20,8 @@ FREEDOM = 5.0
 """Degrees of freedom of the independent proposals: tails that the posterior's do not outreach."""
 SCALES = (0.02, 0.1, 0.4, 1.2)
 """Steps of the local walk over the curvature's widths: one of them suits where the curvature misleads."""
+START_STEP = 1e-3
+"""Step of the derivative by a start state."""
 JUMPS = 0.01
 """Relative width that the walk begins with where the prediction jumps."""
 
@@ -31,6 +34,17 @@ class _Coordinates:
     """
 
     listed: tuple[tuple[str, Parameter], ...]
+    starts: Mapping[str, Mapping[str, float]]
+
+    @classmethod
+    def about(cls, problem: Problem, explanation: Explanation) -> "_Coordinates":
+        """Walk over the effects' own parameters; the start states stay (`beside_starts` leaves them open)."""
+        listed = problem.parameters(explanation.names)
+        starts: dict[str, dict[str, float]] = {}
+        for name, parameter in listed:
+            if parameter.run is not None:
+                starts.setdefault(name, {})[parameter.name] = explanation.values[name].get(parameter.name, 0.0)
+        return cls(tuple(entry for entry in listed if entry[1].run is None), starts)
 
     def of(self, values: Mapping[str, Mapping[str, float]]) -> Array:
         """Parameters to coordinates; shape (p,)."""
@@ -38,7 +52,7 @@ class _Coordinates:
 
     def at(self, coordinates: Array) -> Point:
         """Coordinates to parameters, held within the bounds."""
-        out: Point = {}
+        out: Point = {name: dict(values) for name, values in self.starts.items()}
         for (name, parameter), x in zip(self.listed, coordinates, strict=True):
             value = _back(parameter, float(x))
             out.setdefault(name, {})[parameter.name] = float(np.clip(value, parameter.lower, parameter.upper))
@@ -114,7 +128,7 @@ def draws(problem: Problem, explanation: Explanation, rng: np.random.Generator) 
     tuple of dict
         Parameters, as an explanation's `values`.
     """
-    walk = _Coordinates(tuple(problem.parameters(explanation.names)))
+    walk = _Coordinates.about(problem, explanation)
     best = walk.of(explanation.values)
     lower, upper = walk.bounds
     covariance = _widths(problem, explanation, walk, best)
@@ -153,6 +167,28 @@ def draws(problem: Problem, explanation: Explanation, rng: np.random.Generator) 
     return tuple(walk.at(at) for at in kept)
 
 
+def beside_starts(problem: Problem, explanation: Explanation) -> Problem:
+    """Leave the start states of an explanation open: random effects about where they were fitted.
+
+    A start at an end of its bounds stays there: what lies beyond is impossible.
+    """
+    base = problem.chain.stacked(explanation.values)
+    columns = []
+    for name, parameter in problem.parameters(explanation.names):
+        value = explanation.values[name].get(parameter.name, 0.0)
+        if parameter.run is None or not parameter.lower < value < parameter.upper:
+            continue
+        step = START_STEP if value < 0.0 else -START_STEP
+        moved = {**explanation.values, name: {**explanation.values[name], parameter.name: value + step}}
+        columns.append((problem.chain.stacked(moved) - base) / step * np.sqrt(START_VARIANCE))
+    if not columns:
+        return problem
+    drawn = problem.whitener.drawing
+    beside = [*columns] if drawn is None else [*columns, *drawn.T]
+    whitener = replace(problem.whitener, drawing=np.stack(beside, axis=1))
+    return replace(problem, whitener=whitener, offsets=RunOffsets.of(whitener))
+
+
 def settled(
     problem: Problem, explanation: Explanation, rng: np.random.Generator
 ) -> tuple[Explanation, tuple[Point, ...]]:
@@ -171,8 +207,9 @@ def settled(
     """
     if not explanation.names:
         return explanation, ({},)
+    problem = beside_starts(problem, explanation)
     found = draws(problem, explanation, rng)
-    walk = _Coordinates(tuple(problem.parameters(explanation.names)))
+    walk = _Coordinates.about(problem, explanation)
     values, score = explanation.values, explanation.score
     if explanation.free < len(walk.listed):
         middle = walk.at(np.mean([walk.of(point) for point in found], axis=0))

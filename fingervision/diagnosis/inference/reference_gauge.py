@@ -11,10 +11,9 @@ import numpy as np
 
 from fingervision.diagnosis.inference.hypothesis_fit import Explanation
 from fingervision.diagnosis.inference.search import Findings
-from fingervision.diagnosis.input.observations import BenchData
+from fingervision.diagnosis.input.observations import Observations
 from fingervision.domain.effect import PointEffect
 from fingervision.domain.reference_slot import ReferenceSlot
-from fingervision.domain.report import Verdict
 from fingervision.domain.response import Response
 from fingervision.effects import catalogue
 
@@ -28,7 +27,7 @@ STEP = 0.1
 Values = Mapping[str, Mapping[str, float]]
 
 
-def told_by_slots(bench: BenchData, found: Findings) -> tuple[Findings, tuple[str, ...]]:
+def consistent_with_gauges(data: Observations, found: Findings) -> tuple[Findings, tuple[str, ...]]:
     """Drop the explanations that a reference slot contradicts, and say what the slots showed.
 
     Where all are contradicted none is dropped: then something else is wrong, and the sentence says so.
@@ -40,61 +39,60 @@ def told_by_slots(bench: BenchData, found: Findings) -> tuple[Findings, tuple[st
     tuple of str
         A sentence for each slot, and one for what was dropped.
     """
-    slots = bench.table.slots
+    slots = data.table.slots
     if not slots:
         return found, ()
     members = found.alternatives or (found.best,)
-    costs = [sum(_surprise(bench, e, slot) for slot in slots) for e in members]
-    said = tuple(_sentence(bench, members[int(np.argmin(costs))], slot) for slot in slots)
+    costs = [sum(_surprise(data, e, slot) for slot in slots) for e in members]
+    said = tuple(_sentence(data, members[int(np.argmin(costs))], slot) for slot in slots)
     least = min(costs)
-    if found.verdict is not Verdict.AMBIGUOUS or least >= REFUTED * len(slots):
+    if found.unknown is not None or len(members) < 2 or least >= REFUTED * len(slots):
         return found, said
     left = [e for e, cost in zip(members, costs, strict=True) if cost - least < REFUTED]
     if len(left) == len(members):
         return found, said
     dropped = " and ".join("+".join(e.names) for e in members if e not in left)
     best = min(left, key=lambda e: e.score + costs[members.index(e)])
-    verdict = Verdict.NAMED if len(left) == 1 else Verdict.AMBIGUOUS
     others = [e for e in left if e is not best]
-    told = replace(found, best=best, alternatives=(best, *others), verdict=verdict)
+    told = replace(found, best=best, alternatives=(best, *others))
     return told, (*said, f"that rules out {dropped}.")
 
 
-def seen_mm(bench: BenchData, values: Values, size_mm: float) -> float:
+def seen_mm(data: Observations, values: Values, size_mm: float) -> float:
     """Width at which a slot is measured if an explanation is true."""
     half = np.full(1, 0.5 * size_mm)
-    response, acting = Response(-half, half), {**bench.chain.fixed, **values}
+    response, acting = Response(-half, half), {**data.chain.fixed, **values}
     for name in SHOWN:
         effect = catalogue()[name]
         if name in acting and isinstance(effect, PointEffect):
-            response = effect.act(response, bench.chain.history, acting[name])
+            response = effect.act(response, data.chain.history, acting[name])
     return float(response.gap_mm[0])
 
 
-def _surprise(bench: BenchData, explanation: Explanation, slot: ReferenceSlot) -> float:
+def _surprise(data: Observations, explanation: Explanation, slot: ReferenceSlot) -> float:
     """Chi-square of a slot under an explanation."""
-    off_mm = slot.measured_mm - seen_mm(bench, explanation.values, slot.size_mm)
-    return float((off_mm / _u_mm(bench, explanation, slot)) ** 2)
+    off_mm = slot.measured_mm - seen_mm(data, explanation.values, slot.size_mm)
+    return float((off_mm / _u_mm(data, explanation, slot)) ** 2)
 
 
-def _u_mm(bench: BenchData, explanation: Explanation, slot: ReferenceSlot) -> float:
+def _u_mm(data: Observations, explanation: Explanation, slot: ReferenceSlot) -> float:
     """Standard uncertainty of the difference: of the slot, of its picture, and of the explanation's parameters."""
     values = {name: dict(given) for name, given in explanation.values.items()}
     listed = [(name, key) for name in explanation.names for key in values[name]]
     slopes = np.zeros(len(listed))
     spread = np.sqrt(np.maximum(np.diag(explanation.covariance), 0.0))
-    at_mm = seen_mm(bench, values, slot.size_mm)
+    at_mm = seen_mm(data, values, slot.size_mm)
     for k, (name, key) in enumerate(listed):
         if name in SHOWN and spread[k] > 0.0:
             moved = {**values, name: {**values[name], key: values[name][key] + STEP * spread[k]}}
-            slopes[k] = (seen_mm(bench, moved, slot.size_mm) - at_mm) / (STEP * spread[k])
+            slopes[k] = (seen_mm(data, moved, slot.size_mm) - at_mm) / (STEP * spread[k])
     by_parameters = float(slopes @ explanation.covariance @ slopes)
     return float(np.sqrt(slot.u_size_mm**2 + slot.u_random_mm**2 + by_parameters))
 
 
-def _sentence(bench: BenchData, explanation: Explanation, slot: ReferenceSlot) -> str:
-    expected_mm = seen_mm(bench, explanation.values, slot.size_mm)
-    fits = "as" if _surprise(bench, explanation, slot) < REFUTED else "but"
+def _sentence(data: Observations, explanation: Explanation, slot: ReferenceSlot) -> str:
+    expected_mm = seen_mm(data, explanation.values, slot.size_mm)
+    fits = "as" if _surprise(data, explanation, slot) < REFUTED else "but"
     answer = "+".join(explanation.names) or "the model"
     return (
         f"the reference slot of {slot.size_mm:g} mm measures {slot.measured_mm:.4f} mm, {fits} {answer} foretells "

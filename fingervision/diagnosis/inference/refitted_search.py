@@ -4,14 +4,29 @@ from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
+from scipy.stats import t as student
 
 from fingervision.diagnosis.inference.hypothesis_fit import Explanation, Point, Problem, fit
+from fingervision.diagnosis.inference.position_map import (
+    LEAST_GAIN,
+    NAME,
+    PositionMap,
+    likeliest_map,
+    why_no_map,
+)
 from fingervision.diagnosis.inference.posterior import settled
-from fingervision.diagnosis.inference.reference_gauge import told_by_slots
+from fingervision.diagnosis.inference.reference_gauge import consistent_with_gauges
 from fingervision.diagnosis.inference.search import Findings, Progress, search
-from fingervision.diagnosis.input.intersample_interpolation import along_likelier_path
-from fingervision.diagnosis.input.observations import BenchData
+from fingervision.diagnosis.inference.verdict import standing_of, without_passengers
+from fingervision.diagnosis.input.intersample_interpolation import likelier_interpolation
+from fingervision.diagnosis.input.observations import Observations
+from fingervision.diagnosis.noise.whitening import RunOffsets
 
+BY_ACCIDENT = 1e-3
+"""Probability by which the runs' offsets have a mean so far from zero by accident (Student's t), below which they share
+a cause."""
+LOWERED = 0.9
+"""Times what stands that an answer with such a cause must leave at most."""
 MOST_SEARCHES = 3
 """The second is nearly always the last, and none is needed where the drawing's numbers act along a straight line."""
 
@@ -22,7 +37,7 @@ class Refitted:
 
     Parameters
     ----------
-    bench : BenchData
+    data : Observations
         Measurement and model; the drawing's uncertain numbers stand where they explain the most.
     found : Findings
         What the search found.
@@ -30,56 +45,184 @@ class Refitted:
         Draws of the best explanation's parameters.
     """
 
-    bench: BenchData
+    data: Observations
     found: Findings
     posterior: tuple[Point, ...]
 
 
-def _problem(bench: BenchData, explanation: Explanation | None) -> Problem:
+def _problem_of(data: Observations, explanation: Explanation | None) -> Problem:
     values = {} if explanation is None else explanation.values
     free = 0 if explanation is None else explanation.free
-    return bench.problem(bench.stacked_mm - bench.chain.stacked(values), free, explained=explanation is not None)
+    return data.problem(data.stacked_mm - data.chain.stacked(values), free, explained=explanation is not None)
 
 
-def refitted_search(bench: BenchData, rng: np.random.Generator, forced: frozenset[str], progress: Progress) -> Refitted:
-    """Search; where a drawing's numbers are uncertain, redraw it and search again until neither changes the other.
+def refitted_search(
+    data: Observations,
+    rng: np.random.Generator,
+    forced: frozenset[str],
+    without: frozenset[str],
+    progress: Progress,
+) -> Refitted:
+    """Search, stage by stage: between samples, beside a map of position errors, beside a redrawn gripper.
 
     Parameters
     ----------
-    bench : BenchData
+    data : Observations
         Measurement and model.
     rng : numpy Generator
         For the bootstrap and the posterior.
-    forced : frozenset of str
-        Effects that the user insists on.
+    forced, without : frozenset of str
+        Effects that the user insists on, or rules out.
     progress : callable
         Told the share that is done.
     """
-    found, said = told_by_slots(bench, search(partial(_problem, bench), rng, forced, progress))
-    likelier = along_likelier_path(bench, found.problem, found.best)
-    if likelier is not bench:
-        bench = likelier
-        found, said = told_by_slots(bench, search(partial(_problem, bench), rng, forced, progress))
-    if not bench.refit.moved:
-        best, posterior = settled(found.problem, found.best, rng)
-        return Refitted(_with_notes(bench, said), _with_best(found, best), posterior)
+    look = _Look(rng, forced, progress)
+    state = look.again(data)
+    likelier = likelier_interpolation(state.data, state.found.problem, state.found.best)
+    if likelier is not state.data:
+        state = look.again(likelier)
+    state = _over_the_ends(state, look)
+    if NAME not in without:
+        state = _beside_map(state, look)
+    state = _common_offset(state, look)
+    return _settled(_beside_drawing(state, look), rng)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Searched:
+    """A search that was made: measurement and model, what was found, and what slots of known width said."""
+
+    data: Observations
+    found: Findings
+    said: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Look:
+    """How searches are made."""
+
+    rng: np.random.Generator
+    forced: frozenset[str]
+    progress: Progress
+
+    def again(self, data: Observations, known: Explanation | None = None) -> _Searched:
+        """Search once more, the noise estimated beside what is known already."""
+        found = search(partial(_problem_of, data), self.rng, self.forced, self.progress, known)
+        found, said = consistent_with_gauges(data, found)
+        return _Searched(data, found, said)
+
+
+def _over_the_ends(state: _Searched, look: _Look) -> _Searched:
+    """Search along a path with overshoots, and keep it where an effect with memory then explains the data better."""
+    data = state.data.with_overshoots()
+    if data is state.data:
+        return state
+    found = state.found
+    with_memory = [name for name, effect in found.problem.effects.items() if effect.memory]
+    over = replace(found.problem, chain=data.chain)
+    tried = [e for e in found.singles if e.names[0] in with_memory]
+    straight = min(e.score for e in [found.nothing, *tried])
+    refits = [fit(over, e.names, e.values, iterations=20).score for e in tried]
+    turned = min([over.nothing().score, *refits])
+    return look.again(data) if turned < straight - LEAST_GAIN else state
+
+
+def _beside_map(state: _Searched, look: _Look) -> _Searched:
+    """Search beside a map of position errors, and keep what is found where it is the far likelier explanation.
+
+    The map competes only where something remains that the other effects do not explain, and at the price of its
+    freedom; where an effect with a few numbers does as well, it stays.
+    """
+    history, found = state.data.chain.history, state.found
+    reason = why_no_map(history, state.data.chain.path)
+    asked = NAME in look.forced
+    if reason is not None:
+        excluded = {**state.data.excluded, NAME: reason}
+        return replace(state, data=replace(state.data, excluded=excluded))
+    if not asked and found.unknown is None:
+        return state
+    first, gain = likeliest_map(found.problem, found.best)
+    if gain < LEAST_GAIN and found.best.names:
+        # What was named may itself stand for a part of the map.
+        first, gain = likeliest_map(found.problem, found.nothing)
+    if gain < LEAST_GAIN and not asked:
+        return state
+    beside = look.again(replace(state.data, position_map=first), found.best)
+    plain = replace(beside.found.problem, offsets=_offsets_without_map(beside.found.problem, first))
+    second, _ = likeliest_map(plain, _left(plain, beside.found.best))
+    if first.is_like(second):
+        second = first
+    else:
+        beside = look.again(replace(beside.data, position_map=second), beside.found.best)
+        plain = replace(beside.found.problem, offsets=_offsets_without_map(beside.found.problem, second))
+    rows = max(2, int(plain.measured.size - plain.whitener.aside.sum()))
+    rival = fit(plain, found.best.names, found.best.values, iterations=20) if found.best.names else plain.nothing()
+    gained = rival.bic(rows) - beside.found.best.bic(rows) - second.price
+    return beside if asked or gained > LEAST_GAIN else state
+
+
+def _common_offset(state: _Searched, look: _Look) -> _Searched:
+    """Search once more for a constant that the runs share, where their offsets had taken it.
+
+    Runs that are off by nearly the same amount share a cause and no accident: they may then be offset against each
+    other by no more than they depart from their mean.
+    """
+    runs = len(state.data.chain.history.runs)
+    found = state.found
+    if runs < 2 or max(found.best.sigma_mm) == 0.0:
+        return state
+    offsets = found.problem.offsets
+    means = (offsets.metric(found.best.sigma_mm) @ (offsets.design.T @ found.best.residual))[:runs]
+    scatter = float(np.std(means, ddof=1))
+    chance = 2.0 * float(student.sf(abs(means.mean()) / max(scatter / np.sqrt(runs), 1e-300), runs - 1))
+    stands = standing_of(state.data, found)
+    if chance > BY_ACCIDENT and stands.is_little:
+        return state
+    again = look.again(replace(state.data, runs_scatter_mm=scatter), found.best)
+    lower = standing_of(again.data, again.found).after_mm
+    return again if lower < LOWERED * stands.after_mm else state
+
+
+def _left(problem: Problem, explanation: Explanation) -> Explanation:
+    """Judge an explanation as it stands by another observation model."""
+    residual = problem.measured - problem.whitened(explanation.values)
+    return replace(explanation, residual=residual, sigma_mm=problem.offsets.spread(residual)[0])
+
+
+def _offsets_without_map(problem: Problem, position_map: PositionMap) -> RunOffsets:
+    drawing = problem.whitener.drawing
+    count = position_map.coefficients.size
+    kept = None if drawing is None or drawing.shape[1] == count else drawing[:, count:]
+    return RunOffsets.of(replace(problem.whitener, drawing=kept))
+
+
+def _beside_drawing(state: _Searched, look: _Look) -> _Searched:
+    """Redraw a gripper whose numbers are uncertain, and search again until neither changes the other."""
+    if not state.data.refit.moved:
+        return state
     for _ in range(MOST_SEARCHES - 1):
-        nearer = bench.redrawn(found.problem, found.best)
-        straight = nearer.straight(bench, found.problem)
-        bench = nearer
+        nearer = state.data.redrawn(state.found.problem, state.found.best)
+        straight = nearer.straight(state.data, state.found.problem)
+        state = replace(state, data=nearer)
         if straight:
             break
-        found, said = told_by_slots(bench, search(partial(_problem, bench), rng, forced, progress))
-    found = replace(found, problem=_problem(bench, found.best))
+        state = look.again(state.data)
+    found = replace(state.found, problem=_problem_of(state.data, state.found.best))
     refit = fit(found.problem, found.best.names, found.best.values, iterations=20) if found.best.names else found.best
-    best, posterior = settled(found.problem, refit, rng)
+    return replace(state, found=_with_best(found, refit))
+
+
+def _settled(state: _Searched, rng: np.random.Generator) -> Refitted:
+    """Drop what only rides along, estimate the map, and give every parameter its posterior."""
+    data, found = state.data, without_passengers(state.data, state.found)
+    best, posterior = settled(found.problem, found.best, rng)
     found = _with_best(found, best)
-    bench = bench.redrawn(found.problem, best if best.names else found.problem.nothing())
-    return Refitted(_with_notes(bench, said), replace(found, problem=_problem(bench, best)), posterior)
-
-
-def _with_notes(bench: BenchData, said: tuple[str, ...]) -> BenchData:
-    return replace(bench, notes=(*bench.notes, *said))
+    if data.position_map is not None:
+        data = replace(data, position_map=data.position_map.refitted(found.problem, best, len(data.refit.moved)))
+    if data.refit.moved:
+        data = data.redrawn(found.problem, best if best.names else found.problem.nothing())
+        found = replace(found, problem=_problem_of(data, best))
+    return Refitted(replace(data, notes=(*data.notes, *state.said)), found, posterior)
 
 
 def _with_best(found: Findings, best: Explanation) -> Findings:

@@ -1,19 +1,19 @@
 """Which effects: singles, pairs and triples, refitted in the chain; thresholds from a bootstrap of the null."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from fingervision.diagnosis.inference.ambiguity_set import beside_foretold, indistinguishable, odds
-from fingervision.diagnosis.inference.detection_limit import smallest_seen
+from fingervision.diagnosis.inference.ambiguity_set import ambiguity_set, beside_foretold, odds
+from fingervision.diagnosis.inference.detection_limit import detection_limits
 from fingervision.diagnosis.inference.hypothesis_fit import FORM_SHARE, SMALL_SHARE, Explanation, Problem, fit, scan
-from fingervision.diagnosis.inference.model_adequacy import imitated, shapes_of, unexplained
+from fingervision.diagnosis.inference.model_adequacy import imitated, remaining_structure, shapes_of
 from fingervision.diagnosis.inference.null_bootstrap import LONG
+from fingervision.diagnosis.inference.probe_basis import Probes
 from fingervision.diagnosis.inference.signatures import Signatures, signatures, tangents
 from fingervision.diagnosis.inference.significance import Evidence
 from fingervision.diagnosis.input.input_uncertainty import below_the_input
-from fingervision.domain.report import Verdict
 
 Progress = Callable[[float], None]
 TRIPLE_SHARE = 0.15
@@ -24,6 +24,19 @@ SCANNED = 6
 """Explanations beside which an effect that jumps is tried at all its sizes: where it jumps depends on the others."""
 LEAST_GAIN = 4.0
 """Chi-square that an effect's signature must take for a refit to be tried."""
+PART_OF_UNKNOWN = 9.0
+"""Times what still stands, in chi-square, that a part must explain to be told beside *unknown*: it then leaves a
+third of it, as RMS."""
+COMPLETE = 0.05
+"""Share of what stands beyond the noise, in chi-square, that a complete explanation leaves: forms that only bend to
+what an effect's form leaves over take less of it."""
+FEW_ROWS = 0.1
+"""Share of the rows on which a stop or a contact acts that only the ends of strokes speak for; what acts on more is
+averaged over many roundings."""
+STEPS_HIDDEN = 1.0
+"""Steps of the encoder within which an effect is not told from its roundings."""
+BASES = 14
+"""Single effects to which a second one is added."""
 SHORT = 100
 """Samples below which the noise is estimated beside single effects only."""
 
@@ -32,7 +45,6 @@ SHORT = 100
 class Findings:
     """What the search found; explanations sorted best first."""
 
-    verdict: Verdict
     best: Explanation
     alternatives: tuple[Explanation, ...]
     nothing: Explanation
@@ -120,6 +132,25 @@ def _added(problem: Problem, smaller: Explanation, larger: Explanation) -> float
     return float(np.linalg.norm(after - before) / max(1e-12, float(np.linalg.norm(after - bare))))
 
 
+def _within_a_step(problem: Problem, explanation: Explanation) -> bool:
+    """Whether an effect acts on a few rows by less than an encoder's step: roundings at the end of a stroke do."""
+    history = problem.chain.history
+    if history.input_step_mm == 0.0:
+        return False
+    reach = 0.5 * history.input_step_mm
+    low, high = (problem.chain.with_input(history.input_mm + way).stacked({}) for way in (-reach, reach))
+    change = problem.chain.stacked(explanation.values) - problem.chain.stacked({})
+    largest = float(np.max(np.abs(change)))
+    few = float(np.mean(np.abs(change) > 0.1 * largest)) < FEW_ROWS
+    return few and largest < STEPS_HIDDEN * float(np.max(np.abs(high - low)))
+
+
+def _completes(state: "_State", smaller: Explanation, larger: Explanation) -> bool:
+    """Whether the larger explanation takes nearly all that the smaller one left, as a true one does."""
+    rows = state.values - int(state.problem.whitener.aside.sum())
+    return larger.score - rows < COMPLETE * (smaller.score - rows)
+
+
 def _choose(candidates: list[Explanation], samples: int) -> Explanation:
     return min(candidates, key=lambda explanation: explanation.bic(samples))
 
@@ -137,16 +168,19 @@ def _simplest(singles: list[Explanation], samples: int, nothing: Explanation) ->
 
 
 def search(
-    bench_problem: Callable[[Explanation | None], Problem],
+    problem_beside: Callable[[Explanation | None], Problem],
     rng: np.random.Generator,
     forced: frozenset[str],
     progress: Progress,
+    known: Explanation | None = None,
 ) -> Findings:
     """Find the explanation, the others that cannot be told apart from it, and what remains.
 
+    The stages are one effect, two, three, the gate of *unknown*, the ambiguity set; each returns a new state.
+
     Parameters
     ----------
-    bench_problem : callable
+    problem_beside : callable
         Gives the problem with the noise estimated on an explanation's residual.
     rng : numpy Generator
         For the bootstrap of the null.
@@ -154,85 +188,197 @@ def search(
         Effects that the user insists on.
     progress : callable
         Told the share that is done.
+    known : Explanation or None
+        Found by an earlier search of the same measurement: the noise is estimated beside it.
     """
-    problem = bench_problem(None)
+    state = _one_effect(_noise_known(problem_beside, known), rng, forced)
+    progress(0.3)
+    state = _two_effects(state, lambda share: progress(0.3 + 0.4 * share))
+    state = _three_effects(state, lambda share: progress(0.7 + 0.1 * share))
+    state = _insisted(state, forced) if forced else _without_imitations(state)
+    progress(0.82)
+    state = _gated(state, rng)
+    progress(0.9)
+    return _findings(state, forced)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _State:
+    """What the search has found so far.
+
+    Parameters
+    ----------
+    problem, atoms : Problem, Signatures
+        The data, and what each effect would add.
+    nothing, best : Explanation
+        The model as it is, and the explanation that stands.
+    peers : list of Explanation
+        Explanations of as many effects as the best, best first.
+    shapes : Probes
+        Generic shapes that no catalogue names.
+    singles, pairs, triples : list of Explanation
+        All of one effect, and the likeliest of two and three, best first.
+    evidence : Evidence or None
+        What gains are judged by.
+    imitation, unknown, left_over : str or None
+        Probes for which effects only stand in; structure that nothing explains; structure that is small.
+    """
+
+    problem: Problem
+    atoms: Signatures
+    nothing: Explanation
+    best: Explanation
+    peers: list[Explanation]
+    shapes: Probes
+    singles: list[Explanation] = field(default_factory=list)
+    pairs: list[Explanation] = field(default_factory=list)
+    triples: list[Explanation] = field(default_factory=list)
+    evidence: Evidence | None = None
+    imitation: str | None = None
+    unknown: str | None = None
+    left_over: str | None = None
+
+    @property
+    def values(self) -> int:
+        """Values that were measured, at least 2."""
+        return max(2, int(self.problem.measured.size))
+
+    def speaks_for(self, found: list[Explanation], base: Explanation) -> bool:
+        """Whether the best of some explanations gains more over `base` than noise would give it."""
+        return self.evidence is not None and self.evidence.speaks_for(found, base)
+
+
+def _noise_known(problem_beside: Callable[[Explanation | None], Problem], known: Explanation | None) -> _State:
+    """Estimate the noise beside what is known, or beside the likeliest explanation of a first, rough search."""
+    if known is not None:
+        problem = problem_beside(known)
+        nothing = problem.nothing()
+        return _State(problem, signatures(problem), nothing, nothing, [nothing], shapes_of(problem))
+    problem = problem_beside(None)
     atoms = signatures(problem)
     rough = _singles(problem, atoms, 4)
     # A pair fitted to a few samples takes their noise with it, which would then be estimated too small.
     many = problem.chain.history.input_mm.size >= SHORT
     pairs = _extended(problem, atoms, rough[:3], 16, lambda _: None) if many else []
     first = [*rough[:1], *pairs[:1]]
-    progress(0.15)
     if first:
-        problem = bench_problem(min(first, key=lambda e: e.bic(problem.measured.size)))
+        problem = problem_beside(min(first, key=lambda e: e.bic(problem.measured.size)))
         atoms = signatures(problem)
     nothing = problem.nothing()
-    samples = max(2, int(problem.measured.size))
-    singles = _singles(problem, atoms, 20)
-    evidence = Evidence.of(problem, atoms, nothing, rng)
-    progress(0.3)
-    best, peers = nothing, [nothing]
-    pairs, foreign, shape, shapes = [], None, None, shapes_of(problem)
+    return _State(problem, atoms, nothing, nothing, [nothing], shapes_of(problem))
 
-    if singles and (evidence.speaks_for(singles, nothing) or forced):
-        best, peers = _simplest(singles[:6], samples, nothing), singles
-        bases = singles[:14]
-        pairs = _extended(problem, atoms, bases, PAIRS_REFITTED, lambda share: progress(0.3 + 0.4 * share))
-        pairs = _swapped(problem, atoms, pairs)
-        # Beside a simpler form a second effect would gain what the richest has gained already.
-        if pairs and _added(problem, singles[0], pairs[0]) > SMALL_SHARE and evidence.speaks_for(pairs, singles[0]):
-            best, peers = _choose(pairs[:6], samples), pairs
-            triples = _extended(problem, atoms, pairs[:3], 24, lambda share: progress(0.7 + 0.1 * share))
-            if triples and _added(problem, best, triples[0]) > TRIPLE_SHARE and evidence.speaks_for(triples, best):
-                foreign = imitated(problem, shapes, triples[0], [nothing, *bases, *pairs[:3]])
-                if foreign is None:
-                    best, peers = _choose(triples[:6], samples), triples
-        if len(best.names) <= 2:
-            parts = [e for e in singles if e.names[0] in best.names] if len(best.names) == 2 else []
-            shape = imitated(problem, shapes, best, [nothing, *parts, *singles[: len(parts)]])
-    if forced:
-        best, foreign, shape = _insisted(problem, forced, [*singles, *pairs], singles, samples), None, None
-    progress(0.82)
-    words, left = unexplained(problem, shapes, best, rng)
+
+def _one_effect(state: _State, rng: np.random.Generator, forced: frozenset[str]) -> _State:
+    """Fit every effect alone; the simplest that is as good as the best stands, if noise would not give so much."""
+    problem = state.problem
+    singles = [e for e in _singles(problem, state.atoms, 20) if not _within_a_step(problem, e)]
+    evidence = Evidence.of(state.problem, state.atoms, state.nothing, rng)
+    state = replace(state, singles=singles, evidence=evidence)
+    if not singles:
+        return state
+    stalled = [e for e in singles if set(e.names) & state.problem.stalled]
+    if stalled and stalled[0].score < state.nothing.score:
+        near = [e for e in stalled if e.score - stalled[0].score < LEAST_GAIN]
+        return replace(state, best=_simplest(near, state.values, state.nothing), peers=singles)
+    if not (state.speaks_for(singles, state.nothing) or forced):
+        return state
+    return replace(state, best=_simplest(singles[:6], state.values, state.nothing), peers=singles)
+
+
+def _two_effects(state: _State, progress: Progress) -> _State:
+    """Fit pairs from the single effects, and once more from where the best pair puts each of its halves."""
+    if not state.best.names:
+        return state
+    problem, singles = state.problem, state.singles
+    pairs = _extended(problem, state.atoms, singles[:BASES], PAIRS_REFITTED, progress)
+    pairs = _swapped(problem, state.atoms, pairs)
+    state = replace(state, pairs=pairs)
+    # Beside a simpler form a second effect would gain what the richest has gained already.
+    if not pairs:
+        return state
+    large = _added(problem, singles[0], pairs[0]) > SMALL_SHARE or _completes(state, singles[0], pairs[0])
+    if large and state.speaks_for(pairs, singles[0]):
+        return replace(state, best=_choose(pairs[:6], state.values), peers=pairs)
+    return state
+
+
+def _three_effects(state: _State, progress: Progress) -> _State:
+    """Fit triples, unless one or two probes beside fewer effects do as well."""
+    if len(state.best.names) != 2:
+        return state
+    problem, pairs = state.problem, state.pairs
+    triples = _extended(problem, state.atoms, pairs[:3], 24, progress)
+    state = replace(state, triples=triples)
+    if not triples:
+        return state
+    large = _added(problem, state.best, triples[0]) > TRIPLE_SHARE
+    if not (large or _completes(state, state.best, triples[0])) or not state.speaks_for(triples, state.best):
+        return state
+    imitation = imitated(problem, state.shapes, triples[0], [state.nothing, *state.singles[:BASES], *pairs[:3]])
+    if imitation is not None:
+        # Where it changes little, what the third effect imitates is left over, and the gate will tell it.
+        return replace(state, imitation=imitation) if large else state
+    return replace(state, best=_choose(triples[:6], state.values), peers=triples)
+
+
+def _without_imitations(state: _State) -> _State:
+    """Look whether one or two effects only stand in for a shape that no catalogue names."""
+    best, singles = state.best, state.singles
+    if not best.names or len(best.names) > 2:
+        return state
+    parts = [e for e in singles if e.names[0] in best.names] if len(best.names) == 2 else []
+    imitation = imitated(state.problem, state.shapes, best, [state.nothing, *parts, *singles[: len(parts)]])
+    return state if imitation is None else replace(state, imitation=imitation, unknown=imitation)
+
+
+def _gated(state: _State, rng: np.random.Generator) -> _State:
+    """Test what the best explanation leaves with generic probes."""
+    unknown, left_over = remaining_structure(state.problem, state.shapes, state.best, rng)
     # What is small beside all that was explained is left over, whether probes found it or a third effect.
-    words = foreign if words is None and left is None else words
-    words = shape if words is None else words
-    progress(0.9)
-    alternatives, distances = (
-        ([best], {})
-        if forced or not best.names
-        else indistinguishable(problem, best, nothing, [*singles, *peers] if len(best.names) > 1 else singles, pairs)
-    )
+    if unknown is None and left_over is None:
+        unknown = state.imitation
+    return replace(state, unknown=state.unknown if unknown is None else unknown, left_over=left_over)
+
+
+def _findings(state: _State, forced: frozenset[str]) -> Findings:
+    """Collect what cannot be told apart from the best; of what is unknown, only a part that explains much is kept."""
+    problem, best, nothing = state.problem, state.best, state.nothing
+    alternatives, distances = [best], dict[tuple[str, ...], float]()
+    if best.names and not forced:
+        pool = [*state.singles, *state.peers] if len(best.names) > 1 else state.singles
+        alternatives, distances = ambiguity_set(problem, best, nothing, pool, state.pairs)
     alternatives = beside_foretold(problem, alternatives)
-    best = min(alternatives, key=lambda e: odds(problem, e, samples)) if best.names else best
+    best = min(alternatives, key=lambda e: odds(problem, e, state.values)) if best.names else best
     alternatives.sort(key=lambda e: e is not best)
-    verdict = Verdict.AGREES if not best.names else Verdict.NAMED if len(alternatives) == 1 else Verdict.AMBIGUOUS
-    if words is not None:
-        verdict = Verdict.UNKNOWN
-        if nothing.score - best.score < 9.0 * max(0.0, best.score - samples):
+    if state.unknown is not None:
+        stands = max(0.0, best.score - state.values)
+        if nothing.score - best.score < PART_OF_UNKNOWN * stands:
             best = nothing
         alternatives = [best] if best.names else []
+    smallest = (
+        {} if state.evidence is None else detection_limits(problem, state.atoms, nothing, state.evidence.thresholds)
+    )
     return Findings(
-        verdict,
-        best,
-        tuple(alternatives),
-        nothing,
-        tuple(singles),
-        words,
-        left,
-        smallest_seen(problem, atoms, nothing, evidence.thresholds),
-        distances,
-        problem,
+        best=best,
+        alternatives=tuple(alternatives),
+        nothing=nothing,
+        singles=tuple(state.singles),
+        unknown=state.unknown,
+        left_over=state.left_over,
+        smallest=smallest,
+        distances=distances,
+        problem=problem,
     )
 
 
-def _insisted(
-    problem: Problem, forced: frozenset[str], found: list[Explanation], singles: list[Explanation], samples: int
-) -> Explanation:
+def _insisted(state: _State, forced: frozenset[str]) -> _State:
     """Choose the best explanation that holds every effect on which the user insists."""
+    problem = state.problem
     able = forced & set(problem.effects)
-    holding = [explanation for explanation in found if able <= set(explanation.names)]
+    holding = [explanation for explanation in [*state.singles, *state.pairs] if able <= set(explanation.names)]
     if holding or not able:
-        return _choose(holding, samples) if able else problem.nothing()
-    begin = {e.names[0]: e.values[e.names[0]] for e in singles if e.names[0] in able}
-    return fit(problem, tuple(begin), begin, iterations=20)
+        best = _choose(holding, state.values) if able else problem.nothing()
+    else:
+        begin = {e.names[0]: e.values[e.names[0]] for e in state.singles if e.names[0] in able}
+        best = fit(problem, tuple(begin), begin, iterations=20)
+    return replace(state, best=best, imitation=None)

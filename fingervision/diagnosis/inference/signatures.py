@@ -7,7 +7,10 @@ import numpy as np
 
 from fingervision.diagnosis.inference.hypothesis_fit import Explanation, Problem
 from fingervision.diagnosis.noise.whitening import RunOffsets
-from fingervision.domain.effect import Array
+from fingervision.domain.effect import Array, History, start_key
+
+START_MOVES = 1e-3
+"""Share of the range that a first move must exceed to tell from which side a run begins."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -84,7 +87,7 @@ def signatures(problem: Problem) -> Signatures:
     bare = problem.chain.stacked({})
     names, starts, grows, columns = [], [], [], []
     for name in problem.effects:
-        listed = [parameter for _, parameter in problem.parameters((name,))]
+        listed = [parameter for _, parameter in problem.parameters((name,)) if parameter.run is None]
         shapes = [p for p in listed if p.neutral is None]
         amplitudes = [p for p in listed if p.neutral is not None]
         for shape in product(*(p.starting_values() for p in shapes)):
@@ -96,7 +99,9 @@ def signatures(problem: Problem) -> Signatures:
                     neutral = float(p.neutral) if p.neutral is not None else 0.0
                     linear = (p.name, neutral, float(value) - neutral, p.lower, p.upper) if p.starts == 1 else None
                     tried.append(({**fixed, p.name: float(value)}, linear))
-            for start, grow in tried:
+            begins = start_patterns(problem.chain.history) if problem.effects[name].start else ({},)
+            for (start, grow), begin in product(tried, begins):
+                start = {**start, **begin}
                 column = problem.chain.stacked({name: start}) - bare
                 if np.max(np.abs(column)) > 1e-12:
                     names.append(name)
@@ -107,12 +112,22 @@ def signatures(problem: Problem) -> Signatures:
     return Signatures(tuple(names), tuple(starts), tuple(grows), whitened)
 
 
+def start_patterns(history: History) -> tuple[dict[str, float], ...]:
+    """Start states to set out from: in the middle, where the first motion had left them, and at the other end."""
+    first = []
+    for run in history.runs:
+        moves = np.diff(history.input_mm[run])
+        moving = moves[np.abs(moves) > START_MOVES * history.input_span_mm]
+        first.append(float(np.sign(moving[0])) if moving.size else 1.0)
+    return tuple({start_key(run): end * way for run, way in enumerate(first)} for end in (0.0, -1.0, 1.0))
+
+
 def tangents(problem: Problem, explanation: Explanation) -> Array:
     """Whitened derivatives of an explanation's prediction by its parameters; shape (m, p)."""
     base = problem.chain.stacked(explanation.values)
     columns = []
     for name, parameter in problem.parameters(explanation.names):
-        value = explanation.values[name][parameter.name]
+        value = explanation.values[name].get(parameter.name, 0.0)
         step = 1e-3 * max(abs(value), 1e-3 * min(parameter.upper - parameter.lower, 1.0))
         step = step if value + step <= parameter.upper else -step
         moved = {**explanation.values, name: {**explanation.values[name], parameter.name: value + step}}

@@ -3,6 +3,8 @@
 from math import comb
 
 import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import norm
 
 from fingervision.domain.effect import Array
 
@@ -20,6 +22,23 @@ ROUNDED = 1.5
 """Times the scatter of rounding above which there is noise as well."""
 HALTING = 0.5
 """Changes of speed by a single step over samples that moved: a slow motion halts between an encoder's steps."""
+CLUSTERED = 0.5
+"""Length of the mean unit vector of all values on a circle of one encoder step, above which they lie on its lines: with
+normal jitter of sigma it is exp(-2 (pi sigma / step)^2), 0.5 at a jitter of 0.19 steps."""
+EXACT = 1.0 - 1e-6
+"""The same above which there is no jitter and nothing to be taken out."""
+ON_LINE, EXACT_SHARE = 1e-3, 0.2
+"""Share of a step within which a value lies exactly on a line, and share of such values that jitter does not give."""
+BETWEEN = 0.4
+"""Distance from the lines, in steps, that jitter seldom reaches and values on no lines have in a fifth of the cases."""
+FEWEST_LINES = 8
+"""Lines that a record must cross for their distance to be told."""
+BEYOND_CHANCE = 4.0
+"""Times the length that so many values would have by chance at any of the steps that are tried."""
+PEAK_STEP = 0.2
+"""Step of the frequencies that are tried, over the inverse of the range: a peak is one wide."""
+MOST_LINES = 400
+"""Lines over the range at most: finer ones are no finer than the noise of other records."""
 FEWEST_SINGLE = 3
 """Single steps that tell an encoder from set points in round numbers."""
 
@@ -46,6 +65,54 @@ def input_sigma(input_mm: Array, runs: tuple[slice, ...]) -> tuple[float, float]
         sigma, rounding = min(sigma, _scatter(input_mm, runs)), step / float(np.sqrt(12.0))
         sigma = sigma if sigma > ROUNDED * rounding else rounding
     return (sigma if 1e-7 * np.ptp(input_mm) < sigma < np.inf else 0.0), step
+
+
+def on_lines(input_mm: Array, runs: tuple[slice, ...]) -> Array:
+    """Take the jitter out of an encoder's record: put each value on the line about which it lies.
+
+    The lines may lie anywhere; their distance is where the characteristic function of the values has its largest
+    peak at the lowest frequency. A record that lies about no lines, or exactly on them, comes back as it is.
+
+    Parameters
+    ----------
+    input_mm : ndarray of float, shape (n,)
+        Recorded input.
+    runs : tuple of slice
+        Samples of each run.
+    """
+    moved = [run.start + np.flatnonzero(np.abs(np.diff(input_mm[run], prepend=np.inf)) > RESOLVED_MM) for run in runs]
+    values = input_mm[np.concatenate(moved)]
+    span = float(np.ptp(values))
+    if values.size < MANY or span == 0.0:
+        return input_mm
+    finest = np.median(np.abs(np.diff(np.sort(values)))) * 4.0
+    frequency = np.arange(FEWEST_LINES, min(span / max(finest, RESOLVED_MM), MOST_LINES), PEAK_STEP) / span
+    length = np.abs(_characteristic(values, frequency))
+    peaks = np.flatnonzero(length > max(CLUSTERED, BEYOND_CHANCE / np.sqrt(values.size)))
+    if not peaks.size:
+        return input_mm
+    first = peaks[0]
+    while first + 1 < length.size and length[first + 1] > length[first]:
+        first += 1
+    around = np.linspace(frequency[first] - PEAK_STEP / span, frequency[first] + PEAK_STEP / span, 201)
+    peak = _characteristic(values, around)
+    best = int(np.argmax(np.abs(peak)))
+    if np.abs(peak[best]) > EXACT:
+        return input_mm
+    step, shift = 1.0 / around[best], float(np.angle(peak[best])) / (2.0 * np.pi)
+    snapped = np.asarray((np.round(input_mm / step - shift) + shift) * step)
+    jitter = np.abs(values - (np.round(values / step - shift) + shift) * step) / step
+    sigma = float(np.sqrt(-2.0 * np.log(np.abs(peak[best])))) / (2.0 * np.pi)
+    between = 2.0 * float(norm.sf(BETWEEN / sigma))
+    # Equal steps of a motion lie on lines exactly, and what is between them is no jitter.
+    if np.mean(jitter < ON_LINE) > EXACT_SHARE or np.mean(jitter > BETWEEN) > 1.5 * between + 0.005:
+        return input_mm
+    return snapped
+
+
+def _characteristic(values: Array, frequency: Array) -> NDArray[np.complex128]:
+    """Mean of exp(2 pi i f x); shape of `frequency`."""
+    return np.asarray(np.mean(np.exp(2j * np.pi * frequency[:, None] * values), axis=1))
 
 
 def _sigma_by_differences(input_mm: Array, runs: tuple[slice, ...], order: int) -> float:

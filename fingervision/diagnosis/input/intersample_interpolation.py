@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from fingervision.diagnosis.inference.hypothesis_fit import MANY_STEPS, Explanation, Point, Problem, fit
-from fingervision.diagnosis.input.observations import BenchData
+from fingervision.diagnosis.input.observations import Observations
 
 DELAYS = ("drive_lag", "camera_latency")
 RESONANCE = "structural_resonance"
@@ -13,7 +13,7 @@ CLEARLY = 10.0
 """Chi-square by which curves must explain the data better than straight lines."""
 
 
-def along_likelier_path(bench: BenchData, problem: Problem, best: Explanation) -> BenchData:
+def likelier_interpolation(data: Observations, problem: Problem, best: Explanation) -> Observations:
     """Read the record along curves where a delay then explains the data better than along straight lines.
 
     A stage that turns within half a second goes along a curve between samples that are an eighth of a second apart.
@@ -22,7 +22,7 @@ def along_likelier_path(bench: BenchData, problem: Problem, best: Explanation) -
 
     Parameters
     ----------
-    bench : BenchData
+    data : Observations
         Measurement and model.
     problem : Problem
         The observation model in which `best` was found.
@@ -31,15 +31,15 @@ def along_likelier_path(bench: BenchData, problem: Problem, best: Explanation) -
 
     Returns
     -------
-    BenchData
-        `bench` itself where nothing is late or straight lines do as well.
+    Observations
+        `data` itself where nothing is late or straight lines do as well.
     """
-    fixed = any(name in bench.chain.fixed for name in DELAYS)
-    if bench.chain.curved or not (fixed or {*DELAYS, RESONANCE} & set(best.names)):
-        return bench
-    curved = replace(bench.chain, curved=True)
-    straight, along = (_score(replace(problem, chain=chain), best, fixed) for chain in (bench.chain, curved))
-    return replace(bench, chain=curved) if along < straight - CLEARLY else bench
+    fixed = any(name in data.chain.fixed for name in DELAYS)
+    if data.chain.curved or not (fixed or {*DELAYS, RESONANCE} & set(best.names)):
+        return data
+    curved = replace(data.chain, curved=True)
+    straight, along = (_score(replace(problem, chain=chain), best, fixed) for chain in (data.chain, curved))
+    return replace(data, chain=curved) if along < straight - CLEARLY else data
 
 
 def _score(problem: Problem, best: Explanation, fixed: bool) -> float:

@@ -1,11 +1,14 @@
 """The recorded input: smoothed as far as its error is random, and what the rest of that error does to the gap."""
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
-from fingervision.diagnosis.input.encoder import input_sigma
+from fingervision.diagnosis.input.commands import is_commanded
+from fingervision.diagnosis.input.encoder import input_sigma, on_lines
 from fingervision.diagnosis.input.local_polynomial_smoothing import smoothed
+from fingervision.diagnosis.input.path import readings_at_rest, recorded
 from fingervision.diagnosis.noise.spectrum import LEAST_RUN
 from fingervision.domain.effect import Array, Flags, History
 from fingervision.domain.measured_table import MeasuredTable
@@ -17,6 +20,8 @@ STAYING = 0.2
 """Leverage below which neighbours share so many samples that they share the error too."""
 STANDING_SHARE = 1e-3
 """Share of the input's range within which a stage stands."""
+AT_REST_SHARE = 0.5
+"""Share of the rows that were read at rest above which no row tells anything about its neighbours' input."""
 SURELY = 3.0
 """Standard errors by which the gap must follow the input's unrest before that is taken for motion."""
 
@@ -28,7 +33,9 @@ class RecordedInput:
     Parameters
     ----------
     smooth_mm : ndarray of float, shape (n,)
-        The record, smoothed.
+        The measured rows' record, smoothed.
+    along_mm : ndarray of float, shape (m,)
+        The same of every row that has an input.
     sigma_mm, step_mm : float
         Standard uncertainty of one recorded value, and the encoder's step; 0 where there is none.
     error_mm : ndarray of float, shape (n,)
@@ -39,38 +46,56 @@ class RecordedInput:
         Samples over which it stays.
     is_motion : bool
         Whether the record's unrest shows in the gap as well, and was left as it is.
+    commanded : bool
+        Whether the record is a command that keeps its value until it jumps.
     """
 
     smooth_mm: Array
+    along_mm: Array
     sigma_mm: float
     step_mm: float
     error_mm: Array
     stays: Flags
     samples: float
-    is_motion: bool
+    is_motion: bool = False
+    commanded: bool = False
+
+    @classmethod
+    def exact(cls, table: MeasuredTable, *, is_motion: bool = False, commanded: bool = False) -> "RecordedInput":
+        """Take a table's record as it stands."""
+        u, along_mm = table.input_mm, recorded(table)[0]
+        still = np.zeros(u.size, dtype=bool)
+        return cls(u, along_mm, 0.0, 0.0, np.zeros(u.size), still, 1.0, is_motion, commanded)
 
     @classmethod
     def of(cls, table: MeasuredTable, model: CorrectedModel) -> "RecordedInput":
-        """Smooth a table's record, unless the gap follows its unrest."""
-        u = table.input_mm
-        still = np.zeros(u.size, dtype=bool)
-        sigma, step = (0.0, 0.0) if table.time_s is None else input_sigma(u, table.runs)
-        if sigma == 0.0 or table.time_s is None:
-            return cls(u, 0.0, 0.0, np.zeros(u.size), still, 1.0, is_motion=False)
-        smooth, leverage = smoothed(u, table.time_s, table.runs, sigma, step)
-        if _is_motion(table, model, smooth):
-            return cls(u, 0.0, 0.0, np.zeros(u.size), still, 1.0, is_motion=True)
+        """Smooth a table's record, unless it is one of commands or set-points, or the gap follows its unrest."""
+        along_mm, time_s, runs = recorded(table)
+        if time_s is None or np.mean(readings_at_rest(table)) > AT_REST_SHARE:
+            return cls.exact(table)
+        rows = np.arange(along_mm.size) if table.path is None else table.path.rows
+        gap_of_input = model.base.respond(table.input_mm).gap_mm
+        if is_commanded(table.input_mm, table.runs, gap_of_input, table.gap_mm):
+            return cls.exact(table, commanded=True)
+        snapped_mm = on_lines(along_mm, runs)
+        sigma, step = input_sigma(snapped_mm, runs)
+        if sigma == 0.0:
+            return cls.exact(table)
+        smooth, leverage = smoothed(snapped_mm, time_s, runs, sigma, step)
+        if _is_motion(table, model, smooth[rows]):
+            return cls.exact(table, is_motion=True)
         samples, stays = 1.0 / float(np.median(leverage)), leverage < STAYING
         if step > 0.0:
             samples = max(samples, HELD_SAMPLES)
-            stays = _within(u, table.runs, HELD_SAMPLES, 1.01 * step) | _within(
-                u, table.runs, SLOW_SAMPLES, 2.01 * step
+            stays = _within(snapped_mm, runs, HELD_SAMPLES, 1.01 * step) | _within(
+                snapped_mm, runs, SLOW_SAMPLES, 2.01 * step
             )
         low, high = model.input_range_mm
         reach = 1e-3 * (high - low)
-        ahead, behind = (model.base.respond(smooth + way).gap_mm for way in (reach, -reach))
+        ahead, behind = (model.base.respond(smooth[rows] + way).gap_mm for way in (reach, -reach))
         slope = np.abs(ahead - behind) / (2.0 * reach)
-        return cls(smooth, sigma, step, slope * sigma * np.sqrt(leverage), stays, samples, is_motion=False)
+        error = slope * sigma * np.sqrt(leverage[rows])
+        return cls(smooth[rows], smooth, sigma, step, error, stays[rows], samples)
 
 
 def standing_still(history: History) -> tuple[slice, ...]:
@@ -86,6 +111,27 @@ def standing_still(history: History) -> tuple[slice, ...]:
                 begin, low, high = i, value, value
         found.append(slice(begin, run.stop))
     return tuple(stretch for stretch in found if stretch.stop - stretch.start >= LEAST_RUN)
+
+
+def scatter_in_holds(history: History, residual_mm: Array) -> float:
+    """Standard deviation of a residual within the second halves of holds, when the stage has settled; in mm.
+
+    Parameters
+    ----------
+    history : History
+        Input and runs.
+    residual_mm : ndarray of float, shape (n,)
+        Of one channel.
+    """
+    total, degrees = 0.0, 0
+    for run in history.runs:
+        borders = [run.start, *(run.start + 1 + np.flatnonzero(np.diff(history.input_mm[run]))), run.stop]
+        for begin, end in pairwise(borders):
+            settled = residual_mm[begin + (end - begin) // 2 : end]
+            if settled.size >= 2:
+                total += float(np.sum((settled - settled.mean()) ** 2))
+                degrees += settled.size - 1
+    return float(np.sqrt(total / degrees)) if degrees else np.inf
 
 
 def _within(input_mm: Array, runs: tuple[slice, ...], samples: int, reach_mm: float) -> Flags:

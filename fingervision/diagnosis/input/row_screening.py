@@ -14,7 +14,7 @@ OFF_LINE = 0.01
 """Share of the simulated range; a table straight within half of it has a fault where it is off by more."""
 
 
-def distrusted_rows(table: MeasuredTable, model: Model, rest_gap_mm: float) -> tuple[NDArray[np.bool_], list[str]]:
+def screened_rows(table: MeasuredTable, model: Model, rest_gap_mm: float) -> tuple[NDArray[np.bool_], list[str]]:
     """Mark the rows, shape (n,), and say why in sentences. Only tables without times are that small and hand-made."""
     out = np.zeros(table.input_mm.size, dtype=bool)
     notes: list[str] = []

@@ -7,14 +7,14 @@ import numpy as np
 
 from fingervision.diagnosis.inference.hypothesis_fit import Explanation, Problem
 from fingervision.diagnosis.inference.null_bootstrap import noise_doubt
-from fingervision.diagnosis.input.observations import SHORT_RUN, BenchData
+from fingervision.diagnosis.input.observations import SHORT_RUN, Observations
 from fingervision.diagnosis.noise.noise_model import Noise, without_input
 from fingervision.diagnosis.noise.restricted_likelihood import drawn_noises
 from fingervision.diagnosis.noise.whitening import RunOffsets
 
 
 def problems_of_drawn_noise(
-    bench: BenchData, problem: Problem, explanation: Explanation, count: int, rng: np.random.Generator
+    data: Observations, problem: Problem, explanation: Explanation, count: int, rng: np.random.Generator
 ) -> Iterator[Problem]:
     """Yield the problem with so many draws of its noise.
 
@@ -23,7 +23,7 @@ def problems_of_drawn_noise(
 
     Parameters
     ----------
-    bench : BenchData
+    data : Observations
         Measurement and model.
     problem : Problem
         With the noise as it was estimated.
@@ -34,13 +34,13 @@ def problems_of_drawn_noise(
     rng : numpy Generator
         For the draws.
     """
-    for noises in _noises(bench, problem, explanation, count, rng):
+    for noises in _noises(data, problem, explanation, count, rng):
         whitener = replace(problem.whitener, noises=noises)
-        yield replace(problem, whitener=whitener, measured=whitener.one(bench.aim_mm), offsets=RunOffsets.of(whitener))
+        yield replace(problem, whitener=whitener, measured=whitener.one(data.aim_mm), offsets=RunOffsets.of(whitener))
 
 
 def _noises(
-    bench: BenchData, problem: Problem, explanation: Explanation, count: int, rng: np.random.Generator
+    data: Observations, problem: Problem, explanation: Explanation, count: int, rng: np.random.Generator
 ) -> list[tuple[Noise, ...]]:
     history, whitener = problem.chain.history, problem.whitener
     if history.time_s is None or max(run.stop - run.start for run in history.runs) >= SHORT_RUN:
@@ -50,6 +50,6 @@ def _noises(
             for f in factors.tolist()
         ]
     channels = len(whitener.noises)
-    residuals = np.split(bench.aim_mm - bench.chain.stacked(explanation.values), channels)
+    residuals = np.split(data.aim_mm - data.chain.stacked(explanation.values), channels)
     drawn = drawn_noises(residuals, history.runs, np.split(whitener.aside, channels), count, rng)
     return [(without_input(gap, whitener.passing_mm), *others) for gap, *others in drawn]

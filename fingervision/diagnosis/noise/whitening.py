@@ -71,6 +71,8 @@ class Whitener:
         The same of errors that are another at each sample.
     drawing : ndarray of float, shape (channels * n, p), or None
         What one standard uncertainty of each uncertain number of the gripper's drawing does to the prediction.
+    runs_scatter_mm : float
+        By how much the runs may be offset against each other by chance at most, as a standard deviation.
     """
 
     history: History
@@ -80,6 +82,7 @@ class Whitener:
     input_samples: float
     passing_mm: Array
     drawing: Array | None = None
+    runs_scatter_mm: float = np.inf
 
     def columns(self, columns: Array) -> tuple[Array, float]:
         """Whiten columns of shape (channels * n, k); also the logarithm of the covariance's determinant."""
@@ -136,6 +139,8 @@ class RunOffsets:
         Noise of each channel.
     drawn : int
         How many numbers of the drawing are uncertain.
+    most_mm : float
+        Largest spread of the runs' offsets that is considered.
     """
 
     design: Array
@@ -145,6 +150,7 @@ class RunOffsets:
     midline: bool
     scales_mm: tuple[float, ...]
     drawn: int = 0
+    most_mm: float = np.inf
 
     @classmethod
     def of(cls, whitener: Whitener) -> "RunOffsets":
@@ -163,7 +169,7 @@ class RunOffsets:
             columns = np.hstack([columns, whitener.drawing])
         design = whitener.columns(columns)[0]
         scales = tuple(noise.total_mm for noise in whitener.noises)
-        return cls(design, design.T @ design, channels, runs, bool(free), scales, drawn)
+        return cls(design, design.T @ design, channels, runs, bool(free), scales, drawn, whitener.runs_scatter_mm)
 
     def metric(self, sigma_mm: tuple[float, ...]) -> Array:
         """Return G with r^T r - (Z^T r)^T G (Z^T r) the squared length once offsets of these spreads are allowed."""
@@ -194,7 +200,7 @@ class RunOffsets:
         out, total = [], 0.0
         for scale, determinant, gain in self._tried(residual):
             best = int(np.argmin(determinant - gain))
-            out.append(scale * float(SPREADS[best]))
+            out.append(min(scale * float(SPREADS[best]), self.most_mm))
             total += float(determinant[best])
         return tuple(out), total
 
@@ -236,7 +242,7 @@ class RunOffsets:
             if channel == 1 and self.midline:
                 mean = mean - np.sum(mean * z) / np.sum(z)
             scale = self.scales_mm[channel]
-            spread = (scale * SPREADS)[:, None] ** 2 * z
+            spread = np.minimum(scale * SPREADS, self.most_mm)[:, None] ** 2 * z
             gain = np.sum(mean**2 * z * spread / (1.0 + spread), axis=1)
             found.append((scale, np.sum(np.log1p(spread), axis=1) + 2.0 * np.log1p(SPREADS**2), gain))
         return found

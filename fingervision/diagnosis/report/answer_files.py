@@ -3,8 +3,10 @@
 from pathlib import Path
 
 from fingervision.diagnosis.diagnose import Diagnosis
+from fingervision.diagnosis.report.positioning_of_data import positioning_section
 from fingervision.diagnosis.report.report_page import report_page
 from fingervision.domain.parameter import Estimate
+from fingervision.effects.position_error_map import curve_values
 from fingervision.models.corrected import CorrectedModel
 from fingervision.storage.model_toml import write_model
 from fingervision.storage.recipe_toml import write_recipe
@@ -27,13 +29,16 @@ def write_answer(out: Path, done: Diagnosis, model: CorrectedModel) -> dict[str,
     """
     report = done.report
     effects: dict[str, dict[str, Estimate]] = {name: dict(values) for name, values in model.effects.items()}
-    effects |= {effect.name: dict(effect.parameters) for effect in report.effects}
+    for effect in report.effects:
+        curve = curve_values([at for at, _ in effect.points], [error for _, error in effect.points])
+        effects[effect.name] = {**effect.parameters, **{name: Estimate(value, None) for name, value in curve.items()}}
     write_model(out / MODEL, Path(model.base_path), effects, model.kind)
     if report.next_run is None:
         (out / NEXT_RUN).unlink(missing_ok=True)
     else:
         write_recipe(out / NEXT_RUN, report.next_run.name, report.next_run.steps)
     document = report_document(report, MODEL, NEXT_RUN if report.next_run else None)
+    document["iso230"] = positioning_section(done.positioning)
     write_report(out / REPORT, document)
     (out / PAGE).write_text(report_page(done), encoding="utf-8")
     return document

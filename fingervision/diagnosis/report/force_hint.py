@@ -5,26 +5,26 @@ from dataclasses import replace
 import numpy as np
 
 from fingervision.diagnosis.inference.hypothesis_fit import Explanation
-from fingervision.diagnosis.input.observations import BenchData
+from fingervision.diagnosis.input.observations import Observations
 from fingervision.domain.model import PhysicalModel
 
 SEEN = 0.002
 """Of the largest force: what any force sensor repeats to, averaged over a run."""
 
 
-def force_hint(bench: BenchData, alternatives: tuple[Explanation, ...]) -> tuple[str, ...]:
+def force_hint(data: Observations, alternatives: tuple[Explanation, ...]) -> tuple[str, ...]:
     """Say which explanations of the same gap differ in force, where the force was not measured.
 
     Parameters
     ----------
-    bench : BenchData
+    data : Observations
         Measurement and model.
     alternatives : tuple of Explanation
         What the data cannot tell apart, the best first.
     """
-    if bench.chain.history.force or len(alternatives) < 2 or not isinstance(bench.model.base, PhysicalModel):
+    if data.chain.history.force or len(alternatives) < 2 or not isinstance(data.model.base, PhysicalModel):
         return ()
-    chain = replace(bench.chain, history=replace(bench.chain.history, force=True))
+    chain = replace(data.chain, history=replace(data.chain.history, force=True))
     n = chain.history.input_mm.size
     forces = [chain.stacked(explanation.values)[-n:] for explanation in alternatives]
     largest = float(np.max(np.abs(forces[0])))

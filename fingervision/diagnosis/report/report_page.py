@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from html import escape
 
 from fingervision.diagnosis.diagnose import Diagnosis, by_channel
+from fingervision.diagnosis.report.positioning_of_data import positioning_html
 from fingervision.diagnosis.report.residual_figure import residual_figure
 from fingervision.domain.parameter import Estimate
 from fingervision.domain.report import DiagnosisReport, Verdict
@@ -71,8 +72,11 @@ def report_page(diagnosis: Diagnosis) -> str:
     """Write the report as HTML."""
     report = diagnosis.report
     d = report.disagreement
-    before, after = by_channel(diagnosis.bench, diagnosis.before_mm), by_channel(diagnosis.bench, diagnosis.after_mm)
-    figure = residual_figure(before, after if report.effects else None, diagnosis.bench.chain.history)
+    before, after = (
+        by_channel(diagnosis.data, diagnosis.before_mm),
+        by_channel(diagnosis.data, diagnosis.after_mm),
+    )
+    figure = residual_figure(before, after if report.effects else None, diagnosis.data.chain.history)
     image = base64.b64encode(figure).decode()
     parameters = [
         [effect.name, name, *_interval(e)] for effect in report.effects for name, e in effect.parameters.items()
@@ -111,6 +115,9 @@ def report_page(diagnosis: Diagnosis) -> str:
         ("Not shown by this data", _list([f"{e['name']}: {e['reason']}" for e in report.excluded])),
         ("Notes", _list(list(report.notes))),
     ]
+    positioning = positioning_html(diagnosis.positioning)
+    if positioning is not None:
+        sections.insert(4, ("Positioning accuracy and repeatability (ISO 230-2)", positioning))
     body = "".join(f"<h2>{escape(title)}</h2>{content}" for title, content in sections)
     return (
         f'<!doctype html><html lang="en"><meta charset="utf-8"><title>fingervision: {report.verdict}</title>'

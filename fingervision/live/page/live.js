@@ -5,7 +5,7 @@
   const at = (id) => document.getElementById(id);
   const canvas = at("picture"), pen = canvas.getContext("2d"), stage = at("stage");
   // Ten minutes at 25 frames a second; the chart then forgets its beginning.
-  const MOST_POINTS = 15000, AGAIN_AFTER_MS = 500, SILENT_MS = 1000;
+  const MOST_POINTS = 15000, AGAIN_AFTER_MS = 500, SILENT_MS = 1000, WINDOW_S = 30, CHART_PX = 180;
   let socket = null, paused = false, lastAt = 0, state = null, drag = null, dragFor = null, reference = null;
   let data = [[], [], [], []], zoomed = false, dirty = false, chart = null, firstMessage = true;
 
@@ -16,6 +16,7 @@
     socket.onopen = () => { firstMessage = true; say("connection", "connected", ""); };
     socket.onclose = () => {
       say("connection", "The live view does not answer: trying again.", "bad");
+      stale("not connected");
       alarm("The live view is not running, or out of reach. This page goes on by itself when it is back.");
       setTimeout(connect, AGAIN_AFTER_MS);
     };
@@ -100,7 +101,8 @@
       ["region_x", "region_y", "region_w", "region_h"].forEach((id, i) => { at(id).value = whole[i]; });
     if (!drag) showBox(reference || now.region);
     if (performance.now() < alarmUntil) return;
-    if (now.ended) alarm("The source has ended.");
+    if (now.trouble) alarm(now.trouble);
+    else if (now.ended) alarm("The source has ended.");
     else if (now.silent_s > 0) alarm(`No picture for ${now.silent_s.toFixed(1)} s: the source is silent or cut off. Measuring resumes by itself.`);
     else if (now.px_per_mm === null) alarm("The scale is not known, so nothing is measured: drag over a reference and give its size, or type the scale.");
     else alarm("");
@@ -108,12 +110,16 @@
 
   function figures(now) {
     const gap = at("gap_mm");
-    if (!now || now.gap_mm === null || (state && state.silent_s > 0)) {
+    // What is old looks old: no value, and no green.
+    if (state && (state.silent_s > 0 || state.ended)) { stale(state.ended ? "ended" : "no picture"); return; }
+    if (!now || now.gap_mm === null) {
       gap.textContent = "–";
       at("uncertainty").textContent = "\u00a0";
     } else {
       gap.textContent = (now.gap_mm - now.zero_mm).toFixed(4);
       const what = now.has_budget ? "k = 2" : "k = 2, from frame to frame; the scale has no uncertainty";
+      at("zeroed").hidden = now.zero_mm === 0;
+      at("zeroed").textContent = `less zero ${now.zero_mm.toFixed(4)} mm`;
       at("uncertainty").textContent = now.u_mm === null ? "" : `± ${(2000 * now.u_mm).toFixed(2)} µm (${what})`;
     }
     gap.dataset.frame = now ? String(now.frame) : "";
@@ -124,6 +130,15 @@
     const verdict = now ? now.verdict : "";
     at("verdict").hidden = !verdict;
     say("verdict", verdict, `badge ${{ pass: "good", fail: "bad", unsure: "unsure" }[verdict] || ""}`);
+  }
+
+  function stale(words) {
+    at("gap_mm").textContent = "–";
+    at("uncertainty").textContent = "\u00a0";
+    at("zeroed").hidden = true;
+    say("status", words, "badge bad");
+    at("why").textContent = "";
+    at("verdict").hidden = true;
   }
 
   // ---- the chart
@@ -151,7 +166,7 @@
     const ink = colour("--ink"), line = colour("--line"), accent = colour("--accent");
     const axis = { stroke: ink, grid: { stroke: line, width: 1 }, ticks: { stroke: line, width: 1 } };
     chart = new uPlot({
-      width: chartWidth(), height: 260,
+      width: chartWidth(), height: CHART_PX,
       cursor: { drag: { x: true, y: false } },
       scales: { x: { time: false } },
       axes: [{ ...axis, label: "time (s)" }, { ...axis, label: "gap (mm)", size: 70 }],
@@ -164,16 +179,28 @@
       bands: [{ series: [3, 2], fill: accent + "44" }],
       hooks: { setSelect: [(u) => { if (u.select.width > 2) zoomed = true; }] },
     }, data, at("chart"));
-    at("chart").addEventListener("dblclick", follow);
+    at("chart").addEventListener("dblclick", all);
   }
   function follow() { zoomed = false; dirty = true; }
+  function all() { // from the beginning on, as far as it is kept
+    zoomed = true;
+    dirty = true;
+    if (data[0].length > 1) chart.setScale("x", { min: data[0][0], max: data[0][data[0].length - 1] });
+  }
   function drawChart() {
     if (dirty && chart && !paused && !document.hidden) {
       dirty = false;
-      if (zoomed) { // new points come in without moving what is looked at
-        const { min, max } = chart.scales.x;
-        chart.batch(() => { chart.setData(data, false); chart.setScale("x", { min, max }); });
-      } else chart.setData(data);
+      const zero = state ? state.zero_mm : 0, count = data[0].length;
+      // New points come in without moving what is looked at; else the last half minute moves along.
+      let { min, max } = chart.scales.x;
+      if (!zoomed && count > 1) { max = data[0][count - 1]; min = Math.max(data[0][0], max - WINDOW_S); }
+      let shown = data;
+      if (!zoomed) {
+        const from = data[0].findIndex((time) => time >= min);
+        shown = data.map((column) => column.slice(Math.max(0, from - 1)));
+      }
+      if (zero !== 0) shown = shown.map((column, i) => (i === 0 ? column : column.map((v) => (v === null ? null : v - zero))));
+      chart.batch(() => { chart.setData(shown, count < 2); if (count > 1) chart.setScale("x", { min, max }); });
     }
   }
   function savePlot() {
@@ -284,11 +311,14 @@
     if (press) at(press).click();
     if (event.key === "Escape") { drag = null; reference = null; dragFor = null; stage.classList.remove("dragging"); at("hint").textContent = ""; }
   });
-  window.addEventListener("resize", () => { if (chart) chart.setSize({ width: chartWidth(), height: 260 }); });
+  window.addEventListener("resize", () => { if (chart) chart.setSize({ width: chartWidth(), height: CHART_PX }); });
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", makeChart);
   setInterval(() => {
-    if (lastAt && performance.now() - lastAt > SILENT_MS && socket.readyState === WebSocket.OPEN)
+    if (lastAt && performance.now() - lastAt > SILENT_MS && socket.readyState === WebSocket.OPEN) {
       alarm("The live view does not answer.");
+      say("connection", "The live view does not answer.", "bad");
+      stale("not connected");
+    } else if (lastAt && socket.readyState === WebSocket.OPEN) say("connection", "connected", "");
   }, 250);
   makeChart();
   setInterval(drawChart, 100);

@@ -6,7 +6,7 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 
-from tests.benchmarks.hidden.catalogue_chain import Samples, Simulated
+from tests.benchmarks.hidden.catalogue_chain import MAP, MAP_WAVES, Samples, Simulated
 from tests.benchmarks.hidden.noise import Noise
 from tests.benchmarks.hidden.sizes import CLOCKED
 
@@ -52,8 +52,21 @@ def _many(name: str, names: tuple[str, ...], lower: list[float], upper: list[flo
     )
 
 
-def candidates(model: Simulated, at: Samples, noise: Noise, *, time_restarts: bool, has_force: bool) -> list[Candidate]:
-    """All effects that this table allows, in the catalogue's order."""
+def map_candidate(width_mm: float) -> Candidate:
+    """The map of position errors, as the judge has it."""
+    count = len(MAP_WAVES)
+    names = tuple(f"wave_{k}_mm" for k in MAP_WAVES)
+    begins = (1e-3 * width_mm * np.eye(count)).tolist()
+    return _many(MAP, names, [-0.3 * width_mm] * count, [0.3 * width_mm] * count, begins, count)
+
+
+def candidates(
+    model: Simulated, at: Samples, noise: Noise, *, time_restarts: bool, has_force: bool, with_map: bool = False
+) -> list[Candidate]:
+    """All effects that this table allows, in the catalogue's order.
+
+    The map of position errors, which many tables could take in at the price of its freedom, is there only where asked.
+    """
     u = at.input_mm
     low, high = float(u.min()), float(u.max())
     width = high - low
@@ -80,6 +93,13 @@ def candidates(model: Simulated, at: Samples, noise: Noise, *, time_restarts: bo
     depths = width * np.array([0.01, 0.03, 0.07, 0.14, 0.25])
     stops = [[high - d, low] for d in depths] + [[high, low + d] for d in depths]
     found.append(_many("end_stop", ("upper_mm", "lower_mm"), [low, low], [high, high], stops))
+    # Below the fastest motion it acts; the slowest, and its corners, must still be followed.
+    speeds = np.abs(np.diff(u)) / np.maximum(np.diff(at.run_time_s), 1e-9)
+    speeds = speeds[(np.diff(at.run_time_s) > 0) & (steps > 1e-3 * steps.max())]
+    slowest, fastest = (float(q) for q in np.quantile(speeds, [0.02, 0.98]))
+    if slowest < 0.9 * fastest:
+        found.append(_many("slew_limit", ("speed_mm_s",), [slowest], [2 * fastest],
+                           [[slowest + f * (fastest - slowest)] for f in (0.2, 0.5, 0.8, 0.95)]))  # fmt: skip
     plays = min(0.5, width) * np.array([0.003, 0.01, 0.02, 0.05, 0.1, 0.2, 0.4])
     found.append(_many("backlash", ("play_mm",), [0.0], [0.5], [[p] for p in plays]))
     seen = max(2 * noise.encoder_step_mm, 6 * float(np.sqrt(noise.input_variance_mm2)), 1e-3 * width)
@@ -118,5 +138,7 @@ def candidates(model: Simulated, at: Samples, noise: Noise, *, time_restarts: bo
         _one("edge_bias", "offset_mm", 0.1, 1e-3),
         _one("camera_latency", "delay_s", 1.0, 0.02, 0.0),
     ]
+    if with_map:
+        found.insert([c.name for c in found].index("end_stop") + 1, map_candidate(width))
     assert not (time_restarts and {c.name for c in found} & set(CLOCKED))
     return found

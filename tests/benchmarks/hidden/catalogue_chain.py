@@ -1,17 +1,25 @@
 """The catalogue's definitions, written anew from effects.md: what each effect does to a simulation at the samples.
 
-The judge's own implementation. Every effect is a function of its parameters in the order of the table in effects.md;
-recursions start each run at rest at its first sample.
+The judge's own implementation. Every effect is a function of its parameters in the order of the table in effects.md.
+Effects with memory start each run where nobody saw them: `RUN_START` (plays and sliders) and `CREEP_START` stand beside
+the effects, one number in -1..1 a run; without them the play is centred, the sliders relaxed, creep settled.
 """
 
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
+
+from tests.benchmarks.hidden.recursions import jump, limited, low_pass, oscillator, play, sliders
 
 Array = NDArray[np.float64]
 CREEP_TAU_S = np.array([1.0, 4.0, 16.0, 64.0])
+RUN_START, CREEP_START = "run_start", "creep_start"
+WITH_START = {"backlash": RUN_START, "friction_hysteresis": RUN_START, "viscoelastic_creep": CREEP_START}
+"""Effects whose start is a nuisance, and under which key it stands."""
+MAP = "position_error_map"
+MAP_WAVES = np.arange(1, 15)
+"""Half waves over the travel of the judge's map of position errors; the tool's is a Gaussian process."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -48,6 +56,7 @@ class Simulated:
     midline_mm: Array
     force_n: Array | None
     placement_mm: float = 0.0
+    travel_mm: tuple[float, float] = (0.0, 1.0)
 
     @property
     def rest_gap_mm(self) -> float:
@@ -56,9 +65,18 @@ class Simulated:
 
 
 def extended(
-    input_mm: Array, gap_mm: Array, midline_mm: Array, force_n: Array | None, placement_mm: float = 0.0
+    input_mm: Array,
+    gap_mm: Array,
+    midline_mm: Array,
+    force_n: Array | None,
+    placement_mm: float = 0.0,
+    travel_mm: tuple[float, float] | None = None,
 ) -> Simulated:
-    """Add the far rows: slope of a line through the last quarter of the rows there."""
+    """Add the far rows: slope of a line through the last quarter of the rows there.
+
+    `travel_mm` are the ends over which a map of position errors has neither mean nor line; the table's by default.
+    """
+    travel = travel_mm or (float(input_mm[0]), float(input_mm[-1]))
     quarter = max(2, len(input_mm) // 4)
     far = 10.0 * np.ptp(input_mm)
 
@@ -68,100 +86,36 @@ def extended(
         return np.concatenate([[values[0] - first * far], values, [values[-1] + last * far]])
 
     u = np.concatenate([[input_mm[0] - far], input_mm, [input_mm[-1] + far]])
-    return Simulated(u, grown(gap_mm), grown(midline_mm), None if force_n is None else grown(force_n), placement_mm)
+    force = None if force_n is None else grown(force_n)
+    return Simulated(u, grown(gap_mm), grown(midline_mm), force, placement_mm, travel)
 
 
-@njit(cache=True)
-def play(u: Array, starts: NDArray[np.int64], full_width: float) -> Array:
-    """Play operator, centred at each run's start."""
-    out = np.empty_like(u)
-    half = 0.5 * full_width
-    for r in range(starts.size - 1):
-        place = u[starts[r]]
-        for i in range(starts[r], starts[r + 1]):
-            place = min(max(place, u[i] - half), u[i] + half)
-            out[i] = place
-    return out
-
-
-@njit(cache=True)
-def jump(u: Array, starts: NDArray[np.int64], size: float) -> Array:
-    """Stays until the input is more than `size` away, then follows at once."""
-    out = np.empty_like(u)
-    for r in range(starts.size - 1):
-        place = u[starts[r]]
-        for i in range(starts[r], starts[r + 1]):
-            if abs(u[i] - place) > size:
-                place = u[i]
-            out[i] = place
-    return out
-
-
-@njit(cache=True)
-def sliders(u: Array, starts: NDArray[np.int64], fraction: float, reach: float) -> Array:
-    """Eight elastic sliders of reach k / 8."""
-    out = np.empty_like(u)
-    e = np.zeros(8)
-    for r in range(starts.size - 1):
-        e[:] = 0.0
-        for i in range(starts[r], starts[r + 1]):
-            mean = 0.0
-            for k in range(8):
-                if i > starts[r]:
-                    limit = reach * (k + 1) / 8
-                    e[k] = min(max(e[k] + u[i] - u[i - 1], -limit), limit)
-                mean += e[k] / 8
-            out[i] = u[i] - fraction * mean
-    return out
-
-
-@njit(cache=True)
-def low_pass(o: Array, t: Array, starts: NDArray[np.int64], tau: float) -> Array:
-    """First order, exact for an input linear between samples, relaxed at each run's start."""
-    out = np.empty_like(o)
-    for r in range(starts.size - 1):
-        out[starts[r]] = o[starts[r]]
-        for i in range(starts[r] + 1, starts[r + 1]):
-            dt = t[i] - t[i - 1]
-            fade = np.exp(-dt / tau)
-            slope = (o[i] - o[i - 1]) / dt
-            out[i] = o[i] - slope * tau + (out[i - 1] - o[i - 1] + slope * tau) * fade
-    return out
-
-
-@njit(cache=True)
-def oscillator(o: Array, t: Array, starts: NDArray[np.int64], frequency_hz: float, zeta: float) -> Array:
-    """Second order, damped to ground, unit gain, exact for an input linear between samples, from rest."""
-    out = np.empty_like(o)
-    omega = 2 * np.pi * frequency_hz
-    zeta = min(zeta, 0.999999)
-    damped = omega * np.sqrt(1 - zeta * zeta)
-    for r in range(starts.size - 1):
-        x, v = o[starts[r]], 0.0
-        out[starts[r]] = x
-        for i in range(starts[r] + 1, starts[r + 1]):
-            dt = t[i] - t[i - 1]
-            slope = (o[i] - o[i - 1]) / dt
-            # Particular solution for a ramp: o - 2 zeta slope / omega, moving with the slope.
-            lag = 2 * zeta * slope / omega
-            a = x - (o[i - 1] - lag)
-            b = (v - slope + zeta * omega * a) / damped
-            fade, c, s = np.exp(-zeta * omega * dt), np.cos(damped * dt), np.sin(damped * dt)
-            free = fade * (a * c + b * s)
-            v = fade * ((b * damped - zeta * omega * a) * c - (a * damped + zeta * omega * b) * s) + slope
-            x = free + o[i] - lag
-            out[i] = x
+def map_errors(u: Array, travel_mm: tuple[float, float], heights_mm: Array) -> Array:
+    """Map of position errors at inputs: half waves, each without its straight line over the travel."""
+    even = np.linspace(0.0, 1.0, 201)
+    z = np.clip((u - travel_mm[0]) / (travel_mm[1] - travel_mm[0]), -0.1, 1.1)
+    out = np.zeros_like(u)
+    for k, height in zip(MAP_WAVES, heights_mm, strict=True):
+        line = np.polyfit(even, np.cos(np.pi * k * even), 1)
+        out += height * (np.cos(np.pi * k * z) - np.polyval(line, z))
     return out
 
 
 Effects = dict[str, Array]
-"""Parameters of the effects that act, by name; arrays in the order of effects.md."""
+"""Parameters of the effects that act, by name; arrays in the order of effects.md. The starts may stand among them."""
+
+
+def without_starts(acting: Effects) -> Effects:
+    """The effects alone."""
+    return {name: values for name, values in acting.items() if name not in (RUN_START, CREEP_START)}
 
 
 def respond(model: Simulated, at: Samples, acting: Effects) -> tuple[Array, Array, Array]:
     """Gap, midline and force at the samples, with the effects acting in the catalogue's order."""
     u = at.input_mm
     zero = np.zeros(1)
+    centred = np.zeros(len(at.starts) - 1)
+    begin = acting.get(RUN_START, centred)
     if "drive_lag" in acting:
         u = at.late(u, acting["drive_lag"][0])
     u = (u + acting.get("input_offset", zero)[0]) * (1 + acting.get("input_scale", zero)[0])
@@ -171,12 +125,16 @@ def respond(model: Simulated, at: Samples, acting: Effects) -> tuple[Array, Arra
     if "end_stop" in acting:
         upper, lower = acting["end_stop"]
         u = np.clip(u, lower, upper)
+    if MAP in acting:
+        u = u + map_errors(u, model.travel_mm, acting[MAP])
+    if "slew_limit" in acting:
+        u = limited(u, at.run_time_s, at.starts, acting["slew_limit"][0])
     if "backlash" in acting:
-        u = play(u, at.starts, acting["backlash"][0])
+        u = play(u, at.starts, acting["backlash"][0], begin)
     if "stick_slip" in acting:
         u = jump(u, at.starts, acting["stick_slip"][0])
     if "friction_hysteresis" in acting:
-        u = sliders(u, at.starts, *acting["friction_hysteresis"])
+        u = sliders(u, at.starts, *acting["friction_hysteresis"], begin)
     rest = model.rest_gap_mm
     o = (np.interp(u, model.input_mm, model.gap_mm) - rest) * (1 + acting.get("lever_ratio_error", zero)[0])
     midline = model.placement_mm + np.interp(u, model.input_mm, model.midline_mm)
@@ -185,7 +143,7 @@ def respond(model: Simulated, at: Samples, acting: Effects) -> tuple[Array, Arra
         o = reach * np.sin(o / reach) + cross * reach * (1 - np.cos(o / reach))
     if "viscoelastic_creep" in acting:
         o = o - sum(
-            share * (o - low_pass(o, at.run_time_s, at.starts, tau))
+            share * (o - low_pass(o, at.run_time_s, at.starts, tau, acting.get(CREEP_START, centred)))
             for share, tau in zip(acting["viscoelastic_creep"], CREEP_TAU_S, strict=True)
         )
     if "structural_resonance" in acting:

@@ -1,11 +1,13 @@
 """What the mechanism really receives: drives integrated sample by sample, in forms that are not the catalogue's.
 
-Every function takes the fine input u (mm, shape (n,)) of one run and gives the input that comes out of that part.
+Every function takes the fine input u (mm, shape (n,)) of one run and gives the input that comes out of that part. A
+`start` in -1..1 says where a play or a friction stands when the run begins: -1 where upward motion has left it.
 """
 
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline
 
 Array = NDArray[np.float64]
 
@@ -31,9 +33,34 @@ def stopped(u_mm: Array, lower_mm: float | None, upper_mm: float | None) -> Arra
     return u_mm
 
 
+def mapped(u_mm: Array, travel_mm: tuple[float, float], heights_mm: Array) -> Array:
+    """Smooth map of position errors: a natural spline through its heights, without its line over the travel."""
+    knots = np.linspace(travel_mm[0], travel_mm[1], heights_mm.size)
+    spline = CubicSpline(knots, heights_mm, bc_type="natural")
+    even = np.linspace(travel_mm[0], travel_mm[1], 401)
+    line = np.polyfit(even, spline(even), 1)
+    inside = np.clip(u_mm, travel_mm[0], travel_mm[1])
+    return np.asarray(u_mm + spline(inside) - np.polyval(line, inside))
+
+
 @njit(cache=True)
-def _plays(u: Array, half: Array) -> Array:
-    place = np.full(half.size, u[0])
+def _limited(u: Array, way: float) -> Array:
+    place = u[0]
+    out = np.empty_like(u)
+    for i in range(u.size):
+        place = min(max(u[i], place - way), place + way)
+        out[i] = place
+    return out
+
+
+def limited(time_s: Array, u_mm: Array, speed_mm_s: float) -> Array:
+    """A drive that cannot follow faster, step by step on the fine grid."""
+    return np.asarray(_limited(u_mm, speed_mm_s * (time_s[1] - time_s[0])))
+
+
+@njit(cache=True)
+def _plays(u: Array, half: Array, start: float) -> Array:
+    place = u[0] + start * half
     out = np.empty_like(u)
     for i in range(u.size):
         total = 0.0
@@ -47,9 +74,9 @@ def _plays(u: Array, half: Array) -> Array:
     return out
 
 
-def backlash(u_mm: Array, play_mm: float) -> Array:
-    """Clearance whose flanks engage over 6 % of the play: the mean of five plays, each starting centred."""
-    return np.asarray(_plays(u_mm, 0.5 * play_mm * np.linspace(0.97, 1.03, 5)))
+def backlash(u_mm: Array, play_mm: float, start: float = 0.0) -> Array:
+    """Clearance whose flanks engage over 6 % of the play: the mean of five plays, all from one start."""
+    return np.asarray(_plays(u_mm, 0.5 * play_mm * np.linspace(0.97, 1.03, 5), start))
 
 
 @njit(cache=True)
@@ -73,10 +100,10 @@ def stick_slip(u_mm: Array, jump_mm: float, every: int) -> Array:
 
 
 @njit(cache=True)
-def _dahl(u: Array, reach: float, steepness: float) -> Array:
-    z = 0.0
+def _dahl(u: Array, reach: float, steepness: float, start: float) -> Array:
+    z = -start * reach
     out = np.empty_like(u)
-    out[0] = 0.0
+    out[0] = z
     for i in range(1, u.size):
         du = u[i] - u[i - 1]
         parts = 8
@@ -89,18 +116,19 @@ def _dahl(u: Array, reach: float, steepness: float) -> Array:
     return out
 
 
-def dahl_friction(u_mm: Array, fraction: float, reach_mm: float) -> Array:
+def dahl_friction(u_mm: Array, fraction: float, reach_mm: float, start: float = 0.0) -> Array:
     """Dahl's friction (1968): bristles that yield smoothly instead of eight sliders.
 
     `reach_mm` is that of the catalogue's longest slider; its eight sliders level out at 9/16 of it on average.
     """
-    return u_mm - fraction * np.asarray(_dahl(u_mm, 9 / 16 * reach_mm, 1.0))
+    return u_mm - fraction * np.asarray(_dahl(u_mm, 9 / 16 * reach_mm, 1.0, start))
 
 
 @njit(cache=True)
-def _sliders(u: Array, reach: Array, weight: Array) -> Array:
-    strain = np.zeros(reach.size)
+def _sliders(u: Array, reach: Array, weight: Array, start: float) -> Array:
+    strain = -start * reach
     out = np.zeros(u.size)
+    out[0] = np.sum(weight * strain)
     for i in range(1, u.size):
         for k in range(reach.size):
             strain[k] = min(max(strain[k] + u[i] - u[i - 1], -reach[k]), reach[k])
@@ -108,8 +136,8 @@ def _sliders(u: Array, reach: Array, weight: Array) -> Array:
     return out
 
 
-def slider_friction(u_mm: Array, fraction: float, reach_mm: float) -> Array:
+def slider_friction(u_mm: Array, fraction: float, reach_mm: float, start: float = 0.0) -> Array:
     """Another spectrum of elastic sliders: thirteen, from 4 to 104 % of the reach, the long ones a little heavier."""
     reach = reach_mm * np.linspace(0.04, 1.04, 13)
     weight = np.linspace(0.9, 1.1, 13)
-    return u_mm - fraction * np.asarray(_sliders(u_mm, reach, weight / weight.sum()))
+    return u_mm - fraction * np.asarray(_sliders(u_mm, reach, weight / weight.sum(), start))

@@ -1,8 +1,6 @@
-"""One experiment with its truth: drawn from a seed, sized to a signal-to-noise ratio, written as the tool's files."""
+"""One experiment with its truth: drawn from a seed, sized to a signal-to-noise ratio."""
 
-import json
-from dataclasses import asdict, dataclass, replace
-from pathlib import Path
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -38,6 +36,12 @@ class Row:
         Whether a thing from outside acts.
     snr : tuple of float
         Ratios to draw from; 0 means the everyday size as it falls.
+    names : tuple of str
+        Effects to draw from; the whole catalogue of the first rows where empty.
+    beside : tuple of str
+        What the second effect is drawn from; the same as the first where empty.
+    free_start : bool
+        Whether plays and frictions start each run anywhere, two times of three at an end, instead of centred.
     """
 
     name: str
@@ -45,6 +49,9 @@ class Row:
     hidden: int
     foreign: bool
     snr: tuple[float, ...]
+    names: tuple[str, ...] = ()
+    beside: tuple[str, ...] = ()
+    free_start: bool = False
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -162,6 +169,11 @@ def draw_experiment(seed: int, row: Row) -> Experiment:
     raise NotDrawnError(f"Row {row.name} must be drawn within {TRIES} tries, but seed {seed} was not; use another.")
 
 
+def _run_starts(rng: np.random.Generator, runs: int) -> tuple[float, ...]:
+    at_an_end = rng.random(runs) < 2 / 3
+    return tuple(float(v) for v in np.where(at_an_end, rng.choice([-1.0, 1.0], runs), rng.uniform(-1, 1, runs)))
+
+
 def _draw(rng: np.random.Generator, row: Row, seed: int) -> Experiment:
     kind: Kind = row.kinds[rng.integers(len(row.kinds))]
     snr = float(rng.choice(row.snr))
@@ -172,18 +184,24 @@ def _draw(rng: np.random.Generator, row: Row, seed: int) -> Experiment:
     noise = draw_noise(rng, len(design.motions), slope, inputs.width_mm)
     total_s = sum(m.duration_s + design.pause_s for m in design.motions)
     placement = rng.uniform(-0.3, 0.3) if rng.random() < 0.5 else 0.0
-    bare = Plant(table, inputs, total_s=total_s, placement_mm=placement)
+    starts = _run_starts(rng, len(design.motions)) if row.free_start else ()
+    bare = Plant(table, inputs, total_s=total_s, placement_mm=placement, run_start=starts)
     experiment = Experiment(bare, design, noise, snr, seed)
-    names = [n for n in NAMES if n != "hinge_stiffness_error" and not (design.time_restarts and n in CLOCKED)]
-    if with_force and row.hidden:
+    among = row.names or NAMES
+    names = [n for n in among if n != "hinge_stiffness_error" and not (design.time_restarts and n in CLOCKED)]
+    if with_force and row.hidden and not row.names:
         names = ["hinge_stiffness_error"]
-    if row.hidden > len(names):
+    if row.hidden > len(names) + len(row.beside):
         raise NotDrawnError("Force tables hide one effect.")
     hidden = []
-    for name in rng.choice(names, row.hidden, replace=False):
-        effect: Hidden | None = draw_hidden(rng, str(name), table, inputs, design, total_s)
+    picked = [str(name) for name in rng.choice(names, 1 if row.beside else row.hidden, replace=False)]
+    if row.beside:
+        others = [n for n in row.beside if n not in picked and not (design.time_restarts and n in CLOCKED)]
+        picked += [str(name) for name in rng.choice(others, row.hidden - 1, replace=False)]
+    for name in picked:
+        effect: Hidden | None = draw_hidden(rng, name, table, inputs, design, total_s)
         if snr > 0:
-            effect = _sized(draw_hidden(rng, str(name), table, inputs, design, total_s), experiment, snr)
+            effect = _sized(draw_hidden(rng, name, table, inputs, design, total_s), experiment, snr)
         if effect is None or not within_bounds(effect, table, inputs, design.rate_hz):
             raise NotDrawnError(f"{name} has no such size here.")
         hidden.append(effect)
@@ -216,34 +234,3 @@ def measured(experiment: Experiment, traces: list[Trace], rng: np.random.Generat
 def first_columns(experiment: Experiment) -> dict[str, list[Array]]:
     """Columns of the experiment's own runs, with the noise that its table has."""
     return measured(experiment, experiment.traces(), np.random.default_rng([experiment.seed, 7]))
-
-
-def write_table(experiment: Experiment, columns: dict[str, list[Array]], folder: Path) -> None:
-    """Write measured.csv and simulation.csv."""
-    folder.mkdir(parents=True, exist_ok=True)
-    with_force = experiment.plant.table.force_n is not None
-    header = ["run", "time_s", "input_mm", "gap_mm", "left_mm", "right_mm"] + ["force_n"] * with_force
-    lines = [",".join(header)]
-    for k in range(len(columns["time_s"])):
-        left, right = columns["left_mm"][k], columns["right_mm"][k]
-        values = [columns["time_s"][k], columns["input_mm"][k], right - left, left, right]
-        values += [columns["force_n"][k]] * with_force
-        lines += [f"run{k + 1}," + ",".join(f"{v:.9g}" for v in row) for row in zip(*values, strict=True)]
-    (folder / "measured.csv").write_text("\n".join(lines) + "\n", encoding="utf-8")
-    experiment.plant.table.write(folder / "simulation.csv")
-
-
-def write(experiment: Experiment, folder: Path) -> None:
-    """Write measured.csv, simulation.csv and truth.json."""
-    write_table(experiment, first_columns(experiment), folder)
-    truth = {
-        "hidden": [asdict(h) for h in experiment.plant.hidden],
-        "foreign": asdict(experiment.plant.foreign) if experiment.plant.foreign else None,
-        "snr": experiment.snr,
-        "design": experiment.design.kind,
-        "runs": len(experiment.design.motions),
-        "rate_hz": experiment.design.rate_hz,
-        "time_restarts": experiment.design.time_restarts,
-        "noise": asdict(experiment.noise),
-    }
-    (folder / "truth.json").write_text(json.dumps(truth, indent=1), encoding="utf-8")

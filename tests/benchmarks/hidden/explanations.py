@@ -6,9 +6,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tests.benchmarks.hidden.candidates import Candidate, candidates
-from tests.benchmarks.hidden.catalogue_chain import Effects, Samples, extended, respond
+from tests.benchmarks.hidden.catalogue_chain import MAP, Effects, Samples, extended, respond
 from tests.benchmarks.hidden.experiment import Experiment, edges
-from tests.benchmarks.hidden.fit import Curve, Fit, Library, Problem, fit
+from tests.benchmarks.hidden.fit import Curve, Fit, Problem, fit
+from tests.benchmarks.hidden.linear_signatures import Library
 from tests.benchmarks.hidden.plant import Trace
 from tests.benchmarks.hidden.weights import Weights
 
@@ -35,7 +36,9 @@ def problem_of(experiment: Experiment, traces: list[Trace], *, known_input: bool
     force = None if table.force_n is None else noise.force_n
     weights = Weights(gap_sd, midline_sd, noise.correlation, offset, starts, force)
     placement = experiment.plant.placement_mm
-    model = extended(table.input_mm, table.gap_mm, table.midline_mm, table.force_n, placement)
+    inputs = experiment.plant.inputs
+    travel = (inputs.lower_mm, inputs.upper_mm)
+    model = extended(table.input_mm, table.gap_mm, table.midline_mm, table.force_n, placement, travel)
     return Problem(model, at, weights)
 
 
@@ -45,14 +48,15 @@ def curve_of(traces: list[Trace]) -> Curve:
     return right - left, (left + right) / 2, np.concatenate([t.force_n for t in traces])
 
 
-def known_effects(experiment: Experiment, problem: Problem) -> list[Candidate]:
-    """The candidates on this experiment."""
+def known_effects(experiment: Experiment, problem: Problem, *, with_map: bool = False) -> list[Candidate]:
+    """The candidates on this experiment; the map of position errors where it is hidden or asked for."""
     return candidates(
         problem.model,
         problem.at,
         experiment.noise,
         time_restarts=experiment.design.time_restarts,
         has_force=experiment.plant.table.force_n is not None,
+        with_map=with_map or any(h.name == MAP for h in experiment.plant.hidden),
     )
 
 
@@ -74,7 +78,7 @@ class Search:
         found = []
         for _, (group,) in self.library.left_over(signal, 1):
             candidate = self.known[self.library.owner[group]]
-            tries = [self.library.begin(self.known, (group,), signal)[0], *_more(candidate)]
+            tries = [self.library.begin(self.known, (group,), signal)[0], *more_beginnings(candidate)]
             fits = [fit(self.problem, target, [candidate], [start], 40) for start in tries]
             found.append(min(fits, key=lambda f: f.distance))
         return sorted(found, key=lambda f: f.distance)
@@ -116,9 +120,9 @@ class Search:
         return self.problem.weights.cautious(float(r @ r), difference[0], difference[1])
 
 
-def _more(candidate: Candidate) -> list[Array]:
+def more_beginnings(candidate: Candidate) -> list[Array]:
     """Further beginnings where a search stands still easily: what has no amplitude."""
-    if candidate.name in ("backlash", "stick_slip", "structural_resonance"):
+    if candidate.name in ("slew_limit", "backlash", "stick_slip", "structural_resonance"):
         picked = np.linspace(0, len(candidate.starts) - 1, 4).astype(int)
         return [candidate.starts[k] for k in picked]
     if candidate.name == "large_deflection":
@@ -126,10 +130,12 @@ def _more(candidate: Candidate) -> list[Array]:
     return []
 
 
-def search_of(experiment: Experiment, traces: list[Trace], *, known_input: bool) -> tuple[Search, Curve]:
+def search_of(
+    experiment: Experiment, traces: list[Trace], *, known_input: bool, with_map: bool = False
+) -> tuple[Search, Curve]:
     """A search on an experiment's runs, and their curve without noise."""
     problem = problem_of(experiment, traces, known_input=known_input)
-    known = known_effects(experiment, problem)
+    known = known_effects(experiment, problem, with_map=with_map)
     bare = respond(problem.model, problem.at, {})
     sure = problem_of(experiment, traces, known_input=True)
     return Search(problem, sure, known, Library.of(problem, known), bare), curve_of(traces)

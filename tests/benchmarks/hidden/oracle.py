@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from tests.benchmarks.hidden.catalogue_chain import Effects, respond
+from tests.benchmarks.hidden.catalogue_chain import MAP, RUN_START, Effects, respond
 from tests.benchmarks.hidden.experiment import Experiment
 from tests.benchmarks.hidden.explanations import Search, search_of
 from tests.benchmarks.hidden.fit import Curve, Fit, fit
@@ -63,6 +63,13 @@ class Judgement:
     nearest: dict[str, float]
     outside: bool
     rival: float = 0.0
+    run_start: tuple[float, ...] = ()
+    """Where plays and sliders start each run in the catalogue's form of what is hidden."""
+
+    @property
+    def acting(self) -> Effects:
+        """The hidden effects in the catalogue's form, with their starts."""
+        return self.effects | ({RUN_START: np.array(self.run_start)} if self.run_start else {})
 
 
 def own_fit(search: Search, experiment: Experiment, target: Curve) -> Fit:
@@ -82,6 +89,8 @@ def own_fit(search: Search, experiment: Experiment, target: Curve) -> Fit:
                 h.parameters.get("upper_mm", candidate.upper[0]),
                 h.parameters.get("lower_mm", candidate.lower[1]),
             ]
+        if h.name == MAP:
+            begin = [0.0] * len(candidate.names)
         if h.name == "viscoelastic_creep":
             share = [h.parameters[f"share_{k}"] for k in range(5)]
             begin = [share[0], share[1] + share[2], share[3] + share[4], 0.01]
@@ -123,7 +132,7 @@ def judge(experiment: Experiment) -> Judgement:
     for found in _among(search, form, singles, own):
         nearest["+".join(found.names)] = round(found.distance, 2)
         rival = min(rival, search.problem.distance(target, found.effects) - own.distance)
-        verdict = _verdict(search, form, found, own, target)
+        verdict = verdict_on(search, form, found, own, target)
         if verdict is None:
             continue
         surely_single |= set(found.names) if verdict else set()
@@ -136,7 +145,7 @@ def judge(experiment: Experiment) -> Judgement:
         nearest["+".join(found.names)] = round(found.distance, 2)
         if len(own.names) == 2:
             rival = min(rival, search.problem.distance(target, found.effects) - own.distance)
-        verdict = _verdict(search, form, found, own, target)
+        verdict = verdict_on(search, form, found, own, target)
         if verdict is not None:
             # A pair against a single effect: the tool's order of preference may drop it.
             sure = verdict and len(own.names) == 2
@@ -146,9 +155,11 @@ def judge(experiment: Experiment) -> Judgement:
     if nothing < FAR:
         may, must = ([*may, *must], [frozenset()]) if nothing < NEAR else ([*may, frozenset()], must)
     nearest = dict(sorted(nearest.items(), key=lambda item: item[1])[:12])
+    starts = tuple(float(v) for v in own.effects.get(RUN_START, np.zeros(0)))
     return Judgement(
-        tuple(must), tuple(may), nothing, own.distance, own.effects, nearest, outside=False, rival=float(rival)
-    )
+        tuple(must), tuple(may), nothing, own.distance, own.alone, nearest,
+        outside=False, rival=float(rival), run_start=starts,
+    )  # fmt: skip
 
 
 def _foldable(must: list[frozenset[str]]) -> tuple[list[frozenset[str]], list[frozenset[str]]]:
@@ -169,12 +180,13 @@ def _among(search: Search, form: Curve, singles: list[Fit], own: Fit) -> list[Fi
             continue
         chosen = [c for c in search.known if c.name in found.names]
         if found.distance - own.distance < max(400.0, 0.3 * own.distance):
-            found = fit(search.problem, form, chosen, [found.effects[c.name] for c in chosen], 40)
+            begin = [found.effects[c.name] for c in chosen]
+            found = fit(search.problem, form, chosen, begin, 40, begun=found.effects)
         again.append(replace(found, names=tuple(found.names)))
     return again
 
 
-def _verdict(search: Search, form: Curve, found: Fit, own: Fit, target: Curve) -> bool | None:
+def verdict_on(search: Search, form: Curve, found: Fit, own: Fit, target: Curve) -> bool | None:
     """True where the explanation must be in the set, False where it may, None where it must not."""
     away = search.cautious(form, found.effects)
     excess = search.problem.distance(target, found.effects) - own.distance
@@ -184,11 +196,12 @@ def _verdict(search: Search, form: Curve, found: Fit, own: Fit, target: Curve) -
             return None
         # The other way round: from the explanation at its estimate to the truth's form.
         other = respond(search.problem.model, search.problem.at, found.effects)
-        back = fit(search.problem, other, chosen, [own.effects[c.name] for c in chosen], 40)
+        back = fit(search.problem, other, chosen, [own.effects[c.name] for c in chosen], 40, begun=own.effects)
         if search.cautious(other, back.effects) > FAR:
             return None
         return False
     folded = any(
         LIMITING.get(a, set()) & set(own.names) or a in LIMITING.get(b, set()) for a in found.names for b in own.names
     )
-    return bool(search.sure.distance(form, found.effects) < NEAR and not folded)
+    priced = MAP in found.names and MAP not in own.names
+    return bool(search.sure.distance(form, found.effects) < NEAR and not folded and not priced)

@@ -8,7 +8,8 @@ from numpy.typing import NDArray
 
 from tests.benchmarks.hidden.candidates import candidates
 from tests.benchmarks.hidden.catalogue_chain import respond
-from tests.benchmarks.hidden.fit import Library, Problem
+from tests.benchmarks.hidden.fit import Problem
+from tests.benchmarks.hidden.linear_signatures import Library
 from tests.benchmarks.hidden.measured_table import read_measured, read_simulation
 from tests.benchmarks.hidden.noise import Noise
 from tests.benchmarks.hidden.weights import Weights

@@ -63,6 +63,8 @@ class Plant:
         Length of the whole experiment.
     placement_mm : float
         Where the gripper stands in the picture, off the image's centre: cameras act on that place.
+    run_start : tuple of float
+        Where plays and frictions stand when each run begins, -1..1; centred for runs beyond.
     """
 
     table: GripperTable
@@ -71,6 +73,7 @@ class Plant:
     foreign: Foreign | None = None
     total_s: float = 1.0
     placement_mm: float = 0.0
+    run_start: tuple[float, ...] = ()
     _by_name: dict[str, dict[str, float]] = field(init=False)
 
     def __post_init__(self) -> None:
@@ -82,7 +85,7 @@ class Plant:
         frames = int(np.floor(motion.duration_s * rate_hz + 1e-9)) + 1
         time_s = np.arange((frames - 1) * FINE_STEPS + 1) * dt
         u = motion.at(time_s)
-        driven = self._drive(time_s, u)
+        driven = self._drive(time_s, u, self.run_start[run] if run < len(self.run_start) else 0.0)
         gap, midline = self._mechanism(driven, dt, started_s + time_s)
         left, right = self.placement_mm + midline - gap / 2, self.placement_mm + midline + gap / 2
         if self.foreign is not None:
@@ -103,7 +106,7 @@ class Plant:
         at = slice(None, None, FINE_STEPS)
         return Trace(time_s[at], started_s + time_s[at], u[at], left[at], right[at], force[at])
 
-    def _drive(self, time_s: Array, u: Array) -> Array:
+    def _drive(self, time_s: Array, u: Array, start: float) -> Array:
         acting = self._by_name
         if "drive_lag" in acting:
             u = drive_plant.late(time_s, u, **acting["drive_lag"])
@@ -113,14 +116,19 @@ class Plant:
             u = drive_plant.cyclic_error(u, **acting["encoder_cyclic_error"])
         if "end_stop" in acting:
             u = drive_plant.stopped(u, acting["end_stop"].get("lower_mm"), acting["end_stop"].get("upper_mm"))
+        if "position_error_map" in acting:
+            heights = np.array(list(acting["position_error_map"].values()))
+            u = drive_plant.mapped(u, (self.inputs.lower_mm, self.inputs.upper_mm), heights)
+        if "slew_limit" in acting:
+            u = drive_plant.limited(time_s, u, **acting["slew_limit"])
         if "backlash" in acting:
-            u = drive_plant.backlash(u, **acting["backlash"])
+            u = drive_plant.backlash(u, **acting["backlash"], start=start)
         if "stick_slip" in acting:
             u = drive_plant.stick_slip(u, acting["stick_slip"]["jump_mm"], FINE_STEPS)
         if "friction_hysteresis" in acting:
             p = acting["friction_hysteresis"]
             law = drive_plant.dahl_friction if p["dahl"] else drive_plant.slider_friction
-            u = law(u, p["fraction"], p["reach_mm"])
+            u = law(u, p["fraction"], p["reach_mm"], start)
         return u
 
     def _mechanism(self, u: Array, dt: float, table_time_s: Array) -> tuple[Array, Array]:

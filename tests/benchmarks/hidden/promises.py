@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from tests.benchmarks.hidden.binomial import Rate
 from tests.benchmarks.hidden.catalogue_chain import respond
 from tests.benchmarks.hidden.diagnose_adapter import Answer, diagnose
-from tests.benchmarks.hidden.experiment import write_table
+from tests.benchmarks.hidden.experiment_files import write_table
 from tests.benchmarks.hidden.explanations import known_effects, problem_of
 from tests.benchmarks.hidden.fit import fit
 from tests.benchmarks.hidden.motion import Motion, hold, staircase, triangle

@@ -21,6 +21,7 @@ from pathlib import Path
 import numpy as np
 
 from tests.benchmarks.hidden.binomial import Rate
+from tests.benchmarks.hidden.catalogue_chain import MAP
 from tests.benchmarks.hidden.diagnose_adapter import Answer, diagnose, read_report
 from tests.benchmarks.hidden.explanations import known_effects, problem_of
 from tests.benchmarks.hidden.ideal import ideal
@@ -32,6 +33,7 @@ from tests.benchmarks.hidden.reported_effects import reported_effects
 from tests.benchmarks.hidden.rows import ROWS
 from tests.benchmarks.hidden.score import Mark, intervals, mark, row_lines
 from tests.benchmarks.hidden.table_cache import JudgedTable, draw_table_of_row
+from tests.benchmarks.hidden.unforeseen import widened
 from tests.benchmarks.hidden.unseen_run import unseen_error_ratio
 from tests.benchmarks.workers import workers
 
@@ -95,7 +97,7 @@ def work(task: Task) -> dict[str, object]:
     if task.method == "gp":
         return {"unseen": unseen_error_ratio(table, None)} if row.hidden else {}
     answer = _ask(table, task.method)
-    given = mark(row, table.judgement, answer, hidden)
+    given = mark(row, widened(table, answer, hidden), answer, hidden)
     result: dict[str, object] = {"mark": asdict(given), "verdict": answer.verdict, "seconds": answer.seconds}
     result |= {"sets": ["+".join(sorted(s)) for s in answer.sets], "hidden": "+".join(sorted(hidden))}
     result["folder"] = str(folder)
@@ -106,7 +108,8 @@ def work(task: Task) -> dict[str, object]:
         names = {c.name: c.names for c in known}
         covered = intervals(table.judgement, answer, names)
         result["intervals"] = [asdict(c) for c in covered]
-        result["unseen"] = unseen_error_ratio(table, reported_effects(answer.report, known))
+        if MAP not in hidden | answer.sets[0]:
+            result["unseen"] = unseen_error_ratio(table, reported_effects(answer.report, known))
     if row.hidden:
         try:
             gain = gain_that_came(table, answer)

@@ -16,7 +16,12 @@ NAMES = (
     "camera_scale_drift", "out_of_plane_motion", "scale_error", "lens_distortion", "camera_tilt", "edge_bias",
     "camera_latency",
 )  # fmt: skip
-"""The catalogue, in its order."""
+"""The catalogue that the first rows draw from, in its order."""
+
+WITH_START = ("backlash", "friction_hysteresis")
+"""What may stand anywhere when a run begins."""
+MAP_HEIGHTS = 8
+"""Knots of a hidden map of position errors."""
 
 
 def draw_hidden(
@@ -43,6 +48,11 @@ def draw_hidden(
             depth = width * rng.uniform(0.05, 0.2)
             upper = rng.random() < 0.5
             p = {"upper_mm": inputs.upper_mm - depth} if upper else {"lower_mm": inputs.lower_mm + depth}
+        case "position_error_map":
+            heights = rng.standard_normal(MAP_HEIGHTS) * 0.01
+            p = {f"height_{k}_mm": float(h) for k, h in enumerate(heights)}
+        case "slew_limit":
+            p = {"speed_mm_s": width * rng.uniform(0.1, 0.4)}
         case "backlash":
             p = {"play_mm": abs(about(0.015))}
         case "stick_slip":
@@ -83,7 +93,7 @@ def draw_hidden(
         case "edge_bias":
             p = {"offset_mm": about(0.03)}
         case _:
-            raise ValueError(f"hidden effect must be one of {NAMES}, but is {name}.")
+            raise ValueError(f"hidden effect must be one of {NAMES} or of those of the rows, but is {name}.")
     return Hidden(name, p)
 
 
@@ -106,6 +116,8 @@ def scaled(effect: Hidden, factor: float, inputs: InputRange, table: GripperTabl
             p["cross"] *= np.sqrt(factor)
         case "structural_resonance":
             p["frequency_hz"] /= factor
+        case "slew_limit":
+            p["speed_mm_s"] /= factor
         case "finger_contact":
             closed = float(table.gap(np.array([inputs.lower_mm]))[0])
             p["floor_mm"] = closed + factor * (p["floor_mm"] - closed)
@@ -132,6 +144,11 @@ def within_bounds(effect: Hidden, table: GripperTable, inputs: InputRange, rate_
     p = effect.parameters
     ends = table.gap(np.array([inputs.lower_mm, inputs.upper_mm])) - table.rest_gap_mm
     match effect.name:
+        case "position_error_map":
+            return max(abs(v) for v in p.values()) < 0.2 * inputs.width_mm
+        case "slew_limit":
+            # The slowest strokes of every design take 18 s, their corners included.
+            return p["speed_mm_s"] > inputs.width_mm / 15
         case "end_stop":
             stop = p.get("upper_mm", p.get("lower_mm", 0.0))
             return bool(inputs.lower_mm + 0.1 * inputs.width_mm < stop or "lower_mm" in p) and bool(

@@ -6,7 +6,8 @@ from pathlib import Path
 
 import numpy as np
 
-from tests.benchmarks.hidden.experiment import Experiment, Row, draw_experiment, write
+from tests.benchmarks.hidden.experiment import Experiment, Row, draw_experiment
+from tests.benchmarks.hidden.experiment_files import write
 from tests.benchmarks.hidden.oracle import NEAR, Judgement, judge
 
 FORM_SHARE = 0.003
@@ -44,6 +45,7 @@ def _written(judgement: Judgement) -> str:
         "nearest": judgement.nearest,
         "outside": judgement.outside,
         "rival": judgement.rival,
+        "run_start": list(judgement.run_start),
     }
     return json.dumps(right, indent=1)
 
@@ -53,6 +55,7 @@ def _read(text: str) -> Judgement:
     right["must"] = tuple(frozenset(names) for names in right["must"])
     right["may"] = tuple(frozenset(names) for names in right["may"])
     right["effects"] = {name: np.array(values) for name, values in right["effects"].items()}
+    right["run_start"] = tuple(right.get("run_start", ()))
     return Judgement(**right)
 
 

@@ -38,6 +38,7 @@ def unseen_error_ratio(table: JudgedTable, effects: Effects | None) -> float:
         off = off - off.mean()
         return float(np.sqrt(np.mean(off**2 + (gap - prediction[0]) ** 2 / 4)))
 
+    # Where nobody saw the unseen run start, it starts centred for both.
     judge = respond(model, at, table.judgement.effects)
     asked = gp_prediction(table.folder, at) if effects is None else respond(model, at, effects)[:2]
     return error_mm((asked[0], asked[1])) / error_mm((judge[0], judge[1]))

@@ -1,0 +1,134 @@
+"""Mistakes in a table that no physical effect makes: a mirrored or rescaled column, directions that are swapped."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from fingervision.diagnosis.inference.hypothesis_fit import Problem
+from fingervision.diagnosis.input.observations import Observations
+from fingervision.diagnosis.noise.whitening import RunOffsets
+from fingervision.domain.effect import Array
+from fingervision.effects.play_operator import play
+
+LEAST_CORRELATION = 0.5
+"""Correlation of measured and predicted gap below which the model does not describe the motion at all."""
+LARGEST_RATIO = 3.0
+"""Ratio of measured to predicted motion above which, or below whose inverse, a unit or the model is wrong: the
+catalogue's scale, lever and input errors together make 1.3 * 1.3 * 1.2 = 2.03."""
+ENDS = (0.05, 0.95)
+"""Quantiles between which a motion is taken."""
+DELAYS_S = (0.0, 0.1, 0.2, 0.3, 0.5, 0.7, 1.0)
+"""Delays at which the measured motion is looked for."""
+SWAPPED_SIGMAS = 6.0
+"""Standard errors by which the gap must lead at reversals, before swapped directions are asked about: far beyond
+what any other effect's leftover leaves there."""
+SWAPPED_SHARE = 0.5
+"""Share of the disagreement's square that a leading play must explain: the rest may be other effects'."""
+LEAST_NORM = 1e-6
+"""Share of a play's shape that an offset and a ratio must leave for it to be told from them."""
+WIDTHS = 25
+"""Widths of the play that are tried."""
+
+
+@dataclass(frozen=True, slots=True)
+class Finding:
+    """A mistake that was found, in a sentence; `blocks` where no name can be given until it is mended."""
+
+    words: str
+    blocks: bool
+
+
+def gross_mistake(data: Observations) -> Finding | None:
+    """Compare the measured motion with the predicted one as a whole: sign, unit, and whether they have to do at all."""
+    gap, predicted = data.table.gap_mm, data.chain.respond({}).gap_mm
+    if np.ptp(predicted) == 0.0:
+        return None
+    # Ranks and quantiles resist rows that are wrong; a stage that follows late is looked at as late as it may be.
+    order = max((_order(gap, late) for late in _later(data)), key=abs)
+    way, predicted_way = (float(np.diff(np.quantile(values, ENDS))[0]) for values in (gap, predicted))
+    if order < -LEAST_CORRELATION:
+        return Finding(
+            "the measured gap falls where the model says that it rises: input_mm or the gap "
+            "is mirrored (the sign of one column is turned round), or the model belongs to another rig.",
+            blocks=True,
+        )
+    if abs(order) < LEAST_CORRELATION:
+        return Finding(
+            f"the measured gap does not follow the model (rank correlation {order:.2f}): the model has nothing to do "
+            "with these data, or most rows are wrong; look at the columns before anything is named.",
+            blocks=True,
+        )
+    ratio = way / max(predicted_way, 1e-300)
+    if not 1.0 / LARGEST_RATIO < ratio < LARGEST_RATIO:
+        return Finding(
+            f"the measured gap moves {ratio:.3g} times as far as the model says: check the units of the gap and of the "
+            "model (a factor of 1000 is micrometres for millimetres), no effect of the catalogue makes so much.",
+            blocks=True,
+        )
+    return None
+
+
+def swapped_directions(data: Observations, problem: Problem) -> Finding | None:
+    """Look for a play with the wrong sign: at reversals the gap leads the input instead of lagging behind it."""
+    history = data.chain.history if data.chain.path is None else data.chain.path.history
+    rows = np.arange(history.input_mm.size) if data.chain.path is None else data.chain.path.rows
+    if history.time_s is None:
+        return None
+    residual = problem.nothing().residual
+    offsets, metric = problem.offsets, problem.offsets.metric(problem.nothing().sigma_mm)
+    reach = 1e-3 * history.input_span_mm
+    n = data.chain.history.input_mm.size
+    low, high = (data.chain.with_input(data.chain.history.input_mm + way).stacked({}) for way in (-reach, reach))
+    slope = (high - low) / (2.0 * reach)
+    constant = np.ones(n)
+    line = data.chain.history.input_mm - data.chain.history.input_mm.mean()
+    beside = np.stack([slope * np.tile(shape, slope.size // n) for shape in (constant, line)], axis=1)
+    whitened = problem.whitener.columns(beside)[0]
+    alone = _without(residual, whitened, offsets, metric)
+    best: tuple[float, float, float] | None = None
+    for width in history.input_span_mm * np.geomspace(1e-5, 0.3, WIDTHS):
+        lag = np.empty_like(history.input_mm)
+        for run in history.runs:
+            first = np.sign(np.diff(history.input_mm[run])[np.flatnonzero(np.diff(history.input_mm[run]))[:1]].sum())
+            lag[run] = play(history.input_mm[run], width, -float(first)) - history.input_mm[run]
+        column = problem.whitener.one(slope * np.tile(lag[rows], slope.size // n))
+        own = _without(column, whitened, offsets, metric)
+        norm = offsets.squared(own, metric)
+        if norm > LEAST_NORM * max(float(column @ column), 1e-300):
+            moved = own - offsets.design @ (metric @ (offsets.design.T @ own))
+            coefficient = float(moved @ residual) / norm
+            if best is None or coefficient**2 * norm > best[0]:
+                best = coefficient**2 * norm, coefficient * width, coefficient * float(np.sqrt(norm))
+    if best is None:
+        return None
+    gain, size_mm, sigmas = best
+    stands = offsets.squared(alone, metric)
+    scatter = float(np.sqrt(max((stands - gain) / max(1, residual.size), 1.0)))
+    if sigmas > -SWAPPED_SIGMAS * scatter or gain < SWAPPED_SHARE * stands:
+        return None
+    return Finding(
+        f"at reversals the gap leads the input by {1e3 * abs(size_mm):.3g} um instead of lagging behind it, which no "
+        "mechanism does: are the directions swapped, or the sign of the gap's error?",
+        blocks=True,
+    )
+
+
+def _without(values: Array, columns: Array, offsets: RunOffsets, metric: Array) -> Array:
+    """Take columns out of whitened values; shape as given."""
+    moved = columns - offsets.design @ (metric @ (offsets.design.T @ columns))
+    return np.asarray(values - columns @ np.linalg.lstsq(moved.T @ columns, moved.T @ values, rcond=1e-10)[0])
+
+
+def _later(data: Observations) -> list[Array]:
+    """Predicted gap for a stage that follows at once, and by up to a second later."""
+    if "drive_lag" not in data.effects:
+        return [data.chain.respond({}).gap_mm]
+    return [data.chain.respond({"drive_lag": {"delay_s": delay_s}}).gap_mm for delay_s in DELAYS_S]
+
+
+def _order(gap: Array, predicted: Array) -> float:
+    return float(np.corrcoef(_ranks(gap), _ranks(predicted))[0, 1]) if np.ptp(predicted) > 0.0 else 0.0
+
+
+def _ranks(values: Array) -> Array:
+    return np.argsort(np.argsort(values, kind="stable"), kind="stable").astype(np.float64)

@@ -1,0 +1,196 @@
+"""A map of position errors beside an explanation: a Gaussian process over the input, judged by marginal likelihood.
+
+The map is a random effect (Rasmussen & Williams 2006, chapter 2): its curve is integrated out, and the logarithm of
+the determinant is the price of its freedom. Mean and straight line are taken out of it: offsets and ratios have names.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.interpolate import CubicSpline
+
+from fingervision.diagnosis.inference.hypothesis_fit import Explanation, Problem
+from fingervision.diagnosis.inference.measuring_chain import MeasuringChain
+from fingervision.domain.effect import Array, History, InputPath
+from fingervision.domain.parameter import Estimate
+from fingervision.effects import catalogue
+from fingervision.effects.position_error_map import covariance, curve_values, without_line
+
+NAME = "position_error_map"
+SET_POINTS = 60
+"""Different inputs up to which each is a node of the curve; above, nodes are spread evenly."""
+NODES = 13
+"""Of a curve over many inputs: about as many targets as an error map is tabulated at."""
+SMOOTH = 0.1
+"""Shortest length of a map over the range: what changes faster repeats with a period, or is no property of the place
+that anybody could have measured beforehand."""
+PASSES = 1.8
+"""Travel over range from which on each place was passed twice: an error seen once is not known to repeat."""
+LENGTHS, SIZES = 10, 25
+"""Lengths and sizes that are tried."""
+LEAST_GAIN = 10.0
+"""Twice the logarithm of a Bayes factor that is very strong evidence (Kass & Raftery 1995)."""
+SLOPE_STEP = 1e-3
+"""Share of the range over which the prediction is differentiated by the input."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PositionMap:
+    """A map of position errors as a random effect.
+
+    Parameters
+    ----------
+    nodes_mm : ndarray of float, shape (k,)
+        Inputs at which the curve is known.
+    root_mm : ndarray of float, shape (k, k)
+        The curve at the nodes is `root_mm` times independent standard normal numbers.
+    columns_mm : ndarray of float, shape (channels * n, k)
+        What each of these numbers does to the prediction.
+    rms_mm, length_mm : Estimate
+        Root mean square of the curve once it is estimated, of the process before; and the process's length.
+    price : float
+        Logarithm of the determinant and of the choice of size and length, on the scale of chi-square.
+    coefficients : ndarray of float, shape (k,)
+        The numbers as they were estimated.
+    """
+
+    nodes_mm: Array
+    root_mm: Array
+    columns_mm: Array
+    rms_mm: Estimate
+    length_mm: Estimate
+    price: float
+    coefficients: Array
+
+    @property
+    def fitted_mm(self) -> Array:
+        """What the estimated curve does to the prediction, to first order; shape (channels * n,)."""
+        return np.asarray(self.columns_mm @ self.coefficients, dtype=np.float64)
+
+    @property
+    def curve_mm(self) -> Array:
+        """The estimated curve at the nodes, shape (k,)."""
+        return np.asarray(self.root_mm @ self.coefficients, dtype=np.float64)
+
+    def values(self) -> dict[str, float]:
+        """Values of the effect: size, length and points."""
+        described = {"rms_mm": self.rms_mm.value, "length_mm": self.length_mm.value}
+        return described | curve_values(self.nodes_mm.tolist(), self.curve_mm.tolist())
+
+    def is_like(self, other: "PositionMap") -> bool:
+        """Whether size and length are within what either leaves open."""
+        pairs = ((self.rms_mm, other.rms_mm), (self.length_mm, other.length_mm))
+        return all(abs(np.log(one.value / two.value)) < max(one.u or 0.0, 1e-12) / one.value for one, two in pairs)
+
+    def refitted(self, problem: Problem, explanation: Explanation, behind: int) -> "PositionMap":
+        """Estimate the curve beside an explanation; `behind` random effects stand behind the map's in the problem."""
+        metric = problem.offsets.metric(explanation.sigma_mm)
+        best = metric @ (problem.offsets.design.T @ explanation.residual)
+        own = slice(best.size - behind - self.coefficients.size, best.size - behind)
+        curve = self.root_mm @ best[own]
+        rms = float(np.sqrt(np.mean(curve**2)))
+        # Derivative of the root mean square by the curve, over the curve's posterior covariance.
+        slope = self.root_mm.T @ (curve / (curve.size * max(rms, 1e-300)))
+        u = float(np.sqrt(max(float(slope @ metric[own, own] @ slope), 0.0)))
+        return replace(self, coefficients=best[own], rms_mm=Estimate(rms, u, "mm"))
+
+
+def why_no_map(history: History, path: InputPath | None) -> str | None:
+    """Say why these data can show no map that repeats; None where they can."""
+    history = history if path is None else path.history
+    narrowed = catalogue()[NAME].search(history)
+    if isinstance(narrowed, str):
+        return narrowed
+    if history.time_s is None:
+        return "the table has no time_s, so nothing tells how often each place was passed"
+    travel = sum(float(np.sum(np.abs(np.diff(history.input_mm[run])))) for run in history.runs)
+    if travel < PASSES * history.input_span_mm:
+        return "each place was passed once, and what was seen once is not known to repeat"
+    return None
+
+
+def likeliest_map(problem: Problem, explanation: Explanation) -> tuple[PositionMap, float]:
+    """Find size and length of a map beside an explanation.
+
+    Parameters
+    ----------
+    problem : Problem
+        Without a map.
+    explanation : Explanation
+        Whose residual the map is to explain.
+
+    Returns
+    -------
+    found : PositionMap
+        The likeliest.
+    gain : float
+        By how much it lowers -2 log of the marginal likelihood, its price paid.
+    """
+    history = problem.chain.history
+    nodes_mm = _nodes(history)
+    raw = _columns(problem.chain, nodes_mm)
+    offsets, metric = problem.offsets, problem.offsets.metric(explanation.sigma_mm)
+    white = problem.whitener.columns(raw)[0]
+    moved = white - offsets.design @ (metric @ (offsets.design.T @ white))
+    gram, aim = white.T @ moved, moved.T @ explanation.residual
+    spacing = float(np.median(np.diff(nodes_mm)))
+    shortest = spacing if nodes_mm.size < NODES else SMOOTH * history.input_span_mm
+    lengths = np.geomspace(shortest, max(history.input_span_mm, 2.0 * shortest), LENGTHS)
+    scale = 1.0 / max(float(np.sqrt(np.trace(gram) / nodes_mm.size)), 1e-300)
+    sizes = scale * np.geomspace(0.1, 1e4, SIZES)
+    gains = np.empty((LENGTHS, SIZES))
+    roots = []
+    for i, length in enumerate(lengths):
+        root = without_line(nodes_mm) @ np.linalg.cholesky(covariance(nodes_mm, length) + 1e-9 * np.eye(nodes_mm.size))
+        roots.append(root)
+        value, vector = np.linalg.eigh(root.T @ gram @ root)
+        value = np.maximum(value, 0.0)
+        share = (vector.T @ (root.T @ aim)) ** 2
+        for j, size in enumerate(sizes):
+            load = 1.0 + size**2 * value
+            gains[i, j] = float(np.sum(size**2 * share / load) - np.sum(np.log(load)))
+    i, j = divmod(int(np.argmax(gains)), SIZES)
+    # Size and length are two numbers chosen by the data.
+    choice = 2.0 * float(np.log(max(2, problem.measured.size)))
+    root_mm = sizes[j] * roots[i]
+    inner = np.eye(nodes_mm.size) + root_mm.T @ gram @ root_mm
+    coefficients = np.linalg.solve(inner, root_mm.T @ aim)
+    weight = np.exp(0.5 * (gains - gains.max()))
+    weight /= weight.sum()
+    found = PositionMap(
+        nodes_mm=nodes_mm,
+        root_mm=root_mm,
+        columns_mm=raw @ root_mm,
+        rms_mm=_estimate(float(sizes[j]), np.log(sizes), weight.sum(axis=0)),
+        length_mm=_estimate(float(lengths[i]), np.log(lengths), weight.sum(axis=1)),
+        price=float(np.linalg.slogdet(inner)[1]) + choice,
+        coefficients=coefficients,
+    )
+    return found, float(gains[i, j]) - choice
+
+
+def _estimate(value: float, logarithms: Array, weight: Array) -> Estimate:
+    """A likeliest value with its posterior standard deviation, which is no smaller than the grid is fine."""
+    mean = float(weight @ logarithms)
+    spread = float(np.sqrt(weight @ (logarithms - mean) ** 2 + np.diff(logarithms)[0] ** 2 / 12.0))
+    return Estimate(value, value * spread, "mm")
+
+
+def _nodes(history: History) -> Array:
+    near = max(1e-6 * history.input_span_mm, 1e-300)
+    _, first = np.unique(np.round(history.input_mm / near), return_index=True)
+    places = history.input_mm[first]
+    if places.size <= SET_POINTS:
+        return np.asarray(places)
+    return np.linspace(float(places[0]), float(places[-1]), NODES)
+
+
+def _columns(chain: MeasuringChain, nodes_mm: Array) -> Array:
+    """Change of the stacked prediction by a unit error of the stage at each node; shape (channels * n, k)."""
+    history = chain.history
+    reach = SLOPE_STEP * history.input_span_mm
+    low, high = (chain.with_input(history.input_mm + way).stacked({}) for way in (-reach, reach))
+    slope = (high - low) / (2.0 * reach)
+    inputs = np.clip(history.input_mm, nodes_mm[0], nodes_mm[-1])
+    basis = np.asarray(CubicSpline(nodes_mm, np.eye(nodes_mm.size))(inputs), dtype=np.float64)
+    return slope[:, None] * np.tile(basis, (slope.size // inputs.size, 1))

@@ -1,0 +1,158 @@
+"""The verdict from what stands: a name is given only where little of the disagreement is left beside it."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.stats import f as fisher
+
+from fingervision.diagnosis.inference.hypothesis_fit import Explanation, Problem, fit
+from fingervision.diagnosis.inference.search import Findings
+from fingervision.diagnosis.input.observations import Observations
+from fingervision.diagnosis.input.recorded_input import scatter_in_holds
+from fingervision.diagnosis.noise.replicates import resolution
+from fingervision.domain.effect import Array
+from fingervision.domain.report import Verdict
+
+STANDING_SHARE = 0.05
+"""Share of the disagreement, as RMS, that a named explanation may leave: the catalogue's forms are off by that much."""
+STANDING_NOISES = 3.0
+"""Standard deviations of the noise that it may leave in any case: less hardly shows to the eye."""
+NEEDED = 1.1
+"""Times that dropping an effect may raise what stands, as RMS; an effect that lowers it by more is seen by eye."""
+LACK_OF_FIT = 1e-3
+"""Significance of the F ratio of lack of fit to pure error, above which nothing is to be explained."""
+
+
+@dataclass(frozen=True, slots=True)
+class Standing:
+    """How much of the disagreement an explanation leaves.
+
+    All as RMS over left and right where both exist, else over the gap; the midline's constant, the runs' departure
+    from their common mean and outliers taken out.
+
+    Parameters
+    ----------
+    before_mm, after_mm : float
+        Without and with the explanation.
+    noise_mm : float
+        What would be left of a true one: noise of the picture, and the recorded input's own error.
+    rows : int
+        Values that count.
+    noise_degrees : int or None
+        Degrees of freedom of a noise that comes from repeats; None where it comes from the residual itself.
+    """
+
+    before_mm: float
+    after_mm: float
+    noise_mm: float
+    rows: int
+    noise_degrees: int | None
+
+    @property
+    def explained_share(self) -> float:
+        """1 - (after / before)^2, from 0 to 1."""
+        return float(np.clip(1.0 - (self.after_mm / max(self.before_mm, 1e-300)) ** 2, 0.0, 1.0))
+
+    @property
+    def share(self) -> float:
+        """Share of the disagreement that stands, as a ratio of RMS, from 0 to 1."""
+        return float(min(1.0, self.after_mm / max(self.before_mm, 1e-300)))
+
+    @property
+    def is_little(self) -> bool:
+        """Whether what stands is noise, or a small part of the disagreement."""
+        return self.after_mm <= max(STANDING_SHARE * self.before_mm, STANDING_NOISES * self.noise_mm)
+
+    @property
+    def is_noise(self) -> bool:
+        """Whether what stands is no more than repeats scatter, or than the noise may be."""
+        ratio = (self.after_mm / max(self.noise_mm, 1e-300)) ** 2
+        if self.noise_degrees is None:
+            return ratio <= STANDING_NOISES**2
+        return float(fisher.sf(ratio, self.rows, self.noise_degrees)) > LACK_OF_FIT
+
+
+def standing(data: Observations, problem: Problem, before_mm: Array, after_mm: Array) -> Standing:
+    """Judge residuals; `before_mm` and `after_mm` of shape (channels * n,)."""
+    history = data.chain.history
+    n, both = history.input_mm.size, history.both_edges
+    aside = problem.whitener.aside[:n]
+    noises = [noise.total_mm for noise in problem.whitener.noises]
+    if history.commanded:
+        # What the stage does after each jump is no noise, and passes for it in the spectrum.
+        parts = np.split(after_mm, len(data.channels))
+        digits = resolution(data.table.gap_mm) / float(np.sqrt(12.0))
+        settled = [max(scatter_in_holds(history, part), digits) for part in parts]
+        noises = [min(noise, scatter or noise) for noise, scatter in zip(noises, settled, strict=True)]
+    error = np.hypot(problem.whitener.input_mm, problem.whitener.passing_mm)[~aside]
+    gap2 = noises[0] ** 2 + float(np.mean(error**2)) if error.size else noises[0] ** 2
+    noise = float(np.sqrt(0.25 * gap2 + noises[1] ** 2)) if both else float(np.sqrt(gap2))
+
+    def rms(residual: Array) -> float:
+        gap = _without_scatter(residual[:n], history.runs)[~aside]
+        if not both:
+            return float(np.sqrt(np.mean(gap**2)))
+        midline = _without_scatter(residual[n : 2 * n], history.runs)[~aside]
+        return float(np.sqrt(np.mean(0.25 * gap**2 + (midline - midline.mean()) ** 2)))
+
+    errors = data.measured_pure_errors(np.split(problem.whitener.aside, len(data.channels)))
+    degrees = None if errors is None else min(error.degrees for error in errors)
+    return Standing(rms(before_mm), rms(after_mm), noise, int(np.sum(~aside)), degrees)
+
+
+def _without_scatter(values: Array, runs: tuple[slice, ...]) -> Array:
+    """Take out by how much each run departs from the mean of all: a constant that all share stays."""
+    means = np.array([values[run].mean() for run in runs])
+    out = values.copy()
+    for run, mean in zip(runs, means, strict=True):
+        out[run] -= mean - means.mean()
+    return out
+
+
+def standing_of(data: Observations, found: Findings) -> Standing:
+    """Judge what a search leaves, a map of position errors taken out to first order."""
+    before = data.stacked_mm - data.chain.stacked({})
+    left = before if not found.best.names else data.stacked_mm - data.chain.stacked(found.best.values)
+    if data.position_map is not None:
+        left = left - data.position_map.refitted(found.problem, found.best, len(data.refit.moved)).fitted_mm
+    return standing(data, found.problem, before, left)
+
+
+def without_passengers(data: Observations, found: Findings) -> Findings:
+    """Drop effects that explain less than what still stands: they may only imitate a part of it.
+
+    Where structure remains beside several effects, a further one is fitted to that structure as well as to its own.
+    """
+    rows = int(found.problem.measured.size - found.problem.whitener.aside.sum())
+    while len(found.best.names) > 1 and (found.unknown is not None or found.left_over is not None):
+        best = found.best
+        less = min((_without(found, name) for name in best.names), key=lambda explanation: explanation.score)
+        fewer = replace(found, best=less, alternatives=(less,))
+        needed = standing_of(data, fewer).after_mm > NEEDED * standing_of(data, found).after_mm
+        if less.score - best.score > best.score - rows or needed:
+            break
+        found = fewer
+    return found
+
+
+def _without(found: Findings, name: str) -> Explanation:
+    kept = {other: found.best.values[other] for other in found.best.names if other != name}
+    refit = fit(found.problem, tuple(kept), kept, iterations=20)
+    known = [e for e in found.singles if e.names == refit.names]
+    return min([refit, *known], key=lambda e: e.score)
+
+
+def verdict(found: Findings, *, mapped: bool, stands: Standing) -> tuple[Verdict, str | None]:
+    """Give the verdict that equals its residual, and where it is *unknown* what the structure looks like."""
+    named = bool(found.best.names) or mapped
+    remains = (
+        f"{1e3 * stands.after_mm:.3g} um RMS remain where {1e3 * stands.noise_mm:.2g} um are noise, "
+        f"{100.0 * stands.share:.0f} % of the disagreement"
+    )
+    if found.unknown is not None:
+        return Verdict.UNKNOWN, found.unknown
+    if not named:
+        return (Verdict.AGREES, None) if stands.is_noise else (Verdict.UNKNOWN, remains)
+    if not stands.is_little:
+        return Verdict.UNKNOWN, remains if found.left_over is None else f"{found.left_over}; {remains}"
+    return (Verdict.NAMED if len(found.alternatives) < 2 else Verdict.AMBIGUOUS), None

@@ -1,0 +1,58 @@
+"""Step commands told from encoders: a command stands exactly and jumps, and so does an encoder in a slow motion."""
+
+from itertools import pairwise
+
+import numpy as np
+
+from fingervision.domain.effect import Array
+
+HELD_SHARE = 0.5
+"""Share of the samples that repeat the one before; a motion that is recorded moves in most of its samples."""
+ISOLATED_SHARE = 0.9
+"""Share of the jumps that stand alone between two equal values; ramps and strokes have neighbouring steps."""
+FEWEST_LINES = 8.0
+"""Lines of an encoder over the range: one that resolves the range into fewer is of no use to anybody."""
+LEAST_HOLD = 6
+"""Samples of a hold in the second half of which a gap that follows a motion can be told from one that stands."""
+FOLLOWS = 0.5
+"""Slope of the gap in holds over what a steady motion through them would give: 1 for an encoder, 0 for a command."""
+
+
+def is_commanded(input_mm: Array, runs: tuple[slice, ...], gap_of_input: Array, gap_mm: Array) -> bool:
+    """Whether the input is a command that keeps its value until it jumps.
+
+    An encoder of coarse step stands and jumps as well while the stage moves slowly. Then the gap moves on while the
+    record stands, and under a command it stands too.
+
+    Parameters
+    ----------
+    input_mm : ndarray of float, shape (n,)
+        Recorded input.
+    runs : tuple of slice
+        Samples of each run.
+    gap_of_input, gap_mm : ndarray of float, shape (n,)
+        Gap that the model predicts for the record, and measured gap.
+    """
+    moves = np.concatenate([np.diff(input_mm[run]) for run in runs])
+    inner = [np.diff(input_mm[run]) != 0.0 for run in runs]
+    jumps = int(sum(np.sum(jump) for jump in inner))
+    if jumps == 0 or np.mean(moves == 0.0) < HELD_SHARE:
+        return False
+    beside = sum(int(np.sum(jump[1:] & jump[:-1])) for jump in inner)
+    if 2 * beside > (1.0 - ISOLATED_SHARE) * jumps:
+        return False
+    if float(np.ptp(input_mm)) < FEWEST_LINES * float(np.min(np.abs(moves[moves != 0.0]))):
+        return True
+    along, power = 0.0, 0.0
+    for run, jump in zip(runs, inner, strict=True):
+        at = run.start + 1 + np.flatnonzero(jump)
+        for before, after in pairwise(at):
+            passing = (input_mm[before] - input_mm[before - 1]) * (input_mm[after] - input_mm[before]) > 0.0
+            if after - before < LEAST_HOLD or not passing:
+                continue
+            second = np.arange(before + (after - before) // 2, after)
+            way = 0.5 * (gap_of_input[after] - gap_of_input[before - 1])
+            drift = way * (second - second.mean()) / (after - before)
+            along += float(drift @ (gap_mm[second] - gap_mm[second].mean()))
+            power += float(drift @ drift)
+    return power > 0.0 and along < FOLLOWS * power

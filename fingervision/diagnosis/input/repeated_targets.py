@@ -1,0 +1,243 @@
+"""Recognise repeated visits of targets (an ISO 230-2 cycle and its kin) in the path of a measured table."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fingervision.domain.effect import Array, Flags
+
+Integers = NDArray[np.intp]
+
+FEWEST_TARGETS = 3
+"""Targets below which there is no axis to speak of: two positions are the ends of a step, and a range over them is one
+difference."""
+SPACING_RATIO = 10.0
+"""Distance between neighbouring targets over the distance between inputs at one target. A stage repeats a set-point to
+its in-position window, which is a small part of any spacing that somebody tests; samples of a motion lie evenly."""
+WIDEST = 0.2
+"""Range of the inputs at one target, of the distance to the next. Wider, and a reading could belong to either."""
+MOST_TARGETS = 200
+"""ISO 230-2 asks for 5 targets a metre; with 200, five cycles are 2000 rests. More places are samples of a motion, or
+the steps of an encoder that it ran over."""
+SHORTEST_REST_S = 0.3
+"""Median time from one visit to the next below which the stage was in motion: to move, arrive and stand takes a stage
+a few tenths of a second, and the standard asks for rest."""
+SETTLING_ROWS = 4
+"""Rows of one visit from which on its first half is taken for settling and left out."""
+LEAST_SHARE = 0.5
+"""Share of the measured rows in repeated visits; below, the figures would speak for the smaller part of the table."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class RepeatedTargets:
+    """Target, side of approach and visit of each measured row.
+
+    Parameters
+    ----------
+    target_mm : ndarray of float, shape (m,)
+        Mean input of the target's rows.
+    direction : ndarray of int, shape (m,)
+        +1 approached from below, -1 from above, 0 not known, or still settling: not to be used.
+    cycle : ndarray of int, shape (m,)
+        Number of the visit of that target from that side, from 0.
+    notes : tuple of str
+        What was assumed, a sentence each.
+    """
+
+    target_mm: Array
+    direction: Integers
+    cycle: Integers
+    notes: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class NoRepeatedTargets:
+    """Why a table has no repeated visits of targets, as the end of a sentence."""
+
+    reason: str
+
+
+@dataclass(frozen=True, slots=True)
+class _Visit:
+    """Consecutive rows of the path at one target: rows with a reading, and the inputs before and after (None: none).
+
+    `places` are all rows, with those whose reading is missing.
+    """
+
+    target: int
+    places: tuple[int, ...]
+    rows: tuple[int, ...]
+    before_mm: float | None
+    after_mm: float | None
+    direction: int
+
+
+def repeated_targets(
+    input_mm: Array, measured: Flags, runs: Sequence[slice], time_s: Array | None = None
+) -> RepeatedTargets | NoRepeatedTargets:
+    """Find targets, sides of approach and cycles in a path.
+
+    The side of approach of a visit is where the path came from: the last row elsewhere, with a reading or without (an
+    overshoot, an approach). Two things are assumed where the table leaves them out, and said: a pair of readings at an
+    end of the range, where all other targets have one, is a turn with an overshoot between the two; and a run that
+    begins at an end of the range in such a table, or in one whose runs all go one way, came from beyond that end.
+
+    Parameters
+    ----------
+    input_mm : ndarray of float, shape (n,)
+        The path in the order of travel, runs one after the other.
+    measured : ndarray of bool, shape (n,)
+        Rows that have a reading; m of them.
+    runs : sequence of slice
+        Rows of each run.
+    time_s : ndarray of float, shape (n,), or None
+        Times, which tell rests from a motion.
+
+    Returns
+    -------
+    RepeatedTargets or NoRepeatedTargets
+        The visits, in the order of the measured rows, or why there are none.
+    """
+    found = _targets(input_mm[measured])
+    if isinstance(found, NoRepeatedTargets):
+        return found
+    centres, halfwidth = found
+    visits = [visit for run in runs for visit in _visits(input_mm, measured, run, centres, halfwidth)]
+    if time_s is not None:
+        between = _seconds_between(visits, time_s, runs)
+        if between is not None and between < SHORTEST_REST_S:
+            return NoRepeatedTargets(
+                f"the input changes every {between:.2g} s, so readings were taken in motion and not at rest"
+            )
+    visits, notes = _ends(visits, centres)
+    direction, cycle = np.zeros(input_mm.size, dtype=np.intp), np.zeros(input_mm.size, dtype=np.intp)
+    target = np.zeros(input_mm.size)
+    counted: dict[tuple[int, int], int] = {}
+    read: dict[tuple[int, int], int] = {}
+    for visit in visits:
+        key = (visit.target, visit.direction)
+        counted[key] = counted.get(key, -1) + 1
+        read[key] = read.get(key, 0) + bool(visit.rows)
+        target[list(visit.rows)] = centres[visit.target]
+        cycle[list(visit.rows)] = counted[key]
+        settled = visit.rows[len(visit.rows) // 2 :] if len(visit.rows) >= SETTLING_ROWS else visit.rows
+        direction[list(settled)] = visit.direction
+    repeated = {key for key, times in read.items() if times > 1 and key[1]}
+    within = sum(len(visit.rows) for visit in visits if (visit.target, visit.direction) in repeated)
+    if not repeated:
+        return NoRepeatedTargets("no target is visited twice from the same side")
+    if within < LEAST_SHARE * np.count_nonzero(measured):
+        return NoRepeatedTargets(
+            f"only {within} of {np.count_nonzero(measured)} readings are of targets visited twice from the same side"
+        )
+    return RepeatedTargets(target[measured], direction[measured], cycle[measured], notes)
+
+
+def _targets(inputs: Array) -> tuple[Array, float] | NoRepeatedTargets:
+    """Targets in ascending order, and the distance from its target within which an input is at it."""
+    ordered = np.sort(inputs)
+    if ordered.size < 4 or ordered[0] == ordered[-1]:
+        return NoRepeatedTargets("there are fewer than four readings, or the input never changes")
+    # Equal set-points differ by nothing, or by the rounding of their digits.
+    floor = 1e-9 * float(ordered[-1] - ordered[0])
+    steps = np.maximum(np.diff(ordered), floor)
+    falling = np.sort(steps)[::-1]
+    # No more targets than half the readings can have two: among smaller steps a chance pair makes a large ratio.
+    most = min(MOST_TARGETS, ordered.size // 2)
+    ratios = (falling[:-1] / falling[1:])[: most - 1]
+    last = int(np.argmax(ratios))
+    if ratios[last] < SPACING_RATIO:
+        return NoRepeatedTargets(
+            "the inputs do not gather at targets: none is visited again, or readings were taken on the way"
+        )
+    parts = np.split(ordered, np.flatnonzero(steps >= falling[last]) + 1)
+    if len(parts) < FEWEST_TARGETS:
+        return NoRepeatedTargets(f"only {len(parts)} different targets were measured, and {FEWEST_TARGETS} are needed")
+    centres = np.array([part.mean() for part in parts])
+    halfwidth = max(max(abs(part[0] - c), abs(part[-1] - c)) for part, c in zip(parts, centres, strict=True))
+    if max(np.ptp(part) for part in parts) > WIDEST * float(np.min(np.diff(centres))):
+        return NoRepeatedTargets("the inputs scatter too widely about the places where they gather to be set-points")
+    # Rows without a reading scatter as much, and one of them may lie a little farther off than any that has one.
+    return centres, 2.0 * float(halfwidth) + floor
+
+
+def _visits(input_mm: Array, measured: Flags, run: slice, centres: Array, halfwidth: float) -> list[_Visit]:
+    """Visits of a run in the order of travel; those without a reading are counted too."""
+    path = input_mm[run]
+    nearest = np.clip(np.searchsorted((centres[1:] + centres[:-1]) / 2.0, path), 0, centres.size - 1)
+    at = np.where(np.abs(path - centres[nearest]) <= halfwidth, nearest, -1)
+    starts = np.flatnonzero(np.concatenate([[True], (np.diff(at) != 0) | (at[1:] < 0)]))
+    ends = np.append(starts[1:], path.size)
+    out = []
+    for start, end in zip(starts, ends, strict=True):
+        if at[start] < 0:
+            continue
+        before = float(path[start - 1]) if start else None
+        after = float(path[end]) if end < path.size else None
+        places = tuple(range(run.start + int(start), run.start + int(end)))
+        rows = tuple(row for row in places if measured[row])
+        target = int(at[start])
+        side = 0 if before is None else int(np.sign(centres[target] - before))
+        out.append(_Visit(target, places, rows, before, after, side))
+    return out
+
+
+def _seconds_between(visits: Sequence[_Visit], time_s: Array, runs: Sequence[slice]) -> float | None:
+    """Median time from the first reading of a visit to that of the next within a run."""
+    first = np.array([visit.rows[0] for visit in visits if visit.rows])
+    steps = [np.diff(time_s[first[(first >= run.start) & (first < run.stop)]]) for run in runs]
+    together = np.concatenate(steps) if steps else np.empty(0)
+    return float(np.median(together)) if together.size else None
+
+
+def _ends(visits: list[_Visit], centres: Array) -> tuple[list[_Visit], tuple[str, ...]]:
+    """Split the pairs of readings at the ends of the range, and give runs that begin there their side."""
+    last = centres.size - 1
+    inner = [len(visit.places) for visit in visits if 0 < visit.target < last]
+    usual = int(np.median(inner)) if inner else 0
+    beyond = {0: -1, last: 1}
+    turns = [
+        visit
+        for visit in visits
+        if visit.direction == beyond.get(visit.target) and _goes_back(visit, centres[visit.target])
+    ]
+    pairs = sum(len(visit.places) == 2 * usual for visit in turns)
+    paired = usual > 0 and pairs > len(turns) / 2
+    ways = {int(np.sign(v.after_mm - centres[v.target])) for v in visits if v.after_mm is not None}
+    one_way = len(ways) == 1
+    out: list[_Visit] = []
+    began_beyond = False
+    for visit in visits:
+        if paired and any(visit is turn for turn in turns):
+            # A turn of another number of rows lacks some, and which of its rows came first is not known.
+            whole = len(visit.places) == 2 * usual
+            for part, side in ((visit.places[:usual], 1), (visit.places[usual:], -1)):
+                rows = tuple(row for row in visit.rows if row in part)
+                out.append(replace(visit, places=part, rows=rows, direction=side * visit.direction if whole else 0))
+        elif not visit.direction and visit.after_mm is not None and (paired or one_way) and visit.target in beyond:
+            away = int(np.sign(visit.after_mm - centres[visit.target]))
+            began_beyond |= away == -beyond[visit.target]
+            out.append(replace(visit, direction=away if away == -beyond[visit.target] else 0))
+        else:
+            out.append(visit)
+    notes = []
+    if paired:
+        notes.append(
+            "The table has no rows beyond its end targets: of the readings that follow one another there, the first "
+            "was taken as approached from inside, the second from beyond, as in an ISO 230-2 cycle."
+        )
+    if began_beyond:
+        notes.append("Runs that begin at an end target were taken to have come from beyond it.")
+    unknown = sum(len(visit.rows) for visit in out if not visit.direction)
+    if unknown:
+        notes.append(f"{unknown} readings were left out: from which side their target was approached is not known.")
+    return out, tuple(notes)
+
+
+def _goes_back(visit: _Visit, centre: float) -> bool:
+    """Whether the path leaves a target to the side from which it came."""
+    if visit.before_mm is None or visit.after_mm is None:
+        return False
+    return bool(np.sign(visit.before_mm - centre) == np.sign(visit.after_mm - centre))

@@ -1,0 +1,45 @@
+"""Ends of the range at which the reading stands while the command moves on: a stop or a contact, whatever the noise."""
+
+from itertools import pairwise
+
+import numpy as np
+
+from fingervision.diagnosis.noise.replicates import resolution
+from fingervision.domain.effect import Array
+
+FEWEST_EQUAL = 6
+"""Equal readings at an end that are no accident of a few."""
+LONGER = 3.0
+"""Times the longest stand elsewhere, in rows and in predicted motion: stairs of a dead band stand as well."""
+LEAST_DIGITS = 5.0
+"""Digits of the reading by which the model moves on while the reading stands."""
+LOWER, UPPER = frozenset({"end_stop", "finger_contact"}), frozenset({"end_stop"})
+"""What stands at the closed end, and at the open one."""
+
+
+def stalled_ends(input_mm: Array, predicted_mm: Array, gap_mm: Array) -> frozenset[str]:
+    """Effects that would make the reading stand at an end of the range, where it stands there.
+
+    Noise of any colour changes a reading from row to row; equal readings over many rows, while the model moves on by
+    many digits, have another cause.
+
+    Parameters
+    ----------
+    input_mm, predicted_mm, gap_mm : ndarray of float, shape (n,)
+        Recorded input, predicted and measured gap.
+    """
+    order = np.argsort(input_mm, kind="stable")
+    gap, predicted = gap_mm[order], predicted_mm[order]
+    digit = resolution(gap_mm)
+    changes = np.flatnonzero(np.abs(np.diff(gap)) > 0.5 * digit) + 1
+    borders = np.concatenate([[0], changes, [gap.size]])
+    rows = np.diff(borders)
+    motion = np.array([np.ptp(predicted[a:b]) for a, b in pairwise(borders)])
+    found: frozenset[str] = frozenset()
+    for end, effects in ((0, LOWER), (rows.size - 1, UPPER)):
+        others = np.arange(rows.size) != end
+        least = max(float(FEWEST_EQUAL), LONGER * float(rows[others].max(initial=0)))
+        far = max(LEAST_DIGITS * digit, LONGER * float(motion[others].max(initial=0.0)))
+        if rows.size > 1 and rows[end] >= least and motion[end] > far:
+            found |= effects
+    return found

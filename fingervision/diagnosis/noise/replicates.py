@@ -1,0 +1,145 @@
+"""Pure error: the scatter between visits of the same input from the same side (ISO 230-2; Box & Draper 1987)."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fingervision.domain.effect import Array, Flags
+
+SAME_PLACE = 1e-6
+"""Share of the input's range within which two set-points are the same: the last digits of a file."""
+FEWEST_DEGREES = 4
+"""Degrees of freedom below which a scatter is known to less than a factor of 1.4 and is not used."""
+TREND_SIGMAS = 2.33
+"""Standard deviations by which neighbouring visits must agree better than distant ones before the visits have a trend:
+one table in a hundred without one."""
+TREND_DEGREE = 3
+"""Degree of the polynomial in time that takes a drift or a run-in out of the repeats: it follows either over some
+cycles."""
+ORDINARY_SIGMAS = 6.0
+"""Robust standard deviations beyond which a single visit is a gross error and no scatter."""
+
+
+@dataclass(frozen=True, slots=True)
+class PureError:
+    """Scatter of repeats.
+
+    Parameters
+    ----------
+    sd_mm : float
+        Standard deviation of one reading, a trend taken out.
+    degrees : int
+        Degrees of freedom.
+    trend_sigmas : float
+        By how many standard deviations visits that follow one another agree better than any two.
+    """
+
+    sd_mm: float
+    degrees: int
+    trend_sigmas: float
+
+    @property
+    def has_trend(self) -> bool:
+        """Whether the repeats drift or run in."""
+        return self.trend_sigmas > TREND_SIGMAS
+
+
+def visits(path_mm: Array, runs: tuple[slice, ...], rows: NDArray[np.intp]) -> NDArray[np.intp]:
+    """Number the places that were visited from the same side.
+
+    Parameters
+    ----------
+    path_mm : ndarray of float, shape (m,)
+        Recorded input, rows without a gap included.
+    runs : tuple of slice
+        Rows of the path in each run.
+    rows : ndarray of int, shape (n,)
+        Those that were measured.
+
+    Returns
+    -------
+    ndarray of int, shape (n,)
+        The same number for visits of the same input from the same side; -1 where the side is not known, at the first
+        input of a run, and for a further reading of the visit before.
+    """
+    near = SAME_PLACE * max(float(np.ptp(path_mm)), 1e-300)
+    place = np.round(path_mm / near).astype(np.int64)
+    _, place = np.unique(place, return_inverse=True)
+    side = np.zeros(path_mm.size, dtype=np.int64)
+    new = np.zeros(path_mm.size, dtype=bool)
+    measured = np.zeros(path_mm.size, dtype=bool)
+    measured[rows] = True
+    for run in runs:
+        seen = False
+        for i in range(run.start + 1, run.stop):
+            way = np.sign(path_mm[i] - path_mm[i - 1]) if abs(path_mm[i] - path_mm[i - 1]) > near else 0.0
+            side[i] = way or side[i - 1]
+            seen = measured[i - 1] or (seen and not way)
+            new[i] = way != 0.0 or not seen
+    label = 2 * place + (side > 0)
+    return np.where((side != 0) & new, label, -1)[rows]
+
+
+def pure_error(values: Array, time_s: Array, label: NDArray[np.intp], aside: Flags) -> PureError | None:
+    """Estimate the scatter of repeats; None where too little repeats.
+
+    Parameters
+    ----------
+    values : ndarray of float, shape (n,)
+        Measured, or measured minus predicted.
+    time_s : ndarray of float, shape (n,)
+        When each was read.
+    label : ndarray of int, shape (n,)
+        As `visits` gives it.
+    aside : ndarray of bool, shape (n,)
+        Values that do not count.
+    """
+    numbers, counts = np.unique(label[(label >= 0) & ~aside], return_counts=True)
+    groups = [np.flatnonzero((label == number) & ~aside) for number in numbers[counts > 1]]
+    groups = [group[np.argsort(time_s[group], kind="stable")] for group in groups]
+    degrees = sum(group.size - 1 for group in groups)
+    if degrees < FEWEST_DEGREES:
+        return None
+    rest = np.concatenate([values[group] - values[group].mean() for group in groups])
+    pooled = float(rest @ rest) / degrees
+    trend = _trend_sigmas([values[group] for group in groups], pooled)
+    if trend <= TREND_SIGMAS or degrees - TREND_DEGREE < FEWEST_DEGREES:
+        return PureError(_without_gross_errors(rest, degrees), degrees, trend)
+    at = np.concatenate([time_s[group] for group in groups])
+    powers = np.vander((at - at.mean()) / max(float(np.ptp(at)), 1e-300), TREND_DEGREE + 1)[:, :-1]
+    begin = 0
+    for group in groups:
+        own = slice(begin, begin + group.size)
+        powers[own] -= powers[own].mean(axis=0)
+        begin += group.size
+    rest = rest - powers @ np.linalg.lstsq(powers, rest, rcond=None)[0]
+    return PureError(_without_gross_errors(rest, degrees - TREND_DEGREE), degrees - TREND_DEGREE, trend)
+
+
+def _without_gross_errors(rest: Array, degrees: int) -> float:
+    robust = 1.4826 * float(np.median(np.abs(rest)))
+    kept = np.abs(rest) <= ORDINARY_SIGMAS * robust if robust > 0.0 else np.ones(rest.size, dtype=bool)
+    return float(np.sqrt(np.sum(rest[kept] ** 2) / max(1, degrees - int(np.sum(~kept)))))
+
+
+def _trend_sigmas(groups: list[Array], pooled: float) -> float:
+    """Von Neumann's ratio over all groups, as standard deviations below its expectation (von Neumann 1941)."""
+    if pooled <= 0.0:
+        return 0.0
+    neighbours = sum(float(np.sum(np.diff(group) ** 2)) for group in groups)
+    pairs = sum(group.size - 1 for group in groups)
+    ratio = 0.5 * neighbours / pairs / pooled
+    # Of one group of k: variance (k - 2) / (k^2 - 1); groups count by their pairs.
+    variance = sum((group.size - 1) ** 2 * (group.size - 2) / (group.size**2 - 1) for group in groups) / pairs**2
+    return (1.0 - ratio) / float(np.sqrt(variance)) if variance > 0.0 else 0.0
+
+
+def resolution(values: Array) -> float:
+    """Smallest difference of values that all lie on one grid, as a reading of few digits gives them; 0 without one."""
+    steps = np.diff(np.unique(np.round(values, 10)))
+    steps = steps[steps > 1e-9]
+    if not steps.size:
+        return 0.0
+    least = float(np.min(steps))
+    return least if np.all(np.abs(steps / least - np.round(steps / least)) < 0.02) else 0.0

@@ -1,0 +1,240 @@
+"""Positioning accuracy and repeatability of an axis from repeated visits of targets, as ISO 230-2:2014 defines them.
+
+Published reports differ from the standard in three ways, which the tests hold against readings of real stages:
+`forward` may mean the approach from above, so that the reversal has the other sign; R may be max(R_up, R_down), while
+the standard's R is a bidirectional figure with the reversal in it; E may be that of one direction alone. All of those
+stand among the figures here: compare R with R_up and R_down, E with E_up and E_down.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from fingervision.diagnosis.report.positioning_figures import (
+    COVERAGE,
+    DEFINITIONS,
+    DOWN,
+    FEWEST_CYCLES,
+    FEWEST_TARGETS,
+    UP,
+    Figure,
+    PositioningAccuracy,
+    Target,
+    Visits,
+)
+
+Array = NDArray[np.float64]
+Integers = NDArray[np.intp]
+
+
+def positioning_accuracy(
+    target_mm: ArrayLike, deviation_mm: ArrayLike, direction: ArrayLike, cycle: ArrayLike
+) -> PositioningAccuracy:
+    """Reversal, repeatability, systematic deviation and accuracy of an axis.
+
+    Parameters
+    ----------
+    target_mm : ndarray of float, shape (n,)
+        Target of each reading; readings of one target carry exactly the same number.
+    deviation_mm : ndarray of float, shape (n,)
+        Measured position minus target (or measured minus simulated gap).
+    direction : ndarray of int, shape (n,)
+        +1 approached from below, -1 from above, 0 not known: left out.
+    cycle : ndarray of int, shape (n,)
+        Visit of that target from that side; readings of one visit are averaged first. The reversal's uncertainty is
+        taken from the differences of like-numbered visits, so that a drift from cycle to cycle does not enlarge it.
+
+    Returns
+    -------
+    PositioningAccuracy
+        Bidirectional figures over the targets approached from both sides, the others over all targets of that side;
+        R and A over those with two visits and more.
+
+    Raises
+    ------
+    ValueError
+        Arrays of different length, numbers that are not finite, directions other than +1, -1 and 0.
+
+    Examples
+    --------
+    >>> found = positioning_accuracy([0, 1, 1, 0], [0.0, 0.1, 0.4, 0.2], [1, 1, -1, -1], [0, 0, 0, 0])
+    >>> round(found.value_mm("B_mean"), 3), round(found.value_mm("E"), 3)
+    (-0.25, 0.4)
+    """
+    places, deviations, sides, numbers = _checked(target_mm, deviation_mm, direction, cycle)
+    targets: list[Target] = []
+    by_cycle: dict[int, list[float]] = {}
+    for place in np.unique(places[sides != 0]):
+        at = places == place
+        up, down = (_by_visit(deviations, numbers, at & (sides == side)) for side in (UP, DOWN))
+        targets.append(_target(float(place), up, down))
+        for visit in up.keys() & down.keys():
+            by_cycle.setdefault(visit, []).append(up[visit] - down[visit])
+    below = [_side([t.up for t in targets], "below")]
+    above = [_side([t.down for t in targets], "above")]
+    pairs = [t for t in targets if t.up is not None and t.down is not None]
+    both = [_side([t.up for t in pairs], "both sides"), _side([t.down for t in pairs], "both sides")]
+    paired = all(len(one) == len(pairs) for one in by_cycle.values())
+    found = _reversals(targets, list(by_cycle.values()) if paired else [])
+    for symbol, sides_of in (("_up", below), ("_down", above), ("", both)):
+        found |= {
+            f"R{symbol}": _figure(f"R{symbol}", sides_of, _repeatability, fewest=1, scatter=True),
+            f"E{symbol}": _figure(f"E{symbol}", sides_of, _systematic),
+            f"A{symbol}": _figure(f"A{symbol}", sides_of, _accuracy, scatter=True),
+        }
+    found["M"] = _figure("M", both, _mean_bidirectional)
+    figures = {symbol: found[symbol] for symbol in DEFINITIONS}
+    return PositioningAccuracy(tuple(targets), figures, _notes(targets))
+
+
+@dataclass(frozen=True, slots=True)
+class _Side:
+    """Means and standard deviations over the targets approached from one side; s is 0 where `scattered` is False."""
+
+    mean: Array
+    s: Array
+    scattered: NDArray[np.bool_]
+    words: str
+
+
+def _checked(*given: ArrayLike) -> tuple[Array, Array, Integers, Integers]:
+    """Four columns of one length, the first two finite, the directions known."""
+    target, deviation, side, number = (np.atleast_1d(np.asarray(column, dtype=np.float64)) for column in given)
+    names = ("target_mm", "deviation_mm", "direction", "cycle")
+    for name, column in zip(names, (target, deviation, side, number), strict=True):
+        if column.shape != (target.size,):
+            message = f"{name} must have {target.size} values, one a reading, but has shape {column.shape}."
+            raise ValueError(message)
+        if not np.all(np.isfinite(column)):
+            message = f"{name} must be finite, but is {column[~np.isfinite(column)][0]}: leave that reading out."
+            raise ValueError(message)
+    strange = side[~np.isin(side, (UP, 0, DOWN))]
+    if strange.size:
+        message = f"direction must be +1 (from below), -1 (from above) or 0 (not known), but is {strange[0]:g}."
+        raise ValueError(message)
+    return target, deviation, side.astype(np.intp), number.astype(np.intp)
+
+
+def _by_visit(deviation: Array, number: Integers, chosen: NDArray[np.bool_]) -> dict[int, float]:
+    """Mean deviation of each visit among the chosen readings."""
+    return {int(visit): float(np.mean(deviation[chosen & (number == visit)])) for visit in np.unique(number[chosen])}
+
+
+def _visits(readings: dict[int, float]) -> Visits | None:
+    if not readings:
+        return None
+    values = np.array(list(readings.values()))
+    return Visits(values.size, float(values.mean()), float(values.std(ddof=1)) if values.size > 1 else None)
+
+
+def _target(place: float, up: dict[int, float], down: dict[int, float]) -> Target:
+    """Statistics of a target; the reversal's uncertainty from like-numbered visits, or from both scatters."""
+    above, below = _visits(down), _visits(up)
+    if above is None or below is None:
+        return Target(place, below, above, None, None)
+    paired = np.array([up[visit] - down[visit] for visit in up.keys() & down.keys()])
+    u, freedom = None, None
+    if paired.size > 1:
+        u, freedom = float(paired.std(ddof=1) / np.sqrt(paired.size)), paired.size - 1
+    elif above.s_mm is not None and below.s_mm is not None:
+        u = float(np.hypot(below.s_mm / np.sqrt(below.n), above.s_mm / np.sqrt(above.n)))
+        # The smaller of the two, on the safe side of Welch and Satterthwaite.
+        freedom = min(below.n, above.n) - 1
+    return Target(place, below, above, below.mean_mm - above.mean_mm, u, freedom)
+
+
+def _side(visits: Sequence[Visits | None], words: str) -> _Side:
+    of = [v for v in visits if v is not None]
+    scattered = np.array([v.s_mm is not None for v in of], dtype=bool)
+    return _Side(np.array([v.mean_mm for v in of]), np.array([v.s_mm or 0.0 for v in of]), scattered, words)
+
+
+def _repeatability(sides: Sequence[_Side]) -> float:
+    """R of the sides' targets: 4 s of one side; the reversal joins where there are two."""
+    single = max(float(2.0 * COVERAGE * np.max(side.s)) for side in sides)
+    if len(sides) == 1:
+        return single
+    up, down = sides
+    return max(single, float(np.max(COVERAGE * (up.s + down.s) + np.abs(up.mean - down.mean))))
+
+
+def _systematic(sides: Sequence[_Side]) -> float:
+    return float(np.ptp(np.concatenate([side.mean for side in sides])))
+
+
+def _mean_bidirectional(sides: Sequence[_Side]) -> float:
+    return float(np.ptp(np.mean([side.mean for side in sides], axis=0)))
+
+
+def _accuracy(sides: Sequence[_Side]) -> float:
+    high, low = (np.concatenate([one.mean + sign * COVERAGE * one.s for one in sides]) for sign in (1.0, -1.0))
+    return float(high.max() - low.min())
+
+
+Statistic = Callable[[Sequence[_Side]], float]
+
+
+def _figure(
+    symbol: str,
+    sides: Sequence[_Side],
+    of: Callable[[Sequence[_Side]], float],
+    *,
+    fewest: int = 2,
+    scatter: bool = False,
+) -> Figure:
+    """Figure over the targets that have what it needs, or the reason why there are too few."""
+    words, targets = sides[0].words, sides[0].mean.size
+    if scatter:
+        kept = np.logical_and.reduce([side.scattered for side in sides])
+        sides = [_Side(side.mean[kept], side.s[kept], side.scattered[kept], words) for side in sides]
+    left = sides[0].mean.size
+    reason = None
+    if not targets:
+        reason = f"no target was approached from {words}"
+    elif not left:
+        reason = f"no target was visited twice from {words}, so the scatter of its readings is not known"
+    elif left < fewest:
+        reason = f"a range over the targets needs {fewest} that were approached from {words}, but there is {left}"
+    value = of(sides) if reason is None else None
+    return Figure(symbol, DEFINITIONS[symbol], value, reason=reason)
+
+
+def _reversals(targets: Sequence[Target], by_cycle: Sequence[Sequence[float]]) -> dict[str, Figure]:
+    """B and its mean; the mean's uncertainty from the scatter of the cycles' own means where there are two."""
+    known = [t for t in targets if t.reversal_mm is not None]
+    if not known:
+        reason = "no target was approached from both sides"
+        return {symbol: Figure(symbol, DEFINITIONS[symbol], None, reason=reason) for symbol in ("B_mean", "B")}
+    reversals = np.array([t.reversal_mm for t in known])
+    worst = int(np.argmax(np.abs(reversals)))
+    u_mean, freedom = None, None
+    if len(by_cycle) > 1:
+        means = np.array([np.mean(one) for one in by_cycle])
+        u_mean, freedom = float(means.std(ddof=1) / np.sqrt(means.size)), means.size - 1
+    elif all(t.u_reversal_mm is not None for t in known):
+        u_mean = float(np.sqrt(sum((t.u_reversal_mm or 0.0) ** 2 for t in known)) / len(known))
+        freedom = min(t.degrees_of_freedom or 0 for t in known)
+    largest, at = float(np.abs(reversals[worst])), known[worst]
+    return {
+        "B_mean": Figure("B_mean", DEFINITIONS["B_mean"], float(reversals.mean()), u_mean, freedom),
+        "B": Figure("B", DEFINITIONS["B"], largest, at.u_reversal_mm, at.degrees_of_freedom),
+    }
+
+
+def _notes(targets: Sequence[Target]) -> tuple[str, ...]:
+    """What a reader of the figures must know: fewer targets or cycles than the standard asks for, one side missing."""
+    notes = []
+    if len(targets) < FEWEST_TARGETS:
+        notes.append(f"ISO 230-2 asks for at least {FEWEST_TARGETS} targets; there are {len(targets)}.")
+    fewest = min((v.n for t in targets for v in (t.up, t.down) if v is not None), default=0)
+    if fewest < FEWEST_CYCLES:
+        notes.append(
+            f"ISO 230-2 asks for {FEWEST_CYCLES} approaches of a target from each side; the fewest here are {fewest}."
+        )
+    single = [t.target_mm for t in targets if t.up is None or t.down is None]
+    if single:
+        places = ", ".join(f"{place:g}" for place in single[:8]) + (" and others" if len(single) > 8 else "")
+        notes.append(f"Approached from one side only, and not in the bidirectional figures: {places} mm.")
+    return tuple(notes)

@@ -1,0 +1,99 @@
+"""Figures of positioning accuracy: symbols and definitions of ISO 230-2:2014, and the nouns that hold them.
+
+Arrows of the standard are written `up` (target approached from below, the input increasing) and `down` (from above).
+
+References
+----------
+.. [1] ISO 230-2:2014, Test code for machine tools, Part 2: Determination of accuracy and repeatability of positioning
+   of numerically controlled axes, clause 3 (definitions).
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from scipy.special import stdtrit
+
+UP, DOWN = 1, -1
+COVERAGE = 2.0
+"""Standard deviations on each side of a mean: the coverage factor of ISO 230-2 (R_up = 4 s)."""
+FEWEST_TARGETS = 5
+"""Targets that ISO 230-2 asks for on a linear axis up to 2 m; fewer are computed, and said."""
+FEWEST_CYCLES = 5
+"""Approaches of each target from each side that ISO 230-2 asks for (clause 5.3.2); fewer are computed, and said."""
+
+_U, _D = "approached from below", "approached from above"
+DEFINITIONS: Mapping[str, str] = {
+    "B_mean": f"mean over the targets of the reversal B_i = mean deviation {_U} minus mean deviation {_D}",
+    "B": "reversal of the axis: the largest absolute reversal |B_i| of a target",
+    "R_up": f"repeatability from below: 4 times the largest standard deviation s_i of a target's readings, {_U}",
+    "R_down": f"repeatability from above: 4 times the largest standard deviation s_i of a target's readings, {_D}",
+    "R": "bidirectional repeatability: the largest of 2 s_up + 2 s_down + |B_i|, 4 s_up and 4 s_down of any target",
+    "E_up": f"systematic deviation from below: range over the targets of the mean deviation, {_U}",
+    "E_down": f"systematic deviation from above: range over the targets of the mean deviation, {_D}",
+    "E": "bidirectional systematic deviation: range of all mean deviations, over the targets and both directions",
+    "M": "mean bidirectional deviation: range over the targets of the mean of both directions' mean deviations",
+    "A_up": f"accuracy from below: range over the targets of mean deviation +- 2 s_i, {_U}",
+    "A_down": f"accuracy from above: range over the targets of mean deviation +- 2 s_i, {_D}",
+    "A": "bidirectional accuracy: range of mean deviation +- 2 s_i, over the targets and both directions",
+}
+"""Symbol and definition of every figure, in the order in which they are told."""
+
+
+@dataclass(frozen=True, slots=True)
+class Visits:
+    """Readings at one target from one side: number, mean deviation, standard deviation (None where n is 1)."""
+
+    n: int
+    mean_mm: float
+    s_mm: float | None
+
+
+@dataclass(frozen=True, slots=True)
+class Target:
+    """A target with its readings from either side; its reversal B_i = up - down, its uncertainty and their freedom."""
+
+    target_mm: float
+    up: Visits | None
+    down: Visits | None
+    reversal_mm: float | None
+    u_reversal_mm: float | None
+    degrees_of_freedom: int | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Figure:
+    """A figure of the axis: value and standard uncertainty where it is known, or the reason why there is no value.
+
+    With five cycles an uncertainty has four degrees of freedom: a 95 % interval is 2.8 of it to either side, not 2.
+    """
+
+    symbol: str
+    definition: str
+    value_mm: float | None
+    u_mm: float | None = None
+    degrees_of_freedom: int | None = None
+    reason: str | None = None
+
+    @property
+    def interval_mm(self) -> float | None:
+        """Half a 95 % interval (Student's t); None where the uncertainty is not known."""
+        if self.u_mm is None or self.degrees_of_freedom is None:
+            return None
+        return float(stdtrit(self.degrees_of_freedom, 0.975)) * self.u_mm
+
+
+@dataclass(frozen=True, slots=True)
+class PositioningAccuracy:
+    """All figures of an axis by symbol, the targets that they are taken from, and what a reader must know of them."""
+
+    targets: tuple[Target, ...]
+    figures: Mapping[str, Figure]
+    notes: tuple[str, ...]
+
+    def value_mm(self, symbol: str) -> float:
+        """Value of a figure that there is; a figure without a value is a programming error."""
+        value = self.figures[symbol].value_mm
+        if value is None:
+            message = f"{symbol} has no value: {self.figures[symbol].reason}."
+            raise ValueError(message)
+        return value

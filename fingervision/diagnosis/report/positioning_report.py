@@ -1,0 +1,115 @@
+"""The positioning figures of a diagnosis: as measured, after the answer, and the share of each named effect."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from fingervision.diagnosis.input.repeated_targets import RepeatedTargets
+from fingervision.diagnosis.report.positioning_accuracy import positioning_accuracy
+from fingervision.diagnosis.report.positioning_figures import PositioningAccuracy
+from fingervision.domain.effect import Array, Values
+
+
+@dataclass(frozen=True, slots=True)
+class PositioningReport:
+    """Positioning figures before and after the answer, and with each effect's predicted change taken out.
+
+    Parameters
+    ----------
+    measured : PositioningAccuracy
+        Of measured minus simulated, or minus target.
+    after : PositioningAccuracy or None
+        Of what remains after the whole answer; None where nothing was named.
+    without : mapping of str to PositioningAccuracy
+        By effect, of the measured deviations minus that effect's predicted change.
+    assumed : tuple of str
+        What was assumed of the targets and their sides of approach.
+    reference : str
+        What deviations were taken from: `target` or `model`.
+    slope_sign : int
+        +1 where the gap rises with the input, -1 where it falls: play makes the reversal of the other sign.
+    """
+
+    measured: PositioningAccuracy
+    after: PositioningAccuracy | None
+    without: Mapping[str, PositioningAccuracy]
+    assumed: tuple[str, ...] = ()
+    reference: str = "target"
+    slope_sign: int = 1
+
+    def share_mm(self, effect: str, symbol: str) -> float | None:
+        """Figure as measured minus figure without the effect; negative where the effect hides a part of it.
+
+        Figures are ranges and maxima, so shares need not add up to the figure; those of B_mean do.
+        """
+        whole, rest = self.measured.figures[symbol].value_mm, self.without[effect].figures[symbol].value_mm
+        return None if whole is None or rest is None else whole - rest
+
+    @property
+    def cycles(self) -> tuple[int, int]:
+        """Fewest and most visits of a target from one side."""
+        counts = [v.n for t in self.measured.targets for v in (t.up, t.down) if v is not None]
+        return (min(counts), max(counts)) if counts else (0, 0)
+
+
+def effect_changes(
+    predict_mm: Callable[[Mapping[str, Values]], Array], answer: Mapping[str, Values]
+) -> dict[str, Array]:
+    """Change of the prediction that each effect of an answer makes beside the others.
+
+    Parameters
+    ----------
+    predict_mm : callable
+        Predicted gap of the measured rows, shape (m,), for the parameters of the effects that act.
+    answer : mapping of str to mapping of str to float
+        Effects of the answer and their parameters.
+    """
+    whole = predict_mm(answer)
+    return {
+        name: whole - predict_mm({other: values for other, values in answer.items() if other != name})
+        for name in answer
+    }
+
+
+def positioning_report(
+    visits: RepeatedTargets,
+    measured_mm: Array,
+    after_mm: Array | None = None,
+    changes_mm: Mapping[str, Array] | None = None,
+    reference: str = "target",
+    slope_sign: int = 1,
+) -> PositioningReport:
+    """Compute the figures as measured, after the answer, and without each effect.
+
+    Parameters
+    ----------
+    visits : RepeatedTargets
+        Target, side and cycle of the m measured rows.
+    measured_mm : ndarray of float, shape (m,)
+        Position minus target, or measured gap minus that of the model without the answer's effects.
+    after_mm : ndarray of float, shape (m,), or None
+        Measured gap minus that of the model with all of the answer's effects.
+    changes_mm : mapping of str to ndarray of float, shape (m,), or None
+        By effect, the change of the gap that it predicts: with all effects minus with all others, so that an effect
+        that acts through another is counted where both stand.
+    reference : str
+        What deviations are taken from: `target` or `model`.
+    slope_sign : int
+        +1 where the gap rises with the input, -1 where it falls.
+    """
+
+    def figures(deviation_mm: Array) -> PositioningAccuracy:
+        return positioning_accuracy(visits.target_mm, deviation_mm, visits.direction, visits.cycle)
+
+    without = {
+        name: figures(np.asarray(measured_mm - change, dtype=np.float64)) for name, change in (changes_mm or {}).items()
+    }
+    return PositioningReport(
+        figures(measured_mm),
+        None if after_mm is None else figures(after_mm),
+        without,
+        visits.notes,
+        reference,
+        slope_sign,
+    )

@@ -1,0 +1,152 @@
+"""Positioning figures as they are written: section of report.json, table and sentences of report.html."""
+
+from fingervision.diagnosis.report.positioning_figures import Figure, Visits
+from fingervision.diagnosis.report.positioning_report import PositioningReport
+
+STANDARD = "ISO 230-2:2014"
+TOLD = 0.05
+"""Smallest share of a figure that is told in words, of the figure: the standard deviation of five readings is itself
+known to a third only, and the list stays readable. All shares stand in the table and in report.json."""
+SENTENCES = ("B_mean", "R", "E", "M", "A")
+"""Figures that get a sentence; where there is one direction only, those of that direction."""
+NAMES = {
+    "B_mean": "Mean reversal",
+    "B": "Largest reversal",
+    "R": "Repeatability",
+    "E": "Systematic deviation",
+    "M": "Mean bidirectional deviation",
+    "A": "Accuracy",
+}
+REFERENCES = {
+    "target": "Deviations are measured gap minus recorded input, less a constant.",
+    "model": "Deviations are measured minus simulated gap: figures of what the model lacks, not of the axis alone.",
+}
+SHARES = (
+    "Shares are the best explanation's: the figure minus the figure with the effect's predicted change taken out. "
+    "Figures are ranges and maxima: shares need not add up."
+)
+SIDES = {"up": "approached from below", "down": "approached from above"}
+
+
+def positioning_document(report: PositioningReport) -> dict[str, object]:
+    """Section `iso230` of report.json: every figure with unit and definition, what remains of it, shares by effect."""
+    figures = {}
+    for symbol, figure in report.measured.figures.items():
+        after = None if report.after is None else report.after.figures[symbol].value_mm
+        figures[symbol] = {
+            "definition": figure.definition,
+            "unit": "mm",
+            "value": figure.value_mm,
+            "u": figure.u_mm,
+            "interval_95": figure.interval_mm,
+            "after": after,
+            "shares": {effect: report.share_mm(effect, symbol) for effect in report.without},
+            "reason": figure.reason,
+        }
+    return {
+        "standard": STANDARD,
+        "reference": report.reference,
+        "up": SIDES["up"],
+        "down": SIDES["down"],
+        "targets_count": len(report.measured.targets),
+        "cycles": list(report.cycles),
+        "figures": figures,
+        "targets": [
+            {
+                "target_mm": target.target_mm,
+                "up": _visits(target.up),
+                "down": _visits(target.down),
+                "reversal_mm": target.reversal_mm,
+                "u_reversal_mm": target.u_reversal_mm,
+            }
+            for target in report.measured.targets
+        ],
+        "words": list(positioning_words(report)),
+        "notes": list(positioning_notes(report)),
+    }
+
+
+def positioning_rows(report: PositioningReport) -> tuple[list[str], list[list[str]]]:
+    """Head and rows of the table in report.html; lengths in um."""
+    effects = list(report.without)
+    after = [] if report.after is None else ["after the answer, um"]
+    head = ["figure", "measured, um", *after, *(f"share of {effect}, um" for effect in effects), "definition"]
+    rows = []
+    for symbol, figure in report.measured.figures.items():
+        if figure.value_mm is None:
+            cells = [f"none: {figure.reason}", *("-" for _ in (*after, *effects))]
+        else:
+            cells = [_um(figure.value_mm) + _interval(figure)]
+            cells += [] if report.after is None else [_um(report.after.figures[symbol].value_mm)]
+            cells += [_um(report.share_mm(effect, symbol)) for effect in effects]
+        rows.append([symbol, *cells, figure.definition])
+    return head, rows
+
+
+def positioning_notes(report: PositioningReport) -> tuple[str, ...]:
+    """What deviations and shares are, what was assumed of the cycle, what the standard asks for and the table lacks."""
+    shares = (SHARES,) if report.without else ()
+    return (REFERENCES[report.reference], *shares, *report.assumed, *report.measured.notes)
+
+
+def positioning_words(report: PositioningReport) -> tuple[str, ...]:
+    """Sentences for a person: each main figure, which effect makes how much of it, what remains."""
+    out = []
+    for plain in SENTENCES:
+        symbols = [plain]
+        if report.measured.figures[plain].value_mm is None and f"{plain}_up" in report.measured.figures:
+            symbols = [f"{plain}_{side}" for side in SIDES]
+        for symbol in symbols:
+            value = report.measured.figures[symbol].value_mm
+            if value is not None:
+                out.append(_sentence(report, symbol, value))
+    return tuple(out)
+
+
+def _sentence(report: PositioningReport, symbol: str, value: float) -> str:
+    figure, side = report.measured.figures[symbol], symbol.partition("_")[2]
+    name = NAMES.get(symbol) or f"{NAMES[symbol[0]]} {SIDES[side].replace('approached ', '')},"
+    words = f"{name} {symbol}: {_um(value)}" + (" um" if symbol != "B_mean" else "")
+    if symbol == "B_mean":
+        words += f"{_interval(figure)} um" + (" (95 %)" if figure.interval_mm is not None else "")
+        words += _side_words(figure, report.slope_sign)
+    causes = []
+    for effect in report.without:
+        share = report.share_mm(effect, symbol)
+        if share is None or abs(share) <= TOLD * abs(value):
+            continue
+        if 0.0 < share * value <= (1.0 + TOLD) * value**2:
+            causes.append(f"{_um(abs(share))} um of it is {effect}")
+        else:
+            # It hides a part of the figure, or others hide a part of it: what would stand without it is true always.
+            causes.append(f"without {effect} it would be {_um(value - share)} um")
+    words += f"; {', '.join(causes)}" if causes else ""
+    rest = None if report.after is None else report.after.figures[symbol].value_mm
+    return words + (f"; {_um(rest)} um remain." if rest is not None else ".")
+
+
+def _side_words(figure: Figure, slope_sign: int) -> str:
+    """On which side the readings are smaller, and whether that is what play makes; nothing within the uncertainty."""
+    value, interval = figure.value_mm or 0.0, figure.interval_mm
+    if not value or (interval is not None and abs(value) <= interval):
+        return ""
+    words = f", {'smaller' if value < 0.0 else 'larger'} readings where a target is approached from below"
+    if interval is None:
+        return words
+    if value * slope_sign < 0.0:
+        return f"{words}, as play makes it"
+    return f"{words}; play makes it the other way round: are the directions swapped?"
+
+
+def _visits(visits: Visits | None) -> dict[str, float | None] | None:
+    return None if visits is None else {"n": visits.n, "mean_mm": visits.mean_mm, "s_mm": visits.s_mm}
+
+
+def _um(value_mm: float | None) -> str:
+    """Micrometres to a hundredth: the last digit that published reports print."""
+    # Adding zero takes the sign from what rounds to zero.
+    return "-" if value_mm is None else f"{round(1e3 * value_mm, 2) + 0.0:.2f}"
+
+
+def _interval(figure: Figure) -> str:
+    return "" if figure.interval_mm is None else f" +- {_um(figure.interval_mm)}"

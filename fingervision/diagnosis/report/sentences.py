@@ -1,0 +1,98 @@
+"""The answer in sentences: what the model lacks, what remains, which rows were set aside."""
+
+import numpy as np
+
+from fingervision.diagnosis.inference.hypothesis_fit import Explanation, Problem
+from fingervision.diagnosis.inference.verdict import Standing
+from fingervision.diagnosis.input.observations import Observations
+from fingervision.domain.effect import Array
+from fingervision.domain.report import Disagreement, NamedEffect, Verdict
+
+ODD_SIGMAS = 2.5
+"""In a table of a few rows a person wants to know of any row this far off, even where it was not set aside."""
+FEW_ROWS = 60
+"""Rows up to which that holds."""
+
+
+def phrase(effect: NamedEffect) -> str:
+    """Name an effect with its parameters and their standard uncertainties."""
+    parts = []
+    for name, e in effect.parameters.items():
+        u = "" if e.u is None else f" +-{e.u:.2g}"
+        parts.append(f"{name} = {e.value:.4g}{u}{' ' + e.unit if e.unit else ''}")
+    return f"{effect.name} ({', '.join(parts)})"
+
+
+def answer(
+    verdict: Verdict,
+    unknown: str | None,
+    effects: tuple[NamedEffect, ...],
+    alternatives: tuple[tuple[str, ...], ...],
+    d: Disagreement,
+) -> str:
+    """Say the whole answer in one or two sentences."""
+    fall = f"the disagreement falls from {d.before_rms_mm:.3g} to {d.after_rms_mm:.3g} mm RMS"
+    fall += f" at a random noise of {d.noise_rms_mm:.2g} mm"
+    what = " and ".join(phrase(effect) for effect in effects)
+    if verdict is Verdict.AGREES:
+        return (
+            f"Simulation and measurement agree within the random noise of {d.noise_rms_mm:.2g} mm "
+            f"(RMS disagreement {d.before_rms_mm:.3g} mm)."
+        )
+    if verdict is Verdict.NAMED:
+        return f"The model lacks {what}; {fall}."
+    if verdict is Verdict.AMBIGUOUS:
+        names = " or ".join("+".join(names) for names in alternatives)
+        return f"This data cannot tell {names} apart; with {what}, {fall}."
+    part = f" {what} explains a part; {fall}." if effects else ""
+    return f"There is structure that no effect of the catalogue explains: {unknown}.{part}"
+
+
+def remaining(stands: Standing, left_over: str | None, scatter_mm: tuple[float, ...]) -> str:
+    """Say what is left after the answer."""
+    if stands.is_noise:
+        words = f"The remaining difference is {stands.after_mm:.3g} mm RMS: random noise only"
+    else:
+        words = (
+            f"The remaining difference is {stands.after_mm:.3g} mm RMS, {100.0 * stands.share:.0f} % of the "
+            f"disagreement; {stands.noise_mm:.2g} mm of it would be random noise"
+        )
+    if left_over is not None:
+        words += f"; its largest part is {left_over}, small beside what was explained"
+    if max(scatter_mm, default=0.0) > 0.0:
+        words += f"; the runs are offset against each other by {scatter_mm[0]:.2g} mm (standard deviation) in the gap"
+    return words + "."
+
+
+def outliers(data: Observations, problem: Problem, after: Array) -> tuple[str, ...]:
+    """Say how many rows were set aside, and in a short table which rows lie off."""
+    n = data.chain.history.input_mm.size
+    aside = np.flatnonzero(problem.whitener.aside[:n])
+    out = [f"{aside.size} of {n} samples were set aside as outliers."] if aside.size else []
+    if n <= FEW_ROWS:
+        gap = after[:n] - np.median(after[:n])
+        scale = 1.4826 * float(np.median(np.abs(gap)))
+        out += [
+            f"the row at input {data.table.input_mm[i]:g} mm lies {gap[i]:+.3g} mm off the others "
+            f"({'set aside' if i in aside else 'kept'})."
+            for i in np.flatnonzero(np.abs(gap) > ODD_SIGMAS * scale)
+        ]
+    return tuple(out)
+
+
+def rows_beyond_model(data: Observations, best: Explanation) -> tuple[str, ...]:
+    """Say for how many rows the model was extended beyond its inputs."""
+    low, high = data.model.input_range_mm
+    u = data.chain.history.input_mm
+    moved = u + best.values.get("input_offset", {}).get("offset_mm", 0.0)
+    moved = moved * (1.0 + best.values.get("input_scale", {}).get("ratio", 0.0))
+    rows = int(np.sum((moved < low) | (moved > high)))
+    return (f"for {rows} rows the model was extended by a straight line beyond its inputs.",) if rows else ()
+
+
+def input_dominates(data: Observations, problem: Problem) -> tuple[str, ...]:
+    """Say so where the recorded input's own error is the larger part of the noise."""
+    error = float(np.median(data.recorded.error_mm))
+    if error > problem.whitener.noises[0].total_mm:
+        return (f"the recorded input's own error ({error:.2g} mm of gap) is larger than the measurement's.",)
+    return ()

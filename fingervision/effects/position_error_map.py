@@ -1,0 +1,87 @@
+"""The stage errs by the same amount at the same place, in both directions."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from scipy.interpolate import CubicSpline
+
+from fingervision.domain.effect import Array, DriveEffect, History, Stage, Values
+from fingervision.domain.parameter import Parameter
+
+FEWEST_PLACES = 5
+"""Different inputs that show more than a straight line and a bend."""
+TYPICAL_NODES = 65
+TYPICAL_SEED = 230
+"""Of the curve that stands for a map whose points are not given."""
+
+
+def covariance(inputs_mm: Array, length_mm: float) -> Array:
+    """Matern covariance of smoothness 5/2 and unit variance (Rasmussen & Williams 2006, 4.17); shape (k, k)."""
+    far = np.sqrt(5.0) * np.abs(inputs_mm[:, None] - inputs_mm) / length_mm
+    return np.asarray((1.0 + far + far**2 / 3.0) * np.exp(-far))
+
+
+def without_line(inputs_mm: Array) -> Array:
+    """Projector that takes mean and straight line out of values at some inputs; shape (k, k)."""
+    line = np.stack([np.ones_like(inputs_mm), inputs_mm - inputs_mm.mean()], axis=1)
+    return np.asarray(np.eye(inputs_mm.size) - line @ np.linalg.pinv(line))
+
+
+def curve_values(inputs_mm: Sequence[float], errors_mm: Sequence[float]) -> dict[str, float]:
+    """Values of the effect that state its curve, point by point."""
+    out: dict[str, float] = {}
+    for k, (at, error) in enumerate(zip(inputs_mm, errors_mm, strict=True), start=1):
+        out |= {f"point_{k}_input_mm": float(at), f"point_{k}_error_mm": float(error)}
+    return out
+
+
+def curve_points(values: Values) -> tuple[Array, Array]:
+    """Inputs and errors of the curve that the values state, each of shape (k,); empty where they state none."""
+    count = sum(key.endswith("_error_mm") for key in values)
+    inputs, errors = ([values[f"point_{k}_{what}_mm"] for k in range(1, count + 1)] for what in ("input", "error"))
+    return np.array(inputs), np.array(errors)
+
+
+def typical_curve(low_mm: float, high_mm: float, rms_mm: float, length_mm: float) -> tuple[Array, Array]:
+    """Draw the curve that stands for a map of which size and length alone are known: always the same one."""
+    at = np.linspace(low_mm, high_mm, TYPICAL_NODES)
+    root = np.linalg.cholesky(covariance(at, length_mm) + 1e-9 * np.eye(at.size))
+    drawn = without_line(at) @ root @ np.random.default_rng(TYPICAL_SEED).standard_normal(at.size)
+    return at, drawn * rms_mm / float(np.sqrt(np.mean(drawn**2)))
+
+
+def act(input_mm: Array, history: History, values: Values) -> Array:
+    """Apply the effect: add the stage's error at each place; beyond the last point it stays."""
+    at, errors = curve_points(values)
+    if not at.size:
+        if values["rms_mm"] == 0.0:
+            return input_mm
+        low, high = float(history.input_mm.min()), float(history.input_mm.max())
+        at, errors = typical_curve(low, high, values["rms_mm"], values["length_mm"])
+    return input_mm + np.asarray(CubicSpline(at, errors)(np.clip(input_mm, at[0], at[-1])), dtype=np.float64)
+
+
+def narrow(history: History) -> tuple[Parameter, ...] | str:
+    """Bound the parameters by what these data can show."""
+    places = np.unique(np.round(history.input_mm / max(1e-6 * history.input_span_mm, 1e-300)))
+    if places.size < FEWEST_PLACES:
+        return f"a map must be seen at {FEWEST_PLACES} different inputs at least, but the table has {places.size}"
+    return EFFECT.parameters
+
+
+EFFECT = DriveEffect(
+    name="position_error_map",
+    stage=Stage.DRIVE,
+    order=53,
+    words="the stage errs by the same amount at the same place",
+    formula="u + f(u), f a Gaussian process without its mean and straight-line part",
+    source="ISO 230-2:2014, mean bi-directional positional deviation; Rasmussen & Williams 2006",
+    residual="the same curve over the input in both directions and in every run",
+    parameters=(
+        Parameter("rms_mm", "mm", 0.0, 1.0, "root mean square of the errors"),
+        Parameter("length_mm", "mm", 1e-4, 1e4, "length over which they change", neutral=None, logarithmic=True),
+    ),
+    narrow=narrow,
+    act=act,
+    curve=True,
+)

@@ -1,0 +1,82 @@
+"""The stage cannot follow faster than a highest speed."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from fingervision.domain.compiled import compiled_as_written
+from fingervision.domain.effect import Array, DriveEffect, History, Stage, Values
+from fingervision.domain.parameter import Parameter
+
+SLOWEST_SHARE = 0.05
+"""Share of the moving samples that are slower than what is called the slowest motion: ends of strokes are slower."""
+JUMP_RANGE = 0.01
+"""Lowest speed that is searched under step commands, over the fastest one that they ask for."""
+APART = 1.2
+"""Fastest over slowest motion above which a limit between them shows."""
+
+
+@compiled_as_written
+def follow(input_mm: Array, time_s: Array, speed_mm_s: float) -> Array:
+    """Follow one run's input at no more than `speed_mm_s`, from its first sample on; exact; shape (n,)."""
+    out = np.empty_like(input_mm)
+    state = input_mm[0]
+    out[0] = state
+    for i in range(1, input_mm.size):
+        reach = speed_mm_s * (time_s[i] - time_s[i - 1])
+        state += min(max(input_mm[i] - state, -reach), reach)
+        out[i] = state
+    return out
+
+
+def act(input_mm: Array, history: History, values: Values) -> Array:
+    """Apply the effect: the stage follows at its highest speed at most."""
+    out = np.empty_like(input_mm)
+    for run in history.runs:
+        out[run] = follow(input_mm[run], history.times[run], values["speed_mm_s"])
+    return out
+
+
+def narrow(history: History) -> tuple[Parameter, ...] | str:
+    """Bound the parameters by what these data can show."""
+    if history.dwell_s > 0.0:
+        return "the stage is taken to have arrived and waited before each reading, however slowly it went"
+    moving: list[Array] = []
+    jumping: list[Array] = []
+    for run in history.runs:
+        move = np.abs(np.diff(history.input_mm[run]))
+        # A single move between two stands is a command's jump: it asks for a speed, and shows none.
+        stands = np.pad(move <= 4.0 * history.input_sigma_mm, 1, constant_values=True)
+        alone = stands[:-2] & stands[2:]
+        speed = move / np.diff(history.times[run])
+        moving.append(speed[~stands[1:-1] & ~alone])
+        jumping.append(speed[~stands[1:-1] & alone])
+    steady, jumps = np.concatenate(moving), np.concatenate(jumping)
+    if not steady.size and not jumps.size:
+        return "the input never moves between two samples"
+    fastest = float(np.max(np.concatenate([steady, jumps])))
+    slowest = float(np.quantile(steady, SLOWEST_SHARE)) if steady.size else JUMP_RANGE * fastest
+    if fastest < APART * slowest:
+        return f"the input moves at one speed only, about {fastest:.3g} mm/s: a limit below it would follow nothing"
+    (speed_limit,) = EFFECT.parameters
+    return (replace(speed_limit, lower=slowest, upper=fastest, neutral=fastest),)
+
+
+EFFECT = DriveEffect(
+    name="slew_limit",
+    stage=Stage.DRIVE,
+    order=56,
+    words="the stage cannot follow faster",
+    formula="follows u at most at speed_mm_s",
+    source="rate limiter",
+    residual="a ramp after each fast move, gone once the stage has caught up",
+    parameters=(
+        Parameter(
+            "speed_mm_s", "mm/s", 1e-6, 1e4, "highest speed of the stage", neutral=1e4, starts=12, logarithmic=True
+        ),
+    ),
+    needs_times=True,
+    memory=True,
+    narrow=narrow,
+    act=act,
+)

@@ -1,0 +1,144 @@
+"""Which frame a packet of an AVI file is, from where it lies: AVI has no times, it counts.
+
+A reader that loses a frame in a damaged place counts on as if there had been none, and every frame after it is too
+early. The file's own index (idx1) says where each frame lies, so a packet that lies where the index says is that frame,
+whatever was lost before it. Where bytes are missing, all behind them lies nearer to the front; packets whose lengths,
+one after the other, occur only once in the rest of the index are those frames. Without an index, or where
+it does not say, frames are counted as long as one chunk follows another without a hole.
+
+Source: Microsoft, AVI RIFF File Reference (chunks, LIST, idx1).
+"""
+
+import re
+import struct
+from pathlib import Path
+from typing import BinaryIO
+
+import numpy as np
+from numpy.typing import NDArray
+
+# The list of frames begins behind the headers, the index stands at the end: nothing longer is searched.
+HEAD_BYTES, TAIL_BYTES = 1 << 20, 1 << 25
+# Between two pictures lie the sound and indices of that moment.
+CHUNKS_BETWEEN = 64
+HEADER_BYTES = 8
+ENTRY = np.dtype([("id", "S4"), ("flags", "<u4"), ("offset", "<u4"), ("size", "<u4")])
+KINDS = (b"dc", b"db")
+KNOWN_CHUNK = re.compile(rb"\d\d(dc|db|wb|tx|pc|iv)|ix\d\d|rec ")
+
+
+class AviPlaces:
+    """Numbers the packets of a video stream; they must be given in the order of the file.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    stream : int
+        Number of the video stream in it.
+    """
+
+    def __init__(self, path: Path, stream: int) -> None:
+        self._path, self._tag = path, b"%02d" % stream
+        with path.open("rb") as file:
+            begin = file.read(HEAD_BYTES).find(b"movi")
+            self._offsets, self._sizes = _index(file, self._tag, begin)
+        self.after_hole = False
+        """Whether bytes are missing between the beginnings of the last two packets: the first may be hurt itself."""
+        self._by_offset = {int(offset): number for number, offset in enumerate(self._offsets)}
+        self._end: int | None = begin + 4 if begin >= 0 else None
+        self._missing = 0
+        self._possible = np.zeros(0, np.int64)
+        self._number = -1
+        self.is_lost = False
+        """Whether the packet before could not be numbered."""
+        self.missing: tuple[int, ...] = ()
+        """Frames that the index has, with a picture, between the last two packets that could be numbered."""
+
+    def number(self, position: int, size: int) -> int | None:
+        """Which frame, from 0, the packet is whose bytes begin here; None where nothing tells.
+
+        Parameters
+        ----------
+        position : int
+            Where the packet's bytes begin, behind its chunk's header.
+        size : int
+            Their length.
+        """
+        begin, missing = position - HEADER_BYTES, self._missing
+        found = self._by_offset.get(begin + self._missing)
+        if found is None or self._sizes[found] != size or found <= self._number:
+            found = self._by_length(begin, size)
+        if found is None and not self.is_lost:
+            found = self._counted(begin)
+        self.is_lost = found is None
+        self._end = position + size + size % 2
+        self.missing = ()
+        if found is not None:
+            between = range(self._number + 1, min(found, len(self._sizes)))
+            self.missing = tuple(number for number in between if self._sizes[number] > 0)
+            self._number = found
+        self.after_hole = self.is_lost or bool(self.missing) or self._missing != missing
+        return found
+
+    def _by_length(self, begin: int, size: int) -> int | None:
+        """Which frame has the lengths of this packet and of those before it that could not be numbered, if one does."""
+        if self.is_lost:
+            possible = self._possible + 1
+            possible = possible[possible < len(self._sizes)]
+        else:
+            possible = np.arange(self._number + 1, len(self._sizes))
+        # What is missing makes everything behind it lie nearer to the front, never farther.
+        alike = (self._sizes[possible] == size) & (self._offsets[possible] >= begin + self._missing)
+        self._possible = possible[alike]
+        if len(self._possible) != 1:
+            return None
+        number = int(self._possible[0])
+        self._missing = int(self._offsets[number]) - begin
+        return number
+
+    def _counted(self, begin: int) -> int | None:
+        """Go from chunk to chunk; a picture of no bytes stands for a frame that the camera dropped."""
+        if self._end is None:
+            return None
+        at, number = self._end, self._number + 1
+        with self._path.open("rb") as file:
+            for _ in range(CHUNKS_BETWEEN):
+                if at == begin:
+                    return number
+                file.seek(at)
+                header = file.read(HEADER_BYTES)
+                if at > begin or len(header) < HEADER_BYTES or not header[:4].isalnum():
+                    return None
+                (length,) = struct.unpack("<I", header[4:])
+                if header[:4] == b"LIST":
+                    length = 4  # its kind; what is in it follows
+                elif header[:2] == self._tag and header[2:4] in KINDS and length == 0:
+                    number += 1
+                at += HEADER_BYTES + length + length % 2
+        return None
+
+
+def _index(file: BinaryIO, tag: bytes, begin: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Read where each frame's chunk begins, and how long it is; nothing where there is no index."""
+    end = file.seek(0, 2)
+    start = max(0, end - TAIL_BYTES)
+    file.seek(start)
+    tail = file.read()
+    at = tail.rfind(b"idx1")
+    nothing = np.zeros(0, np.int64)
+    if at < 0 or begin < 0:
+        return nothing, nothing
+    stated = int.from_bytes(tail[at + 4 : at + 8], "little")
+    count = min(stated, len(tail) - at - 8) // ENTRY.itemsize
+    entries = np.frombuffer(tail, ENTRY, count, at + 8)
+    if not all(map(KNOWN_CHUNK.fullmatch, entries["id"].tolist())) or np.any(
+        np.diff(entries["offset"].astype(int)) <= 0
+    ):
+        return nothing, nothing  # a damaged index would tell wrong numbers
+    chosen = entries[np.isin(entries["id"], [tag + kind for kind in KINDS])]
+    offsets = chosen["offset"].astype(np.int64)
+    # Offsets count from the word `movi`; some programs count from the beginning of the file.
+    if len(offsets) and offsets[0] < begin:
+        offsets = offsets + begin
+    return offsets, chosen["size"].astype(np.int64)

@@ -1,0 +1,51 @@
+"""Whether a video file ends before the end that it states."""
+
+import av
+
+
+def cut_off(
+    container: av.container.InputContainer, stream: av.VideoStream, packets: int, last_end_s: float | None
+) -> str | None:
+    """Say so if the file states more than it holds.
+
+    Parameters
+    ----------
+    container, stream : PyAV's
+        Read to the end.
+    packets : int
+        How many there were.
+    last_end_s : float or None
+        End of the last one.
+
+    Returns
+    -------
+    str or None
+        A sentence.
+    """
+    kind = container.format.name
+    if "mp4" in kind and stream.frames > packets:
+        return f"The recording is cut off here: the file announces {stream.frames} frames and holds {packets}."
+    stated_s = None
+    if "matroska" in kind:
+        stated_s = _clock_s(stream.metadata.get("DURATION")) or (
+            container.duration / av.time_base if container.duration and len(container.streams) == 1 else None
+        )
+    elif "avi" in kind and stream.duration and stream.time_base:
+        stated_s = float(stream.duration * stream.time_base)
+    if stated_s is None or not stream.average_rate:
+        return None
+    # One frame and a half: containers round, and some count up to the last frame's start, others to its end.
+    if stated_s - (last_end_s or 0.0) > 1.5 / float(stream.average_rate):
+        return (
+            f"The recording is cut off here: the file announces {stated_s:.2f} s and holds {last_end_s or 0.0:.2f} s."
+        )
+    return None
+
+
+def _clock_s(clock: str | None) -> float | None:
+    """Seconds of Matroska's hours:minutes:seconds."""
+    try:
+        hours, minutes, seconds = (float(part) for part in (clock or "").split(":"))
+    except ValueError:
+        return None
+    return 3600.0 * hours + 60.0 * minutes + seconds

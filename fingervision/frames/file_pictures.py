@@ -1,0 +1,167 @@
+"""Pictures of an open video file, in order; what is broken, missing, or hangs on that, is said instead."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import av
+
+from fingervision.frames.avi_places import AviPlaces
+from fingervision.frames.cut_off import cut_off
+from fingervision.frames.damage import DamageTrail, Picture
+from fingervision.frames.spoken_damage import Heard, listening
+from fingervision.frames.transport_stream import TransportLosses
+
+MISSING = "Bytes are damaged or missing in the file"
+
+
+def pictures(container: av.container.InputContainer, stream: av.VideoStream, path: Path) -> Iterator[Picture]:
+    """Decode an open file.
+
+    Parameters
+    ----------
+    container, stream : PyAV's
+        At their beginning; the decoder is told to be strict.
+    path : Path
+        The file.
+
+    Yields
+    ------
+    (int or None, VideoFrame or str)
+        Pictures with their ticks in order of presentation, or what happened instead of one.
+    """
+    trail = DamageTrail()
+    packets, last_end_s, at_end = 0, None, ""
+    losses = TransportLosses(container.format.name)
+    with listening(stream.codec_context.name) as heard:
+        for read in _read(container, stream, path, heard):
+            packet = read.packet
+            yield from _before(read, trail)
+            if packet.size:
+                packets += 1
+                if leap := losses.before(packet, trail):
+                    yield None, leap
+                trail.enters(packet)
+                losses.behind(packet, trail)
+                if packet.pts is not None and packet.time_base is not None:
+                    last_end_s = max(last_end_s or 0.0, float((packet.pts + (packet.duration or 0)) * packet.time_base))
+            at_end = at_end or read.at_end
+            if read.hole:
+                trail.breaks(f"{MISSING} behind it ({read.hole}).")
+            yield from _decoded(packet, trail, heard)
+            if read.hole and not read.is_placed:
+                trail.hole(f"{MISSING} before it ({read.hole}).")
+                yield None, f"{MISSING} ({read.hole}); frames may be missing here."
+            if read.end:
+                yield from trail.rest()
+                yield None, read.end
+                return
+    yield from trail.rest()
+    missing = cut_off(container, stream, packets, last_end_s)
+    if missing or at_end:
+        yield None, missing or f"{MISSING} at its end ({at_end})."
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Read:
+    """A packet, and what is known of its place once the next one is read.
+
+    Parameters
+    ----------
+    packet : av.Packet
+        With the time of the frame that it is.
+    missing : tuple of int
+        Ticks of frames that are missing before it.
+    loses_count : bool
+        Whether from here on nothing tells which frame is which.
+    is_placed : bool
+        Whether places tell what is missing.
+    hole : str
+        What is wrong between it and the next one; empty where nothing is.
+    end : str
+        Why there is no next one, where that is damage.
+    at_end : str
+        What the container said when there was none: that the file is cut off, mostly.
+    """
+
+    packet: "av.Packet[av.VideoStream]"
+    missing: tuple[int, ...]
+    loses_count: bool
+    is_placed: bool
+    hole: str = ""
+    end: str = ""
+    at_end: str = ""
+
+
+def _read(container: av.container.InputContainer, stream: av.VideoStream, path: Path, heard: Heard) -> Iterator[_Read]:
+    """Packets, one behind the one that is read: a hole is noticed by what comes behind it."""
+    demuxed = container.demux(stream)
+    places = AviPlaces(path, stream.index) if container.format.name == "avi" else None
+    before: _Read | None = None
+    while True:
+        end, packet = "", None
+        try:
+            packet = next(demuxed, None)
+        except av.FFmpegError as error:
+            end = f"The file cannot be read any further ({error.strerror})."
+        except IndexError:
+            # PyAV has no place for a stream that a damaged file invents on the way.
+            end = "The file cannot be read any further (it announces another stream on the way)."
+        hole = heard.of_file()
+        missing: tuple[int, ...] = ()
+        loses_count = False
+        if places is not None and packet is not None and packet.size and packet.dts is not None and packet.pos:
+            was_lost = places.is_lost
+            number = places.number(packet.pos, packet.size)
+            missing, loses_count = places.missing, places.is_lost and not was_lost
+            hole = "another chunk was expected" if places.after_hole and not was_lost else ""
+            if number is None:
+                packet.pts = packet.dts = None
+            else:
+                packet.pts, packet.dts = None if packet.pts is None else packet.pts + number - packet.dts, number
+        if before is not None:
+            is_last = (packet is None or not packet.size) and not end
+            yield replace(before, hole="" if is_last else hole, end=end, at_end=hole if is_last else "")
+        if packet is None:
+            return
+        before = _Read(packet, missing, loses_count, places is not None)
+
+
+def _before(read: _Read, trail: DamageTrail) -> Iterator[Picture]:
+    """Say what is missing before a packet."""
+    if read.loses_count:
+        trail.hole(f"{MISSING} before it.")
+        yield None, f"{MISSING} here. AVI counts frames to tell the time, so the time of those behind is not known."
+    for tick in read.missing:
+        trail.lost(tick, f"{MISSING}, and this frame with them.")
+
+
+def _decoded(packet: "av.Packet[av.VideoStream]", trail: DamageTrail, heard: Heard) -> Iterator[Picture]:
+    try:
+        decoded = packet.decode()
+    except av.FFmpegError as error:
+        trail.breaks(f"It could not be decoded ({error.strerror}).")
+        return
+    finally:
+        said = heard.of_picture()
+    if said:
+        trail.breaks(f"It is damaged in the file ({said}).")
+    for picture in decoded:
+        yield from trail.leaves(picture)
+
+
+def _placed(packet: "av.Packet[av.VideoStream]", places: AviPlaces, trail: DamageTrail) -> Iterator[Picture]:
+    """Give a packet of an AVI file the time of the frame that it is, after the frames that are missing before it."""
+    if packet.dts is None or packet.pos is None:
+        return
+    was_lost = places.is_lost
+    number = places.number(packet.pos, packet.size)
+    if number is None:
+        if not was_lost:
+            trail.hole(f"{MISSING} before it.")
+            yield None, f"{MISSING} here. AVI counts frames to tell the time, so the time of those behind is not known."
+        packet.pts = packet.dts = None
+        return
+    for missing in places.missing:
+        trail.lost(missing, f"{MISSING}, and this frame with them.")
+    packet.pts, packet.dts = None if packet.pts is None else packet.pts + number - packet.dts, number

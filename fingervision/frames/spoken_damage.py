@@ -1,0 +1,67 @@
+"""What FFmpeg says of damage in its log alone: heard, kept off the screen, and told apart by who says it."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+
+import av
+
+# A damaged slice is an error, not a guess from the picture before it; checksums are looked at where there are any.
+STRICT = {"err_detect": "crccheck+explode"}
+# Errors in what no pixel hangs on: cheap cameras write such headers into every picture.
+HARMLESS = ("unable to decode APP",)
+# The rest of what FFmpeg says at this level is said by helpers of its own (scaling, the log itself), not of the stream.
+HELPERS = ("swscaler", "swresampler", "")
+
+
+@dataclass(slots=True)
+class Heard:
+    """What was said of errors since it was asked last.
+
+    Decoders fill in a damaged part from the picture before it, and containers skip to the next place that looks whole;
+    both say so in the log, and most of it is no error that the caller gets.
+
+    Parameters
+    ----------
+    decoder : str
+        Name of the decoder; who else speaks is the container.
+    warnings : tuple of str
+        Beginnings of the container's warnings that speak of damage too.
+    """
+
+    decoder: str
+    warnings: tuple[str, ...] = ()
+    log: list[tuple[int, str, str]] = field(default_factory=list)
+
+    def of_picture(self) -> str:
+        """Take what the decoder said, its first sentence; empty where it said nothing."""
+        said = [
+            words.strip() for level, speaker, words in self.log if speaker == self.decoder and level <= av.logging.ERROR
+        ]
+        said = [words for words in said if words and not words.startswith(HARMLESS)]
+        self.log.clear()
+        return said[0].rstrip(".") if said else ""
+
+    def of_file(self) -> str:
+        """Take what the container said and leave what the decoder said."""
+        said = [
+            words.strip()
+            for level, speaker, words in self.log
+            if speaker not in (self.decoder, *HELPERS)
+            and (level <= av.logging.ERROR or words.startswith(self.warnings))
+        ]
+        self.log[:] = [entry for entry in self.log if entry[1] == self.decoder]
+        return said[0].rstrip(".") if said else ""
+
+
+@contextmanager
+def listening(decoder: str, warnings: tuple[str, ...] = ()) -> Iterator[Heard]:
+    """Listen to what FFmpeg says of errors, and keep it off the user's screen."""
+    before = av.logging.get_level()
+    av.logging.set_level(av.logging.WARNING if warnings else av.logging.ERROR)
+    try:
+        # Slices are decoded by threads of FFmpeg's own, so not this thread alone.
+        with av.logging.Capture(local=False) as log:
+            yield Heard(decoder, warnings, log)
+    finally:
+        av.logging.set_level(before)

@@ -1,0 +1,110 @@
+"""What times tell of damage: they run backwards, leap out of an even row and back into it, or leave frames out."""
+
+from collections import Counter, deque
+from collections.abc import Iterable, Iterator
+
+import av
+
+from fingervision.frames.damage import Picture
+
+# An even row: so many equal steps one after the other. Cameras of uneven rate never make one, to the tick.
+EVEN_STEPS = 8
+# Containers round a time to their tick, and a step has two ends.
+TICKS = 1.01
+
+BACKWARDS = "Its time is not after that of the frame before it: one of the two is damaged in the file."
+OUT_OF_ROW = "Its time does not fit between those of the frames around it, which are evenly spaced."
+
+
+def believable(pictures: Iterable[Picture]) -> Iterator[Picture]:
+    """Pass on pictures in order of presentation, and lost ones instead of those whose time cannot be.
+
+    Pictures leave a decoder in the order in which they are shown. A time that is earlier than the one before it is
+    wrong, or the one before it is; neither is known, and both pictures are lost, with all until times are beyond both.
+    A single time that is off an otherwise even row is wrong by itself. A repeated time is left alone: that is a
+    duplicate.
+
+    Parameters
+    ----------
+    pictures : iterable of (int or None, VideoFrame or str)
+        Ticks with pictures, or with what happened instead of one. One is held back.
+
+    Yields
+    ------
+    (int or None, VideoFrame or str)
+        The same, in the same order.
+    """
+    steps: deque[int] = deque(maxlen=EVEN_STEPS)
+    before: int | None = None  # time of the last picture that was passed on
+    latest: int | None = None
+    held: Picture | None = None
+    for picture in pictures:
+        tick, held_tick = picture[0], None if held is None else held[0]
+        if held is None or held_tick is None or tick is None:
+            if held is not None:
+                before = before if held_tick is None else held_tick
+                yield held
+            held = picture
+            continue
+        latest = held_tick if latest is None else max(latest, held_tick)
+        if tick < latest:
+            # The latest time stays, so that what follows must come after it.
+            yield held if tick >= held_tick else _lost(held, BACKWARDS)
+            held, before = _lost(picture, BACKWARDS), None
+            steps.clear()
+            continue
+        if before is not None and _out_of_row(steps, held_tick - before, tick - held_tick):
+            held = _lost(held, OUT_OF_ROW)
+        else:
+            if before is not None:
+                steps.append(held_tick - before)
+            before = held_tick
+        yield held
+        held = picture
+    if held is not None:
+        yield held
+
+
+class EvenRow:
+    """Notices frames that are missing in a row of even steps, in the order of decoding.
+
+    For formats that are broadcast (MPEG-TS): their encoders keep an even rate, and what is missing was lost on the way.
+    """
+
+    def __init__(self) -> None:
+        self._steps: deque[int] = deque(maxlen=EVEN_STEPS)
+        self._last: int | None = None
+
+    def leaps(self, tick: int) -> bool:
+        """Whether frames are missing between the tick before and this one."""
+        step = None if self._last is None else tick - self._last
+        self._last = tick
+        if step is None:
+            return False
+        usual, often = Counter(self._steps).most_common(1)[0] if self._steps else (0, 0)
+        self._steps.append(step)
+        return often >= EVEN_STEPS // 2 and step > usual + TICKS
+
+
+def _usual(steps: "deque[int]") -> float | None:
+    """Step of an even row; None if it is none."""
+    if len(steps) < EVEN_STEPS:
+        return None
+    usual = sum(steps) / len(steps)
+    even = usual > 0.0 and all(abs(step - usual) <= TICKS for step in steps)
+    return usual if even else None
+
+
+def _out_of_row(steps: "deque[int]", to_it: int, from_it: int) -> bool:
+    usual = _usual(steps)
+    if usual is None:
+        return False
+    frames = round((to_it + from_it) / usual)
+    together_fit = frames >= 2 and abs(to_it + from_it - frames * usual) <= TICKS
+    on_row = round(to_it / usual)
+    return together_fit and (on_row < 1 or abs(to_it - on_row * usual) > TICKS)
+
+
+def _lost(picture: Picture, words: str) -> Picture:
+    tick, found = picture
+    return (tick, words) if isinstance(found, av.VideoFrame) else picture

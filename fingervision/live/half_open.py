@@ -1,0 +1,57 @@
+"""Connections that ask for nothing: few at a time from one address, and none for long."""
+
+import asyncio
+from collections import defaultdict
+from typing import Any, ClassVar
+
+from uvicorn.protocols.http.h11_impl import H11Protocol
+
+# A browser asks as soon as it is connected; so many may be about to from one address, and for so long.
+HALF_OPEN_AT_ONCE, ASKS_WITHIN_S = 16, 5.0
+
+
+class PatientProtocol(H11Protocol):
+    """Uvicorn's HTTP, which lets go of who connects and then does not ask.
+
+    Whoever holds connections open without asking would use up the places of those who do. Of more than a few from one
+    address the oldest is closed, so that the newest is heard, whoever it is.
+    """
+
+    half_open: ClassVar[defaultdict[str, dict["PatientProtocol", asyncio.TimerHandle]]] = defaultdict(dict)
+
+    def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
+        """Wait for the request, but not for long."""
+        super().connection_made(transport)
+        peer = transport.get_extra_info("peername")
+        self._address = str(peer[0]) if peer else ""
+        waiting = self.half_open[self._address]
+        waiting[self] = self.loop.call_later(ASKS_WITHIN_S, transport.close)
+        if len(waiting) > HALF_OPEN_AT_ONCE:
+            oldest = next(iter(waiting))
+            oldest.transport.close()
+            oldest.heard()
+
+    def handle_events(self) -> None:
+        """Stop waiting once there is a request."""
+        super().handle_events()
+        if self.cycle is not None:
+            self.heard()
+
+    def handle_websocket_upgrade(self, event: Any) -> None:
+        """Hand over to the socket's protocol, which has its own patience."""
+        self.heard()
+        super().handle_websocket_upgrade(event)
+
+    def connection_lost(self, exc: Exception | None) -> None:
+        """Forget who is gone."""
+        self.heard()
+        super().connection_lost(exc)
+
+    def heard(self) -> None:
+        """Wait no longer."""
+        waiting = self.half_open[self._address]
+        timer = waiting.pop(self, None)
+        if timer is not None:
+            timer.cancel()
+        if not waiting:
+            self.half_open.pop(self._address, None)

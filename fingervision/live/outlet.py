@@ -1,0 +1,77 @@
+"""Printing in a thread of its own: a reader that pauses, or is gone, holds up neither measuring nor recording."""
+
+import os
+from contextlib import suppress
+from queue import Empty, Full, Queue
+from threading import Event, Thread
+from typing import TextIO
+
+# Ten minutes at 25 frames a second; what comes on top is left out and counted.
+LINES_WAITING = 15_000
+# How long a reader may take at the end for what waits.
+PATIENCE_S = 2.0
+
+
+class Outlet:
+    """Prints to one stream.
+
+    Parameters
+    ----------
+    stream : text stream or None
+        Standard output or error; None where it was closed before the program began.
+    waiting : int
+        Lines that may wait for the reader.
+    """
+
+    def __init__(self, stream: TextIO | None, waiting: int = LINES_WAITING) -> None:
+        self.left_out = 0
+        self.broken = stream is None
+        """Whether nobody reads any more."""
+        self._stream = stream
+        self._waiting: Queue[str] = Queue(waiting)
+        self._ending = Event()
+        self._thread = Thread(target=self._print, name="printing", daemon=True)
+        self._thread.start()
+
+    def put(self, text: str) -> None:
+        """Hand over what shall be printed; never waits."""
+        if self.broken:
+            return
+        try:
+            self._waiting.put_nowait(text)
+        except Full:
+            self.left_out += 1
+
+    def close(self) -> None:
+        """Print what waits, as far as the reader takes it in time."""
+        self._ending.set()
+        self._thread.join(PATIENCE_S)
+        if self._thread.is_alive():
+            self.left_out += self._waiting.qsize()
+            self.broken = True
+        if self.broken:
+            self._let_go()
+
+    def _print(self) -> None:
+        while not (self._ending.is_set() and self._waiting.empty()):
+            try:
+                text = self._waiting.get(timeout=0.1)
+            except Empty:
+                continue
+            if self._stream is None:
+                return
+            try:
+                self._stream.write(text)
+                self._stream.flush()
+            except (OSError, ValueError):
+                self.broken = True
+                return
+
+    def _let_go(self) -> None:
+        """Point the stream at nothing, so that Python does not fail, or wait, when it flushes it at its end."""
+        if self._stream is None:
+            return
+        with suppress(OSError, ValueError):
+            nothing = os.open(os.devnull, os.O_WRONLY)
+            os.dup2(nothing, self._stream.fileno())
+            os.close(nothing)

@@ -1,0 +1,53 @@
+"""A recording with what was lost when it was made: such frames stay lost when it is measured."""
+
+from collections import deque
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import replace
+
+from fingervision.domain.frame import Frame, LostFrame
+from fingervision.domain.status import Status
+from fingervision.storage.recorded_video import TICKS_PER_S
+
+# A packet with the time of the one before it is written a tick later, since times in a file must grow.
+TICKS_AFTER = 3
+
+
+def marked(source: Iterable[Frame | LostFrame], marks: Sequence[LostFrame]) -> Iterator[Frame | LostFrame]:
+    """Put lost frames where the recording's frames have their times, or between them.
+
+    Parameters
+    ----------
+    source : iterable of Frame or LostFrame
+        The recording.
+    marks : sequence of LostFrame
+        With times, in order.
+
+    Yields
+    ------
+    Frame or LostFrame
+        Counted anew.
+    """
+    waiting = deque(marks)
+    index = 0
+    for item in source:
+        tick = None if item.time_s is None else _tick(item.time_s)
+        taken = False
+        while waiting and tick is not None and not taken:
+            mark = waiting[0]
+            behind = tick - _tick(mark.time_s or 0.0)
+            repeats = mark.status is Status.DUPLICATE
+            if behind < 0 or (behind == 0 and repeats):
+                break
+            yield replace(waiting.popleft(), index=index)
+            index += 1
+            taken = behind <= TICKS_AFTER if repeats else behind == 0
+        if not taken:
+            yield replace(item, index=index)
+            index += 1
+    for mark in waiting:
+        yield replace(mark, index=index)
+        index += 1
+
+
+def _tick(time_s: float) -> int:
+    return round(time_s * TICKS_PER_S)

@@ -1,0 +1,57 @@
+"""Where the kinds of model of one drawing differ by more than their own errors, and which of them to trust."""
+
+from collections.abc import Callable, Mapping
+from itertools import combinations
+
+from fingervision.models.answer_figures import ModelFigures
+
+_APART = 0.10
+"""Beyond the stated errors of both: what differs by more is no error of the kind but of its picture of the body."""
+_TRUST = ("finite_element", "lumped", "stiffness_matrix")
+"""In order: the outline itself, its bars in the plane, its bars at small displacements."""
+_Figure = Callable[[ModelFigures], float | None]
+_QUANTITIES: tuple[tuple[str, str, _Figure, Callable[[ModelFigures], float]], ...] = (
+    ("gap per input", "", lambda f: f.gap_per_input, lambda f: f.slope_error),
+    ("force per input", " N/mm", lambda f: f.input_stiffness_n_mm, lambda f: f.force_error),
+    ("first mode, drive free", " Hz", lambda f: next(iter(f.free_modes_hz), None), lambda f: f.mode_error),
+    ("first mode, drive held", " Hz", lambda f: next(iter(f.locked_modes_hz), None), lambda f: f.mode_error),
+)
+_WHY = {
+    "finite_element": "it has the outline itself, and the other takes the body for bars and notches joined at points",
+    "lumped": "both take the body for bars, and it has more of them",
+}
+
+
+def disagreements(figures: Mapping[str, ModelFigures]) -> list[str]:
+    """Compare slope, force and first mode of every pair of kinds.
+
+    Parameters
+    ----------
+    figures : mapping of str to ModelFigures
+        By kind.
+
+    Returns
+    -------
+    list of str
+        One sentence for each quantity that differs; of several pairs the one that differs most.
+    """
+    kinds = sorted(figures, key=lambda kind: _TRUST.index(kind) if kind in _TRUST else len(_TRUST))
+    sentences = []
+    for name, unit, value, error in _QUANTITIES:
+        worst = None
+        for better, other in combinations(kinds, 2):
+            a, b = value(figures[better]), value(figures[other])
+            if a is None or b is None:
+                continue
+            errors = error(figures[better]) + error(figures[other])
+            apart = abs(b - a) / max(abs(a), 1e-300)
+            if apart > _APART + errors and (worst is None or apart > worst[0]):
+                worst = (apart, better, other, a, b, errors)
+        if worst is not None:
+            apart, better, other, a, b, errors = worst
+            sentences.append(
+                f"{better} and {other} must agree on the {name} within their model errors of {100.0 * errors:.2g} % "
+                f"together, but have {a:.4g} and {b:.4g}{unit}, {100.0 * apart:.3g} % apart; trust {better}: "
+                f"{_WHY.get(better, 'it stands first')}."
+            )
+    return sentences

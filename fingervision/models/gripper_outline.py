@@ -1,0 +1,181 @@
+"""The outline of a gripper's right half, and what must be geometrically true of it.
+
+The half is the union of its bars and polygons, less four notch discs, less everything left of the symmetry axis.
+"""
+
+from functools import lru_cache
+from math import atan2, cos, degrees, radians, sin
+
+import numpy as np
+
+from fingervision.domain.errors import FingervisionError
+from fingervision.domain.gripper import Gripper, Hinge, Lever, Links, PointMm
+from fingervision.models.planar_region import Ellipse, Loop, PlanarRegion, Polygon, Shape, bar, box
+
+_ON = 1e-6
+"""Of the height: how far beside a face material and void are looked for."""
+_SLIT = 0.05
+"""Of the neck: width of the slit that is sawn through it to see whether the body then falls in two."""
+_ASKEW_DEG = 15.0
+"""A notch across its link by more than this is no hinge of the link: its neck is then 4 % longer than its height."""
+_STATED = 0.05
+"""Relative: how far the stated width and height may be from the drawn ones. They take no part in any answer."""
+
+
+def notch_centres_mm(gripper: Gripper) -> tuple[PointMm, ...]:
+    """Centres of the four discs that cut the two hinges: radius + thickness / 2 to either side of each axis."""
+    return _notch_centres_mm(gripper.hinge, gripper.lever)
+
+
+def _notch_centres_mm(hinge: Hinge, lever: Lever) -> tuple[PointMm, ...]:
+    offset_mm = hinge.radius_mm + hinge.thickness_mm / 2.0
+    centres: list[PointMm] = []
+    for (x_mm, y_mm), axis_deg in ((lever.hinge1_mm, lever.hinge1_axis_deg), (lever.hinge2_mm, lever.hinge2_axis_deg)):
+        across = (-sin(radians(axis_deg)), cos(radians(axis_deg)))
+        centres += [(x_mm + side * offset_mm * across[0], y_mm + side * offset_mm * across[1]) for side in (-1, 1)]
+    return tuple(centres)
+
+
+def half_region(gripper: Gripper) -> PlanarRegion:
+    """Return the right half as shapes that are added and cut; its outline is computed once per drawing."""
+    face = (gripper.lever.drive_face_half_width_mm, gripper.lever.drive_face_y_mm)
+    return _half_region(gripper.hinge, gripper.lever, gripper.links, (face,))
+
+
+@lru_cache(maxsize=32)
+def _half_region(hinge: Hinge, lever: Lever, links: Links, marks: tuple[PointMm, ...]) -> PlanarRegion:
+    added: tuple[Polygon, ...] = (
+        box(*links.pillar_and_root_mm),
+        bar(*links.shuttle_from_mm, *links.shuttle_to_mm, links.shuttle_width_mm),
+        box(*links.drive_block_mm),
+        bar(*links.cross_bar_mm, links.cross_bar_width_mm),
+        bar(*links.finger_mm, links.finger_width_mm),
+        Polygon(links.tip_polygon_mm),
+    )
+    discs: list[Shape] = [
+        Ellipse(centre, (hinge.radius_mm, hinge.radius_mm)) for centre in _notch_centres_mm(hinge, lever)
+    ]
+    corners = np.concatenate([np.array(shape.corners_mm) for shape in added])
+    far = 3.0 * float(np.abs(corners).max())
+    cut = [*discs, box(-far, 0.0, -far, far)]
+    steps: list[tuple[bool, Shape]] = [(True, shape) for shape in added]
+    steps += [(False, shape) for shape in cut]
+    return PlanarRegion(tuple(steps), marks)
+
+
+def check_outline(gripper: Gripper, origin: str = "the drawing") -> None:
+    """Refuse a drawing whose outline is not that of a gripper with two hinges.
+
+    Raises
+    ------
+    FingervisionError
+        Where the half is not one body, a notch is a closed hole, a hinge does not hold its two sides together or does
+        not part them, or the clamp, the drive face or the tip's inner face is no face of the body.
+    """
+    region = half_region(gripper)
+    try:
+        outer = sum(loop.area_mm2 > 0.0 for loop in region.loops)
+    except FingervisionError as error:
+        raise FingervisionError(f"In {origin}: {error}") from error
+    if outer != 1:
+        raise FingervisionError(
+            f"The right half in {origin} must be one body, but the links and notches leave {outer} pieces; "
+            "check that the links overlap and that no notch cuts through one of them."
+        )
+    for number in (1, 2):
+        _check_hinge(gripper, number, origin)
+    _check_faces(gripper, region, origin)
+
+
+def _check_hinge(gripper: Gripper, number: int, origin: str) -> None:
+    region, hinge, links = half_region(gripper), gripper.hinge, gripper.links
+    (xa, ya), (xb, yb) = links.shuttle_from_mm, links.shuttle_to_mm
+    link_deg = 90.0 if number == 1 else degrees(atan2(yb - ya, xb - xa))
+    axis_deg = gripper.lever.hinge1_axis_deg if number == 1 else gripper.lever.hinge2_axis_deg
+    askew_deg = abs((axis_deg - link_deg + 90.0) % 180.0 - 90.0)
+    if askew_deg > _ASKEW_DEG:
+        raise FingervisionError(
+            f"lever.hinge{number}_axis_deg in {origin} must follow its link, which runs at {link_deg:.4g} degrees, "
+            f"within {_ASKEW_DEG:g} degrees, but is {axis_deg:g}."
+        )
+    x, y = gripper.lever.hinge1_mm if number == 1 else gripper.lever.hinge2_mm
+    if not region.holds(np.array([[x], [y]]))[0]:
+        raise FingervisionError(
+            f"lever.hinge{number}_mm in {origin} must lie inside its link, but there is no material at "
+            f"({x:g}, {y:g}) mm; check its place and its axis."
+        )
+    centres = notch_centres_mm(gripper)[2 * number - 2 : 2 * number]
+    for centre in centres:
+        for loop in region.loops:
+            ends = [curve.origin for curve in loop.curves if not curve.is_straight]
+            if loop.area_mm2 < 0.0 and len(ends) == len(loop.curves) and np.allclose(ends, centre):
+                raise FingervisionError(
+                    f"The notches of hinge {number} in {origin} must open through the faces of its link, but the disc "
+                    f"of hinge.radius_mm = {hinge.radius_mm:g} about ({centre[0]:.4g}, {centre[1]:.4g}) mm is a closed "
+                    "hole inside it; make hinge.radius_mm larger or the link narrower."
+                )
+    # Saw through the neck from disc to disc: the half must fall in two.
+    (xa, ya), (xb, yb) = centres
+    saw = bar(xa, ya, xb, yb, _SLIT * hinge.thickness_mm)
+    pieces = [loop for loop in PlanarRegion((*region.steps, (False, saw))).loops if loop.area_mm2 > 0.0]
+    apart = _ON * gripper.body.height_mm
+    x0, x1, y0, _ = links.pillar_and_root_mm
+    foot = (0.5 * (x0 + x1), y0 + apart) if number == 1 else (apart, gripper.lever.drive_mm[1])
+    tip = (gripper.tip_corner_mm[0] + apart, gripper.measuring_point_mm[1])
+    parted = any(_encloses(piece, foot) and not _encloses(piece, tip) for piece in pieces)
+    if len(pieces) != 2 or not parted:
+        end = "clamp" if number == 1 else "drive"
+        raise FingervisionError(
+            f"Hinge {number} in {origin} must be all that joins the {end} to the tip, but beside the "
+            f"neck of {hinge.thickness_mm:g} mm at ({x:g}, {y:g}) mm other material does; check "
+            f"lever.hinge{number}_mm, lever.hinge{number}_axis_deg and hinge.radius_mm against the link that it cuts."
+        )
+
+
+def _encloses(loop: Loop, point: PointMm) -> bool:
+    along = [curve.at(np.linspace(curve.t0, curve.t1, 33))[:, :-1] for curve in loop.curves]
+    corners = tuple((float(x), float(y)) for x, y in np.concatenate(along, axis=1).T)
+    return bool(Polygon(corners).holds(np.array(point)[:, None])[0])
+
+
+def _check_faces(gripper: Gripper, region: PlanarRegion, origin: str) -> None:
+    x0, x1, y0, _ = gripper.links.pillar_and_root_mm
+    lever = gripper.lever
+    half = min(lever.drive_face_half_width_mm, gripper.links.drive_block_mm[1])
+    inner_mm = gripper.tip_corner_mm[0]
+    tip_y = gripper.measuring_point_mm[1]
+    apart = _ON * gripper.body.height_mm
+    for name, (x, y), (nx, ny) in (
+        ("lower face of the pillar (links.pillar_and_root_mm)", (0.5 * (x0 + x1), y0), (0.0, 1.0)),
+        ("drive face (lever.drive_face_y_mm)", (0.5 * half, lever.drive_face_y_mm), (0.0, 1.0)),
+        ("tip's inner face at the measuring height (body.measured_below_tip_mm)", (inner_mm, tip_y), (1.0, 0.0)),
+    ):
+        beside = np.array([[x + apart * nx, x - apart * nx], [y + apart * ny, y - apart * ny]])
+        if region.holds(beside).tolist() != [True, False]:
+            raise FingervisionError(
+                f"The {name} in {origin} must be a free face of the body, but at ({x:.5g}, {y:.5g}) mm there is none; "
+                "check the links."
+            )
+    if not region.holds(np.array([[apart], [lever.drive_mm[1]]]))[0]:
+        raise FingervisionError(
+            f"lever.drive_mm in {origin} must lie in the drive block on the symmetry axis, but there is no material at "
+            f"(0, {lever.drive_mm[1]:g}) mm; check links.drive_block_mm."
+        )
+
+
+def check_stated_size(gripper: Gripper, origin: str) -> None:
+    """Refuse a drawing whose stated width or height is not that of its links."""
+    region = half_region(gripper)
+    points = np.concatenate([c.at(np.linspace(c.t0, c.t1, 9)) for loop in region.loops for c in loop.curves], axis=1)
+    body = gripper.body
+    drawn = {
+        "width_mm": 2.0 * float(points[0].max()),
+        "height_mm": float(points[1].max()) - gripper.links.pillar_and_root_mm[2],
+    }
+    for name, value in drawn.items():
+        stated = getattr(body, name)
+        if abs(stated - value) > _STATED * value:
+            raise FingervisionError(
+                f"body.{name} in {origin} must be that of the drawn links, {value:.6g} mm within "
+                f"{100.0 * _STATED:g} %, but is {stated:g}; correct the one or the other."
+            )

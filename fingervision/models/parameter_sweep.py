@@ -1,0 +1,120 @@
+"""A grid over numbers of a drawing, each variant answered by the lumped model."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import product
+from operator import attrgetter
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fingervision.domain.errors import UsageError
+from fingervision.domain.gripper import Gripper
+from fingervision.models.gripper_outline import check_outline
+from fingervision.models.hinge_correction import HingeTheory
+from fingervision.models.lumped import LumpedGripper
+from fingervision.models.redrawn import redrawn
+from fingervision.models.static_answer import gap_per_input
+
+Array = NDArray[np.float64]
+
+COLUMNS = ("gap_per_input", "input_stiffness_n_mm", "peak_stress_mpa_per_mm", "input_at_yield_mm", "contact_input_mm")
+_MOST_VARIANTS = 2000
+
+
+@dataclass(frozen=True, slots=True)
+class Variation:
+    """Values that one number of a drawing takes.
+
+    Parameters
+    ----------
+    name : str
+        Dotted name as in `gripper.toml`, such as `hinge.thickness_mm`.
+    values : tuple of float
+        In its own unit.
+    """
+
+    name: str
+    values: tuple[float, ...]
+
+
+def parse_variation(text: str) -> Variation:
+    """Read `NAME=A:B:N`.
+
+    Raises
+    ------
+    UsageError
+        Where the text is no such thing.
+    """
+    name, _, span = text.partition("=")
+    parts = span.split(":")
+    try:
+        first, last, count = float(parts[0]), float(parts[1]), int(parts[2])
+    except (ValueError, IndexError):
+        count = 0
+    if len(parts) != 3 or not 2 <= count <= _MOST_VARIANTS or not np.all(np.isfinite([first, last])):
+        raise UsageError(
+            f"--vary must be NAME=A:B:N with numbers A and B and 2 to {_MOST_VARIANTS} values, such as "
+            f"hinge.thickness_mm=0.6:1.4:9, but is {text}."
+        )
+    return Variation(name, tuple(np.linspace(first, last, count).tolist()))
+
+
+def varied(gripper: Gripper, variations: Sequence[Variation], values: Sequence[float]) -> Gripper:
+    """Redraw a gripper with some numbers at given values, and all that hangs on them."""
+    for variation, value in zip(variations, values, strict=True):
+        try:
+            now = attrgetter(variation.name)(gripper)
+        except AttributeError:
+            now = None
+        if not isinstance(now, float):
+            raise UsageError(
+                f"--vary must name a number of the drawing as gripper.toml does, such as hinge.thickness_mm, but names "
+                f"{variation.name}."
+            )
+        gripper = redrawn(gripper, variation.name, value - now)
+    return gripper
+
+
+def sweep_answers(gripper: Gripper, variations: Sequence[Variation], theory: HingeTheory) -> tuple[Array, Array]:
+    """Answer every combination of the values.
+
+    Parameters
+    ----------
+    gripper : Gripper
+        The drawing.
+    variations : sequence of Variation
+        Each an axis of the grid; the last runs fastest.
+    theory : HingeTheory
+        Of the hinges.
+
+    Returns
+    -------
+    values : ndarray of float, shape (n, k)
+        Of the numbers varied.
+    answers : ndarray of float, shape (n, 5)
+        In the order of `COLUMNS`; a contact that never comes is infinite.
+
+    Raises
+    ------
+    FingervisionError
+        Where a corner of the grid is no gripper, or the grid is too large.
+    """
+    grid = list(product(*(variation.values for variation in variations)))
+    if len(grid) > _MOST_VARIANTS:
+        raise UsageError(f"--vary must give at most {_MOST_VARIANTS} variants, but gives {len(grid)}.")
+    for corner in product(*((min(v.values), max(v.values)) for v in variations)):
+        check_outline(varied(gripper, variations, corner), f"the variant {_spelt(variations, corner)}")
+    rows = []
+    for values in grid:
+        drawn = varied(gripper, variations, values)
+        model = LumpedGripper(drawn, theory=theory)
+        stress, touch = model.peak_stress().mpa_per_mm, model.half.first_touch_mm()
+        force = model.half.equilibrium(1.0).force_n
+        at_yield = drawn.material.yield_mpa / stress
+        rows.append((gap_per_input(model.half), force, stress, at_yield, -np.inf if touch is None else touch))
+    return np.array(grid), np.array(rows)
+
+
+def _spelt(variations: Sequence[Variation], values: Sequence[float]) -> str:
+    return ", ".join(f"{v.name} = {value:g}" for v, value in zip(variations, values, strict=True))

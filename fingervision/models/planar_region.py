@@ -1,0 +1,266 @@
+"""A plane body as shapes that are added and cut in turn, and its exact outline of segments and arcs.
+
+Every shape's outline is divided where it meets another's; the pieces that have material on exactly one side are the
+body's outline. Nothing is approximated: a notch stays an arc.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fingervision.domain.errors import FingervisionError
+from fingervision.models.outline_curves import Curve, crossings
+
+Array = NDArray[np.float64]
+Point = tuple[float, float]
+
+_BESIDE = 1e-6
+"""Of the body's size: how far beside a piece its two sides are looked at. Finer details than this do not exist."""
+_TURNS_IN = -0.2
+"""Sine of the turn to the right beyond which a corner turns into the body."""
+_SAME = 1e-8
+"""Of the body's size: corners closer than this are one."""
+
+
+@dataclass(frozen=True, slots=True)
+class Polygon:
+    """A straight-sided shape.
+
+    Parameters
+    ----------
+    corners_mm : tuple of (float, float)
+        In order, either way round.
+    """
+
+    corners_mm: tuple[Point, ...]
+
+    def curves(self) -> list[Curve]:
+        """Sides."""
+        corners = np.array(self.corners_mm)
+        pairs = zip(corners, np.roll(corners, -1, axis=0), strict=True)
+        return [Curve(a, b - a, None, 0.0, 1.0) for a, b in pairs if np.hypot(*(b - a)) > 0.0]
+
+    def holds(self, points: Array) -> NDArray[np.bool_]:
+        """Whether points, shape (2, n), lie inside: an odd number of sides to the right of them."""
+        x, y = points
+        inside = np.zeros(x.shape, dtype=bool)
+        corners = np.array(self.corners_mm)
+        for (xa, ya), (xb, yb) in zip(corners, np.roll(corners, -1, axis=0), strict=True):
+            if ya != yb:
+                inside ^= ((ya > y) != (yb > y)) & (x < xa + (xb - xa) * (y - ya) / (yb - ya))
+        return inside
+
+
+@dataclass(frozen=True, slots=True)
+class Ellipse:
+    """A disc or an ellipse.
+
+    Parameters
+    ----------
+    centre_mm : (float, float)
+        Its middle.
+    half_axes_mm : (float, float)
+        Along its own axis and across it; equal for a disc.
+    axis_deg : float
+        Direction of its own axis from x.
+    """
+
+    centre_mm: Point
+    half_axes_mm: Point
+    axis_deg: float = 0.0
+
+    def _axes(self) -> tuple[Array, Array]:
+        angle = np.radians(self.axis_deg)
+        along = np.array([np.cos(angle), np.sin(angle)])
+        return self.half_axes_mm[0] * along, self.half_axes_mm[1] * np.array([-along[1], along[0]])
+
+    def curves(self) -> list[Curve]:
+        """Four arcs."""
+        u, v = self._axes()
+        quarters = np.pi / 2.0 * np.arange(5.0)
+        return [Curve(np.array(self.centre_mm), u, v, a, b) for a, b in pairwise(quarters.tolist())]
+
+    def holds(self, points: Array) -> NDArray[np.bool_]:
+        """Whether points, shape (2, n), lie inside."""
+        return np.asarray(self.curves()[0].level(points) < 0.0)
+
+
+Shape = Polygon | Ellipse
+
+
+def crosses_itself(corners_mm: tuple[Point, ...]) -> bool:
+    """Whether two sides of a polygon that are no neighbours meet."""
+    sides = Polygon(corners_mm).curves()
+    count = len(sides)
+    return any(
+        crossings(sides[i], sides[j])
+        for i in range(count)
+        for j in range(i + 2, count)
+        if not (i == 0 and j == count - 1)
+    )
+
+
+def bar(x0: float, y0: float, x1: float, y1: float, width_mm: float) -> Polygon:
+    """Return a straight bar about the line between two points."""
+    length = float(np.hypot(x1 - x0, y1 - y0))
+    nx, ny = -(y1 - y0) / length * width_mm / 2.0, (x1 - x0) / length * width_mm / 2.0
+    return Polygon(((x0 - nx, y0 - ny), (x1 - nx, y1 - ny), (x1 + nx, y1 + ny), (x0 + nx, y0 + ny)))
+
+
+def box(x0: float, x1: float, y0: float, y1: float) -> Polygon:
+    """Return an upright rectangle."""
+    return Polygon(((x0, y0), (x1, y0), (x1, y1), (x0, y1)))
+
+
+@dataclass(frozen=True, slots=True)
+class Loop:
+    """A closed part of the outline.
+
+    Parameters
+    ----------
+    curves : tuple of Curve
+        In order, the body on their left: the outside runs anticlockwise, a hole clockwise.
+    area_mm2 : float
+        Enclosed; negative for a hole.
+    """
+
+    curves: tuple[Curve, ...]
+    area_mm2: float
+
+
+@dataclass(frozen=True, eq=False)
+class PlanarRegion:
+    """A body as steps: each adds a shape to what is there or cuts it away.
+
+    Parameters
+    ----------
+    steps : tuple of (bool, Shape)
+        Whether the shape is added, and the shape; in order.
+    marks_mm : tuple of (float, float)
+        Points that must be corners where they lie on the outline.
+    """
+
+    steps: tuple[tuple[bool, Shape], ...]
+    marks_mm: tuple[Point, ...] = ()
+
+    def holds(self, points: Array) -> NDArray[np.bool_]:
+        """Whether points, shape (2, n), lie in the body."""
+        inside = np.zeros(points.shape[1], dtype=bool)
+        for added, shape in self.steps:
+            inside = inside | shape.holds(points) if added else inside & ~shape.holds(points)
+        return inside
+
+    @cached_property
+    def size_mm(self) -> float:
+        """Diagonal of the box round all that is added."""
+        ends = np.concatenate([c.at(np.linspace(c.t0, c.t1, 5)) for added, s in self.steps if added
+                               for c in s.curves()], axis=1)  # fmt: skip
+        return float(np.hypot(*(ends.max(axis=1) - ends.min(axis=1))))
+
+    @cached_property
+    def loops(self) -> tuple[Loop, ...]:
+        """The outline.
+
+        Raises
+        ------
+        FingervisionError
+            Where two parts of it touch in a point, so that the body is not defined there.
+        """
+        curves = [curve for _, shape in self.steps for curve in shape.curves()]
+        pieces: list[Curve] = []
+        boxes = np.array([_box_mm(curve) for curve in curves])
+        apart = _BESIDE * self.size_mm
+        for place, curve in enumerate(curves):
+            at = [curve.t0, curve.t1]
+            low, high = boxes[place, 0] - apart, boxes[place, 1] + apart
+            near = np.all((boxes[:, 0] <= high) & (boxes[:, 1] >= low), axis=1)
+            near[place] = False
+            for other in np.flatnonzero(near).tolist():
+                at += crossings(curve, curves[other])
+            for mark in self.marks_mm:
+                at += crossings(curve, Curve(np.array(mark), np.array([1e-12, 0.0]), None, 0.0, 1.0))
+            at = sorted(at)
+            pieces += [curve.part(a, b) for a, b in pairwise(at)]
+        return _chained(self._on_outline(pieces), _SAME * self.size_mm)
+
+    def _on_outline(self, pieces: list[Curve]) -> list[Curve]:
+        """Keep the pieces that part the body from the void, turned so that the body lies on their left."""
+        apart = _BESIDE * self.size_mm
+        pieces = [p for p in pieces if np.hypot(*(p.end_mm - p.start_mm)) > 2.0 * _SAME * self.size_mm]
+        middles = np.array([0.5 * (p.t0 + p.t1) for p in pieces])
+        at = np.concatenate([p.at(np.array([t])) for p, t in zip(pieces, middles, strict=True)], axis=1)
+        along = np.concatenate([p.direction(np.array([t])) for p, t in zip(pieces, middles, strict=True)], axis=1)
+        left = np.stack([-along[1], along[0]])
+        on_left, on_right = self.holds(at + apart * left), self.holds(at - apart * left)
+        kept: list[Curve] = []
+        seen: set[tuple[int, ...]] = set()
+        for place in np.flatnonzero(on_left != on_right).tolist():
+            key = tuple(np.round(at[:, place] / (10.0 * apart)).astype(int).tolist())
+            if key not in seen:  # shapes that share a side have it once
+                seen.add(key)
+                piece = pieces[place]
+                kept.append(piece if on_left[place] else piece.part(piece.t1, piece.t0))
+        return kept
+
+
+def sharp_corners_mm(region: PlanarRegion) -> list[Array]:
+    """Corners that turn into the body without a radius: stress is singular there."""
+    found = []
+    for loop in region.loops:
+        for before, after in zip(loop.curves, loop.curves[1:] + loop.curves[:1], strict=True):
+            a, b = before.direction(np.array([before.t1]))[:, 0], after.direction(np.array([after.t0]))[:, 0]
+            if a[0] * b[1] - a[1] * b[0] < _TURNS_IN:
+                found.append(after.start_mm)
+    return found
+
+
+def _box_mm(curve: Curve) -> tuple[Array, Array]:
+    """Lowest and highest corner of an upright box that holds a curve; the whole ellipse where it is an arc."""
+    if curve.v is None:
+        points = np.stack([curve.start_mm, curve.end_mm])
+    else:
+        reach = np.abs(curve.u) + np.abs(curve.v)
+        points = np.stack([curve.origin - reach, curve.origin + reach])
+    return points.min(axis=0), points.max(axis=0)
+
+
+def _chained(pieces: list[Curve], same_mm: float) -> tuple[Loop, ...]:
+    starts = np.array([p.start_mm for p in pieces]).reshape(-1, 2)
+    following: dict[int, int] = {}
+    for place, piece in enumerate(pieces):
+        distance = np.hypot(*(starts - piece.end_mm).T)
+        near = np.flatnonzero(distance < 10.0 * same_mm)
+        if near.size != 1:
+            x, y = piece.end_mm
+            what = "ends" if near.size == 0 else "touches itself in a point"
+            raise FingervisionError(
+                f"The outline must close and part the body everywhere, but it {what} at ({x:.6g}, {y:.6g}) mm; "
+                "let the shapes overlap there, or stay apart."
+            )
+        following[place] = int(near[0])
+    loops = []
+    left = set(following)
+    while left:
+        first = min(left)
+        order = [first]
+        left.discard(first)
+        while (place := following[order[-1]]) != first:
+            if place not in left:
+                break
+            order.append(place)
+            left.discard(place)
+        curves = tuple(pieces[place] for place in order)
+        loops.append(Loop(curves, _area_mm2(curves)))
+    return tuple(sorted(loops, key=lambda loop: -abs(loop.area_mm2)))
+
+
+def _area_mm2(curves: tuple[Curve, ...]) -> float:
+    """Green's formula along the curves; the trapezoidal rule on an arc is good to 1e-4, and only its sign is used."""
+    total = 0.0
+    for curve in curves:
+        x, y = curve.at(np.linspace(curve.t0, curve.t1, 2 if curve.is_straight else 65))
+        total += 0.5 * float(np.sum(x[:-1] * y[1:] - x[1:] * y[:-1]))
+    return total

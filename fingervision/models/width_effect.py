@@ -1,0 +1,90 @@
+"""How far the width of a plate holds its flexures back: between plane stress and plane strain.
+
+A bar that bends narrows on its stretched side and widens on the pressed one. A flexure that is short beside its width
+cannot, because the thick material at its ends does not: it is stiffer than plane stress has it, by up to 1 / (1 - nu^2)
+in plane strain. The share w of the way from the one to the other comes from brick elements (`hinge_correction`).
+"""
+
+from dataclasses import dataclass
+from math import cos, radians, sin
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fingervision.domain.gripper import Gripper, Material, PointMm
+from fingervision.models.hinge_correction import plane_strain_share
+from fingervision.models.notch import notches_of
+
+Array = NDArray[np.float64]
+
+SHARE_UNCERTAINTY = 0.05
+"""Of w, standard. Bending is within 0.42 % of bricks between elastic blocks for width over thickness 1 to 20 and t / R
+0.0125 to 0.5 (`tests/benchmarks/models_width.py`), which is 0.04 of w at nu = 0.34. Of the force it is 0.05 nu^2,
+0.6 %."""
+
+
+@dataclass(frozen=True, slots=True)
+class ConstrainedZone:
+    """A flexure as the plate sees it: an upright or turned rectangle in which the width is held back.
+
+    Parameters
+    ----------
+    centre_mm : (float, float)
+        Its middle.
+    axis_deg : float
+        Direction of the flexure's axis from x.
+    half_length_mm, half_height_mm : float
+        Half extents along the axis and across it.
+    share : float
+        0 plane stress, 1 plane strain.
+    """
+
+    centre_mm: PointMm
+    axis_deg: float
+    half_length_mm: float
+    half_height_mm: float
+    share: float
+
+    def holds(self, points: Array) -> NDArray[np.bool_]:
+        """Whether points, shape (2, n), lie in it."""
+        c, s = cos(radians(self.axis_deg)), sin(radians(self.axis_deg))
+        x, y = points[0] - self.centre_mm[0], points[1] - self.centre_mm[1]
+        return np.asarray(
+            (np.abs(c * x + s * y) <= self.half_length_mm) & (np.abs(c * y - s * x) <= self.half_height_mm)
+        )
+
+
+def gripper_zones(gripper: Gripper) -> tuple[ConstrainedZone, ...]:
+    """Return the zones of a gripper's two hinges."""
+    lever = gripper.lever
+    places = ((lever.hinge1_mm, lever.hinge1_axis_deg), (lever.hinge2_mm, lever.hinge2_axis_deg))
+    return tuple(
+        ConstrainedZone(
+            centre, axis_deg, notch.reach_mm, notch.depth_mm + 0.5 * notch.thickness_mm, plane_strain_share(notch)
+        )
+        for (centre, axis_deg), notch in zip(places, notches_of(gripper), strict=True)
+    )
+
+
+def shares_at(zones: tuple[ConstrainedZone, ...], points: Array) -> Array:
+    """Share of plane strain at points, shape (2, n); 0 outside the zones."""
+    share = np.zeros(points.shape[1])
+    for zone in zones:
+        share = np.where(zone.holds(points), np.maximum(share, zone.share), share)
+    return share
+
+
+def held_moduli(material: Material, share: Array) -> tuple[Array, Array]:
+    """Young's modulus and Poisson's ratio of the plane law with a share w of plane strain.
+
+    With sigma_z = w nu (sigma_x + sigma_y) Hooke's law in the plane is that of plane stress with
+    E' = E / (1 - w nu^2) and nu' = nu (1 + w nu) / (1 - w nu^2); the shear modulus stays.
+    """
+    E, nu = material.youngs_modulus_mpa, material.poisson_ratio
+    held = 1.0 - share * nu**2
+    return E / held, nu * (1.0 + share * nu) / held
+
+
+def force_uncertainty(material: Material) -> float:
+    """Relative standard uncertainty of force and frequency squared by the width effect."""
+    return SHARE_UNCERTAINTY * material.poisson_ratio**2

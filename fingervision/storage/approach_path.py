@@ -1,0 +1,127 @@
+"""The path that an axis travelled between readings at targets, from the side of approach of each."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import numpy as np
+
+NOMINAL_S = 30.0
+"""Time from one row to the next where a table has none. A published log of a stage against a laser has 28.5 s from
+reading to reading: move, settle, average. Effects of a second and less are then rightly taken for unseen."""
+SWAPPED = 0.75
+"""Share of the moves from target to target that go against the stated direction, above which the directions stand the
+wrong way round. Right, hardly any do: the way back of cycles in one direction, one in as many as there are targets."""
+LONGEST_OVERSHOOT_MM = 0.5
+"""Longest way beyond a target: the largest play that the catalogue knows. Shorter where the targets lie closer, so that
+no target is approached over a longer way than its neighbours."""
+
+
+@dataclass(frozen=True, slots=True)
+class Reading:
+    """A reading at a target: position (None: missing), side of approach (+1 from below, -1 from above), cycle, time."""
+
+    target_mm: float
+    position_mm: float | None
+    side: int
+    cycle: int
+    run: str = ""
+    time_s: float | None = None
+    u_random_mm: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class PathRow:
+    """A row of a measured table; without a gap it belongs to the input's path alone."""
+
+    input_mm: float
+    gap_mm: float | None
+    time_s: float
+    run: str
+    u_random_mm: float | None = None
+
+
+def approach_path(readings: Sequence[Reading]) -> tuple[tuple[PathRow, ...], tuple[str, ...]]:
+    """Put readings into the order of travel, with a row beyond the target wherever the path must have been there.
+
+    Parameters
+    ----------
+    readings : sequence of Reading
+        In any order, each target once a run, cycle and side.
+
+    Returns
+    -------
+    rows : tuple of PathRow
+        Runs one after the other, times rising within each.
+    notes : tuple of str
+        What was assumed, a sentence each.
+    """
+    timed = all(reading.time_s is not None for reading in readings)
+    notes = []
+    against, moves = _against(
+        sorted(readings, key=lambda reading: (reading.run, _time(reading)) if timed else ("", 0.0))
+    )
+    if against > SWAPPED * moves:
+        came = f"{against} of {moves} moves from target to target go against the stated direction"
+        if timed:
+            readings = [replace(reading, side=-reading.side) for reading in readings]
+            notes.append(f"By the times {came}: the directions were taken as swapped, and exchanged.")
+        elif len({reading.side for reading in readings}) > 1:
+            # A table of one side may well be sorted by its targets.
+            notes.append(f"In the order of the rows {came}: are the directions swapped?")
+    targets = np.unique([reading.target_mm for reading in readings])
+    closest = float(np.min(np.diff(targets))) if targets.size > 1 else LONGEST_OVERSHOOT_MM
+    beyond = min(LONGEST_OVERSHOOT_MM, closest)
+    rows: list[PathRow] = []
+    added = 0
+    for run in dict.fromkeys(reading.run for reading in readings):
+        mine = [reading for reading in readings if reading.run == run]
+        ordered = sorted(mine, key=_time) if timed else sorted(mine, key=_travel)
+        path, times = _with_overshoots(ordered, beyond, timed)
+        added += len(path) - len(ordered)
+        rows += [replace(row, time_s=time) for row, time in zip(path, times, strict=True)]
+    if not timed:
+        notes.append(
+            "The table has no times: within a cycle, targets approached from below were taken in ascending order, then "
+            f"those from above in descending order, one row every {NOMINAL_S:g} s. Rates and time constants of the "
+            "report count in that time."
+        )
+    if added:
+        notes.append(
+            f"{added} rows without a gap were added {beyond:g} mm beyond a target, where the stated side of approach "
+            "needs that the stage came from there."
+        )
+    return tuple(rows), tuple(notes)
+
+
+def _against(ordered: Sequence[Reading]) -> tuple[int, int]:
+    """Moves to another target that go against the direction stated there, and all moves."""
+    moves = [(b.target_mm - a.target_mm) * b.side for a, b in pairwise(ordered) if a.run == b.run]
+    return sum(move < 0.0 for move in moves), sum(move != 0.0 for move in moves)
+
+
+def _time(reading: Reading) -> float:
+    return 0.0 if reading.time_s is None else reading.time_s
+
+
+def _travel(reading: Reading) -> tuple[int, int, float]:
+    """Cycle, from below before from above, in the direction of travel."""
+    return reading.cycle, -reading.side, reading.side * reading.target_mm
+
+
+def _with_overshoots(ordered: Sequence[Reading], beyond: float, timed: bool) -> tuple[list[PathRow], list[float]]:
+    """Rows of a run and their times; an added row is halfway in time between its neighbours."""
+    path: list[PathRow] = []
+    times: list[float] = []
+    clock = [_time(reading) for reading in ordered]
+    usual = float(np.median(np.diff(clock))) if timed and len(clock) > 1 else NOMINAL_S
+    for reading, time in zip(ordered, clock, strict=True):
+        came_from = path[-1].input_mm if path else None
+        if came_from is None or reading.side * (reading.target_mm - came_from) <= 0.0:
+            path.append(PathRow(reading.target_mm - reading.side * beyond, None, 0.0, reading.run))
+            times.append((times[-1] + time) / 2.0 if times else time - usual / 2.0)
+        path.append(PathRow(reading.target_mm, reading.position_mm, 0.0, reading.run, reading.u_random_mm))
+        times.append(time)
+    if not timed:
+        times = [NOMINAL_S * k for k in range(len(path))]
+    return path, times

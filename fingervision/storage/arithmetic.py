@@ -1,0 +1,75 @@
+"""Arithmetic in drawings: lengths that refer to each other by name."""
+
+import ast
+import math
+import operator
+from collections.abc import Callable, Mapping
+from types import MappingProxyType
+from typing import Any
+
+from fingervision.domain.errors import FingervisionError
+
+_BINARY: Mapping[type[ast.operator], Callable[[float, float], float]] = MappingProxyType(
+    {ast.Add: operator.add, ast.Sub: operator.sub, ast.Mult: operator.mul, ast.Div: operator.truediv}
+)
+_FUNCTIONS: Mapping[str, Callable[[float], float]] = MappingProxyType(
+    {
+        "sqrt": math.sqrt,
+        "sin_deg": lambda angle: math.sin(math.radians(angle)),
+        "cos_deg": lambda angle: math.cos(math.radians(angle)),
+        "tan_deg": lambda angle: math.tan(math.radians(angle)),
+    }
+)
+LARGEST = 1e5
+"""Nothing drawn is larger than 100 m, or has more degrees."""
+
+
+def number(raw: Any, names: Mapping[str, float], what: str) -> float:
+    """Read a number, or a text of numbers, names, + - * / ( ), sqrt, sin_deg, cos_deg and tan_deg.
+
+    Parameters
+    ----------
+    raw : object
+        As the file has it.
+    names : mapping of str to float
+        What names stand for.
+    what : str
+        The number and its file, for errors.
+
+    Raises
+    ------
+    FingervisionError
+        Where it is no finite number of a sensible size, or uses what is not known.
+    """
+    if isinstance(raw, str):
+        try:
+            value = _evaluated(ast.parse(raw, mode="eval").body, names)
+        except (SyntaxError, ValueError, ZeroDivisionError, OverflowError, RecursionError) as error:
+            raise FingervisionError(
+                f"{what} must be a number or arithmetic with names, but is {raw!r}: {error}."
+            ) from None
+    elif isinstance(raw, bool) or not isinstance(raw, int | float):
+        raise FingervisionError(f"{what} must be a number or arithmetic with names, but is {raw!r}.")
+    else:
+        value = float(raw) if abs(raw) <= 10.0 * LARGEST else math.copysign(math.inf, raw)
+    if not abs(value) <= LARGEST:
+        raise FingervisionError(f"{what} must be a number of at most {LARGEST:g}, but is {value:g}.")
+    return value
+
+
+def _evaluated(node: ast.expr, names: Mapping[str, float]) -> float:
+    match node:
+        case ast.Constant(value=int() | float() as value) if not isinstance(value, bool):
+            return float(value)
+        case ast.Name(id=name):
+            if name not in names:
+                raise ValueError(f"there is no {name} in [lengths] above it")
+            return names[name]
+        case ast.UnaryOp(op=ast.USub(), operand=operand):
+            return -_evaluated(operand, names)
+        case ast.BinOp(left=left, op=op, right=right) if type(op) in _BINARY:
+            return _BINARY[type(op)](_evaluated(left, names), _evaluated(right, names))
+        case ast.Call(func=ast.Name(id=name), args=[argument], keywords=[]) if name in _FUNCTIONS:
+            return _FUNCTIONS[name](_evaluated(argument, names))
+        case _:
+            raise ValueError("only numbers, names, + - * / ( ), sqrt, sin_deg, cos_deg and tan_deg are known")

@@ -1,0 +1,220 @@
+"""A table of targets, cycles and directions (ISO 230-2) read as the rows of a measured table in the order of travel.
+
+Long form, a reading a row: `target_mm, cycle, direction` and one of `position_mm, position_um, deviation_mm,
+deviation_um`, with `time_s, run, u_random_mm` where there are. Matrix form, a target a row: `target_mm` and columns
+such as `up_1_deviation_um`, `down_1_deviation_um`; or `cycle_1_position_mm` beside a `direction` column.
+"""
+
+import csv
+import re
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from fingervision.domain.errors import FingervisionError
+from fingervision.storage.approach_path import PathRow, Reading, approach_path
+from fingervision.storage.csv_columns import number, read_columns
+
+TARGET = "target_mm"
+QUANTITIES = {"position_mm": 1.0, "position_um": 1e-3, "deviation_mm": 1.0, "deviation_um": 1e-3}
+"""Columns of a reading and their factor to mm."""
+FROM_BELOW = "+ +1 1 up u forward forwards fwd positive pos increasing ascending rising ↑"
+FROM_ABOVE = "- -1 down d backward backwards bwd reverse rev negative neg decreasing descending falling ↓"
+SIDES = dict.fromkeys(FROM_BELOW.split(), 1) | dict.fromkeys(FROM_ABOVE.split(), -1)
+MINUS = "\N{MINUS SIGN}"
+MATRIX = re.compile(
+    r"(?P<side>[^\d\s_]+)_?(?P<cycle>\d+)_(?P<quantity>(?:position|deviation)_(?:mm|um))", re.IGNORECASE
+)
+FORWARD = {"forward", "forwards", "fwd"}
+"""Words that say along the axis to one author and towards its zero to another."""
+UNSIDED = "cycle"
+SMALLEST_TRAVEL = 0.05
+"""Range of the positions over that of the targets below which they are deviations under a wrong name."""
+LARGEST_DEVIATION = 0.5
+"""Range of the deviations over that of the targets above which they are positions under a wrong name: no axis errs by
+half its travel."""
+
+
+@dataclass(frozen=True, slots=True)
+class Iso230Rows:
+    """Rows of a measured table, overshoots among them, and what was assumed, a sentence each."""
+
+    rows: tuple[PathRow, ...]
+    notes: tuple[str, ...]
+
+    def cells(self) -> dict[str, list[str]]:
+        """Columns `input_mm, gap_mm, time_s` and, where there are, `run, u_random_mm`, as text; a missing gap is ''."""
+        out = {
+            "input_mm": [repr(row.input_mm) for row in self.rows],
+            "gap_mm": ["" if row.gap_mm is None else repr(row.gap_mm) for row in self.rows],
+            "time_s": [repr(row.time_s) for row in self.rows],
+        }
+        if any(row.run for row in self.rows):
+            out["run"] = [row.run for row in self.rows]
+        if any(row.u_random_mm is not None for row in self.rows):
+            out["u_random_mm"] = ["" if row.u_random_mm is None else repr(row.u_random_mm) for row in self.rows]
+        return out
+
+
+def read_iso230_table(path: Path) -> Iso230Rows | None:
+    """Read a table of targets, cycles and directions; None where the file is none (no `target_mm`, or an `input_mm`).
+
+    The gap is the position, or target + deviation. Rows are put into the order of travel: by `time_s` where every row
+    has one, else cycle by cycle, the targets approached from below in ascending order and then those from above in
+    descending order, a reading every 30 s. Where the path does not come from the stated side a row without a gap is
+    added beyond the target.
+
+    Raises
+    ------
+    FingervisionError
+        In a sentence: columns missing, words that are no direction, a reading that stands twice, deviations under the
+        name of positions or the other way round.
+    """
+    header = _header(path)
+    if TARGET not in header or "input_mm" in header:
+        return None
+    blocks = {name: match for name in header if (match := MATRIX.fullmatch(name)) is not None}
+    quantities = {name: match["quantity"].lower() for name, match in blocks.items()} or {
+        name: name for name in QUANTITIES if name in header
+    }
+    kinds = sorted(set(quantities.values()))
+    if len(kinds) != 1:
+        raise FingervisionError(
+            f"{path} must have its readings as one of {', '.join(QUANTITIES)}, but has "
+            f"{' and '.join(kinds) or ','.join(header)}: name the column of the readings so, or one column a cycle "
+            "up_1_deviation_um, down_1_deviation_um and so on."
+        )
+    sided = bool(blocks) and all(match["side"].lower() != UNSIDED for match in blocks.values())
+    if not sided and "direction" not in header:
+        raise FingervisionError(
+            f"{path} must have a column direction (up or down: the side from which the target was approached), but "
+            f"has {','.join(header)}: add it; or, where the rows stand in the order of travel, name the columns "
+            "input_mm and gap_mm."
+        )
+    wanted = ("run", *(() if sided else ("direction",)), *(() if blocks else ("cycle", "time_s", "u_random_mm")))
+    cells = read_columns(path, (TARGET, *quantities), wanted)
+    listed = _cells(cells, blocks, next(iter(quantities)))
+    readings, words = _readings(path, listed, kinds[0], cells)
+    _check_quantity(path, readings, kinds[0])
+    rows, assumed = approach_path(readings)
+    notes = [
+        f"Read as an ISO 230-2 table: {len({r.target_mm for r in readings})} targets, "
+        f"{len({(r.run, r.cycle) for r in readings})} cycles; input = target, gap = "
+        f"{'position' if kinds[0].startswith('position') else 'target + deviation'}."
+    ]
+    if words & FORWARD:
+        notes.append(
+            f"The direction {sorted(words & FORWARD)[0]} was taken as the approach from below, the input increasing. "
+            "Some published reports mean the approach from above by it: if the reversal comes out with the wrong sign, "
+            "exchange the directions."
+        )
+    return Iso230Rows(rows, (*notes, *assumed))
+
+
+def _header(path: Path) -> list[str]:
+    """Names in the first line that is no comment; none where the file cannot be read, which `read_columns` will say."""
+    try:
+        lines = path.read_text(encoding="utf-8-sig").splitlines()
+    except (OSError, UnicodeDecodeError):
+        return []
+    first = next((line for line in lines if line.strip() and not line.lstrip().startswith("#")), "")
+    return [cell.strip() for cell in next(csv.reader([first]), [])]
+
+
+@dataclass(frozen=True, slots=True)
+class _Cell:
+    """A cell with a reading: row of the table, its column, the word of its direction, its cycle ('': by order)."""
+
+    row: int
+    column: str
+    direction: str
+    cycle: str
+
+
+def _cells(cells: dict[str, list[str]], blocks: dict[str, re.Match[str]], column: str) -> list[_Cell]:
+    """Every cell that may hold a reading, of the long form or of the matrix."""
+    directions = cells.get("direction")
+    if not blocks:
+        cycles = cells.get("cycle", [""] * len(cells[TARGET]))
+        return [_Cell(row, column, directions[row], cycles[row]) for row in range(len(cycles))] if directions else []
+    return [
+        _Cell(row, name, directions[row] if directions else match["side"], match["cycle"])
+        for name, match in blocks.items()
+        for row in range(len(cells[TARGET]))
+    ]
+
+
+def _readings(
+    path: Path, listed: list[_Cell], quantity: str, cells: dict[str, list[str]]
+) -> tuple[list[Reading], set[str]]:
+    """Readings, and the words of direction that were used."""
+    factor, relative = QUANTITIES[quantity], quantity.startswith("deviation")
+    names = [cell.cycle for cell in listed]
+    numbers = {name: k for k, name in enumerate(sorted(set(names), key=_cycle_order(names)))}
+    out: list[Reading] = []
+    seen: dict[tuple[str, float, int, int], int] = {}
+    words = set()
+    for cell in listed:
+        target = number(path, TARGET, cell.row, cells[TARGET][cell.row])
+        if target is None:
+            raise FingervisionError(f"{TARGET} must be a number, but is empty in data row {cell.row + 1} of {path}.")
+        word = cell.direction.strip().lower().replace(MINUS, "-")
+        word = re.sub(r"^([+-]?1)\.0*$", r"\1", word)
+        if word not in SIDES:
+            raise FingervisionError(
+                f"direction must be up (from below) or down (from above), or a word for it such as + and -, +1 and -1, "
+                f"forward and backward, but is {cell.direction or 'empty'} in data row {cell.row + 1} of {path}: "
+                "rename it."
+            )
+        words.add(word)
+        run = cells["run"][cell.row] if "run" in cells else ""
+        value = number(path, cell.column, cell.row, cells[cell.column][cell.row])
+        side = SIDES[word]
+        cycle = numbers[cell.cycle]
+        key = (run, target, side, cycle)
+        if not cell.cycle:
+            cycle = seen.get(key, 0)
+        elif key in seen:
+            raise FingervisionError(
+                f"A target must stand once a cycle and direction, but {target:g} mm, cycle {cell.cycle}, "
+                f"{cell.direction} stands twice in {path}: number the cycles, or name the runs in a column run."
+            )
+        seen[key] = seen.get(key, 0) + 1
+        position = None if value is None else factor * value + (target if relative else 0.0)
+        timed = number(path, "time_s", cell.row, cells["time_s"][cell.row]) if "time_s" in cells else None
+        u = number(path, "u_random_mm", cell.row, cells["u_random_mm"][cell.row]) if "u_random_mm" in cells else None
+        out.append(Reading(target, position, side, cycle, run, timed, u))
+    return out, words
+
+
+def _cycle_order(names: list[str]) -> Callable[[str], float]:
+    """Cycles by their numbers; by their first row where they are no numbers."""
+    try:
+        by_number = {name: float(name) for name in names}
+    except ValueError:
+        return names.index
+    return by_number.__getitem__
+
+
+def _check_quantity(path: Path, readings: list[Reading], quantity: str) -> None:
+    """Refuse deviations under the name of positions, and the other way round."""
+    known = [(r.target_mm, r.position_mm) for r in readings if r.position_mm is not None]
+    if len(known) < 2 or len({target for target, _ in known}) < 2:
+        return
+    targets, positions = (np.array(column) for column in zip(*known, strict=True))
+    values = positions - targets if quantity.startswith("deviation") else positions
+    share = float(np.ptp(values) / np.ptp(targets))
+    if quantity.startswith("deviation") and share > LARGEST_DEVIATION:
+        raise FingervisionError(
+            f"{quantity} must be position minus target, but ranges over {np.ptp(values):g} mm while the targets range "
+            f"over {np.ptp(targets):g} mm in {path}: these are positions; name the column "
+            f"{quantity.replace('deviation', 'position')}."
+        )
+    if quantity.startswith("position") and share < SMALLEST_TRAVEL:
+        raise FingervisionError(
+            f"{quantity} must follow the target, but ranges over {np.ptp(values):g} mm while the targets range over "
+            f"{np.ptp(targets):g} mm in {path}: if these are deviations, name the column "
+            f"{quantity.replace('position', 'deviation')}."
+        )

@@ -1,0 +1,109 @@
+"""lost.csv: frames of a run that could not be measured when they came, which its video alone no longer shows.
+
+The marks of damage (packets lost on the way, a picture that hangs on them) are the stream's and the decoder's; a video
+file holds the packets without them, and read again some would look whole.
+"""
+
+import json
+from collections.abc import Sequence
+from pathlib import Path
+
+from fingervision.domain.errors import FingervisionError
+from fingervision.domain.frame import LostFrame
+from fingervision.domain.status import Status
+from fingervision.storage.csv_columns import number, read_columns
+from fingervision.storage.gaps_csv import TIME_PLACES
+from fingervision.storage.line_file import cell, quoted
+from fingervision.storage.run_files import RUN
+
+LOST = "lost.csv"
+HEADER = "time_s,status,words"
+
+
+class LostFrames:
+    """Writes lost.csv; each line reaches the file at once, before the packets that it is about.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+
+    Raises
+    ------
+    FingervisionError
+        It cannot be written; from every method.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+        try:
+            self._file = path.open("w", encoding="utf-8", buffering=1)
+            self._file.write(f"{HEADER}\n")
+        except OSError as error:
+            raise self._failed(error) from error
+
+    def add(self, time_s: float, lost: LostFrame) -> None:
+        """Add a frame, at its time in the recording."""
+        try:
+            self._file.write(f"{cell(time_s, TIME_PLACES)},{lost.status.value},{quoted(lost.words)}\n")
+        except OSError as error:
+            raise self._failed(error) from error
+
+    def close(self) -> None:
+        """Close the file."""
+        try:
+            self._file.close()
+        except OSError as error:
+            raise self._failed(error) from error
+
+    def _failed(self, error: OSError) -> FingervisionError:
+        return FingervisionError(
+            f"{self._path} could not be written any further ({error.strerror}); what was recorded until then is valid: "
+            "make room, or name another --out."
+        )
+
+
+def lost_frames(files: Sequence[Path]) -> tuple[LostFrame, ...]:
+    """Read what was lost when a recording was made, in order of time.
+
+    Parameters
+    ----------
+    files : sequence of Path
+        What the recording is made of.
+
+    Returns
+    -------
+    tuple of LostFrame
+        Empty where no run.json beside the file speaks of such a table; `index` counts the table's rows.
+
+    Raises
+    ------
+    FingervisionError
+        There should be a table, and it is not there or cannot be read.
+    """
+    if len(files) != 1:
+        return ()
+    try:
+        run = json.loads((files[0].parent / RUN).read_text(encoding="utf-8"))
+        named = str(run["lost"]) if run["video"] == files[0].name else ""
+    except (OSError, ValueError, LookupError, TypeError):
+        return ()  # there is none, or it is something else's
+    if named != LOST:
+        return ()
+    path = files[0].parent / LOST
+    if not path.exists():
+        raise FingervisionError(
+            f"{path} must say which frames of {files[0].name} were damaged when they came, but is missing: put it "
+            "back, or measure a copy of the video in another folder, where damaged frames may look whole."
+        )
+    columns = read_columns(path, ("time_s", "status", "words"), ())
+    found = []
+    for row, (time, status, words) in enumerate(zip(*(columns[name] for name in HEADER.split(",")), strict=True)):
+        time_s = number(path, "time_s", row, time)
+        if time_s is None or status not in (Status.DAMAGED, Status.DUPLICATE):
+            raise FingervisionError(
+                f"Row {row + 1} of {path} must have a time and `damaged` or `duplicate`, but has '{time}' and "
+                f"'{status}': copy the run again."
+            )
+        found.append(LostFrame(row, time_s, Status(status), words))
+    return tuple(sorted(found, key=lambda lost: lost.time_s or 0.0))

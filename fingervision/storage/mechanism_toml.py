@@ -1,0 +1,246 @@
+"""mechanism.toml: any planar flexure mechanism; its numbers may refer to [lengths] by name and arithmetic."""
+
+import difflib
+import tomllib
+from collections.abc import Mapping
+from math import hypot
+from pathlib import Path
+from typing import Any
+
+from fingervision.domain.errors import FingervisionError
+from fingervision.models.mechanism import Drive, Face, Flexure, Mechanism, check_mechanism
+from fingervision.models.planar_region import Ellipse, Polygon, Shape, bar, box, crosses_itself
+from fingervision.storage.arithmetic import number
+from fingervision.storage.gripper_toml import check_material, read_material
+
+_TOP = (
+    "schema",
+    "name",
+    "plate_mm",
+    "material",
+    "lengths",
+    "body",
+    "flexure",
+    "fixed",
+    "slide",
+    "drive",
+    "probe",
+    "pair",
+)
+_SHAPES = {"bar_mm": 4, "box_mm": 4, "disc_mm": 3, "ellipse_mm": 5}
+_FLEXURES = {
+    "circular": ("thickness_mm", "radius_mm"),
+    "elliptic": ("thickness_mm", "half_length_mm", "depth_mm"),
+    "filleted": ("thickness_mm", "half_length_mm", "depth_mm", "fillet_mm"),
+    "leaf": ("thickness_mm", "half_length_mm"),
+}
+
+
+def is_mechanism(path: Path) -> bool:
+    """Whether a TOML file draws a mechanism by bodies, and not a gripper by its template."""
+    try:
+        return "body" in (tables := tomllib.loads(path.read_text(encoding="utf-8-sig"))) and isinstance(
+            tables["body"], list
+        )
+    except (OSError, ValueError):
+        return False
+
+
+def read_mechanism(path: Path) -> Mechanism:
+    """Read and check a mechanism.
+
+    Raises
+    ------
+    FingervisionError
+        The file cannot be read, a key is missing, unknown or no number, or the drawing cannot be a mechanism.
+    """
+    try:
+        tables = tomllib.loads(path.read_text(encoding="utf-8-sig"))
+    except FileNotFoundError:
+        raise FingervisionError(f"There is no mechanism {path}.") from None
+    except (OSError, ValueError) as error:
+        raise FingervisionError(f"{path} must be TOML in UTF-8, but is not: {error}.") from error
+    return mechanism_from_tables(tables, str(path))
+
+
+def mechanism_from_tables(tables: Mapping[str, Any], origin: str) -> Mechanism:
+    """Build a checked mechanism; `origin` is named in errors."""
+    for key in tables:
+        if key not in _TOP:
+            near = difflib.get_close_matches(key, _TOP, 1, cutoff=0.0)[0]
+            raise FingervisionError(f"{origin} has an unknown section or key, {key}; did you mean {near}?")
+    lengths: dict[str, float] = {}
+    for name, raw in _table(tables.get("lengths", {}), f"[lengths] in {origin}").items():
+        lengths[name] = number(raw, lengths, f"lengths.{name} in {origin}")
+    reader = _Reader(lengths, origin)
+    material = read_material(tables, origin)
+    mechanism = Mechanism(
+        name=str(tables.get("name", origin)),
+        material=material,
+        plate_mm=reader.positive(tables, "plate_mm", ""),
+        bodies=tuple(
+            step for i, table in enumerate(reader.sections(tables, "body"), 1) for step in reader.body(table, i)
+        ),
+        flexures=tuple(reader.flexure(t, i) for i, t in enumerate(reader.sections(tables, "flexure", least=0), 1)),
+        fixed=tuple(reader.face(t, f"fixed {i}") for i, t in enumerate(reader.sections(tables, "fixed", least=0), 1)),
+        slides=tuple(reader.slide(t, i) for i, t in enumerate(reader.sections(tables, "slide", least=0), 1)),
+        drive=reader.drive(tables),
+        probes={name: p for t in reader.sections(tables, "probe", least=0) for name, p in [reader.probe(t)]},
+        pairs={},
+    )
+    pairs = {name: ends for t in reader.sections(tables, "pair", least=0) for name, ends in [reader.pair(t, mechanism)]}
+    mechanism.pairs.update(pairs)
+    check_material(material, origin)
+    check_mechanism(mechanism, mechanism.region)
+    return mechanism
+
+
+def _table(raw: Any, what: str) -> Mapping[str, Any]:
+    if not isinstance(raw, dict):
+        raise FingervisionError(f"{what} must be a table, but is {raw!r}.")
+    return raw
+
+
+class _Reader:
+    def __init__(self, lengths: Mapping[str, float], origin: str) -> None:
+        self.lengths, self.origin = lengths, origin
+
+    def sections(self, tables: Mapping[str, Any], name: str, least: int = 1) -> list[Mapping[str, Any]]:
+        raw = tables.get(name, [])
+        if not isinstance(raw, list) or len(raw) < least:
+            raise FingervisionError(f"{self.origin} must have [[{name}]] sections, at least {least}, but has {raw!r}.")
+        return [_table(table, f"[[{name}]] in {self.origin}") for table in raw]
+
+    def known(self, table: Mapping[str, Any], keys: tuple[str, ...], what: str) -> None:
+        for key in table:
+            if key not in keys:
+                near = difflib.get_close_matches(key, keys, 1, cutoff=0.0)[0]
+                raise FingervisionError(f"{what} in {self.origin} has an unknown key, {key}; did you mean {near}?")
+
+    def value(self, table: Mapping[str, Any], key: str, what: str) -> float:
+        name = f"{what}.{key}" if what else key
+        if key not in table:
+            raise FingervisionError(f"{self.origin} must state {name}, but does not.")
+        return number(table[key], self.lengths, f"{name} in {self.origin}")
+
+    def positive(self, table: Mapping[str, Any], key: str, what: str) -> float:
+        value = self.value(table, key, what)
+        if value <= 0.0:
+            name = f"{what}.{key}" if what else key
+            raise FingervisionError(f"{name} in {self.origin} must be positive, but is {value:g}.")
+        return value
+
+    def numbers(self, table: Mapping[str, Any], key: str, count: int, what: str) -> tuple[float, ...]:
+        raw = table.get(key)
+        if not isinstance(raw, list) or len(raw) != count:
+            raise FingervisionError(f"{what}.{key} in {self.origin} must be a list of {count} numbers, but is {raw!r}.")
+        return tuple(number(part, self.lengths, f"{what}.{key} in {self.origin}") for part in raw)
+
+    def body(self, table: Mapping[str, Any], place: int) -> list[tuple[bool, Shape]]:
+        what = f"body {table.get('name', place)}"
+        self.known(table, ("name", "cut", "width_mm", "polygon_mm", *_SHAPES), what)
+        given = [key for key in (*_SHAPES, "polygon_mm") if key in table]
+        if len(given) != 1:
+            raise FingervisionError(
+                f"{what} in {self.origin} must be one of {', '.join((*_SHAPES, 'polygon_mm'))}, but has "
+                f"{' and '.join(given) or 'none'}."
+            )
+        added = table.get("cut", False) is not True
+        return [(added, self._shape(table, given[0], what))]
+
+    def _shape(self, table: Mapping[str, Any], key: str, what: str) -> Shape:
+        if key == "polygon_mm":
+            raw = table[key]
+            if not isinstance(raw, list) or len(raw) < 3:
+                raise FingervisionError(
+                    f"{what}.polygon_mm in {self.origin} must be three points or more, but is {raw!r}."
+                )
+            points = [self.numbers({"polygon_mm": point}, "polygon_mm", 2, what) for point in raw]
+            corners = tuple((x, y) for x, y in points)
+            if len(set(corners)) < len(corners) or crosses_itself(corners):
+                raise FingervisionError(
+                    f"{what}.polygon_mm in {self.origin} must go round without crossing itself, but does; put its "
+                    "points in order, each once."
+                )
+            return Polygon(corners)
+        values = self.numbers(table, key, _SHAPES[key], what)
+        if key == "bar_mm":
+            width_mm = self.positive(table, "width_mm", what)
+            if hypot(values[2] - values[0], values[3] - values[1]) == 0.0:
+                raise FingervisionError(f"{what}.bar_mm in {self.origin} must have some length, but has none.")
+            return bar(values[0], values[1], values[2], values[3], width_mm)
+        if key == "box_mm":
+            return box(*self._grown(values, f"{what}.box_mm"))
+        radii = (values[2], values[2]) if key == "disc_mm" else (values[2], values[3])
+        if min(radii) <= 0.0:
+            raise FingervisionError(f"{what}.{key} in {self.origin} must have positive radii, but has {min(radii):g}.")
+        return Ellipse((values[0], values[1]), radii, values[4] if key == "ellipse_mm" else 0.0)
+
+    def _grown(self, values: tuple[float, ...], what: str, *, flat: bool = False) -> tuple[float, float, float, float]:
+        x0, x1, y0, y1 = values
+        fine = x1 >= x0 and y1 >= y0 if flat else x1 > x0 and y1 > y0
+        if not fine:
+            raise FingervisionError(
+                f"{what} in {self.origin} must be x from, x to, y from, y to, both growing, but is "
+                f"[{x0:g}, {x1:g}, {y0:g}, {y1:g}]."
+            )
+        return x0, x1, y0, y1
+
+    def flexure(self, table: Mapping[str, Any], place: int) -> Flexure:
+        name = str(table.get("name", place))
+        what = f"flexure {name}"
+        kind = table.get("kind")
+        if kind not in _FLEXURES:
+            raise FingervisionError(
+                f"{what}.kind in {self.origin} must be one of {', '.join(_FLEXURES)}, but is {kind!r}."
+            )
+        self.known(table, ("name", "kind", "at_mm", "axis_deg", *_FLEXURES[kind]), what)
+        at = self.numbers(table, "at_mm", 2, what)
+        values = {key: self.positive(table, key, what) for key in _FLEXURES[kind]}
+        if "radius_mm" in values:
+            values["half_length_mm"] = values["depth_mm"] = values.pop("radius_mm")
+        if values.get("fillet_mm", 0.0) > min(values["half_length_mm"], values.get("depth_mm", 0.0) or 1e300):
+            raise FingervisionError(
+                f"{what}.fillet_mm in {self.origin} must be at most half_length_mm and depth_mm, but is "
+                f"{values['fillet_mm']:g}."
+            )
+        return Flexure(name, kind, (at[0], at[1]), self.value(table, "axis_deg", what), **values)
+
+    def face(self, table: Mapping[str, Any], what: str) -> Face:
+        name = str(table.get("name", what))
+        return Face(name, self._grown(self.numbers(table, "box_mm", 4, what), f"{what}.box_mm", flat=True))
+
+    def slide(self, table: Mapping[str, Any], place: int) -> tuple[Face, str]:
+        if table.get("holds") not in ("x", "y"):
+            raise FingervisionError(
+                f"slide {place}.holds in {self.origin} must be x or y, but is {table.get('holds')!r}."
+            )
+        return self.face(table, f"slide {place}"), table["holds"]
+
+    def drive(self, tables: Mapping[str, Any]) -> Drive:
+        table = _table(tables.get("drive", None), f"[drive] in {self.origin}")
+        self.known(table, ("name", "box_mm", "direction", "across"), "drive")
+        x, y = self.numbers(table, "direction", 2, "drive")
+        across = table.get("across", "held")
+        if hypot(x, y) == 0.0:
+            raise FingervisionError(f"drive.direction in {self.origin} must point somewhere, but is [0, 0].")
+        if across not in ("held", "free") or (across == "free" and x * y != 0.0):
+            raise FingervisionError(
+                f"drive.across in {self.origin} must be held, or free where drive.direction is along x or y, "
+                f"but is {across!r}."
+            )
+        return Drive(self.face(table, "drive"), (x / hypot(x, y), y / hypot(x, y)), across)
+
+    def probe(self, table: Mapping[str, Any]) -> tuple[str, tuple[float, float]]:
+        name = str(table.get("name", ""))
+        x, y = self.numbers(table, "at_mm", 2, f"probe {name}")
+        return name, (x, y)
+
+    def pair(self, table: Mapping[str, Any], mechanism: Mechanism) -> tuple[str, tuple[str, str]]:
+        name, of = str(table.get("name", "")), table.get("of")
+        if not isinstance(of, list) or len(of) != 2 or not all(end in mechanism.probes for end in of) or of[0] == of[1]:
+            raise FingervisionError(
+                f"pair {name}.of in {self.origin} must be two of the probes {', '.join(mechanism.probes)}, "
+                f"but is {of!r}."
+            )
+        return name, (of[0], of[1])

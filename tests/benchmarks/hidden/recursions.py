@@ -1,0 +1,114 @@
+"""The definitions with memory, sample by sample over all runs; `starts` are the runs' first samples, and n."""
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+@njit(cache=True)
+def limited(u: Array, t: Array, starts: NDArray[np.int64], speed: float) -> Array:
+    """Follows at most at a speed."""
+    out = np.empty_like(u)
+    for r in range(starts.size - 1):
+        place = u[starts[r]]
+        out[starts[r]] = place
+        for i in range(starts[r] + 1, starts[r + 1]):
+            way = speed * (t[i] - t[i - 1])
+            place = min(max(u[i], place - way), place + way)
+            out[i] = place
+    return out
+
+
+@njit(cache=True)
+def play(u: Array, starts: NDArray[np.int64], full_width: float, begin: Array) -> Array:
+    """Play operator; at each run's start the place is `begin` half widths beside the input."""
+    out = np.empty_like(u)
+    half = 0.5 * full_width
+    for r in range(starts.size - 1):
+        place = u[starts[r]] + begin[r] * half
+        for i in range(starts[r], starts[r + 1]):
+            place = min(max(place, u[i] - half), u[i] + half)
+            out[i] = place
+    return out
+
+
+@njit(cache=True)
+def jump(u: Array, starts: NDArray[np.int64], size: float) -> Array:
+    """Stays until the input is more than `size` away, then follows at once."""
+    out = np.empty_like(u)
+    for r in range(starts.size - 1):
+        place = u[starts[r]]
+        for i in range(starts[r], starts[r + 1]):
+            if abs(u[i] - place) > size:
+                place = u[i]
+            out[i] = place
+    return out
+
+
+@njit(cache=True)
+def sliders(u: Array, starts: NDArray[np.int64], fraction: float, reach: float, begin: Array) -> Array:
+    """Eight elastic sliders of reach k / 8; at each run's start each is strained by -`begin` times its reach.
+
+    The sign is that of the play: -1 stands where upward motion has left it.
+    """
+    out = np.empty_like(u)
+    e = np.zeros(8)
+    for r in range(starts.size - 1):
+        for k in range(8):
+            e[k] = -begin[r] * reach * (k + 1) / 8
+        for i in range(starts[r], starts[r + 1]):
+            mean = 0.0
+            for k in range(8):
+                if i > starts[r]:
+                    limit = reach * (k + 1) / 8
+                    e[k] = min(max(e[k] + u[i] - u[i - 1], -limit), limit)
+                mean += e[k] / 8
+            out[i] = u[i] - fraction * mean
+    return out
+
+
+@njit(cache=True)
+def low_pass(o: Array, t: Array, starts: NDArray[np.int64], tau: float, begin: Array) -> Array:
+    """First order, exact for an input linear between samples.
+
+    At each run's start relaxed where `begin` is 0, at the least or largest of all values where it is -1 or 1.
+    """
+    out = np.empty_like(o)
+    least, largest = np.min(o), np.max(o)
+    for r in range(starts.size - 1):
+        first = o[starts[r]]
+        room = largest - first if begin[r] > 0 else first - least
+        out[starts[r]] = first + begin[r] * room
+        for i in range(starts[r] + 1, starts[r + 1]):
+            dt = t[i] - t[i - 1]
+            fade = np.exp(-dt / tau)
+            slope = (o[i] - o[i - 1]) / dt
+            out[i] = o[i] - slope * tau + (out[i - 1] - o[i - 1] + slope * tau) * fade
+    return out
+
+
+@njit(cache=True)
+def oscillator(o: Array, t: Array, starts: NDArray[np.int64], frequency_hz: float, zeta: float) -> Array:
+    """Second order, damped to ground, unit gain, exact for an input linear between samples, from rest."""
+    out = np.empty_like(o)
+    omega = 2 * np.pi * frequency_hz
+    zeta = min(zeta, 0.999999)
+    damped = omega * np.sqrt(1 - zeta * zeta)
+    for r in range(starts.size - 1):
+        x, v = o[starts[r]], 0.0
+        out[starts[r]] = x
+        for i in range(starts[r] + 1, starts[r + 1]):
+            dt = t[i] - t[i - 1]
+            slope = (o[i] - o[i - 1]) / dt
+            # Particular solution for a ramp: o - 2 zeta slope / omega, moving with the slope.
+            lag = 2 * zeta * slope / omega
+            a = x - (o[i - 1] - lag)
+            b = (v - slope + zeta * omega * a) / damped
+            fade, c, s = np.exp(-zeta * omega * dt), np.cos(damped * dt), np.sin(damped * dt)
+            free = fade * (a * c + b * s)
+            v = fade * ((b * damped - zeta * omega * a) * c - (a * damped + zeta * omega * b) * s) + slope
+            x = free + o[i] - lag
+            out[i] = x
+    return out

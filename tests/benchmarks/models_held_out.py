@@ -1,0 +1,83 @@
+"""Print how the kinds stand on grippers that nothing was fitted to: slope, force, stress and modes of each."""
+
+import time
+from dataclasses import replace
+from pathlib import Path
+
+from fingervision.domain.gripper import Gripper, Material
+from fingervision.models.finite_element import FiniteElementGripper
+from fingervision.models.lumped import LumpedGripper
+from fingervision.models.mesh_outline import ElementSize, mesh_outline
+from fingervision.models.redrawn import redrawn
+from fingervision.models.static_answer import gap_per_input
+from fingervision.models.stiffness_matrix import StiffnessMatrixGripper
+from fingervision.storage.gripper_toml import read_gripper
+
+ROOT = Path(__file__).parents[2]
+PA2200 = Material("PA2200", 1650.0, 0.34, 930.0, 48.0)
+ALUMINIUM = Material("aluminium 7075-T6", 71700.0, 0.33, 2810.0, 503.0)
+ABS = Material("ABS", 2200.0, 0.35, 1040.0, 40.0)
+TITANIUM = Material("Ti-6Al-4V", 113800.0, 0.342, 4430.0, 880.0)
+STEEL = Material("spring steel", 210000.0, 0.3, 7850.0, 1200.0)
+SILICON = Material("silicon", 169000.0, 0.28, 2330.0, 1000.0)
+# Material, thickness, radius, plate, l2 longer by, l3 longer by.
+HELD_OUT = (
+    (PA2200, 1.0, 4.0, 3.0, 0.0, 0.0),
+    (ALUMINIUM, 0.05, 4.0, 1.0, 0.0, 0.0),
+    (STEEL, 0.1, 5.0, 2.0, 0.0, 0.0),
+    (ABS, 1.5, 5.0, 6.0, 4.0, 0.0),
+    (TITANIUM, 0.5, 4.0, 6.0, -3.0, 0.0),
+    (SILICON, 0.2, 8.0, 1.0, 0.0, 0.0),
+    (ABS, 2.0, 5.0, 20.0, 0.0, 0.0),
+    (ALUMINIUM, 1.0, 6.0, 10.0, 8.0, 2.0),
+    (STEEL, 0.3, 4.5, 6.0, -6.0, -2.0),
+)
+REFINED = 0.5
+"""Edge lengths of the reference over those of the model: its force is within 0.005 % of the limit for the sample."""
+
+
+def drawn(gripper: Gripper, row: tuple[Material, float, float, float, float, float]) -> Gripper:
+    """Change the sample's drawing."""
+    material, thickness_mm, radius_mm, plate_mm, l2_by, l3_by = row
+    gripper = replace(
+        gripper,
+        material=material,
+        hinge=replace(gripper.hinge, thickness_mm=thickness_mm, radius_mm=radius_mm),
+        body=replace(gripper.body, plate_mm=plate_mm),
+    )
+    for name, by in (("lever.l2_mm", l2_by), ("lever.l3_mm", l3_by)):
+        gripper = redrawn(gripper, name, by) if by else gripper
+    return gripper
+
+
+def main() -> None:
+    """Print errors in % against the plane model on a mesh twice as fine; force and modes with its width effect."""
+    sample = read_gripper(ROOT / "sample_frames" / "paper" / "gripper.toml")
+    print("material, t, R, plate | finite_element: slope force stress mode (drive free, held) | lumped: same | matrix")
+    for row in HELD_OUT:
+        began = time.perf_counter()
+        gripper = drawn(sample, row)
+        fine = REFINED * 0.2 * gripper.hinge.thickness_mm
+        reference = FiniteElementGripper(gripper, mesh=mesh_outline(gripper, ElementSize(fine, REFINED * 2.5)))
+        model, lumped = FiniteElementGripper(gripper), LumpedGripper(gripper)
+        cells = []
+        for other in (model, lumped):
+            pairs = (
+                (gap_per_input(other.half), gap_per_input(reference.half)),
+                (other.half.equilibrium(1.0).force_n, reference.half.equilibrium(1.0).force_n),
+                (other.peak_stress().mpa_per_mm, reference.peak_stress().mpa_per_mm),
+                (other.modes_hz(drive_held=False)[0], reference.modes_hz(drive_held=False)[0]),
+                (other.modes_hz(drive_held=True)[0], reference.modes_hz(drive_held=True)[0]),
+            )
+            cells.append(" ".join(f"{100.0 * (a / b - 1.0):+7.3f}" for a, b in pairs))
+        matrix = 100.0 * (StiffnessMatrixGripper(gripper).gap_per_input / gap_per_input(reference.half) - 1.0)
+        print(
+            f"{row[0].name:18s} {row[1]:5.2f} {row[2]:4.1f} {row[3]:5.1f} | {cells[0]} | {cells[1]} | {matrix:+7.3f} | "
+            f"{model.half.unknowns} unknowns, quality {model.mesh.quality().min():.2f}, "
+            f"{time.perf_counter() - began:.0f} s",
+            flush=True,
+        )
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,75 @@
+"""Draw tables that look like other people's rigs.
+
+    python -m tests.benchmarks.world.draw --seed 7 --tables 6 --rows iso_cycles,sparse --out results/world
+
+Writes a folder ROW_INDEX a table with measured.csv, simulation.csv and truth.json; the same seed gives the same files.
+"""
+
+import argparse
+import time
+from pathlib import Path
+
+import numpy as np
+
+from tests.benchmarks.world.folder import write
+from tests.benchmarks.world.nearest import Judge
+from tests.benchmarks.world.rig import Rig
+from tests.benchmarks.world.right_answers import FAR, RightAnswers, outside_enough, right_answers
+from tests.benchmarks.world.rows.catalogue import ROWS
+
+TRIES = 30
+FORM_SHARE = 0.01
+"""The catalogue's form leaves at most 1 % of the hidden chi-square (10 % of the amplitude), or 20: else drawn again."""
+
+
+def fair(rig: Rig, right: RightAnswers, judge: Judge) -> bool:
+    """Whether the table asks what its row asks: its truth is near the catalogue, or truly outside."""
+    if rig.wrong_sign:
+        return right.nothing > FAR
+    if rig.outside:
+        return outside_enough(rig, judge)
+    return right.own <= max(FAR, FORM_SHARE * right.nothing)
+
+
+def drawn(row: str, seed: int, index: int, attempt: int) -> Rig:
+    """One attempt at a table: the same numbers give the same table."""
+    return ROWS[row](np.random.default_rng([seed, index, attempt, *row.encode()]))
+
+
+def draw_judged(row: str, seed: int, index: int) -> tuple[Rig, Judge, RightAnswers, dict[str, object]]:
+    """Draw one table of a row with its right answers and its numbers; again where the question is not fair."""
+    for attempt in range(TRIES):
+        rig = drawn(row, seed, index, attempt)
+        right, judge = right_answers(rig)
+        if fair(rig, right, judge):
+            return rig, judge, right, {"row": row, "seed": seed, "index": index, "attempt": attempt}
+    raise ValueError(f"Row {row} must give a fair table in {TRIES} draws, but seed {seed} index {index} did not.")
+
+
+def draw_table(row: str, seed: int, index: int, out: Path) -> Path:
+    """Draw and write one table, unless it is there."""
+    folder = out / f"{row}_{index}"
+    if not (folder / "truth.json").exists():
+        write(*draw_judged(row, seed, index), folder)
+    return folder
+
+
+def main() -> None:
+    """Read the options and write the folders."""
+    options = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    options.add_argument("--seed", type=int, default=1)
+    options.add_argument("--tables", type=int, default=6, help="tables a row")
+    options.add_argument("--rows", default=",".join(ROWS))
+    options.add_argument("--out", type=Path, required=True)
+    chosen = options.parse_args()
+    for row in chosen.rows.split(","):
+        if row not in ROWS:
+            options.error(f"--rows must be of {', '.join(ROWS)}, but has {row}.")
+        begun = time.perf_counter()
+        for index in range(chosen.tables):
+            draw_table(row, chosen.seed, index, chosen.out)
+        print(f"{row}: {chosen.tables} tables, {time.perf_counter() - begun:.0f} s", flush=True)
+
+
+if __name__ == "__main__":
+    main()

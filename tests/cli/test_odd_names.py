@@ -1,0 +1,97 @@
+"""What people and shells hand over: odd names, pipes, closed streams, links in circles; a sentence or the result."""
+
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from fingervision.domain.frame import Frame
+from fingervision.rendering import Camera, render, two_fingers
+from fingervision.rendering.clip import Ffv1, write_clip
+
+PATIENCE_S = 120.0
+SCALE = ("--px-per-mm", "20")
+
+
+@pytest.fixture(scope="module")
+def clip(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("clip") / "clip.mkv"
+    rng = np.random.default_rng(0)
+    scenes = [two_fingers(60.0 + k, below_tip_px=6.0, width_px=40.0, frame=(240, 200)) for k in range(3)]
+    write_clip(path, (Frame(render(each, Camera(), rng), k, 0.04 * k) for k, each in enumerate(scenes)), Ffv1())
+    return path
+
+
+def run(folder: Path, *arguments: str | bytes, shell: str = "") -> "subprocess.CompletedProcess[bytes]":
+    """Run the command as a process of its own, through a shell where its streams are bent."""
+    command: list[str | bytes] = [sys.executable, "-m", "fingervision", *arguments]
+    if shell:
+        command = ["/bin/sh", "-c", f'"$@" {shell}', "sh", *command]
+    environment = {**os.environ, "PYTHONPATH": str(Path(__file__).parents[2]), "OMP_NUM_THREADS": "1"}
+    done = subprocess.run(
+        command,
+        cwd=folder,
+        capture_output=True,
+        timeout=PATIENCE_S,
+        env=environment,
+        check=False,
+        stdin=subprocess.DEVNULL,
+    )
+    assert b"Traceback" not in done.stderr, done.stderr.decode(errors="replace")
+    assert b"Exception ignored" not in done.stderr
+    return done
+
+
+@pytest.mark.parametrize("name", [b"12:30:05.mkv", b"a$b^c$.mkv", b"=1+1.mkv", b"caf\xe9.mkv", b"with 'quotes\".mkv"])
+def test_a_recording_of_any_name_is_measured(tmp_path: Path, clip: Path, name: bytes) -> None:
+    shutil.copy(clip, tmp_path / os.fsdecode(name))
+    done = run(tmp_path, "measure", name, *SCALE)
+    assert done.returncode == 0, done.stderr
+    assert b"3 of 3 frames measured" in done.stdout
+    assert len(list((tmp_path / "measured").glob("*/gaps.csv"))) == 1
+
+
+@pytest.mark.parametrize("closed", ["2>&-", ">&-", "<&- 2>&- >&-"])
+def test_closed_streams_cost_no_result(tmp_path: Path, clip: Path, closed: str) -> None:
+    done = run(tmp_path, "measure", str(clip), *SCALE, "--out", "out", shell=closed)
+    assert done.returncode == 0
+    assert (tmp_path / "out" / "summary.json").exists()
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs /dev/full.")
+def test_a_full_output_is_a_sentence(tmp_path: Path, clip: Path) -> None:
+    done = run(tmp_path, "measure", str(clip), *SCALE, "--out", "out", shell="> /dev/full")
+    assert done.returncode == 1
+    assert b"Standard output could not be written" in done.stderr
+    assert (tmp_path / "out" / "summary.json").exists()
+
+
+def said(folder: Path, *arguments: str) -> str:
+    done = run(folder, *arguments)
+    assert done.returncode in (1, 2), done.stdout
+    return done.stderr.decode()
+
+
+def test_what_is_no_recording_is_a_sentence(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "pipe.mp4")
+    (tmp_path / "loop").symlink_to("loop")
+    assert "is a pipe or a device" in said(tmp_path, "measure", "pipe.mp4", *SCALE)
+    assert "must have a name, but it is empty" in said(tmp_path, "measure", "", *SCALE)
+    assert "is a camera, which does not" in said(tmp_path, "measure", "simulated", *SCALE)
+    assert "fingervision: " in said(tmp_path, "measure", "loop", *SCALE)
+
+
+def test_what_is_no_table_is_a_sentence(tmp_path: Path, clip: Path) -> None:
+    os.mkfifo(tmp_path / "pipe.csv")
+    (tmp_path / "loop").symlink_to("loop")
+    (tmp_path / "drive.csv").write_text("time_s,input_mm\n100,0\n101,1\n")
+    (tmp_path / "quote.csv").write_text('time_s,input_mm,run\n0,0,"a\n1,1,a\n')
+    measure = ("measure", str(clip), *SCALE, "--drive")
+    assert "is a folder or a pipe" in said(tmp_path, *measure, "pipe.csv")
+    assert "No frame lies within the drive's times (100 to 101 s" in said(tmp_path, *measure, "drive.csv")
+    assert "quote" in said(tmp_path, *measure, "quote.csv")
+    assert "loop" in said(tmp_path, "measure", str(clip), *SCALE, "--out", "loop")

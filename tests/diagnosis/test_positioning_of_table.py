@@ -1,0 +1,164 @@
+"""From a table as it is read, with its model, to the figures of a published report and the causes of each."""
+
+import csv
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from fingervision.diagnosis.diagnose import diagnose
+from fingervision.diagnosis.input.repeated_targets import NoRepeatedTargets
+from fingervision.diagnosis.report.positioning_figures import DEFINITIONS
+from fingervision.diagnosis.report.positioning_of_data import (
+    positioning_html,
+    positioning_of_data,
+    positioning_section,
+)
+from fingervision.diagnosis.report.positioning_of_table import MODEL, positioning_of_table
+from fingervision.diagnosis.report.positioning_report import PositioningReport
+from fingervision.diagnosis.report.positioning_words import positioning_document, positioning_words
+from fingervision.storage.iso230_table import read_iso230_table
+from fingervision.storage.measured_table import read_measured_table
+from fingervision.storage.model_toml import read_model
+
+RIGS = Path(__file__).parents[3] / "shared" / "real" / "rigs"
+PATH = np.tile(np.concatenate([[-0.5], np.arange(5.0), [4.5], np.arange(5.0)[::-1]]), 5)
+MEASURED = np.abs(PATH - 2.0) <= 2.0
+SIDE = np.tile(np.repeat([1, -1], 5), 5)
+
+
+def columns(path: Path) -> dict[str, np.ndarray]:
+    with path.open() as file:
+        rows = list(csv.DictReader(file))
+    return {
+        name: np.array([float(row[name] or "nan") for row in rows])
+        for name in ("time_s", "input_mm", "gap_mm")
+        if name in rows[0]
+    }
+
+
+def report(
+    gap_mm: np.ndarray, model: object, answer: dict[str, dict[str, float]] | None = None, path: np.ndarray = PATH
+) -> PositioningReport:
+    def predict(acting: dict[str, dict[str, float]]) -> np.ndarray:
+        return model(path[MEASURED]) - 0.5 * SIDE * acting.get("backlash", {"play_mm": 0.0})["play_mm"]
+
+    found = positioning_of_table(path, MEASURED, (slice(0, path.size),), None, gap_mm, predict, answer or {})
+    assert isinstance(found, PositioningReport)
+    return found
+
+
+@pytest.mark.skipif(not RIGS.exists(), reason="the measured tables of real rigs are not here (../shared/real/rigs)")
+@pytest.mark.parametrize("name", ["ess_x_line", "ess_x_map_path"])
+def test_a_published_report_whatever_the_model(name: str) -> None:
+    # The ideal line without overshoots, or the axis's own map with them: the figures of the axis are the same.
+    measured, model = columns(RIGS / name / "measured.csv"), columns(RIGS / name / "simulation.csv")
+    read = np.isfinite(measured["gap_mm"])
+    inputs = measured["input_mm"]
+    found = positioning_of_table(
+        inputs,
+        read,
+        (slice(0, inputs.size),),
+        measured["time_s"],
+        measured["gap_mm"][read],
+        lambda acting: (
+            np.interp(inputs[read], model["input_mm"], model["gap_mm"])
+            - 0.5 * 0.0254 * np.where(np.arange(read.sum()) % 18 < 9, 1, -1) * ("backlash" in acting)
+        ),
+        {"backlash": {"play_mm": 0.0254}},
+    )
+    assert isinstance(found, PositioningReport)
+    axis = {s: found.measured.value_mm(s) for s in ("B_mean", "B", "R_down", "E_down", "M")}
+    published = {"B_mean": -0.02537, "B": 0.03358, "R_down": 0.02831, "E_down": 0.09065, "M": 0.09365}
+    assert axis == pytest.approx(published, abs=0.5e-5)
+    assert found.share_mm("backlash", "B_mean") == pytest.approx(-0.0254)
+    assert found.after.value_mm("B_mean") == pytest.approx(0.00003, abs=1e-5)
+    if name == "ess_x_map_path":
+        # Its own map is what makes M, and all of it.
+        assert found.share_mm(MODEL, "M") == pytest.approx(0.09365, abs=2e-6)
+        assert found.share_mm(MODEL, "B_mean") == pytest.approx(0.0, abs=1e-6)
+    else:
+        assert set(found.without) == {"backlash"}
+
+
+def test_a_gripper_is_compared_with_its_model() -> None:
+    def model(inputs: np.ndarray) -> np.ndarray:
+        return 4.0 + 7.7 * inputs + 0.1 * inputs**2
+
+    found = report(model(PATH[MEASURED]) - 0.01 * SIDE, model, {"backlash": {"play_mm": 0.02}})
+    assert found.reference == "model"
+    assert found.measured.value_mm("E") == pytest.approx(0.02)
+    assert found.after.value_mm("E") == pytest.approx(0.0, abs=1e-12)
+    document = positioning_document(found)
+    assert document["reference"] == "model"
+    assert "not of the axis alone" in document["notes"][0]
+    assert "as play makes it" in positioning_words(found)[0]
+
+
+@pytest.mark.parametrize("slope", [1.0, -1.0])
+@pytest.mark.parametrize("play_mm", [0.02, -0.02])
+def test_a_reversal_of_the_wrong_sign_is_asked_about(slope: float, play_mm: float) -> None:
+    # Play: the gap of a stage approached from below lags behind, whichever way the gap counts.
+    rng = np.random.default_rng(4)
+    gap = 10.0 + slope * (PATH[MEASURED] - 0.5 * play_mm * SIDE) + rng.normal(0.0, 1e-3, SIDE.size)
+    found = report(gap, lambda inputs: 10.0 + slope * inputs)
+    assert found.reference == "target"
+    assert found.after is None
+    assert ("swapped?" in positioning_words(found)[0]) == (play_mm < 0.0)
+    assert ("as play makes it" in positioning_words(found)[0]) == (play_mm > 0.0)
+
+
+def test_a_reversal_within_its_uncertainty_has_no_side() -> None:
+    gap = PATH[MEASURED] + np.random.default_rng(4).normal(0.0, 1e-3, SIDE.size)
+    words = positioning_words(report(gap, lambda inputs: inputs))[0]
+    assert "readings" not in words
+
+
+def test_a_rest_gap_changes_no_figure() -> None:
+    gap = PATH[MEASURED] - 0.01 * SIDE + 0.003 * np.sin(PATH[MEASURED])
+    plain, shifted = (report(gap + c, lambda inputs: inputs + 3.0).measured for c in (0.0, 25.0))
+    for symbol, figure in plain.figures.items():
+        assert shifted.figures[symbol].value_mm == pytest.approx(figure.value_mm, abs=1e-12)
+
+
+def test_a_sweep_has_no_figures_and_says_why() -> None:
+    inputs = np.linspace(0.0, 4.0, 60)
+    ones = np.ones(60, dtype=bool)
+    found = positioning_of_table(inputs, ones, (slice(0, 60),), None, inputs, lambda _: inputs, {})
+    assert isinstance(found, NoRepeatedTargets)
+    assert "do not gather" in found.reason
+
+
+def test_a_diagnosed_table_of_targets_tells_the_play(tmp_path: Path) -> None:
+    # Seven targets, five cycles, 20 um of play and 1 um of scatter, told as targets, cycles and directions.
+    rng = np.random.default_rng(8)
+    lines = ["target_mm,cycle,direction,deviation_um"]
+    for cycle in range(1, 6):
+        for side, word in ((1, "up"), (-1, "down")):
+            lines += [f"{t},{cycle},{word},{-10.0 * side + rng.normal():.3f}" for t in np.linspace(-3.0, 3.0, 7)]
+    targets, rows, model = (tmp_path / name for name in ("targets.csv", "measured.csv", "simulation.csv"))
+    targets.write_text("\n".join(lines) + "\n")
+    model.write_text("input_mm,gap_mm\n-4,-4\n4,4\n")
+    cells = read_iso230_table(targets).cells()
+    rows.write_text("\n".join([",".join(cells), *(",".join(row) for row in zip(*cells.values(), strict=True))]) + "\n")
+    done = diagnose(read_measured_table(rows), read_model(model))
+    answer = {e.name: {name: known.value for name, known in e.parameters.items()} for e in done.report.effects}
+    found = positioning_of_data(done.data, answer)
+    assert found.cycles == (5, 5)
+    assert found.measured.value_mm("B_mean") == pytest.approx(-0.02, abs=0.001)
+    # Ranges over fourteen means of five readings, and scatter: 1 um each; five standard deviations.
+    assert found.measured.value_mm("E") == pytest.approx(0.02, abs=0.005)
+    assert found.share_mm("backlash", "B_mean") == pytest.approx(-0.02, abs=0.002)
+    assert "backlash" in found.without
+    section = json.loads(json.dumps(positioning_section(found), allow_nan=False))
+    assert section["figures"]["R"]["value"] == found.measured.value_mm("R")
+    page = positioning_html(found)
+    assert all(symbol in page for symbol in DEFINITIONS)
+
+
+def test_a_table_without_targets_has_a_section_with_the_reason() -> None:
+    section = positioning_section(NoRepeatedTargets("the inputs do not repeat"))
+    assert section["figures"] is None
+    assert section["reason"] == "the inputs do not repeat"
+    assert positioning_html(NoRepeatedTargets("the inputs do not repeat")) is None

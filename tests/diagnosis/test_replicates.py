@@ -1,0 +1,78 @@
+"""Pure error is the scatter of visits to the same place from the same side, and of nothing else."""
+
+import numpy as np
+import pytest
+
+from fingervision.diagnosis.noise.replicates import pure_error, resolution, visits
+
+SCATTER_MM = 0.003
+TARGETS = np.arange(-20.0, 21.0, 5.0)
+CYCLES = 40
+"""So many that a standard deviation is known to 2 %."""
+KNOWN = 0.06
+"""Three standard uncertainties of that standard deviation."""
+
+
+def cycles(overshoot_mm: float) -> tuple[np.ndarray, np.ndarray]:
+    """Path of ISO 230-2 cycles and which of its rows are read; without overshoots the ends are read once."""
+    path, read = [], []
+    for _ in range(CYCLES):
+        for targets in (TARGETS, TARGETS[::-1]):
+            beyond = targets[0] - np.sign(targets[1] - targets[0]) * overshoot_mm
+            path += [beyond, *targets] if overshoot_mm else list(targets)
+            read += [False] * bool(overshoot_mm) + [True] * targets.size
+    return np.array(path), np.flatnonzero(read)
+
+
+def estimated(values: np.ndarray, path: np.ndarray, rows: np.ndarray) -> tuple[float, float]:
+    label = visits(path, (slice(0, path.size),), rows)
+    found = pure_error(values, 28.0 * np.arange(rows.size), label, np.zeros(rows.size, dtype=bool))
+    assert found is not None
+    return found.sd_mm, found.trend_sigmas
+
+
+def test_a_reversal_and_a_map_are_no_scatter() -> None:
+    path, rows = cycles(0.5)
+    rng = np.random.default_rng(5)
+    way = np.sign(np.diff(path, prepend=path[0] - 1.0))[rows]
+    values = 0.02 * way + 0.05 * np.sin(path[rows]) + SCATTER_MM * rng.standard_normal(rows.size)
+    sd, trend = estimated(values, path, rows)
+    assert sd == pytest.approx(SCATTER_MM, rel=KNOWN)
+    assert abs(trend) < 4.0
+
+
+@pytest.mark.parametrize("drift", [lambda t: 0.06 * (1.0 - np.exp(-t / 0.3)), lambda t: 0.05 * t])
+def test_a_drift_from_cycle_to_cycle_is_told_and_taken_out(drift: object) -> None:
+    path, rows = cycles(0.5)
+    rng = np.random.default_rng(6)
+    t = np.linspace(0.0, 1.0, rows.size)
+    values = drift(t) + SCATTER_MM * rng.standard_normal(rows.size)  # type: ignore[operator]
+    sd, trend = estimated(values, path, rows)
+    assert trend > 10.0
+    assert sd == pytest.approx(SCATTER_MM, rel=2 * KNOWN)
+
+
+def test_the_overshoot_tells_from_which_side_an_end_was_approached() -> None:
+    path, rows = cycles(0.5)
+    label = visits(path, (slice(0, path.size),), rows)
+    at_end = label[path[rows] == TARGETS[-1]]
+    assert set(at_end[0::2]).isdisjoint(at_end[1::2])
+
+
+def test_a_second_reading_of_one_visit_is_no_repeat() -> None:
+    path = np.array([0.0, 1.0, 1.0, 2.0, 1.0, 0.0, 1.0])
+    label = visits(path, (slice(0, path.size),), np.arange(path.size))
+    assert label[2] == -1
+    assert label[1] == label[6] >= 0
+    assert label[4] not in (label[1], -1)
+
+
+def test_few_repeats_tell_nothing() -> None:
+    path = np.array([0.0, 1.0, 0.0, 1.0, 0.0])
+    label = visits(path, (slice(0, 5),), np.arange(5))
+    assert pure_error(path, np.arange(5.0), label, np.zeros(5, dtype=bool)) is None
+
+
+def test_the_digits_of_a_reading_are_found_and_noise_has_none() -> None:
+    assert resolution(np.round(np.random.default_rng(1).normal(size=200), 3)) == pytest.approx(0.001)
+    assert resolution(np.random.default_rng(1).normal(size=200)) == 0.0

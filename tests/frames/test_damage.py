@@ -1,0 +1,189 @@
+"""Damaged recordings: what is passed on as whole is what the undamaged recording shows at that time."""
+
+from collections.abc import Callable
+from fractions import Fraction
+from pathlib import Path
+
+import av
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from fingervision.domain.frame import Frame, LostFrame
+from fingervision.frames.source import open_source
+from fingervision.frames.told_times import EvenRow, believable
+
+RATE_HZ, COUNT, SIZE_PX = 25, 60, (96, 64)
+GREY = {"ffv1": "gray", "mjpeg": "yuvj420p", "libx264": "yuv420p"}
+FFV1 = {"level": "3", "slicecrc": "1"}
+
+
+def film() -> list[NDArray[np.uint8]]:
+    """A pattern that moves, over one that stands: each picture is unlike every other."""
+    x, y = np.meshgrid(np.arange(SIZE_PX[0]), np.arange(SIZE_PX[1]))
+    still = np.random.default_rng(4).integers(0, 40, x.shape)
+    return [(100 + 60 * np.sin((x + 1.7 * k) / 6.0) * np.cos(y / 7.0) + still).astype(np.uint8) for k in range(COUNT)]
+
+
+def coded(path: Path, coder: str, **options: str) -> bytes:
+    with av.open(str(path), "w") as container:
+        stream = container.add_stream(coder, rate=RATE_HZ, options=options)
+        stream.width, stream.height, stream.pix_fmt = *SIZE_PX, GREY[coder]
+        for k, levels in enumerate(film()):
+            picture = av.VideoFrame.from_ndarray(levels, format="gray").reformat(format=GREY[coder])
+            picture.pts, picture.time_base = k, Fraction(1, RATE_HZ)
+            container.mux(stream.encode(picture))
+        container.mux(stream.encode(None))
+    return path.read_bytes()
+
+
+def packets(path: Path) -> list[bytes]:
+    with av.open(str(path)) as container:
+        return [bytes(packet) for packet in container.demux(video=0) if packet.size]
+
+
+def read(path: Path) -> list[Frame | LostFrame]:
+    return list(open_source(str(path)))
+
+
+def nothing_wrong(path: Path, change: Callable[[bytearray], object]) -> tuple[list[Frame | LostFrame], int]:
+    """Read the file with a fault in it; every whole frame must show what the file without it shows at its time."""
+    truth = {item.time_s: item.pixels for item in read(path) if isinstance(item, Frame)}
+    assert len(truth) == COUNT
+    content = bytearray(path.read_bytes())
+    change(content)
+    damaged = path.with_name(f"damaged{path.suffix}")
+    damaged.write_bytes(content)
+    found = read(damaged)
+    whole = 0
+    for item in found:
+        if isinstance(item, Frame) and item.time_s is not None:
+            np.testing.assert_array_equal(item.pixels, truth[item.time_s], f"frame {item.index}, {item.time_s} s")
+            whole += 1
+    return found, whole
+
+
+def test_flips_in_frames_one_after_the_other_lose_each_of_them(tmp_path: Path) -> None:
+    # Every frame by itself, as the recordings of live are.
+    path = tmp_path / "clip.mkv"
+    content = coded(path, "ffv1", g="1", **FFV1)
+    coded_frames = packets(path)
+
+    def flip(changed: bytearray) -> None:
+        for frame in coded_frames[20:28]:
+            changed[content.index(frame) + len(frame) // 2] ^= 4
+
+    found, whole = nothing_wrong(path, flip)
+    assert [item.index for item in found if isinstance(item, LostFrame)] == list(range(20, 28))
+    assert whole == COUNT - 8
+
+
+def test_a_key_frame_that_is_damaged_makes_nothing_whole(tmp_path: Path) -> None:
+    path = tmp_path / "clip.mkv"
+    content = coded(path, "ffv1", g="12", **FFV1)
+    coded_frames = packets(path)
+
+    def flip(changed: bytearray) -> None:
+        for frame in (coded_frames[20], coded_frames[24]):
+            changed[content.index(frame) + len(frame) // 2] ^= 4
+
+    found, _ = nothing_wrong(path, flip)
+    assert [item.index for item in found if isinstance(item, LostFrame)] == list(range(20, 36))
+
+
+@pytest.mark.parametrize("coder", ["mjpeg", "ffv1"])
+@pytest.mark.parametrize("removed", [False, True], ids=["zeroed", "missing"])
+def test_a_hole_in_an_avi_moves_no_frame_in_time(tmp_path: Path, coder: str, removed: bool) -> None:
+    path = tmp_path / "clip.avi"
+    content = coded(path, coder, g="1", **(FFV1 if coder == "ffv1" else {}))
+    coded_frames = packets(path)
+    begin, end = content.index(coded_frames[20]) + 40, content.index(coded_frames[23]) + 40
+
+    def hole(changed: bytearray) -> None:
+        if removed:
+            del changed[begin:end]
+        else:
+            changed[begin:end] = bytes(end - begin)
+
+    found, whole = nothing_wrong(path, hole)
+    assert whole >= COUNT - 8
+    lost_s = {round(item.time_s, 3) for item in found if isinstance(item, LostFrame) and item.time_s is not None}
+    assert {0.84, 0.88} <= lost_s
+
+
+def test_behind_a_hole_in_an_avi_without_index_no_time_is_made_up(tmp_path: Path) -> None:
+    path = tmp_path / "clip.avi"
+    content = coded(path, "mjpeg")
+    coded_frames = packets(path)
+    begin, end = content.index(coded_frames[20]) + 40, content.index(coded_frames[23]) + 40
+
+    def hole(changed: bytearray) -> None:
+        changed[begin:end] = bytes(end - begin)
+        changed[changed.rindex(b"idx1") :] = b""
+
+    found, whole = nothing_wrong(path, hole)
+    assert 19 <= whole <= 21
+    behind = [item for item in found if isinstance(item, Frame) and item.time_s is None]
+    assert COUNT - 25 <= len(behind) <= COUNT - 23
+    assert any("the time of those behind is not known" in item.words for item in found if isinstance(item, LostFrame))
+
+
+def test_what_the_decoder_of_h264_says_in_its_log_alone_is_damage(tmp_path: Path) -> None:
+    path = tmp_path / "clip.mp4"
+    content = coded(path, "libx264", g="20", bf="2", crf="18")
+    coded_frames = packets(path)
+
+    def spoil(changed: bytearray) -> None:
+        frame = coded_frames[24]
+        at = content.index(frame) + len(frame) // 3
+        changed[at : at + 24] = np.random.default_rng(1).bytes(24)
+
+    found, whole = nothing_wrong(path, spoil)
+    assert whole >= 40
+    assert whole < COUNT
+    assert isinstance(found[-1], Frame)
+
+
+@pytest.mark.parametrize("frame", [24, 38, 39, 40, 41])
+def test_packets_lost_from_a_transport_stream_lose_frames_until_a_key_frame(tmp_path: Path, frame: int) -> None:
+    path = tmp_path / "clip.ts"
+    coded(path, "libx264", g="20", bf="2", crf="18")
+    with av.open(str(path)) as container:
+        begins = [packet.pos for packet in container.demux(video=0) if packet.size]
+
+    def lose(changed: bytearray) -> None:
+        del changed[begins[frame] : begins[frame] + 2 * 188]
+
+    found, whole = nothing_wrong(path, lose)
+    assert whole >= 20
+    assert any(isinstance(item, LostFrame) for item in found)
+
+
+def ticks_of(ticks: list[int]) -> list[int]:
+    """Ticks of the pictures that are believed."""
+    blank = av.VideoFrame(16, 16, "gray")
+    return [tick for tick, what in believable((tick, blank) for tick in ticks) if isinstance(what, av.VideoFrame)]
+
+
+def test_a_single_time_out_of_an_even_row_is_not_believed() -> None:
+    row = list(range(0, 1200, 40))
+    assert ticks_of(row) == row
+    assert ticks_of([*row[:20], row[20] + 8, *row[21:]]) == [*row[:20], *row[21:]]
+    # Matroska's rounding, a frame that the camera dropped, a pause, and times that were never even are no damage.
+    assert len(ticks_of([round(100 * k / 3) for k in range(30)])) == 30
+    assert ticks_of([*row[:20], *row[21:]]) == [*row[:20], *row[21:]]
+    paused = [*row[:20], *[tick + 517 for tick in row[20:]]]
+    assert ticks_of(paused) == paused
+    uneven = np.cumsum(np.random.default_rng(2).integers(1, 80, 200)).tolist()
+    assert ticks_of(uneven) == uneven
+
+
+def test_times_that_run_backwards_are_not_believed_and_a_repeated_one_is_left_alone() -> None:
+    row = list(range(0, 1200, 40))
+    assert ticks_of([*row[:15], 512, 552, *row[17:]]) == [*row[:14], *row[17:]]
+    assert ticks_of([0, 40, 40, 80]) == [0, 40, 40, 80]
+
+
+def test_frames_missing_in_an_even_row_are_noticed() -> None:
+    row = EvenRow()
+    assert [tick for tick in [*range(0, 800, 40), *range(880, 1200, 40)] if row.leaps(tick)] == [880]

@@ -1,0 +1,122 @@
+"""A stream that arrives damaged: what was lost live stays lost in the recording, row by row."""
+
+from dataclasses import asdict
+from fractions import Fraction
+from pathlib import Path
+
+import av
+import numpy as np
+import pytest
+
+from calib.calibration import BareScale
+from fingervision.domain.errors import FingervisionError
+from fingervision.domain.frame import Frame, LostFrame
+from fingervision.frames.network_stream import NetworkStream
+from fingervision.frames.source import open_source
+from fingervision.live.capture import Arrival, Capture, Ended
+from fingervision.live.run_folder import RecordedFrame, RunFolder
+from fingervision.measuring.measure import Task, measure
+from fingervision.measuring.rows import Result, RowMaker
+from fingervision.rendering import Camera, render, two_fingers
+from fingervision.vision.pipeline import measure_frame
+
+COUNT, RATE_HZ, SIZE_PX, SCALE = 60, 25, (160, 120), 17.0
+CODERS = {
+    "h264": ("libx264", "yuv420p", {"g": "20", "bf": "0", "crf": "18"}),
+    "mjpeg": ("mjpeg", "yuvj420p", {"qmin": "3", "qmax": "3"}),
+}
+
+
+@pytest.fixture(scope="module")
+def film() -> list[np.ndarray]:
+    scenes = [two_fingers(50.0 + 0.5 * k, below_tip_px=5.1, width_px=25.0, frame=SIZE_PX) for k in range(COUNT)]
+    return [render(scene, Camera(noise_grey=1.0), np.random.default_rng(k)) for k, scene in enumerate(scenes)]
+
+
+def coded(path: Path, film: list[np.ndarray], coder: str, container_format: str | None = None) -> list[int]:
+    """Write the film; gives the place of each packet in the file."""
+    name, pixel_format, options = CODERS[coder]
+    with av.open(str(path), "w", format=container_format) as container:
+        stream = container.add_stream(name, rate=RATE_HZ, options=options)
+        stream.width, stream.height, stream.pix_fmt = *SIZE_PX, pixel_format
+        for k, levels in enumerate(film):
+            picture = av.VideoFrame.from_ndarray(levels, format="gray").reformat(format=pixel_format)
+            picture.pts, picture.time_base = k, Fraction(1, RATE_HZ)
+            container.mux(stream.encode(picture))
+        container.mux(stream.encode(None))
+    if container_format == "mpjpeg":
+        return []
+    with av.open(str(path)) as container:
+        return [packet.pos for packet in container.demux(video=0) if packet.size]
+
+
+def recorded(stream: Path, out: Path, task: Task) -> Path:
+    """Record a stream as live does, one frame after the other."""
+    capture = Capture(NetworkStream(str(stream)), again=None)
+    source = capture.source
+    run = RunFolder(out, source.description, task, source.template)
+    rows = RowMaker(task.scale, SIZE_PX)
+    capture.begin()
+    while not isinstance(what := capture.next(5.0), Ended):
+        if isinstance(what, Arrival):
+            item = what.item
+            outcome = measure_frame(item, task.settings) if isinstance(item, Frame) else item
+            (row,) = rows.rows((Result(item.index, item.time_s, outcome),))
+            run.add(RecordedFrame(item, what.packets, row))
+    run.close("The stream ended.")
+    return run.path
+
+
+@pytest.mark.parametrize("coder", ["h264", "mjpeg"])
+@pytest.mark.parametrize("seed", [1, 2])
+def test_the_recording_of_a_lossy_stream_measures_to_the_live_table(
+    tmp_path: Path, film: list[np.ndarray], coder: str, seed: int
+) -> None:
+    stream = tmp_path / ("clip.ts" if coder == "h264" else "clip.mkv")
+    begins = coded(stream, film, coder)
+    content = bytearray(stream.read_bytes())
+    for frame in sorted(np.random.default_rng(seed).choice(np.arange(3, COUNT - 3), 4, replace=False), reverse=True):
+        if coder == "h264":
+            del content[begins[frame] + 188 : begins[frame] + 2 * 188]
+        else:
+            content[begins[frame] + 700 : begins[frame] + 760] = bytes(60)
+    stream.write_bytes(content)
+    task = Task(BareScale(SCALE))
+    run = recorded(stream, tmp_path / "runs", task)
+    measure(open_source(str(run / "video.mp4")), task, tmp_path / "again")
+    live, again = ((path / "gaps.csv").read_text() for path in (run, tmp_path / "again"))
+    assert ",damaged," in live
+    assert again == live
+
+
+def test_one_damaged_jpeg_of_a_stream_without_times_costs_one_frame(tmp_path: Path, film: list[np.ndarray]) -> None:
+    stream = tmp_path / "feed.mpjpeg"
+    coded(stream, film, "mjpeg", "mpjpeg")
+    whole = items_of(stream)
+    content = bytearray(stream.read_bytes())
+    at = [k for k in range(len(content)) if content.startswith(b"\xff\xda", k)][20] + 20
+    content[at : at + 400] = b"\xff\xc4" * 200
+    stream.write_bytes(content)
+    items = items_of(stream)
+    assert len(items) == len(whole)
+    assert [item.index for item in items if isinstance(item, LostFrame)] == [19]  # the first is used up by probing
+
+
+def items_of(stream: Path) -> list[Frame | LostFrame]:
+    items: list[Frame | LostFrame] = []
+    with pytest.raises(FingervisionError, match="cut off"):
+        items.extend(NetworkStream(str(stream)))
+    return items
+
+
+def test_what_was_lost_is_said_with_its_reason(tmp_path: Path, film: list[np.ndarray]) -> None:
+    stream = tmp_path / "clip.ts"
+    begins = coded(stream, film, "h264")
+    content = bytearray(stream.read_bytes())
+    del content[begins[30] + 188 : begins[30] + 2 * 188]
+    stream.write_bytes(content)
+    task = Task(BareScale(SCALE))
+    run = recorded(stream, tmp_path / "runs", task)
+    again = measure(open_source(str(run / "video.mp4")), task, tmp_path / "again")
+    assert again.summary["why"]["damaged"]["words"]
+    assert asdict(again.series.first_damaged)["frame"] in (29, 30, 31)  # the mark may be one too early

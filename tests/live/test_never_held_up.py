@@ -1,0 +1,204 @@
+"""Measuring waits for nobody, and what dies or is old is seen: paused readers, silent pages, a zero out of date."""
+
+import io
+import json
+import struct
+import sys
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from threading import Event, Thread
+from typing import Any
+
+import numpy as np
+import pytest
+from websockets.exceptions import ConnectionClosed
+from websockets.sync.client import connect
+
+from calib.calibration import BareScale
+from fingervision.domain.errors import FingervisionError
+from fingervision.domain.frame import Frame
+from fingervision.domain.status import Status
+from fingervision.frames.source import Wish
+from fingervision.live import server
+from fingervision.live.cadence import Cadence
+from fingervision.live.choices import Choices
+from fingervision.live.opening import opened
+from fingervision.live.outlet import PATIENCE_S, Outlet
+from fingervision.live.preview import message
+from fingervision.live.session import Seen, Session
+from fingervision.live.terminal import JsonLines
+from fingervision.storage.gaps_csv import GapRow
+
+HAMMERED_S = 0.5
+
+
+@pytest.fixture
+def session(tmp_path: Path) -> Session:
+    return Session(opened("simulated", Wish()), Choices(scale=BareScale(34.0)), tmp_path)
+
+
+def head_of(session: Session) -> dict[str, Any]:
+    content = message(session, 0, 0, None).content
+    (length,) = struct.unpack(">I", content[:4])
+    head: dict[str, Any] = json.loads(content[4 : 4 + length])
+    return head
+
+
+class Unread(io.StringIO):
+    """A stream whose reader pauses until it is told to go on."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.goes_on = Event()
+
+    def write(self, text: str) -> int:
+        self.goes_on.wait()
+        return super().write(text)
+
+
+class Gone(io.StringIO):
+    """A stream that nobody reads any more."""
+
+    def write(self, text: str) -> int:
+        raise BrokenPipeError
+
+
+def test_a_reader_that_pauses_costs_no_frame_of_measurement_or_recording(
+    session: Session, rows: Callable[[Path], list[dict[str, str]]]
+) -> None:
+    stream = Unread()
+    outlet = Outlet(stream)
+    session.on_row.append(JsonLines(outlet).add)
+    run = session.record()
+    session.start()
+    until_s = time.monotonic() + 60.0
+    while session.history.count < 30 and time.monotonic() < until_s:
+        time.sleep(0.02)
+    session.stop()
+    assert session.history.count >= 30
+    assert [int(row["frame"]) for row in rows(run / "gaps.csv")] == list(range(session.history.count))
+    stream.goes_on.set()
+    outlet.close()
+    assert len(stream.getvalue().splitlines()) == session.history.count
+
+
+def test_printing_to_a_reader_that_does_not_read_never_waits_and_counts_what_it_leaves_out() -> None:
+    stream = Unread()
+    outlet = Outlet(stream, waiting=10)
+    began_s = time.monotonic()
+    for _ in range(200):
+        outlet.put("line\n")
+    assert time.monotonic() - began_s < 1.0
+    outlet.close()
+    assert time.monotonic() - began_s < PATIENCE_S + 2.0
+    assert outlet.left_out >= 199
+    stream.goes_on.set()
+
+
+def test_a_reader_that_is_gone_is_noticed() -> None:
+    outlet = Outlet(Gone())
+    outlet.put("line\n")
+    outlet.close()
+    assert outlet.broken
+
+
+def test_rate_and_jitter_can_be_asked_for_while_frames_come() -> None:
+    cadence, ending, before = Cadence(), Event(), sys.getswitchinterval()
+
+    def come() -> None:
+        time_s = 0.0
+        while not ending.is_set():
+            cadence.add(time_s := time_s + 0.005)
+
+    sys.setswitchinterval(1e-6)
+    thread = Thread(target=come)
+    thread.start()
+    try:
+        until_s = time.monotonic() + HAMMERED_S
+        while time.monotonic() < until_s:
+            assert (cadence.jitter_s or 0.0) >= 0.0
+            assert (cadence.rate_hz or 1.0) > 0.0
+    finally:
+        ending.set()
+        thread.join()
+        sys.setswitchinterval(before)
+
+
+@pytest.fixture
+def page(session: Session) -> Iterator[server.Page]:
+    ending = Event()
+    page = server.Page(session, server.bound("127.0.0.1", 0), "127.0.0.1")
+    thread = Thread(target=page.serve, args=(ending,))
+    thread.start()
+    yield page
+    ending.set()
+    thread.join()
+
+
+def closing_code(page: server.Page) -> int | None:
+    """Look at the page without a word, until the server closes the socket."""
+    address = page.address.replace("http://", "ws://").replace("/?", "/socket?")
+    origin = page.address.partition("/?")[0]
+    with connect(address, origin=origin) as socket:  # type: ignore[arg-type]
+        try:
+            while True:
+                socket.recv(timeout=5.0)
+        except ConnectionClosed as closed:
+            return None if closed.rcvd is None else closed.rcvd.code
+
+
+def test_a_fault_in_sending_closes_the_socket_so_that_the_page_connects_again(
+    page: server.Page, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fail(*_: object) -> None:
+        raise RuntimeError("a fault of ours")
+
+    monkeypatch.setattr(server, "message", fail)
+    assert closing_code(page) == server.TRY_AGAIN_LATER
+
+
+def test_a_page_that_is_silent_is_let_go(page: server.Page, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(server, "ACKNOWLEDGED_WITHIN_S", 0.2)
+    assert closing_code(page) == server.TRY_AGAIN_LATER
+
+
+def test_a_zero_does_not_outlive_the_scale_that_it_was_taken_with(session: Session) -> None:
+    session.choose(zero_mm=1.25)
+    session.choose(least_mm=0.1)
+    assert session.choices.zero_mm == 1.25
+    session.choose(scale=BareScale(20.0))
+    assert session.choices.zero_mm == 0.0
+    assert session.messages[-1].words.startswith("The zero is off")
+
+
+def test_a_zeroed_value_and_its_tolerance_agree(session: Session) -> None:
+    frame = Frame(np.zeros((480, 640), np.uint8), 0, 0.0)
+    row = GapRow(0, 0.0, Status.OK, gap_mm=5.0, u_random_mm=0.001)
+    session.seen = Seen(frame, None, row)
+    session.choose(zero_mm=4.0, least_mm=0.5, greatest_mm=1.5)
+    head = head_of(session)
+    assert head["now"]["verdict"] == "pass"
+    assert head["state"]["zero_mm"] == head["now"]["zero_mm"] == 4.0
+
+
+def test_nothing_is_recorded_after_the_source_has_ended(session: Session, tmp_path: Path) -> None:
+    session.ended.set()
+    with pytest.raises(FingervisionError, match="source has ended"):
+        session.record()
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_recording_that_failed_is_told_until_the_next_one(session: Session) -> None:
+    session.record()
+    recorder = session.recording
+    assert recorder is not None
+    recorder.failure = "the disk is full"
+    session.start()
+    until_s = time.monotonic() + 30.0
+    while not session.trouble and time.monotonic() < until_s:
+        time.sleep(0.02)
+    assert "the disk is full" in head_of(session)["state"]["trouble"]
+    session.record()
+    assert head_of(session)["state"]["trouble"] == ""
+    session.stop()
