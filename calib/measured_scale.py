@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from calib.budget import Budget, distance_budget
+from calib.camera_response import CameraResponse
 from calib.distances import Distances
 from calib.errors import CalibrationError
 from calib.lens import Lens
@@ -104,6 +105,13 @@ class Calibration:
         The camera's settings, where known.
     made_at, software : str
         When (ISO 8601) and by what.
+    camera_response : CameraResponse or None
+        Which light the levels of its pictures were taken for; None where it does not say.
+    response_known : bool
+        Whether that was stated or measured, and not merely assumed.
+    response_shift_px : float or None
+        How much wider a light gap between its edges is than under the other standard response; None where it does not
+        say.
     """
 
     px_per_mm: float
@@ -119,6 +127,9 @@ class Calibration:
     camera: Mapping[str, str] = field(default_factory=dict)
     made_at: str = ""
     software: str = ""
+    camera_response: CameraResponse | None = None
+    response_known: bool = False
+    response_shift_px: float | None = None
 
     def __post_init__(self) -> None:
         """Refuse what cannot be a calibration."""

@@ -77,6 +77,7 @@ def scale_from_sizes(
     frame_size_px: tuple[int, int],
     limits: Limits,
     stated: frozenset[str] = frozenset(),
+    response_shift_px: float = 0.0,
 ) -> ScaleFit:
     """Fit gap_mm = (gap_px + p b) / s to objects of known size, with p = +1 for a light gap and -1 for a dark object.
 
@@ -91,6 +92,9 @@ def scale_from_sizes(
         Width and height of the pictures.
     limits, stated
         What the user states about the bench, and which of it is not a default.
+    response_shift_px : float
+        How much wider a light gap may have been read because the camera's response is assumed; 0 where it is known. The
+        true shift lies between 0 and this (rectangular, about its end). An edge bias that is found takes it up.
     """
     if not sizes:
         raise CalibrationError("A scale needs at least one object of known size, but there is none.")
@@ -113,11 +117,15 @@ def scale_from_sizes(
         covariance = np.outer(by_bias, by_bias) * rectangular(limits.edge_bias_px) ** 2
         how = f"+-{limits.edge_bias_px:g} px ({'stated' if 'edge_bias_px' in stated else 'default'})"
         parts.append(ScalePart("edge bias", covariance, f"{how}; three sizes, or a bar and a slot, would find it"))
+        if response_shift_px:
+            shifted = np.outer(by_bias, by_bias) * rectangular(response_shift_px) ** 2
+            how = f"0 to {response_shift_px:.2g} px; state or measure it with --response"
+            parts.append(ScalePart("camera response", shifted, how))
     lens, tilt = _seen_through(sizes, polarity, frame_size_px, limits.camera_distance_mm * line.slope)
     expected = np.diag(u_y**2 + (line.slope * u_x) ** 2) + np.outer(lens, lens) * rectangular(limits.lens_relative) ** 2
     expected += (tilt.T @ tilt) * rectangular(limits.tilt_rad) ** 2
     if not bias_known:
-        expected += rectangular(limits.edge_bias_px) ** 2
+        expected += rectangular(limits.edge_bias_px) ** 2 + rectangular(response_shift_px) ** 2
     chi_square = _chi_square(line, x, expected, bias_known)
     probability = float(chdtrc(line.freedom, chi_square)) if line.freedom > 0 else 1.0
     if probability < CHANCE:

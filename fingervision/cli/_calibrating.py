@@ -11,7 +11,8 @@ import click
 
 from fingervision import __version__
 from fingervision.cli._bench_limits import limits_from
-from fingervision.cli._references import read_pictures, read_references, region_from
+from fingervision.cli._picture_response import PictureResponse
+from fingervision.cli._references import named_references, read_pictures, read_references, region_from
 from fingervision.domain.errors import FingervisionError, UsageError
 
 if TYPE_CHECKING:
@@ -40,6 +41,7 @@ def calibrate_on_sizes(
     out: Path,
     certificate: str,
     date: str,
+    response: str,
     camera: Sequence[str],
     no_picture: bool,
     as_json: bool,
@@ -54,9 +56,12 @@ def calibrate_on_sizes(
         from fingervision.cli import _calibration_report as report
 
         _refuse_foreign(out)
-        pictures = read_references(items, kind, u_size_mm)
+        stored = read_references(items, kind, u_size_mm)
+        read_with = PictureResponse.of(response, [path for _, path, _ in named_references(items, kind)])
+        pictures = [replace(picture, grey=read_with.light(picture.grey)) for picture in stored]
         bench, stated = limits_from(limits, lens_calibrated=False)
         edges = find_widths(pictures, region_from(roi))
+        shift_px = read_with.shift_px(stored, edges, region_from(roi))
         sizes = [
             MeasuredSize(
                 Reference(f"{picture.kind} {picture.name}", picture.size_mm, picture.u_size_mm, certificate, date),
@@ -68,10 +73,10 @@ def calibrate_on_sizes(
             for picture, edge in zip(pictures, edges, strict=True)
         ]
         height, width = pictures[0].grey.shape
-        fit = scale_from_sizes(sizes, (width, height), bench, stated)
-        calibration = _written(fit.calibration, out, camera)
+        fit = scale_from_sizes(sizes, (width, height), bench, stated, 0.0 if read_with.is_known else shift_px)
+        calibration = _written(read_with.noted(fit.calibration, shift_px), out, camera)
         if not no_picture:
-            for picture, edge in zip(pictures, edges, strict=True):
+            for picture, edge in zip(stored, edges, strict=True):
                 words = f"{picture.name}: {picture.size_mm:g} mm = {edge.width_px:.3f} px"
                 _write_picture(out, picture.name, picture_of_edges(picture.grey, edge, words))
         if as_json:
@@ -112,6 +117,7 @@ def calibrate_on_board(
     out: Path,
     certificate: str,
     date: str,
+    response: str,
     camera: Sequence[str],
     no_picture: bool,
     as_json: bool,
@@ -129,15 +135,19 @@ def calibrate_on_board(
         u_square = 0.001 * square_mm if u_square_mm is None else u_square_mm
         board = Board(columns, rows, square_mm, u_square, marker_mm)
         bench, stated = limits_from(limits, lens_calibrated=len(images) > 1)
-        pictures = read_pictures(images)
+        stored = read_pictures(images)
+        read_with = PictureResponse.of(response, images)
+        pictures = [read_with.light(grey) for grey in stored]
         corners = [find_corners(grey, board, path.name) for grey, path in zip(pictures, images, strict=True)]
         height, width = pictures[0].shape
         fit = scale_from_board(corners, board, (width, height), bench, stated)
         certified = tuple(replace(each, certificate=certificate, date=date) for each in fit.calibration.references)
-        calibration = _written(replace(fit.calibration, references=certified), out, camera)
+        # A board's corners lie between equal edges on every side: a response does not move them.
+        noted = read_with.noted(replace(fit.calibration, references=certified), 0.0)
+        calibration = _written(noted, out, camera)
         if not no_picture:
             residuals = [fit.plane.residual_px] if fit.lens is None else fit.lens.residual_px
-            for grey, found, residual in zip(pictures, corners, residuals, strict=True):
+            for grey, found, residual in zip(stored, corners, residuals, strict=True):
                 words = f"{found.name}: {len(found.points_px)} corners"
                 _write_picture(out, found.name, picture_of_corners(grey, found.points_px, residual, words))
         if as_json:

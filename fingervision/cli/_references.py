@@ -25,12 +25,22 @@ def read_references(items: Sequence[str], kind: str, u_size_mm: float) -> list["
     """
     from calib.known_widths import KnownSize
 
-    named = [_item(item, kind) for item in items]
+    named = named_references(items, kind)
     pictures = read_pictures([path for _, path, _ in named])
     return [
         KnownSize(path.name, which, size_mm, u_size_mm, grey)
         for (which, path, size_mm), grey in zip(named, pictures, strict=True)
     ]
+
+
+def named_references(
+    items: Sequence[str],
+    kind: str,
+    form: str = "SIZE_MM with a positive size",
+    example: str = "ref5.png=5.000",
+) -> list[tuple[str, Path, float]]:
+    """Kind, picture and value of every item; `form` and `example` say in a sentence what the value must be."""
+    return [_item(item, kind, form, example) for item in items]
 
 
 def read_pictures(paths: Sequence[Path]) -> list["GreyImage"]:
@@ -60,7 +70,7 @@ def read_pictures(paths: Sequence[Path]) -> list["GreyImage"]:
     return pictures
 
 
-def _item(item: str, kind: str) -> tuple[str, Path, float]:
+def _item(item: str, kind: str, form: str, example: str) -> tuple[str, Path, float]:
     name, _, size = item.rpartition("=")
     prefix, colon, rest = name.partition(":")
     if colon and prefix in KINDS:
@@ -71,7 +81,7 @@ def _item(item: str, kind: str) -> tuple[str, Path, float]:
         size_mm = 0.0
     if not name or not 0.0 < size_mm < float("inf"):
         raise UsageError(
-            f"A reference must be IMAGE=SIZE_MM with a positive size, but is {item!r}: write ref5.png=5.000."
+            f"A {'reference' if 'SIZE' in form else 'picture'} must be IMAGE={form}, but is {item!r}: write {example}."
         )
     return kind, Path(name), size_mm
 

@@ -2,6 +2,7 @@
 
 import json
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -9,6 +10,7 @@ import click
 
 from fingervision.cli._bench_limits import limit_options
 from fingervision.cli._calibrating import calibrate_on_board, calibrate_on_sizes, sentences
+from fingervision.cli._picture_response import PictureResponse
 from fingervision.cli._references import read_references, region_from
 from fingervision.domain.errors import FingervisionError, UsageError
 
@@ -32,6 +34,12 @@ CHARUCO_EXAMPLES = """
 \b
 Example:
   fingervision calibrate charuco plane.png tilted*.png --squares 8x6 --square-mm 3 --marker-mm 2.2
+"""
+RESPONSE_EXAMPLES = """
+\b
+Examples:
+  fingervision calibrate response e05.png=0.5 e10.png=1 e20.png=2 e40.png=4 -o response.csv
+  fingervision measure run.mkv --calibration calibration.json --response response.csv
 """
 CHECK_EXAMPLES = """
 \b
@@ -59,6 +67,13 @@ def _output_options(command: Command) -> Command:
             click.option("-o", "--out", default="calibration.json", type=click.Path(path_type=Path), show_default=True),
             click.option("--certificate", default="", help="Name of the reference's certificate."),
             click.option("--date", default="", help="Date of the certificate."),
+            click.option(
+                "--response",
+                default="auto",
+                show_default=True,
+                metavar="auto|linear|srgb|bt709|FILE",
+                help="Which light a grey level stands for; auto: the pictures' own tag, else linear.",
+            ),
             click.option("--camera", multiple=True, metavar="NAME=VALUE", help="A setting of the camera; repeatable."),
             click.option("--no-picture", is_flag=True, help="Write no calibration picture."),
             click.option("--json", "as_json", is_flag=True, help="Print the result for programs."),
@@ -152,6 +167,45 @@ def charuco(marker_mm: float | None, square_mm: float, **options: Any) -> None:
     calibrate_on_board(marker_mm=0.75 * square_mm if marker_mm is None else marker_mm, square_mm=square_mm, **options)
 
 
+@command.command("response", epilog=RESPONSE_EXAMPLES)
+@click.argument("items", nargs=-1, required=True, metavar="IMAGE=EXPOSURE...")
+@click.option("-o", "--out", default="response.csv", type=click.Path(path_type=Path), show_default=True)
+@click.option("--json", "as_json", is_flag=True, help="Print the result for programs.")
+def response(items: Sequence[str], out: Path, as_json: bool) -> None:
+    """Measure the camera's response from pictures of one still scene at several exposures.
+
+    The scene needs flat parts of many shades (paper with grey fields); only the exposure time changes, the aperture,
+    the light and the focus do not. Exposures count by their ratios: seconds or any other unit.
+    """
+    with sentences():
+        from calib.response_from_exposures import response_from_exposures
+        from fingervision.cli._references import named_references, read_pictures
+        from fingervision.storage.response_csv import write_response
+        from fingervision.vision.grey import top_level
+
+        named = named_references(items, "bar", "EXPOSURE with a positive exposure", "e20.png=2")
+        pictures = read_pictures([path for _, path, _ in named])
+        top = max(top_level(grey) for grey in pictures)
+        found = response_from_exposures(pictures, [value for *_, value in named], top, out.name)
+        write_response(found.response, out)
+        if as_json:
+            content = {
+                "out": str(out),
+                "exponent": found.exponent,
+                "rms_relative": found.rms_relative,
+                "least_level": found.covered[0] * top,
+                "largest_level": found.covered[1] * top,
+            }
+            click.echo(json.dumps(content))
+            return
+        click.echo(
+            f"The camera's response is nearest to a power law with an exponent of {found.exponent:.3f} (1 is linear); "
+            f"the pictures agree to {100.0 * found.rms_relative:.2f} % of the light (RMS), over levels "
+            f"{found.covered[0] * top:.0f} to {found.covered[1] * top:.0f} of {top}."
+        )
+        click.echo(f"Written: {out}")
+
+
 @command.command("check", epilog=CHECK_EXAMPLES)
 @click.argument("calibration", type=click.Path(path_type=Path))
 @_size_options
@@ -169,7 +223,9 @@ def check(calibration: Path, items: Sequence[str], u_size_mm: float, roi: str | 
         pictures = read_references(items, "bar", u_size_mm)
         height, width = pictures[0].grey.shape
         scale.check_frame_size(width, height)
-        edges = find_widths(pictures, region_from(roi), scale.px_per_mm)
+        read_with = PictureResponse.of_calibration(scale)
+        light = [replace(picture, grey=read_with.light(picture.grey)) for picture in pictures]
+        edges = find_widths(light, region_from(roi), scale.px_per_mm)
         points = np.array([edge.points_px for edge in edges])
         u_random = np.array([edge.u_width_px for edge in edges])
         distances = scale.distances(points, u_random, np.array([edge.light for edge in edges]))

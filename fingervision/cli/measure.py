@@ -50,6 +50,21 @@ Exit codes: 0 done; 1 could not, or no frame gave a number; 2 wrong usage;
     show_default=True,
     help="Added to the drive's times to get the recording's.",
 )
+@click.option(
+    "--response",
+    default="auto",
+    show_default=True,
+    metavar="auto|linear|srgb|bt709|FILE",
+    help="Which light a grey level stands for; auto: the calibration's, else the recording's own tag, else linear.",
+)
+@click.option("--bits", type=click.IntRange(8, 16), help="Depth of levels stored in 16 bits, where it is not 16.")
+@click.option(
+    "--fingers",
+    type=click.Choice(["auto", "dark", "light"]),
+    default="auto",
+    show_default=True,
+    help="Whether the fingers are darker or lighter than their ground.",
+)
 @click.option("--overlay", is_flag=True, help="Also write overlay.mp4.")
 @click.option("--steps", "steps_frame", type=int, metavar="FRAME", help="Also write every step of this frame (from 0).")
 @click.option(
@@ -68,6 +83,9 @@ def command(
     rate_hz: float | None,
     drive: Path | None,
     drive_offset_s: float,
+    response: str,
+    bits: int | None,
+    fingers: str,
     overlay: bool,
     steps_frame: int | None,
     out: Path | None,
@@ -82,6 +100,7 @@ def command(
     from fingervision.frames.source import Wish, open_source
     from fingervision.measuring.measure import Task, measure
     from fingervision.storage.drive_csv import read_drive
+    from fingervision.storage.response_csv import response_named
 
     task = Task(
         scale=_scale(calibration, px_per_mm),
@@ -93,6 +112,9 @@ def command(
         drive_offset_s=drive_offset_s,
         overlay=overlay,
         steps_frame=steps_frame,
+        response=response_named(response),
+        bits=bits,
+        fingers_are_dark={"auto": None, "dark": True, "light": False}[fingers],
     )
     source = open_source(recording, Wish(rate_hz=rate_hz))
     with _Bar() as bar:

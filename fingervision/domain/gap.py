@@ -58,6 +58,9 @@ class GapMeasurement:
     u_shift_px : float
         Standard uncertainty of `gap_px` for what may have moved the edges in every frame alike: a bright rim, or light
         just beyond the end of the scale. Zero where the edges show neither.
+    response_shift_px : float
+        How much larger `gap_px` is than it would be if the other camera response that is possible were the true one;
+        zero where the response is known.
     """
 
     left: FingerEdge
@@ -66,6 +69,16 @@ class GapMeasurement:
     u_gap_px: float
     light_gap: bool
     u_shift_px: float = 0.0
+    response_shift_px: float = 0.0
+
+    @property
+    def u_picture_px(self) -> float:
+        """Standard uncertainty of `gap_px` for all that this picture leaves open in every frame alike.
+
+        The true response lies anywhere between the one that was taken and the other one: a rectangular distribution
+        that ends at the value found (JCGM 100:2008, 4.3.7, about its end and not its middle).
+        """
+        return hypot(self.u_shift_px, self.response_shift_px / 3.0**0.5)
 
     @property
     def status(self) -> Status:

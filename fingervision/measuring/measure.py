@@ -7,6 +7,7 @@ from pathlib import Path
 from time import monotonic
 from typing import Any
 
+from calib.camera_response import CameraResponse
 from fingervision.domain.direction import Direction
 from fingervision.domain.drive import DriveHistory
 from fingervision.domain.errors import ExitCode, FingervisionError, UsageError
@@ -22,6 +23,7 @@ from fingervision.measuring.marked import marked
 from fingervision.measuring.other_camera import other_camera
 from fingervision.measuring.output_folder import OutputFolder, claimed
 from fingervision.measuring.overlay_video import OverlayVideo
+from fingervision.measuring.response_budget import choose_response
 from fingervision.measuring.rows import Result, RowMaker
 from fingervision.measuring.scale import Scale
 from fingervision.measuring.series import GapSeries
@@ -63,6 +65,12 @@ class Task:
         Whether a video is written with what was measured drawn in.
     steps_frame : int or None
         The frame of which every step is written as a picture.
+    response : CameraResponse or None
+        The camera's response, where the user knows it.
+    bits : int or None
+        Depth of levels that are stored in 16 bits; None finds it in every frame.
+    fingers_are_dark : bool or None
+        Whether the fingers are darker than the ground; None finds out in every frame.
     """
 
     scale: Scale
@@ -74,6 +82,9 @@ class Task:
     drive_offset_s: float = 0.0
     overlay: bool = False
     steps_frame: int | None = None
+    response: CameraResponse | None = None
+    bits: int | None = None
+    fingers_are_dark: bool | None = None
 
     def __post_init__(self) -> None:
         if not 0.0 < self.below_tip_mm < float("inf"):
@@ -85,8 +96,15 @@ class Task:
 
     @property
     def settings(self) -> Settings:
-        """What vision needs of it."""
-        return Settings(self.below_tip_mm * self.scale.px_per_mm, self.direction, self.region)
+        """What vision needs of it, whatever the recording says of itself."""
+        return self.settings_for(())[0]
+
+    def settings_for(self, files: tuple[Path, ...]) -> tuple[Settings, str]:
+        """What vision needs of it for a recording of these files, and a warning where there is one."""
+        response, other, words = choose_response(self.response, self.scale, files)
+        below_px = self.below_tip_mm * self.scale.px_per_mm
+        settings = Settings(below_px, self.direction, self.region, response, other, self.bits, self.fingers_are_dark)
+        return settings, words
 
     @property
     def drive_columns(self) -> tuple[str, ...]:
@@ -168,6 +186,9 @@ def _measured(source: FrameSource, task: Task, out: Path, on_progress: Progress 
     description = source.description
     if words := other_camera(task.scale, recorded_camera(description.files)):
         description = replace(description, notes=(words, *description.notes))
+    settings, words = task.settings_for(description.files)
+    if words:
+        description = replace(description, notes=(words, *description.notes))
     folder = claimed(out, description.files)
     frame_size_px = (description.width_px, description.height_px)
     marks = lost_frames(description.files)
@@ -193,13 +214,13 @@ def _measured(source: FrameSource, task: Task, out: Path, on_progress: Progress 
         stack.callback(hand_over)
         handed_over_at = monotonic()
         try:
-            for item, outcome in _outcomes(marked(source, marks) if marks else source, task):
+            for item, outcome in _outcomes(marked(source, marks) if marks else source, settings):
                 result = Result(item.index, item.time_s, outcome)
                 pending.append(result)
                 if video is not None and isinstance(item, Frame):
                     video.add(item, outcome, row_maker.rows([result])[0])
                 if isinstance(item, Frame) and item.index == task.steps_frame:
-                    write_steps(item, task.settings, folder.steps)
+                    write_steps(item, settings, folder.steps)
                 if len(pending) >= FRAMES_AT_ONCE or monotonic() - handed_over_at >= SECONDS_AT_ONCE:
                     hand_over()
                     handed_over_at = monotonic()
@@ -213,7 +234,9 @@ def _measured(source: FrameSource, task: Task, out: Path, on_progress: Progress 
     if on_progress is not None:
         on_progress(series.frames, description.frame_count)
     draw_gap(folder.figure, series)
-    summary = summarise(description, _in_words(task), task.scale, task.scale_file, series, complete=not stopped)
+    summary = summarise(
+        description, _in_words(task, settings), task.scale, task.scale_file, series, complete=not stopped
+    )
     write_summary(folder.summary, summary)
     if task.drive is not None and driven == {False} and not stopped:
         raise FingervisionError(
@@ -240,12 +263,12 @@ def _held(out: Path) -> Iterator[None]:
 
 
 def _outcomes(
-    source: Iterable[Frame | LostFrame], task: Task
+    source: Iterable[Frame | LostFrame], settings: Settings
 ) -> Iterator[tuple[Frame | LostFrame, GapMeasurement | NoGap | LostFrame]]:
     """Every frame with what it says; the decoder runs ahead and is stopped when this is."""
     with closing(decoded_ahead(source)) as frames:
         for item in frames:
-            yield item, measure_frame(item, task.settings) if isinstance(item, Frame) else item
+            yield item, measure_frame(item, settings) if isinstance(item, Frame) else item
 
 
 def _check(task: Task, description: Description) -> None:
@@ -275,13 +298,17 @@ def _check(task: Task, description: Description) -> None:
         raise FingervisionError(str(error)) from error
 
 
-def _in_words(task: Task) -> dict[str, Any]:
+def _in_words(task: Task, settings: Settings) -> dict[str, Any]:
     """Put the task as it stands in the summary."""
     region = task.region
     return {
         "below_tip_mm": task.below_tip_mm,
         "tips": "auto" if task.direction is None else task.direction.value,
         "roi": None if region is None else [region.x_px, region.y_px, region.width_px, region.height_px],
+        "response": settings.response.name,
+        "response_known": settings.other_response is None,
+        "bits": task.bits,
+        "fingers": {None: "auto", True: "dark", False: "light"}[task.fingers_are_dark],
         "drive": task.drive is not None,
         "drive_offset_s": task.drive_offset_s if task.drive is not None else None,
     }

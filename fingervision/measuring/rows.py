@@ -9,6 +9,7 @@ from fingervision.domain.drive import DriveHistory
 from fingervision.domain.frame import Frame, LostFrame
 from fingervision.domain.gap import GapMeasurement, NoGap
 from fingervision.measuring.drive_at import drive_at
+from fingervision.measuring.response_budget import u_response_shift_mm
 from fingervision.measuring.scale import Scale
 from fingervision.measuring.tip_bias import u_tip_bias_mm
 from fingervision.storage.gaps_csv import GapRow
@@ -85,7 +86,8 @@ class RowMaker:
         if distances.u_mm is not None:
             u_tip_mm = u_tip_bias_mm(measured, self.scale.edge_bias_px, self.scale.px_per_mm)
             u_shift_mm = np.array([m.u_shift_px for m in measured]) / self.scale.px_per_mm
-            u_mm = np.sqrt(distances.u_mm**2 + u_tip_mm**2 + u_shift_mm**2).tolist()
+            u_response_mm = u_response_shift_mm(measured, self.scale)
+            u_mm = np.sqrt(distances.u_mm**2 + u_tip_mm**2 + u_shift_mm**2 + u_response_mm**2).tolist()
         return list(
             zip(
                 distances.value_mm.tolist(),
@@ -124,6 +126,8 @@ class RowMaker:
             right_tip_px=outcome.right.tip_px,
             left_mm=left_mm,
             right_mm=right_mm,
+            u_shift_px=outcome.u_picture_px,
+            fingers="dark" if outcome.light_gap else "light",
             run=run,
             input_mm=input_mm,
             force_n=force_n,

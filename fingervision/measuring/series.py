@@ -44,12 +44,15 @@ class GapSeries:
         Frames with each status.
     first_without : dict of Status to FirstBad
         The first frame with each status but ok, and why.
+    fingers : Counter of str
+        Frames with dark and with light fingers.
     has_budget : bool
         Whether the scale said how surely it is known.
     """
 
     counts: Counter[Status] = field(default_factory=Counter)
     first_without: dict[Status, FirstBad] = field(default_factory=dict)
+    fingers: Counter[str] = field(default_factory=Counter)
     has_budget: bool = False
     _frame: array[int] = field(default_factory=lambda: array("q"))
     _time_s: array[float] = field(default_factory=lambda: array("d"))
@@ -73,6 +76,7 @@ class GapSeries:
                     words = getattr(result.outcome, "words", "")
                     self.first_without[row.status] = FirstBad(row.frame, row.time_s, words)
                 continue
+            self.fingers[row.fingers] += 1
             self._frame.append(row.frame)
             self._time_s.append(time_s)
             self._gap_mm.append(row.gap_mm)

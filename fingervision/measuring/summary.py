@@ -77,18 +77,31 @@ def summarise(
         "scale": _scale(scale, scale_file),
         "frames": series.frames,
         "counts": {status.value: series.counts[status] for status in Status},
+        "fingers": dict(series.fingers),
         "first_damaged": None if first is None else asdict(first),
         "why": {
             status.value: {"first_frame": found.frame, "words": found.words}
             for status, found in series.first_without.items()
         },
         "gap": _statistics(series),
-        "uncertainty": _uncertainty(scale),
+        "uncertainty": _uncertainty(scale, settings),
         "advice": [
             *([LOSSLESS_ADVICE.format(codec=description.codec)] if description.lossy else []),
+            *_about_fingers(series),
             *description.notes,
         ],
     }
+
+
+def _about_fingers(series: GapSeries) -> list[str]:
+    """Say so where the frames disagree about what the fingers are."""
+    if len(series.fingers) < 2:
+        return []
+    counts = " and ".join(f"{tone} in {count}" for tone, count in series.fingers.most_common())
+    return [
+        f"The frames disagree about what the fingers are: {counts} frames. Look at both with --steps, and state "
+        "--fingers dark or --fingers light."
+    ]
 
 
 def _statistics(series: GapSeries) -> dict[str, float | int | None]:
@@ -127,7 +140,12 @@ def _scale(scale: Scale, file: Path | None) -> dict[str, Any]:
     }
 
 
-def _uncertainty(scale: Scale) -> dict[str, Any]:
+def _uncertainty(scale: Scale, settings: Mapping[str, Any]) -> dict[str, Any]:
+    response = (
+        f"the camera's response, taken as {settings.get('response', 'linear')} and not measured: what another one "
+        "would change, as far as the calibration does not share it (u_shift_px holds all of it)"
+    )
+    is_assumed = not settings.get("response_known", True)
     random = (
         "u_random_mm and u_gap_px: what changes from frame to frame - noise at both edges, both tips through the slope "
         "of the edges, what the edge model leaves unexplained, compression"
@@ -146,7 +164,8 @@ def _uncertainty(scale: Scale) -> dict[str, Any]:
                 f"everything of the scale: {scale.px_per_mm:g} px/mm was stated without an uncertainty, "
                 "so u_gap_mm is empty; calibrate to know it",
                 "edge bias (blooming), lens distortion, tilt, distance from the plane of the scale, temperature",
-                "bright rims beside the edges, and light beyond the end of the scale",
+                "bright rims, walls and shadows beside the edges, and light beyond the end of the scale",
+                *([response] if is_assumed else []),
                 *never,
             ],
         }
@@ -156,7 +175,8 @@ def _uncertainty(scale: Scale) -> dict[str, Any]:
         "covers": [
             random,
             "scale and edge bias with their covariance, from the calibration",
-            "what the edges show of a bright rim, or of light just beyond the end of the scale",
+            "what the edges show of a bright rim, a wall or a shadow, or of light just beyond the end of the scale",
+            *([response] if is_assumed else []),
             *(
                 f"{words}: {scale.how_stated(name, unit)}"
                 for name, words, unit in (

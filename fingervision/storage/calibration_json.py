@@ -10,6 +10,7 @@ from typing import Any, NoReturn
 import numpy as np
 from numpy.typing import NDArray
 
+from calib.camera_response import CURVES, CameraResponse, standard_response
 from calib.errors import CalibrationError
 from calib.lens import Lens
 from calib.limits import Limits
@@ -63,6 +64,7 @@ def write_calibration(calibration: Calibration, path: Path) -> None:
                 for part in calibration.parts
             ],
             "response": {"lens": calibration.response.lens.tolist(), "tilt": calibration.response.tilt.tolist()},
+            "camera_response": _response_content(calibration),
         },
         "frame_width": calibration.frame_size_px[0],
         "frame_height": calibration.frame_size_px[1],
@@ -79,6 +81,21 @@ def write_calibration(calibration: Calibration, path: Path) -> None:
         raise FingervisionError(
             f"The calibration could not be written to {path}: {error.strerror}; name another place with -o."
         ) from error
+
+
+def _response_content(calibration: Calibration) -> dict[str, Any] | None:
+    response = calibration.camera_response
+    if response is None:
+        return None
+    is_standard = response.name in CURVES
+    return {
+        "name": response.name,
+        "known": calibration.response_known,
+        "shift_px": calibration.response_shift_px,
+        "top_level": response.top_level,
+        "level": None if is_standard else response.level.tolist(),
+        "light": None if is_standard else response.light.tolist(),
+    }
 
 
 def read_calibration(path: Path) -> Calibration:
@@ -141,9 +158,41 @@ class _Reader:
                 camera={str(name): str(value) for name, value in self._object("camera").items()},
                 made_at=self._text(self._content, "made_at"),
                 software=self._text(self._content, "software"),
+                camera_response=self._camera_response(),
+                response_known=self._camera_response_content().get("known") is True,
+                response_shift_px=self._response_shift_px(),
             )
         except CalibrationError as error:
             self._refuse(str(error).rstrip("."))
+
+    def _camera_response_content(self) -> dict[str, Any]:
+        content = self._object("budget").get("camera_response")
+        if content is not None and not isinstance(content, dict):
+            self._refuse(f"camera_response must be an object, but is {content!r}")
+        return content or {}
+
+    def _camera_response(self) -> CameraResponse | None:
+        content = self._camera_response_content()
+        name = self._text(content, "name")
+        if not name:
+            return None
+        if content.get("level") is None:
+            return standard_response(name)
+        level, light = content["level"], content.get("light")
+        size = len(level) if isinstance(level, list) else 0
+        top = content.get("top_level")
+        if top is not None and (isinstance(top, bool) or not isinstance(top, int) or top < 1):
+            self._refuse(f"top_level of the response must be a whole number, but is {top!r}")
+        return CameraResponse(
+            name,
+            self._array(level, "level of the response", (size,)),
+            self._array(light, "light of the response", (size,)),
+            top,
+        )
+
+    def _response_shift_px(self) -> float | None:
+        content = self._camera_response_content()
+        return None if content.get("shift_px") is None else self._number(content, "shift_px")
 
     def _object(self, name: str) -> dict[str, Any]:
         value = self._content.get(name)

@@ -10,7 +10,8 @@ from fingervision.storage.line_file import LineFile, cell, quoted
 
 COLUMNS = (
     "frame,time_s,status,gap_mm,u_gap_mm,u_random_mm,gap_px,u_gap_px,"
-    "left_x_px,left_y_px,right_x_px,right_y_px,left_tip_px,right_tip_px,left_mm,right_mm"
+    "left_x_px,left_y_px,right_x_px,right_y_px,left_tip_px,right_tip_px,left_mm,right_mm,"
+    "u_shift_px,fingers,held_px,held_mm"
 )
 # Decimal places; a nanosecond, a hundred-thousandth of a pixel and a tenth of a nanometre are below any uncertainty.
 TIME_PLACES, PX_PLACES, MM_PLACES, FORCE_PLACES = 9, 5, 7, 6
@@ -38,6 +39,12 @@ class GapRow:
         Tips along the fingers' axis.
     left_mm, right_mm : float or None
         Measuring points across the fingers, from the picture's middle.
+    u_shift_px : float or None
+        Standard uncertainty of `gap_px` for what the picture leaves open in every frame alike.
+    fingers : str
+        `dark` or `light` on their ground; empty where there is no number.
+    held_px, held_mm : float or None
+        Width of a part that is held between the fingers.
     run : str
         Run of the drive that the frame belongs to; empty where none.
     input_mm, force_n : float or None
@@ -60,6 +67,10 @@ class GapRow:
     right_tip_px: float | None = None
     left_mm: float | None = None
     right_mm: float | None = None
+    u_shift_px: float | None = None
+    fingers: str = ""
+    held_px: float | None = None
+    held_mm: float | None = None
     run: str = ""
     input_mm: float | None = None
     force_n: float | None = None
@@ -121,6 +132,10 @@ class GapsCsv:
             cell(row.right_tip_px, PX_PLACES),
             cell(row.left_mm, MM_PLACES),
             cell(row.right_mm, MM_PLACES),
+            cell(row.u_shift_px, PX_PLACES),
+            row.fingers,
+            cell(row.held_px, PX_PLACES),
+            cell(row.held_mm, MM_PLACES),
         ]
         if self._drive_columns:
             cells += [quoted(row.run), cell(row.input_mm, MM_PLACES)]

@@ -40,13 +40,13 @@ class Binary:
         return cv2.bitwise_not(self.dark)  # type: ignore[return-value]
 
 
-def binarise(denoised: GreyImage) -> Binary:
+def binarise(denoised: GreyImage, top_level: int | None = None) -> Binary:
     """Split the picture in two by Otsu's threshold (IEEE Trans. SMC 9(1), 1979, 62-66).
 
     Every pixel has its say in the threshold, so that a picture which is turned, mirrored or shifted is split alike. One
-    histogram gives the threshold and how far the classes stand apart.
+    histogram gives the threshold and how far the classes stand apart. No level lies above `top_level`, full scale.
     """
-    histogram = _histogram(denoised, full_scale(denoised) + 1)
+    histogram = _histogram(denoised, (full_scale(denoised) if top_level is None else top_level) + 1)
     threshold, contrast, separation = _split(histogram)
     _, dark = cv2.threshold(denoised, threshold, 255, cv2.THRESH_BINARY_INV)
     return Binary(

@@ -81,6 +81,10 @@ class EdgeFilters:
         """
         return Look(*_look(levels, *lines, blur_px, position_px, self.contrast, self.shift, self.blur, self.offsets_px))
 
+    def middle(self, sigma_px: float) -> tuple[int, int]:
+        """Row and column of the filters for an edge of this blur in the middle of the window."""
+        return _row(sigma_px, self.sigmas_px.size), _column(0.0)
+
     def mean_square(self, levels: Floats, look: "Look") -> tuple[Floats, Floats]:
         """What a look leaves of each line: mean square residual and the position's gain, shape (n,) each."""
         gain = self.shift_gain[look.row, look.column]

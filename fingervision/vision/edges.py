@@ -6,18 +6,14 @@ is the Cramer-Rao bound. What all rows share is the spread, one for the flanks a
 (motion spreads a flank more than a tip). Nothing is resampled.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import ndtri
 
 from fingervision.domain.compiled import compiled
 from fingervision.vision.edge_filters import (
-    LARGEST_BLUR_PX,
-    PIXEL_VARIANCE,
-    SMALLEST_BLUR_PX,
     EdgeFilters,
     Lines,
     edge_filters,
@@ -26,18 +22,16 @@ from fingervision.vision.edge_filters import (
 from fingervision.vision.edge_profile import NO_MARK, EdgeMark, edge_mark
 from fingervision.vision.facing import facing_lines, without_the_other
 from fingervision.vision.grey import GreyImage
+from fingervision.vision.line_levels import first_blur, first_position, line_levels
 from fingervision.vision.median import middle
+from fingervision.vision.noise_correlation import flat_noise
+from fingervision.vision.outline_blur import curvature_gain
 from fingervision.vision.profile_lines import INNER, IS_ROW, PLACES, ProfileLines
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int_]
 Number = TypeVar("Number", np.float64, np.bool_)
 
-# Half-length of the first look at an edge (pixels), enough for the strongest blur that is still measured; at one line
-# in so many.
-FIRST_REACH_PX, FIRST_LOOK, NEAR_MIDDLE_PX = 20, 6, 8
-# The window follows an edge so far (pixels), where its ends differ by so many grey levels at all.
-FIRST_MOVE_PX, LEAST_LEVELS = 2.0, 1e-3
 # The passes of Gauss-Newton, and whether each also refines the blur. It converges quadratically from the first look.
 BLUR_PASSES = (True, True, False)
 # Lines of each finger's flanks and of its tip share their blur: the number of that blur, for every line.
@@ -72,6 +66,12 @@ class EdgePoints:
         Half-length of the window along each line.
     marks : (EdgeMark, EdgeMark)
         What each inner flank shows that a blurred step does not; nothing where the window holds both edges.
+    inside : (float, float)
+        Level of each finger beside its inner flank.
+    shared_lines : float
+        Neighbouring lines that share their noise.
+    noise_flat : float
+        Standard deviation of the light in the flat parts beside the edges; 0 where none is in view.
     """
 
     lines: ProfileLines
@@ -84,9 +84,12 @@ class EdgePoints:
     is_clipped: NDArray[np.bool_]
     reach_px: int
     marks: tuple[EdgeMark, EdgeMark]
+    inside: tuple[float, float]
+    shared_lines: float = 1.0
+    noise_flat: float = 0.0
 
 
-def fit_edges(upright: GreyImage, lines: ProfileLines) -> EdgePoints:
+def fit_edges(upright: GreyImage, lines: ProfileLines, light: Floats, top_level: int) -> EdgePoints:
     """Sub-pixel position of the edge on every line of two fingers.
 
     Parameters
@@ -95,98 +98,40 @@ def fit_edges(upright: GreyImage, lines: ProfileLines) -> EdgePoints:
         Grey levels, seen with the tips up.
     lines : ProfileLines
         Where to look.
+    light : ndarray of float, shape (levels,)
+        Light of every grey level, on the levels' own scale.
+    top_level : int
+        End of the scale.
 
     Returns
     -------
     EdgePoints
         One point a line.
     """
-    blur = _first_blur(upright, lines)
+    blur = first_blur(upright, lines, light)
     filters = edge_filters(reach_for(blur))
-    position = _first_position(_levels(upright, lines, filters.reach_px))
+    position = first_position(line_levels(upright, lines, light, filters.reach_px))
     # Where the coarse outline lies a pixel off, the window follows the edge: what finds must not sway what measures.
-    lines = replace(lines, coarse=lines.coarse + lines.outward * np.floor(position).astype(np.intp))
-    levels = _levels(upright, lines, filters.reach_px)
-    return _fit(levels, lines, blur, filters, float(np.iinfo(upright.dtype).max))
+    coarse = lines.coarse + lines.outward * np.floor(position).astype(np.intp)
+    lines = ProfileLines(lines.fixed, coarse, lines.slope, lines.weight, lines.outward)
+    levels = line_levels(upright, lines, light, filters.reach_px)
+    return _fit(upright, light, levels, lines, blur, filters, float(top_level))
 
 
-def _levels(upright: GreyImage, lines: ProfileLines, reach: int) -> Floats:
-    return _gather(upright, IS_ROW, lines.fixed, lines.coarse, lines.outward, reach)
-
-
-@compiled
-def _gather(
-    upright: GreyImage, is_row: NDArray[np.bool_], fixed: Ints, coarse: Ints, outward: Ints, reach: int
-) -> Floats:
-    """Grey levels from inside to outside, `reach` pixels to either side of the coarse edge, shape (2, n, pixels).
-
-    Beyond the picture's border the last pixel is repeated: what is cut off there is a finger's inside or the ground.
-    """
-    rows, columns = upright.shape
-    values = np.empty((fixed.shape[0], fixed.shape[1], 2 * reach + 1))
-    for k in range(fixed.shape[0]):
-        for i in range(fixed.shape[1]):
-            for j in range(2 * reach + 1):
-                at = coarse[k, i] + outward[k, i] * (j - reach)
-                if is_row[i]:
-                    values[k, i, j] = upright[fixed[k, i], min(max(at, 0), columns - 1)]
-                else:
-                    values[k, i, j] = upright[min(max(at, 0), rows - 1), fixed[k, i]]
-    return values
-
-
-def _first_blur(upright: GreyImage, lines: ProfileLines) -> float:
-    """Blur of the edges from the steepest place of some of the flanks' rows, robustly."""
-    some = slice(0, INNER, FIRST_LOOK)
-    levels = _gather(
-        upright, IS_ROW[some], lines.fixed[:, some], lines.coarse[:, some], lines.outward[:, some], FIRST_REACH_PX
-    )
-    shares = _steepest_shares(levels)[lines.weight[:, some] > 0]
-    if not len(shares):
-        return 1.0
-    sigma = 1.0 / ndtri(0.5 + min(max(middle(shares), 0.02), 0.49))
-    return float(min(max(sigma, SMALLEST_BLUR_PX), LARGEST_BLUR_PX))
-
-
-@compiled
-def _steepest_shares(levels: Floats) -> Floats:
-    """Largest step from pixel to pixel near the middle, as a share of what lies between the ends; shape (2, n)."""
-    fingers, lines, pixels = levels.shape
-    shares = np.empty((fingers, lines))
-    for k in range(fingers):
-        for i in range(lines):
-            line = levels[k, i]
-            steepest, middle = 0.0, pixels // 2
-            for j in range(middle - NEAR_MIDDLE_PX, middle + NEAR_MIDDLE_PX + 1):
-                steepest = max(steepest, 0.5 * abs(line[j + 1] - line[j - 1]))
-            contrast = abs(line[-6:].sum() - line[:6].sum()) / 6.0
-            shares[k, i] = steepest / max(contrast, 1.0)
-    return shares
-
-
-@compiled
-def _first_position(levels: Floats) -> Floats:
-    """Where an edge between the window's two end levels would have the same mean level as the window."""
-    fingers, lines, pixels = levels.shape
-    position = np.empty((fingers, lines))
-    for k in range(fingers):
-        for i in range(lines):
-            line = levels[k, i]
-            outside = line[-3:].sum() / 3.0
-            contrast = outside - line[:3].sum() / 3.0
-            if abs(contrast) < LEAST_LEVELS:
-                contrast = LEAST_LEVELS
-            share = (outside - line.sum() / pixels) / contrast
-            position[k, i] = min(max((share - 0.5) * pixels, -FIRST_MOVE_PX), FIRST_MOVE_PX)
-    return position
-
-
-def _fit(levels: Floats, lines: ProfileLines, blur_px: float, filters: EdgeFilters, top_level: float) -> EdgePoints:
+def _fit(
+    upright: GreyImage,
+    light: Floats,
+    levels: Floats,
+    lines: ProfileLines,
+    blur_px: float,
+    filters: EdgeFilters,
+    top_level: float,
+) -> EdgePoints:
     """Gauss-Newton over every line's two levels and position, and the blur of flanks and tips."""
     pixels, real = levels.shape[-1], lines.weight.ravel() > 0
     shared = Lines(lines.slope.ravel(), lines.weight.ravel(), BLUR_OF_LINE)
     facing = facing_lines(lines, filters.reach_px)
-    blur, position, seen = np.full(4, blur_px), _first_position(levels).ravel(), levels
+    blur, position, seen = np.full(4, blur_px), first_position(levels).ravel(), levels
     for is_blur_free in BLUR_PASSES:
         look = filters.look(seen.reshape(-1, pixels), shared, blur, position)
         position, blur = look.position, look.blur if is_blur_free else blur
@@ -200,15 +145,15 @@ def _fit(levels: Floats, lines: ProfileLines, blur_px: float, filters: EdgeFilte
     if facing is None:
         left, right = (
             edge_mark(
-                levels[k, rows],
-                position[k * PLACES + rows],
-                look.sigma[k * PLACES + rows],
-                look.contrast[k * PLACES + rows],
-                mean_square[k * PLACES + rows],
+                levels[k, :filled],
+                position[k * PLACES : k * PLACES + filled],
+                look.sigma[k * PLACES : k * PLACES + filled],
+                look.contrast[k * PLACES : k * PLACES + filled],
+                mean_square[k * PLACES : k * PLACES + filled],
                 noise,
                 top_level,
             )
-            for k, rows in enumerate(np.flatnonzero(inner) for inner in lines.weight[:, :INNER])
+            for k, filled in enumerate(np.count_nonzero(lines.weight[:, :INNER], axis=1).tolist())
         )
         marks = (left, right)
     u_position = np.sqrt(np.maximum(mean_square, noise_variance)) / (np.abs(look.contrast) * gain)
@@ -223,7 +168,15 @@ def _fit(levels: Floats, lines: ProfileLines, blur_px: float, filters: EdgeFilte
         _shaped(_clipped(levels.reshape(-1, pixels), position, look.sigma, top_level)),
         filters.reach_px,
         marks,
+        (_inside(levels[0], lines.weight[0]), _inside(levels[1], lines.weight[1])),
+        *flat_noise(upright, light, lines, filters, *filters.middle(blur[0])),
     )
+
+
+@compiled
+def _inside(levels: Floats, weight: Floats) -> float:
+    """Usual level at the inner end of an inner flank's lines; 0 where there is none."""
+    return middle(levels[:INNER, 0].copy()[weight[:INNER] > 0])
 
 
 def _shaped(a: NDArray[Number]) -> NDArray[Number]:
@@ -244,22 +197,3 @@ def _clipped(levels: Floats, position: Floats, sigma: Floats, top_level: float) 
             if abs(j - pixels // 2 - position[i]) < near and (levels[i, j] <= 0 or levels[i, j] >= top_level):
                 is_clipped[i] = True
     return is_clipped
-
-
-def curvature_gain(slope: Floats, reach_sigmas: Floats) -> Floats:
-    """What a fit with two free levels makes of an edge whose distance along the line is not quite straight.
-
-    Along a line that meets a curved edge at a slant of slope m, the distance to the edge is t + kappa m^2 t^2 / (2 (1 +
-    m^2)^(1/2)). Projected on the fit's own directions over a window of w standard deviations this moves the position by
-    m^2 c sigma^2 kappa / 2 across the edge, c = (1 / (4 sqrt pi) - 1 / 2w) / (1 / (2 sqrt pi) - 1 / 2w); the half-level
-    itself is moved by sigma^2 kappa / 2.
-    """
-    level = 0.5 / np.maximum(reach_sigmas, 2.5)
-    root = 0.5 / np.sqrt(np.pi)
-    return np.asarray(1.0 + slope**2 * (0.5 * root - level) / (root - level))
-
-
-def outline_blur(edges: EdgePoints) -> Floats:
-    """Blur (sigma_e, the pixel included) that the curvature of the outline is felt through, shape (2, PLACES)."""
-    own = np.where(IS_ROW, edges.blur_px[:, :1], edges.blur_px[:, 1:])
-    return np.asarray(np.sqrt((own**2 + PIXEL_VARIANCE) * edges.curvature_gain))

@@ -1,7 +1,5 @@
 """Step 8, the gap: the distance between the two measuring points, and how surely it is known."""
 
-from dataclasses import replace
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -72,7 +70,8 @@ def measure_gap(
     if min(len(p.x) for p in points) < FEWEST_LINES:
         return NoGap(Status.NO_FINGERS, "Too little of a finger's outline is in view to be measured.")
     left, right = (squared(fit_finger_end(p, *first_guess(p, below_tip_px))) for p in points)
-    shared = shared_points(points, (left, right), coding)
+    noise_shared = max(SHARED_POINTS[coding], edges.shared_lines)
+    shared = max(shared_points(points, (left, right), coding), noise_shared)
     fitted = [
         measuring_point(end, below_tip_px, float(p.blur[0])) for p, end in zip(points, (left, right), strict=True)
     ]
@@ -84,11 +83,12 @@ def measure_gap(
     for p, end, found, does_hold in zip(points, (left, right), fitted, holds, strict=True):
         own = None
         if not all(holds):  # both in the same way: what a method does to a shape, it does to either
-            own = local_measuring_point(p, below_tip_px, SHARED_POINTS[coding])
+            own = local_measuring_point(p, below_tip_px, noise_shared)
         if own is None and does_hold:
             if found.apex < p.x.min() - 1.0:
                 return NoGap(Status.TIP_OUT_OF_VIEW, "A finger's tip lies beyond the picture's border.")
-            own = replace(found, covariance=found.covariance * spread(end) * shared)
+            covariance = found.covariance * spread(end) * shared
+            own = MeasuringPoint(found.tip, found.apex, found.edge, found.slope, covariance)
         if own is None:
             return NoGap(Status.NO_FINGERS, "The outline near the measuring height is broken.")
         measured.append(own)
@@ -164,7 +164,7 @@ def _assemble(
     if not variance < LEAST_SURE_PX**2:
         return NoGap(Status.NO_FINGERS, "The outlines are too rough to say where a finger's tip and edge are.")
     # A rim or too much light does the same to both edges.
-    u_shift = abs(sum(mark.shift_px for mark in edges.marks))
+    u_shift = float(abs(sum(mark.shift_px for mark in edges.marks)))
     return GapMeasurement(found[0], found[1], orientation.direction, float(np.sqrt(variance)), light_gap, u_shift)
 
 

@@ -1,4 +1,4 @@
-"""Step 1, grey scale: one number a pixel, as close to the sensor as the source allows."""
+"""Step 1, grey scale: one number a pixel, as close to the sensor as the source allows, and where its scale ends."""
 
 import cv2
 import numpy as np
@@ -7,6 +7,9 @@ from numpy.typing import NDArray
 from fingervision.domain.frame import Pixels
 
 GreyImage = NDArray[np.uint8] | NDArray[np.uint16]
+
+# Depths of sensors whose levels are stored in 16 bits.
+SENSOR_BITS = (10, 12, 14, 16)
 
 
 def to_grey(pixels: Pixels) -> GreyImage:
@@ -33,3 +36,27 @@ def to_grey(pixels: Pixels) -> GreyImage:
 def full_scale(grey: GreyImage) -> int:
     """Largest level that the picture's type can hold."""
     return int(np.iinfo(grey.dtype).max)
+
+
+def top_level(grey: GreyImage, bits: int | None = None) -> int:
+    """Level at which the sensor's scale ends.
+
+    Cameras store 10, 12 or 14 bits in 16, at their lower or at their upper end. The bits that are set anywhere in the
+    picture show which: none above the depth, or none below it.
+
+    Parameters
+    ----------
+    grey : ndarray, shape (height, width)
+        Grey levels.
+    bits : int or None
+        Depth that the user states; the picture itself overrules one that is too small.
+    """
+    if grey.dtype == np.uint8:
+        return 255
+    used = int(np.bitwise_or.reduce(grey, axis=None))
+    unused_below = (used & -used).bit_length() - 1 if used else 0
+    if used.bit_length() == 16 and unused_below:
+        return used | (0xFFFF >> unused_below << unused_below)
+    seen = next(depth for depth in SENSOR_BITS if used.bit_length() <= depth)
+    depth = seen if bits is None else max(bits, used.bit_length())
+    return int(2**depth - 1)

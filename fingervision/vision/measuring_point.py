@@ -1,6 +1,6 @@
 """Step 7, the measuring point: the tip and the inner edge below it, read off the fitted end of a finger."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -63,7 +63,7 @@ def squared(end: FingerEnd) -> FingerEnd:
     slanted.
     """
     parameters, covariance = _squared(end.parameters, end.covariance, end.misfit)
-    return replace(end, parameters=parameters, covariance=covariance)
+    return FingerEnd(parameters, covariance, end.origin, end.misfit, end.residual, end.robust)
 
 
 @compiled

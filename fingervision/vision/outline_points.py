@@ -5,9 +5,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from fingervision.vision.edges import EdgePoints, outline_blur
+from fingervision.vision.edges import EdgePoints
 from fingervision.vision.fingers import CoarseFinger, CoarseFingers
 from fingervision.vision.median import middle
+from fingervision.vision.outline_blur import outline_blur
 from fingervision.vision.profile_lines import SIDE, TIP_SIDE
 
 Floats = NDArray[np.float64]
@@ -53,7 +54,8 @@ def finger_origin(finger: CoarseFinger) -> tuple[int, int]:
 
 def outline_points(fingers: CoarseFingers, edges: EdgePoints) -> tuple[OutlinePoints, OutlinePoints]:
     """Points of the left and of the right finger, each in its own axes."""
-    lines, height, blur = edges.lines, np.abs(edges.contrast), outline_blur(edges)
+    lines, height = edges.lines, np.abs(edges.contrast)
+    blur = outline_blur(edges.blur_px, lines.slope, edges.curvature_gain)
     typical = middle(height[lines.weight > 0])
     is_point = (lines.weight > 0) & (height > LEAST_CONTRAST * typical)
     is_shared = np.abs(lines.slope) > SHARED_SLOPE

@@ -9,6 +9,7 @@ from fingervision.domain.frame import Frame, Pixels
 from fingervision.domain.gap import FingerEdge, GapMeasurement, NoGap
 from fingervision.vision.edges import EdgePoints
 from fingervision.vision.fingers import CoarseFingers
+from fingervision.vision.grey import top_level
 from fingervision.vision.orientation import Orientation
 from fingervision.vision.profile_lines import IS_ROW
 
@@ -87,7 +88,9 @@ def draw_edge_points(frame: Frame, fingers: CoarseFingers | None, edges: EdgePoi
 
 def in_eight_bits(grey: Pixels) -> Canvas:
     """Grey levels for a screen."""
-    return np.ascontiguousarray((grey >> 8).astype(np.uint8) if grey.dtype == np.uint16 else grey)
+    if grey.dtype != np.uint16:
+        return np.ascontiguousarray(grey)
+    return np.ascontiguousarray((grey >> (top_level(grey).bit_length() - 8)).astype(np.uint8))
 
 
 def _polyline(canvas: Canvas, outline: NDArray[np.float64], orientation: Orientation) -> None:

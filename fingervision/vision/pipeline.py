@@ -1,12 +1,16 @@
 """The order of the steps: grey, denoise, binarise, fingers, edges, tip, gap. Only this file knows it."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import cv2
 import numpy as np
+from numpy.typing import NDArray
 
+from calib.camera_response import CameraResponse, standard_response
 from fingervision.domain.direction import Direction
+from fingervision.domain.errors import FingervisionError
 from fingervision.domain.frame import Coding, Frame, Pixels
 from fingervision.domain.gap import GapMeasurement, NoGap
 from fingervision.domain.region import Region
@@ -16,9 +20,11 @@ from fingervision.vision.denoise import denoise
 from fingervision.vision.edges import EdgePoints, fit_edges
 from fingervision.vision.fingers import CoarseFingers, find_fingers
 from fingervision.vision.gap import measure_gap
-from fingervision.vision.grey import GreyImage, full_scale, to_grey
+from fingervision.vision.grey import GreyImage, to_grey, top_level
 from fingervision.vision.overlay import draw_boundary, draw_edge_points, draw_overlay, in_eight_bits
+from fingervision.vision.profile_choice import with_profile
 from fingervision.vision.profile_lines import profile_lines
+from fingervision.vision.response_shift import gap_shift_px
 from fingervision.vision.stripes import with_stripes
 
 # A picture whose two classes differ by less (share of full scale, and in units of the spread within) shows nothing.
@@ -30,6 +36,8 @@ EDGE_REACH_PX, EDGE_SHARE = 3, 0.2
 SMALLEST_SIDE_PX = 16
 # Where fingers were found and this was wrong with them, nothing else in the picture is taken for fingers.
 FINAL = (Status.SATURATED, Status.BLURRED)
+# What is taken of a camera that says nothing, and what it may be as well.
+LINEAR, SRGB = standard_response("linear"), standard_response("srgb")
 # The outline is followed so far below the measuring height (pixels, or in units of that height).
 REACH_BELOW_PX, REACH_BELOW_HEIGHTS = 45.0, 1.5
 
@@ -46,11 +54,23 @@ class Settings:
         Where the tips point; None finds out in every frame.
     region : Region or None
         The part of the frame that is looked at; None is all of it.
+    response : CameraResponse
+        Which light a grey level is taken for.
+    other_response : CameraResponse or None
+        What the response may be as well (one of the standards); None where it is known.
+    bits : int or None
+        Depth of levels that are stored in 16 bits; None finds it in the picture.
+    fingers_are_dark : bool or None
+        Whether the fingers are darker than the ground; None finds out in every frame.
     """
 
     below_tip_px: float
     direction: Direction | None = None
     region: Region | None = None
+    response: CameraResponse = LINEAR
+    other_response: CameraResponse | None = SRGB
+    bits: int | None = None
+    fingers_are_dark: bool | None = None
 
 
 def measure_frame(frame: Frame, settings: Settings) -> GapMeasurement | NoGap:
@@ -128,9 +148,9 @@ class _Attempt:
 def _attempt(grey: GreyImage, settings: Settings, coding: Coding) -> _Attempt:
     if min(grey.shape) < SMALLEST_SIDE_PX:
         return _Attempt(NoGap(Status.NO_FINGERS, "The picture is too small to hold two fingers."))
-    scale = full_scale(grey)
+    scale = _scale(grey, settings)
     denoised = denoise(grey)
-    binary = binarise(denoised)
+    binary = binarise(denoised, scale)
     # The grey picture itself is counted only where denoising has left it nearly white.
     if binary.full_scale_share > 0.9 and np.count_nonzero(grey == scale) > SATURATED_SHARE * grey.size:
         words = "The picture is white: nearly every pixel is at full scale."
@@ -146,13 +166,38 @@ def _attempt(grey: GreyImage, settings: Settings, coding: Coding) -> _Attempt:
             attempt = _Attempt(fingers, split)
         else:
             upright = fingers.orientation.view(grey)
-            edges = with_stripes(upright, fit_edges(upright, profile_lines((fingers.left, fingers.right))))
+            light = _light(settings.response, scale, int(np.iinfo(grey.dtype).max) + 1)
+            lines = profile_lines((fingers.left, fingers.right))
+            edges = with_profile(upright, fit_edges(upright, lines, light, scale), light, scale)
+            edges = with_stripes(upright, edges, light)
             outcome = measure_gap(fingers, edges, settings.below_tip_px, scale, light_gap, coding)
+            if settings.other_response is not None and isinstance(outcome, GapMeasurement):
+                shift = gap_shift_px(outcome, edges, settings.response, settings.other_response, scale)
+                outcome = replace(outcome, response_shift_px=shift)
             attempt = _Attempt(outcome, split, fingers, edges)
         if isinstance(attempt.outcome, GapMeasurement) or attempt.outcome.status in FINAL:
             return attempt
         first = first or attempt
     return first or _Attempt(NoGap(Status.NO_FINGERS, "Nothing in the picture looks like two fingers."), binary)
+
+
+def _scale(grey: GreyImage, settings: Settings) -> int:
+    """End of the scale: a response that was measured knows its depth."""
+    known = settings.response.top_level
+    bits = settings.bits if known is None or grey.dtype == np.uint8 else known.bit_length()
+    found = top_level(grey, bits)
+    if known is not None and known != found:
+        msg = (
+            f"The camera response {settings.response.name} was measured on levels up to {known}, but these pictures "
+            f"have levels up to {found}: measure it on pictures of this depth."
+        )
+        raise FingervisionError(msg)
+    return found
+
+
+@lru_cache(maxsize=4)
+def _light(response: CameraResponse, scale: int, levels: int) -> NDArray[np.float64]:
+    return response.table(scale, levels)
 
 
 def _candidates(
@@ -167,6 +212,8 @@ def _candidates(
         dark_first = _border_is_light(split)
         unsure: list[tuple[Binary, CoarseFingers | NoGap, bool]] = []
         for light_gap in (dark_first, not dark_first):
+            if settings.fingers_are_dark not in (None, light_gap):
+                continue
             fingers = find_fingers(split.dark if light_gap else split.light, directions, below, reach)
             if isinstance(fingers, CoarseFingers) and not fingers.is_rooted:
                 unsure.append(

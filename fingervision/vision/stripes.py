@@ -10,9 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fingervision.vision.edge_filters import blurred_step
-from fingervision.vision.edges import EdgePoints, curvature_gain
+from fingervision.vision.edges import EdgePoints
 from fingervision.vision.facing import facing_lines
 from fingervision.vision.grey import GreyImage
+from fingervision.vision.outline_blur import curvature_gain
 from fingervision.vision.profile_lines import ROWS
 
 Floats = NDArray[np.float64]
@@ -47,7 +48,7 @@ class StripeEdges:
     u_shared: Floats
 
 
-def with_stripes(upright: GreyImage, edges: EdgePoints) -> EdgePoints:
+def with_stripes(upright: GreyImage, edges: EdgePoints, light: Floats) -> EdgePoints:
     """The same points, but where the fingers nearly touch both edges of a row are fitted as one stripe."""
     lines, reach = edges.lines, edges.reach_px
     facing = facing_lines(lines, reach)
@@ -73,6 +74,7 @@ def with_stripes(upright: GreyImage, edges: EdgePoints) -> EdgePoints:
         contrast,
         edges.noise,
         reach,
+        light,
     )
     position, u_position = edges.position.copy(), edges.u_position.copy()
     position[0, left], position[1, right] = stripes.left, stripes.right
@@ -110,6 +112,7 @@ def fit_stripes(
     contrast: float,
     noise: float,
     margin: int,
+    light: Floats | None = None,
 ) -> StripeEdges:
     """Fit a blurred stripe of known contrast to each row.
 
@@ -129,6 +132,8 @@ def fit_stripes(
         Standard deviation of the grey levels.
     margin : int
         Pixels of the fingers to either side.
+    light : ndarray of float, shape (levels,), or None
+        Light of every grey level; None where that is the level itself.
 
     Returns
     -------
@@ -138,7 +143,8 @@ def fit_stripes(
     middle = np.rint(0.5 * (left + right)).astype(int)
     reach = int(np.ceil(0.5 * float((right - left).max()))) + margin
     columns = np.clip(middle[:, None] + np.arange(-reach, reach + 1), 0, upright.shape[1] - 1)
-    values = upright[row[:, None], columns].astype(np.float64)
+    levels = upright[row[:, None], columns]
+    values = levels.astype(np.float64) if light is None else light[levels]
     borders = np.arange(-reach - 0.5, reach + 1.0)
     wide = sigma[:, None]
     centre, width = 0.5 * (left + right) - middle, np.maximum(right - left, 0.5)

@@ -1,12 +1,14 @@
 """calibration.json: what is written is read back, and nonsense is refused with a sentence."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
+from calib.camera_response import CameraResponse, standard_response
 from calib.lens import Lens
 from calib.limits import Limits
 from calib.measured_scale import Calibration, Reference, Response, ScalePart
@@ -135,3 +137,17 @@ def test_other_frames_and_other_settings_are_refused() -> None:
     calibration().check_camera({"exposure_us": "200", "gain": "3"})
     with pytest.raises(ValueError, match="exposure_us = 200, but it is 500 now"):
         calibration().check_camera({"exposure_us": "500"})
+
+
+@pytest.mark.parametrize("is_standard", [True, False])
+def test_the_camera_response_comes_back(tmp_path: Path, is_standard: bool) -> None:
+    share = np.linspace(0.0, 1.0, 33)
+    response = standard_response("srgb") if is_standard else CameraResponse("mine.csv", share, share**1.8, 4095)
+    written = replace(calibration(), camera_response=response, response_known=True, response_shift_px=0.41)
+    write_calibration(written, tmp_path / "calibration.json")
+    read = read_calibration(tmp_path / "calibration.json")
+    assert read.camera_response is not None
+    assert (read.camera_response.name, read.camera_response.top_level) == (response.name, response.top_level)
+    assert read.camera_response.light == pytest.approx(response.light)
+    assert read.response_known
+    assert read.response_shift_px == pytest.approx(0.41)

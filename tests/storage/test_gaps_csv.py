@@ -14,7 +14,8 @@ from fingervision.storage.gaps_csv import COLUMNS, MM_PLACES, GapRow, GapsCsv
 
 HEADER = (
     "frame,time_s,status,gap_mm,u_gap_mm,u_random_mm,gap_px,u_gap_px,left_x_px,left_y_px,right_x_px,right_y_px,"
-    "left_tip_px,right_tip_px,left_mm,right_mm"
+    "left_tip_px,right_tip_px,left_mm,right_mm,"
+    "u_shift_px,fingers,held_px,held_mm"
 )
 # Half a unit of the last place written.
 MM_TOLERANCE = 0.51 * 10.0**-MM_PLACES
@@ -32,8 +33,8 @@ def test_what_is_not_known_is_an_empty_cell(tmp_path: Path) -> None:
     with GapsCsv(tmp_path / "gaps.csv", ("run", "input_mm")) as table:
         table.add([GapRow(0, None, Status.TOUCHING), GapRow(1, 0.04, Status.OK, gap_mm=1.5, run="a,b", input_mm=0.0)])
     lines = (tmp_path / "gaps.csv").read_text().splitlines()
-    assert lines[1] == "0,,touching" + "," * 15
-    assert lines[2] == "1,0.04,ok,1.5" + "," * 13 + '"a,b",0'
+    assert lines[1] == "0,,touching" + "," * 19
+    assert lines[2] == "1,0.04,ok,1.5" + "," * 17 + '"a,b",0'
 
 
 @settings(max_examples=50, deadline=None)

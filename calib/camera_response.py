@@ -1,0 +1,121 @@
+"""The camera's response: which light a stored grey level stands for.
+
+An edge lies where the light passes half-way between its plateaus. In levels that a camera has put through a transfer
+curve (gamma) the half-way level is another one, and the edge is found elsewhere, the farther off the larger the blur.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from calib.errors import CalibrationError
+
+Floats = NDArray[np.float64]
+Grey = NDArray[np.uint8] | NDArray[np.uint16]
+
+# A curve through fewer measured points than this is a guess.
+FEWEST_POINTS = 8
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class CameraResponse:
+    """A transfer curve, from stored levels to light.
+
+    Parameters
+    ----------
+    name : str
+        How it is called in files and sentences.
+    level : ndarray of float, shape (n,)
+        Stored level as a share of full scale, from 0 to 1, increasing.
+    light : ndarray of float, shape (n,)
+        Light as a share of that which gives full scale, from 0 to 1, increasing.
+    top_level : int or None
+        Full scale of the pictures that it was measured on; None where it holds for any depth.
+
+    Raises
+    ------
+    CalibrationError
+        The curve has too few points, does not rise, or does not reach from 0 to 1.
+    """
+
+    name: str
+    level: Floats
+    light: Floats
+    top_level: int | None = None
+
+    def __post_init__(self) -> None:
+        """Refuse what cannot be a response."""
+        level, light = self.level, self.light
+        if level.shape != light.shape or level.ndim != 1 or level.size < FEWEST_POINTS:
+            raise CalibrationError(
+                f"A camera response must have at least {FEWEST_POINTS} pairs of level and light, but {self.name} has "
+                f"{level.size}: measure it with `fingervision calibrate response`."
+            )
+        if not (np.isfinite(level).all() and np.isfinite(light).all()):
+            raise CalibrationError(f"Levels and light of the camera response {self.name} must all be numbers.")
+        for what, values in (("level", level), ("light", light)):
+            falls = np.flatnonzero(np.diff(values) <= 0.0)
+            if falls.size:
+                raise CalibrationError(
+                    f"The {what} of the camera response {self.name} must rise from row to row, but does not after row "
+                    f"{falls[0] + 1}: measure the response again."
+                )
+        if abs(level[0]) > 1e-9 or abs(level[-1] - 1.0) > 1e-9:
+            raise CalibrationError(
+                f"The levels of the camera response {self.name} must reach from 0 to full scale, but reach from "
+                f"{level[0]:.3g} to {level[-1]:.3g} of it."
+            )
+
+    def table(self, top_level: int, size: int) -> Floats:
+        """Light of every stored level on the scale of the levels themselves: 0 gives 0, full scale gives full scale.
+
+        Parameters
+        ----------
+        top_level : int
+            Full scale of the pictures.
+        size : int
+            Length of the table; levels beyond full scale are as light as full scale.
+
+        Raises
+        ------
+        CalibrationError
+            The response was measured on pictures of another depth.
+        """
+        if self.top_level is not None and self.top_level != top_level:
+            raise CalibrationError(
+                f"The camera response {self.name} was measured on levels up to {self.top_level}, but these pictures "
+                f"have levels up to {top_level}: measure it on pictures of this depth, or state --bits."
+            )
+        share = np.minimum(np.arange(size) / top_level, 1.0)
+        return np.asarray(top_level * np.interp(share, self.level, self.light))
+
+    def linearised(self, grey: Grey, top_level: int) -> NDArray[np.uint16]:
+        """Give a picture's light in 16 bits."""
+        table = self.table(top_level, int(np.iinfo(grey.dtype).max) + 1) * (65535.0 / top_level)
+        return np.rint(table).astype(np.uint16)[grey]
+
+
+def _srgb(level: Floats) -> Floats:
+    """IEC 61966-2-1."""
+    return np.where(level <= 0.04045, level / 12.92, ((level + 0.055) / 1.055) ** 2.4)
+
+
+def _bt709(level: Floats) -> Floats:
+    """ITU-R BT.709-6, item 1.2, from the signal to the light; constants with the digits that join its two parts."""
+    alpha, beta = 1.09929682680944, 0.018053968510807
+    return np.where(level < 4.5 * beta, level / 4.5, ((level + alpha - 1.0) / alpha) ** (1.0 / 0.45))
+
+
+CURVES: dict[str, Callable[[Floats], Floats]] = {"linear": lambda level: level, "srgb": _srgb, "bt709": _bt709}
+
+
+@cache
+def standard_response(name: str) -> CameraResponse:
+    """One of the curves of the standards: linear, srgb or bt709."""
+    if name not in CURVES:
+        raise CalibrationError(f"A standard camera response must be one of {', '.join(CURVES)}, but is {name}.")
+    level = np.linspace(0.0, 1.0, 4097)
+    return CameraResponse(name, level, np.asarray(CURVES[name](level), dtype=np.float64))

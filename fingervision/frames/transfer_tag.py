@@ -1,0 +1,93 @@
+"""What a recording's own tag says of the camera's transfer curve."""
+
+import struct
+from collections.abc import Iterator
+from pathlib import Path
+
+import av
+
+from fingervision.frames.image_file import JPEG_START, PNG_SIGNATURE
+
+# Transfer characteristics of ITU-T H.273, table 3, by what `calib.camera_response` calls them.
+VIDEO_TAGS = {1: "bt709", 6: "bt709", 8: "linear", 13: "srgb", 14: "bt709", 15: "bt709"}
+# PNG stores 100000 / gamma of the file (PNG specification, 11.3.3.2).
+PNG_GAMMAS = {45455: "srgb", 100000: "linear"}
+EXIF_START, EXIF_IFD, COLOUR_SPACE = b"Exif\x00\x00", 0x8769, 0xA001
+# Tags stand in front of the pixels.
+HEAD_BYTES = 1 << 16
+
+
+def transfer_tag(files: tuple[Path, ...]) -> str | None:
+    """Name of the standard response that the first file states; None where it states none.
+
+    Parameters
+    ----------
+    files : tuple of Path
+        A recording's files.
+    """
+    if not files:
+        return None
+    try:
+        with files[0].open("rb") as file:
+            head = file.read(HEAD_BYTES)
+    except OSError:
+        return None
+    if head.startswith(PNG_SIGNATURE):
+        return _of_png(head)
+    if head.startswith(JPEG_START):
+        return _of_jpeg(head)
+    if len(files) > 1:
+        return None
+    try:
+        with av.open(str(files[0])) as container:
+            video = next(iter(container.streams.video), None)
+            return None if video is None else VIDEO_TAGS.get(int(video.codec_context.color_trc))
+    except (av.FFmpegError, OSError, ValueError):
+        return None
+
+
+def _of_png(head: bytes) -> str | None:
+    gamma = None
+    for kind, body in _chunks(head):
+        if kind == b"sRGB":
+            return "srgb"
+        if kind == b"gAMA" and len(body) == 4:
+            gamma = PNG_GAMMAS.get(struct.unpack(">I", body)[0])
+    return gamma
+
+
+def _chunks(head: bytes) -> Iterator[tuple[bytes, bytes]]:
+    place = len(PNG_SIGNATURE)
+    while place + 8 <= len(head):
+        (length,) = struct.unpack_from(">I", head, place)
+        kind = head[place + 4 : place + 8]
+        if kind == b"IDAT":
+            return
+        yield kind, head[place + 8 : place + 8 + length]
+        place += length + 12
+
+
+def _of_jpeg(head: bytes) -> str | None:
+    """Read the colour space of the camera's Exif record: 1 is sRGB. A JPEG without one says nothing of its camera."""
+    start = head.find(EXIF_START)
+    if start < 0:
+        return None
+    tiff = head[start + len(EXIF_START) :]
+    order = "<" if tiff[:2] == b"II" else ">"
+    try:
+        (place,) = struct.unpack_from(order + "I", tiff, 4)
+        inner = _entry(tiff, order, place, EXIF_IFD)
+        space = None if inner is None else _entry(tiff, order, inner, COLOUR_SPACE)
+    except struct.error:
+        return None
+    return "srgb" if space == 1 else None
+
+
+def _entry(tiff: bytes, order: str, place: int, wanted: int) -> int | None:
+    """Value of one entry of an image file directory (TIFF 6.0, section 2)."""
+    (count,) = struct.unpack_from(order + "H", tiff, place)
+    for k in range(count):
+        tag, kind, _ = struct.unpack_from(order + "HHI", tiff, place + 2 + 12 * k)
+        if tag == wanted:
+            return int(struct.unpack_from(order + ("H" if kind == 3 else "I"), tiff, place + 10 + 12 * k)[0])
+    return None

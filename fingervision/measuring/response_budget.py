@@ -1,0 +1,74 @@
+"""The camera response: which one a recording is read with, and what it costs where it is assumed."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from calib.camera_response import CameraResponse, standard_response
+from calib.measured_scale import Calibration
+from fingervision.domain.gap import GapMeasurement
+from fingervision.frames.transfer_tag import transfer_tag
+from fingervision.measuring.scale import Scale
+
+
+def u_response_shift_mm(measured: Sequence[GapMeasurement], scale: Scale) -> NDArray[np.float64]:
+    """Standard uncertainty of each gap because the camera's response is assumed, shape (n,).
+
+    The same response moved the edges of the calibration. What it moved them by there is in the calibration's edge bias,
+    or in its budget; the difference to this recording's edges is left. A calibration that does not say is taken to have
+    been made as the recording was.
+    """
+    if not isinstance(scale, Calibration) or scale.response_shift_px is None:
+        return np.zeros(len(measured))
+    shift_px = np.array([m.response_shift_px for m in measured])
+    polarity = np.where([m.light_gap for m in measured], 1.0, -1.0)
+    left_px = np.where(shift_px == 0.0, 0.0, shift_px - polarity * scale.response_shift_px)
+    return np.asarray(np.abs(left_px) / np.sqrt(3.0) / scale.px_per_mm)
+
+
+def choose_response(
+    stated: CameraResponse | None, scale: Scale, files: tuple[Path, ...]
+) -> tuple[CameraResponse, CameraResponse | None, str]:
+    """Response that a recording is read with, what it may be as well, and a sentence where the user should know.
+
+    What the user states goes first, then what the calibration knows, then the recording's own tag; a recording without
+    any is taken as linear.
+
+    Returns
+    -------
+    response : CameraResponse
+        What the levels are taken for.
+    other : CameraResponse or None
+        What they may be as well; None where the response is known.
+    words : str
+        A warning; empty where there is none.
+    """
+    calibrated = scale.camera_response if isinstance(scale, Calibration) else None
+    known = isinstance(scale, Calibration) and scale.response_known
+    tag = transfer_tag(files)
+    if stated is not None:
+        response, other = stated, None
+    elif known and calibrated is not None:
+        response, other = calibrated, None
+    else:
+        response = standard_response(tag or "linear")
+        other = standard_response("srgb" if response.name == "linear" else "linear")
+    if calibrated is not None and calibrated.name != response.name:
+        shift_px = scale.response_shift_px if isinstance(scale, Calibration) else None
+        size = "" if not shift_px else f", which moves a gap by about {abs(shift_px):.2f} px on the calibration's edges"
+        return (
+            response,
+            other,
+            f"The calibration was made with the camera response {calibrated.name}, but this recording is read as "
+            f"{response.name}{size}: calibrate with this camera, or state the same --response for both.",
+        )
+    if stated is None and known and tag is not None and calibrated is not None and tag != calibrated.name:
+        return (
+            response,
+            other,
+            f"The recording's own tag says {tag}, but the calibration's camera response {calibrated.name} is used: "
+            "state --response if another camera made this recording.",
+        )
+    return response, other, ""

@@ -1,0 +1,91 @@
+"""A camera's response as a file: `level,light`, one row a level, from 0 to the depth's full scale."""
+
+import csv
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from calib.camera_response import CURVES, CameraResponse, standard_response
+from calib.errors import CalibrationError
+from fingervision.domain.errors import FingervisionError, UsageError
+
+COLUMNS = ("level", "light")
+# Full scales that pictures have.
+TOP_LEVELS = (255, 1023, 4095, 16383, 65535)
+
+
+def response_named(name: str) -> CameraResponse | None:
+    """What --response names: a standard curve or a file; None for auto.
+
+    Raises
+    ------
+    UsageError
+        It is neither.
+    FingervisionError
+        The file is no response.
+    """
+    if name == "auto":
+        return None
+    if name in CURVES:
+        return standard_response(name)
+    if not Path(name).exists():
+        raise UsageError(
+            f"--response must be auto, {', '.join(CURVES)} or a file made by `fingervision calibrate response`, "
+            f"but is {name}, and there is no such file."
+        )
+    return read_response(Path(name))
+
+
+def read_response(path: Path) -> CameraResponse:
+    """Read a response.
+
+    Raises
+    ------
+    FingervisionError
+        The file cannot be read, or is no response.
+    """
+    try:
+        with path.open(newline="", encoding="utf-8-sig") as file:
+            rows = list(csv.reader(line for line in file if not line.startswith("#")))
+    except (OSError, UnicodeDecodeError) as error:
+        raise FingervisionError(f"The camera response {path} could not be read: {error}.") from error
+    if not rows or tuple(cell.strip() for cell in rows[0]) != COLUMNS:
+        raise FingervisionError(f"{path} must begin with the line {','.join(COLUMNS)}, but does not.")
+    try:
+        level, light = np.array([[float(cell) for cell in row] for row in rows[1:] if row]).reshape(-1, 2).T
+    except ValueError as error:
+        raise FingervisionError(f"Every row of {path} must be two numbers, level and light ({error}).") from error
+    top = level[-1] if level.size else 0.0
+    if top not in TOP_LEVELS:
+        depths = ", ".join(map(str, TOP_LEVELS))
+        raise FingervisionError(
+            f"The last level of {path} must be the full scale of a picture ({depths}), but is {top:g}."
+        )
+    return _response(path.name, level, light, int(top))
+
+
+def _response(name: str, level: NDArray[np.float64], light: NDArray[np.float64], top: int) -> CameraResponse:
+    span = float(light[-1] - light[0])
+    if not span > 0.0:
+        raise FingervisionError(f"The light of the camera response {name} must rise, but does not.")
+    try:
+        return CameraResponse(name, level / top, (light - light[0]) / span, top)
+    except CalibrationError as error:
+        raise FingervisionError(str(error)) from error
+
+
+def write_response(response: CameraResponse, path: Path) -> None:
+    """Write a response.
+
+    Raises
+    ------
+    FingervisionError
+        The file cannot be written.
+    """
+    top = response.top_level or 255
+    rows = [f"{top * level:g},{light:.6f}" for level, light in zip(response.level, response.light, strict=True)]
+    try:
+        path.write_text("\n".join((",".join(COLUMNS), *rows)) + "\n", encoding="utf-8")
+    except OSError as error:
+        raise FingervisionError(f"The camera response could not be written to {path}: {error.strerror}.") from error

@@ -1,0 +1,214 @@
+"""What stands beside a finger's edge, by the evidence of all rows together, and where the finger's own edge then is.
+
+A shadow, a wall and a line of glare each leave their own mean profile. Some of them cannot be told apart on one flank
+alone: a wall half as light as the ground looks like motion during the exposure, and glare like a wall on the other side
+of the edge. A wall is seen on the inner flank only, because the camera looks between the fingers; motion spreads both
+flanks and no tip; glare and shadow go all around.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fingervision.vision.edge_filters import PIXEL_VARIANCE
+from fingervision.vision.edge_profile import EdgeMark
+from fingervision.vision.edges import EdgePoints
+from fingervision.vision.grey import GreyImage
+from fingervision.vision.profile_lines import INNER, IS_INNER, IS_ROW, ROWS
+from fingervision.vision.profile_models import GLARE, SHADOW, STARTS_PX, STEP, WALL, ProfileFit, fit_profile
+
+Floats = NDArray[np.float64]
+
+# The flanks are looked at where a step leaves so many times the noise of the picture's flat parts.
+UNEXPLAINED = 1.2
+# The mean profile reaches so far to either side (pixels), in bins of this breadth with so many pixels each.
+REACH_PX, BIN_PX, FEWEST_IN_BIN = 16, 0.5, 4
+# A flank is straight where its rows lie this near to a line (pixels, standard deviation), over so many of them.
+STRAIGHT_PX, FEWEST_ROWS = 0.3, 6
+# A model explains a profile that it leaves with so many times the noise, or with this part of what a step leaves; a
+# step does with half of that, or with so many times what the best model leaves. A wall improves it by so much in
+# chi-square.
+MODEL_LEAVES, MODEL_TIMES, STEP_TIMES, SIGNIFICANT = 4.0, 10.0, 3.0, 30.0
+# One model is clearly better than another that leaves so much more chi-square, in units of what its own bins leave
+# (odds of e^8 to one).
+CLEARLY = 16.0
+# What stands beside an edge makes this share of the contrast: less is texture, more is no finger's edge.
+SHARES = (0.05, 0.85)
+# Levels within so many standard deviations of the end of the scale are cut off now and then.
+CUT_OFF_SIGMAS = 2.0
+# The inner flank is wider than the outer one, or than the tip, where its variance is larger by this share.
+WIDER = 0.15
+# A wall or glare narrower than so many blurs cannot be told from the blur itself.
+RESOLVED_BLURS = 1.6
+# What a step takes for blur is partly what stands beside it: the search begins at this share of it as well.
+OWN_BLUR = 0.55
+# Motion spreads a fillet of this radius like a box and not like a Gaussian: the half-level moves by up to half of the
+# variance that it adds over the radius.
+MOTION_RADIUS_PX = 15.0
+# Shadows are not quite ramps and walls not quite of one tone; glare lies elsewhere on a fillet than on the flank. This
+# share of a correction is its standard uncertainty.
+U_SHADOW, U_WALL, U_GLARE = 0.1, 0.1, 0.35
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Profile:
+    """Mean light across a flank: places outwards from the single step, light, and how many pixels."""
+
+    t: Floats
+    light: Floats
+    count: Floats
+
+
+def with_profile(upright: GreyImage, edges: EdgePoints, light: Floats, top_level: int) -> EdgePoints:
+    """The same points, moved to the finger's own edge where something beside it has drawn the fitted step away.
+
+    Parameters
+    ----------
+    upright : ndarray, shape (rows, columns)
+        Grey levels, seen with the tips up.
+    edges : EdgePoints
+        Steps that were fitted to every line.
+    light : ndarray of float, shape (levels,)
+        Light of every grey level.
+    top_level : int
+        End of the scale.
+    """
+    flank, tip = edges.blur_px[:, 0].max(), edges.blur_px[:, 1].min()
+    is_unlike_tip = flank**2 > (1.0 + WIDER) * (tip**2 + PIXEL_VARIANCE)
+    if edges.noise_flat <= 0.0 or not (is_unlike_tip or edges.noise**2 > UNEXPLAINED * edges.noise_flat**2):
+        return edges
+    room = _room(edges)
+    inner = [_profile(upright, edges, light, k, slice(0, INNER), room) for k in range(2)]
+    if inner[0] is None or inner[1] is None:
+        return edges
+    if any(p.light.max() > top_level - CUT_OFF_SIGMAS * edges.noise or p.light.min() <= 0.0 for p in inner if p):
+        return edges  # a flank that is cut off at the end of the scale is none of these
+    weight = 1.0 / edges.noise_flat**2
+    blur = [float(np.hypot(edges.blur_px[k, 0], np.sqrt(PIXEL_VARIANCE))) for k in range(2)]
+    fits = [[_best(kind, profile, weight, blur[k]) for kind in range(4)] for k, profile in enumerate(inner) if profile]
+    left = np.array([[fit.squares for fit in each] for each in fits]).sum(axis=0)
+    enough = max(MODEL_LEAVES * sum(profile.t.size for profile in inner if profile), left[STEP] / MODEL_TIMES)
+    is_step = left[STEP] < max(0.5 * enough, STEP_TIMES * left.min())
+    shadow, wall, glare = ([each[kind] for each in fits] for kind in (SHADOW, WALL, GLARE))
+    all_around = np.hypot(1.0, edges.lines.slope)
+    bins = sum(profile.t.size for profile in inner if profile)
+    margin = CLEARLY * np.maximum(left / bins, 1.0)
+    is_shadow = left[SHADOW] < enough and left[SHADOW] + margin[SHADOW] < min(left[WALL], left[GLARE])
+    if not is_step and is_shadow and _are_of_size(shadow, -1.0):
+        return _moved(edges, shadow, U_SHADOW, all_around)
+    if not is_step and left[GLARE] < enough and left[GLARE] + margin[GLARE] < left[WALL] and _are_of_size(glare, 1.0):
+        return _moved(edges, glare, U_GLARE, all_around)
+    outer = [_profile(upright, edges, light, k, slice(INNER, ROWS), REACH_PX) for k in range(2)]
+    if outer[0] is None or outer[1] is None:
+        is_wall = not is_step and left[WALL] < enough and _are_of_size(wall, -1.0)
+        return _unsure(edges, [abs(fit.position) for fit in wall]) if is_wall else edges
+    widths = [_best(STEP, profile, weight, blur[k]).blur for k, profile in enumerate(outer) if profile]
+    if all(each[STEP].blur ** 2 > (1.0 + WIDER) * width**2 for each, width in zip(fits, widths, strict=True)):
+        narrow = [_best(WALL, p, weight, width, True) for p, width in zip(inner, widths, strict=True) if p]
+        remains = sum(fit.squares for fit in narrow)
+        if remains < min(enough, left[STEP] - SIGNIFICANT) and _are_of_size(narrow, -1.0):
+            return _with_blur(_moved(edges, narrow, U_WALL, _across(edges)), widths)
+    flanks, tips = (edges.blur_px[:, part] ** 2 + PIXEL_VARIANCE for part in (0, 1))
+    widened = np.maximum(flanks - (1.0 + WIDER) * tips, 0.0).tolist()
+    if any(widened):
+        return _unsure(edges, [0.5 * more / MOTION_RADIUS_PX for more in widened])
+    is_resolved = all(fit.breadth > RESOLVED_BLURS * fit.blur for fit in wall)
+    if is_step or left[GLARE] > enough or not is_resolved or not _are_of_size(glare, 1.0):
+        return edges
+    # Glare on the finger, or a bevel around it: the outline is in between.
+    bevel = [abs(w.position + w.breadth - g.position) / np.sqrt(3.0) for w, g in zip(wall, glare, strict=True)]
+    moved = _moved(edges, glare, U_GLARE, all_around)
+    return replace(moved, marks=_stated(moved, [max(m.shift_px, u) for m, u in zip(moved.marks, bevel, strict=True)]))
+
+
+def _are_of_size(fits: list[ProfileFit], sign: float) -> bool:
+    """Whether what stands beside a dark finger's edge has the sign that it must have, and the size of such things."""
+    return all(SHARES[0] < sign * fit.share < SHARES[1] for fit in fits)
+
+
+def _room(edges: EdgePoints) -> int:
+    """How far the window may reach before it meets the other finger (pixels)."""
+    real = [edges.position[k, :INNER][edges.lines.weight[k, :INNER] > 0] for k in range(2)]
+    if not (real[0].size and real[1].size):
+        return 0
+    return int(min(REACH_PX, 0.5 * (real[1].min() - real[0].max())))
+
+
+def _best(kind: int, profile: _Profile, weight: float, blur: float, is_blur_known: bool = False) -> ProfileFit:
+    """The best fit of a model from any of its starts."""
+    weights = profile.count * weight
+    blurs = (blur,) if is_blur_known or kind == STEP else (blur, OWN_BLUR * blur)
+    return min(
+        (
+            fit_profile(kind, profile.t, profile.light, weights, own, start, is_blur_known)
+            for own in blurs
+            for start in STARTS_PX[kind]
+        ),
+        key=lambda fit: fit.squares,
+    )
+
+
+def _profile(upright: GreyImage, edges: EdgePoints, light: Floats, k: int, part: slice, room: int) -> _Profile | None:
+    """Mean profile of the half of a flank that is farther from the tip; None where it is short or not straight."""
+    real = np.flatnonzero(edges.lines.weight[k, part] > 0)
+    rows = real[real.size // 2 :]
+    if rows.size < FEWEST_ROWS or room < REACH_PX // 2:
+        return None
+    fixed, found = edges.lines.fixed[k, part][rows], edges.position[k, part][rows]
+    outward = int(edges.lines.outward[k, part][0])
+    keep = np.ones(rows.size, dtype=bool)
+    for _look in range(3):
+        slope, at = np.polyfit(fixed[keep], found[keep], 1)
+        away = found - at - slope * fixed
+        spread = 1.4826 * float(np.median(np.abs(away[keep])))
+        keep = np.abs(away) < 3.0 * spread + 1e-3
+        if np.count_nonzero(keep) < FEWEST_ROWS:
+            return None
+    if spread > STRAIGHT_PX:
+        return None
+    # Every row between the first and the last that were looked at, also where lines were thinned out.
+    fixed = np.arange(fixed[keep].min(), fixed[keep].max() + 1)
+    line = at + slope * fixed
+    columns = np.rint(line).astype(int)[:, None] + outward * np.arange(-REACH_PX, room + 1)
+    is_in = (columns >= 0) & (columns < upright.shape[1])
+    values = light[upright[np.broadcast_to(fixed[:, None], columns.shape)[is_in], columns[is_in]]]
+    t = (outward * (columns - line[:, None]) / np.hypot(1.0, slope))[is_in]
+    place = np.floor(t / BIN_PX).astype(int) + int(2.0 * REACH_PX / BIN_PX)
+    count = np.bincount(place)
+    full = count >= FEWEST_IN_BIN
+    total, middle = np.bincount(place, values), np.bincount(place, t)
+    return _Profile(middle[full] / count[full], total[full] / count[full], count[full].astype(np.float64))
+
+
+def _across(edges: EdgePoints) -> Floats:
+    """Movement along every line for one pixel across the picture: a wall is the outline seen again beside itself."""
+    towards_gap = edges.lines.outward[:, :1] * edges.lines.slope
+    return np.where(IS_INNER, 1.0, np.where(IS_ROW, 0.0, np.maximum(towards_gap, 0.0)))
+
+
+def _moved(edges: EdgePoints, fits: list[ProfileFit], u_relative: float, by_pixel: Floats) -> EdgePoints:
+    """Edges at the place that a model gives; what is not known of it is stated."""
+    moves = np.array([fit.position for fit in fits])[:, None] * by_pixel
+    u_px = [float(np.hypot(fit.u_position, u_relative * fit.position)) for fit in fits]
+    return replace(edges, position=edges.position + edges.lines.outward * moves, marks=_stated(edges, u_px))
+
+
+def _with_blur(edges: EdgePoints, widths: list[float]) -> EdgePoints:
+    """Edges whose inner flanks are blurred as the outer ones are: a wall is no blur."""
+    blur_px = edges.blur_px.copy()
+    blur_px[:, 0] = [np.sqrt(max(width**2 - PIXEL_VARIANCE, 0.0)) for width in widths]
+    blur_px[:, 1] = np.minimum(blur_px[:, 0], blur_px[:, 1])
+    return replace(edges, blur_px=blur_px)
+
+
+def _unsure(edges: EdgePoints, limit_px: list[float]) -> EdgePoints:
+    """Edges that stay, with what nobody can tell: anywhere up to the limit."""
+    u_px = [max(abs(m.shift_px), limit / np.sqrt(3.0)) for m, limit in zip(edges.marks, limit_px, strict=True)]
+    return replace(edges, marks=_stated(edges, u_px))
+
+
+def _stated(edges: EdgePoints, u_px: list[float]) -> tuple[EdgeMark, EdgeMark]:
+    """Marks that hold these uncertainties; both edges err alike."""
+    left, right = (EdgeMark(u, mark.beyond) for u, mark in zip(u_px, edges.marks, strict=True))
+    return left, right

@@ -1,0 +1,84 @@
+"""How far another camera response would move a fitted edge: the price of an assumption that nobody has measured."""
+
+from functools import lru_cache
+from math import hypot
+
+import numpy as np
+from numpy.typing import NDArray
+
+from calib.camera_response import CameraResponse, standard_response
+from fingervision.domain.gap import GapMeasurement
+from fingervision.vision.edge_filters import PIXEL_VARIANCE, Lines, blurred_step, edge_filters, reach_for
+from fingervision.vision.edges import EdgePoints
+
+Floats = NDArray[np.float64]
+
+# The shift changes slowly: it is worked out for levels in steps of this share of full scale, and for blurs in steps of
+# this ratio, so that a steady recording asks once. Each step changes it by less than a twentieth.
+LEVEL_STEP, BLUR_RATIO = 1.0 / 64.0, 1.05
+# Sub-pixel positions over which the shift is averaged, and looks of Gauss-Newton at each.
+PHASES_PX = np.array([-0.375, -0.125, 0.125, 0.375])
+LOOKS = 8
+# Light and levels are compared in so many steps of full scale.
+STEPS = 4096
+
+
+def edge_shift_px(
+    assumed: CameraResponse, other: CameraResponse, inside: float, outside: float, blur_px: float
+) -> float:
+    """Error of an edge that is fitted under one response while another one is true, from the finger outwards (pixels).
+
+    Parameters
+    ----------
+    assumed, other : CameraResponse
+        What the levels were taken for, and what they may be.
+    inside, outside : float
+        Light of the two plateaus under the assumed response, shares of full scale.
+    blur_px : float
+        Gaussian sigma of the edge (pixels).
+    """
+    levels = [round(min(max(share, 0.0), 1.0) / LEVEL_STEP) for share in (inside, outside)]
+    blur = round(np.log(max(blur_px, 0.2)) / np.log(BLUR_RATIO))
+    return 0.0 if levels[0] == levels[1] else _shift(assumed.name, other.name, *levels, blur)
+
+
+def gap_shift_px(
+    measured: GapMeasurement, edges: EdgePoints, assumed: CameraResponse, other: CameraResponse, top_level: int
+) -> float:
+    """How much larger a measured gap is than it would be if the other response were the true one (pixels).
+
+    A finger's whole outline moves, the tip as well: where the edge is slanted the measuring point goes down with it.
+    """
+    total = 0.0
+    for k, (finger, slope) in enumerate(
+        ((measured.left, measured.left.slope), (measured.right, -measured.right.slope))
+    ):
+        inside, outside = (level / top_level for level in (edges.inside[k], edges.inside[k] + finger.contrast))
+        outward = edge_shift_px(assumed, other, inside, outside, float(edges.blur_px[k, 0]))
+        total -= outward * (hypot(1.0, slope) - slope)
+    return total
+
+
+@lru_cache(maxsize=4096)
+def _shift(assumed: str, other: str, inside: int, outside: int, blur: int) -> float:
+    """Fit a step of the other response's light, seen through the assumed one; the responses are the standards'."""
+    sigma = BLUR_RATIO**blur
+    shares = np.linspace(0.0, 1.0, STEPS)
+    assumed_light, other_light = (
+        standard_response(name).table(STEPS - 1, STEPS) / (STEPS - 1) for name in (assumed, other)
+    )
+    plateaus = np.array([inside, outside]) * LEVEL_STEP
+    # From assumed light to the stored level, and on to the other response's light; and back.
+    there = np.interp(np.interp(plateaus, assumed_light, shares), shares, other_light)
+    reach = reach_for(float(np.sqrt(sigma**2 + PIXEL_VARIANCE)))
+    borders = np.arange(-reach - 0.5, reach + 1.0) - PHASES_PX[:, None]
+    step, _, _ = blurred_step(borders, np.full((PHASES_PX.size, 1), sigma))
+    light = there[0] + (there[1] - there[0]) * step
+    seen = 255.0 * np.interp(np.interp(light, other_light, shares), shares, assumed_light)
+    count = PHASES_PX.size
+    lines = Lines(np.zeros(count), np.ones(count), np.zeros(count, dtype=np.intp))
+    filters, position, width = edge_filters(reach), PHASES_PX.copy(), np.array([sigma])
+    for _look in range(LOOKS):
+        look = filters.look(seen, lines, width, position)
+        position, width = look.position, look.blur
+    return float(np.mean(position - PHASES_PX))
