@@ -14,11 +14,13 @@ from fingervision.domain.effect import Array
 TRUTHS = 16
 """Draws of either explanation's parameters, each with a noise of its own."""
 MANY_SAMPLES, FEW_TRUTHS = 6000, 4
+"""Samples above which so few draws of the posterior are followed: a long table leaves little open, and each costs more."""
 FURTHER = 2
 """Further starts of a rival's refit: one search may stand still beside the place where it imitates the truth."""
 NOISES = 4000
 """Draws of what the run's noise adds."""
 PROMISED = 0.95
+"""Probability that the stated interval of a gain holds what comes."""
 REZEROED = 0.5
 """Chance that the run is offset against the data."""
 KEPT = (0.7, 1.3)

@@ -29,6 +29,7 @@ MOST_MIN, MOST_SAMPLES = 8.0, 6000
 NEEDED, BARELY = 30.0, 20.0
 """Gain that settles a pair: 9, and what noise and the parameters' uncertainty take of it; and what will just do."""
 MOST_TRUTHS, MOST_RIVALS = 4, 8
+"""Likeliest members taken for the truth, and rivals of each: more cost time and hardly ever decide a run."""
 COMPARED = 6
 """Pairs among which the one is sought that gains least."""
 WITHIN = 1.5

@@ -9,6 +9,7 @@ from fingervision.domain.effect import Array
 
 PERIODIC = "encoder_cyclic_error"
 ORDERS = (2, 3)
+"""Harmonics that a screw's or a resolver's first one brings along."""
 LARGEST = 0.25
 """Share of the first harmonic beyond which another is a cause of its own."""
 

@@ -12,10 +12,12 @@ from fingervision.domain.parameter import Parameter
 
 Point = dict[str, dict[str, float]]
 AT_BOUND = 1e-6
+"""Share of a parameter's range within which it lies at its bound: rounding of the search."""
 SCANS = ((0.06, 241), (0.012, 13), (0.003, 13), (0.0006, 25))
 """Relative half-widths, and values, of the scans of a parameter in which the prediction jumps. The first is for a
 thorough search: with a thousand jumps in a record the right size has a basin some ten-thousandths wide."""
 MANY_STEPS = 20
+"""Steps of a thorough fit; Levenberg-Marquardt from a signature's start needs five to twelve."""
 START_VARIANCE = 1.0 / 3.0
 """Variance of a start state that may be anywhere between -1 and 1."""
 FORM_SHARE = 0.02

@@ -11,7 +11,9 @@ from fingervision.diagnosis.inference.signatures import Signatures, tangents
 from fingervision.domain.effect import Array
 
 QUANTILE = 0.98
+"""Of the largest excess over all families: one table of noise in fifty makes a claim (one in forty cost more nulls)."""
 DRAWS, LONG_DRAWS, FEWEST = 40, 20, 10
+"""Refitted draws at most, of a long record, and before which none stops: a Gumbel quantile from 40 is known to 15 %."""
 SURELY = 3.0
 """Standard errors of the quantile beyond which no further draw would change the answer."""
 LONG = 6000
@@ -19,6 +21,7 @@ LONG = 6000
 OWN_QUANTILE = 0.95
 """Of what one family takes from noise: as far out as so many draws tell."""
 LINEAR_DRAWS = 300
+"""Draws of linear gains: the 98 % quantile is then the sixth largest of 300."""
 REFIT_MARGIN = 0.2
 """Share at most by which the threshold of linear signatures is raised for all that refitting finds between them."""
 REFITTED = 2

@@ -19,7 +19,9 @@ Progress = Callable[[float], None]
 TRIPLE_SHARE = 0.15
 """A third effect needs evidence of its own: three effects bend to almost anything."""
 PAIRS_REFITTED = 60
+"""Pairs refitted jointly, those first whose signatures take the most: all of 27 effects would be 351."""
 SWAPS_REFITTED = 24
+"""Partners refitted beside the halves of the best pair: each half has at most 26."""
 SCANNED = 6
 """Explanations beside which an effect that jumps is tried at all its sizes: where it jumps depends on the others."""
 LEAST_GAIN = 4.0

@@ -10,6 +10,7 @@ SLOW, SLOW_EXPLAINED = 0.04, 0.02
 TAPERED = 1.94
 """Neighbouring ordinates under Hann's taper share so much that this many count as one."""
 CORRELATIONS = tuple(float(phi) for phi in np.linspace(0.05, 0.95, 46))
+"""Correlations of neighbouring samples that are tried, as fine as a record of 2500 samples tells them."""
 SLOWEST = 2.0 * np.pi * np.array([0.01])
 """Where a gripper's effects have their power: some turns in a hundred samples each."""
 LINE = 9.0

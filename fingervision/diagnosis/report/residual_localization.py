@@ -10,10 +10,12 @@ from fingervision.domain.effect import Array, Flags, History
 from fingervision.domain.report import Place
 
 BINS = 16
+"""Parts of each variable's range: regions are found to a sixteenth of it, then their ends are moved within parts."""
 ENDS = 200
 """Ends of a region that are tried on either side."""
 DRAWS = 200
 QUANTILE = 0.99
+"""Draws of noise and quantile of their maximum: one table of noise in a hundred is told a place."""
 MOST = 8
 """Places told; what is left after these is too little to point at."""
 SMALL = 0.05
