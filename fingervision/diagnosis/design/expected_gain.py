@@ -14,7 +14,7 @@ from fingervision.domain.effect import Array
 TRUTHS = 16
 """Draws of either explanation's parameters, each with a noise of its own."""
 MANY_SAMPLES, FEW_TRUTHS = 6000, 4
-"""Samples above which so few draws of the posterior are followed: a long table leaves little open, and each costs more."""
+"""Samples above which so few draws of the posterior are followed: a long table leaves little open."""
 FURTHER = 2
 """Further starts of a rival's refit: one search may stand still beside the place where it imitates the truth."""
 NOISES = 4000
