@@ -54,6 +54,8 @@ def usual_values(effect: Effect) -> dict[str, float]:
     searched = effect.search(history)
     values = {}
     for p in effect.parameters if isinstance(searched, str) else searched:
+        if p.run is not None:  # where an effect starts is its run's own affair
+            continue
         if p.typical is not None:
             values[p.name] = min(TIMES_TYPICAL * p.typical, p.upper)
         elif p.neutral is not None:

@@ -148,9 +148,14 @@ def _within_a_step(problem: Problem, explanation: Explanation) -> bool:
 
 
 def _completes(state: "_State", smaller: Explanation, larger: Explanation) -> bool:
-    """Whether the larger explanation takes nearly all that the smaller one left, as a true one does."""
+    """Whether the larger explanation takes nearly all that the smaller one left, as a true one does.
+
+    What the smaller one leaves must be plainly more than the noise, and more than its form may be off.
+    """
     rows = state.values - int(state.problem.whitener.aside.sum())
-    return larger.score - rows < COMPLETE * (smaller.score - rows)
+    stands = smaller.score - rows
+    plain = max(float(rows), state.problem.form_share**2 * (state.nothing.score - smaller.score))
+    return stands > plain and larger.score - rows < COMPLETE * stands
 
 
 def _choose(candidates: list[Explanation], samples: int) -> Explanation:
