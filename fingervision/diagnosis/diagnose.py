@@ -17,7 +17,7 @@ from fingervision.diagnosis.inference.search import Findings, Progress
 from fingervision.diagnosis.inference.verdict import standing, verdict
 from fingervision.diagnosis.input.observations import Observations, prepare
 from fingervision.diagnosis.input.repeated_targets import NoRepeatedTargets
-from fingervision.diagnosis.noise.replicates import PureError
+from fingervision.diagnosis.noise.replicates import PureError, resolution
 from fingervision.diagnosis.report.force_hint import force_hint
 from fingervision.diagnosis.report.positioning_of_data import positioning_of_data
 from fingervision.diagnosis.report.positioning_report import PositioningReport
@@ -117,9 +117,12 @@ def diagnose(
     before = data.stacked_mm - data.chain.stacked({})
     after = data.stacked_mm - data.chain.stacked(_values(data, found))
     stands = standing(data, found.problem, before, after)
-    if stands.after_mm > stands.before_mm:
-        # What makes the disagreement larger explains nothing.
-        found = replace(found, best=found.problem.nothing(), alternatives=())
+    digit = resolution(data.table.gap_mm) if data.recorded.commanded else 0.0
+    if stands.after_mm > stands.before_mm or stands.before_mm < digit:
+        # What makes the disagreement larger explains nothing, and less than the digit of a reading that stands still is
+        # its rounding, the same in every hold.
+        unknown = None if stands.before_mm < digit else found.unknown
+        found = replace(found, best=found.problem.nothing(), alternatives=(), unknown=unknown)
         data = replace(data, position_map=None)
         after, stands = before, standing(data, found.problem, before, before)
     mapped = data.position_map is not None

@@ -6,7 +6,7 @@ import numpy as np
 
 from fingervision.diagnosis.inference.ambiguity_set import choices
 from fingervision.diagnosis.inference.harmonics import harmonics
-from fingervision.diagnosis.inference.hypothesis_fit import MANY_STEPS, Explanation, Problem, fit
+from fingervision.diagnosis.inference.hypothesis_fit import MANY_STEPS, SMALL_SHARE, Explanation, Problem, fit
 from fingervision.diagnosis.inference.null_bootstrap import FEWEST, jumps_astray, linear_thresholds, noise_alone, rare
 from fingervision.diagnosis.inference.probe_basis import Probes, probes
 from fingervision.diagnosis.inference.signatures import tangents
@@ -94,7 +94,9 @@ def imitated(problem: Problem, shapes: Probes, found: Explanation, fewer: list[E
     several = len(found.names) > 2
     columns, rows = shapes.columns, int(problem.measured.size)
     basis = _Basis.of(problem, columns)
-    barred = _is_an_effect_itself(problem, found, basis) if several else np.zeros(columns.shape[1], dtype=bool)
+    # Where repeats tell the noise, readings at rest show of a play what a probe shows as well, with its form's errors.
+    same = several or problem.form_share > SMALL_SHARE
+    barred = _is_an_effect_itself(problem, found, basis) if same else np.zeros(columns.shape[1], dtype=bool)
     each = float(np.log(rows)) + 2.0 * float(np.log(columns.shape[1]))
     ahead = VERY_STRONG if several else -max(VERY_STRONG, problem.form_share**2 * _explained(problem, found))
     least = found.bic(rows) + choices(problem, found) + ahead

@@ -107,7 +107,10 @@ class Observations:
             residual_mm = residual_mm - self.position_map.fitted_mm
         n, timed = history.input_mm.size, history.time_s is not None
         sigmas = OUTLIER_SIGMAS if explained else None if timed and n < SHORT else RAW_SIGMAS
-        floor = 0.0 if self.table.u_random_mm is None else float(np.median(self.table.u_random_mm))
+        # A reading is known to its last digit at best: rounding has the standard deviation of a step over root 12.
+        floor = resolution(self.table.gap_mm) / float(np.sqrt(12.0))
+        if self.table.u_random_mm is not None:
+            floor = max(floor, float(np.median(self.table.u_random_mm)))
         floors = [{"gap": floor, "midline": 0.5 * floor, "force": 0.0}[name] for name in self.channels]
         parts = [residual_mm[channel * n : (channel + 1) * n] for channel in range(len(self.channels))]
         aside = [gate(part, history.input_mm, history.runs, timed, sigmas) | self.distrusted for part in parts]
@@ -188,10 +191,9 @@ class Observations:
         errors = self.measured_pure_errors(aside)
         if errors is None:
             return None
-        digits = resolution(self.table.gap_mm) / float(np.sqrt(12.0))
         # The doubt of a standard deviation's square is sqrt(2 / degrees).
         return tuple(
-            Noise(max(error.sd_mm, floor, digits, 1e-9), 0.0, 0.0, float(np.sqrt(2.0 / error.degrees)))
+            Noise(max(error.sd_mm, floor, 1e-9), 0.0, 0.0, float(np.sqrt(2.0 / error.degrees)))
             for error, floor in zip(errors, floors, strict=True)
         )
 

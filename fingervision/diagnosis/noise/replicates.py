@@ -17,6 +17,10 @@ one table in a hundred without one."""
 TREND_DEGREE = 3
 """Degree of the polynomial in time that takes a drift or a run-in out of the repeats: it follows either over some
 cycles."""
+FEWEST_STEPS = 8
+"""Differences between neighbouring values from which a grid is told."""
+LEVELS = 4096
+"""Of a reading whose digits do not show: 12 bits, as in the encoders of servos and in cheap converters."""
 ORDINARY_SIGMAS = 6.0
 """Robust standard deviations beyond which a single visit is a gross error and no scatter."""
 
@@ -136,10 +140,13 @@ def _trend_sigmas(groups: list[Array], pooled: float) -> float:
 
 
 def resolution(values: Array) -> float:
-    """Smallest difference of values that all lie on one grid, as a reading of few digits gives them; 0 without one."""
+    """Smallest difference of values that all lie on one grid, as a reading of few digits gives them; 0 without one.
+
+    Of a few different values nobody can tell a grid: then the reading is taken for one of 12 bits over their range.
+    """
     steps = np.diff(np.unique(np.round(values, 10)))
     steps = steps[steps > 1e-9]
-    if not steps.size:
-        return 0.0
+    if steps.size < FEWEST_STEPS:
+        return float(np.ptp(values)) / LEVELS
     least = float(np.min(steps))
     return least if np.all(np.abs(steps / least - np.round(steps / least)) < 0.02) else 0.0
