@@ -11,6 +11,8 @@ from fingervision.domain.parameter import Parameter
 SLOWEST_SHARE, FASTEST_SHARE = 0.05, 0.98
 """Share of the moving samples that are slower than what is called the slowest motion, and than the fastest: the ends of
 strokes are slower, and errors of the recorded input make single samples seem faster."""
+WINDOW, ONE_WAY = 9, 0.8
+"""Samples over which a speed is taken, and share of the travel by which the stage must have come on meanwhile."""
 JUMP_RANGE = 0.01
 """Lowest speed that is searched under step commands, over the fastest one that they ask for."""
 APART = 1.5
@@ -38,6 +40,17 @@ def act(input_mm: Array, history: History, values: Values) -> Array:
     return out
 
 
+def _steady_speeds(input_mm: Array, time_s: Array) -> Array:
+    """Speeds over `WINDOW` samples that go one way: neighbouring samples differ by whole steps of an encoder."""
+    if input_mm.size <= WINDOW:
+        return np.zeros(0)
+    net = np.abs(input_mm[WINDOW:] - input_mm[:-WINDOW])
+    way = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(input_mm)))])
+    travelled = way[WINDOW:] - way[:-WINDOW]
+    one_way = (net > ONE_WAY * travelled) & (net > 0.0)
+    return np.asarray((net / (time_s[WINDOW:] - time_s[:-WINDOW]))[one_way])
+
+
 def narrow(history: History) -> tuple[Parameter, ...] | str:
     """Bound the parameters by what these data can show."""
     if history.dwell_s > 0.0:
@@ -49,9 +62,8 @@ def narrow(history: History) -> tuple[Parameter, ...] | str:
         # A single move between two stands is a command's jump: it asks for a speed, and shows none.
         stands = np.pad(move <= 4.0 * history.input_sigma_mm, 1, constant_values=True)
         alone = stands[:-2] & stands[2:]
-        speed = move / np.diff(history.times[run])
-        moving.append(speed[~stands[1:-1] & ~alone])
-        jumping.append(speed[~stands[1:-1] & alone])
+        jumping.append((move / np.diff(history.times[run]))[~stands[1:-1] & alone])
+        moving.append(_steady_speeds(history.input_mm[run], history.times[run]) if not alone.all() else np.zeros(0))
     steady, jumps = np.concatenate(moving), np.concatenate(jumping)
     if not steady.size and not jumps.size:
         return "the input never moves between two samples"
