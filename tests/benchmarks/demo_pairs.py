@@ -83,7 +83,8 @@ def one(seed: int) -> tuple[str, bool, bool, str]:
     chain: MeasuringChain = prepare(table, model).chain
     shown = replace(chain, midline_mm=0.0, seen_midline_mm=None).respond({k: v for k, v in hidden.items() if v})
     left, right = (edge + EDGE_MM * rng.standard_normal(edge.size) for edge in (shown.left_mm, shown.right_mm))
-    measured = replace(table, gap_mm=right - left, midline_mm=0.5 * (left + right))
+    u_mm = np.full(left.size, EDGE_MM * float(np.sqrt(2.0)))
+    measured = replace(table, gap_mm=right - left, midline_mm=0.5 * (left + right), u_random_mm=u_mm)
     report = diagnose(measured, model, seed=seed).report
     d = report.disagreement
     allowed = max(STANDING[0] * d.before_rms_mm, STANDING[1] * EDGE_MM) * ROUNDING

@@ -17,6 +17,10 @@ STANDING_SHARE = 0.05
 """Share of the disagreement, as RMS, that a named explanation may leave: the catalogue's forms are off by that much."""
 STANDING_NOISES = 3.0
 """Standard deviations of the noise that it may leave in any case: less hardly shows to the eye."""
+CORRELATED = 10.0
+"""Times the scatter from sample to sample that noise may have in all: an autoregression of 0.95 has six times it."""
+TRUSTED = 10.0
+"""Times the measurement's own random uncertainty that noise may have: more is structure that looks like noise."""
 NEEDED = 1.1
 """Times that dropping an effect may raise what stands, as RMS; an effect that lowers it by more is seen by eye."""
 LACK_OF_FIT = 1e-3
@@ -84,6 +88,15 @@ def standing(data: Observations, problem: Problem, before_mm: Array, after_mm: A
         digits = resolution(data.table.gap_mm) / float(np.sqrt(12.0))
         settled = [max(scatter_in_holds(history, part), digits) for part in parts]
         noises = [min(noise, scatter or noise) for noise, scatter in zip(noises, settled, strict=True)]
+    elif history.time_s is not None and data.repeats is None:
+        # Slow structure passes for correlated noise, which leaves traces in what changes from sample to sample.
+        parts = np.split(after_mm, len(data.channels))
+        digits = resolution(data.table.gap_mm) / float(np.sqrt(12.0))
+        most = [CORRELATED * max(short_scatter(part, history.runs), digits) for part in parts]
+        noises = [min(noise, limit or noise) for noise, limit in zip(noises, most, strict=True)]
+    if data.table.u_random_mm is not None:
+        stated = TRUSTED * float(np.median(data.table.u_random_mm))
+        noises[0] = min(noises[0], stated or noises[0])
     error = np.hypot(problem.whitener.input_mm, problem.whitener.passing_mm)[~aside]
     gap2 = noises[0] ** 2 + float(np.mean(error**2)) if error.size else noises[0] ** 2
     noise = float(np.sqrt(0.25 * gap2 + noises[1] ** 2)) if both else float(np.sqrt(gap2))
@@ -98,6 +111,13 @@ def standing(data: Observations, problem: Problem, before_mm: Array, after_mm: A
     errors = data.measured_pure_errors(np.split(problem.whitener.aside, len(data.channels)))
     degrees = None if errors is None else min(error.degrees for error in errors)
     return Standing(rms(before_mm), rms(after_mm), noise, int(np.sum(~aside)), degrees)
+
+
+def short_scatter(residual_mm: Array, runs: tuple[slice, ...]) -> float:
+    """Standard deviation of white noise with the median third difference of a residual; 0 in runs of a few samples."""
+    differences = np.concatenate([np.diff(residual_mm[run], 3) for run in runs])
+    # Third differences of white noise have 1 + 9 + 9 + 1 times its variance; 0.6745 is the normal median.
+    return float(np.median(np.abs(differences))) / 0.6745 / float(np.sqrt(20.0)) if differences.size else 0.0
 
 
 def _without_scatter(values: Array, runs: tuple[slice, ...]) -> Array:
