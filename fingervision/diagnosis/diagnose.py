@@ -113,7 +113,7 @@ def diagnose(
     if mistake is not None and mistake.blocks:
         nothing = found.problem.nothing()
         found = replace(found, best=nothing, alternatives=(), unknown=mistake.words.rstrip("."), left_over=None)
-        data = replace(data, position_map=None)
+        data = replace(data, position_map=None, run_gains=None)
     before = data.stacked_mm - data.chain.stacked({})
     after = data.stacked_mm - data.chain.stacked(_values(data, found))
     stands = standing(data, found.problem, before, after)
@@ -123,7 +123,7 @@ def diagnose(
         # its rounding, the same in every hold.
         unknown = None if stands.before_mm < digit else found.unknown
         found = replace(found, best=found.problem.nothing(), alternatives=(), unknown=unknown)
-        data = replace(data, position_map=None)
+        data = replace(data, position_map=None, run_gains=None)
         after, stands = before, standing(data, found.problem, before, before)
     mapped = data.position_map is not None
     decided, unknown = verdict(found, mapped=mapped, stands=stands)

@@ -135,16 +135,24 @@ def _added(problem: Problem, smaller: Explanation, larger: Explanation) -> float
 
 
 def _within_a_step(problem: Problem, explanation: Explanation) -> bool:
-    """Whether an effect acts on a few rows by less than an encoder's step: roundings at the end of a stroke do."""
+    """Whether an effect in it acts by less than an encoder's step, on a few rows or at the ends: as roundings do."""
     history = problem.chain.history
     if history.input_step_mm == 0.0:
         return False
     reach = 0.5 * history.input_step_mm
     low, high = (problem.chain.with_input(history.input_mm + way).stacked({}) for way in (-reach, reach))
-    change = problem.chain.stacked(explanation.values) - problem.chain.stacked({})
-    largest = float(np.max(np.abs(change)))
-    few = float(np.mean(np.abs(change) > 0.1 * largest)) < FEW_ROWS
-    return few and largest < STEPS_HIDDEN * float(np.max(np.abs(high - low)))
+    step_mm = STEPS_HIDDEN * float(np.max(np.abs(high - low)))
+    from_end = np.minimum(history.input_mm - history.input_mm.min(), history.input_mm.max() - history.input_mm)
+    at_ends = np.tile(from_end < STEPS_HIDDEN * history.input_step_mm, low.size // from_end.size)
+    whole = problem.chain.stacked(explanation.values)
+    for name in explanation.names:
+        others = {other: values for other, values in explanation.values.items() if other != name}
+        change = np.abs(whole - problem.chain.stacked(others))
+        largest = float(np.max(change))
+        acts = change > 0.1 * largest
+        if largest < step_mm and (float(np.mean(acts)) < FEW_ROWS or not np.any(acts & ~at_ends)):
+            return True
+    return False
 
 
 def _completes(state: "_State", smaller: Explanation, larger: Explanation) -> bool:
@@ -298,7 +306,7 @@ def _two_effects(state: _State, progress: Progress) -> _State:
         return state
     problem, singles = state.problem, state.singles
     pairs = _extended(problem, state.atoms, singles[:BASES], PAIRS_REFITTED, progress)
-    pairs = _swapped(problem, state.atoms, pairs)
+    pairs = [e for e in _swapped(problem, state.atoms, pairs) if not _within_a_step(problem, e)]
     state = replace(state, pairs=pairs)
     # Beside a simpler form a second effect would gain what the richest has gained already.
     if not pairs:
@@ -314,7 +322,8 @@ def _three_effects(state: _State, progress: Progress) -> _State:
     if len(state.best.names) != 2:
         return state
     problem, pairs = state.problem, state.pairs
-    triples = _extended(problem, state.atoms, pairs[:3], 24, progress)
+    extended = _extended(problem, state.atoms, pairs[:3], 24, progress)
+    triples = [e for e in extended if not _within_a_step(problem, e)]
     state = replace(state, triples=triples)
     if not triples:
         return state

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from fingervision.diagnosis.inference.hypothesis_fit import SMALL_SHARE, Explanation, Problem
 from fingervision.diagnosis.inference.measuring_chain import MeasuringChain, admissible
 from fingervision.diagnosis.inference.position_map import PositionMap
+from fingervision.diagnosis.inference.run_gains import RunGains
 from fingervision.diagnosis.inference.signatures import start_patterns
 from fingervision.diagnosis.inference.uncertain_dimensions import BENT, DrawingRefit, estimated, tangent, with_moved
 from fingervision.diagnosis.input.path import dwell_s, input_path, readings_at_rest, turning_readings
@@ -15,7 +16,7 @@ from fingervision.diagnosis.input.path import recorded as recorded_rows
 from fingervision.diagnosis.input.recorded_input import AT_REST_SHARE, RecordedInput, standing_still
 from fingervision.diagnosis.input.row_screening import screened_rows
 from fingervision.diagnosis.input.stalled_ends import stalled_ends
-from fingervision.diagnosis.noise.noise_model import Noise, gate, white_noise, without_input
+from fingervision.diagnosis.noise.noise_model import LEAST_SHARE, Noise, gate, white_noise, without_input
 from fingervision.diagnosis.noise.replicates import PureError, pure_error, resolution, visits
 from fingervision.diagnosis.noise.restricted_likelihood import noise_of_short_runs
 from fingervision.diagnosis.noise.spectrum import noise_by_spectrum
@@ -81,6 +82,7 @@ class Observations:
     refit: DrawingRefit
     repeats: NDArray[np.intp] | None = None
     position_map: PositionMap | None = None
+    run_gains: RunGains | None = None
     runs_scatter_mm: float = np.inf
 
     @property
@@ -95,6 +97,16 @@ class Observations:
         return ("gap", *(["midline"] if history.both_edges else []), *(["force"] if history.force else []))
 
     @property
+    def behind_gains(self) -> int:
+        """Random effects that stand behind the runs' gains in a problem."""
+        return len(self.refit.moved)
+
+    @property
+    def behind_map(self) -> int:
+        """Random effects that stand behind a map of position errors in a problem."""
+        return self.behind_gains + (0 if self.run_gains is None else self.run_gains.coefficients.size)
+
+    @property
     def stalled(self) -> frozenset[str]:
         """Effects for which readings that stand at an end of the range speak."""
         history = self.chain.history
@@ -103,8 +115,9 @@ class Observations:
     def problem(self, residual_mm: Array, degrees: int, *, explained: bool) -> Problem:
         """Estimate outliers and noise from a residual and whiten the measurement with them."""
         history = self.chain.history
-        if self.position_map is not None:
-            residual_mm = residual_mm - self.position_map.fitted_mm
+        for nuisance in (self.position_map, self.run_gains):
+            if nuisance is not None:
+                residual_mm = residual_mm - nuisance.fitted_mm
         n, timed = history.input_mm.size, history.time_s is not None
         sigmas = OUTLIER_SIGMAS if explained else None if timed and n < SHORT else RAW_SIGMAS
         # A reading is known to its last digit at best: rounding has the standard deviation of a step over root 12.
@@ -124,7 +137,7 @@ class Observations:
             error = np.zeros_like(error)
         passing = np.where(self.recorded.stays, 0.0, error)
         noises = (without_input(noises[0], passing), *noises[1:])
-        beside = [] if self.position_map is None else [self.position_map.columns_mm]
+        beside = [one.columns_mm for one in (self.position_map, self.run_gains) if one is not None]
         beside += [self.refit.columns] if self.refit.moved else []
         drawing = np.hstack(beside) if beside else None
         whitener = Whitener(
@@ -192,10 +205,12 @@ class Observations:
         if errors is None:
             return None
         # The doubt of a standard deviation's square is sqrt(2 / degrees).
-        return tuple(
-            Noise(max(error.sd_mm, floor, 1e-9), 0.0, 0.0, float(np.sqrt(2.0 / error.degrees)))
-            for error, floor in zip(errors, floors, strict=True)
-        )
+        found = []
+        for error, floor in zip(errors, floors, strict=True):
+            sd_mm, doubt = max(error.sd_mm, floor, 1e-9), float(np.sqrt(2.0 / error.degrees))
+            slow = float(np.sqrt(1.0 - LEAST_SHARE)) * sd_mm if error.correlation > 0.0 else 0.0
+            found.append(Noise(float(np.sqrt(sd_mm**2 - slow**2)), slow, error.correlation, doubt))
+        return tuple(found)
 
     def with_overshoots(self) -> "Observations":
         """Let the stage run over where it turned between two readings of the same target; itself where it did not."""
