@@ -218,7 +218,7 @@ def imitating_effects(problem: Problem, position_map: PositionMap) -> dict[str, 
     mapped = ~lines & (beyond < CURVE_SHARE * bent)
     span = f"{history.input_mm.min():g} to {history.input_mm.max():g} mm"
     return {
-        name: f"beside a map of position errors it shows as a part of the map: over {span} it depends on the place alone"
+        name: f"beside a map of position errors it is a part of the map: over {span} it depends on the place alone"
         for name in still
         if np.any(mapped[owner == name]) and np.all((mapped | lines)[owner == name])
     }
