@@ -8,14 +8,16 @@ import numpy as np
 from fingervision.diagnosis.design.further_evidence import further_evidence
 from fingervision.diagnosis.design.next_run import next_run
 from fingervision.diagnosis.inference.cross_validation import left_out_rms_mm, rms_mm
+from fingervision.diagnosis.inference.explanation_candidates import Progress
 from fingervision.diagnosis.inference.hypothesis_fit import Problem
 from fingervision.diagnosis.inference.measuring_chain import Settings
 from fingervision.diagnosis.inference.plausibility import gross_mistake, swapped_directions
 from fingervision.diagnosis.inference.position_map import NAME
 from fingervision.diagnosis.inference.refitted_search import refitted_search
-from fingervision.diagnosis.inference.search import Findings, Progress
+from fingervision.diagnosis.inference.search import Findings
 from fingervision.diagnosis.inference.verdict import standing, verdict
-from fingervision.diagnosis.input.observations import Observations, prepare
+from fingervision.diagnosis.input.observations import Observations
+from fingervision.diagnosis.input.preparation import prepare
 from fingervision.diagnosis.input.repeated_targets import NoRepeatedTargets
 from fingervision.diagnosis.noise.replicates import PureError, resolution
 from fingervision.diagnosis.report.force_hint import force_hint

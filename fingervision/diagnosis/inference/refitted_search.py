@@ -6,6 +6,7 @@ from functools import partial
 import numpy as np
 from scipy.stats import t as student
 
+from fingervision.diagnosis.inference.explanation_candidates import Progress
 from fingervision.diagnosis.inference.hypothesis_fit import Explanation, Point, Problem, fit
 from fingervision.diagnosis.inference.position_map import (
     LEAST_GAIN,
@@ -18,7 +19,7 @@ from fingervision.diagnosis.inference.posterior import settled
 from fingervision.diagnosis.inference.reference_gauge import consistent_with_gauges
 from fingervision.diagnosis.inference.run_gains import FEWEST_RUNS, likeliest_gains
 from fingervision.diagnosis.inference.run_gains import LEAST_GAIN as LEAST_GAIN_OF_RUNS
-from fingervision.diagnosis.inference.search import Findings, Progress, search
+from fingervision.diagnosis.inference.search import Findings, search
 from fingervision.diagnosis.inference.verdict import standing_of, without_passengers
 from fingervision.diagnosis.input.intersample_interpolation import likelier_interpolation
 from fingervision.diagnosis.input.observations import Observations
@@ -177,9 +178,9 @@ def _beside_map(state: _Searched, look: _Look) -> _Searched:
         return state
     imitating = imitating_effects(found.problem, first)
     effects = {name: effect for name, effect in state.data.effects.items() if name not in imitating}
-    beside = replace(state.data, position_map=first, effects=effects, excluded={**state.data.excluded, **imitating})
+    excluded = {**state.data.excluded, **imitating}
     kept = found.best if not set(found.best.names) & set(imitating) else None
-    beside = look.again(beside, kept)
+    beside = look.again(replace(state.data, position_map=first, effects=effects, excluded=excluded), kept)
     plain = replace(beside.found.problem, offsets=_offsets_without(beside.found.problem, first.coefficients.size))
     second, _ = likeliest_map(plain, _left(plain, beside.found.best))
     if first.is_like(second):

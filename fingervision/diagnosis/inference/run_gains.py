@@ -112,6 +112,6 @@ def likeliest_gains(problem: Problem, explanation: Explanation) -> tuple[RunGain
         columns_mm=raw * size,
         sd=size,
         price=float(np.linalg.slogdet(inner)[1]) + choice,
-        coefficients=np.linalg.solve(inner, size * aim),
+        coefficients=np.asarray(np.linalg.solve(inner, size * aim), dtype=np.float64),
     )
     return found, float(gained[best]) - choice
