@@ -148,8 +148,8 @@ def standing_of(data: Observations, found: Findings) -> Standing:
     return standing(data, found.problem, before, left)
 
 
-def without_passengers(data: Observations, found: Findings) -> Findings:
-    """Drop effects that explain less than what still stands: they may only imitate a part of it.
+def without_unneeded_effects(data: Observations, found: Findings) -> Findings:
+    """Drop effects that explain less than what still stands: such an effect may only imitate a part of it.
 
     Where structure remains beside several effects, a further one is fitted to that structure as well as to its own.
     """
