@@ -132,7 +132,10 @@ def _over_the_ends(state: _Searched, look: _Look) -> _Searched:
 
 
 def _beside_gains(state: _Searched, look: _Look) -> _Searched:
-    """Search beside gains that differ from run to run, and keep what is found where it is the far likelier one."""
+    """Search beside gains that differ from run to run, and keep what is found where it is the far likelier one.
+
+    Such gains are a nuisance beside an effect that does more than they do; alone they are structure with no name.
+    """
     found = state.found
     explained = found.unknown is None and standing_of(state.data, found).is_little
     if explained or len(state.data.chain.history.runs) < FEWEST_RUNS:
@@ -149,11 +152,23 @@ def _beside_gains(state: _Searched, look: _Look) -> _Searched:
         apart = look.again(replace(state.data, run_gains=gains.without_mean()), known)
         if standing_of(apart.data, apart.found).after_mm < stands.after_mm:
             beside = apart
+    if not _does_more(beside):
+        return state
     plain = replace(beside.found.problem, offsets=_offsets_without(beside.found.problem, gains.coefficients.size))
     rows = max(2, int(plain.measured.size - plain.whitener.aside.sum()))
     rival = fit(plain, found.best.names, found.best.values, iterations=20) if found.best.names else plain.nothing()
     gained = rival.bic(rows) - beside.found.best.bic(rows) - gains.price
     return beside if gained > LEAST_GAIN_OF_RUNS else state
+
+
+def _does_more(beside: _Searched) -> bool:
+    """Whether the named effects change the prediction by more than the scatter of the runs' gains does."""
+    best, gains = beside.found.best, beside.data.run_gains
+    if gains is None or not best.names:
+        return False
+    scatter_mm = gains.refitted(beside.found.problem, best, beside.data.behind_gains).scatter_mm
+    changed_mm = beside.data.chain.stacked(best.values) - beside.data.chain.stacked({})
+    return bool(np.linalg.norm(changed_mm) > np.linalg.norm(scatter_mm))
 
 
 def _beside_map(state: _Searched, look: _Look) -> _Searched:
