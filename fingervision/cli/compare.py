@@ -45,7 +45,7 @@ def command(measured: Path, model_paths: tuple[Path, ...], out: Path, seed: int,
         compared = {name: compare(table, model, seed=seed) for name, model in models.items()}
     files = {"measured table": measured, **{f"model {name}": p for name, p in zip(models, model_paths, strict=True)}}
     with out_folder(out):
-        document = write_comparison(out, compared, provenance(files))
+        document = write_comparison(out, compared, provenance(files), measured)
     if as_json:
         click.echo(json.dumps(document, indent=2))
         return

@@ -74,7 +74,8 @@ def command(
             progress=lambda share: bar.update(max(0, int(1000 * share) - bar.pos)),
         )
     with out_folder(out):
-        document = write_answer(out, done, model, provenance({"measured table": measured, "model": model_path}))
+        made = provenance({"measured table": measured, "model": model_path})
+        document = write_answer(out, done, model, made, measured)
     report = done.report
     if as_json:
         click.echo(json.dumps(document, indent=2))

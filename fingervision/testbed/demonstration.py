@@ -137,5 +137,6 @@ def _answer(table: Path, simulation: Path, out: Path, seed: int) -> tuple[Diagno
     model = read_model(simulation)
     done = diagnose(read_measured_table(table), model, seed=seed)
     with out_folder(out):
-        write_answer(out, done, model, provenance({"measured table": table, "model": simulation}))
+        made = provenance({"measured table": table, "model": simulation})
+        write_answer(out, done, model, made, table)
     return done, out / PAGE

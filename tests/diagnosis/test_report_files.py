@@ -11,6 +11,7 @@ import pytest
 from click.testing import CliRunner, Result
 
 from fingervision.cli import cli
+from fingervision.diagnosis.report.frame_strip import strip_html, turning_rows
 
 CHROMIUM = shutil.which("chromium")
 PLAY_MM = 0.05
@@ -108,6 +109,24 @@ def test_one_model_is_diagnosed_at_a_time(rig: Path) -> None:
 def test_the_same_model_twice_is_refused(rig: Path) -> None:
     done = run("compare", rig / "measured.csv", "--model", rig / "steep.csv", "--model", rig / "steep.csv")
     assert done.exit_code == 2
+
+
+def test_turning_points_are_found_and_their_frames_shown(tmp_path: Path) -> None:
+    sample = Path(__file__).parents[2] / "sample_frames" / "opening"
+    recording = tmp_path / "opening.mp4"
+    shutil.copy(sample / recording.name, recording)
+    words = ("--calibration", sample / "calibration.json", "--drive", sample / "drive.csv", "--out", tmp_path / "gaps")
+    assert run("measure", recording, *words).exit_code == 0
+    table = tmp_path / "gaps" / "gaps.csv"
+    turns = turning_rows(table)
+    drive = np.genfromtxt(sample / "drive.csv", delimiter=",", names=True)["input_mm"]
+    # The drive opens, closes and comes back.
+    assert [turn.input_mm for turn in turns[1:3]] == pytest.approx([drive.max(), drive.min()], abs=0.02)
+    strip = strip_html(table)
+    assert strip.count("<img") == len(turns)
+    assert f"gap {turns[1].gap_mm:.3f} mm" in strip
+    recording.write_bytes(recording.read_bytes()[:-1])
+    assert "<img" not in strip_html(table)  # another file of the same name is no witness
 
 
 @pytest.mark.slow

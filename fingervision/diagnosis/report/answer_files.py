@@ -4,6 +4,7 @@ from pathlib import Path
 
 from fingervision.diagnosis.diagnose import Diagnosis, by_channel
 from fingervision.diagnosis.report.figure_files import write_figures
+from fingervision.diagnosis.report.frame_strip import strip_html
 from fingervision.diagnosis.report.positioning_of_data import positioning_section
 from fingervision.diagnosis.report.report_page import curves_of, report_page
 from fingervision.diagnosis.report.residual_figure import residual_figure
@@ -18,7 +19,7 @@ from fingervision.storage.report_json import report_document, write_report
 PAGE, REPORT, MODEL, NEXT_RUN = "report.html", "report.json", "model.toml", "next_run.toml"
 
 
-def write_answer(out: Path, done: Diagnosis, model: CorrectedModel, made: Provenance) -> dict[str, object]:
+def write_answer(out: Path, done: Diagnosis, model: CorrectedModel, made: Provenance, table: Path) -> dict[str, object]:
     """Write them into a folder, in the place of an earlier answer's, and give what report.json holds.
 
     Parameters
@@ -31,6 +32,8 @@ def write_answer(out: Path, done: Diagnosis, model: CorrectedModel, made: Proven
         What was diagnosed, with the effects that it has already.
     made : Provenance
         Files, command and versions behind the answer.
+    table : Path
+        The measured table, beside which its recording is looked for.
     """
     report = done.report
     effects: dict[str, dict[str, Estimate]] = {name: dict(values) for name, values in model.effects.items()}
@@ -49,5 +52,5 @@ def write_answer(out: Path, done: Diagnosis, model: CorrectedModel, made: Proven
     before, after = (by_channel(done.data, mm) for mm in (done.before_mm, done.after_mm))
     residuals = residual_figure(before, after if report.effects else None, done.data.chain.history)
     write_figures(out, curves_of(done), residuals, f"{Path(model.base_path).name}: {report.verdict}")
-    (out / PAGE).write_text(report_page(done, made), encoding="utf-8")
+    (out / PAGE).write_text(report_page(done, made, strip_html(table)), encoding="utf-8")
     return document

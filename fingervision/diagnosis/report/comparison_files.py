@@ -10,6 +10,7 @@ from matplotlib.figure import Figure
 from fingervision.diagnosis.compare import Comparison
 from fingervision.diagnosis.report.chart_data import charts_of
 from fingervision.diagnosis.report.figure_files import write_figures
+from fingervision.diagnosis.report.frame_strip import strip_html
 from fingervision.diagnosis.report.gap_curves import GapCurves, gap_curves
 from fingervision.diagnosis.report.html_parts import HINT, bullets, chart, number, page, provenance_html, table
 from fingervision.diagnosis.report.residual_figure import residual_figure
@@ -34,14 +35,17 @@ def comparison_document(found: Mapping[str, Comparison], made: Provenance) -> di
     return {**first, "models": models, "provenance": made.document()}
 
 
-def write_comparison(out: Path, found: Mapping[str, Comparison], made: Provenance) -> dict[str, object]:
-    """Write page, figures and compare.json into a folder that is there, and give what compare.json holds."""
+def write_comparison(out: Path, found: Mapping[str, Comparison], made: Provenance, measured: Path) -> dict[str, object]:
+    """Write page, figures and compare.json into a folder that is there, and give what compare.json holds.
+
+    The recording behind the table `measured` is looked for beside it.
+    """
     document = comparison_document(found, made)
     (out / COMPARISON).write_text(json.dumps(document, indent=2, allow_nan=False) + "\n", encoding="utf-8")
     curves, residuals = _curves(found), _residuals(found)
     (out / PICTURE).write_bytes(png_bytes(residuals))
     write_figures(out, curves, residuals, " and ".join(found))
-    (out / PAGE).write_text(_page(found, curves, made), encoding="utf-8")
+    (out / PAGE).write_text(_page(found, curves, made, strip_html(measured)), encoding="utf-8")
     return document
 
 
@@ -61,7 +65,7 @@ def _residuals(found: Mapping[str, Comparison]) -> Figure:
     )
 
 
-def _page(found: Mapping[str, Comparison], curves: GapCurves, made: Provenance) -> str:
+def _page(found: Mapping[str, Comparison], curves: GapCurves, made: Provenance, frames: str) -> str:
     charts = charts_of(curves, {name: one.residual_mm["gap"] for name, one in found.items()})
     names = {
         "gap-input": "Gap over the input, measured and predicted",
@@ -89,6 +93,7 @@ def _page(found: Mapping[str, Comparison], curves: GapCurves, made: Provenance) 
          + f'<p class="hint">{HINT}</p>'),
         ("Difference", "".join(html for name, html in drawn.items() if name.startswith("residual"))),
         ("How much", table(["model", "disagreement, RMS", "random noise", "places beyond the noise"], rows)),
+        ("At the turning points", frames),
         ("Where they disagree", places),
         ("Notes", bullets([*first.data.notes, *first.data.refitted()])),
         ("Where this comes from", provenance_html(made)),

@@ -45,8 +45,8 @@ def curves_of(diagnosis: Diagnosis) -> GapCurves:
     return gap_curves(data, diagnosis.report.disagreement.noise_rms_mm, predictions)
 
 
-def report_page(diagnosis: Diagnosis, made: Provenance) -> str:
-    """Write the report as HTML."""
+def report_page(diagnosis: Diagnosis, made: Provenance, frames: str) -> str:
+    """Write the report as HTML; `frames` is the strip of frames at the turning points, as HTML."""
     report = diagnosis.report
     history = diagnosis.data.chain.history
     n = history.input_mm.size
@@ -74,6 +74,7 @@ def report_page(diagnosis: Diagnosis, made: Provenance) -> str:
         ("Gap against input", f'{gap}<p class="hint">{HINT}</p>'),
         ("Where they disagree", bullets([place.words for place in report.where])),
         ("Difference before and after", residuals),
+        ("At the turning points", frames),
         ("How much", _how_much(report)),
         ("What was named", _mechanisms(report)),
         ("Parameters, with 95 % intervals", table(["effect", "parameter", "value", "interval"], parameters)),
@@ -89,7 +90,7 @@ def report_page(diagnosis: Diagnosis, made: Provenance) -> str:
     ]
     positioning = positioning_html(diagnosis.positioning)
     if positioning is not None:
-        sections.insert(6, ("Positioning accuracy and repeatability (ISO 230-2)", positioning))
+        sections.insert(7, ("Positioning accuracy and repeatability (ISO 230-2)", positioning))
     return page(f"fingervision: {report.verdict}", HEADINGS[report.verdict], report.sentence, sections, charts)
 
 
