@@ -9,12 +9,15 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.tri import Triangulation
 from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline
 
+from fingervision.cli._model_motion import MotionAsked, move_mechanism
 from fingervision.domain.errors import FingervisionError, UsageError
 from fingervision.models.mechanism_plate import MechanismPlate, MechanismState
 from fingervision.storage.mechanism_toml import read_mechanism
 
 _ROWS = 21
+_MOST_ROWS = 41
 _OF_YIELD = 0.5
 """Without a drive, inputs up to half of what makes the flexures yield are answered, either way."""
 
@@ -24,6 +27,7 @@ def predict(
     kind: str,
     drive: Path | None,
     out: Path,
+    asked: MotionAsked,
     *,
     large_rotation: bool,
     contact: bool,
@@ -48,7 +52,7 @@ def predict(
     if drive is None:
         inputs = np.linspace(-_OF_YIELD, _OF_YIELD, _ROWS) * at_yield_mm
     else:
-        inputs = np.unique(read_drive(drive).input_mm)
+        inputs = _inputs_mm(np.unique(read_drive(drive).input_mm))
     states = [model.state(float(value), large_rotation=large_rotation) for value in inputs]
     figures = _figures(model, unit, at_yield_mm)
     try:
@@ -65,6 +69,8 @@ def predict(
         click.echo(mechanism.name)
         for name, value in figures.items():
             click.echo(f"{name:<44}{value:>14.6g}")
+    curve = _curve(states) if large_rotation and asked.drive is not None else None
+    move_mechanism(model, asked, curve, out, as_json=as_json)
     worst = max(states, key=lambda state: state.stress_mpa)
     if worst.stress_mpa > mechanism.material.yield_mpa:
         click.echo(
@@ -73,6 +79,20 @@ def predict(
             f"{at_yield_mm:.3g} mm.",
             err=True,
         )
+
+
+def _inputs_mm(inputs: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Rows of the static table: the drive's own inputs, or as many as a curve needs."""
+    return inputs if inputs.size <= _MOST_ROWS else np.linspace(inputs[0], inputs[-1], _MOST_ROWS)
+
+
+def _curve(states: list[MechanismState]) -> CubicSpline:
+    """Lengths and force over the input, in the order of a motion's columns."""
+    rows = [
+        [*state.pairs_mm.values(), *(part for probe in state.probes_mm.values() for part in probe), state.force_n]
+        for state in states
+    ]
+    return CubicSpline([state.input_mm for state in states], rows)
 
 
 def _figures(model: MechanismPlate, unit: MechanismState, at_yield_mm: float) -> dict[str, float]:
