@@ -23,6 +23,7 @@ Examples:
   fingervision model gripper.toml --kind finite_element --large-rotation --contact --mesh --out model
   fingervision model gripper.toml --kind lumped --vary hinge.thickness_mm=0.6:1.4:9
   fingervision model gripper.toml --kind lumped --drive drive.csv --damping paper --rate-hz 2000
+  fingervision model gripper.toml --kind lumped --object-mm 3 --object-n-mm 50
   fingervision model gripper.toml --kind lumped --frequency 1:500 --modes 500Hz --film
   fingervision model mechanism.toml --large-rotation --mesh --out model
 """
@@ -47,6 +48,8 @@ Examples:
 @click.option("--damping", default="modal:0.025", show_default=True, metavar="LAW", help="In motion: modal:RATIO, "
               "loss:FACTOR, rayleigh:RATIO:HZ:HZ or paper[:GAMMA] (equation 4 above the lowest mode).")  # fmt: skip
 @click.option("--rate-hz", type=float, help="Rows a second of response.csv, beside the drive's own samples.")
+@click.option("--object-mm", type=float, help="Width of a part between the fingers: grip.csv and grip.png.")
+@click.option("--object-n-mm", type=float, help="Stiffness of that part in N/mm; rigid where left out.")
 @click.option("--mesh", is_flag=True, help="Draw the mesh of the finite elements to mesh.png.")
 @click.option("--vary", multiple=True, metavar="NAME=A:B:N", help="Table over one number of the drawing, N values from "
               "A to B; several make a grid. Writes vary.csv and vary.png, by the lumped model.")  # fmt: skip
@@ -64,6 +67,8 @@ def command(
     frequency: str | None,
     damping: str,
     rate_hz: float | None,
+    object_mm: float | None,
+    object_n_mm: float | None,
     mesh: bool,
     vary: tuple[str, ...],
     as_json: bool,
@@ -75,9 +80,10 @@ def command(
     the drive's time, which compare and diagnose take as measured, and response.png. A mechanism drawn by bodies
     (mechanism.toml) is answered by finite elements: mechanism.csv, deformed.png.
     """
+    from fingervision.cli._model_grip import part_asked, write_grip
     from fingervision.cli._model_motion import motion_asked, move
     from fingervision.cli._model_report import loaded_rows, print_table, say_what_limits, write_table
-    from fingervision.domain.errors import FingervisionError
+    from fingervision.domain.errors import FingervisionError, UsageError
     from fingervision.models.agreement import disagreements
     from fingervision.models.hinge_correction import HingeTheory
     from fingervision.models.kinds import build_model, kinds
@@ -90,12 +96,15 @@ def command(
     if is_mechanism(gripper_toml):
         from fingervision.cli._mechanism import predict
 
+        if object_mm is not None or object_n_mm is not None:
+            raise UsageError("--object-mm is known for grippers alone; leave it out for a mechanism drawn by bodies.")
         predict(
             gripper_toml, kind, drive, out, asked,
             large_rotation=large_rotation, contact=contact, mesh=mesh, as_json=as_json,
         )  # fmt: skip
         return
     gripper = read_gripper(gripper_toml)
+    part = part_asked(object_mm, object_n_mm, gripper.body.rest_gap_mm)
     if vary:
         from fingervision.cli._model_sweep import sweep
 
@@ -140,6 +149,9 @@ def command(
     print_table(rows, as_json=as_json)
     folders = {name: out / name if kind == "all" else out for name in models}
     move(models, asked, gripper_toml.stem, folders, out, as_json=as_json)
+    if part is not None:
+        given_inputs = None if drive is None else inputs
+        write_grip(gripper, models, part, given_inputs, gripper_toml.stem, out, as_json=as_json)
     for sentence in disagreements(figures):
         click.echo(f"Warning: {sentence}", err=True)
     say_what_limits(gripper, models, figures, inputs, physics, as_json=as_json)
