@@ -82,9 +82,10 @@ def command(
     """
     from fingervision.cli._model_grip import part_asked, write_grip
     from fingervision.cli._model_motion import motion_asked, move
-    from fingervision.cli._model_report import loaded_rows, print_table, say_what_limits, write_table
+    from fingervision.cli._model_report import print_table, say_what_limits, write_table
     from fingervision.domain.errors import FingervisionError, UsageError
     from fingervision.models.agreement import disagreements
+    from fingervision.models.gripper_figures import gripper_figures
     from fingervision.models.hinge_correction import HingeTheory
     from fingervision.models.kinds import build_model, kinds
     from fingervision.models.physics import LINEAR, Physics
@@ -127,7 +128,7 @@ def command(
             figures[name] = model.figures()
             given = _inputs_until_touch(figures[name]) if inputs is None else inputs
             answers[name] = model.respond(given)
-            row = loaded_rows(gripper, model, figures[name], given)
+            row = gripper_figures(gripper, model, given, figures[name])
         except FingervisionError as error:
             # One kind's failure leaves the others their results.
             figures.pop(name, None)
@@ -147,6 +148,12 @@ def command(
     _draw(gripper_toml.stem, gripper, inputs, models, answers, out, mesh=mesh)
     write_table(rows, out / "models.csv")
     print_table(rows, as_json=as_json)
+    if any(u > 0.0 for u in gripper.uncertainties.values()):
+        from fingervision.cli._model_uncertainty import write_uncertainty
+        from fingervision.models.gripper_uncertainty import gripper_uncertainty
+
+        spread = gripper_uncertainty(gripper, inputs, HingeTheory(hinge), physics)
+        write_uncertainty(spread, rows, gripper_toml.stem, out, as_json=as_json)
     folders = {name: out / name if kind == "all" else out for name in models}
     move(models, asked, gripper_toml.stem, folders, out, as_json=as_json)
     if part is not None:

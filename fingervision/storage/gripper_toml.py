@@ -124,8 +124,13 @@ def _value(raw: Any, name: str, origin: str, uncertainties: dict[str, float]) ->
         u = _number(raw["u"], f"The uncertainty of {name}", origin)
         if u < 0.0:
             raise FingervisionError(f"The uncertainty of {name} in {origin} must not be negative, but is {u:g}.")
-        uncertainties[name] = u
         raw = raw["value"]
+        if isinstance(raw, list):
+            raise FingervisionError(
+                f"The uncertainty of {name} in {origin} must belong to a single number, but {name} is a list; "
+                "state it at lever.l1_mm to l4_mm, which move hinges and drive."
+            )
+        uncertainties[name] = u
     if name.startswith("links.") and not name.endswith("width_mm"):
         if name == "links.tip_polygon_mm":
             if not isinstance(raw, list) or len(raw) < 3:
