@@ -67,9 +67,7 @@ def test_numbers_that_leave_no_drawing_are_refused() -> None:
             raise FingervisionError("x must be at most 1.11.")
         return {"y": (1.0 + by.get("x", 0.0)) ** -3}
 
-    with pytest.raises(
-        FingervisionError, match=r"stated uncertainties must leave a drawing that works, but \d+ of 128"
-    ):
+    with pytest.raises(FingervisionError, match=r"stated uncertainties must leave a drawing .*, but \d+ of 128"):
         propagate(bent, {"x": Estimate(1.0, 0.1)})
 
 
@@ -99,20 +97,20 @@ def test_linear_propagation_against_monte_carlo_of_the_frame(gripper: Gripper) -
 
 @pytest.mark.slow
 def test_sampled_propagation_against_monte_carlo_of_the_frame(gripper: Gripper) -> None:
-    """A printed hinge of 1.0 +- 0.15 mm: the compliance goes with t^-2.5 and is far from linear."""
-    u = MappingProxyType({"hinge.thickness_mm": 0.15})
+    """A printed hinge of 1.0 +- 0.1 mm: the compliance goes with t^-2.5 and is far from linear."""
+    u = MappingProxyType({"hinge.thickness_mm": 0.1})
     found = gripper_uncertainty(replace(gripper, uncertainties=u), ENDS)["midline_by_weight_mm"]
     assert found.sampled
-    # The middles of 80 equal slices of the normal distribution: what many draws come to.
+    # The middles of 60 equal slices of the normal distribution: what many draws come to.
     shifts = [
         midline_by_weight_mm(
-            LumpedGripper(replace(gripper, hinge=replace(gripper.hinge, thickness_mm=1.0 + 0.15 * z))).half
+            LumpedGripper(replace(gripper, hinge=replace(gripper.hinge, thickness_mm=1.0 + 0.1 * z))).half
         )
-        for z in ndtri((np.arange(80) + 0.5) / 80).tolist()
+        for z in ndtri((np.arange(60) + 0.5) / 60).tolist()
     ]
-    assert found.mean == pytest.approx(np.mean(shifts), rel=0.03)
-    assert found.u == pytest.approx(np.std(shifts), rel=0.2)
-    assert found.interval == pytest.approx(np.quantile(shifts, [0.025, 0.975]), rel=0.1)
+    assert found.mean == pytest.approx(np.mean(shifts), rel=0.01)
+    assert found.u == pytest.approx(np.std(shifts), rel=0.1)
+    assert found.interval == pytest.approx(np.quantile(shifts, [0.025, 0.975]), rel=0.06)
     assert found.mean > found.value
 
 
