@@ -9,7 +9,7 @@ from typing import Any
 import click
 import numpy as np
 from matplotlib.figure import Figure
-from scipy.interpolate import CubicSpline
+from scipy.interpolate import PchipInterpolator
 
 from fingervision.cli._model_frequency import Band, answer_frequencies, main_column, mechanism_frequencies, parse_band
 from fingervision.domain.drive import DriveHistory
@@ -61,6 +61,11 @@ class MotionAsked:
     damping: str
     film: bool
 
+    @property
+    def moves(self) -> bool:
+        """Whether anything in motion was asked for."""
+        return self.drive is not None or self.modes is not None or self.band is not None
+
 
 def motion_asked(
     drive: Path | None, modes: str | None, frequency: str | None, damping: str, rate_hz: float | None, *, film: bool
@@ -101,7 +106,7 @@ def move(
 
 
 def move_mechanism(
-    model: MechanismPlate, asked: MotionAsked, static: CubicSpline | None, out: Path, *, as_json: bool
+    model: MechanismPlate, asked: MotionAsked, static: PchipInterpolator | None, out: Path, *, as_json: bool
 ) -> None:
     """Answer all that was asked for in motion of a mechanism drawn by bodies."""
     name = model.mechanism.name
@@ -173,11 +178,17 @@ def draw_motion(motions: Mapping[str, Motion], column: str, title: str, path: Pa
 
 
 def mechanism_motion(
-    model: MechanismPlate, drive: DriveHistory, damping: str, static: CubicSpline | None, out: Path, *, as_json: bool
+    model: MechanismPlate,
+    drive: DriveHistory,
+    damping: str,
+    static: PchipInterpolator | None,
+    out: Path,
+    *,
+    as_json: bool,
 ) -> None:
     """Write response.csv and response.png of a mechanism drawn by bodies.
 
-    With large rotation `static` gives the equilibria: the observed lengths in their order, then the force.
+    With large rotation or contact `static` gives the equilibria: the observed lengths in their order, then the force.
     """
     name = model.mechanism.name
     reduced = model.modal_model(MODES)
@@ -186,10 +197,12 @@ def mechanism_motion(
     motion = modal_motion(reduced, drive, parse_damping(damping))
     if static is not None:
         *lengths, force = static(drive.input_mm).T
-        motion = about_equilibria(motion, dict(zip(motion.observed_mm, lengths, strict=True)), force)
+        touches = model.touch_input_mm().values()
+        apart = np.all([drive.input_mm / at < 1.0 for at in touches], axis=0) if touches else None
+        motion = about_equilibria(motion, dict(zip(motion.observed_mm, lengths, strict=True)), force, apart)
     write_motion(out / "response.csv", drive, motion.observed_mm, motion.force_n)
     column = main_column(reduced)
     draw_motion({"finite_element": motion}, column, f"{name}, damping {damping}", out / "response.png")
     if not as_json:
-        about = " about the equilibria of large rotation" if static is not None else ""
+        about = " about the equilibria, where nothing touches" if static is not None else ""
         click.echo(f"In time by {motion.modes_hz.size} modes{about}; {words_of(motion, column)}")

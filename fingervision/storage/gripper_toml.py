@@ -12,7 +12,7 @@ from typing import Any
 from fingervision.domain.errors import FingervisionError
 from fingervision.domain.gripper import Body, Gripper, Hinge, Lever, Links, Material
 from fingervision.models.gripper_outline import check_outline, check_stated_size
-from fingervision.models.planar_region import crosses_itself
+from fingervision.models.plane_shapes import crosses_itself
 from fingervision.storage.finite import is_number
 from fingervision.storage.sn_line_toml import check_below_yield, read_sn_line
 

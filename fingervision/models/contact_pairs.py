@@ -1,0 +1,124 @@
+"""Where two faces of a mechanism may touch, without friction: gaps of nodes from segments, and their slopes.
+
+Node to segment (Wriggers, Computational Contact Mechanics, chapter 9): every node of the one face keeps its distance
+from the nearest straight piece of the other, or from a rigid wall.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import csr_matrix
+
+from fingervision.domain.errors import FingervisionError
+from fingervision.models.mechanism import Contact, Mechanism
+from fingervision.models.mechanism_faces import nodes_on
+from fingervision.models.plane_stress import PlaneStressPlate
+
+Array = NDArray[np.float64]
+Indices = NDArray[np.int64]
+
+_OVERHANG = 0.05
+"""Of the other face's length: a node that lies farther beyond its end meets nothing. Corners that meet corners slide a
+little past each other, and would else lose hold; the face is then taken for that much longer."""
+_PENETRATES = 1e-6
+"""Of the body's size: faces that overlap by more at rest are drawn wrongly."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ContactPair:
+    """One pair of faces, or a face and a wall.
+
+    Parameters
+    ----------
+    name : str
+        For messages and results.
+    nodes : ndarray of int, shape (k,)
+        Nodes that may touch.
+    segments : ndarray of int, shape (2, s)
+        Nodes at the ends of the other face's pieces, the void on their left; none where it is a wall.
+    wall_mm : ndarray of float, shape (2, 2), or None
+        Two points of a rigid wall, the void on its left.
+    """
+
+    name: str
+    nodes: Indices
+    segments: Indices
+    wall_mm: Array | None
+
+    @property
+    def _is_end(self) -> NDArray[np.bool_]:
+        """Whether a segment's first and second node end the face, shape (2, s)."""
+        if self.wall_mm is not None:
+            return np.zeros((2, 1), dtype=bool)
+        nodes, place, count = np.unique(self.segments, return_inverse=True, return_counts=True)
+        del nodes
+        return np.asarray(count[place].reshape(self.segments.shape) == 1)
+
+    def gaps_mm(self, plate: PlaneStressPlate, moved: Array) -> tuple[Array, csr_matrix]:
+        """Gap of every node, shape (k,), infinite where it faces nothing, and its slope, shape (k, unknowns)."""
+        at = plate.nodes_mm + np.stack([moved[plate.x_dofs], moved[plate.y_dofs]])
+        points = at[:, self.nodes]
+        if self.wall_mm is not None:
+            first, second = self.wall_mm[:, :1], self.wall_mm[:, 1:]
+        else:
+            first, second = at[:, self.segments[0]], at[:, self.segments[1]]
+        chord = second - first
+        length = np.hypot(*chord)
+        along = chord / length
+        apart = points[:, :, None] - first[:, None, :]
+        way = np.sum(apart * along[:, None, :], axis=0)
+        inside = way
+        if self.wall_mm is None:
+            past = _OVERHANG * float(length.sum())
+            inside = np.clip(way, np.where(self._is_end[0], -past, 0.0), length + np.where(self._is_end[1], past, 0.0))
+        distance = np.hypot(*(apart - inside * along[:, None, :]))
+        nearest = np.argmin(distance, axis=1)
+        row = np.arange(self.nodes.size)
+        share = (inside / length)[row, nearest]
+        normal = np.stack([-along[1], along[0]])[:, nearest]
+        gap = np.sum(apart[:, row, nearest] * normal, axis=0)
+        beyond = self._is_end[:, nearest].any(axis=0) & (np.abs(way - inside)[row, nearest] > 1e-9 * length[nearest])
+        gap = np.where(beyond, np.inf, gap)
+        entries = [(self.nodes, np.ones(row.size))]
+        if self.wall_mm is None:
+            entries += [(self.segments[0][nearest], share - 1.0), (self.segments[1][nearest], -share)]
+        rows = np.tile(row, 2 * len(entries))
+        columns = np.concatenate([part for nodes, _ in entries for part in (plate.x_dofs[nodes], plate.y_dofs[nodes])])
+        values = np.concatenate([part for _, weight in entries for part in (weight * normal[0], weight * normal[1])])
+        return gap, csr_matrix((values, (rows, columns)), shape=(row.size, plate.unknowns))
+
+
+def contact_pair(plate: PlaneStressPlate, contact: Contact, mechanism: Mechanism, size_mm: float) -> ContactPair:
+    """Find the nodes of a drawn contact.
+
+    Raises
+    ------
+    FingervisionError
+        Where a face holds none, or the faces overlap at rest.
+    """
+    nodes = nodes_on(plate, contact.face, mechanism, size_mm)
+    if contact.wall_mm is not None:
+        wall = np.array(contact.wall_mm).T
+        middle = plate.nodes_mm[:, nodes].mean(axis=1) - wall[:, 0]
+        along = wall[:, 1] - wall[:, 0]
+        if along[0] * middle[1] - along[1] * middle[0] < 0.0:
+            wall = wall[:, ::-1]
+        pair = ContactPair(contact.name, nodes, np.zeros((2, 0), dtype=np.int64), wall)
+    else:
+        wanted = nodes_on(plate, contact.other or contact.face, mechanism, size_mm)
+        edges = plate.outline_edges[:, np.all(np.isin(plate.outline_edges, wanted), axis=0)]
+        if edges.shape[1] == 0 or np.intersect1d(nodes, wanted).size:
+            raise FingervisionError(
+                f"contact {contact.name} of {mechanism.name} must be between two faces that share nothing, but they do."
+            )
+        # The body lies on the right of an edge that runs so that the void is on its left.
+        segments = np.hstack([edges[[0, 2]], edges[[2, 1]]])
+        pair = ContactPair(contact.name, nodes, segments, None)
+    gap, _ = pair.gaps_mm(plate, np.zeros(plate.unknowns))
+    if gap.min() < -_PENETRATES * size_mm:
+        raise FingervisionError(
+            f"The faces of contact {contact.name} of {mechanism.name} must be apart or touch at rest, but overlap by "
+            f"{-gap.min():.4g} mm."
+        )
+    return pair
