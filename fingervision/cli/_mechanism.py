@@ -12,18 +12,20 @@ from numpy.typing import NDArray
 from scipy.interpolate import PchipInterpolator
 
 from fingervision.cli._model_motion import MotionAsked, move_mechanism
+from fingervision.cli._model_sweep import sweep_mechanism
+from fingervision.cli._model_uncertainty import write_uncertainty
 from fingervision.domain.errors import FingervisionError, UsageError
+from fingervision.models.gripper_figures import unit_of
 from fingervision.models.mechanism import Mechanism
 from fingervision.models.mechanism_chain import MechanismChain
+from fingervision.models.mechanism_figures import MechanismModel, mechanism_figures
 from fingervision.models.mechanism_frame import MechanismFrame
 from fingervision.models.mechanism_plate import MechanismPlate
 from fingervision.models.mechanism_state import MechanismState
-from fingervision.storage.mechanism_toml import read_mechanism
-
-MechanismModel = MechanismPlate | MechanismFrame | MechanismChain
+from fingervision.models.mechanism_uncertainty import mechanism_uncertainty
+from fingervision.storage.mechanism_toml import read_drawing
 
 _KINDS = ("finite_element", "lumped")
-_UNITS = {"input_stiffness_n_mm": "N/mm", "peak_stress_mpa_per_mm": "MPa/mm", "input_at_yield_mm": "mm"}
 _APART = 0.1
 """Relative: kinds that differ by more beyond their stated errors are worth a sentence (the issue's own bar)."""
 _ROWS = 21
@@ -38,6 +40,7 @@ def predict(
     drive: Path | None,
     out: Path,
     asked: MotionAsked,
+    vary: tuple[str, ...],
     *,
     large_rotation: bool,
     contact: bool,
@@ -48,7 +51,11 @@ def predict(
     from fingervision.cli._model_figures import draw_mesh
     from fingervision.storage.drive_csv import read_drive
 
-    mechanism = read_mechanism(path)
+    drawing = read_drawing(path)
+    if vary:
+        sweep_mechanism(drawing, vary, out, as_json=as_json)
+        return
+    mechanism = drawing.mechanism()
     if contact and not mechanism.contacts:
         raise UsageError(f"--contact needs a [[contact]] section that says which faces may touch, but {path} has none.")
     wanted = _KINDS if kind == "all" else (kind,)
@@ -58,7 +65,7 @@ def predict(
     for name in wanted:
         try:
             model = _built(name, mechanism)
-            table[name] = _figures(model)
+            table[name] = mechanism_figures(model)
         except FingervisionError as error:
             # One kind's failure leaves the others their results.
             if kind != "all":
@@ -95,6 +102,9 @@ def predict(
     elif mesh:
         click.echo("--mesh draws the mesh of the finite elements: add --kind finite_element.", err=True)
     _print(mechanism.name, table, as_json=as_json)
+    if drawing.estimates:
+        spread = mechanism_uncertainty(drawing.mechanism, drawing.estimates)
+        write_uncertainty(spread, table, mechanism.name, out, as_json=as_json)
     if isinstance(plate, MechanismPlate):
         bent = large_rotation or contact
         curve = _curve(states["finite_element"]) if bent and asked.drive is not None else None
@@ -136,7 +146,7 @@ def _print(name: str, table: dict[str, dict[str, float]], *, as_json: bool) -> N
     labels = list(dict.fromkeys(label for figures in table.values() for label in figures))
     for label in labels:
         cells = (f"{figures[label]:.6g}" if label in figures else "-" for figures in table.values())
-        shown = f"{label} [{_UNITS[label]}]" if label in _UNITS else label
+        shown = label if label.endswith("]") else f"{label} [{unit_of(label)}]"
         click.echo(f"{shown:<44}" + "".join(f"{cell:>18}" for cell in cells))
 
 
@@ -175,27 +185,6 @@ def _warn(
                     f"model errors of together {100.0 * stated:.2g} % leave; trust {first}.",
                     err=True,
                 )
-
-
-def _figures(model: MechanismModel) -> dict[str, float]:
-    unit, rest = model.state(1.0), model.state(0.0)
-    figures = {
-        "input_stiffness_n_mm": model.stiffness_n_mm,
-        "peak_stress_mpa_per_mm": unit.stress_mpa,
-        "input_at_yield_mm": model.mechanism.material.yield_mpa / unit.stress_mpa,
-    }
-    for name, (x, y) in unit.probes_mm.items():
-        figures[f"{name}: x per input [mm/mm]"] = x
-        figures[f"{name}: y per input [mm/mm]"] = y
-    for name, value in unit.pairs_mm.items():
-        figures[f"{name}: at rest [mm]"] = rest.pairs_mm[name]
-        figures[f"{name}: per input [mm/mm]"] = value - rest.pairs_mm[name]
-    for name, value in model.touch_input_mm().items():
-        figures[f"{name}: input at contact [mm]"] = value
-    for held, label in ((False, "drive_free"), (True, "drive_held")):
-        for place, value in enumerate(model.modes_hz(drive_held=held), 1):
-            figures[f"mode_{place}_{label}_hz"] = value
-    return figures | {"model_error_force_percent": 100.0 * model.force_error}
 
 
 def _write(states: list[MechanismState], out: Path) -> None:

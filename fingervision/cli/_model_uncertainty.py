@@ -62,10 +62,11 @@ def write_uncertainty(
     if as_json:
         return
     click.echo(f"Standard uncertainties by the numbers that the drawing states them of ({best}):")
+    width = max((len(figure) for figure in stated), default=0) + 2
     for figure, own in stated.items():
         most = ", ".join(f"{n} {100.0 * share:.0f} %" for n, share in own.shares if share >= 0.005)
         words = f"{float(rows[best][figure] or 0.0):.5g} +- {own.u:.2g} {unit_of(figure)}"
-        click.echo(f"  {figure:<32}{words:<34}{_method(own):<9}{most}")
+        click.echo(f"  {figure:<{width}}{words:<34}{_method(own):<9}{most}")
 
 
 def _stated(found: Mapping[str, FigureUncertainty], row: Mapping[str, float | None]) -> dict[str, FigureUncertainty]:

@@ -25,6 +25,7 @@ Examples:
   fingervision model gripper.toml --kind lumped --drive drive.csv --damping paper --rate-hz 2000
   fingervision model gripper.toml --kind lumped --object-mm 3 --object-n-mm 50
   fingervision model gripper.toml --kind lumped --frequency 1:500 --modes 500Hz --film
+  fingervision model mechanism.toml --vary lengths.t=0.2:0.4:5
   fingervision model mechanism.toml --large-rotation --mesh --out model
 """
 
@@ -100,7 +101,7 @@ def command(
         if object_mm is not None or object_n_mm is not None:
             raise UsageError("--object-mm is known for grippers alone; leave it out for a mechanism drawn by bodies.")
         predict(
-            gripper_toml, kind, drive, out, asked,
+            gripper_toml, kind, drive, out, asked, vary,
             large_rotation=large_rotation, contact=contact, mesh=mesh, as_json=as_json,
         )  # fmt: skip
         return

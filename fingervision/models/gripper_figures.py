@@ -108,4 +108,17 @@ def life_between(gripper: Gripper, low: Sequence[float | None], high: Sequence[f
 
 def unit_of(name: str) -> str:
     """Return the unit of a row, by its name."""
+    if name.endswith("]"):
+        return name[name.rindex("[") + 1 : -1]
     return _UNITS.get(name) or next((unit for end, unit in _ENDS.items() if name.endswith(end)), "1")
+
+
+def label_of(name: str) -> str:
+    """Return a row's name in words, without its unit, and the unit behind a stroke: for the axis of a figure."""
+    unit = unit_of(name)
+    bare = name[: name.rindex(" [")] if name.endswith("]") else name
+    for end in ("_mpa_per_mm", "_n_mm", "_deg_per_mm", *_ENDS):
+        if bare.endswith(end):
+            bare = bare.removesuffix(end) + (" per input" if end in ("_mpa_per_mm", "_deg_per_mm") else "")
+            break
+    return f"{bare.replace('_', ' ')} / {f'({unit})' if '/' in unit else unit}"
