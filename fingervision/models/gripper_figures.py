@@ -33,7 +33,7 @@ _ENDS: Mapping[str, str] = {"_mm": "mm", "_hz": "Hz", "_n": "N", "_mpa": "MPa", 
 
 
 def gripper_figures(
-    gripper: Gripper, model: Any, inputs: NDArray[np.float64], figures: ModelFigures | None = None
+    gripper: Gripper, model: Any, inputs: Sequence[float] | NDArray[np.float64], figures: ModelFigures | None = None
 ) -> dict[str, float | None]:
     """Compute a model's column of `models.csv`: small displacements at rest, and the loads at both ends of the inputs.
 
@@ -43,7 +43,7 @@ def gripper_figures(
         The drawing.
     model : StiffnessMatrixGripper, LumpedGripper or FiniteElementGripper
         Of that drawing, with its physics.
-    inputs : ndarray of float, shape (n,)
+    inputs : sequence of float
         Whose smallest and largest are the ends; a cycle between them is what the hinges endure.
     figures : ModelFigures or None
         `model.figures()` where known already.
@@ -77,7 +77,7 @@ def gripper_figures(
         # Bars that end where their axes meet grow otherwise: by more than the sample's gap does.
         row["gap_per_kelvin_mm"] = row["force_per_kelvin_n"] = None
     row["sag_out_of_plane_mm"] = model.gravity_sag_mm()[0] if isinstance(model, StiffnessMatrixGripper) else None
-    ends = [float(inputs.min()), float(inputs.max())]
+    ends = [float(min(inputs)), float(max(inputs))]
     if peak is not None:
         states = model.loaded(ends)
         loads = [(s.input_mm, s.gap_mm, s.force_n, s.grip_n, s.stress_mpa) for s in states]

@@ -1,6 +1,6 @@
 """The figures of a gripper with the uncertainty that its drawing's stated numbers give them."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from operator import attrgetter
 
 import numpy as np
@@ -24,7 +24,7 @@ _MOST_POISSON = 0.5
 
 def gripper_uncertainty(
     gripper: Gripper,
-    inputs: NDArray[np.float64],
+    inputs: Sequence[float] | NDArray[np.float64],
     theory: HingeTheory = HingeTheory.CORRECTED,
     physics: Physics = LINEAR,
 ) -> dict[str, FigureUncertainty]:
@@ -38,7 +38,7 @@ def gripper_uncertainty(
     ----------
     gripper : Gripper
         With its `uncertainties`.
-    inputs : ndarray of float, shape (n,)
+    inputs : sequence of float
         Whose smallest and largest are the ends.
     theory : HingeTheory
         Of the hinges.

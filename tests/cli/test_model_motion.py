@@ -177,3 +177,50 @@ def test_wrong_drives_are_refused(tmp_path: Path, text: str, options: tuple[str,
     with pytest.raises(FingervisionError, match=sentence):
         run(GRIPPER, "--kind", "lumped", "--drive", given, "--out", tmp_path / "o", *options)
     assert not (tmp_path / "o" / "response.csv").exists()
+
+
+def test_a_mechanism_is_varied(tmp_path: Path) -> None:
+    rows = json.loads(run(FOUR_BAR, "--vary", "lengths.t=0.7:0.9:2", "--out", tmp_path, "--json"))
+    ratio = rows[1]["input_stiffness_n_mm"] / rows[0]["input_stiffness_n_mm"]
+    # Guided leaves, t^3, on roots that turn by 16.67 M / (pi E b t^2) (O'Donnell): softer by 2.653 t / L.
+    roots = (1.0 + 2.653 * 0.9 / 30.0) / (1.0 + 2.653 * 0.7 / 30.0)
+    assert ratio == pytest.approx((0.9 / 0.7) ** 3 / roots, rel=0.005)
+    assert (tmp_path / "vary.png").read_bytes().startswith(b"\x89PNG")
+
+
+@pytest.mark.parametrize(
+    ("text", "sentence"),
+    [
+        ("lengths.x=1:2:3", "has no number lengths.x"),
+        ("lengths.t=-1:2:3", "The variant lengths.t = -1 has no answer"),
+        ("lengths.t=0.5:1:900", "must give at most 400 mechanisms, but gives 900"),
+    ],
+)
+def test_a_mechanism_that_cannot_be_varied_so(tmp_path: Path, text: str, sentence: str) -> None:
+    with pytest.raises(FingervisionError, match=sentence):
+        run(FOUR_BAR, "--vary", text, "--out", tmp_path)
+    assert not (tmp_path / "vary.csv").exists()
+
+
+def test_uncertain_numbers_give_every_figure_its_own(tmp_path: Path) -> None:
+    modulus = "youngs_modulus_mpa = { value = 1650.0, u = 33.0 }"
+    stated = GRIPPER.read_text().replace("youngs_modulus_mpa = 1650.0", modulus)
+    (tmp_path / "g.toml").write_text(stated.replace("l2_mm = 17.82", "l2_mm = { value = 17.82, u = 0.1 }"))
+    output = run(tmp_path / "g.toml", "--kind", "lumped", "--out", tmp_path)
+    with (tmp_path / "uncertainty.csv").open() as file:
+        rows = {row["figure"]: row for row in csv.DictReader(file)}
+    # The slope goes with the lever alone (5.3 % a mm), stress with the modulus, frequency with its root.
+    assert float(rows["gap_per_input"]["u"]) == pytest.approx(0.0053 * 7.75, rel=0.05)
+    assert rows["gap_per_input"]["first"] == "lever.l2_mm"
+    assert rows["peak_stress_mpa_per_mm"]["first"] == "material.youngs_modulus_mpa"
+    assert float(rows["first_mode_drive_held_hz"]["u"]) == pytest.approx(0.01 * 346.95, rel=0.05)
+    assert {row["method"] for row in rows.values()} == {"linear"}
+    assert "gap_per_input" in output
+    assert "lever.l2_mm 100 %" in output
+
+
+def test_an_uncertain_list_is_refused(tmp_path: Path) -> None:
+    stated = GRIPPER.read_text().replace("hinge1_mm = [35.5, 30.0]", "hinge1_mm = { value = [35.5, 30.0], u = 0.1 }")
+    (tmp_path / "g.toml").write_text(stated)
+    with pytest.raises(FingervisionError, match=r"lever.hinge1_mm in .* must belong to a single number"):
+        run(tmp_path / "g.toml", "--kind", "lumped", "--out", tmp_path / "o")
