@@ -112,6 +112,10 @@ def command(
 
         sweep(gripper, gripper_toml.stem, vary, HingeTheory(hinge), out, as_json=as_json)
         return
+    if uncertain := any(u > 0.0 for u in gripper.uncertainties.values()):
+        from fingervision.models.gripper_uncertainty import check_uncertainties
+
+        check_uncertainties(gripper)
     wanted = kinds() if kind == "all" else (kind,)
     physics = Physics(large_rotation=large_rotation, contact=contact)
     inputs = None if drive is None else _inputs_mm(drive, gripper)
@@ -149,7 +153,7 @@ def command(
     _draw(gripper_toml.stem, gripper, inputs, models, answers, out, mesh=mesh)
     write_table(rows, out / "models.csv")
     print_table(rows, as_json=as_json)
-    if any(u > 0.0 for u in gripper.uncertainties.values()):
+    if uncertain:
         from fingervision.cli._model_uncertainty import write_uncertainty
         from fingervision.models.gripper_uncertainty import gripper_uncertainty
 

@@ -45,30 +45,55 @@ def gripper_uncertainty(
     physics : Physics
         Of the figures.
     """
-    numbers = {name: Estimate(attrgetter(name)(gripper), u) for name, u in gripper.uncertainties.items() if u > 0.0}
-
-    def changed(changes: Mapping[str, float]) -> Gripper:
-        drawn = gripper
-        for name, by in changes.items():
-            value = numbers[name].value + by
-            if not name.endswith(_ANY_SIGN) and value <= 0.0:
-                raise FingervisionError(f"{name} must be positive, but would be {value:g}.")
-            if name == "material.poisson_ratio" and value >= _MOST_POISSON:
-                raise FingervisionError(f"{name} must be below 0.5, but would be {value:g}.")
-            drawn = redrawn(drawn, name, by)
-        if len(changes) == 1:
-            check_outline(drawn, f"the drawing with {next(iter(changes))} changed by its uncertainty")
-        return drawn
+    check_uncertainties(gripper)
+    numbers = _numbers(gripper)
 
     def in_plane(changes: Mapping[str, float]) -> dict[str, float | None]:
-        drawn = changed(changes)
+        drawn = _changed(gripper, changes)
         return gripper_figures(drawn, LumpedGripper(drawn, Physics(contact=physics.contact), theory), inputs)
 
     def out_of_plane(changes: Mapping[str, float]) -> dict[str, float | None]:
-        flat = StiffnessMatrixGripper(changed(changes), theory)
+        flat = StiffnessMatrixGripper(_changed(gripper, changes), theory)
         return {
             "first_out_of_plane_mode_hz": flat.out_of_plane_modes_hz()[0],
             "sag_out_of_plane_mm": flat.gravity_sag_mm()[0],
         }
 
     return propagate(in_plane, numbers) | propagate(out_of_plane, numbers)
+
+
+def check_uncertainties(gripper: Gripper) -> None:
+    """Refuse stated uncertainties by which the drawing cannot be redrawn.
+
+    Raises
+    ------
+    FingervisionError
+        Where one standard uncertainty either way leaves no gripper.
+    """
+    for name, estimate in _numbers(gripper).items():
+        for by in (-(estimate.u or 0.0), estimate.u or 0.0):
+            try:
+                drawn = _changed(gripper, {name: by})
+                check_outline(drawn, "the drawing so changed")
+            except FingervisionError as error:
+                raise FingervisionError(
+                    f"The uncertainty of {name} must leave a drawing that works, but at {estimate.value + by:g} (one "
+                    f"standard uncertainty away) it does not: {error}"
+                ) from error
+
+
+def _numbers(gripper: Gripper) -> dict[str, Estimate]:
+    return {name: Estimate(attrgetter(name)(gripper), u) for name, u in gripper.uncertainties.items() if u > 0.0}
+
+
+def _changed(gripper: Gripper, changes: Mapping[str, float]) -> Gripper:
+    """Redraw a gripper, and refuse numbers that no gripper has."""
+    for name, by in changes.items():
+        value = attrgetter(name)(gripper) + by
+        if not name.endswith(_ANY_SIGN) and value <= 0.0:
+            raise FingervisionError(f"{name} must be positive, but would be {value:g}.")
+        if name == "material.poisson_ratio" and value >= _MOST_POISSON:
+            raise FingervisionError(f"{name} must be below 0.5, but would be {value:g}.")
+    for name, by in changes.items():
+        gripper = redrawn(gripper, name, by)
+    return gripper

@@ -224,3 +224,11 @@ def test_an_uncertain_list_is_refused(tmp_path: Path) -> None:
     (tmp_path / "g.toml").write_text(stated)
     with pytest.raises(FingervisionError, match=r"lever.hinge1_mm in .* must belong to a single number"):
         run(tmp_path / "g.toml", "--kind", "lumped", "--out", tmp_path / "o")
+
+
+def test_an_uncertainty_beyond_sense_leaves_no_results(tmp_path: Path) -> None:
+    stated = GRIPPER.read_text().replace("\nthickness_mm = 1.0", "\nthickness_mm = { value = 1.0, u = 2.0 }")
+    (tmp_path / "g.toml").write_text(stated)
+    with pytest.raises(FingervisionError, match=r"The uncertainty of hinge.thickness_mm must leave .* positive"):
+        run(tmp_path / "g.toml", "--kind", "lumped", "--out", tmp_path / "o")
+    assert not (tmp_path / "o").exists()
