@@ -4,11 +4,12 @@ Node to segment (Wriggers, Computational Contact Mechanics, chapter 9): every no
 from the nearest straight piece of the other, or from a rigid wall.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import csr_matrix
+from scipy.sparse import csr_matrix, diags
 
 from fingervision.domain.errors import FingervisionError
 from fingervision.models.mechanism import Contact, Mechanism
@@ -17,6 +18,7 @@ from fingervision.models.plane_stress import PlaneStressPlate
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
+Bend = Callable[[Array], csr_matrix]
 
 _OVERHANG = 0.05
 """Of the other face's length: a node that lies farther beyond its end meets nothing. Corners that meet corners slide a
@@ -55,8 +57,19 @@ class ContactPair:
         del nodes
         return np.asarray(count[place].reshape(self.segments.shape) == 1)
 
-    def gaps_mm(self, plate: PlaneStressPlate, moved: Array) -> tuple[Array, csr_matrix]:
-        """Gap of every node, shape (k,), infinite where it faces nothing, and its slope, shape (k, unknowns)."""
+    def gaps_mm(self, plate: PlaneStressPlate, moved: Array) -> tuple[Array, csr_matrix, Bend]:
+        """Gap of every node, infinite where it faces nothing, with its first and second derivatives.
+
+        Returns
+        -------
+        ndarray of float, shape (k,)
+            Gaps.
+        sparse matrix, shape (k, unknowns)
+            Slopes.
+        callable
+            Forces on the nodes to the sum of these times the gaps' second derivatives, shape (unknowns, unknowns): the
+            other face turns its normal with it.
+        """
         at = plate.nodes_mm + np.stack([moved[plate.x_dofs], moved[plate.y_dofs]])
         points = at[:, self.nodes]
         if self.wall_mm is not None:
@@ -80,13 +93,29 @@ class ContactPair:
         gap = np.sum(apart[:, row, nearest] * normal, axis=0)
         beyond = self._is_end[:, nearest].any(axis=0) & (np.abs(way - inside)[row, nearest] > 1e-9 * length[nearest])
         gap = np.where(beyond, np.inf, gap)
-        entries = [(self.nodes, np.ones(row.size))]
-        if self.wall_mm is None:
-            entries += [(self.segments[0][nearest], share - 1.0), (self.segments[1][nearest], -share)]
-        rows = np.tile(row, 2 * len(entries))
-        columns = np.concatenate([part for nodes, _ in entries for part in (plate.x_dofs[nodes], plate.y_dofs[nodes])])
-        values = np.concatenate([part for _, weight in entries for part in (weight * normal[0], weight * normal[1])])
-        return gap, csr_matrix((values, (rows, columns)), shape=(row.size, plate.unknowns))
+        segments = self.segments[:, nearest] if self.wall_mm is None else np.tile(self.nodes, (2, 1))
+        held = self.wall_mm is None
+        places = np.stack([self.nodes, *segments])
+
+        def combined(weights: Array, direction: Array) -> csr_matrix:
+            """Weighted motions of a node and of its segment's ends along a direction, one row a node."""
+            values = weights[:, None, :] * direction[None]
+            columns = np.stack([plate.x_dofs[places], plate.y_dofs[places]], axis=1)
+            rows = np.broadcast_to(row, values.shape)
+            return csr_matrix((values.ravel(), (rows.ravel(), columns.ravel())), shape=(row.size, plate.unknowns))
+
+        ends = np.stack([np.ones(row.size), (share - 1.0) * held, -share * held])
+        slope = combined(ends, normal)
+
+        def bend(forces: Array) -> csr_matrix:
+            if not held:
+                return csr_matrix((plate.unknowns, plate.unknowns))
+            turned = combined(np.stack([np.zeros(row.size), -np.ones(row.size), np.ones(row.size)]), normal)
+            slid = combined(ends, along[:, nearest])
+            half = turned.T @ diags(-forces / length[nearest]) @ slid
+            return csr_matrix(half + half.T)
+
+        return gap, slope, bend
 
 
 def contact_pair(plate: PlaneStressPlate, contact: Contact, mechanism: Mechanism, size_mm: float) -> ContactPair:
@@ -115,7 +144,7 @@ def contact_pair(plate: PlaneStressPlate, contact: Contact, mechanism: Mechanism
         # The body lies on the right of an edge that runs so that the void is on its left.
         segments = np.hstack([edges[[0, 2]], edges[[2, 1]]])
         pair = ContactPair(contact.name, nodes, segments, None)
-    gap, _ = pair.gaps_mm(plate, np.zeros(plate.unknowns))
+    gap, _, _ = pair.gaps_mm(plate, np.zeros(plate.unknowns))
     if gap.min() < -_PENETRATES * size_mm:
         raise FingervisionError(
             f"The faces of contact {contact.name} of {mechanism.name} must be apart or touch at rest, but overlap by "

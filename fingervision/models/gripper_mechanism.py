@@ -94,11 +94,11 @@ def _bodies(gripper: Gripper, side: float) -> list[Polygon]:
         bar(*links.finger_mm, links.finger_width_mm),
         Polygon(links.tip_polygon_mm),
     )
-    clipped = (_right_of_axis(shape.corners_mm) for shape in shapes)
+    clipped = (right_of_axis(shape.corners_mm) for shape in shapes)
     return [Polygon(tuple((side * x, y) for x, y in corners)) for corners in clipped]
 
 
-def _right_of_axis(corners: tuple[PointMm, ...]) -> tuple[PointMm, ...]:
+def right_of_axis(corners: tuple[PointMm, ...]) -> tuple[PointMm, ...]:
     """Clip a polygon to x >= 0 (Sutherland and Hodgman, Communications of the ACM 17 (1974) 32)."""
     kept: list[PointMm] = []
     for (xa, ya), (xb, yb) in zip(corners, corners[1:] + corners[:1], strict=True):

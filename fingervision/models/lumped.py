@@ -32,7 +32,7 @@ KIND = "lumped"
 
 _SEGMENTS = 10
 _MODES = 3
-_SLOPE_ERROR, _FORCE_ERROR, _MODE_ERROR = 0.02, 0.05, 0.07
+_SLOPE_ERROR, _FORCE_ERROR, _MODE_ERROR = 0.01, 0.03, 0.07
 """Of bars joined at points, beside finite elements of other grippers (`tests/benchmarks/models_held_out.py`)."""
 
 

@@ -15,7 +15,7 @@ from fingervision.models.signorini import contact_forces_n
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
-Gaps = tuple[Array, csr_matrix]
+Gaps = tuple[Array, csr_matrix, Callable[[Array], csr_matrix]]
 Pairs = tuple[Callable[[Array], Gaps], ...]
 
 _LOAD_STEPS, _NEWTON_STEPS, _SET_CHANGES = 5, 20, 30
@@ -114,7 +114,7 @@ class DrivenMechanism:
         """Input nearest to rest at which each pair first touches, in small displacements; None where it never does."""
         found: list[float | None] = []
         for gaps in self.gaps:
-            gap, slope = gaps(np.zeros(self.by_input.size))
+            gap, slope, _ = gaps(np.zeros(self.by_input.size))
             speed = slope @ self.unit_displacement
             facing = np.isfinite(gap) & (np.abs(speed) > _STILL)
             touches = -gap[facing] / speed[facing]
@@ -148,7 +148,7 @@ class DrivenMechanism:
     @cached_property
     def _touching(self) -> tuple[Array, Array, Array]:
         """Gaps at rest of all nodes that may touch, their slopes, and displacements by unit forces there."""
-        gap, sparse = self._all_gaps(self.gaps, np.zeros(self.by_input.size))
+        gap, sparse, _ = self._all_gaps(self.gaps, np.zeros(self.by_input.size))
         slope = np.where(np.isfinite(gap)[:, None], sparse.toarray(), 0.0)
         return gap, slope, self.motions @ self._solver.solve(np.ascontiguousarray(self.motions.T @ slope.T))
 
@@ -158,9 +158,16 @@ class DrivenMechanism:
 
     def _all_gaps(self, pairs: Pairs, moved: Array) -> Gaps:
         parts = [gaps(moved) for gaps in pairs]
-        if not parts:
-            return np.zeros(0), csr_matrix((0, moved.size))
-        return np.concatenate([gap for gap, _ in parts]), vstack([slope for _, slope in parts], format="csr")
+        gap = np.concatenate([np.zeros(0), *(part[0] for part in parts)])
+        slope = vstack([csr_matrix((0, moved.size)), *(part[1] for part in parts)], format="csr")
+        sizes = np.cumsum([part[0].size for part in parts])[:-1]
+
+        def bend(forces: Array) -> csr_matrix:
+            shares = np.split(forces, sizes) if parts else []
+            whole = csr_matrix((moved.size, moved.size))
+            return csr_matrix(sum((part[2](own) for part, own in zip(parts, shares, strict=True)), whole))
+
+        return gap, slope, bend
 
     def _followed(self, input_mm: float, pairs: Pairs) -> MechanismEquilibrium:
         """Follow the equilibria from rest, in steps that grow while they converge and are halved where they do not."""
@@ -205,7 +212,7 @@ class DrivenMechanism:
             if found is None:
                 return None
             moved, pressed = found
-            gap, _ = self._all_gaps(pairs, moved)
+            gap, _, _ = self._all_gaps(pairs, moved)
             wanted = (touching & (pressed > 0.0) & np.isfinite(gap)) | (gap < -_ON * abs(input_mm))
             if np.array_equal(wanted, touching):
                 return moved, touching, pressed
@@ -220,7 +227,7 @@ class DrivenMechanism:
         scale = float(np.abs(self.stiffness_n_mm @ self.unit_displacement).max()) * abs(input_mm)
         solver, before = None, np.inf
         for _ in range(_NEWTON_STEPS):
-            gap, slopes = self._all_gaps(pairs, moved)
+            gap, slopes, bend = self._all_gaps(pairs, moved)
             held = touching & np.isfinite(gap)
             slope, gap = slopes[held], gap[held]
             loads = motions.T @ (self.internal(moved) - slope.T @ pressed[held])
@@ -230,7 +237,10 @@ class DrivenMechanism:
             if not residual <= _BLOWN_UP * scale:
                 return None
             if solver is None or residual > _SLOW * before:
-                solver = factorised(motions.T @ self.tangent(moved)[0] @ motions)
+                tangent = self.tangent(moved)[0]
+                if gap.size:
+                    tangent = tangent - bend(np.where(held, pressed, 0.0))
+                solver = factorised(motions.T @ tangent @ motions)
             step = -solver.solve(loads)
             if gap.size:
                 across = (slope @ motions).toarray()

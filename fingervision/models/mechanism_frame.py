@@ -141,8 +141,9 @@ class MechanismFrame:
 
         def gaps(moved: Array) -> Gaps:
             field, slope = self.assembly.field(moved)
-            gap, by_node = ends.gaps_mm(plate, field)
-            return gap, csr_matrix(by_node @ slope)
+            gap, by_node, bend = ends.gaps_mm(plate, field)
+            # The frames' own turning is left out of the second derivative: Newton's method is then a little slower.
+            return gap, csr_matrix(by_node @ slope), lambda forces: csr_matrix(slope.T @ bend(forces) @ slope)
 
         return gaps
 

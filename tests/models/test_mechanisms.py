@@ -104,6 +104,22 @@ def test_trapezoid_pivot(kind: Kind) -> None:
     assert state.probes_mm["top"][0] == pytest.approx(29.0 / 30.0, rel=0.002)
 
 
+@both_kinds
+def test_butterfly_pivot(kind: Kind) -> None:
+    """Two trapezoids in series about one centre: half the stiffness of one, and the hub stays where it is."""
+    pivot = build(kind, "butterfly_pivot")
+    E, b, t, length, near = 113800.0, 0.3, 0.3, 30.0, 15.0
+    motion = np.array([near, -1.0])
+    half = 2.0 * motion @ leaf_stiffness(E, b, t, length) @ motion
+    lever = (near + length) * cos(radians(30.0)) + 20.0
+    # Beside the turn the four leaves yield along their axes to the force itself: E b t / L each, 60 degrees from it.
+    across = 2.0 * E * b * t / length * sin(radians(30.0)) ** 2
+    assert pivot.stiffness_n_mm == pytest.approx(1.0 / (lever**2 * 2.0 / half + 2.0 / across), rel=ONE_PERCENT)
+    state = pivot.state(1.0)
+    assert abs(state.probes_mm["hub"][0]) < 0.005
+    assert state.probes_mm["top"][0] == pytest.approx(1.0 - 1.0 / lever, rel=0.002)
+
+
 def test_one_number_changes_the_drawing(tmp_path: Path) -> None:
     text = (DRAWN / "parallel_leaf_stage.toml").read_text()
     (tmp_path / "m.toml").write_text(text.replace("leaf = 40.0", "leaf = 20.0"))
