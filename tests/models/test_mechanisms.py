@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
+from fingervision.models.mechanism_frame import MechanismFrame
 from fingervision.models.mechanism_plate import MechanismPlate
 from fingervision.storage.mechanism_toml import read_mechanism
 
@@ -14,9 +15,14 @@ DRAWN = Path(__file__).parents[2] / "fingervision" / "models" / "mechanisms"
 ONE_PERCENT = 0.01
 
 
-def build(name: str, *, width_effect: bool = False) -> MechanismPlate:
+KINDS = (MechanismPlate, MechanismFrame)
+Kind = type[MechanismPlate] | type[MechanismFrame]
+both_kinds = pytest.mark.parametrize("kind", KINDS, ids=["finite_element", "lumped"])
+
+
+def build(kind: Kind, name: str) -> MechanismPlate | MechanismFrame:
     """In plane stress: the closed forms are those of narrow beams."""
-    return MechanismPlate(read_mechanism(DRAWN / f"{name}.toml"), width_effect=width_effect)
+    return kind(read_mechanism(DRAWN / f"{name}.toml"), width_effect=False)
 
 
 def root_compliance(E: float, b: float, t: float) -> float:
@@ -32,9 +38,10 @@ def leaf_stiffness(E: float, b: float, t: float, length: float) -> np.ndarray:
     return np.linalg.inv(np.array([[across, coupled], [coupled, length / EI + 2 * c]]))
 
 
-def test_parallel_leaf_stage() -> None:
+@both_kinds
+def test_parallel_leaf_stage(kind: Kind) -> None:
     """24 E I / L^3 with the leaves' roots; the first mode by the stage's mass; parasitic motion 3 u^2 / (5 L)."""
-    stage = build("parallel_leaf_stage")
+    stage = build(kind, "parallel_leaf_stage")
     E, b, t, length = 210e3, 0.5, 0.4, 40.0
     guided = 2.0 * leaf_stiffness(E, b, t, length)[0, 0]
     assert stage.stiffness_n_mm == pytest.approx(guided, rel=ONE_PERCENT)
@@ -50,9 +57,10 @@ def test_parallel_leaf_stage() -> None:
     assert -moved.probes_mm["stage"][1] == pytest.approx(0.6 * 2.0**2 / soft, rel=2 * ONE_PERCENT)
 
 
-def test_bridge_amplifier() -> None:
+@both_kinds
+def test_bridge_amplifier(kind: Kind) -> None:
     """A rigid-link quarter on two notches of Paros and Weisbord's compliance, its arm stretched too."""
-    bridge = build("bridge_amplifier")
+    bridge = build(kind, "bridge_amplifier")
     E, b, t, r, lx, ly, arm = 71700.0, 0.2, 0.3, 3.0, 30.0, 5.0, 6.0
     height = lambda a: t + 2 * r * (1 - cos(a))  # noqa: E731
     along = quad(lambda a: r * cos(a) / height(a), -pi / 2, pi / 2)[0] / (E * b)
@@ -66,9 +74,10 @@ def test_bridge_amplifier() -> None:
     assert bridge.stiffness_n_mm == pytest.approx(stiff, rel=ONE_PERCENT)
 
 
-def test_four_bar_gripper() -> None:
+@both_kinds
+def test_four_bar_gripper(kind: Kind) -> None:
     """A parallelogram: guided leaves, and a jaw that hardly turns."""
-    jaw = build("four_bar_gripper")
+    jaw = build(kind, "four_bar_gripper")
     guided = 2.0 * leaf_stiffness(2200.0, 0.8, 0.8, 30.0)[0, 0]
     assert jaw.stiffness_n_mm == pytest.approx(guided, rel=ONE_PERCENT)
     state = jaw.state(1.0)
@@ -79,9 +88,10 @@ def test_four_bar_gripper() -> None:
     assert state.stress_mpa == pytest.approx(0.93 * 3 * 2200.0 * 0.8 / 30.0**2, rel=0.1)
 
 
-def test_trapezoid_pivot() -> None:
+@both_kinds
+def test_trapezoid_pivot(kind: Kind) -> None:
     """Two leaves about a centre: 2 (4 E I / L)(3 l^2 + 3 l + 1) with elastic roots; the centre stays."""
-    pivot = build("trapezoid_pivot")
+    pivot = build(kind, "trapezoid_pivot")
     E, b, t, length, near, lever = 113800.0, 0.3, 0.3, 30.0, 15.0, 30.0
     # A turn by 1 rad about the centre moves the leaf's inner end across by the way to it.
     motion = np.array([near, -1.0])
@@ -92,6 +102,22 @@ def test_trapezoid_pivot() -> None:
     state = pivot.state(1.0)
     assert abs(state.probes_mm["centre"][0]) < 0.005
     assert state.probes_mm["top"][0] == pytest.approx(29.0 / 30.0, rel=0.002)
+
+
+@both_kinds
+def test_butterfly_pivot(kind: Kind) -> None:
+    """Two trapezoids in series about one centre: half the stiffness of one, and the hub stays where it is."""
+    pivot = build(kind, "butterfly_pivot")
+    E, b, t, length, near = 113800.0, 0.3, 0.3, 30.0, 15.0
+    motion = np.array([near, -1.0])
+    half = 2.0 * motion @ leaf_stiffness(E, b, t, length) @ motion
+    lever = (near + length) * cos(radians(30.0)) + 20.0
+    # Beside the turn the four leaves yield along their axes to the force itself: E b t / L each, 60 degrees from it.
+    across = 2.0 * E * b * t / length * sin(radians(30.0)) ** 2
+    assert pivot.stiffness_n_mm == pytest.approx(1.0 / (lever**2 * 2.0 / half + 2.0 / across), rel=ONE_PERCENT)
+    state = pivot.state(1.0)
+    assert abs(state.probes_mm["hub"][0]) < 0.005
+    assert state.probes_mm["top"][0] == pytest.approx(1.0 - 1.0 / lever, rel=0.002)
 
 
 def test_one_number_changes_the_drawing(tmp_path: Path) -> None:
@@ -155,7 +181,7 @@ across = "free"
 
 
 def test_the_axis_of_a_flexure_turns_with_it() -> None:
-    from fingervision.models.mechanism import Flexure
+    from fingervision.models.flexure import Flexure
 
     flexure = Flexure("one", "leaf", (1.0, 2.0), 30.0, 0.4, 5.0)
     assert flexure.point_mm(1.0, 0.0) == pytest.approx((1.0 + cos(radians(30)), 2.0 + sin(radians(30))))
