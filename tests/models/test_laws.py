@@ -139,7 +139,7 @@ def test_contact_is_the_bodys_own_with_its_force(drawn: PhysicalGripper, gripper
 def test_large_rotation_is_the_bodys_own_with_its_force(drawn: PhysicalGripper, gripper: Gripper) -> None:
     bent = LumpedGripper(gripper, Physics(large_rotation=True)).respond(INPUT)
     # The arc nearest to the equilibria over the inputs that the drawn body is meant for.
-    inputs = np.linspace(*drawn.answer.input_range_mm, 201)
+    inputs = np.linspace(*LumpedGripper(gripper).input_range_mm, 201)
     straight_mm = LumpedGripper(gripper).respond(inputs).gap_mm - 4.0
     bent_mm = LumpedGripper(gripper, Physics(large_rotation=True)).respond(inputs).gap_mm - 4.0
 
