@@ -61,6 +61,9 @@ class GapMeasurement:
     response_shift_px : float
         How much larger `gap_px` is than it would be if the other camera response that is possible were the true one;
         zero where the response is known.
+    roughness_px : float
+        Standard deviation of the edges about their mean line where they are rough or printed with a texture; zero where
+        they stray no more than their noise. What is measured is the mean line; a contact is made by the crests.
     """
 
     left: FingerEdge
@@ -70,6 +73,7 @@ class GapMeasurement:
     light_gap: bool
     u_shift_px: float = 0.0
     response_shift_px: float = 0.0
+    roughness_px: float = 0.0
 
     @property
     def u_picture_px(self) -> float:

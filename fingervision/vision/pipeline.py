@@ -21,6 +21,7 @@ from fingervision.vision.edges import EdgePoints, fit_edges
 from fingervision.vision.fingers import CoarseFingers, find_fingers
 from fingervision.vision.gap import measure_gap
 from fingervision.vision.grey import GreyImage, to_grey, top_level
+from fingervision.vision.longer_flanks import is_surer, with_longer_flanks
 from fingervision.vision.overlay import draw_boundary, draw_edge_points, draw_overlay, in_eight_bits
 from fingervision.vision.profile_choice import with_profile
 from fingervision.vision.profile_lines import profile_lines
@@ -166,11 +167,11 @@ def _attempt(grey: GreyImage, settings: Settings, coding: Coding) -> _Attempt:
             attempt = _Attempt(fingers, split)
         else:
             upright = fingers.orientation.view(grey)
-            light = _light(settings.response, scale, int(np.iinfo(grey.dtype).max) + 1)
-            lines = profile_lines((fingers.left, fingers.right))
-            edges = with_profile(upright, fit_edges(upright, lines, light, scale), light, scale)
-            edges = with_stripes(upright, edges, light)
-            outcome = measure_gap(fingers, edges, settings.below_tip_px, scale, light_gap, coding)
+            how = (settings, scale, light_gap, coding)
+            edges, outcome = _measured(upright, fingers, *how)
+            if isinstance(outcome, GapMeasurement) and outcome.roughness_px:
+                longer = _measured(upright, with_longer_flanks(fingers, settings.below_tip_px), *how)
+                edges, outcome = longer if is_surer(longer[1], outcome) else (edges, outcome)
             if settings.other_response is not None and isinstance(outcome, GapMeasurement):
                 shift = gap_shift_px(outcome, edges, settings.response, settings.other_response, scale)
                 outcome = replace(outcome, response_shift_px=shift)
@@ -179,6 +180,17 @@ def _attempt(grey: GreyImage, settings: Settings, coding: Coding) -> _Attempt:
             return attempt
         first = first or attempt
     return first or _Attempt(NoGap(Status.NO_FINGERS, "Nothing in the picture looks like two fingers."), binary)
+
+
+def _measured(
+    upright: GreyImage, fingers: CoarseFingers, settings: Settings, scale: int, light_gap: bool, coding: Coding
+) -> tuple[EdgePoints, GapMeasurement | NoGap]:
+    """Edges of fingers that were found, and what they say."""
+    light = _light(settings.response, scale, int(np.iinfo(upright.dtype).max) + 1)
+    lines = profile_lines((fingers.left, fingers.right))
+    edges = with_profile(upright, fit_edges(upright, lines, light, scale), light, scale)
+    edges = with_stripes(upright, edges, light)
+    return edges, measure_gap(fingers, edges, settings.below_tip_px, scale, light_gap, coding)
 
 
 def _scale(grey: GreyImage, settings: Settings) -> int:

@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from fingervision.vision.beside_edge import without_additions
 from fingervision.vision.edge_filters import PIXEL_VARIANCE
 from fingervision.vision.edge_profile import EdgeMark
 from fingervision.vision.edges import EdgePoints
@@ -96,13 +97,25 @@ def with_profile(upright: GreyImage, edges: EdgePoints, light: Floats, top_level
     margin = CLEARLY * np.maximum(left / bins, 1.0)
     is_shadow = left[SHADOW] < enough and left[SHADOW] + margin[SHADOW] < min(left[WALL], left[GLARE])
     if not is_step and is_shadow and _are_of_size(shadow, -1.0):
-        return _moved(edges, shadow, U_SHADOW, all_around)
+        moved = _moved(edges, shadow, U_SHADOW, all_around)
+        return without_additions(upright, moved, light, SHADOW, shadow)
     if not is_step and left[GLARE] < enough and left[GLARE] + margin[GLARE] < left[WALL] and _are_of_size(glare, 1.0):
-        return _moved(edges, glare, U_GLARE, all_around)
+        moved = _moved(edges, glare, U_GLARE, all_around)
+        return without_additions(upright, moved, light, GLARE, glare)
     outer = [_profile(upright, edges, light, k, slice(INNER, ROWS), REACH_PX) for k in range(2)]
     if outer[0] is None or outer[1] is None:
         is_wall = not is_step and left[WALL] < enough and _are_of_size(wall, -1.0)
         return _unsure(edges, [abs(fit.position) for fit in wall]) if is_wall else edges
+    # A shadow that the inner flanks alone cannot tell from a wall falls on the outer side as well.
+    beyond = np.array(
+        [[_best(kind, p, weight, blur[k]).squares for kind in range(3)] for k, p in enumerate(outer) if p]
+    )
+    both = left[:3] + beyond.sum(axis=0)
+    if not is_step and left[SHADOW] < enough and both[SHADOW] + margin[SHADOW] < both[WALL]:
+        is_shadow = both[SHADOW] < both[STEP] / MODEL_TIMES and _are_of_size(shadow, -1.0)
+        if is_shadow:
+            moved = _moved(edges, shadow, U_SHADOW, all_around)
+            return without_additions(upright, moved, light, SHADOW, shadow)
     widths = [_best(STEP, profile, weight, blur[k]).blur for k, profile in enumerate(outer) if profile]
     if all(each[STEP].blur ** 2 > (1.0 + WIDER) * width**2 for each, width in zip(fits, widths, strict=True)):
         narrow = [_best(WALL, p, weight, width, True) for p, width in zip(inner, widths, strict=True) if p]
@@ -119,6 +132,7 @@ def with_profile(upright: GreyImage, edges: EdgePoints, light: Floats, top_level
     # Glare on the finger, or a bevel around it: the outline is in between.
     bevel = [abs(w.position + w.breadth - g.position) / np.sqrt(3.0) for w, g in zip(wall, glare, strict=True)]
     moved = _moved(edges, glare, U_GLARE, all_around)
+    moved = without_additions(upright, moved, light, GLARE, glare)
     return replace(moved, marks=_stated(moved, [max(m.shift_px, u) for m, u in zip(moved.marks, bevel, strict=True)]))
 
 
