@@ -64,6 +64,8 @@ class GapMeasurement:
     roughness_px : float
         Standard deviation of the edges about their mean line where they are rough or printed with a texture; zero where
         they stray no more than their noise. What is measured is the mean line; a contact is made by the crests.
+    fields_apart_px : float
+        How far apart even and odd rows see the faster finger; zero where they agree. The gap is that of the middle.
     """
 
     left: FingerEdge
@@ -74,6 +76,7 @@ class GapMeasurement:
     u_shift_px: float = 0.0
     response_shift_px: float = 0.0
     roughness_px: float = 0.0
+    fields_apart_px: float = 0.0
 
     @property
     def u_picture_px(self) -> float:

@@ -21,6 +21,7 @@ from fingervision.vision.edges import EdgePoints, fit_edges
 from fingervision.vision.fingers import CoarseFingers, find_fingers
 from fingervision.vision.gap import measure_gap
 from fingervision.vision.grey import GreyImage, to_grey, top_level
+from fingervision.vision.interlace import at_half_way
 from fingervision.vision.longer_flanks import is_surer, with_longer_flanks
 from fingervision.vision.overlay import draw_boundary, draw_edge_points, draw_overlay, in_eight_bits
 from fingervision.vision.profile_choice import with_profile
@@ -188,9 +189,14 @@ def _measured(
     """Edges of fingers that were found, and what they say."""
     light = _light(settings.response, scale, int(np.iinfo(upright.dtype).max) + 1)
     lines = profile_lines((fingers.left, fingers.right))
-    edges = with_profile(upright, fit_edges(upright, lines, light, scale), light, scale)
-    edges = with_stripes(upright, edges, light)
-    return edges, measure_gap(fingers, edges, settings.below_tip_px, scale, light_gap, coding)
+    edges, apart_px = fit_edges(upright, lines, light, scale), 0.0
+    if fingers.orientation.direction.is_vertical:
+        edges, apart_px = at_half_way(edges)
+    edges = with_stripes(upright, with_profile(upright, edges, light, scale), light)
+    outcome = measure_gap(fingers, edges, settings.below_tip_px, scale, light_gap, coding)
+    if apart_px and isinstance(outcome, GapMeasurement):
+        outcome = replace(outcome, fields_apart_px=apart_px)
+    return edges, outcome
 
 
 def _scale(grey: GreyImage, settings: Settings) -> int:

@@ -18,6 +18,7 @@ from fingervision.vision.edges import EdgePoints
 from fingervision.vision.grey import GreyImage
 from fingervision.vision.profile_lines import INNER, IS_INNER, IS_ROW, ROWS
 from fingervision.vision.profile_models import GLARE, SHADOW, STARTS_PX, STEP, WALL, ProfileFit, fit_profile
+from fingervision.vision.sharpening import U_SHIFT, Profile, is_curved, sharpening
 
 Floats = NDArray[np.float64]
 
@@ -85,6 +86,8 @@ def with_profile(upright: GreyImage, edges: EdgePoints, light: Floats, top_level
         return edges
     if any(p.light.max() > top_level - CUT_OFF_SIGMAS * edges.noise or p.light.min() <= 0.0 for p in inner if p):
         return edges  # a flank that is cut off at the end of the scale is none of these
+    if is_curved(light, top_level) and (sharp := _sharpened(upright, edges, light, top_level, room)) is not None:
+        return sharp
     weight = 1.0 / edges.noise_flat**2
     blur = [float(np.hypot(edges.blur_px[k, 0], np.sqrt(PIXEL_VARIANCE))) for k in range(2)]
     fits = [[_best(kind, profile, weight, blur[k]) for kind in range(4)] for k, profile in enumerate(inner) if profile]
@@ -134,6 +137,23 @@ def with_profile(upright: GreyImage, edges: EdgePoints, light: Floats, top_level
     moved = _moved(edges, glare, U_GLARE, all_around)
     moved = without_additions(upright, moved, light, GLARE, glare)
     return replace(moved, marks=_stated(moved, [max(m.shift_px, u) for m, u in zip(moved.marks, bevel, strict=True)]))
+
+
+def _sharpened(upright: GreyImage, edges: EdgePoints, light: Floats, top_level: int, room: int) -> EdgePoints | None:
+    """The same points without what sharpening of the stored levels has moved them by; None where there is none."""
+    stored = np.arange(float(light.size))
+    left, right = (_profile(upright, edges, stored, k, slice(0, INNER), room) for k in range(2))
+    if left is None or right is None:
+        return None
+    blur = float(np.hypot(edges.blur_px[:, 0].mean(), np.sqrt(PIXEL_VARIANCE)))
+    profiles = Profile(left.t, left.light, left.count), Profile(right.t, right.light, right.count)
+    found = sharpening(profiles, light, top_level, blur)
+    if found is None:
+        return None
+    moves = np.array(found.shift_px)
+    by_pixel = np.hypot(1.0, edges.lines.slope)
+    moved = replace(edges, position=edges.position + edges.lines.outward * moves[:, None] * by_pixel)
+    return replace(moved, marks=_stated(moved, [U_SHIFT * abs(move) for move in moves.tolist()]))
 
 
 def _are_of_size(fits: list[ProfileFit], sign: float) -> bool:
