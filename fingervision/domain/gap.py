@@ -66,6 +66,9 @@ class GapMeasurement:
         they stray no more than their noise. What is measured is the mean line; a contact is made by the crests.
     fields_apart_px : float
         How far apart even and odd rows see the faster finger; zero where they agree. The gap is that of the middle.
+    beside : str
+        What stands beside the edges or has moved them: wall, shadow, glare, motion, sharpening; empty where nothing is
+        seen.
     """
 
     left: FingerEdge
@@ -77,6 +80,7 @@ class GapMeasurement:
     response_shift_px: float = 0.0
     roughness_px: float = 0.0
     fields_apart_px: float = 0.0
+    beside: str = ""
 
     @property
     def u_picture_px(self) -> float:

@@ -62,7 +62,9 @@ class _Profile:
     count: Floats
 
 
-def with_profile(upright: GreyImage, edges: EdgePoints, light: Floats, top_level: int) -> EdgePoints:
+def with_profile(
+    upright: GreyImage, edges: EdgePoints, light: Floats, top_level: int, is_outline: bool = False
+) -> EdgePoints:
     """The same points, moved to the finger's own edge where something beside it has drawn the fitted step away.
 
     Parameters
@@ -75,6 +77,8 @@ def with_profile(upright: GreyImage, edges: EdgePoints, light: Floats, top_level
         Light of every grey level.
     top_level : int
         End of the scale.
+    is_outline : bool
+        Whether a thick part's edge is that of its whole outline, side walls included, and not that of its front face.
     """
     flank, tip = edges.blur_px[:, 0].max(), edges.blur_px[:, 1].min()
     is_unlike_tip = flank**2 > (1.0 + WIDER) * (tip**2 + PIXEL_VARIANCE)
@@ -100,15 +104,16 @@ def with_profile(upright: GreyImage, edges: EdgePoints, light: Floats, top_level
     margin = CLEARLY * np.maximum(left / bins, 1.0)
     is_shadow = left[SHADOW] < enough and left[SHADOW] + margin[SHADOW] < min(left[WALL], left[GLARE])
     if not is_step and is_shadow and _are_of_size(shadow, -1.0):
-        moved = _moved(edges, shadow, U_SHADOW, all_around)
+        moved = _moved(edges, shadow, U_SHADOW, all_around, "shadow")
         return without_additions(upright, moved, light, SHADOW, shadow)
     if not is_step and left[GLARE] < enough and left[GLARE] + margin[GLARE] < left[WALL] and _are_of_size(glare, 1.0):
-        moved = _moved(edges, glare, U_GLARE, all_around)
+        moved = _moved(edges, glare, U_GLARE, all_around, "glare")
         return without_additions(upright, moved, light, GLARE, glare)
     outer = [_profile(upright, edges, light, k, slice(INNER, ROWS), REACH_PX) for k in range(2)]
     if outer[0] is None or outer[1] is None:
         is_wall = not is_step and left[WALL] < enough and _are_of_size(wall, -1.0)
-        return _unsure(edges, [abs(fit.position) for fit in wall]) if is_wall else edges
+        chosen = [_beyond_wall(fit) for fit in wall] if is_outline else wall
+        return _unsure(edges, [abs(fit.position) for fit in chosen], "wall") if is_wall else edges
     # A shadow that the inner flanks alone cannot tell from a wall falls on the outer side as well.
     beyond = np.array(
         [[_best(kind, p, weight, blur[k]).squares for kind in range(3)] for k, p in enumerate(outer) if p]
@@ -117,24 +122,25 @@ def with_profile(upright: GreyImage, edges: EdgePoints, light: Floats, top_level
     if not is_step and left[SHADOW] < enough and both[SHADOW] + margin[SHADOW] < both[WALL]:
         is_shadow = both[SHADOW] < both[STEP] / MODEL_TIMES and _are_of_size(shadow, -1.0)
         if is_shadow:
-            moved = _moved(edges, shadow, U_SHADOW, all_around)
+            moved = _moved(edges, shadow, U_SHADOW, all_around, "shadow")
             return without_additions(upright, moved, light, SHADOW, shadow)
     widths = [_best(STEP, profile, weight, blur[k]).blur for k, profile in enumerate(outer) if profile]
     if all(each[STEP].blur ** 2 > (1.0 + WIDER) * width**2 for each, width in zip(fits, widths, strict=True)):
         narrow = [_best(WALL, p, weight, width, True) for p, width in zip(inner, widths, strict=True) if p]
         remains = sum(fit.squares for fit in narrow)
         if remains < min(enough, left[STEP] - SIGNIFICANT) and _are_of_size(narrow, -1.0):
-            return _with_blur(_moved(edges, narrow, U_WALL, _across(edges)), widths)
+            chosen = [_beyond_wall(fit) for fit in narrow] if is_outline else narrow
+            return _with_blur(_moved(edges, chosen, U_WALL, _across(edges), "wall"), widths)
     flanks, tips = (edges.blur_px[:, part] ** 2 + PIXEL_VARIANCE for part in (0, 1))
     widened = np.maximum(flanks - (1.0 + WIDER) * tips, 0.0).tolist()
     if any(widened):
-        return _unsure(edges, [0.5 * more / MOTION_RADIUS_PX for more in widened])
+        return _unsure(edges, [0.5 * more / MOTION_RADIUS_PX for more in widened], "motion")
     is_resolved = all(fit.breadth > RESOLVED_BLURS * fit.blur for fit in wall)
     if is_step or left[GLARE] > enough or not is_resolved or not _are_of_size(glare, 1.0):
         return edges
     # Glare on the finger, or a bevel around it: the outline is in between.
     bevel = [abs(w.position + w.breadth - g.position) / np.sqrt(3.0) for w, g in zip(wall, glare, strict=True)]
-    moved = _moved(edges, glare, U_GLARE, all_around)
+    moved = _moved(edges, glare, U_GLARE, all_around, "glare")
     moved = without_additions(upright, moved, light, GLARE, glare)
     return replace(moved, marks=_stated(moved, [max(m.shift_px, u) for m, u in zip(moved.marks, bevel, strict=True)]))
 
@@ -153,7 +159,8 @@ def _sharpened(upright: GreyImage, edges: EdgePoints, light: Floats, top_level: 
     moves = np.array(found.shift_px)
     by_pixel = np.hypot(1.0, edges.lines.slope)
     moved = replace(edges, position=edges.position + edges.lines.outward * moves[:, None] * by_pixel)
-    return replace(moved, marks=_stated(moved, [U_SHIFT * abs(move) for move in moves.tolist()]))
+    u_px = [U_SHIFT * abs(move) for move in moves.tolist()]
+    return replace(moved, marks=_stated(moved, u_px), beside="sharpening")
 
 
 def _are_of_size(fits: list[ProfileFit], sign: float) -> bool:
@@ -221,11 +228,17 @@ def _across(edges: EdgePoints) -> Floats:
     return np.where(IS_INNER, 1.0, np.where(IS_ROW, 0.0, np.maximum(towards_gap, 0.0)))
 
 
-def _moved(edges: EdgePoints, fits: list[ProfileFit], u_relative: float, by_pixel: Floats) -> EdgePoints:
+def _beyond_wall(fit: ProfileFit) -> ProfileFit:
+    """The far edge of a wall, where the near one was found."""
+    return fit._replace(position=fit.position + fit.breadth)
+
+
+def _moved(edges: EdgePoints, fits: list[ProfileFit], u_relative: float, by_pixel: Floats, beside: str) -> EdgePoints:
     """Edges at the place that a model gives; what is not known of it is stated."""
     moves = np.array([fit.position for fit in fits])[:, None] * by_pixel
     u_px = [float(np.hypot(fit.u_position, u_relative * fit.position)) for fit in fits]
-    return replace(edges, position=edges.position + edges.lines.outward * moves, marks=_stated(edges, u_px))
+    position = edges.position + edges.lines.outward * moves
+    return replace(edges, position=position, marks=_stated(edges, u_px), beside=beside)
 
 
 def _with_blur(edges: EdgePoints, widths: list[float]) -> EdgePoints:
@@ -236,10 +249,10 @@ def _with_blur(edges: EdgePoints, widths: list[float]) -> EdgePoints:
     return replace(edges, blur_px=blur_px)
 
 
-def _unsure(edges: EdgePoints, limit_px: list[float]) -> EdgePoints:
+def _unsure(edges: EdgePoints, limit_px: list[float], beside: str) -> EdgePoints:
     """Edges that stay, with what nobody can tell: anywhere up to the limit."""
     u_px = [max(abs(m.shift_px), limit / np.sqrt(3.0)) for m, limit in zip(edges.marks, limit_px, strict=True)]
-    return replace(edges, marks=_stated(edges, u_px))
+    return replace(edges, marks=_stated(edges, u_px), beside=beside)
 
 
 def _stated(edges: EdgePoints, u_px: list[float]) -> tuple[EdgeMark, EdgeMark]:
