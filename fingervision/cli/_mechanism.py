@@ -23,6 +23,7 @@ def predict(
     path: Path,
     kind: str,
     drive: Path | None,
+    columns: Path | None,
     out: Path,
     *,
     large_rotation: bool,
@@ -32,7 +33,7 @@ def predict(
 ) -> None:
     """Write mechanism.csv (and simulation.csv where a pair is called gap), deformed.png, and print the figures."""
     from fingervision.cli._model_figures import draw_mesh
-    from fingervision.storage.drive_csv import read_drive
+    from fingervision.tables.read import read_drive
 
     mechanism = read_mechanism(path)
     if kind not in ("all", "finite_element"):
@@ -48,7 +49,7 @@ def predict(
     if drive is None:
         inputs = np.linspace(-_OF_YIELD, _OF_YIELD, _ROWS) * at_yield_mm
     else:
-        inputs = np.unique(read_drive(drive).input_mm)
+        inputs = np.unique(read_drive(drive, columns).input_mm)
     states = [model.state(float(value), large_rotation=large_rotation) for value in inputs]
     figures = _figures(model, unit, at_yield_mm)
     try:

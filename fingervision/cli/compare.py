@@ -4,6 +4,7 @@ from pathlib import Path
 
 import click
 
+from fingervision.cli._columns_option import columns_option
 from fingervision.cli._which_model import kind_option, model_option
 
 EXAMPLES = """
@@ -24,18 +25,20 @@ Files written to --out: compare.json, compare.png
 @click.option("--out", type=click.Path(path_type=Path, file_okay=False), default=Path("comparison"), show_default=True)
 @click.option("--seed", default=1, show_default=True, help="Of the bootstrapped threshold.")
 @kind_option
+@columns_option
 @click.option("--json", "as_json", is_flag=True, help="Print compare.json.")
-def command(measured: Path, model_path: Path, out: Path, seed: int, kind: str, as_json: bool) -> None:
+def command(
+    measured: Path, model_path: Path, out: Path, seed: int, kind: str, columns: Path | None, as_json: bool
+) -> None:
     """Say where a measured table and a model disagree beyond the noise."""
     import json
 
     from fingervision.diagnosis.compare import compare
     from fingervision.diagnosis.report.residual_figure import residual_figure
-    from fingervision.storage.measured_table import read_measured_table
-    from fingervision.storage.model_toml import read_model
     from fingervision.storage.out_folder import new_out_folder, out_folder
+    from fingervision.tables.read import read_measured_table, read_model
 
-    table, model = read_measured_table(measured), read_model(model_path, kind)
+    table, model = read_measured_table(measured, columns), read_model(model_path, kind, columns)
     with new_out_folder(out):
         found = compare(table, model, seed=seed)
     document = found.document()

@@ -6,6 +6,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from fingervision.cli._columns_option import columns_option
+
 if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
@@ -29,7 +31,8 @@ Examples:
 @click.command(epilog=_EPILOG)
 @click.argument("gripper_toml", metavar="DRAWING.toml", type=click.Path(path_type=Path))
 @click.option("--kind", type=click.Choice(_KINDS), default="all", show_default=True, help="Which model.")
-@click.option("--drive", type=click.Path(path_type=Path), help="drive.csv with the inputs to answer.")
+@click.option("--drive", type=click.Path(path_type=Path), help="drive.csv, or another log, with the inputs to answer.")
+@columns_option
 @click.option(
     "--out", type=click.Path(path_type=Path), default=Path("model"), show_default=True, help="Folder to write."
 )
@@ -46,6 +49,7 @@ def command(
     gripper_toml: Path,
     kind: str,
     drive: Path | None,
+    columns: Path | None,
     out: Path,
     hinge: str,
     large_rotation: bool,
@@ -75,7 +79,15 @@ def command(
         from fingervision.cli._mechanism import predict
 
         predict(
-            gripper_toml, kind, drive, out, large_rotation=large_rotation, contact=contact, mesh=mesh, as_json=as_json
+            gripper_toml,
+            kind,
+            drive,
+            columns,
+            out,
+            large_rotation=large_rotation,
+            contact=contact,
+            mesh=mesh,
+            as_json=as_json,
         )
         return
     gripper = read_gripper(gripper_toml)
@@ -86,7 +98,7 @@ def command(
         return
     wanted = kinds() if kind == "all" else (kind,)
     physics = Physics(large_rotation=large_rotation, contact=contact)
-    inputs = None if drive is None else _inputs_mm(drive, gripper)
+    inputs = None if drive is None else _inputs_mm(drive, columns, gripper)
     _make_folder(out)
     rows: dict[str, dict[str, Any]] = {}
     answers: dict[str, Response] = {}
@@ -141,13 +153,13 @@ def _make_folder(out: Path) -> None:
         ) from error
 
 
-def _inputs_mm(drive: Path, gripper: "Gripper") -> "NDArray[np.float64]":
+def _inputs_mm(drive: Path, columns: Path | None, gripper: "Gripper") -> "NDArray[np.float64]":
     import numpy as np
 
     from fingervision.domain.errors import UsageError
-    from fingervision.storage.drive_csv import read_drive
+    from fingervision.tables.read import read_drive
 
-    inputs = np.unique(read_drive(drive).input_mm)
+    inputs = np.unique(read_drive(drive, columns).input_mm)
     largest = float(np.abs(inputs).max())
     if 0.0 < largest < _METRES_BELOW_OF_HEIGHT * gripper.body.height_mm:
         raise UsageError(

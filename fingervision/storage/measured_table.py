@@ -96,7 +96,7 @@ def measured_rows(
             f"{path} must have at least {FEWEST_ROWS} rows with an input and a gap, but has {kept.size}: measure more."
         )
     column = {name: each.value[kept] for name, each in values.items() if each.present[kept].all()}
-    names = [run_cells[row] for row in kept] if run_cells is not None else [""] * kept.size
+    names = [run_cells[row] for row in kept.tolist()] if run_cells is not None else [""] * kept.size
     count = len(set(names))
     if count > MOST_RUNS:
         raise FingervisionError(
@@ -110,7 +110,7 @@ def measured_rows(
     column = {name: value[order] for name, value in column.items()}
     along = None
     if on_path.size > kept.size:
-        of_path = [run_cells[row] for row in on_path] if run_cells is not None else [""] * on_path.size
+        of_path = [run_cells[row] for row in on_path.tolist()] if run_cells is not None else [""] * on_path.size
         along = _path(values, on_path, is_kept, of_path, run_names)
     if time is not None:
         times, of_runs = (column["time_s"], runs) if along is None else (along.time_s, along.runs)
