@@ -37,7 +37,7 @@ class OpenQuestionError(FingervisionError):
     """
 
     def __init__(self, path: Path, kind: str, questions: Sequence[Question]) -> None:
-        self.questions = tuple(questions)
+        self.path, self.kind, self.questions = path, kind, tuple(questions)
         open_points = "; ".join(each.words for each in questions)
         keys = " ".join(f"--set {_quoted(each.key)}" for each in questions)
         name = _quoted(str(path))

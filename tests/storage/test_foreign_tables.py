@@ -1,6 +1,7 @@
 """Foreign tables are read to the same numbers as their truth, or refused with the key that decides."""
 
 import shutil
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +11,7 @@ from fingervision.domain.errors import FingervisionError
 from fingervision.tables.mapping import entry_of_settings, entry_text
 from fingervision.tables.questions import OpenQuestionError
 from fingervision.tables.read import read_drive, read_measured_table, read_simulation_table
+from tests.storage.foreign.binary import ASKED, READ, TRUTH
 from tests.storage.foreign.truth import Truth, truths
 
 # Digits of the printed numbers times an exact factor: the rest is the rounding of floating-point numbers.
@@ -78,5 +80,31 @@ def test_a_foreign_table_is_read_to_its_truth_or_asks_for_the_key_that_decides(t
     check(truth, read(table, kind))
 
 
+def check_binary(table: Path) -> None:
+    found = read(table, "measured")
+    for name, values in TRUTH.items():
+        # Whole microseconds are what a sheet's date holds.
+        same = 1e-6 if name == "time_s" and table.suffix == ".xlsx" else SAME_MM
+        np.testing.assert_allclose(found[name], values, atol=same, rtol=1e-12, err_msg=name)
+
+
+@pytest.mark.parametrize("make", READ, ids=lambda make: make.__name__)
+def test_a_binary_table_is_read_to_its_truth(make: Callable[[Path], Path], tmp_path: Path) -> None:
+    check_binary(make(tmp_path))
+
+
+@pytest.mark.parametrize(("make", "key", "states"), ASKED, ids=lambda each: getattr(each, "__name__", ""))
+def test_a_binary_table_that_leaves_something_open_asks_for_the_key(
+    make: Callable[[Path], Path], key: str, states: tuple[str, ...], tmp_path: Path
+) -> None:
+    table = make(tmp_path)
+    with pytest.raises(OpenQuestionError) as caught:
+        read(table, "measured")
+    assert any(question.key.startswith(key) for question in caught.value.questions)
+    entry = entry_of_settings(states, tmp_path / "columns.toml")
+    (tmp_path / "columns.toml").write_text("schema = 1\n" + entry_text(table.name, "measured", entry), encoding="utf-8")
+    check_binary(table)
+
+
 def test_the_collection_is_large() -> None:
-    assert len(TRUTHS) >= 40
+    assert len(TRUTHS) + len(READ) + len(ASKED) >= 100

@@ -4,10 +4,11 @@ import importlib
 import pkgutil
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 
 from fingervision.domain.errors import FingervisionError
+from fingervision.tables.formats._apart import read_apart
 from fingervision.tables.mapping import Entry
 from fingervision.tables.raw_table import RawTable
 
@@ -38,12 +39,17 @@ class Format:
 
 @cache
 def formats() -> tuple[Format, ...]:
-    """All formats: a module of this package with `ORDER`, `recognises` and `read` is one."""
+    """All formats: a module of this package with `ORDER`, `recognises` and `read` is one.
+
+    One with `IN_OWN_PROCESS` is read by libraries that may crash, and so in a process of its own.
+    """
     found = []
     for module in pkgutil.iter_modules(__path__):
         if not module.name.startswith("_"):
             loaded = importlib.import_module(f"{__name__}.{module.name}")
-            found.append(Format(module.name, loaded.ORDER, loaded.recognises, loaded.read))
+            apart = getattr(loaded, "IN_OWN_PROCESS", False)
+            read = partial(read_apart, loaded.__name__) if apart else loaded.read
+            found.append(Format(module.name, loaded.ORDER, loaded.recognises, read))
     return tuple(sorted(found, key=lambda each: each.order))
 
 

@@ -14,6 +14,7 @@ from fingervision.tables.raw_table import RawTable
 from fingervision.tables.vectors import is_numeric, tables_of
 
 ORDER = 30
+IN_OWN_PROCESS = True
 HDF5 = b"\x89HDF\r\n\x1a\n"
 HDF5_AT = (0, 512)
 MOST_BYTES = 2_000_000_000

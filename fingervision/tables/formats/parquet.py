@@ -13,6 +13,7 @@ from fingervision.tables.raw_table import RawColumn, RawTable
 from fingervision.tables.vectors import numbers
 
 ORDER = 40
+IN_OWN_PROCESS = True
 MOST_ROWS = 20_000_000
 MOST_UNPACKED_BYTES = 4_000_000_000
 PER_SECOND = {"s": 1.0, "ms": 1e3, "us": 1e6, "ns": 1e9}
@@ -75,7 +76,8 @@ def _column(field: Any, values: Any) -> RawColumn | None:
         # Nanoseconds since 1970 are more than a float holds: the difference is taken in whole numbers.
         zero = first if types.is_timestamp(kind) else 0
         seconds = np.where(present, (ticks - zero) / PER_SECOND[kind.unit], 0.0)
-        since = str(values[int(np.argmax(present))]) if types.is_timestamp(kind) and present.any() else ""
+        stamped = types.is_timestamp(kind) and present.any()
+        since = str(values.to_numpy(zero_copy_only=False)[int(np.argmax(present))]) if stamped else ""
         return RawColumn(field.name, Numbers(seconds, present), "s", since)
     if types.is_string(kind) or types.is_large_string(kind):
         return RawColumn(field.name, ["" if cell is None else str(cell) for cell in values.to_pylist()], unit)

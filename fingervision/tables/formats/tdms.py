@@ -1,5 +1,8 @@
 """National Instruments' .tdms files, by npTDMS: the channels of one group."""
 
+import logging
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +19,8 @@ from fingervision.tables.vectors import numbers
 
 ORDER = 50
 MOST_VALUES = 50_000_000
+WORDS = 200
+"""Characters of a warning that are told."""
 UNIT_KEYS = ("unit_string", "NI_UnitDescription", "Unit", "unit")
 
 
@@ -27,8 +32,9 @@ def recognises(path: Path, head: bytes) -> bool:
 def read(path: Path, given: Entry) -> RawTable:
     """Read a group's channels; their times are written as a channel, or follow from the waveform's rate."""
     library = needed_library("nptdms", path, "a TDMS file")
+    warned: list[str] = []
     try:
-        with library.TdmsFile.open(path) as file:
+        with _warnings(warned), path.open("rb") as opened, library.TdmsFile.open(opened) as file:
             groups = {group.name: group.channels() for group in file.groups() if group.channels()}
             total = sum(len(channel) for channels in groups.values() for channel in channels)
             _check_size(path, total)
@@ -48,7 +54,26 @@ def read(path: Path, given: Entry) -> RawTable:
             "those of one rate in a group of their own."
         )
     notes = (f"Passed over, being no channels of numbers: {', '.join(passed)}.",) if passed else ()
+    if warned:
+        notes = (*notes, f"The file is damaged or was cut off ({warned[0]}); what could be read of it was taken.")
     return RawTable(path, f"TDMS, group '{name}'", tuple(columns), notes=notes, settings={"part": name})
+
+
+@contextmanager
+def _warnings(into: list[str]) -> Iterator[None]:
+    """Collect what npTDMS logs of damage, which would else go to the terminal."""
+    # It gives each of its modules a logger with a handler of its own.
+    loggers = [log for name, log in logging.root.manager.loggerDict.items() if name.startswith("nptdms.")]
+    kept = [(log, log.handlers, log.propagate) for log in loggers if isinstance(log, logging.Logger)]
+    handler = logging.Handler(logging.WARNING)
+    handler.emit = lambda record: into.append(record.getMessage()[:WORDS])  # type: ignore[method-assign]
+    try:
+        for log, _, _ in kept:
+            log.handlers, log.propagate = [handler], False
+        yield
+    finally:
+        for log, handlers, propagate in kept:
+            log.handlers, log.propagate = handlers, propagate
 
 
 def _check_size(path: Path, values: int) -> None:

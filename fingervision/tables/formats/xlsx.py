@@ -40,8 +40,8 @@ def recognises(path: Path, head: bytes) -> bool:
 def read(path: Path, given: Entry) -> RawTable:
     """Read the sheet that is meant."""
     library = needed_library("openpyxl", path, "an Excel workbook")
-    _check_archive(path)
     try:
+        _check_archive(path)
         book = library.load_workbook(path, read_only=True, data_only=True, keep_links=False)
         try:
             sheets = {sheet.title: sheet for sheet in book.worksheets}
@@ -55,40 +55,35 @@ def read(path: Path, given: Entry) -> RawTable:
             place = book.sheetnames.index(title)
         finally:
             book.close()
+        return _table(path, rows, title, given, _Sheet(path, title, place, library))
     except FingervisionError:
         raise
     except Exception as error:
         raise FingervisionError(
             f"{path} must be an Excel workbook, but could not be read ({type(error).__name__}: {error}): save it again."
         ) from error
-    return _table(path, rows, title, given, _Sheet(path, title, place, library))
 
 
 def _check_archive(path: Path) -> None:
     """Refuse archives that unpack to more than a table, and XML with definitions of its own."""
-    try:
-        with zipfile.ZipFile(path) as archive:
-            infos = archive.infolist()
-            total = sum(info.file_size for info in infos)
-            shared = sum(info.file_size for info in infos if "sharedStrings" in info.filename)
-            if total > MOST_UNPACKED_BYTES or shared > MOST_SHARED_BYTES:
-                raise FingervisionError(
-                    f"{path} must unpack to at most {MOST_UNPACKED_BYTES / 1e6:.0f} MB ({MOST_SHARED_BYTES / 1e6:.0f} "
-                    f"MB of it texts), but would unpack to {total / 1e6:.0f} MB ({shared / 1e6:.0f} MB): save the "
-                    "table as CSV or Parquet."
-                )
-            for info in infos:
-                if info.filename.endswith((".xml", ".rels")):
-                    with archive.open(info) as part:
-                        if b"<!DOCTYPE" in part.read(4096):
-                            raise FingervisionError(
-                                f"{path} must be a workbook as Excel writes it, but {info.filename} in it defines XML "
-                                "entities, which a workbook never needs: save it again with Excel or LibreOffice."
-                            )
-    except (OSError, zipfile.BadZipFile, ValueError, NotImplementedError, RuntimeError) as error:
-        raise FingervisionError(
-            f"{path} must be an Excel workbook, but its archive cannot be read ({error}): save it again."
-        ) from error
+    with zipfile.ZipFile(path) as archive:
+        infos = archive.infolist()
+        total = sum(info.file_size for info in infos)
+        shared = sum(info.file_size for info in infos if "sharedStrings" in info.filename)
+        if total > MOST_UNPACKED_BYTES or shared > MOST_SHARED_BYTES:
+            raise FingervisionError(
+                f"{path} must unpack to at most {MOST_UNPACKED_BYTES / 1e6:.0f} MB ({MOST_SHARED_BYTES / 1e6:.0f} MB "
+                f"of it texts), but would unpack to {total / 1e6:.0f} MB ({shared / 1e6:.0f} MB): save the table as "
+                "CSV or Parquet."
+            )
+        for info in infos:
+            if info.filename.endswith((".xml", ".rels")):
+                with archive.open(info) as part:
+                    if b"<!DOCTYPE" in part.read(4096):
+                        raise FingervisionError(
+                            f"{path} must be a workbook as Excel writes it, but {info.filename} in it defines XML "
+                            "entities, which a workbook never needs: save it again with Excel or LibreOffice."
+                        )
 
 
 def _is_value(cell: object) -> bool:
