@@ -12,6 +12,9 @@ from numpy.typing import NDArray
 from fingervision.domain.errors import FingervisionError
 from fingervision.storage.number_block import number_block
 
+CHUNK_LINES = 1000
+"""Lines that are taken apart at once: their cells stay in the cache. All at once take ten times the file in memory."""
+
 
 def read_columns(path: Path, required: tuple[str, ...], known: tuple[str, ...]) -> dict[str, list[str]]:
     """Read the known columns as text, by name; others are not looked at.
@@ -21,7 +24,8 @@ def read_columns(path: Path, required: tuple[str, ...], known: tuple[str, ...]) 
     FingervisionError
         The file cannot be read, is no table, or a required column is missing: with the nearest name found.
     """
-    lines = _reader(path)
+    text = _text(path)
+    lines = _reader(path, text)
     header = next(lines, None)
     if header is None:
         raise FingervisionError(f"{path} must have a header line with {','.join(required)}, but is empty.")
@@ -35,6 +39,9 @@ def read_columns(path: Path, required: tuple[str, ...], known: tuple[str, ...]) 
     for name in wanted:
         if names.count(name) > 1:
             raise FingervisionError(f"{path} must have each column once, but {name} stands twice: remove one.")
+    plain = _without_quotes(text, names, wanted)
+    if plain is not None:
+        return plain
     found: dict[str, list[str]] = {name: [] for name in wanted}
     adders = [(names.index(name), cells.append) for name, cells in found.items()]
     wide = len(names)
@@ -48,9 +55,28 @@ def read_columns(path: Path, required: tuple[str, ...], known: tuple[str, ...]) 
     return found
 
 
-def _reader(path: Path) -> Iterator[tuple[int, list[str]]]:
+def _without_quotes(text: str, names: list[str], wanted: list[str]) -> dict[str, list[str]] | None:
+    """Read the wanted columns of a table without quotes, several times faster; None where a row must be looked at."""
+    if '"' in text:
+        return None
+    lines = text.splitlines()
+    first = next(k for k, line in enumerate(lines) if not line.lstrip().startswith("#") and line.strip(", \t"))
+    wide = len(names)
+    places = [names.index(name) for name in wanted]
+    found: dict[str, list[str]] = {name: [] for name in wanted}
+    for begin in range(first + 1, len(lines), CHUNK_LINES):
+        chunk = lines[begin : begin + CHUNK_LINES]
+        rows = [line.split(",") for line in chunk if line.strip(", \t") and not line.lstrip().startswith("#")]
+        if any(len(row) != wide for row in rows):
+            return None
+        for place, cells in zip(places, found.values(), strict=True):
+            cells.extend([row[place].strip() for row in rows])
+    return found
+
+
+def _reader(path: Path, text: str) -> Iterator[tuple[int, list[str]]]:
     """Rows with their numbers; comments and empty rows left out."""
-    for number, cells in enumerate(_cells(path), start=1):
+    for number, cells in enumerate(_cells(path, text), start=1):
         if cells and not cells[0].lstrip().startswith("#") and any(map(str.strip, cells)):
             yield number, cells
 
@@ -84,8 +110,7 @@ def _text(path: Path) -> str:
         raise FingervisionError(f"{path} must be a CSV table in UTF-8, but could not be read: {error}.") from error
 
 
-def _cells(path: Path) -> Iterator[list[str]]:
-    text = _text(path)
+def _cells(path: Path, text: str) -> Iterator[list[str]]:
     reader = csv.reader(text.splitlines(keepends=True), strict=True)
     try:
         yield from reader

@@ -1,6 +1,7 @@
 """Cells of text to numbers, in the dialect of their table."""
 
 from collections.abc import Sequence
+from math import isfinite
 
 import numpy as np
 from numpy.typing import NDArray
@@ -42,8 +43,12 @@ def to_numbers(cells: Sequence[str], decimal: str) -> tuple[Numbers, NDArray[np.
     value, present = np.zeros(len(cells)), np.zeros(len(cells), dtype=np.bool_)
     odd = []
     for row, cell in enumerate(cells):
-        number = to_number(cell, decimal)
-        if number is not None:
+        number: float | None
+        try:
+            number = float(cell) if decimal == "." else float(cell.replace(",", ".") if "." not in cell else "?")
+        except ValueError:
+            number = to_number(cell, decimal)
+        if number is not None and isfinite(number):
             value[row], present[row] = number, True
         elif cell.strip().lower() not in MISSING:
             odd.append(row)

@@ -23,6 +23,7 @@ from fingervision.tables.questions import OpenQuestionError, Question
 from fingervision.tables.raw_table import RawColumn, RawTable
 from fingervision.tables.text_header import HEADER_LINES, Header, find_header, first_row, names_in
 
+NUMBER_BEGINS = frozenset("0123456789+-., \t")
 MOST_ODD = 0.05
 """Share of rows that may have another number of cells: more are not a logger's hiccup but a wrong separator."""
 
@@ -148,10 +149,13 @@ class _Rows:
         comments: list[int] = []
         headers: list[int] = []
         odd: list[tuple[int, int]] = []
+        units = list(self._units)
+        plain = separator is not None and not any('"' in text for text in body)
+        ascii_only = all(map(str.isascii, body))
         for line, text in enumerate(body, start=self._first + 1):
-            cells = split(text, separator)
-            if len(cells) == wide and text[:1] != "#" and not is_comment(text):
-                if cells == names or cells == list(self._units) or self._is_header(cells):
+            cells = text.split(separator) if plain else split(text, separator)
+            if len(cells) == wide and text[0] not in "#%/!'" and any(cells):
+                if text[0] not in NUMBER_BEGINS and self._is_header(cells, names, units):
                     headers.append(line)
                     restarts.append(len(rows))
                     continue
@@ -184,14 +188,19 @@ class _Rows:
                 f"{_count(len(odd), 'line')} with another number of cells (line {odd[0][0]} has {odd[0][1]}, not "
                 f"{wide})"
             )
-        columns = [self._column(k, [row[k].translate(MINUS) for row in rows]) for k in range(wide)]
+        cleaned = ([row[k].strip() for row in rows] for k in range(wide))
+        if not ascii_only:
+            cleaned = ([cell.translate(MINUS) for cell in cells] for cells in cleaned)
+        columns = [self._column(k, cells) for k, cells in enumerate(cleaned)]
         return columns, numbers, left_out, sorted({row for row in restarts if 0 < row < len(rows)})
 
-    def _is_header(self, cells: Sequence[str]) -> bool:
-        """Whether a row repeats the header in another spelling, or is a row of units."""
-        if any(is_number(cell, self._dialect.decimal) for cell in cells):
-            return False
-        return sum(a.lower() == b.strip().lower() for a, b in zip(cells, self._names, strict=True)) > len(cells) // 2
+    def _is_header(self, cells: Sequence[str], names: Sequence[str], units: Sequence[str]) -> bool:
+        """Whether a row repeats the header, also in another spelling, or the row of units."""
+        cells = [cell.strip() for cell in cells]
+        if cells in (names, units):
+            return True
+        same = sum(a.lower() == b.lower() for a, b in zip(cells, names, strict=True))
+        return same > len(cells) // 2 and not any(is_number(cell, self._dialect.decimal) for cell in cells)
 
 
 def _count(number: int, noun: str) -> str:

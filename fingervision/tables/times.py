@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from datetime import date, datetime
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fingervision.storage.number_columns import Numbers
 from fingervision.tables.dialect import MISSING
@@ -15,6 +16,8 @@ DAY = re.compile(r"(?P<a>\d{1,4})(?P<mark>[-./])(?P<b>\d{1,2})(?P=mark)(?P<c>\d{
 STAMP = re.compile(
     r"(?P<day>\d{1,4}[-./]\d{1,2}[-./]\d{1,4})[T,;]?\s*(?P<clock>\d{1,2}:\d{2}\S*(?:\s*[AaPp]\.?[Mm]\.?)?)?"
 )
+USUAL = re.compile(r"(\d[\d./-]*)[T ](\d{1,2}):(\d\d):(\d\d)(?:[.,](\d+))?")
+"""A date and time as most programs write it."""
 ZONE = re.compile(r"(Z|[+-]\d{2}:?\d{2})$")
 DAY_S = 86400.0
 HALF_DAY_S = 43200.0
@@ -65,67 +68,74 @@ def seconds_of(cells: Sequence[str], date_order: str = "") -> Seconds:
     date_order : str
         `dmy`, `mdy` or `ymd` where the user has said so.
     """
-    read = {order: _all(cells, order) for order in ([date_order] if date_order else ORDERS)}
-    usable = {order: values for order, values in read.items() if values is not None}
-    if not usable:
+    clock_s, present, codes, words = _taken_apart(cells)
+    days = {order: _days(words, order) for order in ([date_order] if date_order else ORDERS)}
+    usable = [numbers for numbers in days.values() if numbers is not None]
+    if not usable or not present.any():
         none = np.zeros(len(cells))
         return Seconds(Numbers(none, none > 0.0), "", unread=len(cells))
-    results = list(usable.values())
-    first = results[0]
-    differ = len(results) > 1 and not np.allclose(
-        first[0] - _start(*first), results[1][0] - _start(*results[1]), atol=1e-9, rtol=0.0
-    )
-    value, present, has_day = first
+    value = clock_s + np.where(codes >= 0, DAY_S * usable[0][codes], 0.0)
     notes = []
-    if not has_day:
+    if not words:
         known = np.flatnonzero(present)
         falls = np.diff(value[known]) < -HALF_DAY_S
         if falls.any():
-            value = value.copy()
             value[known[1:]] += DAY_S * np.cumsum(falls)
             notes.append(f"Times of day pass midnight {int(falls.sum())} time(s): a day was added each time.")
-    start = _start(value, present, has_day)
-    since = cells[int(np.argmax(present))] if present.any() else ""
-    unread = sum(not there and cell.strip().lower() not in MISSING for there, cell in zip(present, cells, strict=True))
-    return Seconds(Numbers(np.where(present, value - start, 0.0), present), since, tuple(notes), differ, unread)
+    first = int(np.argmax(present))
+    unread = sum(cells[row].strip().lower() not in MISSING for row in np.flatnonzero(~present).tolist())
+    return Seconds(
+        Numbers(np.where(present, value - value[first], 0.0), present),
+        cells[first],
+        tuple(notes),
+        len(usable) > 1 and bool(np.any(usable[0] != usable[1])),
+        unread,
+    )
 
 
-def _start(value: np.ndarray, present: np.ndarray, _: bool = False) -> float:
-    return float(value[int(np.argmax(present))]) if present.any() else 0.0
-
-
-def _all(cells: Sequence[str], order: str) -> tuple[np.ndarray, np.ndarray, bool] | None:
-    """Seconds of every cell; None where a date does not exist in this order of day and month."""
-    value, present = np.zeros(len(cells)), np.zeros(len(cells), dtype=np.bool_)
-    days: dict[str, float] = {}
-    zero: int | None = None
-    has_day = False
+def _taken_apart(
+    cells: Sequence[str],
+) -> tuple[NDArray[np.float64], NDArray[np.bool_], NDArray[np.intp], list[str]]:
+    """Seconds of the day of each cell, whether it is a time, the number of its day's word (-1: none), and the words."""
+    clock_s, present = np.zeros(len(cells)), np.zeros(len(cells), dtype=np.bool_)
+    codes = np.full(len(cells), -1, dtype=np.intp)
+    number: dict[str, int] = {}
     for row, cell in enumerate(cells):
-        text = cell.strip()
-        offset = 0.0
-        if (zone := ZONE.search(text)) is not None and ":" in text[: zone.start()]:
-            offset = _offset(zone[0])
-            text = text[: zone.start()].strip()
-        match = STAMP.fullmatch(text)
-        clock = match["clock"] if match else text
-        if match is None and CLOCK.fullmatch(text) is None:
-            continue
-        seconds = 0.0 if clock is None else _clock(clock)
+        if (usual := USUAL.fullmatch(cell)) is not None:
+            day, hours, minutes, whole, fraction = usual.groups()
+            seconds: float | None = 3600 * int(hours) + 60 * int(minutes) + float(f"{whole}.{fraction or 0}")
+        else:
+            day, seconds = _one(cell.strip())
         if seconds is None:
             continue
-        if match is not None:
-            has_day = True
-            word = match["day"]
-            if word not in days:
-                number = _ordinal(word, order)
-                if number is None:
-                    return None
-                # Days are counted from the first: a float holds its microseconds then.
-                zero = number if zero is None else zero
-                days[word] = DAY_S * (number - zero)
-            seconds += days[word]
-        value[row], present[row] = seconds - offset, True
-    return value, present, has_day
+        clock_s[row], present[row] = seconds, True
+        if day:
+            codes[row] = number.setdefault(day, len(number))
+    return clock_s, present, codes, list(number)
+
+
+def _one(text: str) -> tuple[str, float | None]:
+    """Word of the day ('' for none) and seconds of it; None where a cell is no time."""
+    offset = 0.0
+    if (zone := ZONE.search(text)) is not None and ":" in text[: zone.start()]:
+        offset = _offset(zone[0])
+        text = text[: zone.start()].strip()
+    match = STAMP.fullmatch(text)
+    if match is None and CLOCK.fullmatch(text) is None:
+        return "", None
+    clock = match["clock"] if match else text
+    seconds = 0.0 if clock is None else _clock(clock)
+    return match["day"] if match else "", None if seconds is None else seconds - offset
+
+
+def _days(words: Sequence[str], order: str) -> NDArray[np.float64] | None:
+    """Days from the first of each word (one zero where there is none); None where one does not exist in this order."""
+    numbers = [_ordinal(word, order) for word in words]
+    if None in numbers:
+        return None
+    # Counted from the first: a float holds the microseconds then.
+    known = [number for number in numbers if number is not None]
+    return np.array([number - known[0] for number in known] or [0], dtype=np.float64)
 
 
 def _clock(text: str) -> float | None:
