@@ -5,6 +5,7 @@ from pathlib import Path
 import click
 
 from fingervision.cli._columns_option import columns_option
+from fingervision.cli._results_folder import results_folder
 from fingervision.cli._which_model import kind_option, model_option
 
 EXAMPLES = """
@@ -36,15 +37,18 @@ def command(
     from fingervision.diagnosis.compare import compare
     from fingervision.diagnosis.report.residual_figure import residual_figure
     from fingervision.storage.out_folder import new_out_folder, out_folder
+    from fingervision.storage.result_owner import mark_owner
     from fingervision.tables.read import read_measured_table, read_model
 
     table, model = read_measured_table(measured, columns), read_model(model_path, kind, columns)
+    out = results_folder(out, measured)
     with new_out_folder(out):
         found = compare(table, model, seed=seed)
     document = found.document()
     with out_folder(out):
         (out / "compare.json").write_text(json.dumps(document, indent=2, allow_nan=False) + "\n", encoding="utf-8")
         (out / "compare.png").write_bytes(residual_figure(found.residual_mm, None, found.data.chain.history))
+    mark_owner(out, measured)
     if as_json:
         click.echo(json.dumps(document, indent=2))
         return

@@ -5,6 +5,7 @@ from pathlib import Path
 import click
 
 from fingervision.cli._columns_option import columns_option
+from fingervision.cli._results_folder import results_folder
 from fingervision.cli._which_model import kind_option, model_option
 from fingervision.domain.errors import UsageError
 
@@ -53,6 +54,7 @@ def command(
     from fingervision.diagnosis.report.answer_files import PAGE, write_answer
     from fingervision.effects import catalogue
     from fingervision.storage.out_folder import new_out_folder, out_folder
+    from fingervision.storage.result_owner import mark_owner
     from fingervision.tables.read import read_measured_table, read_model
 
     for name in (*forced, *without):
@@ -63,6 +65,7 @@ def command(
     if set(forced) & set(without):
         raise UsageError(f"An effect must be forced or left out, but {', '.join(set(forced) & set(without))} is both.")
     table, model = read_measured_table(measured, columns), read_model(model_path, kind, columns)
+    out = results_folder(out, measured)
     bar = click.progressbar(length=1000, label="diagnosing", file=sys.stderr, hidden=not sys.stderr.isatty())
     with new_out_folder(out), bar:
         done = diagnose(
@@ -75,6 +78,7 @@ def command(
         )
     with out_folder(out):
         document = write_answer(out, done, model)
+    mark_owner(out, measured)
     report = done.report
     if as_json:
         click.echo(json.dumps(document, indent=2))

@@ -107,6 +107,7 @@ def command(
     from fingervision.frames.source import Wish, open_source
     from fingervision.measuring.measure import Task, measure
     from fingervision.storage.response_csv import response_named
+    from fingervision.storage.summary_json import refuse_other_recording
     from fingervision.tables.read import read_drive
 
     task = Task(
@@ -124,8 +125,10 @@ def command(
         fingers_are_dark={"auto": None, "dark": True, "light": False}[fingers],
     )
     source = open_source(recording, Wish(rate_hz=rate_hz))
+    folder = out or _default_out(recording)
+    refuse_other_recording(folder, recording)
     with _Bar() as bar:
-        measured = measure(source, task, out or _default_out(recording), bar)
+        measured = measure(source, task, folder, bar)
     _report(measured, as_json)
     raise SystemExit(int(measured.exit_code))
 

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from fingervision.cli._columns_option import columns_option
+from fingervision.cli._results_folder import results_folder
 
 if TYPE_CHECKING:
     import numpy as np
@@ -19,6 +20,11 @@ if TYPE_CHECKING:
 _KINDS = ("stiffness_matrix", "lumped", "finite_element", "all")
 _METRES_BELOW_OF_HEIGHT = 1e-4
 _MOST_ROWS = 401
+_SWEPT = ("vary.csv", "vary.png")
+_PREDICTED = (
+    "models.csv", "models.png", "simulation.csv", "mechanism.csv", "deformed.png", "mesh.png", "modes.csv", "modes.png",
+)  # fmt: skip
+"""Files of the two kinds of call, whichever of them a call writes."""
 _EPILOG = """\b
 Examples:
   fingervision model gripper.toml --kind all --drive drive.csv --out model
@@ -73,8 +79,11 @@ def command(
     from fingervision.models.physics import LINEAR, Physics
     from fingervision.storage.gripper_toml import read_gripper
     from fingervision.storage.mechanism_toml import is_mechanism
+    from fingervision.storage.result_owner import began_in, finish_in
     from fingervision.storage.simulation_csv import write_simulation
 
+    out = results_folder(out, gripper_toml)
+    began_ns = began_in(out)
     if is_mechanism(gripper_toml):
         from fingervision.cli._mechanism import predict
 
@@ -89,12 +98,14 @@ def command(
             mesh=mesh,
             as_json=as_json,
         )
+        finish_in(out, gripper_toml, _PREDICTED, began_ns)
         return
     gripper = read_gripper(gripper_toml)
     if vary:
         from fingervision.cli._model_sweep import sweep
 
         sweep(gripper, gripper_toml.stem, vary, HingeTheory(hinge), out, as_json=as_json)
+        finish_in(out, gripper_toml, _SWEPT, began_ns)
         return
     wanted = kinds() if kind == "all" else (kind,)
     physics = Physics(large_rotation=large_rotation, contact=contact)
@@ -137,6 +148,7 @@ def command(
         from fingervision.cli._model_modes import write_modes
 
         write_modes(models, modes, gripper_toml.stem, out, as_json=as_json)
+    finish_in(out, gripper_toml, (*_PREDICTED, *(f"{each}/simulation.csv" for each in kinds())), began_ns)
     for sentence in disagreements(figures):
         click.echo(f"Warning: {sentence}", err=True)
     say_what_limits(gripper, models, figures, inputs, physics, as_json=as_json)
