@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from fingervision.domain.errors import FingervisionError
 from fingervision.storage.number_columns import Numbers
 from fingervision.tables.column_choice import CANONICAL, NEEDED
+from fingervision.tables.column_names import column_name
 from fingervision.tables.formats import read_raw
 from fingervision.tables.iso230 import iso230_rows_of
 from fingervision.tables.mapping import KINDS, Entry
@@ -149,7 +150,10 @@ def account(path: Path, kind: str | None, given: Mapping[str, Entry]) -> Account
 def _open_columns(table: Understood) -> int:
     """How far a table is from a kind: twice the columns that it must have and has not, and those that are open."""
     missing = sum(question.key.startswith("columns.") for question in table.questions)
-    return missing + sum("no column is called" in question.words for question in table.questions)
+    missing += sum("no column is called" in question.words for question in table.questions)
+    # A column called after a program's model holds no measurement.
+    sources = [column_name(each.name).source for each in table.taken if each.role == "gap"]
+    return missing + sum(source not in (None, table.kind) for source in sources)
 
 
 def _account(table: Understood, given: Entry, raw: RawTable) -> Account:
