@@ -25,6 +25,8 @@ USUAL_STEPS_S = (1e-3, 1.0)
 5 to 1000 rows a second: a thousand times slower (or faster) in both is another unit of time, or a log of hours, which
 the user may say."""
 FEWEST_FOR_SPEED = 20
+LEAST_OVERLAP = 0.5
+"""Share of the rows with a gap that have an input: fewer, and two records have hardly met."""
 EPSILON_MM = 1e-9
 
 
@@ -57,9 +59,22 @@ def doubts(
         return found
     if "sizes" not in given.accept and "input" not in given_units:
         found += _sizes(columns, travel, given_units)
+    if kind == "measured" and "overlap" not in given.accept:
+        found += _overlap(columns)
     if kind != "simulation" and "time" in columns:
         found += _times(columns, given, runs, dated=dated)
     return found
+
+
+def _overlap(columns: Mapping[str, Numbers]) -> list[Question]:
+    """Doubt an input that is missing where most of the gaps are."""
+    sides = [columns[name].present for name in ("left", "right") if name in columns]
+    measured = columns["gap"].present if "gap" in columns else np.logical_and.reduce(sides)
+    total = int(np.count_nonzero(measured))
+    shared = int(np.count_nonzero(measured & columns["input"].present))
+    if shared >= LEAST_OVERLAP * total:
+        return []
+    return [Question(f"only {shared} of {total} rows with a gap have an input", "accept=overlap")]
 
 
 def _gap(columns: Mapping[str, Numbers]) -> NDArray[np.float64] | None:

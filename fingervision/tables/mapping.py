@@ -25,7 +25,7 @@ WORDS = {
 }
 """Keys with a few words to choose from."""
 TEXTS = ("encoding", "part")
-ACCEPTED = ("constant_input", "backward_time", "repeated_time", "sizes", "speed", "unreadable_cells")
+ACCEPTED = ("constant_input", "backward_time", "repeated_time", "sizes", "speed", "overlap", "unreadable_cells")
 KEYS = ("file", "as", "columns", "units", *WORDS, *TEXTS, "header_line", "accept")
 
 

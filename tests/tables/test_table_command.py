@@ -128,6 +128,16 @@ def test_a_wrong_mapping_is_a_sentence(text: str, words: str, tmp_path: Path) ->
         read_measured_table(table)
 
 
+def test_an_input_that_is_missing_for_most_of_the_gaps_is_asked_about(tmp_path: Path) -> None:
+    table = tmp_path / "half.csv"
+    rows = [f"{k / 10},{k / 20 if k < 9 else ''},{4 + k / 2}" for k in range(24)]
+    table.write_text("time [s],position [mm],gap [mm]\n" + "\n".join(rows) + "\n")
+    with pytest.raises(OpenQuestionError, match="only 9 of 24 rows"):
+        read_measured_table(table)
+    call("table", table, "--set", "accept=overlap")
+    assert read_measured_table(table).gap_mm.size == 9
+
+
 def test_a_picture_is_drawn(tmp_path: Path) -> None:
     call("table", copied("labview_one_x.lvm", tmp_path), "--png", tmp_path / "t.png")
     assert (tmp_path / "t.png").read_bytes().startswith(b"\x89PNG")
