@@ -150,7 +150,7 @@ def account(path: Path, kind: str | None, given: Mapping[str, Entry]) -> Account
 def _open_columns(table: Understood) -> int:
     """How far a table is from a kind: twice the columns that it must have and has not, and those that are open."""
     missing = sum(question.key.startswith("columns.") for question in table.questions)
-    missing += sum("no column is called" in question.words for question in table.questions)
+    missing += sum(bool(question.missing) for question in table.questions)
     # A column called after a program's model holds no measurement.
     sources = [column_name(each.name).source for each in table.taken if each.role == "gap"]
     return missing + sum(source not in (None, table.kind) for source in sources)

@@ -90,6 +90,7 @@ def choose(raw: RawTable, names: Sequence[ColumnName], kind: str, given: Entry, 
                 Question(
                     f"no column is called as the {role} is (the columns are {listed or 'taken'})",
                     f"columns.{role}={free[0] if free else 'NAME'}",
+                    CANONICAL[role],
                 )
             )
     return chosen

@@ -17,10 +17,13 @@ class Question:
         What is open, a clause without a full stop.
     key : str
         The key that decides, with an example of its value: `units.input=mm`.
+    missing : str
+        Our name of the column that no name in the table stands for; empty where it is another question.
     """
 
     words: str
     key: str
+    missing: str = ""
 
 
 class OpenQuestionError(FingervisionError):
@@ -39,13 +42,14 @@ class OpenQuestionError(FingervisionError):
     def __init__(self, path: Path, kind: str, questions: Sequence[Question]) -> None:
         self.path, self.kind, self.questions = path, kind, tuple(questions)
         open_points = "; ".join(each.words for each in questions)
+        missing = " and a column ".join(each.missing for each in questions if each.missing)
         keys = " ".join(f"--set {_quoted(each.key)}" for each in questions)
         name = _quoted(str(path))
         words = kind if kind in ("drive", "table") else f"{kind} table"
         asked = f" --as {kind}" if kind != "table" else ""
+        begin = f"must have a column {missing}" if missing else f"cannot be read as a {words} without a decision"
         super().__init__(
-            f"{path} cannot be read as a {words} without a decision: {open_points}. "
-            f"Say it once, then call again: fingervision table {name}{asked} {keys}"
+            f"{path} {begin}: {open_points}. Say it once, then call again: fingervision table {name}{asked} {keys}"
         )
 
 

@@ -8,7 +8,7 @@ from fingervision.domain.errors import FingervisionError
 from fingervision.tables.column_names import column_name
 from fingervision.tables.dialect import Dialect, is_comment, is_number, is_value, split
 from fingervision.tables.mapping import Entry
-from fingervision.tables.units import is_unit
+from fingervision.tables.units import is_unit, known_unit
 from fingervision.tables.words import role_of
 
 HEADER_LINES = 6
@@ -73,7 +73,7 @@ def find_header(lines: Sequence[str], first: int, dialect: Dialect, given: Entry
         units = names_in(lines[at + 1], dialect) if at + 1 < first else None
         return Header(names, units if units is not None and _all_units(units) else (), at)
     found: list[tuple[int, int, tuple[str, ...]]] = []
-    units = None
+    units, units_at = None, -1
     blanks = 0
     for at in range(first - 1, max(-1, first - 1 - HEADER_LINES), -1):
         if not lines[at].strip():
@@ -85,10 +85,13 @@ def find_header(lines: Sequence[str], first: int, dialect: Dialect, given: Entry
                 break
             continue
         if units is None and not found and _all_units(names):
-            units = names
+            units, units_at = names, at
             continue
         known = sum(column_name(name).role is not None or column_name(name).source is not None for name in names)
         found.append((known, at, names))
+    if not found and units and not all(known_unit(cell) for cell in units if cell):
+        # `a,b` could be ares and bits; names are likelier above numbers than rare units alone.
+        return Header(units, (), units_at)
     if not found:
         return Header((), units or (), -1)
     # The most words that mean something; among equals the line nearest to the numbers.

@@ -16,7 +16,7 @@ from fingervision.tables.mapping import Entry
 from fingervision.tables.questions import OpenQuestionError, Question
 from fingervision.tables.raw_table import RawColumn, RawTable
 from fingervision.tables.times import is_epoch, looks_like_time, seconds_of
-from fingervision.tables.units import factor, known_unit
+from fingervision.tables.units import factor, known_unit, spelled
 
 DATE = "date"
 """Stands for the unit of times that are written as dates or times of day."""
@@ -156,7 +156,7 @@ def _unit(column: RawColumn, name: ColumnName, role: str, kind: str, given: Entr
     """Unit of a column as stated by the user, beside the name, or in it; None where it is open, or not needed."""
     if role in given.units:
         return given.units[role]
-    stated = [unit for unit in (column.unit.strip(), name.unit) if unit and unit != "-"]
+    stated = [unit for unit in (spelled(column.unit), name.unit) if unit and unit != "-"]
     if stated:
         if len({known_unit(unit) or unit for unit in stated}) > 1:
             about.questions.append(

@@ -36,7 +36,7 @@ def tables(rows: int, folder: Path) -> Iterator[tuple[str, Path]]:
     time = np.arange(rows) / 1000.0
     inputs = np.sin(time / 10.0)
     gaps = 4.0 + 10.0 * inputs
-    start = dt.datetime(2024, 5, 3, 10)  # noqa: DTZ001 - a clock on a wall
+    start = dt.datetime(2024, 5, 3, 10)
 
     def text(name: str, header: str, line: Callable[[int, float, float, float], str], encoding: str = "utf-8") -> Path:
         path = folder / name
