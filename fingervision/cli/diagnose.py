@@ -21,6 +21,7 @@ Examples:
 Files written to --out:
   report.html   the answer on one page       report.json   the same for programs
   model.toml    the corrected model          next_run.toml the run that would settle what is open
+  gap_against_input, gap_over_time, residuals: figures as .svg and .pdf
 """
 
 
@@ -54,6 +55,7 @@ def command(
     from fingervision.diagnosis.report.answer_files import PAGE, write_answer
     from fingervision.effects import catalogue
     from fingervision.storage.out_folder import new_out_folder, out_folder
+    from fingervision.storage.provenance import provenance
     from fingervision.storage.result_owner import mark_owner
     from fingervision.tables.read import read_measured_table, read_model
 
@@ -77,7 +79,8 @@ def command(
             progress=lambda share: bar.update(max(0, int(1000 * share) - bar.pos)),
         )
     with out_folder(out):
-        document = write_answer(out, done, model)
+        made = provenance({"measured table": measured, "model": model_path})
+        document = write_answer(out, done, model, made, measured)
     mark_owner(out, measured)
     report = done.report
     if as_json:
