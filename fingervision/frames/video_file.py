@@ -116,7 +116,7 @@ class VideoFile:
                 elif tick is not None and tick == last_tick:
                     yield LostFrame(index, time_s, Status.DUPLICATE, "It has the same time as the frame before.")
                 else:
-                    yield Frame(luma(found), index, time_s, self.description.coding)
+                    yield Frame(luma(found), index, time_s, self.description.coding, not found.key_frame)
                 last_tick = tick
 
     def _opened(self) -> av.container.InputContainer:

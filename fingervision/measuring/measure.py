@@ -27,6 +27,7 @@ from fingervision.measuring.response_budget import choose_response
 from fingervision.measuring.rows import Result, RowMaker
 from fingervision.measuring.scale import Scale
 from fingervision.measuring.series import GapSeries
+from fingervision.measuring.sound_picture import SoundPictures
 from fingervision.measuring.step_pictures import write_steps
 from fingervision.measuring.summary import summarise
 from fingervision.storage.folder_lock import FolderLock
@@ -266,9 +267,13 @@ def _outcomes(
     source: Iterable[Frame | LostFrame], settings: Settings
 ) -> Iterator[tuple[Frame | LostFrame, GapMeasurement | NoGap | LostFrame]]:
     """Every frame with what it says; the decoder runs ahead and is stopped when this is."""
+    pictures = SoundPictures()
     with closing(decoded_ahead(source)) as frames:
         for item in frames:
-            yield item, measure_frame(item, settings) if isinstance(item, Frame) else item
+            if isinstance(item, Frame):
+                yield item, pictures.judged(item, measure_frame(item, settings))
+            else:
+                yield item, item
 
 
 def _check(task: Task, description: Description) -> None:

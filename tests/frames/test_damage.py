@@ -128,6 +128,58 @@ def test_behind_a_hole_in_an_avi_without_index_no_time_is_made_up(tmp_path: Path
     assert any("the time of those behind is not known" in item.words for item in found if isinstance(item, LostFrame))
 
 
+def test_a_chunk_whose_length_is_damaged_is_no_other_frame_of_the_index(tmp_path: Path) -> None:
+    # No byte is missing, so whatever lies elsewhere than the index says was never written.
+    path = tmp_path / "clip.avi"
+    content = coded(path, "mjpeg", qmin="3", qmax="3")
+    frames = packets(path)
+    sizes = [len(frame) for frame in frames]
+    later = next(k for k in range(30, COUNT) if sizes.count(sizes[k]) == 1 and sizes[k] < sizes[20])
+
+    def change(changed: bytearray) -> None:
+        begin = content.index(frames[20])
+        changed[begin - 4 : begin] = bytes(4)
+        # Inside of the frame stands something that looks like a chunk of a later frame's length.
+        changed[begin + 100 : begin + 108] = b"00dc" + sizes[later].to_bytes(4, "little")
+
+    _, whole = nothing_wrong(path, change)
+    assert whole >= COUNT - 3
+
+
+def test_a_name_that_is_damaged_in_the_index_moves_no_frame(tmp_path: Path) -> None:
+    path = tmp_path / "clip.avi"
+    content = coded(path, "mjpeg")
+    frames = packets(path)
+
+    def change(changed: bytearray) -> None:
+        entry = changed.rindex(b"idx1") + 8 + 16 * 10
+        changed[entry] ^= 1  # 00dc is 10dc
+        begin = content.index(frames[20])
+        changed[begin - 8 : begin] = bytes(8)
+
+    _, whole = nothing_wrong(path, change)
+    assert whole >= COUNT - 3
+
+
+def test_frames_missing_right_at_the_start_of_a_transport_stream_are_noticed(tmp_path: Path) -> None:
+    path = tmp_path / "clip.ts"
+    coded(path, "libx264", g="30", bf="0", crf="18")
+    with av.open(str(path)) as container:
+        begins = [packet.pos for packet in container.demux(video=0) if packet.size]
+
+    def lose(changed: bytearray) -> None:
+        # A multiple of sixteen packets of the stream, and of sixteen pictures: no counter tells.
+        end = next(at for at in begins[2:] if (own(changed, begins[2], at)) % 16 == 0)
+        del changed[begins[2] : end]
+
+    def own(changed: bytearray, begin: int, end: int) -> int:
+        return sum(changed[at + 1 : at + 3] == changed[begins[2] + 1 : begins[2] + 3] for at in range(begin, end, 188)) or 1
+
+    found, whole = nothing_wrong(path, lose)
+    assert whole >= 2
+    assert any(isinstance(item, LostFrame) for item in found)
+
+
 def test_what_the_decoder_of_h264_says_in_its_log_alone_is_damage(tmp_path: Path) -> None:
     path = tmp_path / "clip.mp4"
     content = coded(path, "libx264", g="20", bf="2", crf="18")
@@ -187,3 +239,7 @@ def test_times_that_run_backwards_are_not_believed_and_a_repeated_one_is_left_al
 def test_frames_missing_in_an_even_row_are_noticed() -> None:
     row = EvenRow()
     assert [tick for tick in [*range(0, 800, 40), *range(880, 1200, 40)] if row.leaps(tick)] == [880]
+    # Before there is a row, the rate that the stream states is one, from the first step that keeps it.
+    stated, other = EvenRow(40.0), EvenRow(50.0)
+    assert [tick for tick in (0, 40, 600, 640) if stated.leaps(tick)] == [600]
+    assert [tick for tick in (0, 40, 600, 640) if other.leaps(tick)] == []
