@@ -22,7 +22,7 @@ Files written to --out: compare.json, compare.png
 @click.argument("measured", type=click.Path(path_type=Path))
 @model_option
 @click.option("--out", type=click.Path(path_type=Path, file_okay=False), default=Path("comparison"), show_default=True)
-@click.option("--seed", default=1, show_default=True, help="Of the bootstrapped threshold.")
+@click.option("--seed", type=click.IntRange(0), default=1, show_default=True, help="Of the bootstrapped threshold.")
 @kind_option
 @click.option("--json", "as_json", is_flag=True, help="Print compare.json.")
 def command(measured: Path, model_path: Path, out: Path, seed: int, kind: str, as_json: bool) -> None:

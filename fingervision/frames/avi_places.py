@@ -2,10 +2,10 @@
 
 A reader that loses a frame in a damaged place counts on as if there had been none, and every frame after it is too
 early. The file's own index (idx1) says where each frame lies, so a packet that lies where the index says is that frame,
-whatever was lost before it. Where bytes are missing, all behind them lies nearer to the front, by no more than the index itself
-does; packets whose lengths, one after the other, occur only once in the rest of the index are those frames. Where no
-byte is missing a packet that lies elsewhere than the index says was never written: its header is damaged. Without an
-index, or where it does not say, frames are counted as long as one chunk follows another without a hole.
+whatever was lost before it. Where bytes are missing, what follows lies nearer to the front, not more than the index is;
+packets whose lengths, one after the other, occur only once in the rest of the index are those frames. Where no byte is
+missing, a packet that lies elsewhere than the index says was never written: its header is damaged. Without an index, or
+where it does not say, frames are counted as long as one chunk follows another without a hole.
 
 Source: Microsoft, AVI RIFF File Reference (chunks, LIST, idx1).
 """
@@ -91,7 +91,7 @@ class AviPlaces:
             possible = possible[possible < len(self._sizes)]
         else:
             possible = np.arange(self._number + 1, len(self._sizes))
-        # What is missing makes everything behind it lie nearer to the front, never farther, and never more than the end.
+        # What is missing makes all behind it lie nearer to the front, never farther, and never by more than the end.
         nearer = self._offsets[possible] - begin
         alike = (self._sizes[possible] == size) & (nearer >= self._missing) & (nearer <= self._most_missing)
         self._possible = possible[alike]
@@ -123,9 +123,7 @@ class AviPlaces:
         return None
 
 
-def _index(
-    file: BinaryIO, tag: bytes, begin: int, streams: int
-) -> tuple[NDArray[np.int64], NDArray[np.int64], int]:
+def _index(file: BinaryIO, tag: bytes, begin: int, streams: int) -> tuple[NDArray[np.int64], NDArray[np.int64], int]:
     """Read where each frame's chunk begins, how long it is, and how many bytes are missing before the index."""
     end = file.seek(0, 2)
     start = max(0, end - TAIL_BYTES)

@@ -178,4 +178,3 @@ def _decoded(
         trail.breaks(f"It is damaged in the file ({said}).")
     for picture in decoded:
         yield from trail.leaves(picture)
-

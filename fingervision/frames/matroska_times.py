@@ -12,6 +12,7 @@ import mmap
 import struct
 from bisect import bisect_right
 from dataclasses import dataclass, field
+from itertools import pairwise
 from pathlib import Path
 
 SEGMENT, CLUSTER, CUES, INFO = b"\x18\x53\x80\x67", b"\x1f\x43\xb6\x75", b"\x1c\x53\xbb\x6b", b"\x15\x49\xa9\x66"
@@ -88,11 +89,11 @@ def _doubtful(clusters: list[_Cluster], cues: dict[int, set[int]], duration: flo
         stated = cues.get(cluster.begin, set())
         confirmed.append(bool(stated) and stated <= set(cluster.ticks))
         doubtful.append(bool(stated) and bool(cluster.ticks) and stated.isdisjoint(cluster.ticks))
-    in_order = all(a <= b for cluster in clusters for a, b in zip(cluster.ticks, cluster.ticks[1:], strict=False))
-    steps = [b - a for cluster in clusters for a, b in zip(cluster.ticks, cluster.ticks[1:], strict=False) if b > a]
+    in_order = all(a <= b for cluster in clusters for a, b in pairwise(cluster.ticks))
+    steps = [b - a for cluster in clusters for a, b in pairwise(cluster.ticks) if b > a]
     allowed = 0 if in_order or not steps else MOST_REORDERED * sorted(steps)[len(steps) // 2]
     filled = [k for k, cluster in enumerate(clusters) if cluster.ticks and not doubtful[k]]
-    for one, other in zip(filled, filled[1:], strict=False):
+    for one, other in pairwise(filled):
         if max(clusters[one].ticks) > min(clusters[other].ticks) + allowed:
             for k in (one, other):
                 doubtful[k] = doubtful[k] or not confirmed[k]

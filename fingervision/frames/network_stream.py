@@ -16,8 +16,8 @@ from fingervision.domain.status import Status
 from fingervision.frames.damage import DamageTrail, Picture
 from fingervision.frames.luma import luma
 from fingervision.frames.received import OwnPacket, Received
-from fingervision.frames.source import Description, Wish
 from fingervision.frames.sound_jpeg import SoundJpeg
+from fingervision.frames.source import Description, Wish
 from fingervision.frames.spoken_damage import STRICT, Heard, listening
 from fingervision.frames.transport_stream import TransportLosses
 

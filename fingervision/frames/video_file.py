@@ -105,6 +105,10 @@ class VideoFile:
         with self._opened() as container:
             stream = _stream(container, self.name)
             stream.codec_context.options = STRICT
+            if self.description.coding is Coding.INTERFRAME:
+                # With threads for slices FFmpeg's H.264 neither fills in nor marks what is missing in a picture
+                # (libavcodec/h264_slice.c, enable_er): parts of older pictures would stand there, unsaid.
+                stream.codec_context.thread_count = 1
             DamageTrail.prepare(stream.codec_context)
             for tick, found in believable(pictures(container, stream, Path(self.name))):
                 index = next(numbers)

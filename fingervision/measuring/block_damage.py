@@ -70,7 +70,7 @@ def _outstanding(change: Levels, picture: Levels, before: Levels, least_step: fl
 def _levelled(levels: Levels) -> Levels:
     """Size of the mean step from each column to the next along each block's height, shape (block rows, width - 1)."""
     rows = levels.reshape(levels.shape[0] // SQUARE_PX, SQUARE_PX, levels.shape[1]).mean(axis=1)
-    return np.abs(np.diff(rows, axis=1))
+    return np.asarray(np.abs(np.diff(rows, axis=1)))
 
 
 def _sized(levels: Levels) -> Levels:

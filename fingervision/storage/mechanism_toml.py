@@ -12,6 +12,7 @@ from fingervision.models.mechanism import Drive, Face, Flexure, Mechanism, check
 from fingervision.models.planar_region import Ellipse, Polygon, Shape, bar, box, crosses_itself
 from fingervision.storage.arithmetic import number
 from fingervision.storage.gripper_toml import check_material, read_material
+from fingervision.storage.plain_file import plain
 
 _TOP = (
     "schema",
@@ -39,7 +40,7 @@ _FLEXURES = {
 def is_mechanism(path: Path) -> bool:
     """Whether a TOML file draws a mechanism by bodies, and not a gripper by its template."""
     try:
-        return "body" in (tables := tomllib.loads(path.read_text(encoding="utf-8-sig"))) and isinstance(
+        return "body" in (tables := tomllib.loads(plain(path).read_text(encoding="utf-8-sig"))) and isinstance(
             tables["body"], list
         )
     except (OSError, ValueError):
@@ -55,7 +56,7 @@ def read_mechanism(path: Path) -> Mechanism:
         The file cannot be read, a key is missing, unknown or no number, or the drawing cannot be a mechanism.
     """
     try:
-        tables = tomllib.loads(path.read_text(encoding="utf-8-sig"))
+        tables = tomllib.loads(plain(path).read_text(encoding="utf-8-sig"))
     except FileNotFoundError:
         raise FingervisionError(f"There is no mechanism {path}.") from None
     except (OSError, ValueError) as error:

@@ -17,6 +17,7 @@ from fingervision.models.corrected import CorrectedModel
 from fingervision.models.kinds import kinds
 from fingervision.models.physical_gripper import PhysicalGripper
 from fingervision.storage.gripper_toml import read_gripper
+from fingervision.storage.plain_file import plain
 from fingervision.storage.simulation_table import read_simulation_table
 
 POINTS = "points"
@@ -46,13 +47,17 @@ def read_model(path: Path, kind: str = "lumped", inside: tuple[Path, ...] = ()) 
         table = read_simulation_table(path)
         return CorrectedModel(table.name, table, str(path), table.input_range_mm, {})
     try:
-        document = tomllib.loads(path.read_text(encoding="utf-8-sig"))
+        document = tomllib.loads(plain(path).read_text(encoding="utf-8-sig"))
     except FileNotFoundError:
         raise FingervisionError(f"There is no model {path}.") from None
     except (ValueError, RecursionError, OSError) as error:
         raise FingervisionError(f"{path} must be a TOML file, but could not be read: {error}.") from error
     if "base" not in document:
         return _gripper(path, kind)
+    if document.get("schema", 1) != 1:
+        raise FingervisionError(
+            f"schema in {path} must be 1, but is {document['schema']}: a newer fingervision wrote it; use that one."
+        )
     place = path.resolve()
     if place in inside:
         raise FingervisionError(f"The base of {path} must be another model, but leads back to itself: mend `base`.")

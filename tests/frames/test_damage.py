@@ -168,12 +168,15 @@ def test_frames_missing_right_at_the_start_of_a_transport_stream_are_noticed(tmp
         begins = [packet.pos for packet in container.demux(video=0) if packet.size]
 
     def lose(changed: bytearray) -> None:
-        # A multiple of sixteen packets of the stream, and of sixteen pictures: no counter tells.
-        end = next(at for at in begins[2:] if (own(changed, begins[2], at)) % 16 == 0)
-        del changed[begins[2] : end]
-
-    def own(changed: bytearray, begin: int, end: int) -> int:
-        return sum(changed[at + 1 : at + 3] == changed[begins[2] + 1 : begins[2] + 3] for at in range(begin, end, 188)) or 1
+        own = bytes(changed[begins[2] + 1 : begins[2] + 3])
+        lost = 0
+        for end in range(begins[2], len(changed), 188):
+            # Sixteen packets of the stream, or a multiple: no counter tells.
+            if lost and lost % 16 == 0 and end in begins:
+                del changed[begins[2] : end]
+                return
+            lost += bytes(changed[end + 1 : end + 3])[1:] == own[1:]
+        raise AssertionError("no such place")
 
     found, whole = nothing_wrong(path, lose)
     assert whole >= 2
@@ -194,6 +197,24 @@ def test_what_the_decoder_of_h264_says_in_its_log_alone_is_damage(tmp_path: Path
     assert whole >= 40
     assert whole < COUNT
     assert isinstance(found[-1], Frame)
+
+
+@pytest.mark.parametrize("suffix", [".mp4", ".mkv", ".avi"])
+def test_a_picture_that_calls_itself_a_key_frame_by_a_flipped_bit_heals_nothing(tmp_path: Path, suffix: str) -> None:
+    path = tmp_path / f"clip{suffix}"
+    content = coded(path, "libx264", g="30", bf="0", crf="18")
+    frames = packets(path)
+
+    def spoil(changed: bytearray) -> None:
+        begin = content.index(frames[5])
+        changed[begin + len(frames[5]) // 2 : begin + len(frames[5]) // 2 + 24] = bytes(24)
+        begin = content.index(frames[9])
+        # A slice's first byte is its kind: 1 of a picture that hangs on others, 5 of one that does not.
+        assert changed[begin + 4] & 0x1F == 1
+        changed[begin + 4] ^= 4
+
+    _, whole = nothing_wrong(path, spoil)
+    assert whole >= 30
 
 
 @pytest.mark.parametrize("frame", [24, 38, 39, 40, 41])
