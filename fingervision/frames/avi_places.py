@@ -102,7 +102,7 @@ class AviPlaces:
         return number
 
     def _counted(self, begin: int) -> int | None:
-        """Go from chunk to chunk; a picture of no bytes stands for a frame that the camera dropped."""
+        """Go from chunk to chunk; each picture on the way is a frame: one that the camera dropped, or the reader."""
         if self._end is None:
             return None
         at, number = self._end, self._number + 1
@@ -117,7 +117,7 @@ class AviPlaces:
                 (length,) = struct.unpack("<I", header[4:])
                 if header[:4] == b"LIST":
                     length = 4  # its kind; what is in it follows
-                elif header[:2] == self._tag and header[2:4] in KINDS and length == 0:
+                elif header[:2] == self._tag and header[2:4] in KINDS:
                     number += 1
                 at += HEADER_BYTES + length + length % 2
         return None

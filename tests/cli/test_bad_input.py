@@ -2,7 +2,7 @@
 
 import os
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -87,7 +87,7 @@ Refused = Callable[..., tuple[int, str]]
 
 
 @pytest.fixture
-def refused(folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Iterator[Refused]:
+def refused(folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Refused:
     monkeypatch.chdir(folder)
 
     def command(*arguments: str) -> tuple[int, str]:
@@ -96,7 +96,7 @@ def refused(folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.Captur
             main()
         return int(ended.value.code or 0), capsys.readouterr().err
 
-    yield command
+    return command
 
 
 def diagnose(measured: str, model: str = "sim.csv", *more: str) -> tuple[str, ...]:

@@ -10,6 +10,7 @@ import pytest
 from numpy.typing import NDArray
 
 from fingervision.domain.frame import Frame, LostFrame
+from fingervision.frames.avi_places import AviPlaces
 from fingervision.frames.source import open_source
 from fingervision.frames.told_times import EvenRow, believable
 
@@ -159,6 +160,19 @@ def test_a_name_that_is_damaged_in_the_index_moves_no_frame(tmp_path: Path) -> N
 
     _, whole = nothing_wrong(path, change)
     assert whole >= COUNT - 3
+
+
+@pytest.mark.parametrize("first", [0, 20])
+def test_frames_that_the_reader_skips_in_an_avi_without_index_are_counted(tmp_path: Path, first: int) -> None:
+    path = tmp_path / "clip.avi"
+    content = coded(path, "mjpeg")
+    frames = packets(path)
+    path.write_bytes(content[: content.rindex(b"idx1")])
+    places = AviPlaces(path, 0, 1)
+    begins = [content.index(frame) for frame in frames]
+    assert [places.number(begins[k], len(frames[k])) for k in range(first)] == list(range(first))
+    # The reader finds its way again three frames on; all chunks between are whole.
+    assert places.number(begins[first + 3], len(frames[first + 3])) == first + 3
 
 
 def test_frames_missing_right_at_the_start_of_a_transport_stream_are_noticed(tmp_path: Path) -> None:
