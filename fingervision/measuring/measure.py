@@ -8,10 +8,11 @@ from time import monotonic
 from typing import Any
 
 from fingervision.domain.errors import ExitCode, FingervisionError, UsageError
-from fingervision.domain.frame import Frame, LostFrame
+from fingervision.domain.frame import Coding, Frame, LostFrame
 from fingervision.domain.gap import GapMeasurement, NoGap
 from fingervision.domain.status import Status
 from fingervision.frames.ahead import decoded_ahead
+from fingervision.frames.camera_settings import coding_of
 from fingervision.frames.source import FrameSource
 from fingervision.measuring.asked_to_stop import asked_to_stop
 from fingervision.measuring.gap_figure import draw_gap
@@ -24,7 +25,7 @@ from fingervision.measuring.series import GapSeries
 from fingervision.measuring.sound_picture import SoundPictures
 from fingervision.measuring.step_pictures import write_steps
 from fingervision.measuring.summary import summarise
-from fingervision.measuring.task import Task, check, in_words
+from fingervision.measuring.task import Task, check_task, in_words
 from fingervision.storage.folder_lock import FolderLock
 from fingervision.storage.gaps_csv import GapsCsv
 from fingervision.storage.lost_frames import lost_frames
@@ -100,7 +101,7 @@ def measure(source: FrameSource, task: Task, out: Path, on_progress: Progress | 
             f"measure needs a recording, which ends, but {source.description.name} is a camera, which does not: record "
             f"it with `fingervision live {source.description.name} --no-page --out runs`."
         )
-    check(task, source.description)
+    check_task(task, source.description)
     with _held(out):
         return _measured(source, task, out, on_progress)
 
@@ -109,6 +110,10 @@ def _measured(source: FrameSource, task: Task, out: Path, on_progress: Progress 
     description = source.description
     if words := other_camera(task.scale, recorded_camera(description.files)):
         description = replace(description, notes=(words, *description.notes))
+    # What is stored without loss may have come compressed from the camera.
+    coding = coding_of(recorded_camera(description.files))
+    if coding is not Coding.LOSSLESS and not description.lossy:
+        description = replace(description, coding=coding)
     settings, words = task.settings_for(description.files)
     if words:
         description = replace(description, notes=(words, *description.notes))
@@ -137,7 +142,7 @@ def _measured(source: FrameSource, task: Task, out: Path, on_progress: Progress 
         stack.callback(hand_over)
         handed_over_at = monotonic()
         try:
-            for item, outcome in _outcomes(marked(source, marks) if marks else source, settings):
+            for item, outcome in _outcomes(marked(source, marks) if marks else source, settings, description.coding):
                 result = Result(item.index, item.time_s, outcome)
                 pending.append(result)
                 if video is not None and isinstance(item, Frame):
@@ -186,13 +191,15 @@ def _held(out: Path) -> Iterator[None]:
 
 
 def _outcomes(
-    source: Iterable[Frame | LostFrame], settings: Settings
+    source: Iterable[Frame | LostFrame], settings: Settings, coding: Coding
 ) -> Iterator[tuple[Frame | LostFrame, GapMeasurement | NoGap | LostFrame]]:
     """Every frame with what it says; the decoder runs ahead and is stopped when this is."""
     pictures = SoundPictures()
     with closing(decoded_ahead(source)) as frames:
         for item in frames:
-            if isinstance(item, Frame):
-                yield item, pictures.judged(item, measure_frame(item, settings))
-            else:
+            if isinstance(item, LostFrame):
                 yield item, item
+                continue
+            if item.coding is Coding.LOSSLESS and coding is not Coding.LOSSLESS:
+                item = replace(item, coding=coding)
+            yield item, pictures.judged(item, measure_frame(item, settings))

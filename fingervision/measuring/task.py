@@ -45,6 +45,8 @@ class Task:
         Depth of levels that are stored in 16 bits; None finds it in every frame.
     fingers_are_dark : bool or None
         Whether the fingers are darker than the ground; None finds out in every frame.
+    is_outline : bool
+        Whether a thick part is measured at its whole outline, side walls included, and not at its front face.
     """
 
     scale: Scale
@@ -59,6 +61,7 @@ class Task:
     response: CameraResponse | None = None
     bits: int | None = None
     fingers_are_dark: bool | None = None
+    is_outline: bool = False
 
     def __post_init__(self) -> None:
         if not 0.0 < self.below_tip_mm < float("inf"):
@@ -77,7 +80,16 @@ class Task:
         """What vision needs of it for a recording of these files, and a warning where there is one."""
         response, other, words = choose_response(self.response, self.scale, files)
         below_px = self.below_tip_mm * self.scale.px_per_mm
-        settings = Settings(below_px, self.direction, self.region, response, other, self.bits, self.fingers_are_dark)
+        settings = Settings(
+            below_px,
+            self.direction,
+            self.region,
+            response,
+            other,
+            self.bits,
+            self.fingers_are_dark,
+            self.is_outline,
+        )
         return settings, words
 
     @property
@@ -88,7 +100,7 @@ class Task:
         return ("run", "input_mm") if self.drive.force_n is None else ("run", "input_mm", "force_n")
 
 
-def check(task: Task, description: Description) -> None:
+def check_task(task: Task, description: Description) -> None:
     """Refuse what cannot be meant for these frames.
 
     Parameters
@@ -141,6 +153,7 @@ def in_words(task: Task, settings: Settings) -> dict[str, Any]:
         "response_known": settings.other_response is None,
         "bits": task.bits,
         "fingers": {None: "auto", True: "dark", False: "light"}[task.fingers_are_dark],
+        "face": "outline" if task.is_outline else "front",
         "drive": task.drive is not None,
         "drive_offset_s": task.drive_offset_s if task.drive is not None else None,
     }

@@ -117,6 +117,7 @@ def no_value_is_left(page: Any, status: str) -> None:
     assert box["y"] + box["height"] <= page.viewport_size["height"]
 
 
+@pytest.mark.slow
 def test_the_page_shows_records_and_saves(
     live: Callable[..., Any], opened: Callable[..., Any], measured: Callable[..., str]
 ) -> None:
@@ -326,6 +327,7 @@ def test_a_cut_is_said_within_a_second_and_measuring_resumes(
     shown(page, "document.querySelector('#alarm').hidden && Number(document.querySelector('#gap_mm').textContent) > 0")
 
 
+@pytest.mark.slow
 def test_a_recording_that_ends_by_itself_is_in_view(
     live: Callable[..., Any], opened: Callable[..., Any], tmp_path: Path
 ) -> None:
@@ -356,6 +358,7 @@ def test_a_recording_that_ends_by_itself_is_in_view(
         subprocess.run(["umount", "-l", str(disk)], check=True)
 
 
+@pytest.mark.slow
 def test_a_zeroed_value_says_so_and_its_tolerance_and_table_agree(
     live: Callable[..., Any], opened: Callable[..., Any]
 ) -> None:
@@ -375,6 +378,7 @@ def test_a_zeroed_value_says_so_and_its_tolerance_and_table_agree(
     shown(page, "document.querySelector('#zeroed').hidden")
 
 
+@pytest.mark.slow
 def test_strangers_are_refused(live: Callable[..., Any], browser: Any) -> None:
     view = live("simulated", "--port", "0")
     address = view.address

@@ -47,7 +47,7 @@ def wrong_level(levels: np.ndarray) -> None:
 
 def band(levels: np.ndarray) -> None:
     # The mean level of a square is coded as a difference to the one before it: all behind a wrong one are off.
-    levels[64:80, 128:] = np.clip(levels[64:80, 128:].astype(int) - 60, 0, 255)
+    levels[56:88, 128:] = np.clip(levels[56:88, 128:].astype(int) - 90, 0, 255)
 
 
 @pytest.mark.parametrize("damage", [wrong_level, band])
