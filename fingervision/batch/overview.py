@@ -54,8 +54,8 @@ def table_text(out: Path, reduction: Reduction, outcomes: Sequence[Outcome]) -> 
         cells = outcome.digest.cells if outcome.digest is not None else {}
         result = "" if outcome.folder is None else outcome.folder.name
         line: list[Cell] = [outcome.input, result, outcome.exit_code, outcome.words]
-        line += [_shown(cells.get(name)) for name in reduction.COLUMNS]
-        line = [_no_formula(one) for one in line]
+        line += [cells.get(name) for name in reduction.COLUMNS]
+        line = [_shown(_no_formula(one)) for one in line]  # a negative number is no formula
         writer.writerow([*line, f"{outcome.seconds:.3f}" if outcome.folder is not None else ""])
     return text.getvalue()
 

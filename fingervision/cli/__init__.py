@@ -7,12 +7,13 @@ import pkgutil
 import signal
 import sys
 from contextlib import suppress
+from pathlib import Path
 from typing import NoReturn
 
 import click
 
 from fingervision import __version__
-from fingervision.domain.errors import ExitCode, FingervisionError
+from fingervision.domain.errors import ExitCode, FingervisionError, UsageError
 
 
 class Commands(click.Group):
@@ -20,6 +21,16 @@ class Commands(click.Group):
 
     The module holds it as `command` and imports nothing heavy at its top, so that `--help` stays fast.
     """
+
+    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
+        """Refuse empty names: a path that is empty would be the current folder."""
+        for number, argument in enumerate(args, start=1):
+            if argument == "" or (argument.startswith("--") and argument.endswith("=")):
+                raise UsageError(
+                    f"A file, folder or value must have a name, but it is empty (argument {number}"
+                    f"{', ' + argument if argument else ''}): give one, or leave the option out."
+                )
+        return super().parse_args(ctx, args)
 
     def list_commands(self, ctx: click.Context) -> list[str]:
         """Names of the commands, sorted."""
@@ -47,6 +58,11 @@ def main() -> None:
         signal.signal(signal.SIGTERM, signal.default_int_handler)
     _mend_streams()
     try:
+        Path.cwd()
+    except FileNotFoundError:
+        click.echo("fingervision: The current folder is not there any more: go to one that is.", err=True)
+        sys.exit(ExitCode.COULD_NOT)
+    try:
         cli(standalone_mode=True)
     except FingervisionError as error:
         click.echo(f"fingervision: {error}", err=True)
@@ -63,6 +79,11 @@ def main() -> None:
         click.echo(f"fingervision: A link leads back to itself ({error}): name a real file or folder.", err=True)
         sys.exit(ExitCode.COULD_NOT)
     except OSError as error:
+        if error.errno == errno.ENAMETOOLONG:
+            click.echo(
+                "fingervision: A name must be one that the system can hold, but is too long: shorten it.", err=True
+            )
+            sys.exit(ExitCode.COULD_NOT)
         # Files are their writers' to speak of; what has no name is standard output.
         if error.filename is not None or error.errno not in (errno.ENOSPC, errno.EIO, errno.EPIPE):
             raise

@@ -145,23 +145,25 @@ def _options_key(name: str, given: Mapping[click.Option, Any]) -> str:
     return hashlib.sha256(json.dumps([name, __version__, held], sort_keys=True).encode()).hexdigest()
 
 
-def _content(path: Path) -> str:
+def _content(path: Path, inside: tuple[Path, ...] = ()) -> str:
     """Hash of a file, and of the files that a corrected model rests on."""
     import hashlib
     import tomllib
 
     from fingervision.batch.fingerprint import content_hash
+    from fingervision.storage.plain_file import plain
 
     try:
-        found = content_hash(path)
+        found = content_hash(plain(path))
         base = tomllib.loads(path.read_text(encoding="utf-8")).get("base") if path.suffix.lower() == ".toml" else None
     except FileNotFoundError:
         raise FingervisionError(f"There is no file {path}: check the options.") from None
     except (OSError, ValueError) as error:
         raise FingervisionError(f"{path} could not be read ({error}): check the options.") from error
-    if base is None or path.parent / str(base) == path:
-        return found
-    return hashlib.sha256(f"{found}\n{_content(path.parent / str(base))}".encode()).hexdigest()
+    place = path.resolve()
+    if base is None or (path.parent / str(base)).resolve() in (*inside, place):
+        return found  # a model that rests on itself is said where it is read
+    return hashlib.sha256(f"{found}\n{_content(path.parent / str(base), (*inside, place))}".encode()).hexdigest()
 
 
 def _check_options(name: str, arguments: tuple[str, ...], ask: "Perform") -> None:

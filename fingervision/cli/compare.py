@@ -27,7 +27,7 @@ Files written to --out:
 @click.argument("measured", type=click.Path(path_type=Path))
 @models_option
 @click.option("--out", type=click.Path(path_type=Path, file_okay=False), default=Path("comparison"), show_default=True)
-@click.option("--seed", default=1, show_default=True, help="Of the bootstrapped threshold.")
+@click.option("--seed", type=click.IntRange(0), default=1, show_default=True, help="Of the bootstrapped threshold.")
 @kind_option
 @columns_option
 @click.option("--json", "as_json", is_flag=True, help="Print compare.json.")

@@ -31,7 +31,13 @@ Files written to --out:
 @click.option("--out", type=click.Path(path_type=Path, file_okay=False), default=Path("diagnosis"), show_default=True)
 @click.option("--with", "forced", multiple=True, metavar="EFFECT", help="Insist on this effect.")
 @click.option("--without", multiple=True, metavar="EFFECT", help="Rule this effect out.")
-@click.option("--seed", default=1, show_default=True, help="Of the bootstrap: the same seed gives the same report.")
+@click.option(
+    "--seed",
+    type=click.IntRange(0),
+    default=1,
+    show_default=True,
+    help="Of the bootstrap: the same seed gives the same report.",
+)
 @kind_option
 @columns_option
 @click.option("--json", "as_json", is_flag=True, help="Print report.json.")

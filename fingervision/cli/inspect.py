@@ -77,7 +77,7 @@ def command(
     from fingervision.inspection.frames_to_look_at import frames_to_look_at
     from fingervision.inspection.picture import draw_inspection
     from fingervision.inspection.sample import take_sample
-    from fingervision.measuring.measure import Task, check_task
+    from fingervision.measuring.task import Task, check_task
     from fingervision.storage.calibration_json import read_calibration
     from fingervision.storage.response_csv import response_named
 

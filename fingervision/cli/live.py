@@ -116,6 +116,7 @@ def _choices(
     from fingervision.domain.direction import Direction
     from fingervision.frames import simulated
     from fingervision.live.choices import Choices
+    from fingervision.measuring.scale import check_px_per_mm
     from fingervision.storage.calibration_json import read_calibration
 
     if calibration is not None and px_per_mm is not None:
@@ -124,6 +125,8 @@ def _choices(
     stated = own if px_per_mm is None else px_per_mm
     if stated is not None and not 0.0 < stated < float("inf"):
         raise UsageError(f"--px-per-mm must be positive, but is {stated:g}.")
+    if stated is not None:
+        check_px_per_mm(stated)
     scale = None if calibration is None else read_calibration(calibration)
     return Choices(
         scale=scale or (None if stated is None else BareScale(stated)),

@@ -113,7 +113,8 @@ def command(
     """
     from fingervision.domain.direction import Direction
     from fingervision.frames.source import Wish, open_source
-    from fingervision.measuring.measure import Task, measure
+    from fingervision.measuring.measure import measure
+    from fingervision.measuring.task import Task
     from fingervision.storage.response_csv import response_named
     from fingervision.storage.summary_json import refuse_other_recording
     from fingervision.tables.read import read_drive
@@ -144,6 +145,7 @@ def command(
 
 def _scale(calibration: Path | None, px_per_mm: float | None) -> "Scale":
     from calib.calibration import BareScale
+    from fingervision.measuring.scale import check_px_per_mm
     from fingervision.storage.calibration_json import read_calibration
 
     if calibration is not None and px_per_mm is not None:
@@ -156,9 +158,11 @@ def _scale(calibration: Path | None, px_per_mm: float | None) -> "Scale":
             "or --px-per-mm S."
         )
     try:
-        return BareScale(px_per_mm)
+        scale = BareScale(px_per_mm)
     except ValueError as error:
         raise UsageError(f"--px-per-mm must be positive, but is {px_per_mm:g}.") from error
+    check_px_per_mm(px_per_mm)
+    return scale
 
 
 def _default_out(recording: str) -> Path:

@@ -37,12 +37,15 @@ class Frame:
         Presentation time of the source; None where the source has no times.
     coding : Coding
         Whether a lossy codec stood between the sensor and these pixels: their errors are then correlated.
+    hangs_on_others : bool
+        Whether the picture is coded as a difference to others.
     """
 
     pixels: Pixels
     index: int
     time_s: float | None = None
     coding: Coding = Coding.LOSSLESS
+    hangs_on_others: bool = False
 
     @property
     def lossy(self) -> bool:

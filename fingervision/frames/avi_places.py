@@ -2,9 +2,10 @@
 
 A reader that loses a frame in a damaged place counts on as if there had been none, and every frame after it is too
 early. The file's own index (idx1) says where each frame lies, so a packet that lies where the index says is that frame,
-whatever was lost before it. Where bytes are missing, all behind them lies nearer to the front; packets whose lengths,
-one after the other, occur only once in the rest of the index are those frames. Without an index, or where
-it does not say, frames are counted as long as one chunk follows another without a hole.
+whatever was lost before it. Where bytes are missing, what follows lies nearer to the front, not more than the index is;
+packets whose lengths, one after the other, occur only once in the rest of the index are those frames. Where no byte is
+missing, a packet that lies elsewhere than the index says was never written: its header is damaged. Without an index, or
+where it does not say, frames are counted as long as one chunk follows another without a hole.
 
 Source: Microsoft, AVI RIFF File Reference (chunks, LIST, idx1).
 """
@@ -36,13 +37,15 @@ class AviPlaces:
         The file.
     stream : int
         Number of the video stream in it.
+    streams : int
+        How many streams the file has.
     """
 
-    def __init__(self, path: Path, stream: int) -> None:
+    def __init__(self, path: Path, stream: int, streams: int) -> None:
         self._path, self._tag = path, b"%02d" % stream
         with path.open("rb") as file:
             begin = file.read(HEAD_BYTES).find(b"movi")
-            self._offsets, self._sizes = _index(file, self._tag, begin)
+            self._offsets, self._sizes, self._most_missing = _index(file, self._tag, begin, streams)
         self.after_hole = False
         """Whether bytes are missing between the beginnings of the last two packets: the first may be hurt itself."""
         self._by_offset = {int(offset): number for number, offset in enumerate(self._offsets)}
@@ -88,8 +91,9 @@ class AviPlaces:
             possible = possible[possible < len(self._sizes)]
         else:
             possible = np.arange(self._number + 1, len(self._sizes))
-        # What is missing makes everything behind it lie nearer to the front, never farther.
-        alike = (self._sizes[possible] == size) & (self._offsets[possible] >= begin + self._missing)
+        # What is missing makes all behind it lie nearer to the front, never farther, and never by more than the end.
+        nearer = self._offsets[possible] - begin
+        alike = (self._sizes[possible] == size) & (nearer >= self._missing) & (nearer <= self._most_missing)
         self._possible = possible[alike]
         if len(self._possible) != 1:
             return None
@@ -98,7 +102,7 @@ class AviPlaces:
         return number
 
     def _counted(self, begin: int) -> int | None:
-        """Go from chunk to chunk; a picture of no bytes stands for a frame that the camera dropped."""
+        """Go from chunk to chunk; each picture on the way is a frame: one that the camera dropped, or the reader."""
         if self._end is None:
             return None
         at, number = self._end, self._number + 1
@@ -113,14 +117,14 @@ class AviPlaces:
                 (length,) = struct.unpack("<I", header[4:])
                 if header[:4] == b"LIST":
                     length = 4  # its kind; what is in it follows
-                elif header[:2] == self._tag and header[2:4] in KINDS and length == 0:
+                elif header[:2] == self._tag and header[2:4] in KINDS:
                     number += 1
                 at += HEADER_BYTES + length + length % 2
         return None
 
 
-def _index(file: BinaryIO, tag: bytes, begin: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Read where each frame's chunk begins, and how long it is; nothing where there is no index."""
+def _index(file: BinaryIO, tag: bytes, begin: int, streams: int) -> tuple[NDArray[np.int64], NDArray[np.int64], int]:
+    """Read where each frame's chunk begins, how long it is, and how many bytes are missing before the index."""
     end = file.seek(0, 2)
     start = max(0, end - TAIL_BYTES)
     file.seek(start)
@@ -128,17 +132,24 @@ def _index(file: BinaryIO, tag: bytes, begin: int) -> tuple[NDArray[np.int64], N
     at = tail.rfind(b"idx1")
     nothing = np.zeros(0, np.int64)
     if at < 0 or begin < 0:
-        return nothing, nothing
+        return nothing, nothing, 0
     stated = int.from_bytes(tail[at + 4 : at + 8], "little")
     count = min(stated, len(tail) - at - 8) // ENTRY.itemsize
     entries = np.frombuffer(tail, ENTRY, count, at + 8)
     if not all(map(KNOWN_CHUNK.fullmatch, entries["id"].tolist())) or np.any(
         np.diff(entries["offset"].astype(int)) <= 0
     ):
-        return nothing, nothing  # a damaged index would tell wrong numbers
-    chosen = entries[np.isin(entries["id"], [tag + kind for kind in KINDS])]
-    offsets = chosen["offset"].astype(np.int64)
+        return nothing, nothing, 0  # a damaged index would tell wrong numbers
+    is_chunk = np.array([name[:2].isdigit() for name in entries["id"].tolist()], dtype=bool)
+    if streams == 1:
+        chosen = entries[is_chunk]  # one whose name is damaged is a frame all the same
+    elif all(int(name[:2]) < streams for name in entries["id"][is_chunk].tolist()):
+        chosen = entries[np.isin(entries["id"], [tag + kind for kind in KINDS])]
+    else:
+        return nothing, nothing, 0
+    offsets, sizes = chosen["offset"].astype(np.int64), chosen["size"].astype(np.int64)
     # Offsets count from the word `movi`; some programs count from the beginning of the file.
-    if len(offsets) and offsets[0] < begin:
-        offsets = offsets + begin
-    return offsets, chosen["size"].astype(np.int64)
+    base = begin if len(offsets) and offsets[0] < begin else 0
+    ends = entries["offset"].astype(np.int64) + base + HEADER_BYTES + entries["size"] + entries["size"] % 2
+    most_missing = max(0, int(ends[-1]) - (start + at)) if len(ends) else 0
+    return offsets + base, sizes, most_missing

@@ -25,6 +25,7 @@ class DamageTrail:
         self._entered: list[tuple[int, int]] = []  # (tick, number in coded order) of packets whose picture is awaited
         self._last = -1
         self._broken: dict[int, str] = {}  # why, by number in coded order, until a sound key frame comes after it
+        self._stated_keys: set[int] = set()  # numbers of packets that the container calls key frames
         self._given_up: set[int] = set()  # ticks of lost pictures since the damage
 
     @staticmethod
@@ -36,6 +37,8 @@ class DamageTrail:
         """Note a packet that goes into the decoder."""
         self._last = next(self._numbers)
         packet.opaque = self._last
+        if packet.is_keyframe and self._broken:
+            self._stated_keys.add(self._last)
         if packet.is_corrupt:
             self.breaks("It is incomplete in the file.")
         if packet.pts is not None and not packet.is_discard:
@@ -80,10 +83,12 @@ class DamageTrail:
                 yield early, self._words(early_number)
         if picture.is_corrupt:
             self._broken.setdefault(number, "It was decoded with errors.")
-        if picture.key_frame and number not in self._broken:
+        # One flipped bit makes a picture call itself a key frame: the container must say so too.
+        if picture.key_frame and number in self._stated_keys and number not in self._broken:
             self._broken = {broken: why for broken, why in self._broken.items() if broken > number}
         if not self._broken:
             self._given_up.clear()
+            self._stated_keys.clear()
         yield tick, self._words(number) if self._hangs_on_damage(number) else picture
 
     def rest(self) -> Iterator[Picture]:

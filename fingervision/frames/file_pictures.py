@@ -1,6 +1,7 @@
 """Pictures of an open video file, in order; what is broken, missing, or hangs on that, is said instead."""
 
 from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -9,10 +10,17 @@ import av
 from fingervision.frames.avi_places import AviPlaces
 from fingervision.frames.cut_off import cut_off
 from fingervision.frames.damage import DamageTrail, Picture
+from fingervision.frames.matroska_times import ClusterTimes
+from fingervision.frames.sound_jpeg import SoundJpeg
 from fingervision.frames.spoken_damage import Heard, listening
 from fingervision.frames.transport_stream import TransportLosses
 
 MISSING = "Bytes are damaged or missing in the file"
+NO_COUNT = f"{MISSING} here. AVI counts frames to tell the time, so the time of those behind is not known."
+NO_CLUSTER = (
+    "The time that the file states for the next frames (a Matroska cluster) is damaged: it does not fit the file's "
+    "index, or the frames around it, so their time is not known."
+)
 
 
 def pictures(container: av.container.InputContainer, stream: av.VideoStream, path: Path) -> Iterator[Picture]:
@@ -32,8 +40,10 @@ def pictures(container: av.container.InputContainer, stream: av.VideoStream, pat
     """
     trail = DamageTrail()
     packets, last_end_s, at_end = 0, None, ""
-    losses = TransportLosses(container.format.name)
+    losses = TransportLosses(container.format.name, stream)
     with listening(stream.codec_context.name) as heard:
+        jpegs = SoundJpeg(stream.codec_context.name)
+        jpegs.learn(_first_packets(path, stream))
         for read in _read(container, stream, path, heard):
             packet = read.packet
             yield from _before(read, trail)
@@ -48,7 +58,7 @@ def pictures(container: av.container.InputContainer, stream: av.VideoStream, pat
             at_end = at_end or read.at_end
             if read.hole:
                 trail.breaks(f"{MISSING} behind it ({read.hole}).")
-            yield from _decoded(packet, trail, heard)
+            yield from _decoded(packet, trail, heard, jpegs)
             if read.hole and not read.is_placed:
                 trail.hole(f"{MISSING} before it ({read.hole}).")
                 yield None, f"{MISSING} ({read.hole}); frames may be missing here."
@@ -72,8 +82,8 @@ class _Read:
         With the time of the frame that it is.
     missing : tuple of int
         Ticks of frames that are missing before it.
-    loses_count : bool
-        Whether from here on nothing tells which frame is which.
+    loses_time : str
+        Why from here on nothing tells when a frame was taken; empty where something does, or that was said before.
     is_placed : bool
         Whether places tell what is missing.
     hole : str
@@ -86,7 +96,7 @@ class _Read:
 
     packet: "av.Packet[av.VideoStream]"
     missing: tuple[int, ...]
-    loses_count: bool
+    loses_time: str
     is_placed: bool
     hole: str = ""
     end: str = ""
@@ -96,7 +106,9 @@ class _Read:
 def _read(container: av.container.InputContainer, stream: av.VideoStream, path: Path, heard: Heard) -> Iterator[_Read]:
     """Packets, one behind the one that is read: a hole is noticed by what comes behind it."""
     demuxed = container.demux(stream)
-    places = AviPlaces(path, stream.index) if container.format.name == "avi" else None
+    places = AviPlaces(path, stream.index, len(container.streams)) if container.format.name == "avi" else None
+    clusters = ClusterTimes(path, stream.index) if "matroska" in container.format.name else None
+    is_doubtful = False
     before: _Read | None = None
     while True:
         end, packet = "", None
@@ -109,34 +121,52 @@ def _read(container: av.container.InputContainer, stream: av.VideoStream, path: 
             end = "The file cannot be read any further (it announces another stream on the way)."
         hole = heard.of_file()
         missing: tuple[int, ...] = ()
-        loses_count = False
+        loses_time = ""
         if places is not None and packet is not None and packet.size and packet.dts is not None and packet.pos:
             was_lost = places.is_lost
             number = places.number(packet.pos, packet.size)
-            missing, loses_count = places.missing, places.is_lost and not was_lost
+            missing, loses_time = places.missing, NO_COUNT if places.is_lost and not was_lost else ""
             hole = "another chunk was expected" if places.after_hole and not was_lost else ""
             if number is None:
                 packet.pts = packet.dts = None
             else:
                 packet.pts, packet.dts = None if packet.pts is None else packet.pts + number - packet.dts, number
+        if clusters is not None and packet is not None and packet.size:
+            was_doubtful, is_doubtful = is_doubtful, clusters.is_doubtful(packet.pos)
+            loses_time = NO_CLUSTER if is_doubtful and not was_doubtful else ""
+            if is_doubtful:
+                packet.pts = packet.dts = None
         if before is not None:
             is_last = (packet is None or not packet.size) and not end
             yield replace(before, hole="" if is_last else hole, end=end, at_end=hole if is_last else "")
         if packet is None:
             return
-        before = _Read(packet, missing, loses_count, places is not None)
+        before = _Read(packet, missing, loses_time, places is not None)
 
 
 def _before(read: _Read, trail: DamageTrail) -> Iterator[Picture]:
     """Say what is missing before a packet."""
-    if read.loses_count:
-        trail.hole(f"{MISSING} before it.")
-        yield None, f"{MISSING} here. AVI counts frames to tell the time, so the time of those behind is not known."
+    if read.loses_time:
+        if read.is_placed:
+            trail.hole(f"{MISSING} before it.")
+        yield None, read.loses_time
     for tick in read.missing:
         trail.lost(tick, f"{MISSING}, and this frame with them.")
 
 
-def _decoded(packet: "av.Packet[av.VideoStream]", trail: DamageTrail, heard: Heard) -> Iterator[Picture]:
+def _first_packets(path: Path, stream: av.VideoStream) -> Iterator[bytes]:
+    with suppress(av.FFmpegError, IndexError, OSError), av.open(f"file:{path}") as container:
+        for packet in container.demux(container.streams[stream.index]):
+            if packet.size:
+                yield bytes(packet)
+
+
+def _decoded(
+    packet: "av.Packet[av.VideoStream]", trail: DamageTrail, heard: Heard, jpegs: SoundJpeg
+) -> Iterator[Picture]:
+    fault = jpegs.fault(bytes(packet)) if packet.size else ""
+    if fault:
+        trail.breaks(f"It is damaged in the file ({fault}).")
     try:
         decoded = packet.decode()
     except av.FFmpegError as error:
@@ -148,20 +178,3 @@ def _decoded(packet: "av.Packet[av.VideoStream]", trail: DamageTrail, heard: Hea
         trail.breaks(f"It is damaged in the file ({said}).")
     for picture in decoded:
         yield from trail.leaves(picture)
-
-
-def _placed(packet: "av.Packet[av.VideoStream]", places: AviPlaces, trail: DamageTrail) -> Iterator[Picture]:
-    """Give a packet of an AVI file the time of the frame that it is, after the frames that are missing before it."""
-    if packet.dts is None or packet.pos is None:
-        return
-    was_lost = places.is_lost
-    number = places.number(packet.pos, packet.size)
-    if number is None:
-        if not was_lost:
-            trail.hole(f"{MISSING} before it.")
-            yield None, f"{MISSING} here. AVI counts frames to tell the time, so the time of those behind is not known."
-        packet.pts = packet.dts = None
-        return
-    for missing in places.missing:
-        trail.lost(missing, f"{MISSING}, and this frame with them.")
-    packet.pts, packet.dts = None if packet.pts is None else packet.pts + number - packet.dts, number

@@ -16,6 +16,7 @@ from fingervision.domain.status import Status
 from fingervision.frames.damage import DamageTrail, Picture
 from fingervision.frames.luma import luma
 from fingervision.frames.received import OwnPacket, Received
+from fingervision.frames.sound_jpeg import SoundJpeg
 from fingervision.frames.source import Description, Wish
 from fingervision.frames.spoken_damage import STRICT, Heard, listening
 from fingervision.frames.transport_stream import TransportLosses
@@ -108,6 +109,7 @@ class NetworkStream:
         if codec.width < 1 or codec.height < 1:
             self._container.close()
             raise FingervisionError(f"The stream {self.name} must say how large its pictures are, but does not.")
+        self._jpegs = SoundJpeg(codec.name)
         self.has_own_clock = self._container.format.name not in WITHOUT_TIMES
         self._closed = Event()
         coding = Coding.INTRAFRAME if codec.name in INTRAFRAME_CODECS else Coding.INTERFRAME
@@ -133,7 +135,7 @@ class NetworkStream:
     def received(self) -> Iterator[Received]:
         """Frames with the packets that they came in."""
         numbers, trail = count(), DamageTrail()
-        losses = TransportLosses(self._container.format.name)
+        losses = TransportLosses(self._container.format.name, self._stream)
         last_s: float | None = None
         waiting: list[OwnPacket] = []
         try:
@@ -174,6 +176,8 @@ class NetworkStream:
         return f"The stream {self.name} is cut off ({why})."
 
     def _decoded(self, packet: "av.Packet[av.VideoStream]", trail: DamageTrail, heard: Heard) -> Iterator[Picture]:
+        if packet.size and (fault := self._jpegs.fault(bytes(packet))):
+            trail.breaks(f"It arrived damaged ({fault}).")
         try:
             pictures = packet.decode()
         except av.FFmpegError as error:
@@ -199,7 +203,7 @@ class NetworkStream:
             return LostFrame(index, time_s, Status.DAMAGED, words)
         if time_s == last_s:
             return LostFrame(index, time_s, Status.DUPLICATE, "It has the same time as the frame before.")
-        return Frame(luma(found), index, time_s, self.description.coding)
+        return Frame(luma(found), index, time_s, self.description.coding, not found.key_frame)
 
     def _own(self, packet: "av.Packet[av.VideoStream]", arrived_s: float) -> OwnPacket:
         shown_s = self._time_s(packet.pts, arrived_s)

@@ -69,10 +69,16 @@ class EvenRow:
     """Notices frames that are missing in a row of even steps, in the order of decoding.
 
     For formats that are broadcast (MPEG-TS): their encoders keep an even rate, and what is missing was lost on the way.
+
+    Parameters
+    ----------
+    stated_step : float or None
+        Ticks between two frames, where the stream states a rate: believed from the first step that keeps it.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, stated_step: float | None = None) -> None:
         self._steps: deque[int] = deque(maxlen=EVEN_STEPS)
+        self._stated = stated_step
         self._last: int | None = None
 
     def leaps(self, tick: int) -> bool:
@@ -83,6 +89,8 @@ class EvenRow:
             return False
         usual, often = Counter(self._steps).most_common(1)[0] if self._steps else (0, 0)
         self._steps.append(step)
+        if often < EVEN_STEPS // 2 and self._stated is not None and abs(usual - self._stated) <= TICKS:
+            often = EVEN_STEPS
         return often >= EVEN_STEPS // 2 and step > usual + TICKS
 
 

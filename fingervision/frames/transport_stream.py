@@ -15,11 +15,14 @@ class TransportLosses:
     ----------
     container_format : str
         FFmpeg's name.
+    stream : av.VideoStream
+        The rate that it states is believed from the first two frames that keep it: a loss may come right at the start.
     """
 
-    def __init__(self, container_format: str) -> None:
+    def __init__(self, container_format: str, stream: av.VideoStream) -> None:
         self._is_one = container_format == "mpegts"
-        self._row = EvenRow()
+        rate, tick_s = stream.codec_context.framerate, stream.time_base
+        self._row = EvenRow(float(1 / (rate * tick_s)) if rate and tick_s else None)
         self._was_corrupt = False
 
     def before(self, packet: "av.Packet[av.VideoStream]", trail: DamageTrail) -> str:

@@ -105,6 +105,10 @@ class VideoFile:
         with self._opened() as container:
             stream = _stream(container, self.name)
             stream.codec_context.options = STRICT
+            if self.description.coding is Coding.INTERFRAME:
+                # With threads for slices FFmpeg's H.264 neither fills in nor marks what is missing in a picture
+                # (libavcodec/h264_slice.c, enable_er): parts of older pictures would stand there, unsaid.
+                stream.codec_context.thread_count = 1
             DamageTrail.prepare(stream.codec_context)
             for tick, found in believable(pictures(container, stream, Path(self.name))):
                 index = next(numbers)
@@ -116,7 +120,7 @@ class VideoFile:
                 elif tick is not None and tick == last_tick:
                     yield LostFrame(index, time_s, Status.DUPLICATE, "It has the same time as the frame before.")
                 else:
-                    yield Frame(luma(found), index, time_s, self.description.coding)
+                    yield Frame(luma(found), index, time_s, self.description.coding, not found.key_frame)
                 last_tick = tick
 
     def _opened(self) -> av.container.InputContainer:

@@ -7,8 +7,8 @@ from fingervision.domain.direction import Direction
 from fingervision.domain.errors import FingervisionError, UsageError
 from fingervision.domain.region import Region
 from fingervision.frames.source import Description
-from fingervision.measuring.measure import Task
 from fingervision.measuring.scale import Scale
+from fingervision.measuring.task import Task
 
 
 @dataclass(frozen=True, slots=True)

@@ -13,8 +13,9 @@ from fingervision import __version__
 from fingervision.domain.direction import Direction
 from fingervision.domain.errors import FingervisionError, UsageError
 from fingervision.domain.region import Region
+from fingervision.live.frame_measurement import Seen
 from fingervision.live.picture_calibration import calibrated
-from fingervision.live.session import Seen, Session
+from fingervision.live.session import Session
 from fingervision.storage.calibration_json import write_calibration
 from fingervision.storage.gaps_csv import GapsCsv
 from fingervision.vision.overlay import in_eight_bits

@@ -10,7 +10,8 @@ import cv2
 from calib.measured_scale import Calibration
 from fingervision.domain.gap import NoGap
 from fingervision.domain.status import Status
-from fingervision.live.session import Seen, Session
+from fingervision.live.frame_measurement import Seen
+from fingervision.live.session import Session
 from fingervision.storage.gaps_csv import GapRow
 from fingervision.vision.overlay import draw_overlay
 

@@ -12,7 +12,7 @@ from fingervision.domain.errors import FingervisionError
 from fingervision.domain.frame import Frame, LostFrame
 from fingervision.frames.received import OwnPacket
 from fingervision.frames.source import Description
-from fingervision.measuring.measure import Task
+from fingervision.measuring.task import Task
 from fingervision.storage.calibration_json import write_calibration
 from fingervision.storage.gaps_csv import GapRow, GapsCsv
 from fingervision.storage.lost_frames import LOST, LostFrames

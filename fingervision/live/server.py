@@ -22,12 +22,13 @@ from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from fingervision.domain.errors import FingervisionError, UsageError
 from fingervision.live.commands import Answer, obey, save_gaps
+from fingervision.live.frame_measurement import Seen
 from fingervision.live.guard import EVERYWHERE, POLICY_VIOLATION, Guard
 from fingervision.live.half_open import PatientProtocol
 from fingervision.live.page_token import kept_token
 from fingervision.live.preview import message
 from fingervision.live.promptness import be_prompt
-from fingervision.live.session import Seen, Session
+from fingervision.live.session import Session
 from fingervision.storage.out_folder import out_folder
 
 PAGE = Path(__file__).parent / "page"

@@ -2,71 +2,40 @@
 
 from collections import Counter, deque
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from threading import Event, Lock, Thread
 from time import monotonic
 from typing import Any
 
 from fingervision.domain.errors import FingervisionError
-from fingervision.domain.frame import Frame, LostFrame
-from fingervision.domain.gap import GapMeasurement, NoGap
+from fingervision.domain.frame import Frame
 from fingervision.domain.status import Status
 from fingervision.live.cadence import Cadence
 from fingervision.live.capture import Arrival, Capture, Ended, Happening
 from fingervision.live.choices import Choices
 from fingervision.live.exposure import Exposure
+from fingervision.live.frame_measurement import FrameMeasurement, Seen
 from fingervision.live.history import History
+from fingervision.live.messages import Message, MessageListener, Messages
+from fingervision.live.overflow_report import OverflowReport
 from fingervision.live.promptness import be_prompt
 from fingervision.live.recorder import Recorder
 from fingervision.live.run_folder import RecordedFrame, RunFolder
 from fingervision.measuring.other_camera import other_camera
 from fingervision.measuring.rehearsal import rehearse
-from fingervision.measuring.rows import Result, RowMaker
 from fingervision.storage.gaps_csv import GapRow
-from fingervision.vision.pipeline import measure_frame
 
 # Without a frame for so long, or for so many periods, the source is silent.
 SILENT_S, SILENT_PERIODS = 0.5, 5.0
-MESSAGES_KEPT = 50
 # With more frames than this waiting for the measurement, it is late by one, and the preview gives way.
 FRAMES_UNTIL_HURRY = 1
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Seen:
-    """The newest frame and what it says.
-
-    Parameters
-    ----------
-    frame : Frame
-        The picture.
-    outcome : GapMeasurement, NoGap or None
-        None as long as there is no scale.
-    row : GapRow or None
-        As in gaps.csv.
-    """
-
-    frame: Frame
-    outcome: GapMeasurement | NoGap | None
-    row: GapRow | None
-
-
-@dataclass(frozen=True, slots=True)
-class Message:
-    """A sentence for the user, numbered from 1."""
-
-    number: int
-    name: str
-    words: str
-
-
 MOVES_ZERO = {"scale", "below_tip_mm", "direction", "region"}
 """After a change of these a gap is another one."""
-OVERFLOW_SAID_EVERY_S = 10.0
 
 RowListener = Callable[[GapRow, float], None]
-MessageListener = Callable[[Message], None]
 
 
 class Session:
@@ -91,18 +60,17 @@ class Session:
         self.cadence, self.exposure = Cadence(), Exposure()
         self.counts: Counter[Status] = Counter()
         self.seen: Seen | None = None
-        self.messages: deque[Message] = deque(maxlen=MESSAGES_KEPT)
+        self._messages = Messages()
         self.ended = Event()
         self.on_row: list[RowListener] = []
-        self.on_message: list[MessageListener] = []
-        self._said = 0
+        self._measurement = FrameMeasurement((self.description.width_px, self.description.height_px))
         self._frame_at_s = monotonic()
         self._interrupted = False
         self._recorder: Recorder | None = None
         self._beginning = False
         self.trouble = ""
         """What went wrong and stays so until the user does something; shown where the eye is."""
-        self._overflowed, self._overflow_said_s = 0, float("-inf")
+        self._overflow = OverflowReport(capture, self.say)
         self._lock = Lock()
         self._stopped = Event()
         self._thread = Thread(target=self._measure, name="measuring", daemon=True)
@@ -128,14 +96,20 @@ class Session:
 
     def say(self, name: str, words: str) -> None:
         """Tell everybody who looks, and the recording."""
-        self._said += 1
-        message = Message(self._said, name, words)
-        self.messages.append(message)
         recorder = self._recorder
         if recorder is not None:
             recorder.add((name, words))
-        for listener in self.on_message:
-            listener(message)
+        self._messages.say(name, words)
+
+    @property
+    def messages(self) -> deque[Message]:
+        """What was said last."""
+        return self._messages.kept
+
+    @property
+    def on_message(self) -> list[MessageListener]:
+        """Who is told what is said."""
+        return self._messages.listeners
 
     def choose(self, **changes: Any) -> None:
         """Change what is measured or shown.
@@ -258,13 +232,13 @@ class Session:
         with self._lock:
             self._frame_at_s = monotonic()
             self._interrupted = False
-            item, choices = arrival.item, self.choices
-            outcome, row = self._row(item, choices)
-            if isinstance(item, Frame):
-                if item.time_s is not None:
-                    self.cadence.add(item.time_s)
-                self.exposure.add(item)
-                self.seen = Seen(item, None if isinstance(outcome, LostFrame) else outcome, row)
+            came = arrival.item
+            item, outcome, row = self._measurement.measured(came, self.choices)
+            if isinstance(came, Frame):
+                if came.time_s is not None:
+                    self.cadence.add(came.time_s)
+                self.exposure.add(came)
+                self.seen = Seen(came, outcome, row)
             if row is None:
                 return
             self.history.add(row)
@@ -277,24 +251,6 @@ class Session:
         if recorder is not None and recorder.failure:
             self.trouble = f"Recording has ended: {recorder.failure}"
             self.say("recording_failed", recorder.failure)
-        self._say_overflow()
+        self._overflow.say()
         for listener in self.on_row:
             listener(row, arrival.arrived_s)
-
-    def _say_overflow(self) -> None:
-        lost, now_s = self.capture.overflowed, monotonic()
-        if lost > self._overflowed and now_s - self._overflow_said_s >= OVERFLOW_SAID_EVERY_S:
-            self._overflow_said_s = now_s
-            more, self._overflowed = lost - self._overflowed, lost
-            self.say("overflowed", f"{more} frames came faster than they could be measured, and are lost.")
-
-    def _row(
-        self, item: Frame | LostFrame, choices: Choices
-    ) -> tuple[GapMeasurement | NoGap | LostFrame | None, GapRow | None]:
-        task = choices.task
-        if task is None:
-            return None, None
-        outcome = item if isinstance(item, LostFrame) else measure_frame(item, task.settings)
-        rows = RowMaker(task.scale, (self.description.width_px, self.description.height_px))
-        (row,) = rows.rows((Result(item.index, item.time_s, outcome),))
-        return outcome, row

@@ -4,8 +4,9 @@ import json
 from dataclasses import asdict
 from time import monotonic
 
+from fingervision.live.messages import Message
 from fingervision.live.outlet import Outlet
-from fingervision.live.session import Message, Session
+from fingervision.live.session import Session
 from fingervision.storage.gaps_csv import GapRow
 
 # In place on a terminal, line by line elsewhere.

@@ -7,29 +7,25 @@ from pathlib import Path
 from time import monotonic
 from typing import Any
 
-from calib.camera_response import CameraResponse
-from fingervision.domain.direction import Direction
-from fingervision.domain.drive import DriveHistory
 from fingervision.domain.errors import ExitCode, FingervisionError, UsageError
 from fingervision.domain.frame import Coding, Frame, LostFrame
 from fingervision.domain.gap import GapMeasurement, NoGap
-from fingervision.domain.region import Region
 from fingervision.domain.status import Status
 from fingervision.frames.ahead import decoded_ahead
 from fingervision.frames.camera_settings import coding_of
-from fingervision.frames.source import Description, FrameSource
+from fingervision.frames.source import FrameSource
 from fingervision.measuring.asked_to_stop import asked_to_stop
 from fingervision.measuring.gap_figure import draw_gap
 from fingervision.measuring.marked import marked
 from fingervision.measuring.other_camera import other_camera
 from fingervision.measuring.output_folder import OutputFolder, claimed
 from fingervision.measuring.overlay_video import OverlayVideo
-from fingervision.measuring.response_budget import choose_response
 from fingervision.measuring.rows import Result, RowMaker
-from fingervision.measuring.scale import Scale
 from fingervision.measuring.series import GapSeries
+from fingervision.measuring.sound_picture import SoundPictures
 from fingervision.measuring.step_pictures import write_steps
 from fingervision.measuring.summary import summarise
+from fingervision.measuring.task import Task, check_task, in_words
 from fingervision.storage.folder_lock import FolderLock
 from fingervision.storage.gaps_csv import GapsCsv
 from fingervision.storage.lost_frames import lost_frames
@@ -40,91 +36,6 @@ from fingervision.vision.pipeline import Settings, measure_frame
 
 # Rows are made for so many frames at once, or for what has come in so many seconds, and then handed to the table.
 FRAMES_AT_ONCE, SECONDS_AT_ONCE = 128, 0.4
-
-
-@dataclass(frozen=True, slots=True)
-class Task:
-    """What shall be measured, and how.
-
-    Parameters
-    ----------
-    scale : Scale
-        From pixels to millimetres.
-    scale_file : Path or None
-        The calibration that the scale was read from.
-    below_tip_mm : float
-        Height of measuring below each finger's tip.
-    direction : Direction or None
-        Where the tips point; None finds out in every frame.
-    region : Region or None
-        The part of the frame that is looked at.
-    drive : DriveHistory or None
-        The recorded input.
-    drive_offset_s : float
-        Added to the drive's times to get the recording's.
-    overlay : bool
-        Whether a video is written with what was measured drawn in.
-    steps_frame : int or None
-        The frame of which every step is written as a picture.
-    response : CameraResponse or None
-        The camera's response, where the user knows it.
-    bits : int or None
-        Depth of levels that are stored in 16 bits; None finds it in every frame.
-    fingers_are_dark : bool or None
-        Whether the fingers are darker than the ground; None finds out in every frame.
-    is_outline : bool
-        Whether a thick part is measured at its whole outline, side walls included, and not at its front face.
-    """
-
-    scale: Scale
-    scale_file: Path | None = None
-    below_tip_mm: float = 0.3
-    direction: Direction | None = None
-    region: Region | None = None
-    drive: DriveHistory | None = None
-    drive_offset_s: float = 0.0
-    overlay: bool = False
-    steps_frame: int | None = None
-    response: CameraResponse | None = None
-    bits: int | None = None
-    fingers_are_dark: bool | None = None
-    is_outline: bool = False
-
-    def __post_init__(self) -> None:
-        if not 0.0 < self.below_tip_mm < float("inf"):
-            raise UsageError(f"--below-tip-mm must be positive, but is {self.below_tip_mm:g}.")
-        if not -float("inf") < self.drive_offset_s < float("inf"):
-            raise UsageError(f"--drive-offset-s must be a number of seconds, but is {self.drive_offset_s:g}.")
-        if self.steps_frame is not None and self.steps_frame < 0:
-            raise UsageError(f"--steps must be the number of a frame, from 0, but is {self.steps_frame}.")
-
-    @property
-    def settings(self) -> Settings:
-        """What vision needs of it, whatever the recording says of itself."""
-        return self.settings_for(())[0]
-
-    def settings_for(self, files: tuple[Path, ...]) -> tuple[Settings, str]:
-        """What vision needs of it for a recording of these files, and a warning where there is one."""
-        response, other, words = choose_response(self.response, self.scale, files)
-        below_px = self.below_tip_mm * self.scale.px_per_mm
-        settings = Settings(
-            below_px,
-            self.direction,
-            self.region,
-            response,
-            other,
-            self.bits,
-            self.fingers_are_dark,
-            self.is_outline,
-        )
-        return settings, words
-
-    @property
-    def drive_columns(self) -> tuple[str, ...]:
-        """Columns that the drive adds to the table."""
-        if self.drive is None:
-            return ()
-        return ("run", "input_mm") if self.drive.force_n is None else ("run", "input_mm", "force_n")
 
 
 @dataclass(frozen=True, slots=True)
@@ -252,7 +163,7 @@ def _measured(source: FrameSource, task: Task, out: Path, on_progress: Progress 
         on_progress(series.frames, description.frame_count)
     draw_gap(folder.figure, series)
     summary = summarise(
-        description, _in_words(task, settings), task.scale, task.scale_file, series, complete=not stopped
+        description, in_words(task, settings), task.scale, task.scale_file, series, complete=not stopped
     )
     write_summary(folder.summary, summary)
     if task.drive is not None and driven == {False} and not stopped:
@@ -283,60 +194,12 @@ def _outcomes(
     source: Iterable[Frame | LostFrame], settings: Settings, coding: Coding
 ) -> Iterator[tuple[Frame | LostFrame, GapMeasurement | NoGap | LostFrame]]:
     """Every frame with what it says; the decoder runs ahead and is stopped when this is."""
+    pictures = SoundPictures()
     with closing(decoded_ahead(source)) as frames:
         for item in frames:
-            if isinstance(item, Frame) and item.coding is Coding.LOSSLESS and coding is not Coding.LOSSLESS:
+            if isinstance(item, LostFrame):
+                yield item, item
+                continue
+            if item.coding is Coding.LOSSLESS and coding is not Coding.LOSSLESS:
                 item = replace(item, coding=coding)
-            yield item, measure_frame(item, settings) if isinstance(item, Frame) else item
-
-
-def check_task(task: Task, description: Description) -> None:
-    """Refuse what cannot be meant for these frames.
-
-    Raises
-    ------
-    UsageError
-        The region lies outside the frame, or a drive is given to a recording without times.
-    FingervisionError
-        The scale is for other frames.
-    """
-    width_px, height_px = description.width_px, description.height_px
-    region = task.region
-    if region is not None and not (
-        region.x_px >= 0
-        and region.y_px >= 0
-        and region.width_px > 0
-        and region.height_px > 0
-        and region.x_px + region.width_px <= width_px
-        and region.y_px + region.height_px <= height_px
-    ):
-        raise UsageError(
-            f"--roi must lie inside the frame of {width_px}x{height_px} pixels, but is "
-            f"{region.x_px},{region.y_px},{region.width_px},{region.height_px} (first column, row, width, height)."
-        )
-    if task.drive is not None and not description.has_times:
-        raise UsageError(
-            f"--drive needs a recording with times, but {description.name} has none: "
-            "give --rate-hz, or a times.csv beside the images."
-        )
-    try:
-        task.scale.check_frame_size(width_px, height_px)
-    except ValueError as error:
-        raise FingervisionError(str(error)) from error
-
-
-def _in_words(task: Task, settings: Settings) -> dict[str, Any]:
-    """Put the task as it stands in the summary."""
-    region = task.region
-    return {
-        "below_tip_mm": task.below_tip_mm,
-        "tips": "auto" if task.direction is None else task.direction.value,
-        "roi": None if region is None else [region.x_px, region.y_px, region.width_px, region.height_px],
-        "response": settings.response.name,
-        "response_known": settings.other_response is None,
-        "bits": task.bits,
-        "fingers": {None: "auto", True: "dark", False: "light"}[task.fingers_are_dark],
-        "face": "outline" if task.is_outline else "front",
-        "drive": task.drive is not None,
-        "drive_offset_s": task.drive_offset_s if task.drive is not None else None,
-    }
+            yield item, pictures.judged(item, measure_frame(item, settings))

@@ -6,8 +6,27 @@ import numpy as np
 from numpy.typing import NDArray
 
 from calib.distances import Distances
+from fingervision.domain.errors import UsageError
+
+# From a picture of a street to one through a microscope; what lies beyond is a slip, and overflows later.
+LEAST_PX_PER_MM, MOST_PX_PER_MM = 1e-3, 1e6
 
 Floats = NDArray[np.float64]
+
+
+def check_px_per_mm(px_per_mm: float) -> None:
+    """Refuse a stated scale that no camera has.
+
+    Raises
+    ------
+    UsageError
+        It lies beyond the bounds.
+    """
+    if not LEAST_PX_PER_MM <= px_per_mm <= MOST_PX_PER_MM:
+        raise UsageError(
+            f"--px-per-mm must be between {LEAST_PX_PER_MM:g} and {MOST_PX_PER_MM:g}, but is {px_per_mm:g}: state how "
+            "many pixels of the picture show one millimetre."
+        )
 
 
 class Scale(Protocol):

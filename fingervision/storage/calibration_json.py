@@ -18,6 +18,7 @@ from calib.measured_scale import Calibration, Reference, Response, ScalePart
 from calib.plane import Plane
 from fingervision.domain.errors import FingervisionError
 from fingervision.storage.finite import is_number
+from fingervision.storage.plain_file import plain
 
 Floats = NDArray[np.float64]
 
@@ -107,7 +108,7 @@ def read_calibration(path: Path) -> Calibration:
         There is no such file, it is from a newer schema, or it makes no sense.
     """
     try:
-        content = json.loads(path.read_text(encoding="utf-8-sig"), parse_constant=_no_constant)
+        content = json.loads(plain(path).read_text(encoding="utf-8-sig"), parse_constant=_no_constant)
     except FileNotFoundError:
         raise FingervisionError(
             f"There is no calibration file {path}; make one with `fingervision calibrate`."

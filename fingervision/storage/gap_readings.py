@@ -5,6 +5,7 @@ from math import isfinite
 from pathlib import Path
 
 from fingervision.domain.errors import FingervisionError
+from fingervision.storage.plain_file import plain
 
 # Inputs nearer than this are one part (mm): stages return to a place no better.
 SAME_INPUT_PLACES = 3
@@ -27,7 +28,7 @@ def read_gap_readings(path: Path, by_input: bool) -> dict[float | None, list[flo
     """
     readings: dict[float | None, list[float]] = {}
     try:
-        lines = [line for line in path.read_text(encoding="utf-8").splitlines() if not line.startswith("#")]
+        lines = [line for line in plain(path).read_text(encoding="utf-8").splitlines() if not line.startswith("#")]
     except (OSError, UnicodeDecodeError) as error:
         raise FingervisionError(f"The table {path} could not be read: {error}; give a gaps.csv.") from error
     table = csv.DictReader(lines)

@@ -14,6 +14,7 @@ from fingervision.domain.gripper import Body, Gripper, Hinge, Lever, Links, Mate
 from fingervision.models.gripper_outline import check_outline, check_stated_size
 from fingervision.models.plane_shapes import crosses_itself
 from fingervision.storage.finite import is_number
+from fingervision.storage.plain_file import plain
 from fingervision.storage.sn_line_toml import check_below_yield, read_sn_line
 
 _SECTIONS: Mapping[str, type] = MappingProxyType(
@@ -55,7 +56,7 @@ def read_gripper(path: Path) -> Gripper:
         The file cannot be read, a key is missing, unknown or no number, or the drawing cannot be a gripper.
     """
     try:
-        text = path.read_text(encoding="utf-8-sig")
+        text = plain(path).read_text(encoding="utf-8-sig")
     except FileNotFoundError:
         raise FingervisionError(f"There is no gripper {path}.") from None
     except OSError as error:

@@ -17,6 +17,7 @@ import numpy as np
 from fingervision.domain.errors import FingervisionError
 from fingervision.storage.approach_path import PathRow, Reading, approach_path
 from fingervision.storage.csv_columns import number, read_columns
+from fingervision.storage.plain_file import plain
 
 TARGET = "target_mm"
 QUANTITIES = {"position_mm": 1.0, "position_um": 1e-3, "deviation_mm": 1.0, "deviation_um": 1e-3}
@@ -139,7 +140,7 @@ def iso230_rows(
 def _header(path: Path) -> list[str]:
     """Names in the first line that is no comment; none where the file cannot be read, which `read_columns` will say."""
     try:
-        lines = path.read_text(encoding="utf-8-sig").splitlines()
+        lines = plain(path).read_text(encoding="utf-8-sig").splitlines()
     except (OSError, UnicodeDecodeError):
         return []
     first = next((line for line in lines if line.strip() and not line.lstrip().startswith("#")), "")

@@ -19,6 +19,7 @@ from fingervision.storage.drawing_numbers import bare_tables, changed_tables, nu
 from fingervision.storage.drawing_reader import DrawingReader, as_table
 from fingervision.storage.gripper_template import mechanism_from_gripper
 from fingervision.storage.gripper_toml import check_material, read_material
+from fingervision.storage.plain_file import plain
 
 _TOP = (
     "schema",
@@ -47,7 +48,7 @@ _FLEXURES = {
 def is_mechanism(path: Path) -> bool:
     """Whether a TOML file draws a mechanism by bodies or by a template, and is not a gripper.toml itself."""
     try:
-        tables = tomllib.loads(path.read_text(encoding="utf-8-sig"))
+        tables = tomllib.loads(plain(path).read_text(encoding="utf-8-sig"))
     except (OSError, ValueError):
         return False
     return isinstance(tables.get("body"), list) or isinstance(tables.get("gripper"), dict)
@@ -107,7 +108,7 @@ def read_drawing(path: Path) -> MechanismDrawing:
         The file cannot be read, or states an uncertainty that is none.
     """
     try:
-        tables = tomllib.loads(path.read_text(encoding="utf-8-sig"))
+        tables = tomllib.loads(plain(path).read_text(encoding="utf-8-sig"))
     except FileNotFoundError:
         raise FingervisionError(f"There is no mechanism {path}.") from None
     except (OSError, ValueError, RecursionError) as error:

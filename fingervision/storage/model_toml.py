@@ -18,6 +18,7 @@ from fingervision.models.kinds import kinds
 from fingervision.models.physical_gripper import PhysicalGripper
 from fingervision.models.table import TableModel
 from fingervision.storage.gripper_toml import read_gripper
+from fingervision.storage.plain_file import plain
 from fingervision.storage.simulation_table import read_simulation_table
 
 POINTS = "points"
@@ -54,13 +55,17 @@ def read_model(
         simulation = table(path)
         return CorrectedModel(simulation.name, simulation, str(path), simulation.input_range_mm, {})
     try:
-        document = tomllib.loads(path.read_text(encoding="utf-8-sig"))
+        document = tomllib.loads(plain(path).read_text(encoding="utf-8-sig"))
     except FileNotFoundError:
         raise FingervisionError(f"There is no model {path}.") from None
     except (ValueError, RecursionError, OSError) as error:
         raise FingervisionError(f"{path} must be a TOML file, but could not be read: {error}.") from error
     if "base" not in document:
         return _gripper(path, kind)
+    if document.get("schema", 1) != 1:
+        raise FingervisionError(
+            f"schema in {path} must be 1, but is {document['schema']}: a newer fingervision wrote it; use that one."
+        )
     place = path.resolve()
     if place in inside:
         raise FingervisionError(f"The base of {path} must be another model, but leads back to itself: mend `base`.")

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from calib.camera_response import CURVES, CameraResponse, standard_response
 from calib.errors import CalibrationError
 from fingervision.domain.errors import FingervisionError, UsageError
+from fingervision.storage.plain_file import plain
 
 COLUMNS = ("level", "light")
 # Full scales that pictures have.
@@ -46,7 +47,7 @@ def read_response(path: Path) -> CameraResponse:
         The file cannot be read, or is no response.
     """
     try:
-        with path.open(newline="", encoding="utf-8-sig") as file:
+        with plain(path).open(newline="", encoding="utf-8-sig") as file:
             rows = list(csv.reader(line for line in file if not line.startswith("#")))
     except (OSError, UnicodeDecodeError) as error:
         raise FingervisionError(f"The camera response {path} could not be read: {error}.") from error

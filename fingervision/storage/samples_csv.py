@@ -8,6 +8,7 @@ from pathlib import Path
 from fingervision.domain.errors import FingervisionError
 from fingervision.domain.status import Status
 from fingervision.storage.line_file import LineFile, cell, quoted
+from fingervision.storage.plain_file import plain
 
 COLUMNS = (
     "run,time_s,input_mm,gap_mm,left_mm,right_mm,u_gap_mm,u_random_mm,force_n,status,frame,step,encoder_mm,camera_s,"
@@ -114,7 +115,7 @@ def read_samples(path: Path) -> list[SampleRow]:
         The file is not one of a run on the bed.
     """
     try:
-        text = path.read_bytes()
+        text = plain(path).read_bytes()
         whole = text[: text.rfind(b"\n") + 1]
         lines = whole.decode("utf-8").splitlines()
         columns = lines[0] if lines else COLUMNS

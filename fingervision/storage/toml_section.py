@@ -10,6 +10,7 @@ from typing import Any, NoReturn
 
 from fingervision.domain.errors import FingervisionError
 from fingervision.storage.finite import is_number
+from fingervision.storage.plain_file import plain
 
 
 def read_document(path: Path, what: str) -> tuple[dict[str, Any], str]:
@@ -33,7 +34,7 @@ def read_document(path: Path, what: str) -> tuple[dict[str, Any], str]:
         There is no such file, or it is not TOML.
     """
     try:
-        text = path.read_text(encoding="utf-8-sig")
+        text = plain(path).read_text(encoding="utf-8-sig")
         return tomllib.loads(text), text
     except FileNotFoundError:
         raise FingervisionError(f"There is no {what} {path}.") from None

@@ -22,6 +22,7 @@ from fingervision.domain.errors import FingervisionError
 from fingervision.domain.frame import Frame
 from fingervision.domain.gap import GapMeasurement
 from fingervision.frames.source import open_source
+from fingervision.measuring.sound_picture import SoundPictures
 from fingervision.rendering import Camera, render, two_fingers
 from fingervision.vision.pipeline import Settings, measure_frame
 
@@ -87,9 +88,9 @@ def coded(path: Path, frames: list[Frame], coder: str, pixel_format: str, option
 
 def rows(path: Path) -> list[Row]:
     """Measure a file."""
-    found = []
+    found, pictures = [], SoundPictures()
     for item in open_source(str(path)):
-        outcome = measure_frame(item, SETTINGS) if isinstance(item, Frame) else None
+        outcome = pictures.judged(item, measure_frame(item, SETTINGS)) if isinstance(item, Frame) else None
         if isinstance(outcome, GapMeasurement):
             found.append(Row(item.time_s, outcome.gap_px, float(np.hypot(outcome.u_gap_px, outcome.u_shift_px))))
         else:

@@ -16,7 +16,8 @@ from numpy.typing import NDArray
 
 from calib.calibration import BareScale
 from fingervision.frames.source import open_source
-from fingervision.measuring.measure import Task, measure
+from fingervision.measuring.measure import measure
+from fingervision.measuring.task import Task
 from fingervision.rendering import Camera, render, two_fingers
 from tests.live.test_damaged_stream import COUNT, SCALE, SIZE_PX, coded, recorded
 

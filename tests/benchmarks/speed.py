@@ -28,7 +28,8 @@ from calib.calibration import BareScale
 from fingervision.domain.direction import Direction
 from fingervision.domain.frame import Coding, Frame, Pixels
 from fingervision.frames.source import open_source
-from fingervision.measuring.measure import Task, measure
+from fingervision.measuring.measure import measure
+from fingervision.measuring.task import Task
 from fingervision.rendering import Camera, render, two_fingers
 from fingervision.rendering.clip import H264, write_clip
 from fingervision.vision.pipeline import Settings, measure_frame

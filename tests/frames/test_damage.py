@@ -10,6 +10,7 @@ import pytest
 from numpy.typing import NDArray
 
 from fingervision.domain.frame import Frame, LostFrame
+from fingervision.frames.avi_places import AviPlaces
 from fingervision.frames.source import open_source
 from fingervision.frames.told_times import EvenRow, believable
 
@@ -128,6 +129,74 @@ def test_behind_a_hole_in_an_avi_without_index_no_time_is_made_up(tmp_path: Path
     assert any("the time of those behind is not known" in item.words for item in found if isinstance(item, LostFrame))
 
 
+def test_a_chunk_whose_length_is_damaged_is_no_other_frame_of_the_index(tmp_path: Path) -> None:
+    # No byte is missing, so whatever lies elsewhere than the index says was never written.
+    path = tmp_path / "clip.avi"
+    content = coded(path, "mjpeg", qmin="3", qmax="3")
+    frames = packets(path)
+    sizes = [len(frame) for frame in frames]
+    later = next(k for k in range(30, COUNT) if sizes.count(sizes[k]) == 1 and sizes[k] < sizes[20])
+
+    def change(changed: bytearray) -> None:
+        begin = content.index(frames[20])
+        changed[begin - 4 : begin] = bytes(4)
+        # Inside of the frame stands something that looks like a chunk of a later frame's length.
+        changed[begin + 100 : begin + 108] = b"00dc" + sizes[later].to_bytes(4, "little")
+
+    _, whole = nothing_wrong(path, change)
+    assert whole >= COUNT - 3
+
+
+def test_a_name_that_is_damaged_in_the_index_moves_no_frame(tmp_path: Path) -> None:
+    path = tmp_path / "clip.avi"
+    content = coded(path, "mjpeg")
+    frames = packets(path)
+
+    def change(changed: bytearray) -> None:
+        entry = changed.rindex(b"idx1") + 8 + 16 * 10
+        changed[entry] ^= 1  # 00dc is 10dc
+        begin = content.index(frames[20])
+        changed[begin - 8 : begin] = bytes(8)
+
+    _, whole = nothing_wrong(path, change)
+    assert whole >= COUNT - 3
+
+
+@pytest.mark.parametrize("first", [0, 20])
+def test_frames_that_the_reader_skips_in_an_avi_without_index_are_counted(tmp_path: Path, first: int) -> None:
+    path = tmp_path / "clip.avi"
+    content = coded(path, "mjpeg")
+    frames = packets(path)
+    path.write_bytes(content[: content.rindex(b"idx1")])
+    places = AviPlaces(path, 0, 1)
+    begins = [content.index(frame) for frame in frames]
+    assert [places.number(begins[k], len(frames[k])) for k in range(first)] == list(range(first))
+    # The reader finds its way again three frames on; all chunks between are whole.
+    assert places.number(begins[first + 3], len(frames[first + 3])) == first + 3
+
+
+def test_frames_missing_right_at_the_start_of_a_transport_stream_are_noticed(tmp_path: Path) -> None:
+    path = tmp_path / "clip.ts"
+    coded(path, "libx264", g="30", bf="0", crf="18")
+    with av.open(str(path)) as container:
+        begins = [packet.pos for packet in container.demux(video=0) if packet.size]
+
+    def lose(changed: bytearray) -> None:
+        own = bytes(changed[begins[2] + 1 : begins[2] + 3])
+        lost = 0
+        for end in range(begins[2], len(changed), 188):
+            # Sixteen packets of the stream, or a multiple: no counter tells.
+            if lost and lost % 16 == 0 and end in begins:
+                del changed[begins[2] : end]
+                return
+            lost += bytes(changed[end + 1 : end + 3])[1:] == own[1:]
+        raise AssertionError("no such place")
+
+    found, whole = nothing_wrong(path, lose)
+    assert whole >= 2
+    assert any(isinstance(item, LostFrame) for item in found)
+
+
 def test_what_the_decoder_of_h264_says_in_its_log_alone_is_damage(tmp_path: Path) -> None:
     path = tmp_path / "clip.mp4"
     content = coded(path, "libx264", g="20", bf="2", crf="18")
@@ -142,6 +211,24 @@ def test_what_the_decoder_of_h264_says_in_its_log_alone_is_damage(tmp_path: Path
     assert whole >= 40
     assert whole < COUNT
     assert isinstance(found[-1], Frame)
+
+
+@pytest.mark.parametrize("suffix", [".mp4", ".mkv", ".avi"])
+def test_a_picture_that_calls_itself_a_key_frame_by_a_flipped_bit_heals_nothing(tmp_path: Path, suffix: str) -> None:
+    path = tmp_path / f"clip{suffix}"
+    content = coded(path, "libx264", g="30", bf="0", crf="18")
+    frames = packets(path)
+
+    def spoil(changed: bytearray) -> None:
+        begin = content.index(frames[5])
+        changed[begin + len(frames[5]) // 2 : begin + len(frames[5]) // 2 + 24] = bytes(24)
+        begin = content.index(frames[9])
+        # A slice's first byte is its kind: 1 of a picture that hangs on others, 5 of one that does not.
+        assert changed[begin + 4] & 0x1F == 1
+        changed[begin + 4] ^= 4
+
+    _, whole = nothing_wrong(path, spoil)
+    assert whole >= 30
 
 
 @pytest.mark.parametrize("frame", [24, 38, 39, 40, 41])
@@ -187,3 +274,7 @@ def test_times_that_run_backwards_are_not_believed_and_a_repeated_one_is_left_al
 def test_frames_missing_in_an_even_row_are_noticed() -> None:
     row = EvenRow()
     assert [tick for tick in [*range(0, 800, 40), *range(880, 1200, 40)] if row.leaps(tick)] == [880]
+    # Before there is a row, the rate that the stream states is one, from the first step that keeps it.
+    stated, other = EvenRow(40.0), EvenRow(50.0)
+    assert [tick for tick in (0, 40, 600, 640) if stated.leaps(tick)] == [600]
+    assert [tick for tick in (0, 40, 600, 640) if other.leaps(tick)] == []

@@ -1,4 +1,7 @@
-"""An RTSP camera on loopback, for the system's Python, which has GStreamer's bindings: PORT, and a pattern of JPEGs."""
+"""An RTSP camera on loopback, for the system's Python, which has GStreamer's bindings.
+
+Arguments: PORT, a pattern of JPEGs, their count, the coder (jpeg or h264), and the share of packets that get lost.
+"""
 
 import sys
 
@@ -8,11 +11,18 @@ gi.require_version("Gst", "1.0")
 gi.require_version("GstRtspServer", "1.0")
 from gi.repository import GLib, Gst, GstRtspServer  # noqa: E402 - the versions come first
 
-PORT, PICTURES, COUNT = sys.argv[1:]
+PORT, PICTURES, COUNT, CODER, LOST = sys.argv[1:]
 # RTP's payload for JPEG knows no grey pictures: colour at half resolution it is.
+CODED = {
+    "jpeg": "jpegenc quality=95 ! rtpjpegpay pt=26",
+    "h264": "openh264enc gop-size=12 bitrate=4000000 ! h264parse ! rtph264pay pt=96 config-interval=-1",
+}
+WHOLE = {name: f"{coded} name=pay0" for name, coded in CODED.items()}
+# What stands behind the payloader loses packets as a network does: their sequence numbers are missing.
+NETWORK = f"{CODED[CODER]} ! identity name=pay0 drop-probability={LOST}"
 PIPELINE = (
     f'( multifilesrc location="{PICTURES}" stop-index={int(COUNT) - 1} loop=true caps="image/jpeg,framerate=25/1" '
-    "! jpegdec ! videoconvert ! video/x-raw,format=I420 ! jpegenc quality=95 ! rtpjpegpay name=pay0 pt=26 )"
+    f"! jpegdec ! videoconvert ! video/x-raw,format=I420 ! {NETWORK if float(LOST) else WHOLE[CODER]} )"
 )
 
 Gst.init(None)

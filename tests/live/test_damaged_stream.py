@@ -15,8 +15,9 @@ from fingervision.frames.network_stream import NetworkStream
 from fingervision.frames.source import open_source
 from fingervision.live.capture import Arrival, Capture, Ended
 from fingervision.live.run_folder import RecordedFrame, RunFolder
-from fingervision.measuring.measure import Task, measure
+from fingervision.measuring.measure import measure
 from fingervision.measuring.rows import Result, RowMaker
+from fingervision.measuring.task import Task
 from fingervision.rendering import Camera, render, two_fingers
 from fingervision.vision.pipeline import measure_frame
 

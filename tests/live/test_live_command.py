@@ -9,6 +9,8 @@ from click.testing import CliRunner
 from calib.measured_scale import Calibration
 from fingervision.cli import cli
 from fingervision.domain.errors import ExitCode, FingervisionError
+from fingervision.live.server import Page
+from fingervision.live.session import Session
 from fingervision.storage.calibration_json import write_calibration
 
 
@@ -90,3 +92,16 @@ def test_the_list_says_where_to_begin_without_a_camera() -> None:
     result = CliRunner().invoke(cli, ["live", "--list"])
     assert result.exit_code == 0
     assert "/dev/video" in result.output or "`simulated`" in result.output
+
+
+@pytest.mark.parametrize(("host", "is_warned"), [("127.0.0.1", False), ("0.0.0.0", True)])
+def test_a_page_beyond_this_machine_warns_of_plain_http(
+    host: str, is_warned: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    said: list[str] = []
+    monkeypatch.setattr(Session, "say", lambda self, name, words: said.append(words))
+    monkeypatch.setattr(Page, "serve", lambda self, ending: self._listening.close())
+    monkeypatch.setattr(Session, "start", lambda self: None)
+    monkeypatch.setattr(Session, "stop", lambda self: None)
+    CliRunner().invoke(cli, ["live", "simulated", "--host", host, "--port", "0", "--out", str(tmp_path)])
+    assert any("plain HTTP" in words for words in said) is is_warned

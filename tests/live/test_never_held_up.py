@@ -23,10 +23,11 @@ from fingervision.frames.source import Wish
 from fingervision.live import server
 from fingervision.live.cadence import Cadence
 from fingervision.live.choices import Choices
+from fingervision.live.frame_measurement import Seen
 from fingervision.live.opening import opened
 from fingervision.live.outlet import PATIENCE_S, Outlet
 from fingervision.live.preview import message
-from fingervision.live.session import Seen, Session
+from fingervision.live.session import Session
 from fingervision.live.terminal import JsonLines
 from fingervision.storage.gaps_csv import GapRow
 

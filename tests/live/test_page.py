@@ -6,6 +6,7 @@ import json
 import os
 import re
 import shutil
+import subprocess
 import time
 from collections import deque
 from collections.abc import Callable, Iterator
@@ -103,6 +104,17 @@ def drag(page: Any, box: tuple[int, int, int, int]) -> None:
     page.mouse.move(frame["x"] + (box[0] + box[2] / 2) * x, frame["y"] + (box[1] + box[3] / 2) * y)
     page.mouse.move(frame["x"] + (box[0] + box[2]) * x, frame["y"] + (box[1] + box[3]) * y)
     page.mouse.up()
+
+
+def no_value_is_left(page: Any, status: str) -> None:
+    """Where nothing comes in there is no number, nothing is green, and the reason is in view."""
+    shown(page, f"document.querySelector('#status').textContent === '{status}'")
+    assert not re.search(r"\d", page.inner_text("#gap_mm"))
+    assert page.get_attribute("#status", "class") == "badge bad"
+    assert page.locator("#verdict").is_hidden()
+    box = page.locator("#alarm").bounding_box()
+    assert box is not None
+    assert box["y"] + box["height"] <= page.viewport_size["height"]
 
 
 @pytest.mark.slow
@@ -290,6 +302,7 @@ def test_the_page_fits_a_phone_and_comes_back_after_a_restart(
     assert max(int(level) for level in re.findall(r"\d+", ground)) < 64
     assert view.stop() == 0
     page.locator("#connection", has_text="does not answer").wait_for()
+    no_value_is_left(page, "not connected")
     again = live("simulated", "--port", re.search(r":(\d+)/", address)[1], out=out)
     assert again.address == address
     page.locator("#connection", has_text="connected").wait_for()
@@ -306,11 +319,63 @@ def test_a_cut_is_said_within_a_second_and_measuring_resumes(
     shown(page, "document.querySelector('#alarm').hidden")
     camera.stop()
     page.locator("#alarm", has_text="No picture for").wait_for()
+    no_value_is_left(page, "no picture")
     # How soon is counted by the program, and not by a browser that waits for a busy machine.
     assert SILENT_S + STATE_EVERY_S < SAID_WITHIN_S
     camera.start()
     says(page, "The source is back")
     shown(page, "document.querySelector('#alarm').hidden && Number(document.querySelector('#gap_mm').textContent) > 0")
+
+
+@pytest.mark.slow
+def test_a_recording_that_ends_by_itself_is_in_view(
+    live: Callable[..., Any], opened: Callable[..., Any], tmp_path: Path
+) -> None:
+    disk = tmp_path / "disk"
+    disk.mkdir()
+    mounted = subprocess.run(
+        ["mount", "-t", "tmpfs", "-o", "size=3m", "tmpfs", str(disk)], capture_output=True, text=True, check=False
+    )
+    if mounted.returncode:
+        pytest.skip(f"a small disk cannot be mounted here: {mounted.stderr.strip()}")
+    try:
+        view = live("simulated", "--port", "0", out=disk / "runs")
+        page = opened(view.address, viewport={"width": 1280, "height": 800})
+        shown(page, "Number(document.querySelector('#picture').dataset.shown) > 5")
+        chart = page.locator("#chart").bounding_box()
+        assert chart["y"] + chart["height"] <= 800  # the chart is in view
+        page.locator("body").press("r")
+        page.locator("#alarm", has_text="Recording has ended").wait_for()
+        box = page.locator("#alarm").bounding_box()
+        assert box["y"] >= 0
+        assert box["y"] + box["height"] <= 800
+        assert page.locator("#alarm", has_text="No space left on device").is_visible()
+        assert page.inner_text("#record") != "Stop"
+        page.wait_for_timeout(500)  # it stays, and measuring goes on
+        assert page.locator("#alarm", has_text="Recording has ended").is_visible()
+        assert view.stop() == 1
+    finally:
+        subprocess.run(["umount", "-l", str(disk)], check=True)
+
+
+@pytest.mark.slow
+def test_a_zeroed_value_says_so_and_its_tolerance_and_table_agree(
+    live: Callable[..., Any], opened: Callable[..., Any]
+) -> None:
+    view = live("simulated", "--port", "0")
+    page = opened(view.address)
+    shown(page, "document.querySelector('#status').textContent === 'ok'")
+    page.click("#zero")
+    page.locator("#zeroed", has_text="less zero").wait_for()
+    # Gaps less a zero lie between -3 and 3 mm here: a tolerance of real gaps would fail, this one passes.
+    page.fill("#least", "-3.5")
+    page.fill("#greatest", "3.5")
+    page.press("#greatest", "Enter")
+    page.locator("#verdict", has_text="pass").wait_for()
+    page.fill("#px_per_mm", "20")
+    page.press("#px_per_mm", "Enter")
+    says(page, "The zero is off")
+    shown(page, "document.querySelector('#zeroed').hidden")
 
 
 @pytest.mark.slow

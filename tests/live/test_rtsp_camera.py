@@ -23,13 +23,14 @@ CLOCK_TICK_S = 1.5e-5
 
 
 class RtspCamera:
-    def __init__(self, pictures: str, count: int) -> None:
+    def __init__(self, pictures: str, count: int, coder: str = "jpeg", lost: float = 0.0) -> None:
         self._pictures, self._count, self._port = pictures, count, free_port()
+        self._how = [coder, str(lost)]
         self.address = f"rtsp://127.0.0.1:{self._port}/camera"
         self.start()
 
     def start(self) -> None:
-        arguments = [str(SERVER), str(self._port), self._pictures, str(self._count)]
+        arguments = [str(SERVER), str(self._port), self._pictures, str(self._count), *self._how]
         self._process = subprocess.Popen([SYSTEM_PYTHON, *arguments], stderr=subprocess.DEVNULL)
 
     def wait(self) -> None:
@@ -45,14 +46,15 @@ class RtspCamera:
 
 
 @pytest.fixture
-def rtsp_camera(pictures: Path, tmp_path: Path) -> Iterator[RtspCamera]:
+def rtsp_camera(pictures: Path, tmp_path: Path, request: pytest.FixtureRequest) -> Iterator[RtspCamera]:
+    """One whose coder and share of lost packets a test may give as its parameter."""
     try:
         subprocess.run([SYSTEM_PYTHON, "-c", HAS_GSTREAMER], capture_output=True, check=True)
     except (OSError, subprocess.CalledProcessError):
         pytest.skip("the system's Python has no GstRtspServer: it plays the RTSP camera.")
     for index, picture in enumerate(single_pictures(pictures)):
         (tmp_path / f"{index:03d}.jpg").write_bytes(picture)
-    camera = RtspCamera(str(tmp_path / "%03d.jpg"), CYCLE)
+    camera = RtspCamera(str(tmp_path / "%03d.jpg"), CYCLE, *getattr(request, "param", ()))
     camera.wait()
     yield camera
     camera.stop()
@@ -85,3 +87,31 @@ def test_an_rtsp_camera_keeps_its_clock_and_comes_back_after_a_cut(
     (run,) = view.runs()
     assert len(rows(run / "gaps.csv")) == len(lines)
     assert measured(run / "video.mp4", *SCALE) == (run / "gaps.csv").read_text()
+
+
+def has_lost(lines: list[dict[str, Any]]) -> bool:
+    steps = [after["time_s"] - line["time_s"] for line, after in pairwise(lines)]
+    return any(line["status"] != "ok" for line in lines) or max(steps) > 0.06
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("rtsp_camera", [("h264", 0.01), ("jpeg", 0.002)], indirect=True, ids=["h264", "jpeg"])
+def test_the_recording_of_a_camera_that_loses_packets_measures_to_the_live_table(
+    live: Callable[..., Any],
+    rtsp_camera: RtspCamera,
+    measured: Callable[..., str],
+    rows: Callable[[Path], list[dict[str, str]]],
+) -> None:
+    view = live(rtsp_camera.address, *SCALE, "--no-page", "--json")
+    # Of JPEG a picture that is not whole never comes; of H.264 it comes as damaged.
+    view.until(lambda seen: len(seen.lines()) > 100 and has_lost(seen.lines()))
+    assert view.stop() == 0
+    (run,) = view.runs()
+    table = rows(run / "gaps.csv")
+    assert measured(run / "video.mp4", *SCALE) == (run / "gaps.csv").read_text()
+    # The gripper moves between 1 and 4 mm, by no more than 0.2 mm in a frame: what is `ok` follows it.
+    found = [(float(row["time_s"]), float(row["gap_mm"])) for row in table if row["status"] == "ok"]
+    assert len(found) > 20
+    assert all(0.95 < gap_mm < 4.05 for _, gap_mm in found)
+    for (time_s, gap_mm), (after_s, after_mm) in pairwise(found):
+        assert abs(after_mm - gap_mm) < 0.2 * max(1.0, (after_s - time_s) / 0.04) + 0.02

@@ -22,7 +22,8 @@ from fingervision.domain.region import Region
 from fingervision.domain.status import Status
 from fingervision.frames.rendered import RenderedFrames
 from fingervision.frames.source import Description
-from fingervision.measuring.measure import Measured, Task, measure
+from fingervision.measuring.measure import Measured, measure
+from fingervision.measuring.task import Task
 from fingervision.rendering import Camera, Scene, render, two_fingers
 from fingervision.vision.pipeline import Settings, measure_frame
 

@@ -20,7 +20,7 @@ from calib.calibration import BareScale
 from fingervision.frames.source import Wish, open_source
 from fingervision.inspection.catalogue import inspect, to_mend
 from fingervision.inspection.sample import take_sample
-from fingervision.measuring.measure import Task
+from fingervision.measuring.task import Task
 from tests.benchmarks.faulty_setups.bench import BELOW_MM, PX_PER_MM, Bench, recorded
 from tests.benchmarks.faulty_setups.faults import FAULTS, good
 

@@ -1,0 +1,36 @@
+"""Sentences for whoever looks at the live view: numbered, kept for a while, told to listeners at once."""
+
+from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass
+
+MESSAGES_KEPT = 50
+
+
+@dataclass(frozen=True, slots=True)
+class Message:
+    """A sentence for the user, numbered from 1."""
+
+    number: int
+    name: str
+    words: str
+
+
+MessageListener = Callable[[Message], None]
+
+
+class Messages:
+    """What was said so far."""
+
+    def __init__(self) -> None:
+        self.kept: deque[Message] = deque(maxlen=MESSAGES_KEPT)
+        self.listeners: list[MessageListener] = []
+        self._said = 0
+
+    def say(self, name: str, words: str) -> None:
+        """Tell everybody who looks."""
+        self._said += 1
+        message = Message(self._said, name, words)
+        self.kept.append(message)
+        for listener in self.listeners:
+            listener(message)

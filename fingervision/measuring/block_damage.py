@@ -1,0 +1,79 @@
+"""Squares of a coded picture that do not belong to it: what a decoder draws where a stream is damaged unnoticed.
+
+JPEG and H.264 code squares of 8 or 16 pixels. Damage puts wrong levels, or the right ones at a wrong place, into whole
+squares; the picture then has steps along the grid of the squares that end at its corners, where the picture before has
+none. What moves or changes in front of the camera has no reason to keep to this grid, and lenses let no edge change
+from one pixel to the next alone.
+
+Method: steps across the borders of blocks against steps inside of them, as in measures of blocking (Z. Wang, H. R.
+Sheikh, A. C. Bovik, "No-reference perceptual quality assessment of JPEG compressed images", Proc. ICIP 2002,
+doi:10.1109/ICIP.2002.1038064), here of the change since another picture and of each segment by itself.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+# The smallest square that JPEG and H.264 transform, but for H.264's 4 x 4, whose damage comes in squares of 16.
+SQUARE_PX = 8
+# A step at the border stands out where it is so many times the two steps beside it on either side. A real edge that
+# happens to lie there is spread by the lens and the pixels: one of a Gaussian spread of 0.5 px has a step half as large
+# beside it.
+OUTSTANDING = 3.0
+# A wrong coefficient may draw a wave, whose steps along a border cancel; their sizes also hold the noise of the
+# picture, so that more of them is asked for.
+WAVES = 2.0
+
+Levels = NDArray[np.float32]
+
+
+def foreign_corners(picture: Levels, before: Levels, least_step: float) -> int:
+    """Count the corners of squares that are in a picture and were not in the one before.
+
+    Parameters
+    ----------
+    picture, before : ndarray of float32, shape (height, width)
+        Grey levels of the same part, which begins at a corner of squares and holds whole ones.
+    least_step : float
+        Grey levels: what is less is left by sound coding as well.
+
+    Returns
+    -------
+    int
+        Places where an outstanding step along a column's border meets one along a row's border.
+    """
+    change = picture - before
+    upright = _outstanding(change, picture, before, least_step)
+    lying = _outstanding(change.T, picture.T, before.T, least_step).T
+    # upright[j, i] runs along block row j at the border behind block column i; a corner has one above or below it, and
+    # a lying one to its left or right.
+    meets_upright = upright[:-1] | upright[1:]
+    meets_lying = lying[:, :-1] | lying[:, 1:]
+    return int(np.count_nonzero(meets_upright & meets_lying))
+
+
+def _outstanding(change: Levels, picture: Levels, before: Levels, least_step: float) -> NDArray[np.bool_]:
+    """Segments of upright borders at which the change has a step, shape (block rows, block columns - 1)."""
+    at = np.arange(SQUARE_PX - 1, change.shape[1] - 1, SQUARE_PX)
+    stands_out = np.zeros((change.shape[0] // SQUARE_PX, len(at)), dtype=bool)
+    for steps, least in ((_levelled, least_step), (_sized, WAVES * least_step)):
+        step = steps(change)
+        here = step[:, at]
+        left = np.maximum(step[:, at - 1], step[:, at - 2])
+        right = np.maximum(step[:, at + 1], step[:, at + 2])
+        # A wrong level is quiet on both sides, a wrong wave on the side of the sound picture alone.
+        beside = np.maximum(left, right) if steps is _levelled else np.minimum(left, right)
+        is_new = steps(picture)[:, at] > steps(before)[:, at]
+        stands_out |= (here > least) & (here > OUTSTANDING * beside) & is_new
+    return stands_out
+
+
+def _levelled(levels: Levels) -> Levels:
+    """Size of the mean step from each column to the next along each block's height, shape (block rows, width - 1)."""
+    rows = levels.reshape(levels.shape[0] // SQUARE_PX, SQUARE_PX, levels.shape[1]).mean(axis=1)
+    return np.asarray(np.abs(np.diff(rows, axis=1)))
+
+
+def _sized(levels: Levels) -> Levels:
+    """Mean size of the steps from each column to the next along each block's height, shape (block rows, width - 1)."""
+    steps = np.abs(np.diff(levels, axis=1))
+    return np.asarray(steps.reshape(levels.shape[0] // SQUARE_PX, SQUARE_PX, -1).mean(axis=1))

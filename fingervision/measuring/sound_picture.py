@@ -1,0 +1,171 @@
+"""Whether a measured jump is motion, or a picture of a coded recording that was damaged without the decoder's notice.
+
+A jump alone is no fault: stages step. A picture alone is none either: its squares show in coarse coding. What jumps
+against the motion so far, and where squares of the codec's grid appear that neither the picture before nor that picture
+moved with the fingers has, is damaged; so is all that is coded as a difference to it.
+"""
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from fingervision.domain.frame import Coding, Frame, LostFrame
+from fingervision.domain.gap import GapMeasurement, NoGap
+from fingervision.domain.status import Status
+from fingervision.measuring.block_damage import SQUARE_PX, Levels, foreign_corners
+from fingervision.vision.grey import to_grey
+
+# A jump: farther from where the last two frames lead than so many standard uncertainties of that difference.
+JUMP_U = 3.0
+# Corners of foreign squares, and steps in units of the fingers' contrast. Sound films (H.264 of crf 18 to 45, Motion
+# JPEG of quality 3 to 31, steps of 7 and 16 px, noise of 1 to 4 levels, and the real drops; 2000 frames, whole
+# pictures) had at most one corner with steps of 0.08 of the contrast, and two with 0.06; a damaged square has four.
+FEWEST_CORNERS, LEAST_STEP = 2, 0.08
+# How far around the measuring points pixels take part: the outline is followed so far below them, and to both sides.
+REACH_PX, REACH_HEIGHTS, ASIDE_PX, BEYOND_TIP_PX = 45.0, 1.5, 64.0, 16.0
+
+WORDS = (
+    "Its picture holds squares that are not in the one before and do not move with the fingers: the recording is "
+    "damaged there."
+)
+WORDS_BEHIND = "It is coded as a difference to a frame whose picture is damaged."
+
+Points = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Sound:
+    """A frame that was believed, what it gave, and which it was."""
+
+    frame: Frame
+    outcome: GapMeasurement
+
+
+class SoundPictures:
+    """Judges the frames of one recording in order; lossless ones have checksums, and pass."""
+
+    def __init__(self) -> None:
+        self._last: _Sound | None = None
+        self._before: _Sound | None = None
+        self._is_broken = False
+
+    def judged(self, frame: Frame, outcome: GapMeasurement | NoGap) -> GapMeasurement | NoGap | LostFrame:
+        """Pass on what a frame gave, or say that it is damaged.
+
+        Parameters
+        ----------
+        frame : Frame
+            The picture.
+        outcome : GapMeasurement or NoGap
+            What was measured in it.
+
+        Returns
+        -------
+        GapMeasurement, NoGap or LostFrame
+            The same, or that the frame is damaged.
+        """
+        if frame.coding is Coding.LOSSLESS:
+            return outcome
+        if self._is_broken and frame.hangs_on_others:
+            return LostFrame(frame.index, frame.time_s, Status.DAMAGED, WORDS_BEHIND)
+        self._is_broken = False
+        last = self._last
+        if last is not None and self._jumps(frame, outcome) and _is_foreign(frame, outcome, last):
+            self._is_broken = frame.coding is Coding.INTERFRAME
+            return LostFrame(frame.index, frame.time_s, Status.DAMAGED, WORDS)
+        if isinstance(outcome, GapMeasurement):
+            self._before, self._last = last, _Sound(frame, outcome)
+        return outcome
+
+    def _jumps(self, frame: Frame, outcome: GapMeasurement | NoGap) -> bool:
+        """Whether it does not go on as the two frames before did; also where that cannot be said."""
+        last, before = self._last, self._before
+        if last is None or before is None or not isinstance(outcome, GapMeasurement):
+            return True
+        if frame.index - last.frame.index != 1 or last.frame.index - before.frame.index != 1:
+            return True
+        here, u = _points(outcome)
+        there, u_there = _points(last.outcome)
+        earlier, u_earlier = _points(before.outcome)
+        u_all = np.sqrt(u**2 + 4.0 * u_there**2 + u_earlier**2)
+        return bool(np.any(np.abs(here - 2.0 * there + earlier) > JUMP_U * u_all))
+
+
+def _points(outcome: GapMeasurement) -> tuple[Points, Points]:
+    """Edge and tip of both fingers, each along its own axis, and their standard uncertainties."""
+    sides = (outcome.left, outcome.right)
+    vertical = outcome.direction.is_vertical
+    across = [side.x_px if vertical else side.y_px for side in sides]
+    return (
+        np.array([*across, *(side.tip_px for side in sides)]),
+        np.array([*(side.u_across_px for side in sides), *(side.u_tip_px for side in sides)]),
+    )
+
+
+def _is_foreign(frame: Frame, outcome: GapMeasurement | NoGap, last: _Sound) -> bool:
+    """Whether the picture holds squares that the last sound one, as it was and as it would be moved, has not."""
+    if frame.pixels.shape != last.frame.pixels.shape:
+        return False
+    rows, columns = _part(last.outcome if isinstance(outcome, NoGap) else outcome, frame)
+    if rows.stop - rows.start < 2 * SQUARE_PX or columns.stop - columns.start < 2 * SQUARE_PX:
+        return False
+    least_step = LEAST_STEP * min(abs(last.outcome.left.contrast), abs(last.outcome.right.contrast))
+    picture = _levels(frame.pixels[rows, columns])
+    before = _levels(last.frame.pixels[rows, columns])
+    if foreign_corners(picture, before, least_step) < FEWEST_CORNERS:
+        return False
+    if isinstance(outcome, NoGap):
+        return True
+    moved = _moved(_levels(last.frame.pixels), last.outcome, outcome)[rows, columns]
+    return foreign_corners(picture, moved, least_step) >= FEWEST_CORNERS
+
+
+def _part(outcome: GapMeasurement, frame: Frame) -> tuple[slice, slice]:
+    """What takes part in a measurement, in whole squares of the codec's grid."""
+    sides = (outcome.left, outcome.right)
+    vertical = outcome.direction.is_vertical
+    across = [side.x_px if vertical else side.y_px for side in sides]
+    at = [side.y_px if vertical else side.x_px for side in sides]
+    tips = [side.tip_px for side in sides]
+    height = max(abs(point - tip) for point, tip in zip(at, tips, strict=True))
+    towards_root = 1.0 if sum(at) > sum(tips) else -1.0
+    ends = [tip - towards_root * BEYOND_TIP_PX for tip in tips]
+    ends += [point + towards_root * max(REACH_PX, REACH_HEIGHTS * height) for point in at]
+    along_part = _squares(min(ends), max(ends), frame.height_px if vertical else frame.width_px)
+    across_part = _squares(
+        min(across) - ASIDE_PX, max(across) + ASIDE_PX, frame.width_px if vertical else frame.height_px
+    )
+    return (along_part, across_part) if vertical else (across_part, along_part)
+
+
+def _squares(least: float, most: float, size: int) -> slice:
+    begin = max(0, int(least // SQUARE_PX)) * SQUARE_PX
+    end = min(size // SQUARE_PX, int(-(-most // SQUARE_PX))) * SQUARE_PX
+    return slice(begin, max(begin, end))
+
+
+def _levels(pixels: NDArray[np.uint8] | NDArray[np.uint16]) -> Levels:
+    return np.asarray(to_grey(pixels), dtype=np.float32)
+
+
+def _moved(levels: Levels, before: GapMeasurement, now: GapMeasurement) -> Levels:
+    """Move each finger's half of a picture as the finger has moved."""
+    vertical = now.direction.is_vertical
+    middle = 0.5 * ((now.left.x_px + now.right.x_px) if vertical else (now.left.y_px + now.right.y_px))
+    halves = []
+    for old, new in ((before.left, now.left), (before.right, now.right)):
+        along = new.tip_px - old.tip_px
+        x_px = new.x_px - old.x_px if vertical else along
+        y_px = along if vertical else new.y_px - old.y_px
+        shift = np.array([[1.0, 0.0, x_px], [0.0, 1.0, y_px]])
+        size = (levels.shape[1], levels.shape[0])
+        halves.append(cv2.warpAffine(levels, shift, size, flags=cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE))
+    moved = np.array(halves[0], dtype=np.float32)
+    behind = int(max(0.0, middle)) + 1
+    if vertical:
+        moved[:, behind:] = halves[1][:, behind:]
+    else:
+        moved[behind:] = halves[1][behind:]
+    return moved

@@ -1,0 +1,159 @@
+"""What shall be measured in a recording or live view, and how."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from calib.camera_response import CameraResponse
+from fingervision.domain.direction import Direction
+from fingervision.domain.drive import DriveHistory
+from fingervision.domain.errors import FingervisionError, UsageError
+from fingervision.domain.region import Region
+from fingervision.frames.source import Description
+from fingervision.measuring.response_budget import choose_response
+from fingervision.measuring.scale import Scale
+from fingervision.vision.pipeline import Settings
+
+
+@dataclass(frozen=True, slots=True)
+class Task:
+    """What shall be measured, and how.
+
+    Parameters
+    ----------
+    scale : Scale
+        From pixels to millimetres.
+    scale_file : Path or None
+        The calibration that the scale was read from.
+    below_tip_mm : float
+        Height of measuring below each finger's tip.
+    direction : Direction or None
+        Where the tips point; None finds out in every frame.
+    region : Region or None
+        The part of the frame that is looked at.
+    drive : DriveHistory or None
+        The recorded input.
+    drive_offset_s : float
+        Added to the drive's times to get the recording's.
+    overlay : bool
+        Whether a video is written with what was measured drawn in.
+    steps_frame : int or None
+        The frame of which every step is written as a picture.
+    response : CameraResponse or None
+        The camera's response, where the user knows it.
+    bits : int or None
+        Depth of levels that are stored in 16 bits; None finds it in every frame.
+    fingers_are_dark : bool or None
+        Whether the fingers are darker than the ground; None finds out in every frame.
+    is_outline : bool
+        Whether a thick part is measured at its whole outline, side walls included, and not at its front face.
+    """
+
+    scale: Scale
+    scale_file: Path | None = None
+    below_tip_mm: float = 0.3
+    direction: Direction | None = None
+    region: Region | None = None
+    drive: DriveHistory | None = None
+    drive_offset_s: float = 0.0
+    overlay: bool = False
+    steps_frame: int | None = None
+    response: CameraResponse | None = None
+    bits: int | None = None
+    fingers_are_dark: bool | None = None
+    is_outline: bool = False
+
+    def __post_init__(self) -> None:
+        if not 0.0 < self.below_tip_mm < float("inf"):
+            raise UsageError(f"--below-tip-mm must be positive, but is {self.below_tip_mm:g}.")
+        if not -float("inf") < self.drive_offset_s < float("inf"):
+            raise UsageError(f"--drive-offset-s must be a number of seconds, but is {self.drive_offset_s:g}.")
+        if self.steps_frame is not None and self.steps_frame < 0:
+            raise UsageError(f"--steps must be the number of a frame, from 0, but is {self.steps_frame}.")
+
+    @property
+    def settings(self) -> Settings:
+        """What vision needs of it, whatever the recording says of itself."""
+        return self.settings_for(())[0]
+
+    def settings_for(self, files: tuple[Path, ...]) -> tuple[Settings, str]:
+        """What vision needs of it for a recording of these files, and a warning where there is one."""
+        response, other, words = choose_response(self.response, self.scale, files)
+        below_px = self.below_tip_mm * self.scale.px_per_mm
+        settings = Settings(
+            below_px,
+            self.direction,
+            self.region,
+            response,
+            other,
+            self.bits,
+            self.fingers_are_dark,
+            self.is_outline,
+        )
+        return settings, words
+
+    @property
+    def drive_columns(self) -> tuple[str, ...]:
+        """Columns that the drive adds to the table."""
+        if self.drive is None:
+            return ()
+        return ("run", "input_mm") if self.drive.force_n is None else ("run", "input_mm", "force_n")
+
+
+def check_task(task: Task, description: Description) -> None:
+    """Refuse what cannot be meant for these frames.
+
+    Parameters
+    ----------
+    task : Task
+        What shall be measured.
+    description : Description
+        What is known of the frames.
+
+    Raises
+    ------
+    UsageError
+        The region lies outside the frame, or a drive is given for frames without times.
+    FingervisionError
+        The scale is for other frames.
+    """
+    width_px, height_px = description.width_px, description.height_px
+    region = task.region
+    if region is not None and not (
+        region.x_px >= 0
+        and region.y_px >= 0
+        and region.width_px > 0
+        and region.height_px > 0
+        and region.x_px + region.width_px <= width_px
+        and region.y_px + region.height_px <= height_px
+    ):
+        raise UsageError(
+            f"--roi must lie inside the frame of {width_px}x{height_px} pixels, but is "
+            f"{region.x_px},{region.y_px},{region.width_px},{region.height_px} (first column, row, width, height)."
+        )
+    if task.drive is not None and not description.has_times:
+        raise UsageError(
+            f"--drive needs a recording with times, but {description.name} has none: "
+            "give --rate-hz, or a times.csv beside the images."
+        )
+    try:
+        task.scale.check_frame_size(width_px, height_px)
+    except ValueError as error:
+        raise FingervisionError(str(error)) from error
+
+
+def in_words(task: Task, settings: Settings) -> dict[str, Any]:
+    """Put the task as it stands in the summary."""
+    region = task.region
+    return {
+        "below_tip_mm": task.below_tip_mm,
+        "tips": "auto" if task.direction is None else task.direction.value,
+        "roi": None if region is None else [region.x_px, region.y_px, region.width_px, region.height_px],
+        "response": settings.response.name,
+        "response_known": settings.other_response is None,
+        "bits": task.bits,
+        "fingers": {None: "auto", True: "dark", False: "light"}[task.fingers_are_dark],
+        "face": "outline" if task.is_outline else "front",
+        "drive": task.drive is not None,
+        "drive_offset_s": task.drive_offset_s if task.drive is not None else None,
+    }

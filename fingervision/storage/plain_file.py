@@ -1,0 +1,27 @@
+"""A pipe or a device is no document: reading it waits for somebody to write, or never ends."""
+
+import errno
+from pathlib import Path
+
+
+def plain(path: Path) -> Path:
+    """Pass on the path of what can be read to its end.
+
+    Parameters
+    ----------
+    path : Path
+        Of a document that shall be read.
+
+    Returns
+    -------
+    Path
+        The same; also where there is nothing, or a folder, which the system says when it is opened.
+
+    Raises
+    ------
+    OSError
+        It is a pipe, a socket or a device.
+    """
+    if path.exists() and not (path.is_file() or path.is_dir()):
+        raise OSError(errno.ESPIPE, "it is a pipe or a device: save it as a file first", str(path))
+    return path

@@ -1,0 +1,266 @@
+"""Bad input of every kind: one sentence with the fact in it, the right exit code, never a traceback or a wait."""
+
+import os
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from fingervision.cli import main
+from fingervision.domain.frame import Frame
+from fingervision.rendering import Camera, render, two_fingers
+from fingervision.rendering.clip import Ffv1, write_clip
+
+MODEL = 'schema = 1\nbase = "sim.csv"\n'
+RECIPE = 'schema = 1\nname = "x"\nbelow_force_n = 5.0\n'
+TRIANGLE = '[[step]]\nkind = "triangle"\nfrom_mm = 0\nto_mm = 1\nspeed_mm_s = %s\ncycles = %s\n'
+TABLE = "time_s,input_mm,gap_mm\n"
+FILES: dict[str, str | bytes] = {
+    "sim.csv": "input_mm,gap_mm\n0,1\n1,2\n",
+    "m.csv": TABLE + "".join(f"{k / 10},{k / 20},{1 + k / 20}\n" for k in range(20)),
+    "two.csv": "time_s,input_mm,gap_mm,gap_mm\n0,0,1,2\n1,1,2,3\n",
+    "latin.csv": "time_s,input_mm,gap_mm,note\n0,0,1,é\n".encode("latin1"),
+    "nul.csv": TABLE + "0,0,1\n1,\x00,2\n",
+    "quote.csv": 'time_s,input_mm,gap_mm,run\n0,0,1,"a\n',
+    "nan.csv": TABLE + "0,0,nan\n",
+    "empty.csv": "",
+    "head.csv": TABLE,
+    "short.csv": TABLE + "0,0,1\n1,1\n",
+    "text.csv": "hello world\n",
+    "json.csv": '{"a": 1}\n',
+    "binary.csv": bytes(range(256)) * 20,
+    "late.csv": "time_s,input_mm\n100,0\n101,1\n",
+    "back.csv": "time_s,input_mm\n1,0\n0,1\n",
+    "same.csv": "time_s,input_mm\n0,0\n0,1\n",
+    "self.toml": 'schema = 1\nbase = "self.toml"\n',
+    "a.toml": 'schema = 1\nbase = "b.toml"\n',
+    "b.toml": 'schema = 1\nbase = "a.toml"\n',
+    "latin.toml": 'schema = 1\nbase = "sim\xe9.csv"\n'.encode("latin1"),
+    "unclosed.toml": 'schema = 1\nbase = "sim.csv\n',
+    "effect3.toml": f"{MODEL}effect = 3\n",
+    "schema9.toml": 'schema = 9\nbase = "sim.csv"\n',
+    "magic.toml": f'{MODEL}[[effect]]\nname = "magic"\n[effect.parameters]\nx = {{ value = 1 }}\n',
+    "infinite.toml": f'{MODEL}[[effect]]\nname = "backlash"\n[effect.parameters]\nplay_mm = {{ value = 1e400 }}\n',
+    "twice.toml": "schema = 1\nschema = 1\n",
+    "empty.toml": "",
+    "nowhere.toml": 'schema = 1\nbase = "nowhere/sim.csv"\n',
+    "dance.toml": f'{RECIPE}[[step]]\nkind = "dance"\n',
+    "step3.toml": f"{RECIPE}step = 3\n",
+    "far.toml": f'{RECIPE}[[step]]\nkind = "move"\nto_mm = 1e9\nspeed_mm_s = 1\n',
+    "still.toml": RECIPE + TRIANGLE % ("0", "1"),
+    "endless.toml": RECIPE + TRIANGLE % ("1", "1000000000"),
+    "deep.json": "[" * 5000,
+    "list.json": "[]",
+    "null.json": '{"schema": 1, "px_per_mm": null}',
+    "nan.json": '{"schema": 1, "px_per_mm": NaN}',
+    "empty.json": "",
+    "text.png": "no png",
+    "zero.png": "",
+    "images/a.png": "x",
+    "folder/.keep": "",
+    "folder.csv/.keep": "",
+    "folder.toml/.keep": "",
+}
+SCALE = ("--px-per-mm", "20")
+LONG = "a" * 5000
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    found = tmp_path_factory.mktemp("bad")
+    rng = np.random.default_rng(0)
+    scenes = [two_fingers(60.0 + k, below_tip_px=6.0, width_px=40.0, frame=(240, 200)) for k in range(2)]
+    frames = (Frame(render(each, Camera(), rng), k, 0.04 * k) for k, each in enumerate(scenes))
+    write_clip(found / "c.mkv", frames, Ffv1())
+    for name, content in FILES.items():
+        (found / name).parent.mkdir(exist_ok=True)
+        (found / name).write_bytes(content if isinstance(content, bytes) else content.encode())
+    for suffix in ("toml", "json", "csv", "mp4"):
+        os.mkfifo(found / f"pipe.{suffix}")
+        (found / f"loop.{suffix}").symlink_to(f"loop.{suffix}")
+    return found
+
+
+Refused = Callable[..., tuple[int, str]]
+
+
+@pytest.fixture
+def refused(folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Refused:
+    monkeypatch.chdir(folder)
+
+    def command(*arguments: str) -> tuple[int, str]:
+        monkeypatch.setattr(sys, "argv", ["fingervision", *arguments])
+        with pytest.raises(SystemExit) as ended:
+            main()
+        return int(ended.value.code or 0), capsys.readouterr().err
+
+    return command
+
+
+def diagnose(measured: str, model: str = "sim.csv", *more: str) -> tuple[str, ...]:
+    return ("diagnose", measured, "--model", model, "--out", "o", *more)
+
+
+def measure(recording: str, *more: str) -> tuple[str, ...]:
+    return ("measure", recording, *SCALE, *more)
+
+
+def calibrated(file: str) -> tuple[str, ...]:
+    return ("measure", "c.mkv", "--calibration", file)
+
+
+def bed(recipe: str) -> tuple[str, ...]:
+    return ("bed", "run", recipe, "--bed", "simulated", "--out", "run")
+
+
+CASES: list[tuple[tuple[str, ...], int, str]] = [
+    (diagnose("m.csv", "sim.csv", "--seed", "-1"), 2, "-1 is not in the range"),
+    (("compare", "m.csv", "--model", "sim.csv", "--seed", "-1"), 2, "-1 is not in the range"),
+    (("demo", "--seed", "-1"), 2, "-1 is not in the range"),
+    # Pipes, where a document is asked for: reading one waits for ever.
+    (diagnose("m.csv", "pipe.toml"), 1, "pipe.toml"),
+    (diagnose("pipe.csv"), 1, "pipe.csv"),
+    (diagnose("m.csv", "pipe.csv"), 1, "pipe.csv"),
+    (calibrated("pipe.json"), 1, "pipe.json"),
+    (measure("c.mkv", "--drive", "pipe.csv"), 1, "pipe.csv"),
+    (measure("c.mkv", "--response", "pipe.csv"), 1, "pipe.csv"),
+    (measure("pipe.mp4"), 1, "pipe.mp4"),
+    (bed("pipe.toml"), 1, "pipe.toml"),
+    (("model", "pipe.toml"), 1, "pipe.toml"),
+    (("batch", "diagnose", "m.csv", "--model", "pipe.toml", "--out", "o"), 1, "pipe.toml"),
+    (("calibrate", "repeat", "pipe.csv"), 1, "pipe.csv"),
+    (("calibrate", "check", "pipe.json", "text.png=1"), 1, "pipe.json"),
+    (("live", "pipe.mp4", *SCALE), 1, "pipe.mp4"),
+    # Links that lead back to themselves.
+    (diagnose("loop.csv"), 1, "loop.csv"),
+    (diagnose("m.csv", "loop.toml"), 1, "loop.toml"),
+    (calibrated("loop.json"), 1, "loop.json"),
+    (measure("loop.mp4"), 1, "loop.mp4"),
+    (bed("loop.toml"), 1, "loop.toml"),
+    (("model", "loop.toml"), 1, "loop.toml"),
+    (measure("c.mkv", "--out", "loop.csv"), 1, "loop.csv"),
+    (("batch", "measure", "loop.mp4", *SCALE, "--out", "o"), 1, "loop.mp4"),
+    # Empty names.
+    *(
+        (arguments, 2, "is empty")
+        for arguments in (
+            diagnose(""),
+            diagnose("m.csv", ""),
+            measure(""),
+            measure("c.mkv", "--out", ""),
+            measure("c.mkv", "--drive="),
+            calibrated(""),
+            bed(""),
+            ("model", ""),
+            ("batch", "measure", "", *SCALE, "--out", "o"),
+            ("live", "", *SCALE),
+            ("calibrate", "bar", "", "-o", "x.json"),
+        )
+    ),
+    (("calibrate", "bar", "=1", "-o", "x.json"), 2, "=1"),
+    (("calibrate", "bar", "text.png=", "-o", "x.json"), 2, "text.png="),
+    # Sources without an end, drives that never overlap.
+    (measure("simulated"), 2, "simulated is a camera"),
+    (("batch", "measure", "simulated", *SCALE, "--out", "o"), 1, "simulated"),
+    (measure("/dev/zero"), 1, "/dev/zero"),
+    (measure("c.mkv", "--drive", "late.csv", "--out", "late"), 1, "100 to 101 s"),
+    (measure("c.mkv", "--drive", "back.csv"), 1, "must increase"),
+    (measure("c.mkv", "--drive", "same.csv"), 1, "must increase"),
+    (measure("c.mkv", "--drive", "folder.csv"), 1, "folder.csv"),
+    (measure("c.mkv", "--drive", "late.csv", "--drive-offset-s", "nan"), 2, "nan"),
+    # Tables.
+    (diagnose("two.csv"), 1, "gap_mm stands twice"),
+    (diagnose("m.csv", "two.csv"), 1, "gap_mm stands twice"),
+    (diagnose("latin.csv"), 1, "UTF-8"),
+    (diagnose("nul.csv"), 1, "input_mm"),
+    (diagnose("quote.csv"), 1, "quote"),
+    (diagnose("nan.csv"), 1, "nan"),
+    (diagnose("empty.csv"), 1, "empty"),
+    (diagnose("head.csv"), 1, "has 0"),
+    (diagnose("short.csv"), 1, "Line 3"),
+    (diagnose("text.csv"), 1, "input_mm"),
+    (diagnose("json.csv"), 1, "input_mm"),
+    (diagnose("binary.csv"), 1, "UTF-8"),
+    (diagnose("folder.csv"), 1, "folder.csv"),
+    (diagnose("nothing.csv"), 1, "There is no table nothing.csv"),
+    (diagnose("m.csv", "head.csv"), 1, "two rows"),
+    # Models.
+    (diagnose("m.csv", "self.toml"), 1, "leads back to itself"),
+    (diagnose("m.csv", "a.toml"), 1, "leads back to itself"),
+    (("batch", "diagnose", "m.csv", "--model", "a.toml", "--out", "o", "--jobs", "1"), 1, "a.toml"),
+    (diagnose("m.csv", "latin.toml"), 1, "latin.toml"),
+    (diagnose("m.csv", "unclosed.toml"), 1, "line 2"),
+    (diagnose("m.csv", "effect3.toml"), 1, "`effect` is 3"),
+    (diagnose("m.csv", "schema9.toml"), 1, "schema"),
+    (diagnose("m.csv", "magic.toml"), 1, "magic"),
+    (diagnose("m.csv", "infinite.toml"), 1, "inf"),
+    (diagnose("m.csv", "twice.toml"), 1, "twice.toml"),
+    (diagnose("m.csv", "empty.toml"), 1, "empty.toml"),
+    (diagnose("m.csv", "nowhere.toml"), 1, "nowhere/sim.csv"),
+    (diagnose("m.csv", "folder.toml"), 1, "folder.toml"),
+    (diagnose("m.csv", "sim.csv", "--with", "magic"), 2, "magic"),
+    (diagnose("m.csv", "sim.csv", "--with", "backlash", "--without", "backlash"), 2, "backlash"),
+    (("model", "sim.csv"), 1, "sim.csv"),
+    # Calibrations.
+    *((calibrated(f"{name}.json"), 1, f"{name}.json") for name in ("deep", "list", "null", "nan", "empty")),
+    # Recipes.
+    (bed("dance.toml"), 1, "danc"),
+    (bed("step3.toml"), 1, "[[step]]"),
+    (bed("far.toml"), 1, "1e+09"),
+    (bed("still.toml"), 1, "speed_mm_s"),
+    (bed("endless.toml"), 1, "cycles"),
+    (bed("folder.toml"), 1, "folder.toml"),
+    # Recordings and options.
+    (measure("text.png"), 1, "text.png"),
+    (measure("zero.png"), 1, "zero.png"),
+    (measure("images"), 1, "a.png"),
+    (measure("images", "--rate-hz", "-5"), 2, "-5"),
+    (measure("folder"), 1, "folder"),
+    (measure("["), 1, "["),
+    (measure(LONG), 1, "too long"),
+    (measure("c.mkv", "--out", LONG), 1, "cannot be written"),
+    (measure("c.mkv", "--out", "c.mkv"), 1, "is a file"),
+    (measure("c.mkv", "--roi", "-1,0,10,10"), 2, "-1,0,10,10"),
+    (measure("c.mkv", "--roi", "0,0,99999999999999999999,1"), 2, "240x200"),
+    (measure("c.mkv", "--bits", "99"), 2, "99"),
+    (("measure", "c.mkv", "--px-per-mm", "1e-300"), 2, "1e-300"),
+    (("measure", "c.mkv", "--px-per-mm", "1e300"), 2, "1e+300"),
+    (("live", "simulated", "--px-per-mm", "1e-300"), 2, "1e-300"),
+    (("live", "simulated", "--port", "99999"), 2, "99999"),
+    (("live", "simulated", "--rate-hz", "nan"), 2, "nan"),
+    (("live", "http://[::1", *SCALE), 1, "http://[::1"),
+    (("batch", "measure", "c.mkv", *SCALE, "--out", "c.mkv"), 2, "c.mkv"),
+    (("batch", "measure", "c.mkv", *SCALE, "--out", "o", "--jobs", "0"), 2, "0 is not in the range"),
+    (("calibrate", "bar", "text.png=nan", "-o", "x.json"), 2, "nan"),
+    (("calibrate", "chessboard", "text.png", "--squares", "0x0", "--square-mm", "1", "-o", "x.json"), 1, "0x0"),
+    (("effects", "magic"), 2, "magic"),
+    (("nonsense",), 2, "nonsense"),
+]
+
+
+@pytest.mark.parametrize(("arguments", "code", "fact"), CASES, ids=[" ".join(case[0])[:60] for case in CASES])
+def test_bad_input_is_one_sentence_and_its_code(
+    refused: Refused, arguments: tuple[str, ...], code: int, fact: str
+) -> None:
+    found, said = refused(*arguments)
+    assert fact in said
+    assert "Traceback" not in said
+    assert said.strip().splitlines()[-1].startswith(("fingervision: ", "Error: "))
+    assert found == code
+
+
+def test_a_folder_that_is_gone_is_a_sentence(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    gone = tmp_path / "gone"
+    gone.mkdir()
+    monkeypatch.chdir(gone)
+    gone.rmdir()
+    monkeypatch.setattr(sys, "argv", ["fingervision", "effects"])
+    with pytest.raises(SystemExit) as ended:
+        main()
+    assert ended.value.code == 1
+    assert "current folder" in capsys.readouterr().err
+    monkeypatch.chdir(tmp_path)
