@@ -9,22 +9,27 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.tri import Triangulation
 from numpy.typing import NDArray
+from scipy.interpolate import PchipInterpolator
 
+from fingervision.cli._model_motion import MotionAsked, move_mechanism
+from fingervision.cli._model_sweep import sweep_mechanism
+from fingervision.cli._model_uncertainty import write_uncertainty
 from fingervision.domain.errors import FingervisionError, UsageError
+from fingervision.models.gripper_figures import unit_of
 from fingervision.models.mechanism import Mechanism
 from fingervision.models.mechanism_chain import MechanismChain
+from fingervision.models.mechanism_figures import MechanismModel, mechanism_figures
 from fingervision.models.mechanism_frame import MechanismFrame
 from fingervision.models.mechanism_plate import MechanismPlate
 from fingervision.models.mechanism_state import MechanismState
-from fingervision.storage.mechanism_toml import read_mechanism
-
-MechanismModel = MechanismPlate | MechanismFrame | MechanismChain
+from fingervision.models.mechanism_uncertainty import mechanism_uncertainty
+from fingervision.storage.mechanism_toml import read_drawing
 
 _KINDS = ("finite_element", "lumped")
-_UNITS = {"input_stiffness_n_mm": "N/mm", "peak_stress_mpa_per_mm": "MPa/mm", "input_at_yield_mm": "mm"}
 _APART = 0.1
 """Relative: kinds that differ by more beyond their stated errors are worth a sentence (the issue's own bar)."""
 _ROWS = 21
+_MOST_ROWS = 41
 _OF_YIELD = 0.5
 """Without a drive, inputs up to half of what makes the flexures yield are answered, either way."""
 
@@ -34,6 +39,8 @@ def predict(
     kind: str,
     drive: Path | None,
     out: Path,
+    asked: MotionAsked,
+    vary: tuple[str, ...],
     *,
     large_rotation: bool,
     contact: bool,
@@ -44,7 +51,11 @@ def predict(
     from fingervision.cli._model_figures import draw_mesh
     from fingervision.storage.drive_csv import read_drive
 
-    mechanism = read_mechanism(path)
+    drawing = read_drawing(path)
+    if vary:
+        sweep_mechanism(drawing, vary, out, as_json=as_json)
+        return
+    mechanism = drawing.mechanism()
     if contact and not mechanism.contacts:
         raise UsageError(f"--contact needs a [[contact]] section that says which faces may touch, but {path} has none.")
     wanted = _KINDS if kind == "all" else (kind,)
@@ -54,7 +65,7 @@ def predict(
     for name in wanted:
         try:
             model = _built(name, mechanism)
-            table[name] = _figures(model)
+            table[name] = mechanism_figures(model)
         except FingervisionError as error:
             # One kind's failure leaves the others their results.
             if kind != "all":
@@ -71,7 +82,7 @@ def predict(
     if drive is None:
         inputs = np.linspace(-_OF_YIELD, _OF_YIELD, _ROWS) * at_yield_mm
     else:
-        inputs = np.unique(read_drive(drive).input_mm)
+        inputs = _inputs_mm(np.unique(read_drive(drive).input_mm))
     states = {name: [model.state(float(value), large_rotation=large_rotation, contact=contact) for value in inputs]
               for name, model in models.items()}  # fmt: skip
     try:
@@ -91,7 +102,32 @@ def predict(
     elif mesh:
         click.echo("--mesh draws the mesh of the finite elements: add --kind finite_element.", err=True)
     _print(mechanism.name, table, as_json=as_json)
+    if drawing.estimates:
+        spread = mechanism_uncertainty(drawing.mechanism, drawing.estimates)
+        write_uncertainty(spread, table, mechanism.name, out, as_json=as_json)
+    if isinstance(plate, MechanismPlate):
+        bent = large_rotation or contact
+        curve = _curve(states["finite_element"]) if bent and asked.drive is not None else None
+        move_mechanism(plate, asked, curve, out, as_json=as_json)
+    elif asked.moves:
+        click.echo("Motion is answered by the finite elements: add --kind finite_element.", err=True)
     _warn(mechanism, models[chief], states[chief], table, contact=contact)
+
+
+def _inputs_mm(inputs: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Rows of the static table: the drive's own inputs, or as many as a curve needs."""
+    if inputs.size < 2:
+        raise UsageError(f"--drive must hold at least two different inputs, but holds {inputs.size}.")
+    return inputs if inputs.size <= _MOST_ROWS else np.linspace(inputs[0], inputs[-1], _MOST_ROWS)
+
+
+def _curve(states: list[MechanismState]) -> PchipInterpolator:
+    """Lengths and force over the input, in the order of a motion's columns; a contact may bend it sharply."""
+    rows = [
+        [*state.pairs_mm.values(), *(part for probe in state.probes_mm.values() for part in probe), state.force_n]
+        for state in states
+    ]
+    return PchipInterpolator([state.input_mm for state in states], rows)
 
 
 def _built(name: str, mechanism: Mechanism) -> MechanismModel:
@@ -110,7 +146,7 @@ def _print(name: str, table: dict[str, dict[str, float]], *, as_json: bool) -> N
     labels = list(dict.fromkeys(label for figures in table.values() for label in figures))
     for label in labels:
         cells = (f"{figures[label]:.6g}" if label in figures else "-" for figures in table.values())
-        shown = f"{label} [{_UNITS[label]}]" if label in _UNITS else label
+        shown = label if label.endswith("]") else f"{label} [{unit_of(label)}]"
         click.echo(f"{shown:<44}" + "".join(f"{cell:>18}" for cell in cells))
 
 
@@ -149,27 +185,6 @@ def _warn(
                     f"model errors of together {100.0 * stated:.2g} % leave; trust {first}.",
                     err=True,
                 )
-
-
-def _figures(model: MechanismModel) -> dict[str, float]:
-    unit, rest = model.state(1.0), model.state(0.0)
-    figures = {
-        "input_stiffness_n_mm": model.stiffness_n_mm,
-        "peak_stress_mpa_per_mm": unit.stress_mpa,
-        "input_at_yield_mm": model.mechanism.material.yield_mpa / unit.stress_mpa,
-    }
-    for name, (x, y) in unit.probes_mm.items():
-        figures[f"{name}: x per input [mm/mm]"] = x
-        figures[f"{name}: y per input [mm/mm]"] = y
-    for name, value in unit.pairs_mm.items():
-        figures[f"{name}: at rest [mm]"] = rest.pairs_mm[name]
-        figures[f"{name}: per input [mm/mm]"] = value - rest.pairs_mm[name]
-    for name, value in model.touch_input_mm().items():
-        figures[f"{name}: input at contact [mm]"] = value
-    for held, label in ((False, "drive_free"), (True, "drive_held")):
-        for place, value in enumerate(model.modes_hz(drive_held=held), 1):
-            figures[f"mode_{place}_{label}_hz"] = value
-    return figures | {"model_error_force_percent": 100.0 * model.force_error}
 
 
 def _write(states: list[MechanismState], out: Path) -> None:

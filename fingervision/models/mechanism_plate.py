@@ -13,6 +13,7 @@ from fingervision.models.mechanism import Mechanism, check_mechanism
 from fingervision.models.mechanism_equilibrium import DrivenMechanism
 from fingervision.models.mechanism_faces import driven_components, mean_weights, supports_of, turns_with
 from fingervision.models.mechanism_state import MechanismState, pair_distances_mm
+from fingervision.models.modal_model import FreeModes, ModalModel, Observable
 from fingervision.models.planar_region import PlanarRegion, sharp_corners_mm
 from fingervision.models.plane_stress import PlaneStressPlate
 from fingervision.models.triangulate import PlaneMesh, triangulate
@@ -167,10 +168,63 @@ class MechanismPlate:
 
     def modes_hz(self, *, drive_held: bool, count: int = 3) -> tuple[float, ...]:
         """First natural frequencies in the plane, the drive held or free to move along its direction."""
+        rad_s, _, _ = self._modes(drive_held=drive_held, count=count)
+        return tuple((rad_s / (2.0 * np.pi)).tolist())
+
+    def modes(self, *, drive_held: bool, count: int) -> tuple[Array, Array]:
+        """First natural modes in the plane: angular frequencies in rad/s, and shapes of unit mass by column."""
+        return self._modes(drive_held=drive_held, count=count)[:2]
+
+    def _modes(self, *, drive_held: bool, count: int) -> tuple[Array, Array, Array]:
+        """Angular frequencies, shapes, and the drive's motion in each."""
         columns = self._motions
         if not drive_held:
             columns = hstack([columns, csr_matrix(self._by_input[:, None])], format="csr")
         K = (columns.T @ self.plate.stiffness_n_mm @ columns).tocsc()
         M = (columns.T @ self.plate.mass_t @ columns).tocsc()
-        squared = eigsh(K, count, M, sigma=0.0, v0=np.ones(K.shape[0]), return_eigenvectors=False)
-        return tuple((np.sqrt(np.sort(squared)) / (2.0 * np.pi)).tolist())
+        squared, sought = eigsh(K, count, M, sigma=0.0, v0=np.ones(K.shape[0]))
+        order = np.argsort(squared)
+        drive = np.zeros(count) if drive_held else sought[-1, order]
+        return np.sqrt(squared[order]), np.asarray(columns @ sought[:, order]), drive
+
+    def modal_model(self, count: int) -> ModalModel:
+        """Reduce the mechanism to its static shape and its modes with the drive held; a pair is a length, see `state`.
+
+        Parameters
+        ----------
+        count : int
+            How many modes.
+        """
+        rad_s, shapes = self.modes(drive_held=True, count=count)
+        static = self.unit_displacement_mm
+        inertia = self.plate.mass_t @ static
+        observed = {
+            name: Observable(rest, float(change[0]), change[1:])
+            for name, (rest, change) in self._observed(np.column_stack([static, shapes])).items()
+        }
+        return ModalModel(
+            stiffness_n_mm=self.stiffness_n_mm,
+            mass_t=float(static @ inertia),
+            rad_s=rad_s,
+            participation=shapes.T @ inertia,
+            observed=observed,
+        )
+
+    def free_modes(self, count: int) -> FreeModes:
+        """Return the modes with the drive free along its direction."""
+        rad_s, shapes, drive = self._modes(drive_held=False, count=count)
+        return FreeModes(rad_s, drive, {name: change for name, (_, change) in self._observed(shapes).items()})
+
+    def _observed(self, columns: Array) -> dict[str, tuple[float, Array]]:
+        """Pairs, then probes: the length at rest, and its change by each column of displacements."""
+        mechanism = self.mechanism
+        moved = {name: np.array([self._motion(column, point) for column in columns.T])
+                 for name, point in mechanism.probes.items()}  # fmt: skip
+        observed = {}
+        for name, (a, b) in mechanism.pairs.items():
+            apart = np.array(mechanism.probes[b]) - mechanism.probes[a]
+            observed[f"{name}_mm"] = float(np.hypot(*apart)), (moved[b] - moved[a]) @ apart / np.hypot(*apart)
+        for name, ways in moved.items():
+            for axis, way in zip("xy", ways.T, strict=True):
+                observed[f"{name}_{axis}_mm"] = 0.0, way
+        return observed

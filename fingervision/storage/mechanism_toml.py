@@ -3,15 +3,19 @@
 import difflib
 import tomllib
 from collections.abc import Mapping
+from dataclasses import dataclass
 from math import hypot
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 from fingervision.domain.errors import FingervisionError
+from fingervision.domain.parameter import Estimate
 from fingervision.models.flexure import Flexure
 from fingervision.models.mechanism import Contact, Drive, Face, Mechanism, check_mechanism
 from fingervision.models.plane_shapes import Ellipse, Polygon, Shape, bar, box, crosses_itself
 from fingervision.storage.arithmetic import number
+from fingervision.storage.drawing_numbers import bare_tables, changed_tables, numbers_of
 from fingervision.storage.drawing_reader import DrawingReader, as_table
 from fingervision.storage.gripper_template import mechanism_from_gripper
 from fingervision.storage.gripper_toml import check_material, read_material
@@ -49,6 +53,68 @@ def is_mechanism(path: Path) -> bool:
     return isinstance(tables.get("body"), list) or isinstance(tables.get("gripper"), dict)
 
 
+@dataclass(frozen=True, slots=True)
+class MechanismDrawing:
+    """A mechanism as its file draws it, and how it looks with some of its numbers changed.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    tables : mapping
+        Its tables with bare numbers.
+    uncertainties : mapping of str to float
+        Standard uncertainties of numbers by dotted name, such as `lengths.t`.
+    """
+
+    path: Path
+    tables: Mapping[str, Any]
+    uncertainties: Mapping[str, float]
+
+    def mechanism(self, changes: Mapping[str, float] = MappingProxyType({}), *, absolute: bool = False) -> Mechanism:
+        """Build and check the mechanism, some numbers changed by so much, or to so much where `absolute`.
+
+        Raises
+        ------
+        FingervisionError
+            A number is unknown, or the drawing cannot be a mechanism.
+        """
+        tables = changed_tables(self.tables, changes, str(self.path), absolute=absolute) if changes else self.tables
+        if "gripper" in tables:
+            return mechanism_from_gripper(tables, self.path)
+        return mechanism_from_tables(tables, str(self.path))
+
+    @property
+    def estimates(self) -> dict[str, Estimate]:
+        """Uncertain numbers with their values and standard uncertainties."""
+        lengths: dict[str, float] = {}
+        for name, raw in as_table(self.tables.get("lengths", {}), f"[lengths] in {self.path}").items():
+            lengths[name] = number(raw, lengths, f"lengths.{name} in {self.path}")
+        values = numbers_of(self.tables)
+        found = {}
+        for name, u in self.uncertainties.items():
+            raw = values[name]
+            found[name] = Estimate(number(raw, lengths, f"{name} in {self.path}") if isinstance(raw, str) else raw, u)
+        return found
+
+
+def read_drawing(path: Path) -> MechanismDrawing:
+    """Read a mechanism's file without building it.
+
+    Raises
+    ------
+    FingervisionError
+        The file cannot be read, or states an uncertainty that is none.
+    """
+    try:
+        tables = tomllib.loads(path.read_text(encoding="utf-8-sig"))
+    except FileNotFoundError:
+        raise FingervisionError(f"There is no mechanism {path}.") from None
+    except (OSError, ValueError, RecursionError) as error:
+        raise FingervisionError(f"{path} must be TOML in UTF-8, but is not: {error}.") from error
+    return MechanismDrawing(path, *bare_tables(tables, str(path)))
+
+
 def read_mechanism(path: Path) -> Mechanism:
     """Read and check a mechanism.
 
@@ -57,15 +123,7 @@ def read_mechanism(path: Path) -> Mechanism:
     FingervisionError
         The file cannot be read, a key is missing, unknown or no number, or the drawing cannot be a mechanism.
     """
-    try:
-        tables = tomllib.loads(path.read_text(encoding="utf-8-sig"))
-    except FileNotFoundError:
-        raise FingervisionError(f"There is no mechanism {path}.") from None
-    except (OSError, ValueError) as error:
-        raise FingervisionError(f"{path} must be TOML in UTF-8, but is not: {error}.") from error
-    if "gripper" in tables:
-        return mechanism_from_gripper(tables, path)
-    return mechanism_from_tables(tables, str(path))
+    return read_drawing(path).mechanism()
 
 
 def mechanism_from_tables(tables: Mapping[str, Any], origin: str) -> Mechanism:
