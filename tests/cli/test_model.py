@@ -1,5 +1,6 @@
 import csv
 import json
+import re
 from pathlib import Path
 
 import numpy as np
@@ -68,7 +69,11 @@ def test_a_drive_beyond_the_stress_limit_is_warned_about(tmp_path: Path) -> None
 def test_the_lumped_model_warns_with_its_nominal_stress(tmp_path: Path) -> None:
     given = drive(tmp_path / "drive.csv", [0.0, 3.0])
     output = run(GRIPPER, "--kind", "lumped", "--drive", given, "--out", tmp_path)
-    assert "at (17.99, 29.6) must stay below the yield of 48 MPa, but is 57.2 MPa, 9.23 MPa too much" in output
+    found = re.search(r"must stay below the yield of 48 MPa, but is (\S+) MPa, (\S+) MPa too much", output)
+    assert found is not None
+    # Finite elements have 18.85 MPa/mm.
+    assert float(found[1]) == pytest.approx(3.0 * 18.85, rel=0.01)
+    assert float(found[2]) == pytest.approx(float(found[1]) - 48.0, abs=0.05)
 
 
 def test_the_stiffness_matrix_knows_small_displacements_alone(tmp_path: Path) -> None:
@@ -94,10 +99,10 @@ def test_contact_reaches_stress_warning_and_table(tmp_path: Path) -> None:
     given = drive(tmp_path / "drive.csv", [-2.0, 0.0])
     output = run(GRIPPER, "--kind", "lumped", "--contact", "--drive", given, "--out", tmp_path)
     assert "at an input of -2 mm the stress at" in output
-    assert "stay within -1.5" in output
+    assert "stay within -1.6" in output
     free = run(GRIPPER, "--kind", "lumped", "--drive", given, "--out", tmp_path)
     assert "must stay below the yield" not in free
-    assert "the fingers touch at an input of -0.514 mm" in free.replace("0.5141", "0.514")
+    assert "the fingers touch at an input of -0.5163 mm" in free
     assert "add --contact" in free
 
 
@@ -184,7 +189,7 @@ def test_modes_are_written_and_drawn(tmp_path: Path) -> None:
 
 def test_a_part_is_gripped(tmp_path: Path) -> None:
     output = run(GRIPPER, "--kind", "lumped", "--object-mm", "3", "--object-n-mm", "50", "--out", tmp_path)
-    assert "lumped: a part of 3 mm (50 N/mm) is touched at -0.1285 mm of input" in output
+    assert "lumped: a part of 3 mm (50 N/mm) is touched at -0.1291 mm of input" in output
     with (tmp_path / "grip.csv").open() as file:
         rows = list(csv.DictReader(file))
     held = [row for row in rows if row["held_width_mm"]]
@@ -192,7 +197,7 @@ def test_a_part_is_gripped(tmp_path: Path) -> None:
     for row in held:
         # The part gives way by its grip over its stiffness.
         assert float(row["held_width_mm"]) == pytest.approx(3.0 - float(row["grip_n"]) / 50.0, abs=1e-6)
-    assert all(float(row["grip_n"]) == 0.0 for row in rows if float(row["input_mm"]) > -0.128)
+    assert all(float(row["grip_n"]) == 0.0 for row in rows if float(row["input_mm"]) > -0.129)
     assert (tmp_path / "grip.png").read_bytes().startswith(b"\x89PNG")
 
 
@@ -222,7 +227,7 @@ def test_endurance_and_warmth_where_the_material_states_them(tmp_path: Path) -> 
     assert "Endurance between -0.5 and 1.5 mm (lumped, the material's S-N line, no scatter): about" in output
     with (tmp_path / "models.csv").open() as file:
         (row,) = csv.DictReader(file)
-    # 19.08 MPa/mm: +-19.08 about 9.54 MPa, fully reversed 23.8 MPa.
-    expected = 1e3 * (19.08 / (1 - 9.54 / 48) / 30) ** (np.log(1e3) / np.log(12 / 30))
+    # 18.82 MPa/mm: +-18.82 about 9.41 MPa, fully reversed 23.4 MPa.
+    expected = 1e3 * (18.82 / (1 - 9.41 / 48) / 30) ** (np.log(1e3) / np.log(12 / 30))
     assert float(row["endurance_cycles"]) == pytest.approx(expected, rel=0.02)
     assert row["gap_per_kelvin_mm"] == ""
