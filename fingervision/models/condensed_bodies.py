@@ -15,6 +15,7 @@ from scipy.linalg import eigh
 from scipy.sparse import bmat
 from scipy.sparse.linalg import splu
 
+from fingervision.domain.errors import FingervisionError
 from fingervision.models.body_frames import Frame
 from fingervision.models.plane_stress import PlaneStressPlate
 
@@ -92,7 +93,14 @@ def condensed(
         motion[at : at + len(frame.motion), 3 * place : 3 * place + 3] = scale * frame.motion
         at += len(frame.motion)
     whole = bmat([[K, rows.T], [rows, None]], format="csc")
-    solver = splu(whole)
+    try:
+        solver = splu(whole)
+    except RuntimeError as error:
+        x, y = frames[0].at_mm
+        raise FingervisionError(
+            f"The body at ({x:.5g}, {y:.5g}) mm must be held apart by its faces and flexures, but two of them hold the "
+            "same nodes; check that no two faces or flexures lie on each other."
+        ) from error
     given = np.vstack([np.zeros((unknowns.size, motion.shape[1])), motion])
     moved = solver.solve(given)[: unknowns.size]
     shapes = np.zeros((plate.unknowns, motion.shape[1]))

@@ -133,6 +133,15 @@ def contact_pair(plate: PlaneStressPlate, contact: Contact, mechanism: Mechanism
         along = wall[:, 1] - wall[:, 0]
         if along[0] * middle[1] - along[1] * middle[0] < 0.0:
             wall = wall[:, ::-1]
+        x, y = plate.nodes_mm
+        edges = plate.outline_edges[:, np.all(np.isin(plate.outline_edges, nodes), axis=0)]
+        outward = np.array([np.sum(y[edges[0]] - y[edges[1]]), np.sum(x[edges[1]] - x[edges[0]])])
+        towards = np.array([wall[1, 1] - wall[1, 0], wall[0, 0] - wall[0, 1]])
+        if outward @ towards <= 0.0:
+            raise FingervisionError(
+                f"The wall of contact {contact.name} of {mechanism.name} must lie before its face, but lies "
+                "behind it, where the body is."
+            )
         pair = ContactPair(contact.name, nodes, np.zeros((2, 0), dtype=np.int64), wall)
     else:
         wanted = nodes_on(plate, contact.other or contact.face, mechanism, size_mm)

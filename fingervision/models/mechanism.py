@@ -146,6 +146,16 @@ def check_mechanism(mechanism: Mechanism, region: PlanarRegion) -> None:
                 f"{flexure.at_mm[1]:g}) mm, but there the material is thinner, thicker or none; "
                 "check its place and axis."
             )
+        if flexure.kind == "leaf":
+            _check_leaf(flexure, region, uncut, name)
+    for place, flexure in enumerate(mechanism.flexures):
+        for other in mechanism.flexures[:place]:
+            apart = hypot(flexure.at_mm[0] - other.at_mm[0], flexure.at_mm[1] - other.at_mm[1])
+            if apart < 0.5 * (flexure.thickness_mm + other.thickness_mm):
+                raise FingervisionError(
+                    f"flexures {other.name} and {flexure.name} of {name} must be apart, but lie on each other; take "
+                    "one away or move it."
+                )
     for probe, (x, y) in mechanism.probes.items():
         ring = np.array([[x + 1e-6 * size * dx, y + 1e-6 * size * dy] for dx in (-1, 0, 1) for dy in (-1, 0, 1)]).T
         if not region.holds(ring).any():
@@ -155,3 +165,22 @@ def check_mechanism(mechanism: Mechanism, region: PlanarRegion) -> None:
     for face in (*mechanism.fixed, mechanism.drive.face):
         if hypot(*face.box_mm) > 1e6:
             raise FingervisionError(f"face {face.name} of {name} must have a box of finite size.")
+
+
+def _check_leaf(flexure: Flexure, region: PlanarRegion, uncut: PlanarRegion, name: str) -> None:
+    """A leaf is free for longer than it is thick, and both its ends lie inside bodies."""
+    t, reach = flexure.thickness_mm, flexure.half_length_mm
+    beside = np.array([flexure.point_mm(x * t, s * 0.501 * t) for x in (-0.5, 0.5) for s in (-1.0, 1.0)]).T
+    if region.holds(beside).any():
+        raise FingervisionError(
+            f"flexure {flexure.name} of {name} must be free for longer than its thickness of {t:g} mm, but is not; "
+            "check its length and whether all lengths are millimetres."
+        )
+    ends = np.array([flexure.point_mm(s * reach * (1.0 - 1e-6), 0.0) for s in (-1.0, 1.0)]).T
+    inside = uncut.holds(ends)
+    if not inside.all():
+        x, y = ends[:, int(np.argmin(inside))]
+        raise FingervisionError(
+            f"flexure {flexure.name} of {name} must end inside a body at both ends, but at ({x:.5g}, {y:.5g}) mm it "
+            "ends outside; check its half_length_mm."
+        )

@@ -51,7 +51,7 @@ class MechanismChain:
         region = mechanism.region
         check_mechanism(mechanism, region)
         self._size_mm = region.size_mm
-        spans = [span_of(flexure, region, mechanism.name) for flexure in mechanism.flexures]
+        spans = [span_of(flexure, region) for flexure in mechanism.flexures]
         cut = PlanarRegion((*region.steps, *((False, span.slab) for span in spans)), region.marks_mm)
         self._bodies = [loop for loop in cut.loops if loop.area_mm2 > 0.0]
         # Bodies are rigid: of a leaf all that is free bends.

@@ -72,7 +72,7 @@ class MechanismFrame:
             raise FingervisionError(
                 f"{mechanism.name} must have flexures to be a lumped model, but has none; take --kind finite_element."
             )
-        self.spans = tuple(span_of(flexure, region, mechanism.name) for flexure in mechanism.flexures)
+        self.spans = tuple(span_of(flexure, region) for flexure in mechanism.flexures)
         cut = PlanarRegion((*region.steps, *((False, span.slab) for span in self.spans)), region.marks_mm)
         mesh = triangulate(cut, _ACROSS, _BODY * region.size_mm)
         zones = tuple(f.zone(mechanism.plate_mm) for f in mechanism.flexures if not f.is_notch)

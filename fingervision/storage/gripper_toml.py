@@ -25,6 +25,8 @@ _MAY_BE_ANY_SIGN = frozenset({"lever.l1_mm", "lever.l2_mm", "lever.l3_mm", "leve
                               "material.thermal_expansion_per_k"})  # fmt: skip
 _MEET_MM = 0.02
 _METRES_BELOW_MM = 2.0
+_LEAST_DENSITY, _MOST_DENSITY = 30.0, 25000.0
+"""kg/m3: rigid foam and osmium lie between."""
 _LEAST_YIELD_STRAIN, _MOST_YIELD_STRAIN = 1e-4, 0.1
 """Lead yields at 5e-4, rubber-like polymers beyond 0.1: what lies outside is a modulus in another unit."""
 _LIMITS: Mapping[str, tuple[float, float]] = MappingProxyType(
@@ -214,6 +216,11 @@ def check_material(material: Material, origin: str) -> None:
     if material.poisson_ratio >= 0.5:
         raise FingervisionError(
             f"material.poisson_ratio in {origin} must be below 0.5, but is {material.poisson_ratio:g}."
+        )
+    if not _LEAST_DENSITY <= material.density_kg_m3 <= _MOST_DENSITY:
+        raise FingervisionError(
+            f"material.density_kg_m3 in {origin} must lie between {_LEAST_DENSITY:g} and {_MOST_DENSITY:g}, but is "
+            f"{material.density_kg_m3:g}; is it in g/cm3? Multiply it by 1000."
         )
     if material.sn_line is not None:
         check_below_yield(material.sn_line, material.yield_mpa, origin)

@@ -133,6 +133,8 @@ def mechanism_from_tables(tables: Mapping[str, Any], origin: str) -> Mechanism:
         if key not in _TOP:
             near = difflib.get_close_matches(key, _TOP, 1, cutoff=0.0)[0]
             raise FingervisionError(f"{origin} has an unknown section or key, {key}; did you mean {near}?")
+    if tables.get("schema", 1) != 1:
+        raise FingervisionError(f"schema in {origin} must be 1, but is {tables['schema']!r}.")
     lengths: dict[str, float] = {}
     for name, raw in as_table(tables.get("lengths", {}), f"[lengths] in {origin}").items():
         lengths[name] = number(raw, lengths, f"lengths.{name} in {origin}")
@@ -170,7 +172,9 @@ class _Reader(DrawingReader):
                 f"{what} in {self.origin} must be one of {', '.join((*_SHAPES, 'polygon_mm'))}, but has "
                 f"{' and '.join(given) or 'none'}."
             )
-        added = table.get("cut", False) is not True
+        if not isinstance(table.get("cut", False), bool):
+            raise FingervisionError(f"{what}.cut in {self.origin} must be true or false, but is {table['cut']!r}.")
+        added = not table.get("cut", False)
         return [(added, self._shape(table, given[0], what))]
 
     def _shape(self, table: Mapping[str, Any], key: str, what: str) -> Shape:

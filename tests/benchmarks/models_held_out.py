@@ -6,7 +6,9 @@ from pathlib import Path
 
 from fingervision.domain.gripper import Gripper, Material
 from fingervision.models.finite_element import FiniteElementGripper
+from fingervision.models.gripper_mechanism import half_mechanism
 from fingervision.models.lumped import LumpedGripper
+from fingervision.models.mechanism_frame import MechanismFrame
 from fingervision.models.mesh_outline import ElementSize, mesh_outline
 from fingervision.models.redrawn import redrawn
 from fingervision.models.static_answer import gap_per_input
@@ -53,7 +55,10 @@ def drawn(gripper: Gripper, row: tuple[Material, float, float, float, float, flo
 def main() -> None:
     """Print errors in % against the plane model on a mesh twice as fine; force and modes with its width effect."""
     sample = read_gripper(ROOT / "sample_frames" / "paper" / "gripper.toml")
-    print("material, t, R, plate | finite_element: slope force stress mode (drive free, held) | lumped: same | matrix")
+    print(
+        "material, t, R, plate | finite_element: slope force stress mode (drive free, held) | lumped: same | "
+        "lumped mechanism: same | matrix: slope"
+    )
     for row in HELD_OUT:
         began = time.perf_counter()
         gripper = drawn(sample, row)
@@ -70,9 +75,19 @@ def main() -> None:
                 (other.modes_hz(drive_held=True)[0], reference.modes_hz(drive_held=True)[0]),
             )
             cells.append(" ".join(f"{100.0 * (a / b - 1.0):+7.3f}" for a, b in pairs))
+        frame = MechanismFrame(half_mechanism(gripper))
+        unit = frame.state(1.0)
+        pairs = (
+            (2.0 * unit.probes_mm["tip"][0], gap_per_input(reference.half)),
+            (2.0 * unit.force_n, reference.half.equilibrium(1.0).force_n),
+            (unit.stress_mpa, reference.peak_stress().mpa_per_mm),
+            (frame.modes_hz(drive_held=False)[0], reference.modes_hz(drive_held=False)[0]),
+            (frame.modes_hz(drive_held=True)[0], reference.modes_hz(drive_held=True)[0]),
+        )
+        cells.append(" ".join(f"{100.0 * (a / b - 1.0):+7.3f}" for a, b in pairs))
         matrix = 100.0 * (StiffnessMatrixGripper(gripper).gap_per_input / gap_per_input(reference.half) - 1.0)
         print(
-            f"{row[0].name:18s} {row[1]:5.2f} {row[2]:4.1f} {row[3]:5.1f} | {cells[0]} | {cells[1]} | {matrix:+7.3f} | "
+            f"{row[0].name:18s} {row[1]:5.2f} {row[2]:4.1f} {row[3]:5.1f} | {' | '.join(cells)} | {matrix:+7.3f} | "
             f"{model.half.unknowns} unknowns, quality {model.mesh.quality().min():.2f}, "
             f"{time.perf_counter() - began:.0f} s",
             flush=True,
