@@ -190,7 +190,7 @@ def measure(source: FrameSource, task: Task, out: Path, on_progress: Progress | 
             f"measure needs a recording, which ends, but {source.description.name} is a camera, which does not: record "
             f"it with `fingervision live {source.description.name} --no-page --out runs`."
         )
-    _check(task, source.description)
+    check_task(task, source.description)
     with _held(out):
         return _measured(source, task, out, on_progress)
 
@@ -290,8 +290,16 @@ def _outcomes(
             yield item, measure_frame(item, settings) if isinstance(item, Frame) else item
 
 
-def _check(task: Task, description: Description) -> None:
-    """Refuse what cannot be meant for these frames."""
+def check_task(task: Task, description: Description) -> None:
+    """Refuse what cannot be meant for these frames.
+
+    Raises
+    ------
+    UsageError
+        The region lies outside the frame, or a drive is given to a recording without times.
+    FingervisionError
+        The scale is for other frames.
+    """
     width_px, height_px = description.width_px, description.height_px
     region = task.region
     if region is not None and not (

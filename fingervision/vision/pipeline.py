@@ -105,6 +105,31 @@ def measure_frame(frame: Frame, settings: Settings) -> GapMeasurement | NoGap:
     return _shifted(_attempt(grey, settings, frame.coding).outcome, settings.region)
 
 
+def look_closely(
+    frame: Frame, settings: Settings
+) -> tuple[GapMeasurement | NoGap, CoarseFingers | None, EdgePoints | None]:
+    """Measure one frame and keep what was found on the way, for whoever asks what limits the measurement.
+
+    Parameters
+    ----------
+    frame : Frame
+        The picture.
+    settings : Settings
+        What the user chose.
+
+    Returns
+    -------
+    outcome : GapMeasurement or NoGap
+        As of `measure_frame`, in pixels of the full frame.
+    fingers : CoarseFingers or None
+        Where they were found, in pixels of the region; None where they were not.
+    edges : EdgePoints or None
+        Their sub-pixel outlines, likewise.
+    """
+    attempt = _attempt(_part(to_grey(frame.pixels), settings.region), settings, frame.coding)
+    return _shifted(attempt.outcome, settings.region), attempt.fingers, attempt.edges
+
+
 def steps(frame: Frame, settings: Settings) -> list[tuple[str, Pixels]]:
     """Picture of every step of one frame, in order, each as large as what is looked at.
 
