@@ -107,7 +107,7 @@ def summarise(
         "advice": [
             *([LOSSLESS_ADVICE.format(codec=description.codec)] if description.lossy else []),
             *_about_fingers(series),
-            *(f"In {count} frames {BESIDE[what]}" for what, count in series.beside.most_common()),
+            *about_edges(series),
             *description.notes,
         ],
     }
@@ -121,6 +121,14 @@ def _about_fingers(series: GapSeries) -> list[str]:
     return [
         f"The frames disagree about what the fingers are: {counts} frames. Look at both with --steps, and state "
         "--fingers dark or --fingers light."
+    ]
+
+
+def about_edges(series: GapSeries) -> list[str]:
+    """Say what stood beside the edges or moved them, in how many frames, and what takes it away."""
+    return [
+        f"In {count} {'frame' if count == 1 else 'frames'} {BESIDE[what]}"
+        for what, count in series.beside.most_common()
     ]
 
 
