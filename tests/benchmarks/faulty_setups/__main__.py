@@ -74,7 +74,7 @@ def main() -> None:
                     print(name, bench)
                     for each in findings[:4]:
                         print("    ", each.name, each.severity, each.cost_um, each.figure)
-            cost = next(each.cost_um for each in findings if each.name == name) if findings else None
+            cost = next((each.cost_um for each in findings if each.name == name), None)
             if cost is not None and error_um.size:
                 stated.append(cost)
                 shake_um = 1e3 * bench.shake_px / PX_PER_MM
