@@ -11,11 +11,12 @@ from calib.camera_response import CameraResponse
 from fingervision.domain.direction import Direction
 from fingervision.domain.drive import DriveHistory
 from fingervision.domain.errors import ExitCode, FingervisionError, UsageError
-from fingervision.domain.frame import Frame, LostFrame
+from fingervision.domain.frame import Coding, Frame, LostFrame
 from fingervision.domain.gap import GapMeasurement, NoGap
 from fingervision.domain.region import Region
 from fingervision.domain.status import Status
 from fingervision.frames.ahead import decoded_ahead
+from fingervision.frames.camera_settings import coding_of
 from fingervision.frames.source import Description, FrameSource
 from fingervision.measuring.asked_to_stop import asked_to_stop
 from fingervision.measuring.gap_figure import draw_gap
@@ -71,6 +72,8 @@ class Task:
         Depth of levels that are stored in 16 bits; None finds it in every frame.
     fingers_are_dark : bool or None
         Whether the fingers are darker than the ground; None finds out in every frame.
+    is_outline : bool
+        Whether a thick part is measured at its whole outline, side walls included, and not at its front face.
     """
 
     scale: Scale
@@ -85,6 +88,7 @@ class Task:
     response: CameraResponse | None = None
     bits: int | None = None
     fingers_are_dark: bool | None = None
+    is_outline: bool = False
 
     def __post_init__(self) -> None:
         if not 0.0 < self.below_tip_mm < float("inf"):
@@ -103,7 +107,16 @@ class Task:
         """What vision needs of it for a recording of these files, and a warning where there is one."""
         response, other, words = choose_response(self.response, self.scale, files)
         below_px = self.below_tip_mm * self.scale.px_per_mm
-        settings = Settings(below_px, self.direction, self.region, response, other, self.bits, self.fingers_are_dark)
+        settings = Settings(
+            below_px,
+            self.direction,
+            self.region,
+            response,
+            other,
+            self.bits,
+            self.fingers_are_dark,
+            self.is_outline,
+        )
         return settings, words
 
     @property
@@ -186,6 +199,10 @@ def _measured(source: FrameSource, task: Task, out: Path, on_progress: Progress 
     description = source.description
     if words := other_camera(task.scale, recorded_camera(description.files)):
         description = replace(description, notes=(words, *description.notes))
+    # What is stored without loss may have come compressed from the camera.
+    coding = coding_of(recorded_camera(description.files))
+    if coding is not Coding.LOSSLESS and not description.lossy:
+        description = replace(description, coding=coding)
     settings, words = task.settings_for(description.files)
     if words:
         description = replace(description, notes=(words, *description.notes))
@@ -214,7 +231,7 @@ def _measured(source: FrameSource, task: Task, out: Path, on_progress: Progress 
         stack.callback(hand_over)
         handed_over_at = monotonic()
         try:
-            for item, outcome in _outcomes(marked(source, marks) if marks else source, settings):
+            for item, outcome in _outcomes(marked(source, marks) if marks else source, settings, description.coding):
                 result = Result(item.index, item.time_s, outcome)
                 pending.append(result)
                 if video is not None and isinstance(item, Frame):
@@ -263,11 +280,13 @@ def _held(out: Path) -> Iterator[None]:
 
 
 def _outcomes(
-    source: Iterable[Frame | LostFrame], settings: Settings
+    source: Iterable[Frame | LostFrame], settings: Settings, coding: Coding
 ) -> Iterator[tuple[Frame | LostFrame, GapMeasurement | NoGap | LostFrame]]:
     """Every frame with what it says; the decoder runs ahead and is stopped when this is."""
     with closing(decoded_ahead(source)) as frames:
         for item in frames:
+            if isinstance(item, Frame) and item.coding is Coding.LOSSLESS and coding is not Coding.LOSSLESS:
+                item = replace(item, coding=coding)
             yield item, measure_frame(item, settings) if isinstance(item, Frame) else item
 
 
@@ -317,6 +336,7 @@ def _in_words(task: Task, settings: Settings) -> dict[str, Any]:
         "response_known": settings.other_response is None,
         "bits": task.bits,
         "fingers": {None: "auto", True: "dark", False: "light"}[task.fingers_are_dark],
+        "face": "outline" if task.is_outline else "front",
         "drive": task.drive is not None,
         "drive_offset_s": task.drive_offset_s if task.drive is not None else None,
     }

@@ -9,15 +9,15 @@ from scipy.integrate import quad
 
 from fingervision.domain.errors import FingervisionError
 from fingervision.domain.gripper import Gripper, Material
-from fingervision.models import hinge_closed_forms as closed
 from fingervision.models.finite_element import FiniteElementGripper
 from fingervision.models.hinge_compliance import beam_compliance
 from fingervision.models.hinge_correction import HingeTheory, corrected_compliance
-from fingervision.models.hinge_solid import solid_compliance
 from fingervision.models.lumped import LumpedGripper
 from fingervision.models.notch import Notch, circular_notch
 from fingervision.models.skeleton import skeleton_of
 from fingervision.models.width_effect import force_uncertainty, held_moduli
+from tests.benchmarks.hinge_solid import solid_compliance
+from tests.models import hinge_closed_forms as closed
 
 PA2200 = Material("PA2200", 1650.0, 0.34, 930.0, 48.0)
 ROUNDING = 1e-10
@@ -62,6 +62,7 @@ def test_a_whole_gripper_with_thin_necks_is_as_soft_as_finite_elements(gripper: 
     assert lumped.peak_stress().mpa_per_mm == pytest.approx(plane.peak_stress().mpa_per_mm, rel=0.02)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("nu", "width"), [(0.2, 5.5), (0.42, 5.5), (0.34, 18.0)])
 def test_the_width_effect_between_the_tables_nodes_and_for_other_materials(nu: float, width: float) -> None:
     """Bricks at width over thickness, and a Poisson's ratio, that no table has: bending as sure as is said."""
@@ -73,6 +74,7 @@ def test_the_width_effect_between_the_tables_nodes_and_for_other_materials(nu: f
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("width", [20.0, 100.0])
 def test_torsion_of_wide_hinges(width: float) -> None:
     """Beam theory alone is off by 2.8 and 19 times and more; bricks between rigid planes within 5 %."""
