@@ -59,7 +59,7 @@ def main() -> None:
     rng = np.random.default_rng(options.seed)
     named, drawn = 0, 0
     print("fault         set-ups  first   stated um   error um   named instead")
-    for name in options.only or FAULTS:
+    for name in (options.only or FAULTS) if options.setups else ():
         count = -(-options.setups // len(options.only or FAULTS))
         right, instead, stated, errors = 0, Counter(), [], []
         for _ in range(count):
