@@ -17,6 +17,13 @@ SPREAD = 6.0
 # Verdicts of the same manual: good below 10 %, doubtful up to 30 %.
 GOOD_PERCENT, DOUBTFUL_PERCENT = 10.0, 30.0
 
+MOVING = 3.0
+"""Spread of the readings of one part over that from reading to reading, from which on they do not repeat one value. It
+is 1 +- 1 / sqrt(n) for independent readings (von Neumann 1941, doi:10.1214/aoms/1177731677) and 0.41 n for n readings
+of a steady motion; a drift that triples the noise says as little about the gauge."""
+FEWEST_TO_TELL = 12
+"""Of fewer readings neither is known well enough."""
+
 
 @dataclass(frozen=True, slots=True)
 class GaugeStudy:
@@ -64,6 +71,34 @@ class GaugeStudy:
         """%GRR of the total variation; None where all parts are one part, so that there is no other variation."""
         total = hypot(self.grr_mm, self.part_mm)
         return 100.0 * self.grr_mm / total if self.parts > 1 and total > 0.0 else None
+
+
+def refuse_moving(readings_mm: Sequence[float], name: str) -> None:
+    """Refuse readings of one part that move: their spread is that of the motion and says nothing of the gauge.
+
+    Parameters
+    ----------
+    readings_mm : sequence of float
+        In the order in which they were taken.
+    name : str
+        What they are of, for the sentence.
+
+    Raises
+    ------
+    CalibrationError
+        They move.
+    """
+    values = np.asarray(readings_mm, dtype=np.float64)
+    if values.size < FEWEST_TO_TELL:
+        return
+    spread = float(np.std(values, ddof=1))
+    from_one_to_next = float(np.sqrt(0.5 * np.mean(np.diff(values) ** 2)))
+    if spread > MOVING * from_one_to_next:
+        raise CalibrationError(
+            f"The readings of {name} must repeat one gap, but they move from {values.min():.4f} to {values.max():.4f} "
+            f"mm (standard deviation {1e3 * spread:.3g} um, from reading to reading {1e3 * from_one_to_next:.3g} um): "
+            "record a gap that is held; or, where a staircase was driven, add --by-input."
+        )
 
 
 def gauge_study(readings_mm: Sequence[Sequence[Sequence[float]]]) -> GaugeStudy:

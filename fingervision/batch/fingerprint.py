@@ -5,14 +5,17 @@ from pathlib import Path
 from time import time_ns
 
 BYTES_AT_ONCE = 1 << 20
+COLUMNS = "columns.toml"
+"""Says what the columns of the tables beside it are."""
 SETTLED_NS = 3_000_000_000
 """A file that changed so shortly ago may change again within the same tick of a coarse file system's clock (2 s)."""
 
 
 def files_of(path: Path) -> list[Path]:
-    """Files that an input is made of: itself, or what lies in the folder, hidden files left out."""
+    """Files of an input: itself and the columns.toml beside it; of a folder, what lies in it and is not hidden."""
     if not path.is_dir():
-        return [path]
+        columns = path.parent / COLUMNS
+        return [path, columns] if columns != path and columns.is_file() else [path]
     return sorted(file for file in path.iterdir() if not file.name.startswith(".") and file.is_file())
 
 

@@ -38,6 +38,7 @@ def predict(
     path: Path,
     kind: str,
     drive: Path | None,
+    columns: Path | None,
     out: Path,
     asked: MotionAsked,
     vary: tuple[str, ...],
@@ -49,7 +50,7 @@ def predict(
 ) -> None:
     """Write mechanism.csv (and simulation.csv where a pair is called gap), deformed.png, and print the figures."""
     from fingervision.cli._model_figures import draw_mesh
-    from fingervision.storage.drive_csv import read_drive
+    from fingervision.tables.read import read_drive
 
     drawing = read_drawing(path)
     if vary:
@@ -82,7 +83,7 @@ def predict(
     if drive is None:
         inputs = np.linspace(-_OF_YIELD, _OF_YIELD, _ROWS) * at_yield_mm
     else:
-        inputs = _inputs_mm(np.unique(read_drive(drive).input_mm))
+        inputs = _inputs_mm(np.unique(read_drive(drive, columns).input_mm))
     states = {name: [model.state(float(value), large_rotation=large_rotation, contact=contact) for value in inputs]
               for name, model in models.items()}  # fmt: skip
     try:

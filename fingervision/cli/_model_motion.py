@@ -20,8 +20,8 @@ from fingervision.models.mechanism_plate import MechanismPlate
 from fingervision.models.modal_response import Motion, modal_motion
 from fingervision.models.mode_shapes import ModesWanted, mechanism_mode_shapes, parse_modes
 from fingervision.models.motion_in_time import MODES, about_equilibria, gripper_motion
-from fingervision.storage.drive_csv import read_drive
 from fingervision.storage.motion_csv import write_motion
+from fingervision.tables.read import read_drive
 
 _MOST_ROWS = 2_000_000
 _STYLES = ("-", "--", "-.")
@@ -68,7 +68,14 @@ class MotionAsked:
 
 
 def motion_asked(
-    drive: Path | None, modes: str | None, frequency: str | None, damping: str, rate_hz: float | None, *, film: bool
+    drive: Path | None,
+    columns: Path | None,
+    modes: str | None,
+    frequency: str | None,
+    damping: str,
+    rate_hz: float | None,
+    *,
+    film: bool,
 ) -> MotionAsked:
     """Read what was asked for.
 
@@ -83,7 +90,7 @@ def motion_asked(
     if rate_hz is not None and drive is None:
         raise UsageError("--rate-hz needs --drive: it is the rate of response.csv.")
     return MotionAsked(
-        None if drive is None else at_rate(read_drive(drive), rate_hz),
+        None if drive is None else at_rate(read_drive(drive, columns), rate_hz),
         None if modes is None else parse_modes(modes),
         None if frequency is None else parse_band(frequency),
         damping,

@@ -125,7 +125,7 @@ def _arguments(given: Mapping[click.Option, Any], *, absolute: bool) -> list[str
         if option.is_flag:
             words += [flag] if value else []
             continue
-        for one in value if option.multiple else (value,):
+        for one in value if isinstance(value, tuple) else (value,):
             words += [flag, str(Path(one).absolute() if absolute and isinstance(one, Path) else one)]
     return words
 
@@ -139,7 +139,7 @@ def _options_key(name: str, given: Mapping[click.Option, Any]) -> str:
 
     held: dict[str, Any] = {}
     for option, value in given.items():
-        several = value if option.multiple else (value,)
+        several = value if isinstance(value, tuple) else (value,)
         if several and value != option.default and value is not None:
             held[str(option.name)] = sorted(_content(one) if isinstance(one, Path) else str(one) for one in several)
     return hashlib.sha256(json.dumps([name, __version__, held], sort_keys=True).encode()).hexdigest()

@@ -295,7 +295,7 @@ def repeat(tables: Sequence[Path], tolerance_mm: float | None, by_input: bool, a
     Frames of one recording repeat; recordings of the same thing, set up again each time, reproduce.
     """
     with sentences():
-        from calib.gauge_study import gauge_study, verdict
+        from calib.gauge_study import gauge_study, refuse_moving, verdict
         from fingervision.storage.gap_readings import read_gap_readings
 
         if len({table.resolve() for table in tables}) < len(tables):
@@ -307,6 +307,9 @@ def repeat(tables: Sequence[Path], tolerance_mm: float | None, by_input: bool, a
                 "The recordings must share at least one part with two readings in each, but share none: "
                 "record the same thing in all of them."
             )
+        for table, each in zip(tables, recordings, strict=True):
+            for part in parts:
+                refuse_moving(each[part], str(table) if part is None else f"{table} at input {part:g} mm")
         # Every cell of the study holds the same number of readings: as many as the shortest offers.
         trials = min(len(each[part]) for each in recordings for part in parts)
         study = gauge_study([[each[part][:trials] for part in parts] for each in recordings])

@@ -4,6 +4,8 @@ from pathlib import Path
 
 import click
 
+from fingervision.cli._columns_option import columns_option
+from fingervision.cli._results_folder import results_folder
 from fingervision.cli._which_model import kind_option, models_option, told_apart
 
 EXAMPLES = """
@@ -27,25 +29,38 @@ Files written to --out:
 @click.option("--out", type=click.Path(path_type=Path, file_okay=False), default=Path("comparison"), show_default=True)
 @click.option("--seed", default=1, show_default=True, help="Of the bootstrapped threshold.")
 @kind_option
+@columns_option
 @click.option("--json", "as_json", is_flag=True, help="Print compare.json.")
-def command(measured: Path, model_paths: tuple[Path, ...], out: Path, seed: int, kind: str, as_json: bool) -> None:
+def command(
+    measured: Path,
+    model_paths: tuple[Path, ...],
+    out: Path,
+    seed: int,
+    kind: str,
+    columns: Path | None,
+    as_json: bool,
+) -> None:
     """Say where a measured table and one or more models disagree beyond the noise."""
     import json
 
     from fingervision.diagnosis.compare import compare
     from fingervision.diagnosis.report.comparison_files import PAGE, write_comparison
-    from fingervision.storage.measured_table import read_measured_table
-    from fingervision.storage.model_toml import read_model
     from fingervision.storage.out_folder import new_out_folder, out_folder
     from fingervision.storage.provenance import provenance
+    from fingervision.storage.result_owner import mark_owner
+    from fingervision.tables.read import read_measured_table, read_model
 
-    table = read_measured_table(measured)
-    models = {name: read_model(path, kind) for name, path in zip(told_apart(model_paths), model_paths, strict=True)}
+    table = read_measured_table(measured, columns)
+    models = {
+        name: read_model(path, kind, columns) for name, path in zip(told_apart(model_paths), model_paths, strict=True)
+    }
+    out = results_folder(out, measured)
     with new_out_folder(out):
         compared = {name: compare(table, model, seed=seed) for name, model in models.items()}
     files = {"measured table": measured, **{f"model {name}": p for name, p in zip(models, model_paths, strict=True)}}
     with out_folder(out):
         document = write_comparison(out, compared, provenance(files), measured)
+    mark_owner(out, measured)
     if as_json:
         click.echo(json.dumps(document, indent=2))
         return

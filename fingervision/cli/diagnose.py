@@ -4,6 +4,8 @@ from pathlib import Path
 
 import click
 
+from fingervision.cli._columns_option import columns_option
+from fingervision.cli._results_folder import results_folder
 from fingervision.cli._which_model import kind_option, model_option
 from fingervision.domain.errors import UsageError
 
@@ -31,6 +33,7 @@ Files written to --out:
 @click.option("--without", multiple=True, metavar="EFFECT", help="Rule this effect out.")
 @click.option("--seed", default=1, show_default=True, help="Of the bootstrap: the same seed gives the same report.")
 @kind_option
+@columns_option
 @click.option("--json", "as_json", is_flag=True, help="Print report.json.")
 def command(
     measured: Path,
@@ -40,6 +43,7 @@ def command(
     without: tuple[str, ...],
     seed: int,
     kind: str,
+    columns: Path | None,
     as_json: bool,
 ) -> None:
     """Name the effect that a model lacks beside a measured table."""
@@ -50,10 +54,10 @@ def command(
     from fingervision.diagnosis.diagnose import diagnose
     from fingervision.diagnosis.report.answer_files import PAGE, write_answer
     from fingervision.effects import catalogue
-    from fingervision.storage.measured_table import read_measured_table
-    from fingervision.storage.model_toml import read_model
     from fingervision.storage.out_folder import new_out_folder, out_folder
     from fingervision.storage.provenance import provenance
+    from fingervision.storage.result_owner import mark_owner
+    from fingervision.tables.read import read_measured_table, read_model
 
     for name in (*forced, *without):
         if name not in catalogue():
@@ -62,7 +66,8 @@ def command(
             raise UsageError(f"An effect must be one of the catalogue, but is {name}: {hint}")
     if set(forced) & set(without):
         raise UsageError(f"An effect must be forced or left out, but {', '.join(set(forced) & set(without))} is both.")
-    table, model = read_measured_table(measured), read_model(model_path, kind)
+    table, model = read_measured_table(measured, columns), read_model(model_path, kind, columns)
+    out = results_folder(out, measured)
     bar = click.progressbar(length=1000, label="diagnosing", file=sys.stderr, hidden=not sys.stderr.isatty())
     with new_out_folder(out), bar:
         done = diagnose(
@@ -76,6 +81,7 @@ def command(
     with out_folder(out):
         made = provenance({"measured table": measured, "model": model_path})
         document = write_answer(out, done, model, made, measured)
+    mark_owner(out, measured)
     report = done.report
     if as_json:
         click.echo(json.dumps(document, indent=2))

@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from fingervision.cli._columns_option import columns_option
 from fingervision.cli._where_to_measure import region_of, where_to_measure
 from fingervision.domain.errors import UsageError
 
@@ -42,7 +43,12 @@ Exit codes: 0 done; 1 could not, or no frame gave a number; 2 wrong usage;
 @click.argument("recording")
 @where_to_measure
 @click.option("--rate-hz", type=float, help="Images in a second, where they have no times of their own.")
-@click.option("--drive", type=click.Path(path_type=Path), help="drive.csv: time_s,input_mm[,run][,force_n].")
+@click.option(
+    "--drive",
+    type=click.Path(path_type=Path),
+    help="The stage's log: drive.csv (time_s,input_mm[,run][,force_n]) or any.",
+)
+@columns_option
 @click.option(
     "--drive-offset-s",
     type=float,
@@ -89,6 +95,7 @@ def command(
     roi: str | None,
     rate_hz: float | None,
     drive: Path | None,
+    columns: Path | None,
     drive_offset_s: float,
     response: str,
     bits: int | None,
@@ -107,8 +114,9 @@ def command(
     from fingervision.domain.direction import Direction
     from fingervision.frames.source import Wish, open_source
     from fingervision.measuring.measure import Task, measure
-    from fingervision.storage.drive_csv import read_drive
     from fingervision.storage.response_csv import response_named
+    from fingervision.storage.summary_json import refuse_other_recording
+    from fingervision.tables.read import read_drive
 
     task = Task(
         scale=_scale(calibration, px_per_mm),
@@ -116,7 +124,7 @@ def command(
         below_tip_mm=below_tip_mm,
         direction=None if tips == "auto" else Direction(tips),
         region=region_of(roi),
-        drive=None if drive is None else read_drive(drive),
+        drive=None if drive is None else read_drive(drive, columns),
         drive_offset_s=drive_offset_s,
         overlay=overlay,
         steps_frame=steps_frame,
@@ -126,8 +134,10 @@ def command(
         is_outline=face == "outline",
     )
     source = open_source(recording, Wish(rate_hz=rate_hz))
+    folder = out or _default_out(recording)
+    refuse_other_recording(folder, recording)
     with _Bar() as bar:
-        measured = measure(source, task, out or _default_out(recording), bar)
+        measured = measure(source, task, folder, bar)
     _report(measured, as_json)
     raise SystemExit(int(measured.exit_code))
 

@@ -6,6 +6,9 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from fingervision.cli._columns_option import columns_option
+from fingervision.cli._results_folder import results_folder
+
 if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
@@ -17,6 +20,13 @@ if TYPE_CHECKING:
 _KINDS = ("stiffness_matrix", "lumped", "finite_element", "all")
 _METRES_BELOW_OF_HEIGHT = 1e-4
 _MOST_ROWS = 401
+_SWEPT = ("vary.csv", "vary.png")
+_PREDICTED = (
+    "models.csv", "models.png", "simulation.csv", "mechanism.csv", "deformed.png", "mesh.png", "modes.csv", "modes.png",
+    "frequency.csv", "frequency.png", "grip.csv", "grip.png", "response.csv", "response.png", "uncertainty.csv",
+    "uncertainty.png", "modes.mp4",
+)  # fmt: skip
+"""Files of the two kinds of call, whichever of them a call writes."""
 _EPILOG = """\b
 Examples:
   fingervision model gripper.toml --kind all --drive drive.csv --out model
@@ -33,7 +43,8 @@ Examples:
 @click.command(epilog=_EPILOG)
 @click.argument("gripper_toml", metavar="DRAWING.toml", type=click.Path(path_type=Path))
 @click.option("--kind", type=click.Choice(_KINDS), default="all", show_default=True, help="Which model.")
-@click.option("--drive", type=click.Path(path_type=Path), help="drive.csv with the inputs to answer.")
+@click.option("--drive", type=click.Path(path_type=Path), help="drive.csv, or another log, with the inputs to answer.")
+@columns_option
 @click.option(
     "--out", type=click.Path(path_type=Path), default=Path("model"), show_default=True, help="Folder to write."
 )
@@ -59,6 +70,7 @@ def command(
     gripper_toml: Path,
     kind: str,
     drive: Path | None,
+    columns: Path | None,
     out: Path,
     hinge: str,
     large_rotation: bool,
@@ -92,18 +104,22 @@ def command(
     from fingervision.models.physics import LINEAR, Physics
     from fingervision.storage.gripper_toml import read_gripper
     from fingervision.storage.mechanism_toml import is_mechanism
+    from fingervision.storage.result_owner import began_in, finish_in
     from fingervision.storage.simulation_csv import write_simulation
 
-    asked = motion_asked(drive, modes, frequency, damping, rate_hz, film=film)
+    asked = motion_asked(drive, columns, modes, frequency, damping, rate_hz, film=film)
+    out = results_folder(out, gripper_toml)
+    began_ns = began_in(out)
     if is_mechanism(gripper_toml):
         from fingervision.cli._mechanism import predict
 
         if object_mm is not None or object_n_mm is not None:
             raise UsageError("--object-mm is known for grippers alone; leave it out for a mechanism drawn by bodies.")
         predict(
-            gripper_toml, kind, drive, out, asked, vary,
+            gripper_toml, kind, drive, columns, out, asked, vary,
             large_rotation=large_rotation, contact=contact, mesh=mesh, as_json=as_json,
         )  # fmt: skip
+        finish_in(out, gripper_toml, _SWEPT if vary else _PREDICTED, began_ns)
         return
     gripper = read_gripper(gripper_toml)
     part = part_asked(object_mm, object_n_mm, gripper.body.rest_gap_mm)
@@ -111,6 +127,7 @@ def command(
         from fingervision.cli._model_sweep import sweep
 
         sweep(gripper, gripper_toml.stem, vary, HingeTheory(hinge), out, as_json=as_json)
+        finish_in(out, gripper_toml, _SWEPT, began_ns)
         return
     if uncertain := any(u > 0.0 for u in gripper.uncertainties.values()):
         from fingervision.models.gripper_uncertainty import check_uncertainties
@@ -118,7 +135,7 @@ def command(
         check_uncertainties(gripper)
     wanted = kinds() if kind == "all" else (kind,)
     physics = Physics(large_rotation=large_rotation, contact=contact)
-    inputs = None if drive is None else _inputs_mm(drive, gripper)
+    inputs = None if drive is None else _inputs_mm(drive, columns, gripper)
     _make_folder(out)
     rows: dict[str, dict[str, Any]] = {}
     answers: dict[str, Response] = {}
@@ -164,6 +181,12 @@ def command(
     if part is not None:
         given_inputs = None if drive is None else inputs
         write_grip(gripper, models, part, given_inputs, gripper_toml.stem, out, as_json=as_json)
+    finish_in(
+        out,
+        gripper_toml,
+        (*_PREDICTED, *(f"{each}/{name}.csv" for each in kinds() for name in ("simulation", "response"))),
+        began_ns,
+    )
     for sentence in disagreements(figures):
         click.echo(f"Warning: {sentence}", err=True)
     say_what_limits(gripper, models, figures, inputs, physics, as_json=as_json)
@@ -180,13 +203,13 @@ def _make_folder(out: Path) -> None:
         ) from error
 
 
-def _inputs_mm(drive: Path, gripper: "Gripper") -> "NDArray[np.float64]":
+def _inputs_mm(drive: Path, columns: Path | None, gripper: "Gripper") -> "NDArray[np.float64]":
     import numpy as np
 
     from fingervision.domain.errors import UsageError
-    from fingervision.storage.drive_csv import read_drive
+    from fingervision.tables.read import read_drive
 
-    inputs = np.unique(read_drive(drive).input_mm)
+    inputs = np.unique(read_drive(drive, columns).input_mm)
     largest = float(np.abs(inputs).max())
     if 0.0 < largest < _METRES_BELOW_OF_HEIGHT * gripper.body.height_mm:
         raise UsageError(

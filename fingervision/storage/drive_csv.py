@@ -1,13 +1,19 @@
 """drive.csv: the recorded input, `time_s,input_mm[,run][,force_n]`."""
 
 import csv
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from math import isfinite
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fingervision.domain.drive import DriveHistory
 from fingervision.domain.errors import FingervisionError
+from fingervision.storage.csv_columns import read_block
+
+COLUMNS = ("time_s", "input_mm", "force_n")
 
 
 def read_drive(path: Path) -> DriveHistory:
@@ -21,6 +27,12 @@ def read_drive(path: Path) -> DriveHistory:
         The file cannot be read, a column is missing, a cell is no number, times do not increase, or a run comes back
         after another.
     """
+    block = None
+    with suppress(FingervisionError):  # a file that cannot be read is told below, in a drive table's words
+        block = read_block(path)
+    if block is not None and {"time_s", "input_mm"} <= block.keys() and "run" not in block:
+        kept = {name: block[name] for name in COLUMNS if name in block}
+        return drive_rows(path, kept, None, range(2, 2 + block["time_s"].size))
     lines = _lines(path)
     if not lines:
         raise FingervisionError(f"{path} must have a header line time_s,input_mm[,run][,force_n], but is empty.")
@@ -30,31 +42,55 @@ def read_drive(path: Path) -> DriveHistory:
             raise FingervisionError(f"{path} must have one column {name}, but its header is {','.join(header)}.")
     if len(lines) == 1:
         raise FingervisionError(f"{path} must have at least one row below its header, but has none.")
-    columns: dict[str, list[float]] = {name: [] for name in ("time_s", "input_mm", "force_n") if name in header}
-    runs: list[str] = []
     for line, cells in lines[1:]:
         if len(cells) != len(header):
             raise FingervisionError(f"Line {line} of {path} must have {len(header)} cells, but has {len(cells)}.")
-        for name, values in columns.items():
-            values.append(_number(path, line, name, cells[header.index(name)]))
-        times = columns["time_s"]
-        if len(times) > 1 and not times[-1] > times[-2]:
-            raise FingervisionError(
-                f"time_s must increase from row to row, but in line {line} of {path} it is {times[-1]:g} "
-                f"after {times[-2]:g}: put all runs on the recording's clock, in order."
-            )
-        if "run" in header:
-            runs.append(cells[header.index("run")].strip())
-            if len(runs) > 1 and runs[-1] != runs[-2] and runs[-1] in runs[:-1]:
+    numbers = [line for line, _ in lines[1:]]
+    columns = list(zip(*(cells for _, cells in lines[1:]), strict=True))
+    values = {name: _numbers(path, numbers, name, columns[header.index(name)]) for name in COLUMNS if name in header}
+    runs = tuple(run.strip() for run in columns[header.index("run")]) if "run" in header else None
+    return drive_rows(path, values, runs, numbers)
+
+
+def drive_rows(
+    path: Path, values: Mapping[str, NDArray[np.float64]], runs: tuple[str, ...] | None, lines: Sequence[int]
+) -> DriveHistory:
+    """Take the columns of a drive table, where their times increase and the rows of a run stand together.
+
+    Parameters
+    ----------
+    path : Path
+        Where they come from, for sentences.
+    values : mapping of str to ndarray of float, shape (n,)
+        `time_s`, `input_mm` and, where it was recorded, `force_n`.
+    runs : tuple of str, length n, or None
+        Name of the run of each row.
+    lines : sequence of int, length n
+        Line of the file that each row stands in.
+
+    Raises
+    ------
+    FingervisionError
+        Times do not increase, or a run comes back after another.
+    """
+    times = values["time_s"]
+    back = np.flatnonzero(~(np.diff(times) > 0.0))
+    if back.size:
+        at = int(back[0]) + 1
+        raise FingervisionError(
+            f"time_s must increase from row to row, but in line {lines[at]} of {path} it is {times[at]:g} "
+            f"after {times[at - 1]:g}: put all runs on the recording's clock, in order."
+        )
+    seen: set[str] = set()
+    for at in range(1, len(runs) if runs is not None else 0):
+        if runs is not None and runs[at] != runs[at - 1]:
+            seen.add(runs[at - 1])
+            if runs[at] in seen:
                 raise FingervisionError(
-                    f"The rows of a run must stand together, but run {runs[-1]} comes back in line {line} of {path}."
+                    f"The rows of a run must stand together, but run {runs[at]} comes back in line {lines[at]} of "
+                    f"{path}."
                 )
-    return DriveHistory(
-        time_s=np.array(columns["time_s"]),
-        input_mm=np.array(columns["input_mm"]),
-        run=tuple(runs) if "run" in header else None,
-        force_n=np.array(columns["force_n"]) if "force_n" in header else None,
-    )
+    return DriveHistory(times, values["input_mm"], runs, values.get("force_n"))
 
 
 def _lines(path: Path) -> list[tuple[int, list[str]]]:
@@ -71,16 +107,32 @@ def _lines(path: Path) -> list[tuple[int, list[str]]]:
         raise FingervisionError(f"The drive table {path} could not be read ({error.strerror}).") from error
     except UnicodeDecodeError as error:
         raise FingervisionError(f"{path} must be a CSV table in UTF-8, but is not: {error.reason}.") from error
+    kept = [
+        (number, line)
+        for number, line in enumerate(text.splitlines(), start=1)
+        if line and not line.startswith("#") and line.strip()
+    ]
+    if '"' not in text:
+        return [(number, line.split(",")) for number, line in kept]
     rows = []
-    for number, line in enumerate(text.splitlines(), start=1):
-        if line.strip() and not line.startswith("#"):
-            try:
-                rows.append((number, next(csv.reader([line], strict=True))))
-            except csv.Error as error:
-                raise FingervisionError(
-                    f"Line {number} of {path} has a quote that cannot be read ({error}): close or remove it."
-                ) from error
+    for number, line in kept:
+        try:
+            rows.append((number, next(csv.reader([line], strict=True))))
+        except csv.Error as error:
+            raise FingervisionError(
+                f"Line {number} of {path} has a quote that cannot be read ({error}): close or remove it."
+            ) from error
     return rows
+
+
+def _numbers(path: Path, lines: Sequence[int], name: str, cells: Sequence[str]) -> NDArray[np.float64]:
+    try:
+        value = np.array(list(map(float, cells)), dtype=np.float64)
+    except ValueError:
+        value = np.array([np.nan])
+    if not np.all(np.isfinite(value)):
+        value = np.array([_number(path, line, name, cell) for line, cell in zip(lines, cells, strict=True)])
+    return value
 
 
 def _number(path: Path, line: int, name: str, cell: str) -> float:

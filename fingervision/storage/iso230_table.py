@@ -7,8 +7,9 @@ such as `up_1_deviation_um`, `down_1_deviation_um`; or `cycle_1_position_mm` bes
 
 import csv
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -75,6 +76,28 @@ def read_iso230_table(path: Path) -> Iso230Rows | None:
     header = _header(path)
     if TARGET not in header or "input_mm" in header:
         return None
+    return iso230_rows(path, header, partial(read_columns, path))
+
+
+def iso230_rows(
+    path: Path, header: Sequence[str], columns: Callable[[tuple[str, ...], tuple[str, ...]], dict[str, list[str]]]
+) -> Iso230Rows:
+    """Take the columns of a table of targets, cycles and directions.
+
+    Parameters
+    ----------
+    path : Path
+        Where they come from, for sentences.
+    header : sequence of str
+        Names of the columns.
+    columns : callable
+        Gives the cells of required and of further columns by name, as `csv_columns.read_columns`.
+
+    Raises
+    ------
+    FingervisionError
+        As `read_iso230_table`.
+    """
     blocks = {name: match for name in header if (match := MATRIX.fullmatch(name)) is not None}
     quantities = {name: match["quantity"].lower() for name, match in blocks.items()} or {
         name: name for name in QUANTITIES if name in header
@@ -94,7 +117,7 @@ def read_iso230_table(path: Path) -> Iso230Rows | None:
             "input_mm and gap_mm."
         )
     wanted = ("run", *(() if sided else ("direction",)), *(() if blocks else ("cycle", "time_s", "u_random_mm")))
-    cells = read_columns(path, (TARGET, *quantities), wanted)
+    cells = columns((TARGET, *quantities), wanted)
     listed = _cells(cells, blocks, next(iter(quantities)))
     readings, words = _readings(path, listed, kinds[0], cells)
     _check_quantity(path, readings, kinds[0])

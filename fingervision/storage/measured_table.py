@@ -1,5 +1,6 @@
 """A measured table: any CSV with `input_mm,gap_mm`, and what else the bench recorded (`gaps.csv` is one)."""
 
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -7,8 +8,9 @@ from numpy.typing import NDArray
 
 from fingervision.domain.errors import FingervisionError
 from fingervision.domain.measured_table import MeasuredTable, RecordedPath
-from fingervision.storage.csv_columns import number, read_columns
-from fingervision.storage.iso230_table import read_iso230_table
+from fingervision.storage.csv_columns import read_block, read_columns
+from fingervision.storage.iso230_table import Iso230Rows, read_iso230_table
+from fingervision.storage.number_columns import Numbers, numbers_in
 from fingervision.storage.reference_slots import slots_beside
 
 FEWEST_ROWS = 5
@@ -29,50 +31,87 @@ def read_measured_table(path: Path) -> MeasuredTable:
         never changes, times that repeat within a run.
     """
     targets = read_iso230_table(path)
-    cells = read_columns(path, ("input_mm", "gap_mm"), (*NUMBERS[2:], "run")) if targets is None else targets.cells()
-    values = {
-        name: [number(path, name, row, cell) for row, cell in enumerate(cells[name])]
-        for name in NUMBERS
-        if name in cells
-    }
+    if targets is not None:
+        return targets_as_rows(path, targets)
+    block = read_block(path)
+    if block is not None and {"input_mm", "gap_mm"} <= block.keys() and "run" not in block:
+        return measured_rows(path, {name: Numbers.whole(block[name]) for name in NUMBERS if name in block}, None)
+    cells = read_columns(path, ("input_mm", "gap_mm"), (*NUMBERS[2:], "run"))
+    return measured_rows(path, _numbers(path, cells), cells.get("run"))
+
+
+def targets_as_rows(path: Path, targets: Iso230Rows, notes: Sequence[str] = ()) -> MeasuredTable:
+    """Take a table of targets, cycles and directions as the rows of a measured one."""
+    cells = targets.cells()
+    return measured_rows(path, _numbers(path, cells), cells.get("run"), (*notes, *targets.notes), count_rows=False)
+
+
+def _numbers(path: Path, cells: Mapping[str, list[str]]) -> dict[str, Numbers]:
+    return {name: numbers_in(path, name, cells[name]) for name in NUMBERS if name in cells}
+
+
+def measured_rows(
+    path: Path,
+    values: Mapping[str, Numbers],
+    run_cells: Sequence[str] | None,
+    said: Sequence[str] = (),
+    *,
+    count_rows: bool = True,
+) -> MeasuredTable:
+    """Put the columns of a measured table into order, and refuse what cannot be worked with.
+
+    Parameters
+    ----------
+    path : Path
+        Where they come from, for sentences.
+    values : mapping of str to Numbers
+        Columns of `NUMBERS`, all of one length.
+    run_cells : sequence of str, or None
+        Name of the run of each row.
+    said : sequence of str
+        What the reader has to say of the table, a sentence each.
+    count_rows : bool
+        Whether to say how many rows have no value.
+
+    Raises
+    ------
+    FingervisionError
+        As `read_measured_table`.
+    """
+    values = dict(values)
     edges = "left_mm" in values and "right_mm" in values
-    needed = [
-        "input_mm",
-        *(["left_mm", "right_mm"] if edges else ["gap_mm"]),
-        *(["time_s"] if "time_s" in values else []),
-    ]
-    if "time_s" in values and not any(cell is not None for cell in values["time_s"]):
-        needed.remove("time_s")
+    if "time_s" in values and not values["time_s"].present.any():
         del values["time_s"]
-    total = len(values["input_mm"])
-    kept = [row for row in range(total) if all(values[name][row] is not None for name in needed)]
-    on_path = [row for row in range(total) if all(values[name][row] is not None for name in needed if name in PATH)]
-    on_path = on_path if "time_s" in values else kept
-    notes = _left_out(total, len(kept), len(on_path) - len(kept)) if targets is None else list(targets.notes)
-    if len(kept) < FEWEST_ROWS:
+    timed = ["time_s"] if "time_s" in values else []
+    needed = ["input_mm", *(["left_mm", "right_mm"] if edges else ["gap_mm"]), *timed]
+    total = values["input_mm"].value.size
+    is_kept = np.logical_and.reduce([values[name].present for name in needed])
+    is_path = np.logical_and.reduce([values[name].present for name in PATH]) if timed else is_kept
+    kept, on_path = np.flatnonzero(is_kept), np.flatnonzero(is_path)
+    notes = list(said)
+    if count_rows:
+        notes += _left_out(total, kept.size, on_path.size - kept.size)
+    if kept.size < FEWEST_ROWS:
         raise FingervisionError(
-            f"{path} must have at least {FEWEST_ROWS} rows with an input and a gap, but has {len(kept)}: measure more."
+            f"{path} must have at least {FEWEST_ROWS} rows with an input and a gap, but has {kept.size}: measure more."
         )
-    column = {
-        name: np.array([values[name][row] for row in kept], dtype=np.float64)
-        for name in values
-        if all(values[name][row] is not None for row in kept)
-    }
-    names = [cells["run"][row] for row in kept] if "run" in cells else [""] * len(kept)
+    column = {name: each.value[kept] for name, each in values.items() if each.present[kept].all()}
+    names = [run_cells[row] for row in kept.tolist()] if run_cells is not None else [""] * kept.size
     count = len(set(names))
     if count > MOST_RUNS:
         raise FingervisionError(
-            f"{path} must have at most {MOST_RUNS} runs, but has {count} in {len(kept)} rows: does the run column "
+            f"{path} must have at most {MOST_RUNS} runs, but has {count} in {kept.size} rows: does the run column "
             "number the rows? Leave it out, or give fewer runs at once."
         )
     time = column.get("time_s")
-    if time is not None and "run" not in cells and np.any(np.diff(time) < 0.0):
+    if time is not None and run_cells is None and np.any(np.diff(time) < 0.0):
         notes.append("times run backwards and there is no run column: rows were sorted by time as one run.")
     order, runs, run_names = _runs(column["input_mm"], time, names)
     column = {name: value[order] for name, value in column.items()}
     along = None
-    if len(on_path) > len(kept):
-        along = _path(values, on_path, set(kept), cells.get("run"), run_names)
+    if on_path.size > kept.size:
+        of_path = [run_cells[row] for row in on_path.tolist()] if run_cells is not None else [""] * on_path.size
+        along = _path(values, on_path, is_kept, of_path, run_names)
     if time is not None:
         times, of_runs = (column["time_s"], runs) if along is None else (along.time_s, along.runs)
         for run, name in zip(of_runs, run_names, strict=True):
@@ -125,38 +164,38 @@ def _check_times(time_s: NDArray[np.float64], name: str, path: Path) -> None:
     raise FingervisionError(f"{said} of run {name or '(unnamed)'} of {path}: {cure}.")
 
 
+def _by_run(names: Sequence[str], key: NDArray[np.float64]) -> dict[str, NDArray[np.intp]]:
+    """Rows of each run, sorted by a key; runs in the order in which they first appear."""
+    number: dict[str, int] = {}
+    codes = np.array([number.setdefault(name, len(number)) for name in names], dtype=np.intp)
+    order = np.lexsort((key, codes))
+    ends = np.cumsum(np.bincount(codes))[:-1]
+    return dict(zip(number, np.split(order, ends), strict=True))
+
+
 def _path(
-    values: dict[str, list[float | None]],
-    on_path: list[int],
-    measured: set[int],
-    run_cells: list[str] | None,
+    values: Mapping[str, Numbers],
+    on_path: NDArray[np.intp],
+    is_kept: NDArray[np.bool_],
+    names: Sequence[str],
     run_names: tuple[str, ...],
 ) -> RecordedPath:
     """Order all rows that have an input like the measured ones; rows of runs without any gap are left out."""
-    rows: list[int] = []
-    runs: list[slice] = []
-    for name in run_names:
-        of_run = [row for row in on_path if (run_cells[row] if run_cells else "") == name]
-        of_run.sort(key=lambda row: values["time_s"][row] or 0.0)
-        runs.append(slice(len(rows), len(rows) + len(of_run)))
-        rows += of_run
-    input_mm, time_s = (np.array([values[name][row] for row in rows], dtype=np.float64) for name in PATH)
-    with_gap = np.flatnonzero([row in measured for row in rows])
-    return RecordedPath(input_mm, time_s, tuple(runs), with_gap)
+    of_run = _by_run(names, values["time_s"].value[on_path])
+    rows = np.concatenate([on_path[of_run[name]] for name in run_names])
+    ends = np.cumsum([of_run[name].size for name in run_names])
+    runs = tuple(slice(int(end) - of_run[name].size, int(end)) for end, name in zip(ends, run_names, strict=True))
+    input_mm, time_s = (values[name].value[rows] for name in PATH)
+    return RecordedPath(input_mm, time_s, runs, np.flatnonzero(is_kept[rows]))
 
 
 def _runs(
-    inputs: NDArray[np.float64], time: NDArray[np.float64] | None, names: list[str]
+    inputs: NDArray[np.float64], time: NDArray[np.float64] | None, names: Sequence[str]
 ) -> tuple[NDArray[np.intp], tuple[slice, ...], tuple[str, ...]]:
     """Order of the rows, runs by their first time (or smallest input), so that no name decides anything."""
     key = inputs if time is None else time
-    groups: dict[str, list[int]] = {}
-    for row, name in enumerate(names):
-        groups.setdefault(name, []).append(row)
-    ordered = sorted(groups.items(), key=lambda item: (min(key[item[1]]), float(np.sum(inputs[item[1]]))))
-    order: list[int] = []
-    runs: list[slice] = []
-    for _, rows in ordered:
-        runs.append(slice(len(order), len(order) + len(rows)))
-        order += sorted(rows, key=lambda row: key[row])
-    return np.array(order, dtype=np.intp), tuple(runs), tuple(name for name, _ in ordered)
+    # Each group is sorted by its key: its first is the least.
+    groups = sorted(_by_run(names, key).items(), key=lambda item: (key[item[1][0]], float(np.sum(inputs[item[1]]))))
+    ends = np.cumsum([rows.size for _, rows in groups])
+    runs = tuple(slice(int(end) - rows.size, int(end)) for end, (_, rows) in zip(ends, groups, strict=True))
+    return np.concatenate([rows for _, rows in groups]), runs, tuple(name for name, _ in groups)

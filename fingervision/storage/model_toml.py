@@ -3,7 +3,7 @@
 import json
 import os
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from difflib import get_close_matches
 from pathlib import Path
 
@@ -16,6 +16,7 @@ from fingervision.effects.position_error_map import curve_points, curve_values
 from fingervision.models.corrected import CorrectedModel
 from fingervision.models.kinds import kinds
 from fingervision.models.physical_gripper import PhysicalGripper
+from fingervision.models.table import TableModel
 from fingervision.storage.gripper_toml import read_gripper
 from fingervision.storage.simulation_table import read_simulation_table
 
@@ -25,7 +26,12 @@ POINTS = "points"
 BOUND_SLACK = 1e-6
 
 
-def read_model(path: Path, kind: str = "lumped", inside: tuple[Path, ...] = ()) -> CorrectedModel:
+def read_model(
+    path: Path,
+    kind: str = "lumped",
+    inside: tuple[Path, ...] = (),
+    table: Callable[[Path], TableModel] = read_simulation_table,
+) -> CorrectedModel:
     """Read a simulation table or a gripper (without effects), or a corrected model.
 
     Parameters
@@ -36,6 +42,8 @@ def read_model(path: Path, kind: str = "lumped", inside: tuple[Path, ...] = ()) 
         Kind of model that a gripper becomes.
     inside : tuple of Path
         Corrected models that this one is the base of.
+    table : callable
+        Reader of simulation tables; the project's own alone, unless another is given.
 
     Raises
     ------
@@ -43,8 +51,8 @@ def read_model(path: Path, kind: str = "lumped", inside: tuple[Path, ...] = ()) 
         The file is neither, or its base is missing.
     """
     if path.suffix.lower() != ".toml":
-        table = read_simulation_table(path)
-        return CorrectedModel(table.name, table, str(path), table.input_range_mm, {})
+        simulation = table(path)
+        return CorrectedModel(simulation.name, simulation, str(path), simulation.input_range_mm, {})
     try:
         document = tomllib.loads(path.read_text(encoding="utf-8-sig"))
     except FileNotFoundError:
@@ -57,7 +65,7 @@ def read_model(path: Path, kind: str = "lumped", inside: tuple[Path, ...] = ()) 
     if place in inside:
         raise FingervisionError(f"The base of {path} must be another model, but leads back to itself: mend `base`.")
     kind = str(document.get("kind", kind))
-    base = read_model(path.parent / str(document["base"]), kind, (*inside, place))
+    base = read_model(path.parent / str(document["base"]), kind, (*inside, place), table)
     effects: dict[str, Mapping[str, Estimate]] = dict(base.effects)
     entries = document.get("effect", [])
     if not isinstance(entries, list):

@@ -1,12 +1,14 @@
 """A simulation table: `input_mm,gap_mm[,left_mm,right_mm,force_n]`, any order, at least two rows."""
 
+from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
 
 from fingervision.domain.errors import FingervisionError
 from fingervision.models.table import TableModel
-from fingervision.storage.csv_columns import number, read_columns
+from fingervision.storage.csv_columns import read_columns
+from fingervision.storage.number_columns import Numbers, numbers_in
 
 
 def read_simulation_table(path: Path) -> TableModel:
@@ -19,15 +21,31 @@ def read_simulation_table(path: Path) -> TableModel:
         does not depend on the input at all.
     """
     cells = read_columns(path, ("input_mm", "gap_mm"), ("left_mm", "right_mm", "force_n"))
-    column = {}
-    for name, texts in cells.items():
-        values = [number(path, name, row, text) for row, text in enumerate(texts)]
-        if None in values:
+    return simulation_rows(path, {name: numbers_in(path, name, texts) for name, texts in cells.items()})
+
+
+def simulation_rows(path: Path, columns: Mapping[str, Numbers]) -> TableModel:
+    """Take the columns of a simulation table as a model.
+
+    Parameters
+    ----------
+    path : Path
+        Where they come from, for sentences and as the model's name.
+    columns : mapping of str to Numbers
+        `input_mm, gap_mm` and, where there are, `left_mm, right_mm, force_n`.
+
+    Raises
+    ------
+    FingervisionError
+        As `read_simulation_table`.
+    """
+    for name, each in columns.items():
+        if not each.complete:
             raise FingervisionError(
-                f"{name} must have a number in every row of a simulation table, but data row {values.index(None) + 1} "
-                f"of {path} is empty: fill it, or remove the row."
+                f"{name} must have a number in every row of a simulation table, but data row "
+                f"{int(np.argmin(each.present)) + 1} of {path} is empty: fill it, or remove the row."
             )
-        column[name] = np.array(values, dtype=np.float64)
+    column = {name: each.value for name, each in columns.items()}
     inputs = column["input_mm"]
     if inputs.size < 2:
         raise FingervisionError(f"{path} must have at least two rows, but has {inputs.size}: simulate more inputs.")

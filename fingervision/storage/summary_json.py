@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from fingervision.domain.errors import FingervisionError
+from fingervision.domain.errors import FingervisionError, UsageError
 
 SUMMARY = "summary.json"
 SCHEMA = 1
@@ -50,3 +50,27 @@ def recording_of(folder: Path) -> str | None:
     except (OSError, ValueError, LookupError, TypeError):
         return None
     return name if isinstance(name, str) else None
+
+
+def refuse_other_recording(folder: Path, recording: str) -> None:
+    """Refuse a folder that holds the results of another recording.
+
+    Parameters
+    ----------
+    folder : Path
+        Where results shall go.
+    recording : str
+        As the user names it: a file, a folder or a pattern.
+
+    Raises
+    ------
+    UsageError
+        It holds those of another.
+    """
+    of = recording_of(folder)
+    if of is None or Path(of).resolve() == Path(recording).resolve():
+        return
+    # A name may be relative to a folder from which an earlier call was made: there, the last part tells.
+    if not Path(of).exists() and Path(of).name == Path(recording).name:
+        return
+    raise UsageError(f"--out must be a folder of its own, but {folder} holds the results of {of}: name another folder.")

@@ -15,8 +15,8 @@ from fingervision.models.kinds import build_model, kinds
 from fingervision.models.physics import Physics
 from fingervision.storage.calibration_json import read_calibration
 from fingervision.storage.gripper_toml import read_gripper
-from fingervision.storage.simulation_table import read_simulation_table
 from fingervision.storage.toml_section import Section, read_document
+from fingervision.tables.read import read_simulation_table
 from fingervision.testbed.actuator import Actuator
 from fingervision.testbed.bed import Bed
 from fingervision.testbed.camera import BedCamera
@@ -212,11 +212,12 @@ def _scale(section: Section, folder: Path) -> Scale | None:
 
 
 def _model(section: Section, folder: Path) -> Model:
-    section.only(("file", "kind", "large_rotation", "contact"))
+    section.only(("file", "columns", "kind", "large_rotation", "contact"))
     if "file" in section.values:
         path = folder / section.word("file")
-        if path.suffix.lower() == ".csv":
-            return read_simulation_table(path)
+        if path.suffix.lower() != ".toml":
+            columns = folder / section.word("columns") if "columns" in section.values else None
+            return read_simulation_table(path, columns)
         gripper = read_gripper(path)
     else:
         gripper = sample_gripper()

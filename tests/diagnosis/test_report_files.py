@@ -11,7 +11,9 @@ import pytest
 from click.testing import CliRunner, Result
 
 from fingervision.cli import cli
+from fingervision.diagnosis.report.effect_figure import effect_figure
 from fingervision.diagnosis.report.frame_strip import strip_html, turning_rows
+from fingervision.effects import catalogue
 
 CHROMIUM = shutil.which("chromium")
 PLAY_MM = 0.05
@@ -151,3 +153,9 @@ def test_a_browser_shows_it_without_a_word_or_a_request(answer: Path, width: int
         browser.close()
     assert said == []
     assert [url for url in asked if not url.startswith(("file:", "data:"))] == []
+
+
+@pytest.mark.parametrize("name", list(catalogue()))
+def test_every_effect_has_a_figure_in_which_it_shows(name: str) -> None:
+    lines = [line for axes in effect_figure(name).axes for line in axes.lines]
+    assert max(float(np.ptp(np.asarray(line.get_ydata(), dtype=float))) for line in lines) > 0.0

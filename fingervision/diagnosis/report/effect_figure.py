@@ -9,6 +9,8 @@ from fingervision.domain.effect import History
 from fingervision.effects import catalogue
 from fingervision.models.table import TableModel
 
+PLAIN = {"upper_mm": 1.3, "lower_mm": -0.4, "speed_mm_s": 0.15}
+"""Parameters whose range follows from the motion: stops within the stroke, a speed below that of the stroke."""
 SHOWN_SHARE = 0.2
 """Parameters are drawn at this share of their range, so that the shape is plain."""
 
@@ -32,9 +34,9 @@ def effect_figure(name: str) -> Figure:
     )
     searched = effect.search(history)
     values = {}
-    for p in () if isinstance(searched, str) else searched:
-        if p.name in ("upper_mm", "lower_mm"):
-            values[p.name] = 1.3 if p.name == "upper_mm" else -0.4
+    for p in effect.parameters if isinstance(searched, str) else searched:
+        if p.name in PLAIN:
+            values[p.name] = PLAIN[p.name]
         elif p.logarithmic or p.reciprocal:
             values[p.name] = float(np.sqrt(max(p.lower, 1e-2 * p.upper) * p.upper))
         else:

@@ -1,0 +1,12 @@
+"""The option that says what the columns of foreign tables are."""
+
+from pathlib import Path
+
+import click
+
+columns_option = click.option(
+    "--columns",
+    type=click.Path(path_type=Path),
+    metavar="columns.toml",
+    help="What the columns of foreign tables are (`fingervision table` writes it); else the columns.toml beside each.",
+)

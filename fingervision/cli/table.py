@@ -1,0 +1,150 @@
+"""`fingervision table`: what a foreign table was understood as, and columns.toml to read it so again."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from fingervision.cli._columns_option import columns_option
+
+if TYPE_CHECKING:
+    from fingervision.tables.account import Account
+
+EXAMPLES = """
+\b
+Examples:
+  fingervision table stage.lvm
+  fingervision table comsol.txt --as simulation
+  fingervision table table1.csv --as simulation --set columns.gap=comsol_mm
+  fingervision table log.csv --set units.time=ms --set units.input='0.1 um'
+  fingervision table run.xlsx --set part=Sheet2 --png run.png
+
+\b
+Read are text of every habit (CSV, COMSOL, LabVIEW .lvm), .xlsx, .mat, .parquet and .tdms.
+
+\b
+Keys of --set and of columns.toml:
+  columns.ROLE  name or number of the column: time, input, gap, left, right, force, run, target, position, ...
+  units.ROLE    its unit, or a multiple of one: mm, um, ms, '0.1 um'
+  separator , ; tab | blank     decimal . ,       encoding    header_line (0: none)      part (sheet, group, variable)
+  runs restart|one              date_order dmy|mdy|ymd        accept (doubts that were looked at)
+
+\b
+Exit codes: 0 understood, and columns.toml is written; 1 it is open what it means: the sentence names the key.
+"""
+
+
+@click.command(epilog=EXAMPLES)
+@click.argument("file", type=click.Path(path_type=Path))
+@click.option(
+    "--as", "kind", type=click.Choice(["measured", "drive", "simulation"]), help="What it is; found if not given."
+)
+@click.option("--set", "settings", multiple=True, metavar="KEY=VALUE", help="Decide one key of columns.toml.")
+@columns_option
+@click.option("--out", type=click.Path(path_type=Path), help="Where to write; columns.toml beside FILE if not given.")
+@click.option("--png", type=click.Path(path_type=Path), help="Also draw the curve to this picture.")
+@click.option("--json", "as_json", is_flag=True, help="Print the account for programs.")
+def command(
+    file: Path,
+    kind: str | None,
+    settings: tuple[str, ...],
+    columns: Path | None,
+    out: Path | None,
+    png: Path | None,
+    as_json: bool,
+) -> None:
+    """Print what FILE, a table of any program, is understood as, and write columns.toml to read it so again.
+
+    Every command that reads a table uses the columns.toml beside the table, or the one that --columns names.
+    """
+    import json
+
+    from fingervision.tables.account import account
+    from fingervision.tables.mapping import KINDS, NAME, entry_for, entry_of_settings, write_entry
+
+    target = out or columns or file.parent / NAME
+    decided = {each: entry_for(file, each, columns) for each in KINDS}
+    if settings:
+        own = entry_of_settings(settings, target)
+        decided = {each: own.over(entry) for each, entry in decided.items()}
+    found = account(file, kind, decided)
+    if as_json:
+        click.echo(json.dumps(found.document(), indent=2, allow_nan=False, ensure_ascii=False))
+    else:
+        _print(found)
+    if png is not None:
+        _draw(found, png)
+    if found.question is not None:
+        raise found.question
+    if found.own:
+        _say("It needs no columns.toml.", quiet=as_json)
+        return
+    changed = write_entry(target, _name_for(file, target), found.kind, found.entry)
+    _say(f"{'Written' if changed else 'Unchanged'}: {target}", quiet=as_json)
+
+
+def _name_for(file: Path, target: Path) -> str:
+    """Path of the table from the folder of columns.toml."""
+    import os
+
+    return Path(os.path.relpath(file.resolve(), target.parent.resolve())).as_posix()
+
+
+def _say(words: str, *, quiet: bool) -> None:
+    if not quiet:
+        click.echo(words)
+
+
+def _print(found: "Account") -> None:
+    import sys
+
+    from fingervision.tables.terminal_plot import terminal_plot
+
+    document = found.document()
+    click.echo(f"{found.path}: {found.what}")
+    rate = "" if found.rate_hz is None else f", {found.rate_hz:.6g} rows a second"
+    words = {"drive": "a drive"}.get(found.kind, f"a {found.kind} table")
+    click.echo(f"read as {words}, {found.rows} rows{rate}")
+    if document["columns"]:
+        rows = [("column", "read as", "unit", "range")]
+        for each in document["columns"]:
+            values = "" if each["range"] is None else f"{each['range'][0]:.6g} to {each['range'][1]:.6g}"
+            missing = f" ({each['missing']} missing)" if each["missing"] else ""
+            rows.append((each["name"] or "(no name)", each["read_as"], each["unit"] or "?", values + missing))
+        wide = [max(len(row[k]) for row in rows) for k in range(3)]
+        for row in rows:
+            click.echo("  " + "  ".join([*(f"{row[k]:<{wide[k]}}" for k in range(3)), row[3]]).rstrip())
+    if found.unused:
+        click.echo(f"  not used: {', '.join(name or '(no name)' for name in found.unused)}")
+    for sentence in found.left_out:
+        click.echo(f"  left out: {sentence}")
+    for sentence in found.notes:
+        click.echo(f"  note: {sentence}")
+    if (curve := found.curve()) is not None:
+        plain = not (sys.stdout.encoding or "").lower().startswith("utf")
+        click.echo("\n".join(terminal_plot(*curve, plain=plain)))
+
+
+def _draw(found: "Account", png: Path) -> None:
+    """Draw the curve with the file's name, as it was understood."""
+    from fingervision.domain.errors import FingervisionError
+
+    curve = found.curve()
+    if curve is None:
+        raise found.question or FingervisionError(f"{found.path} has no two columns to draw: leave out --png.")
+    from matplotlib.figure import Figure
+
+    x_name, x, y_name, y = curve
+    figure = Figure(figsize=(6.4, 4.0), layout="constrained")
+    axes = figure.add_subplot()
+    axes.plot(x, y, ".-", markersize=3, linewidth=0.6)
+    labels = {"time_s": "time (s)", "input_mm": "input (mm)", "gap_mm": "gap (mm)"}
+    axes.set_xlabel(labels.get(x_name, x_name))
+    axes.set_ylabel(labels.get(y_name, y_name))
+    axes.set_title(f"{found.path.name}, read as {found.kind}", fontsize=10)
+    try:
+        figure.savefig(png, dpi=120)
+    except (OSError, ValueError) as error:
+        raise FingervisionError(
+            f"{png} could not be written ({error}): name another picture, such as t.png."
+        ) from error

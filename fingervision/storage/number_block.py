@@ -1,0 +1,39 @@
+"""A large table of nothing but numbers, read at once."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+FEWEST_LINES = 2000
+"""Below, reading cell by cell takes less than 20 ms."""
+
+
+def number_block(lines: Sequence[str], separator: str | None, wide: int) -> NDArray[np.float64] | None:
+    """Read lines of numbers in one go; None where that cannot be done, and each cell must be looked at.
+
+    Parameters
+    ----------
+    lines : sequence of str
+        Rows, without header.
+    separator : str or None
+        What stands between two cells; None for any blanks.
+    wide : int
+        Number of cells in a row.
+
+    Returns
+    -------
+    ndarray of float, shape (n, wide), or None
+        None for fewer rows than `FEWEST_LINES`, and where a cell is empty, is no finite number, or rows differ in
+        length.
+    """
+    if len(lines) < FEWEST_LINES:
+        return None
+    try:
+        block = np.loadtxt(lines, delimiter=separator, comments=None, ndmin=2, dtype=np.float64)
+    except ValueError:
+        return None
+    # Lines that were skipped as blank would shift the numbers of the rows.
+    if block.shape != (len(lines), wide) or not np.all(np.isfinite(block)):
+        return None
+    return block

@@ -1,0 +1,59 @@
+"""Columns of numbers as a table holds them: values, and where a cell is empty."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fingervision.storage.csv_columns import number
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Numbers:
+    """One column.
+
+    Parameters
+    ----------
+    value : ndarray of float, shape (n,)
+        Finite numbers; 0 where there is none.
+    present : ndarray of bool, shape (n,)
+        Whether the cell holds a number.
+    """
+
+    value: NDArray[np.float64]
+    present: NDArray[np.bool_]
+
+    @classmethod
+    def whole(cls, value: NDArray[np.float64]) -> "Numbers":
+        """Take a column without empty cells."""
+        return cls(value, np.ones(value.size, dtype=np.bool_))
+
+    @property
+    def complete(self) -> bool:
+        """Whether no cell is empty."""
+        return bool(self.present.all())
+
+
+def numbers_in(path: Path, name: str, cells: Sequence[str]) -> Numbers:
+    """Read cells as finite numbers; an empty cell is no value.
+
+    Raises
+    ------
+    FingervisionError
+        A cell is no finite number; the first is named with its data row.
+    """
+    try:
+        value = np.array(list(map(float, cells)), dtype=np.float64)
+        present = np.ones(value.size, dtype=np.bool_)
+    except ValueError:
+        present = np.array([bool(cell) for cell in cells], dtype=np.bool_)
+        try:
+            value = np.array([float(cell) if cell else 0.0 for cell in cells], dtype=np.float64)
+        except ValueError:
+            value = np.full(len(cells), np.nan)
+    if not np.all(np.isfinite(value)):
+        for row, cell in enumerate(cells):
+            number(path, name, row, cell)
+    return Numbers(value, present)

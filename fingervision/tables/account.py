@@ -1,0 +1,262 @@
+"""An account of a table: what it was understood as, for a person, for a program, and for columns.toml."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fingervision.domain.errors import FingervisionError
+from fingervision.storage.number_columns import Numbers
+from fingervision.tables.column_choice import CANONICAL, NEEDED
+from fingervision.tables.column_names import column_name
+from fingervision.tables.formats import read_raw
+from fingervision.tables.iso230 import iso230_rows_of
+from fingervision.tables.mapping import KINDS, Entry
+from fingervision.tables.own_format import TARGET, is_own
+from fingervision.tables.questions import OpenQuestionError
+from fingervision.tables.raw_table import RawTable
+from fingervision.tables.read import drive_of, read_drive, read_measured_table, read_simulation_table
+from fingervision.tables.understanding import Taken, Understood, understand
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Account:
+    """What a table was understood as.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    kind : str
+        `measured`, `drive` or `simulation`.
+    what : str
+        Format and dialect.
+    own : bool
+        Whether it is in the project's own format, which needs no columns.toml.
+    taken : tuple of Taken
+        Columns with a role.
+    unused : tuple of str
+        Names of the others.
+    columns : mapping of str to Numbers
+        By role, in mm, s and N.
+    rows : int
+        Rows of the file.
+    rate_hz : float or None
+        Median rate of the rows that have a time.
+    left_out, notes : tuple of str
+        What was left out and why; what was assumed.
+    question : OpenQuestionError or FingervisionError, or None
+        Why it cannot be read yet.
+    entry : Entry
+        What columns.toml would say.
+    """
+
+    path: Path
+    kind: str
+    what: str
+    own: bool
+    taken: tuple[Taken, ...]
+    unused: tuple[str, ...]
+    columns: Mapping[str, Numbers]
+    rows: int
+    rate_hz: float | None
+    left_out: tuple[str, ...]
+    notes: tuple[str, ...]
+    question: FingervisionError | None
+    entry: Entry
+
+    def curve(self) -> tuple[str, NDArray[np.float64], str, NDArray[np.float64]] | None:
+        """What to plot: the gap against the input, or the input over time; None where there is too little."""
+        names = ("input", "gap") if "gap" in self.columns else ("time", "input")
+        if not all(name in self.columns for name in names):
+            return None
+        x, y = (self.columns[name] for name in names)
+        both = x.present & y.present
+        if np.count_nonzero(both) < 2:
+            return None
+        return CANONICAL[names[0]], x.value[both], CANONICAL[names[1]], y.value[both]
+
+    def document(self) -> dict[str, Any]:
+        """For programs."""
+        ranges = {
+            role: [float(each.value[each.present].min()), float(each.value[each.present].max())]
+            for role, each in self.columns.items()
+            if each.present.any()
+        }
+        return {
+            "schema": 1,
+            "file": str(self.path),
+            "kind": self.kind,
+            "format": self.what,
+            "own_format": self.own,
+            "rows": self.rows,
+            "rate_hz": self.rate_hz,
+            "columns": [
+                {
+                    "name": each.name,
+                    "role": each.role,
+                    "unit": each.unit,
+                    "read_as": CANONICAL.get(each.role, each.role),
+                    "range": ranges.get(each.role),
+                    "missing": int(np.sum(~self.columns[each.role].present)) if each.role in self.columns else None,
+                }
+                for each in self.taken
+            ],
+            "unused": list(self.unused),
+            "left_out": list(self.left_out),
+            "notes": list(self.notes),
+            "open": [
+                {"words": each.words, "key": each.key}
+                for each in (self.question.questions if isinstance(self.question, OpenQuestionError) else ())
+            ],
+            "error": None if self.question is None else str(self.question),
+        }
+
+
+def account(path: Path, kind: str | None, given: Mapping[str, Entry]) -> Account:
+    """Understand a table, as one kind or as the kind that leaves the least open.
+
+    Parameters
+    ----------
+    path : Path
+        The table.
+    kind : str or None
+        `measured`, `drive` or `simulation`; None: to be found.
+    given : mapping of str to Entry
+        What is decided, by kind.
+
+    Raises
+    ------
+    FingervisionError
+        No table can be read at all.
+    """
+    kinds = KINDS if kind is None else (kind,)
+    if not path.is_file():
+        read_raw(path, Entry())  # says why not
+    for each in kinds:
+        if is_own(path, each, given[each]):
+            return _own(path, each)
+    raws = {each: read_raw(path, given[each]) for each in kinds}
+    if "measured" in kinds and (found := _targets(raws["measured"], given["measured"])) is not None:
+        return found
+    understood = {each: understand(raws[each], each, given[each]) for each in kinds}
+    best = min(kinds, key=lambda each: (_open_columns(understood[each]), KINDS.index(each)))
+    return _account(understood[best], given[best], raws[best])
+
+
+def _open_columns(table: Understood) -> int:
+    """How far a table is from a kind: twice the columns that it must have and has not, and those that are open."""
+    missing = sum(question.key.startswith("columns.") for question in table.questions)
+    missing += sum(bool(question.missing) for question in table.questions)
+    # A column called after a program's model holds no measurement.
+    sources = [column_name(each.name).source for each in table.taken if each.role == "gap"]
+    return missing + sum(source not in (None, table.kind) for source in sources)
+
+
+def _account(table: Understood, given: Entry, raw: RawTable) -> Account:
+    question: FingervisionError | None = None
+    try:
+        table.decided()
+        if table.kind == "drive":
+            drive_of(table, given)
+    except FingervisionError as error:
+        question = error
+    used = {each.name for each in table.taken}
+    return Account(
+        raw.path,
+        table.kind,
+        raw.what,
+        own=False,
+        taken=table.taken,
+        unused=tuple(column.name for column in raw.columns if column.name not in used),
+        columns=table.columns,
+        rows=raw.rows,
+        rate_hz=_rate(table.columns.get("time")),
+        left_out=table.left_out,
+        notes=table.notes,
+        question=question,
+        entry=_entry(table.taken, given, raw),
+    )
+
+
+def _entry(taken: tuple[Taken, ...], given: Entry, raw: RawTable) -> Entry:
+    """Write down everything that was found."""
+    names = [column.name for column in raw.columns]
+    columns = {
+        each.role: given.columns.get(each.role)
+        or (each.name if names.count(each.name) == 1 else str(names.index(each.name) + 1))
+        for each in taken
+    }
+    # Units that the table states itself are not written down: they stay under the same doubts at the next call.
+    line = 0 if not raw.named and "header_line" in raw.settings else given.header_line
+    return replace(given, columns=columns, words={**_dialect(raw), **given.words}, header_line=line)
+
+
+def _dialect(raw: RawTable) -> dict[str, str]:
+    """Keys of the dialect that was found, or of the part that was taken."""
+    return {key: str(raw.settings[key]) for key in ("separator", "decimal", "part") if key in raw.settings}
+
+
+def _rate(time: Numbers | None) -> float | None:
+    """Median rate of the rows."""
+    if time is None:
+        return None
+    steps = np.diff(time.value[time.present])
+    steps = steps[steps > 0.0]
+    return float(1.0 / np.median(steps)) if steps.size else None
+
+
+def _targets(raw: RawTable, given: Entry) -> Account | None:
+    """Account of a table of targets, cycles and directions; None where it is none."""
+    question = None
+    try:
+        rows = iso230_rows_of(raw, given)
+    except FingervisionError as error:
+        rows, question = None, error
+    if rows is None and question is None:
+        return None
+    with_gap = [] if rows is None else [row for row in rows.rows if row.gap_mm is not None]
+    columns = {
+        "input": Numbers.whole(np.array([row.input_mm for row in with_gap])),
+        "gap": Numbers.whole(np.array([row.gap_mm for row in with_gap], dtype=np.float64)),
+    }
+    return Account(
+        raw.path, "measured", f"{raw.what}, a table of targets, cycles and directions (ISO 230-2)", own=False, taken=(),
+        unused=(), columns=columns if with_gap else {}, rows=raw.rows, rate_hz=None, left_out=raw.left_out,
+        notes=(*raw.notes, *(() if rows is None else rows.notes)), question=question,
+        entry=replace(given, words={**_dialect(raw), **given.words}),
+    )  # fmt: skip
+
+
+def _own(path: Path, kind: str) -> Account:
+    """Account of a table in the project's own format, read to the letter."""
+    question = None
+    notes: tuple[str, ...] = ()
+    columns: dict[str, Numbers] = {}
+    try:
+        if kind == "drive":
+            drive = read_drive(path)
+            columns = {"time": Numbers.whole(drive.time_s), "input": Numbers.whole(drive.input_mm)}
+        elif kind == "measured":
+            table = read_measured_table(path)
+            columns = {"input": Numbers.whole(table.input_mm), "gap": Numbers.whole(table.gap_mm)}
+            if table.time_s is not None:
+                columns["time"] = Numbers.whole(table.time_s)
+            notes = table.notes
+        else:
+            model = read_simulation_table(path)
+            inputs = np.linspace(*model.input_range_mm, 200)
+            columns = {"input": Numbers.whole(inputs), "gap": Numbers.whole(model.respond(inputs).gap_mm)}
+    except FingervisionError as error:
+        question = error
+    roles = [role for role in (*NEEDED[kind], "time") if role in columns]
+    taken = tuple(Taken(CANONICAL[role], role, CANONICAL[role].rsplit("_", 1)[1]) for role in dict.fromkeys(roles))
+    rows = max((each.value.size for each in columns.values()), default=0)
+    what = f"the project's own format, by its columns {TARGET if not taken else ', '.join(t.name for t in taken)}"
+    return Account(
+        path, kind, what, own=True, taken=taken, unused=(), columns=columns, rows=rows,
+        rate_hz=_rate(columns.get("time")), left_out=(), notes=notes, question=question, entry=Entry(),
+    )  # fmt: skip

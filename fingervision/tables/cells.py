@@ -1,0 +1,78 @@
+"""Cells of text to numbers, in the dialect of their table."""
+
+from collections.abc import Sequence
+from math import isfinite
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fingervision.storage.number_columns import Numbers
+from fingervision.tables.dialect import GROUPED, MINUS, MISSING
+
+SPACES = dict.fromkeys(map(ord, "' \u00a0\u202f"))
+
+
+def to_numbers(cells: Sequence[str], decimal: str) -> tuple[Numbers, NDArray[np.intp]]:
+    """Read cells as numbers.
+
+    Parameters
+    ----------
+    cells : sequence of str, length n
+        Stripped.
+    decimal : str
+        `.` or `,`.
+
+    Returns
+    -------
+    Numbers
+        Of length n; cells without a number are absent.
+    ndarray of int
+        Rows whose cell holds something that is neither a number nor a usual word for none.
+    """
+    try:
+        if decimal == "," and any("," in cell for cell in cells):
+            if any("." in cell for cell in cells):
+                raise ValueError  # noqa: TRY301 - points would be taken for decimals: cell by cell
+            value = np.array([float(cell.replace(",", ".")) for cell in cells], dtype=np.float64)
+        else:
+            value = np.array(list(map(float, cells)), dtype=np.float64)
+        if np.all(np.isfinite(value)):
+            return Numbers.whole(value), np.zeros(0, dtype=np.intp)
+    except ValueError:
+        pass
+    value, present = np.zeros(len(cells)), np.zeros(len(cells), dtype=np.bool_)
+    odd = []
+    for row, cell in enumerate(cells):
+        number: float | None
+        try:
+            number = float(cell) if decimal == "." else float(cell.replace(",", ".") if "." not in cell else "?")
+        except ValueError:
+            number = to_number(cell, decimal)
+        if number is not None and isfinite(number):
+            value[row], present[row] = number, True
+        elif cell.strip().lower() not in MISSING:
+            odd.append(row)
+    return Numbers(value, present), np.array(odd, dtype=np.intp)
+
+
+def to_number(cell: str, decimal: str) -> float | None:
+    """Read a cell as a finite number; None where it is none.
+
+    Examples
+    --------
+    >>> to_number("1.234,5", ","), to_number("1,234.5", "."), to_number("2,5D-03", ","), to_number("nan", ".")
+    (1234.5, 1234.5, 0.0025, None)
+    """
+    text = cell.strip().translate(MINUS)
+    if GROUPED[decimal].fullmatch(text):
+        text = text.translate(SPACES).replace("," if decimal == "." else ".", "")
+    if decimal == ",":
+        if "." in text:
+            return None
+        text = text.replace(",", ".")
+    text = text.replace("D", "e").replace("d", "e")
+    try:
+        number = float(text)
+    except ValueError:
+        return None
+    return number if np.isfinite(number) else None

@@ -1,0 +1,137 @@
+"""Which column of a table has which role: by the user's word, else by the columns' names."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+from fingervision.domain.errors import FingervisionError
+from fingervision.storage.number_columns import Numbers
+from fingervision.tables.column_names import ColumnName, column_name
+from fingervision.tables.mapping import Entry
+from fingervision.tables.questions import Question
+from fingervision.tables.raw_table import RawColumn, RawTable
+from fingervision.tables.times import looks_like_time
+
+NEEDED = {"measured": ("input", "gap"), "drive": ("time", "input"), "simulation": ("input", "gap")}
+"""Roles that a table of each kind must have; left and right stand for the gap."""
+WANTED = {
+    "measured": ("time", "run", "left", "right", "force", "u_gap", "u_random"),
+    "drive": ("run", "force"),
+    "simulation": ("left", "right", "force"),
+}
+LENGTHS = ("input", "gap", "left", "right", "u_gap", "u_random", "target", "position", "deviation")
+DIMENSION = {**dict.fromkeys(LENGTHS, "length"), "time": "time", "force": "force"}
+UNIT = {"length": "mm", "time": "s", "force": "n"}
+CANONICAL = {role: f"{role}_{UNIT[dimension]}" for role, dimension in DIMENSION.items()}
+"""Names of the columns in the project's own tables."""
+
+
+@dataclass(slots=True)
+class Findings:
+    """What gathers while a table is looked at."""
+
+    questions: list[Question] = field(default_factory=list)
+    notes: list[str] = field(default_factory=list)
+    left_out: list[str] = field(default_factory=list)
+
+
+def choose(raw: RawTable, names: Sequence[ColumnName], kind: str, given: Entry, about: Findings) -> dict[str, int]:
+    """Give the column of each role; what is open is put into `about`.
+
+    Parameters
+    ----------
+    raw : RawTable
+        The table.
+    names : sequence of ColumnName
+        Its names, taken apart.
+    kind : str
+        What it is to be.
+    given : Entry
+        What the user has decided.
+    about : object
+        Takes questions and notes.
+    """
+    chosen = {role: _named_column(raw, role, name, given) for role, name in given.columns.items()}
+    fixed = set(chosen.values())
+    roles: dict[str, list[int]] = {}
+    for place, name in enumerate(names):
+        role = _own_role(name) or name.role
+        if place in fixed or role is None:
+            continue
+        # A target without a direction is a commanded position.
+        roles.setdefault("input" if role == "target" else role, []).append(place)
+    sources = [k for k, name in enumerate(names) if name.source == kind and k not in fixed]
+    if "gap" not in roles and sources:
+        roles["gap"] = sources
+    if "gap" not in chosen and "time" in roles and kind == "simulation":
+        roles.pop("time")
+    sides = all(side in chosen or len(roles.get(side, ())) == 1 for side in ("left", "right"))
+    for role in (*NEEDED[kind], *WANTED[kind]):
+        if role in chosen:
+            continue
+        candidates = roles.get(role, [])
+        exact = [k for k in candidates if names[k].text == CANONICAL.get(role, role)]
+        if len(exact) == 1:
+            candidates = exact
+        if role == "time":
+            candidates = _one_clock(raw, names, candidates, roles.get("date", []), about)
+        if len(candidates) == 1:
+            chosen[role] = candidates[0]
+        elif len(candidates) > 1:
+            if role == "gap" and sides and not sources:
+                continue
+            listed = " or ".join(f"'{raw.columns[k].name}'" for k in candidates)
+            about.questions.append(
+                Question(f"the {role} may be {listed}", f"columns.{role}={raw.columns[candidates[0]].name}")
+            )
+        elif role in NEEDED[kind] and not (role == "gap" and sides):
+            free = [column.name for k, column in enumerate(raw.columns) if k not in set(chosen.values())]
+            listed = ", ".join(f"'{name}'" for name in free[:12]) + (" ..." if len(free) > 12 else "")
+            about.questions.append(
+                Question(
+                    f"no column is called as the {role} is (the columns are {listed or 'taken'})",
+                    f"columns.{role}={free[0] if free else 'NAME'}",
+                    CANONICAL[role],
+                )
+            )
+    return chosen
+
+
+def _own_role(name: ColumnName) -> str | None:
+    """Role of a column of the project's own tables in another unit, `u_random_um`."""
+    for role in ("u_random", "u_gap"):
+        if name.text.startswith(f"{role}_"):
+            return role
+    return None
+
+
+def _one_clock(
+    raw: RawTable, names: Sequence[ColumnName], times: list[int], dates: list[int], about: Findings
+) -> list[int]:
+    """Take the elapsed time where a date stands beside it; a date alone is a time."""
+    both = times + [k for k in dates if _is_dated(raw.columns[k])]
+    elapsed = [k for k in times if not _is_dated(raw.columns[k])]
+    if len(both) > 1 and len(elapsed) == 1:
+        others = ", ".join(raw.columns[k].name for k in both if k != elapsed[0])
+        about.notes.append(f"{raw.columns[elapsed[0]].name} is taken for the time, not {others}.")
+        return elapsed
+    if len(times) == 1 and not elapsed and len(both) > 1:
+        return times  # a day and a time of day in columns of their own: joined later
+    return times or both
+
+
+def _is_dated(column: RawColumn) -> bool:
+    return bool(column.since) if isinstance(column.content, Numbers) else looks_like_time(column.content)
+
+
+def _named_column(raw: RawTable, role: str, name: str, given: Entry) -> int:
+    """Find the column that the user names, by its whole name, its name without unit, or its number."""
+    for way in (lambda c: c.name.strip(), lambda c: column_name(c.name).base, lambda c: c.name.strip().lower()):
+        found = [k for k, column in enumerate(raw.columns) if way(column) == name or way(column) == name.lower()]
+        if len(found) == 1:
+            return found[0]
+    if name.isdecimal() and 1 <= int(name) <= len(raw.columns):
+        return int(name) - 1
+    raise FingervisionError(
+        f"columns.{role} of {given.source} must name a column of {raw.path} "
+        f"({', '.join(column.name for column in raw.columns)}), but is {name}: mend it."
+    )

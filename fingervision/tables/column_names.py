@@ -1,0 +1,66 @@
+"""A column's name taken apart into what it is called and its unit."""
+
+import re
+from dataclasses import dataclass
+
+from fingervision.tables.units import known_unit, spelled
+from fingervision.tables.words import role_of, source_of
+
+BRACKETS = re.compile(r"^(?P<base>.*?)\s*(?:\[(?P<a>[^\]]*)\]|\((?P<b>[^)]*)\)|<(?P<c>[^>]*)>|\{(?P<d>[^}]*)\})\s*$")
+BESIDE = re.compile(r"^(?P<base>.+?)\s*(?:/|,|\bin\b|:|\s|_|-|\.)\s*(?P<unit>[^\s/,_:]+)\s*$")
+
+
+@dataclass(frozen=True, slots=True)
+class ColumnName:
+    """What a column's name says.
+
+    Parameters
+    ----------
+    text : str
+        The whole name.
+    base : str
+        Without its unit.
+    unit : str
+        The unit, as written; empty where the name holds none.
+    """
+
+    text: str
+    base: str
+    unit: str
+
+    @property
+    def role(self) -> str | None:
+        """Role that the name stands for, if any."""
+        return role_of(self.base)
+
+    @property
+    def source(self) -> str | None:
+        """`measured` or `simulation` where the name says no more than where the values come from."""
+        return source_of(self.base)
+
+
+def column_name(text: str) -> ColumnName:
+    """Take a name apart.
+
+    Examples
+    --------
+    >>> column_name("Weg [µm]").unit, column_name("gap_mm").unit, column_name("Zeit/ms").unit, column_name("u_in").unit
+    ('µm', 'mm', 'ms', '')
+    >>> column_name("Force in N").base, column_name("gap"), column_name("opening, mm").unit
+    ('Force', ColumnName(text='gap', base='gap', unit=''), 'mm')
+    """
+    text = text.strip().strip('"').strip()
+    match = BRACKETS.match(text)
+    if match is None and role_of(text) is not None:
+        return ColumnName(text, text, "")
+    if match is not None:
+        unit = next(part for part in match.group("a", "b", "c", "d") if part is not None)
+        # Brackets may hold a remark: `gap (left)`, `position (actual) [mm]`.
+        if known_unit(unit) is not None or role_of(f"{match['base']} {unit}") is None:
+            return ColumnName(text, re.sub(r"[\[\](){}]", " ", match["base"]).strip(), spelled(unit))
+        return ColumnName(text, f"{match['base']} {unit}", "")
+    if (match := BESIDE.match(text)) is not None and known_unit(match["unit"]) is not None:
+        base = match["base"].strip(" _-/,.:")
+        if role_of(base) is not None or source_of(base) is not None:
+            return ColumnName(text, base, spelled(match["unit"]))
+    return ColumnName(text, text, "")

@@ -1,0 +1,141 @@
+"""Separator and decimal mark of a text table, from its lines."""
+
+import csv
+import re
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+COMMENT_MARKS = ("#", "%", "//", "!", "'")
+NAMES = {"\t": "tab", ";": "semicolon", "|": "bar", ",": "comma", None: "blanks"}
+"""Separators, likeliest first: one that stands in every line at all is hardly ever anything else than the separator."""
+BY_NAME = {"tab": "\t", "\t": "\t", ";": ";", "semicolon": ";", "|": "|", "bar": "|", ",": ",", "comma": ","}
+BY_NAME_OR_BLANK: dict[str, str | None] = {**BY_NAME, "blank": None, "blanks": None, " ": None}
+MISSING = frozenset(
+    ["", "nan", "na", "n/a", "null", "none", "-", "--", "---", "#n/a", "#nv", "#na", "1.#qnan", "-1.#ind", "1.#ind"]
+)
+"""What programs write where there is no number (lower case)."""
+NUMBER = {
+    ".": re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eEdD][+-]?\d+)?"),
+    ",": re.compile(r"[+-]?(\d+,?\d*|,\d+)([eEdD][+-]?\d+)?"),
+}
+GROUPED = {
+    ".": re.compile(r"[+-]?\d{1,3}([,' \u00a0\u202f]\d{3})+(\.\d+)?"),
+    ",": re.compile(r"[+-]?\d{1,3}([.' \u00a0\u202f]\d{3})+(,\d+)?"),
+}
+"""Numbers whose thousands are set apart."""
+THOUSANDS = {",": re.compile(r"[+-]?[1-9]\d{0,2}(,\d{3})+"), ".": re.compile(r"[+-]?[1-9]\d{0,2}(\.\d{3})+")}
+"""Numbers whose mark may set thousands apart as well as decimals."""
+DATE_LIKE = re.compile(r"[\d./\-]+([T ]\d.*)?|\d{1,2}:\d{2}(:\d{2}([.,]\d*)?)?( ?[AaPp][Mm])?Z?")
+MINUS = str.maketrans({"\N{MINUS SIGN}": "-", "\N{NO-BREAK SPACE}": " "})
+SAMPLE_LINES = 2000
+
+
+@dataclass(frozen=True, slots=True)
+class Dialect:
+    """How a text table is written.
+
+    Parameters
+    ----------
+    separator : str or None
+        Between two cells; None for any blanks.
+    decimal : str
+        `.` or `,`.
+    wide : int
+        Cells in a row.
+    either_way : bool
+        Whether the only mark in the numbers may be the decimal one, or set thousands apart.
+    """
+
+    separator: str | None
+    decimal: str
+    wide: int
+    either_way: bool = False
+
+    @property
+    def words(self) -> str:
+        """For a person."""
+        return f"separator {NAMES[self.separator]}, decimal {'point' if self.decimal == '.' else 'comma'}"
+
+
+def split(line: str, separator: str | None) -> list[str]:
+    """Cells of a line, quotes taken off."""
+    if separator is None:
+        return line.split()
+    if '"' in line:
+        try:
+            return [cell.strip() for cell in next(csv.reader([line], delimiter=separator, skipinitialspace=True), [])]
+        except csv.Error:
+            pass
+    return [cell.strip() for cell in line.split(separator)]
+
+
+def is_comment(line: str) -> bool:
+    """Whether a line is set apart as a comment."""
+    return line.lstrip().startswith(COMMENT_MARKS)
+
+
+def is_number(cell: str, decimal: str) -> bool:
+    """Whether a cell holds a number as the dialect writes it."""
+    cell = cell.translate(MINUS)
+    return NUMBER[decimal].fullmatch(cell) is not None or GROUPED[decimal].fullmatch(cell) is not None
+
+
+def is_value(cell: str, decimal: str) -> bool:
+    """Whether a cell may stand below a header: a number, none, or a date."""
+    return cell.lower() in MISSING or is_number(cell, decimal) or DATE_LIKE.fullmatch(cell) is not None
+
+
+def find_dialect(lines: Sequence[str], separator: str = "", decimal: str = "") -> Dialect | None:
+    """Find what explains the most cells of the most lines as numbers; None where no line holds two cells.
+
+    Parameters
+    ----------
+    lines : sequence of str
+        All lines.
+    separator, decimal : str
+        What is stated already (keys of columns.toml); empty: to be found.
+    """
+    sample = [line for line in lines[:SAMPLE_LINES] if line.strip() and not is_comment(line)]
+    separators = list(NAMES) if not separator else [BY_NAME_OR_BLANK[separator]]
+    best: tuple[float, Dialect] | None = None
+    for between in separators:
+        rows = [split(line.translate(MINUS), between) for line in sample]
+        for mark in (decimal,) if decimal else (".", ","):
+            if mark == between == ",":
+                continue
+            found = _explained(rows, mark)
+            # Ties go to the first: likelier separators, the point.
+            if found is not None and (best is None or found[0] > best[0] + 1e-9):
+                best = found[0], Dialect(between, mark, found[1])
+    if best is None:
+        return None
+    dialect = best[1]
+    rows = [row for line in sample if len(row := split(line, dialect.separator)) == dialect.wide]
+    either = not decimal and _either_way([cell for row in rows for cell in row], dialect)
+    return Dialect(dialect.separator, dialect.decimal, dialect.wide, either)
+
+
+def _explained(rows: Sequence[Sequence[str]], decimal: str) -> tuple[float, int] | None:
+    """Share of the cells that are values, in rows of the usual length; and that length."""
+    numeric = [(len(row), sum(is_number(cell, decimal) for cell in row), row) for row in rows]
+    lengths = Counter(length for length, numbers, _ in numeric if length > 1 and numbers)
+    if not lengths:
+        return None
+    wide = max(lengths, key=lambda length: (lengths[length], length))
+    used = [(numbers, row) for length, numbers, row in numeric if length == wide and numbers]
+    values = sum(numbers + sum(is_value(cell, decimal) for cell in row) for numbers, row in used)
+    return values / (2.0 * wide * len(used)) * (len(used) / len(rows)) ** 0.5, wide
+
+
+def _either_way(cells: Sequence[str], dialect: Dialect) -> bool:
+    """Whether all numbers with a mark look like whole ones with thousands set apart, as well as like decimal ones.
+
+    A point is asked about only between semicolons, where programs that write decimal commas put it.
+    """
+    numbers = [cell.translate(MINUS) for cell in cells if is_number(cell, dialect.decimal)]
+    marks = {mark for mark in ".," if any(mark in number for number in numbers)}
+    if len(marks) != 1 or (marks == {"."} and dialect.separator != ";"):
+        return False
+    mark = marks.pop()
+    return all(THOUSANDS[mark].fullmatch(number) for number in numbers if mark in number)

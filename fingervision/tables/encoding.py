@@ -1,0 +1,96 @@
+"""Bytes of a text table to text: byte-order marks, UTF-8, UTF-16 without a mark, and the older encodings."""
+
+import codecs
+
+from fingervision.domain.errors import FingervisionError
+
+MARKS = (
+    (codecs.BOM_UTF8, "utf-8-sig"),
+    (codecs.BOM_UTF32_LE, "utf-32"),
+    (codecs.BOM_UTF32_BE, "utf-32"),
+    (codecs.BOM_UTF16_LE, "utf-16"),
+    (codecs.BOM_UTF16_BE, "utf-16"),
+)
+WESTERN = frozenset(
+    "äöüÄÖÜßàâçéèêëîïôùûüÿæœÀÂÇÉÈÊËÎÏÔÙÛÜŸñÑáíóúÁÍÓÚ¿¡ìòÌÒãõÃÕåÅøØ°µ²³±·„…€§«»\xa0"
+    "\u00d7\u2013\u2014\u2018\u2019\u201c\u201d"
+)
+"""Characters that a header in a Western language holds. Others show that the bytes are of another encoding."""
+SAMPLE_BYTES = 65536
+
+
+def decode(content: bytes, given: str | None = None) -> tuple[str, str]:
+    """Decode a table's bytes.
+
+    Parameters
+    ----------
+    content : bytes
+        The whole file.
+    given : str or None
+        Encoding that the user states.
+
+    Returns
+    -------
+    str, str
+        The text, and the name of the encoding.
+
+    Raises
+    ------
+    FingervisionError
+        The stated encoding does not fit, or none does.
+    """
+    if given is not None:
+        try:
+            return content.decode(given).removeprefix("\ufeff"), given
+        except (LookupError, UnicodeDecodeError) as error:
+            raise FingervisionError(
+                f"encoding must be that of the table, but {given} does not fit ({error}): leave the key out, or name "
+                "another."
+            ) from error
+    for mark, name in MARKS:
+        if content.startswith(mark):
+            return content.decode(name, errors="replace"), name
+    if (without_mark := _utf16_without_mark(content[:SAMPLE_BYTES])) is not None:
+        return content.decode(without_mark, errors="replace"), without_mark
+    try:
+        return content.decode("utf-8"), "utf-8"
+    except UnicodeDecodeError as error:
+        # A file that was cut off within a character is UTF-8 still.
+        if error.start > len(content) - 4 and error.reason == "unexpected end of data":
+            return content[: error.start].decode("utf-8"), "utf-8"
+    return _older(content)
+
+
+def _utf16_without_mark(sample: bytes) -> str | None:
+    """Tell UTF-16 by its zeros: ASCII has one in every second byte."""
+    if len(sample) < 4:
+        return None
+    zeros = [sample[start::2].count(0) / len(sample[start::2]) for start in (0, 1)]
+    # Half of the characters and more are digits and separators in any table.
+    if zeros[1] > 0.5 and zeros[0] < 0.1:
+        return "utf-16-le"
+    return "utf-16-be" if zeros[0] > 0.5 and zeros[1] < 0.1 else None
+
+
+def _older(content: bytes) -> tuple[str, str]:
+    """Decode an 8-bit encoding: the Western one where all its characters are usual, else what charset-normalizer says.
+
+    On the few odd bytes of a header the statistics of charset-normalizer have too little to go by, so the usual case is
+    decided by rule.
+    """
+    try:
+        text = content.decode("cp1252")
+    except UnicodeDecodeError:
+        text = content.decode("latin-1")
+    if {letter for letter in set(text) if ord(letter) > 127} <= WESTERN:
+        return text, "cp1252"
+    from charset_normalizer import from_bytes
+
+    odd = b"\n".join(line for line in content.splitlines() if not line.isascii())[:SAMPLE_BYTES]
+    best = from_bytes(odd).best()
+    if best is None:
+        return text, "latin-1"
+    try:
+        return content.decode(best.encoding), best.encoding
+    except UnicodeDecodeError:
+        return text, "latin-1"

@@ -1,0 +1,74 @@
+"""Reading in a process of its own: libraries in C may crash on a damaged file, and that becomes a sentence.
+
+scipy 1.17 ends with a segmentation fault on some MATLAB files with a few wrong bytes (tests/tables/test_bad_files.py).
+"""
+
+import pickle
+import subprocess
+import sys
+from pathlib import Path
+
+from fingervision.domain.errors import FingervisionError
+from fingervision.tables.mapping import Entry
+from fingervision.tables.questions import OpenQuestionError
+from fingervision.tables.raw_table import RawTable
+
+PROGRAM = "import sys; sys.path[:] = {path!r}; from fingervision.tables.formats._apart import serve; serve()"
+SHOWN = 300
+"""Characters of what a failed process said."""
+
+
+def read_apart(name: str, path: Path, given: Entry) -> RawTable:
+    """Read a file by the format's module in a process of its own.
+
+    Parameters
+    ----------
+    name : str
+        Whole name of the format's module.
+    path : Path
+        The file.
+    given : Entry
+        What the user has decided.
+
+    Raises
+    ------
+    FingervisionError
+        The file cannot be read, or its reader crashed.
+    OpenQuestionError
+        As the format's reader.
+    """
+    # What comes back is from our own program over a pipe of its own; nothing of the file is unpickled.
+    done = subprocess.run(
+        [sys.executable, "-c", PROGRAM.format(path=sys.path)],
+        input=pickle.dumps((name, path, given)),
+        capture_output=True,
+        check=False,
+    )
+    if done.returncode != 0 or not done.stdout:
+        said = done.stderr.decode(errors="replace").strip().splitlines()
+        why = f"signal {-done.returncode}" if done.returncode < 0 else (said[-1][:SHOWN] if said else "no answer")
+        raise FingervisionError(
+            f"{path} is damaged: the program that reads it crashed on it ({why}). Save the table again, or as CSV."
+        )
+    kind, *answer = pickle.loads(done.stdout)
+    if kind == "question":
+        raise OpenQuestionError(*answer)
+    if kind == "error":
+        raise FingervisionError(*answer)
+    table: RawTable = answer[0]
+    return table
+
+
+def serve() -> None:
+    """Answer one request from standard input on standard output."""
+    import importlib
+
+    name, path, given = pickle.load(sys.stdin.buffer)
+    answer: tuple[object, ...]
+    try:
+        answer = ("table", importlib.import_module(name).read(path, given))
+    except OpenQuestionError as error:
+        answer = ("question", error.path, error.kind, error.questions)
+    except FingervisionError as error:
+        answer = ("error", str(error))
+    sys.stdout.buffer.write(pickle.dumps(answer))

@@ -1,0 +1,37 @@
+"""Any text with a row a line: CSV of every habit, COMSOL's `%` tables, columns between blanks."""
+
+from pathlib import Path
+
+from fingervision.domain.errors import FingervisionError
+from fingervision.tables.mapping import Entry
+from fingervision.tables.raw_table import RawTable
+from fingervision.tables.text_file import lines_of
+from fingervision.tables.text_table import table_of_lines
+
+ORDER = 100
+OTHERS = {
+    b"\xd0\xcf\x11\xe0": "an old Excel file (.xls): save it as .xlsx",
+    b"\x1f\x8b": "compressed (gzip): unpack it",
+    b"PK": "an archive or a document (.ods, .zip): save the table as .xlsx or .csv",
+    b"%PDF": "a PDF: export the table itself",
+    b"\x89PNG": "a picture: export the table itself",
+    b"\x1a\x45\xdf\xa3": "a video: name the table",
+    b"SQLite format": "a database: export the table as .csv",
+}
+"""First bytes of what is often named by mistake."""
+
+
+def recognises(path: Path, head: bytes) -> bool:
+    """Take every file that no other format has taken."""
+    return True
+
+
+def read(path: Path, given: Entry) -> RawTable:
+    """Read a table as text."""
+    with path.open("rb") as file:
+        head = file.read(16)
+    for magic, words in OTHERS.items():
+        if head.startswith(magic):
+            raise FingervisionError(f"{path} must be a table, but is {words}.")
+    lines, encoding = lines_of(path, given.words.get("encoding"))
+    return table_of_lines(path, lines, given, encoding)

@@ -1,0 +1,222 @@
+"""columns.toml: what the user has decided about foreign tables."""
+
+import fnmatch
+import os
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from fingervision.domain.errors import FingervisionError
+from fingervision.storage.toml_section import Section, read_document
+
+NAME = "columns.toml"
+KINDS = ("measured", "drive", "simulation")
+ROLES = (
+    "time", "date", "input", "gap", "left", "right", "force", "run", "u_gap", "u_random", "target", "cycle",
+    "direction", "position", "deviation",
+)  # fmt: skip
+WORDS = {
+    "separator": (",", ";", "tab", "|", "blank"),
+    "decimal": (".", ","),
+    "runs": ("restart", "one"),
+    "date_order": ("dmy", "mdy", "ymd"),
+}
+"""Keys with a few words to choose from."""
+TEXTS = ("encoding", "part")
+ACCEPTED = ("constant_input", "backward_time", "repeated_time", "sizes", "speed", "overlap", "unreadable_cells")
+KEYS = ("file", "as", "columns", "units", *WORDS, *TEXTS, "header_line", "accept")
+
+
+@dataclass(frozen=True, slots=True)
+class Entry:
+    """What is decided about one table.
+
+    Parameters
+    ----------
+    columns : mapping of str to str
+        Name (or number, from 1) of the column of each role.
+    units : mapping of str to str
+        Unit of each role; may be a multiple, `0.1 µm`.
+    words : mapping of str to str
+        The other keys of text.
+    header_line : int or None
+        Line that names the columns; 0 where none does.
+    accept : frozenset of str
+        Doubts that the user has looked at.
+    source : Path or None
+        The columns.toml; None where nothing is decided.
+    """
+
+    columns: Mapping[str, str] = field(default_factory=dict)
+    units: Mapping[str, str] = field(default_factory=dict)
+    words: Mapping[str, str] = field(default_factory=dict)
+    header_line: int | None = None
+    accept: frozenset[str] = frozenset()
+    source: Path | None = None
+
+    @property
+    def says_nothing(self) -> bool:
+        """Whether nothing is decided."""
+        return self.source is None
+
+    def over(self, other: "Entry") -> "Entry":
+        """Put this entry's keys over another's."""
+        return Entry(
+            {**other.columns, **self.columns},
+            {**other.units, **self.units},
+            {**other.words, **self.words},
+            other.header_line if self.header_line is None else self.header_line,
+            other.accept | self.accept,
+            self.source or other.source,
+        )
+
+
+def entry_for(table: Path, kind: str | None, columns: Path | None = None) -> Entry:
+    """Collect what is decided about a table: by `--columns`, else by a columns.toml in the table's own folder.
+
+    Parameters
+    ----------
+    table : Path
+        The table.
+    kind : str or None
+        What it is read as; None: not known yet.
+    columns : Path or None
+        The file that the user names.
+
+    Raises
+    ------
+    FingervisionError
+        The named file is not there, or a key is wrong.
+    """
+    path = columns if columns is not None else table.parent / NAME
+    if columns is None and not path.is_file():
+        return Entry()
+    document, text = read_document(path, "mapping of columns")
+    top = Section(path, text, "", document)
+    top.only(("schema", "table"))
+    top.whole("schema", 1, low=1, high=1)
+    found = Entry()
+    for section in top.tables("table"):
+        section.only(KEYS)
+        for_kind = section.word("as", "", of=("", *KINDS))
+        pattern = section.word("file", "*")
+        if for_kind and kind is not None and for_kind != kind:
+            continue
+        if _matches(table, pattern, path.parent):
+            found = _entry(section, path).over(found)
+    return found
+
+
+def _matches(table: Path, pattern: str, folder: Path) -> bool:
+    """Whether a pattern means a table: its name alone, or its path from the folder of columns.toml."""
+    relative = Path(os.path.relpath(table.resolve(), folder.resolve())).as_posix()
+    return any(name == pattern or fnmatch.fnmatchcase(name, pattern) for name in (table.name, relative))
+
+
+def _entry(section: Section, path: Path) -> Entry:
+    columns, units = (section.table(key) for key in ("columns", "units"))
+    for each in (columns, units):
+        each.only(ROLES)
+    accept = section.values.get("accept", [])
+    if not isinstance(accept, list) or not all(word in ACCEPTED for word in accept):
+        section.refuse("accept", f"must be a list of some of {', '.join(ACCEPTED)}, but is {accept!r}.")
+    return Entry(
+        {role: str(value) for role, value in columns.values.items()},
+        {role: str(value) for role, value in units.values.items()},
+        {
+            **{key: section.word(key, of=words) for key, words in WORDS.items() if key in section.values},
+            **{key: section.word(key) for key in TEXTS if key in section.values},
+        },
+        section.whole("header_line", low=0) if "header_line" in section.values else None,
+        frozenset(accept),
+        path,
+    )
+
+
+def entry_of_settings(settings: Sequence[str], source: Path) -> Entry:
+    """Read `--set` options, `columns.gap=comsol_mm`.
+
+    Raises
+    ------
+    FingervisionError
+        One is no key, or has no value.
+    """
+    document: dict[str, Any] = {}
+    for setting in settings:
+        key, equals, value = setting.partition("=")
+        first, _, second = key.strip().partition(".")
+        if not equals or not value.strip():
+            raise FingervisionError(f"--set must be KEY=VALUE, such as columns.gap=comsol_mm, but is {setting}.")
+        if second:
+            document.setdefault(first, {})[second] = value.strip()
+        elif first == "accept":
+            document[first] = [*document.get(first, []), *value.replace(",", " ").split()]
+        elif first == "header_line" and value.strip().isdecimal():
+            document[first] = int(value)
+        else:
+            document[first] = value.strip()
+    section = Section(source, "", "table", document)
+    section.only(tuple(key for key in KEYS if key not in ("file", "as")))
+    return _entry(section, source)
+
+
+def entry_text(table: str, kind: str | None, entry: Entry) -> str:
+    """Write an entry as a table of columns.toml."""
+    lines = ["[[table]]", f"file = {_text(table)}"]
+    if kind is not None:
+        lines.append(f'as = "{kind}"')
+    lines += [f"{key} = {_text(value)}" for key, value in entry.words.items()]
+    if entry.header_line is not None:
+        lines.append(f"header_line = {entry.header_line}")
+    if entry.accept:
+        lines.append(f"accept = [{', '.join(_text(word) for word in sorted(entry.accept))}]")
+    lines += [f"columns.{role} = {_text(name)}" for role, name in entry.columns.items()]
+    lines += [f"units.{role} = {_text(unit)}" for role, unit in entry.units.items()]
+    return "\n".join(lines) + "\n"
+
+
+def _text(words: str) -> str:
+    """Write a text as TOML does."""
+    marked = words.replace("\\", "\\\\").replace('"', '\\"').replace("\t", "\\t")
+    return '"' + re.sub(r"[\x00-\x1f\x7f]", lambda mark: f"\\u{ord(mark[0]):04x}", marked) + '"'
+
+
+def write_entry(path: Path, table: str, kind: str | None, entry: Entry) -> bool:
+    """Put an entry into columns.toml; the entries of other tables, and comments above them, stay as they are.
+
+    Returns
+    -------
+    bool
+        Whether the file has changed.
+
+    Raises
+    ------
+    FingervisionError
+        It cannot be read or written.
+    """
+    block = entry_text(table, kind, entry)
+    try:
+        before = path.read_text(encoding="utf-8-sig") if path.exists() else "schema = 1\n"
+        parts = [part.strip("\n") for part in re.split(r"(?m)^(?=\s*\[\[\s*table\s*\]\])", before)]
+        ours = block.splitlines()[: 2 if kind is None else 3]
+        kept = [part for part in parts if part and not _is_of(part, ours)]
+        if block.strip("\n") in parts:
+            return False
+        after = "\n\n".join([*kept, block])
+        part_file = path.with_name(f".{path.name}.part")
+        part_file.write_text(after, encoding="utf-8")
+        part_file.replace(path)
+    except OSError as error:
+        raise FingervisionError(
+            f"{path} could not be written ({error.strerror}): name another file with --out, and give it to --columns."
+        ) from error
+    return True
+
+
+def _is_of(part: str, ours: Sequence[str]) -> bool:
+    """Whether a part of columns.toml is the entry of the same file and kind."""
+    lines = [re.sub(r"\s*=\s*", " = ", line.strip()) for line in part.splitlines()]
+    kinds = [line for line in lines if line.startswith("as = ")]
+    return all(line in lines for line in ours) and (len(ours) == 3 or not kinds)

@@ -1,0 +1,33 @@
+"""Libraries of the extra `formats`: imported where a file needs them, with a sentence where they are missing."""
+
+import importlib
+from pathlib import Path
+from typing import Any
+
+from fingervision.domain.errors import FingervisionError
+
+
+def needed_library(name: str, path: Path, what: str) -> Any:
+    """Import a library that a format needs.
+
+    Parameters
+    ----------
+    name : str
+        Module to import.
+    path : Path
+        File that needs it.
+    what : str
+        What the file is.
+
+    Raises
+    ------
+    FingervisionError
+        It is not installed.
+    """
+    try:
+        return importlib.import_module(name)
+    except ImportError as error:
+        raise FingervisionError(
+            f"{path} is {what}, which needs the library {name.split('.')[0]}, but it is not installed: "
+            "pip install 'fingervision[formats]', or save the table as CSV."
+        ) from error

@@ -1,0 +1,36 @@
+"""Which tables are the project's own, and are read to the letter."""
+
+from pathlib import Path
+
+from fingervision.tables.mapping import Entry
+
+OWN = {"measured": ("input_mm", "gap_mm"), "drive": ("time_s", "input_mm"), "simulation": ("input_mm", "gap_mm")}
+TARGET = "target_mm"
+HEAD_BYTES = 100_000
+
+
+def is_own(path: Path, kind: str, given: Entry) -> bool:
+    """Whether a table is in the project's own format, as its header line says; what cannot be read is taken for such.
+
+    A table that columns.toml speaks of is read as that says.
+    """
+    if not given.says_nothing:
+        return False
+    if not path.is_file():
+        return True
+    try:
+        with path.open("rb") as file:
+            head = file.read(HEAD_BYTES).decode(
+                "utf-8-sig", errors="strict" if path.stat().st_size < HEAD_BYTES else "replace"
+            )
+    except (OSError, UnicodeDecodeError):
+        return False
+    if "\x00" in head:
+        return False
+    header = next((line for line in head.splitlines() if line.strip() and not line.lstrip().startswith("#")), "")
+    names = [cell.strip().strip('"').strip() for cell in header.split(",")]
+    if kind == "measured" and TARGET in names and "input_mm" not in names:
+        from fingervision.storage.iso230_table import MATRIX, QUANTITIES
+
+        return any(name in QUANTITIES or MATRIX.fullmatch(name) for name in names)
+    return all(name in names for name in OWN[kind])

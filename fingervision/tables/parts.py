@@ -1,0 +1,49 @@
+"""Files that hold several tables (sheets, groups, structures): which one is meant."""
+
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+
+from fingervision.domain.errors import FingervisionError
+from fingervision.tables.column_names import column_name
+from fingervision.tables.mapping import Entry
+from fingervision.tables.questions import OpenQuestionError, Question
+
+
+def chosen_part(path: Path, names: Mapping[str, Sequence[str]], given: Entry, what: str) -> str:
+    """Name the part that is meant: the stated one, the only one, or the only one with columns that say what they are.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    names : mapping of str to sequence of str
+        Names of the columns of each part.
+    given : Entry
+        What the user has decided.
+    what : str
+        What a part is called in this format.
+
+    Raises
+    ------
+    FingervisionError
+        There is none, or not the stated one.
+    OpenQuestionError
+        Several may be meant.
+    """
+    listed = ", ".join(f"'{name}'" for name in names)
+    if (stated := given.words.get("part")) is not None:
+        if stated not in names:
+            raise FingervisionError(f"part must be a {what} of {path} ({listed or 'it has none'}), but is '{stated}'.")
+        return stated
+    if len(names) == 1:
+        return next(iter(names))
+    known: Callable[[str], int] = lambda part: len({r for n in names[part] if (r := column_name(n).role) is not None})  # noqa: E731
+    fitting = [part for part in names if known(part) >= 2]
+    if len(fitting) == 1:
+        return fitting[0]
+    if not names:
+        raise FingervisionError(
+            f"{path} must hold a table, but has no {what} with columns of numbers: export it again."
+        )
+    example = (fitting or list(names))[0]
+    raise OpenQuestionError(path, "table", [Question(f"which {what} is meant is open: {listed}", f"part={example}")])

@@ -1,0 +1,181 @@
+"""The front door: any table as a measured table, a drive or a simulation."""
+
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+
+from fingervision.domain.drive import DriveHistory
+from fingervision.domain.errors import FingervisionError
+from fingervision.domain.measured_table import MeasuredTable
+from fingervision.models.corrected import CorrectedModel
+from fingervision.models.table import TableModel
+from fingervision.storage import drive_csv, measured_table, model_toml, simulation_table
+from fingervision.storage.number_columns import Numbers
+from fingervision.tables.column_choice import CANONICAL
+from fingervision.tables.formats import read_raw
+from fingervision.tables.iso230 import iso230_rows_of
+from fingervision.tables.mapping import Entry, entry_for
+from fingervision.tables.own_format import is_own
+from fingervision.tables.questions import OpenQuestionError, Question
+from fingervision.tables.understanding import Understood, understand
+
+
+def read_measured_table(path: Path, columns: Path | None = None) -> MeasuredTable:
+    """Read a measured table of any kind.
+
+    Parameters
+    ----------
+    path : Path
+        The table.
+    columns : Path or None
+        A columns.toml; None: the one beside the table, if any.
+
+    Raises
+    ------
+    FingervisionError
+        It cannot be read, or not be worked with.
+    OpenQuestionError
+        It can be read in more than one way.
+    """
+    given = entry_for(path, "measured", columns)
+    if is_own(path, "measured", given):
+        return measured_table.read_measured_table(path)
+    raw = read_raw(path, given)
+    targets = iso230_rows_of(raw, given)
+    if targets is not None:
+        return measured_table.targets_as_rows(path, targets, said(given, raw.what, raw.notes, raw.left_out))
+    table = understand(raw, "measured", given).decided()
+    values = {CANONICAL[role]: numbers for role, numbers in table.columns.items()}
+    if "gap_mm" not in values:
+        left, right = values["left_mm"], values["right_mm"]
+        both = left.present & right.present
+        values["gap_mm"] = Numbers(np.where(both, right.value - left.value, 0.0), both)
+    return measured_table.measured_rows(path, values, table.runs, _said(table, given))
+
+
+def read_drive(path: Path, columns: Path | None = None) -> DriveHistory:
+    """Read a drive table of any kind.
+
+    Parameters
+    ----------
+    path : Path
+        The table.
+    columns : Path or None
+        A columns.toml; None: the one beside the table, if any.
+
+    Raises
+    ------
+    FingervisionError
+        It cannot be read, or not be worked with.
+    OpenQuestionError
+        It can be read in more than one way.
+    """
+    given = entry_for(path, "drive", columns)
+    if is_own(path, "drive", given):
+        return drive_csv.read_drive(path)
+    return drive_of(understand(read_raw(path, given), "drive", given).decided(), given)
+
+
+def drive_of(table: Understood, given: Entry) -> DriveHistory:
+    """Take a table that is understood as a drive."""
+    path = table.path
+    kept = np.flatnonzero(table.columns["time"].present & table.columns["input"].present)
+    if not kept.size:
+        raise FingervisionError(f"{path} must have at least one row with a time and an input, but has none.")
+    if "backward_time" in given.accept:
+        kept = kept[np.argsort(table.columns["time"].value[kept], kind="stable")]
+    steps = np.diff(table.columns["time"].value[kept])
+    repeated = np.flatnonzero(steps == 0.0)
+    if repeated.size:
+        if "repeated_time" not in given.accept:
+            at = int(kept[repeated[0] + 1])
+            raise OpenQuestionError(
+                path,
+                "drive",
+                [
+                    Question(
+                        f"{repeated.size} rows repeat the time of the row before (the first is {table.raw.place(at)}); "
+                        "accept=repeated_time keeps the first of each",
+                        "accept=repeated_time",
+                    )
+                ],
+            )
+        kept = kept[np.concatenate([[True], steps > 0.0])]
+    force = table.columns.get("force")
+    values = {"time_s": table.columns["time"].value[kept], "input_mm": table.columns["input"].value[kept]}
+    if force is not None and force.present[kept].all():
+        values["force_n"] = force.value[kept]
+    runs = None if table.runs is None else tuple(table.runs[row] for row in kept.tolist())
+    lines = [table.raw.lines[row] for row in kept.tolist()] if len(table.raw.lines) else (kept + 1).tolist()
+    return drive_csv.drive_rows(path, values, runs, lines)
+
+
+def read_simulation_table(path: Path, columns: Path | None = None) -> TableModel:
+    """Read a simulation table of any kind as a model.
+
+    Parameters
+    ----------
+    path : Path
+        The table.
+    columns : Path or None
+        A columns.toml; None: the one beside the table, if any.
+
+    Raises
+    ------
+    FingervisionError
+        It cannot be read, or not be worked with.
+    OpenQuestionError
+        It can be read in more than one way.
+    """
+    given = entry_for(path, "simulation", columns)
+    if is_own(path, "simulation", given):
+        return simulation_table.read_simulation_table(path)
+    table = understand(read_raw(path, given), "simulation", given).decided()
+    needed = [
+        "input",
+        *(["gap"] if "gap" in table.columns else []),
+        *(s for s in ("left", "right") if s in table.columns),
+    ]
+    kept = np.logical_and.reduce([table.columns[role].present for role in needed])
+    values = {
+        CANONICAL[role]: Numbers.whole(numbers.value[kept])
+        for role, numbers in table.columns.items()
+        if role in needed or bool(numbers.present[kept].all())
+    }
+    if "gap_mm" not in values:
+        values["gap_mm"] = Numbers.whole(values["right_mm"].value - values["left_mm"].value)
+    return simulation_table.simulation_rows(path, values)
+
+
+def read_model(path: Path, kind: str = "lumped", columns: Path | None = None) -> CorrectedModel:
+    """Read a model: a simulation table of any kind, a gripper, or a corrected model.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    kind : str
+        Kind of model that a gripper becomes.
+    columns : Path or None
+        A columns.toml for simulation tables; None: the one beside the table, if any.
+
+    Raises
+    ------
+    FingervisionError
+        As `storage.model_toml.read_model` and `read_simulation_table`.
+    """
+    reader: Callable[[Path], TableModel] = partial(read_simulation_table, columns=columns)
+    return model_toml.read_model(path, kind, table=reader)
+
+
+def _said(table: Understood, given: Entry) -> list[str]:
+    roles = ", ".join(f"{each.role} = '{each.name}'" + (f" [{each.unit}]" if each.unit else "") for each in table.taken)
+    return [*said(given, table.raw.what, table.notes, table.left_out), f"Columns: {roles}."]
+
+
+def said(given: Entry, what: str, notes: tuple[str, ...], left_out: tuple[str, ...]) -> list[str]:
+    """Say how a foreign table was read."""
+    how = f" with {given.source}" if given.source is not None else ""
+    return [f"Read as {what}{how}.", *notes, *(f"Left out: {words}." for words in left_out)]

@@ -1,0 +1,61 @@
+"""Lines of a text file, of a size that memory holds."""
+
+from pathlib import Path
+
+from fingervision.domain.errors import FingervisionError
+from fingervision.tables.encoding import decode
+
+MOST_BYTES = 1_000_000_000
+"""Cells as text take about ten times their bytes in memory: more than a desktop has."""
+LONGEST_LINE = 1_000_000
+"""No table has a row of a million characters (a hundred thousand columns); a file without line ends has."""
+
+
+def lines_of(path: Path, encoding: str | None) -> tuple[list[str], str]:
+    """Read all lines.
+
+    Returns
+    -------
+    list of str, str
+        Lines, and the name of the encoding.
+
+    Raises
+    ------
+    FingervisionError
+        The file cannot be read, is too large, is no text, or has a line without end.
+    """
+    try:
+        with path.open("rb") as file:
+            # Looked at before the whole is read: a file of one line is often huge. UTF-32 has four bytes a character.
+            head = file.read(4 * LONGEST_LINE)
+            if len(head) == 4 * LONGEST_LINE and b"\n" not in head and b"\r" not in head:
+                raise _too_long(path)
+            size = path.stat().st_size
+            if size > MOST_BYTES:
+                raise FingervisionError(
+                    f"{path} must have at most {MOST_BYTES / 1e9:g} GB to be read as text, but has {size / 1e9:.1f} "
+                    "GB: split it, or save it as Parquet."
+                )
+            content = head + file.read()
+    except OSError as error:
+        raise FingervisionError(f"The table {path} could not be read ({error.strerror}).") from error
+    text, name = decode(content, encoding)
+    if "\x00" in text:
+        # What a logger's disk held when its power went: zeros at the end.
+        text = text.rstrip("\x00")
+        if "\x00" in text:
+            raise FingervisionError(
+                f"{path} must be a table as text, or of a format that is read (.xlsx, .mat, .parquet, .tdms, .lvm), "
+                f"but holds zero bytes (the first is character {text.index(chr(0))}): export it again."
+            )
+    lines = text.splitlines()
+    if lines and max(map(len, lines)) > LONGEST_LINE:
+        raise _too_long(path)
+    return lines, name
+
+
+def _too_long(path: Path) -> FingervisionError:
+    return FingervisionError(
+        f"{path} must be a table with a row a line, but has a line of more than {LONGEST_LINE} characters: export it "
+        "with line ends."
+    )

@@ -1,0 +1,135 @@
+"""What stands above the rows of a text table: the names of its columns, and their units."""
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from fingervision.domain.errors import FingervisionError
+from fingervision.tables.column_names import column_name
+from fingervision.tables.dialect import Dialect, is_comment, is_number, is_value, split
+from fingervision.tables.mapping import Entry
+from fingervision.tables.units import is_unit, known_unit
+from fingervision.tables.words import role_of
+
+HEADER_LINES = 6
+"""Lines above the numbers that are looked at for names and units."""
+LAST_REMARK = frozenset({"", "comment", "comments", "kommentar", "bemerkung", "commentaire", "comentario", "commento"})
+"""Names of a last column that rows may leave out."""
+
+
+@dataclass(frozen=True, slots=True)
+class Header:
+    """What stands above the numbers.
+
+    Parameters
+    ----------
+    names : tuple of str
+        Of the columns; empty where none are given.
+    units : tuple of str
+        A row of units; empty where there is none.
+    line : int
+        Line of the names, from 0; -1 where there is none.
+    """
+
+    names: tuple[str, ...] = ()
+    units: tuple[str, ...] = ()
+    line: int = -1
+
+
+def _is_row(cells: Sequence[str], dialect: Dialect) -> bool:
+    return len(cells) == dialect.wide and any(is_number(cell, dialect.decimal) for cell in cells)
+
+
+def first_row(lines: Sequence[str], dialect: Dialect, given: Entry) -> int:
+    """Line of the first row of numbers, from 0."""
+    start = 0 if given.header_line is None else min(given.header_line, len(lines))
+    named = given.header_line is None
+    for at in range(start, len(lines)):
+        if is_comment(lines[at]) or not lines[at].strip():
+            continue
+        cells = split(lines[at], dialect.separator)
+        if not _is_row(cells, dialect):
+            continue
+        # A header that numbers its columns has fewer values than a row: `Position 1, Position 2` has none.
+        values = sum(is_value(cell, dialect.decimal) for cell in cells)
+        words = sum(role_of(column_name(cell).base) is not None for cell in cells)
+        if not named or values > words:
+            return at
+    return len(lines)
+
+
+def find_header(lines: Sequence[str], first: int, dialect: Dialect, given: Entry) -> Header:
+    """Find names and units above the first row."""
+    if given.header_line == 0:
+        return Header()
+    if given.header_line is not None:
+        at = given.header_line - 1
+        names = names_in(lines[at], dialect) if at < len(lines) else None
+        if names is None:
+            raise FingervisionError(
+                f"header_line must name the line with {dialect.wide} names of columns, but line {at + 1} is "
+                f"'{lines[at][:80] if at < len(lines) else 'not there'}': mend it."
+            )
+        units = names_in(lines[at + 1], dialect) if at + 1 < first else None
+        return Header(names, units if units is not None and _all_units(units) else (), at)
+    found: list[tuple[int, int, tuple[str, ...]]] = []
+    units, units_at = None, -1
+    blanks = 0
+    for at in range(first - 1, max(-1, first - 1 - HEADER_LINES), -1):
+        if not lines[at].strip():
+            blanks += 1
+            continue
+        names = names_in(lines[at], dialect)
+        if names is None:
+            if found or units:
+                break
+            continue
+        if units is None and not found and _all_units(names):
+            units, units_at = names, at
+            continue
+        known = sum(column_name(name).role is not None or column_name(name).source is not None for name in names)
+        found.append((known, at, names))
+    if not found and units and not all(known_unit(cell) for cell in units if cell):
+        # `a,b` could be ares and bits; names are likelier above numbers than rare units alone.
+        return Header(units, (), units_at)
+    if not found:
+        return Header((), units or (), -1)
+    # The most words that mean something; among equals the line nearest to the numbers.
+    _, at, names = max(found, key=lambda item: (item[0], item[1]))
+    return Header(names, units or (), at)
+
+
+def _all_units(cells: Sequence[str]) -> bool:
+    """Whether a line holds nothing but units, and some."""
+    # `t` is a name and a tonne, `s` a second: a word of a role is a name only beside others that are.
+    return any(cells) and all(is_unit(cell) for cell in cells) and sum(role_of(cell) is not None for cell in cells) == 0
+
+
+def names_in(line: str, dialect: Dialect) -> tuple[str, ...] | None:
+    """Take a line as names of all columns; None where it does not have as many."""
+    text = re.sub(r"^\s*(#+|%+|//+|!+)\s*", "", line).strip()
+    if dialect.separator is not None:
+        text = re.sub(r"^\s*(#+|%+|//+|!+)\s*", "", line).rstrip("\r\n")
+    wide = dialect.wide
+    for cells in _splits(text, dialect):
+        if len(cells) == wide + 1 and cells[-1].strip().lower() in LAST_REMARK:
+            cells = cells[:-1]
+        if len(cells) != wide:
+            continue
+        if all(is_value(cell, dialect.decimal) for cell in cells):
+            return None
+        return tuple(cells)
+    return None
+
+
+def _splits(text: str, dialect: Dialect) -> list[list[str]]:
+    """Ways to take a line of names apart, likeliest first."""
+    ways = [split(text, dialect.separator)]
+    if dialect.separator is None:
+        ways.append([cell.strip() for cell in re.split(r"\t+|\s{2,}", text) if cell.strip()])
+        joined = re.sub(r"\s+(?=[\[(<])", "\u2007", text)
+        ways.append([cell.replace("\u2007", " ") for cell in joined.split()])
+        ways += [[cell.strip() for cell in text.split(mark)] for mark in (",", ";", "|")]
+    elif is_comment(text) or dialect.separator != ",":
+        ways.append([cell.strip() for cell in re.split(r"\t+|\s{2,}", text) if cell.strip()])
+    return ways

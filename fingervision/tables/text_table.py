@@ -1,0 +1,207 @@
+"""Lines of text to a raw table: header, row of units, comments, repeated headers and rows that are no rows."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from fingervision.domain.errors import FingervisionError
+from fingervision.storage.number_block import number_block
+from fingervision.storage.number_columns import Numbers
+from fingervision.tables.dialect import (
+    BY_NAME,
+    MINUS,
+    Dialect,
+    find_dialect,
+    is_comment,
+    is_number,
+    is_value,
+    split,
+)
+from fingervision.tables.mapping import Entry
+from fingervision.tables.questions import OpenQuestionError, Question
+from fingervision.tables.raw_table import RawColumn, RawTable
+from fingervision.tables.text_header import HEADER_LINES, Header, find_header, first_row, names_in
+
+NUMBER_BEGINS = frozenset("0123456789+-., \t")
+MOST_ODD = 0.05
+"""Share of rows that may have another number of cells: more are not a logger's hiccup but a wrong separator."""
+
+
+def table_of_lines(path: Path, lines: Sequence[str], given: Entry, encoding: str) -> RawTable:
+    """Find header and rows among lines, and read the rows.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    lines : sequence of str
+        All of its lines.
+    given : Entry
+        What the user has decided.
+    encoding : str
+        For the description.
+
+    Raises
+    ------
+    FingervisionError
+        There is no table, or too many rows are none.
+    OpenQuestionError
+        A mark may be a decimal comma or set thousands apart.
+    """
+    dialect = find_dialect(lines, given.words.get("separator", ""), given.words.get("decimal", ""))
+    if dialect is None:
+        raise FingervisionError(
+            f"{path} must hold rows of two numbers or more, but has none in its {len(lines)} lines: name another file, "
+            "or export the table again."
+        )
+    first = first_row(lines, dialect, given)
+    header = find_header(lines, first, dialect, given)
+    _check_commas(path, lines, first, dialect)
+    if dialect.either_way:
+        example = _marked(lines, dialect)
+        mark, name = (",", "comma") if "," in example else (".", "point")
+        other = "." if mark == "," else ","
+        words = (
+            f"each {name} in its numbers may be the decimal one or set thousands apart ('{example}'): decimal={mark} "
+            f"or decimal={other} says which sign is the decimal one"
+        )
+        raise OpenQuestionError(path, "table", [Question(words, f"decimal={mark}")])
+    rows = _Rows(path, dialect, header, first)
+    columns, numbers, left_out, restarts = rows.read(lines)
+    notes = () if header.names else (f"The file names no columns: they are called 1 to {len(columns)}.",)
+    return RawTable(
+        path,
+        f"text, {encoding}, {dialect.words}",
+        tuple(columns),
+        numbers,
+        tuple(left_out),
+        notes,
+        np.array(restarts, dtype=np.intp),
+        {**_settings(dialect, header), "encoding": encoding},
+        bool(header.names),
+    )
+
+
+def _settings(dialect: Dialect, header: Header) -> dict[str, str | int]:
+    word = next((name for name, sign in BY_NAME.items() if sign == dialect.separator and sign != name), None)
+    separator = "blank" if dialect.separator is None else "tab" if word == "tab" else dialect.separator
+    return {"separator": separator, "decimal": dialect.decimal, "header_line": header.line + 1}
+
+
+def _check_commas(path: Path, lines: Sequence[str], first: int, dialect: Dialect) -> None:
+    """Refuse rows with twice as many cells between commas as there are names above."""
+    if dialect.separator != ",":
+        return
+    for line in lines[max(0, first - HEADER_LINES) : first]:
+        names = split(line, ",")
+        if 2 * len(names) == dialect.wide and not any(is_value(name, ".") for name in names):
+            raise FingervisionError(
+                f"{path} has {len(names)} names and {dialect.wide} cells a row between commas: decimal commas and "
+                "commas between cells cannot be told apart. Export it with semicolons or tabs."
+            )
+
+
+def _marked(lines: Sequence[str], dialect: Dialect) -> str:
+    """First number with a mark."""
+    for line in lines:
+        for cell in split(line, dialect.separator):
+            if ("," in cell or "." in cell) and is_number(cell, dialect.decimal) and not is_comment(line):
+                return cell
+    return ""
+
+
+class _Rows:
+    """Reads what stands below the header."""
+
+    def __init__(self, path: Path, dialect: Dialect, header: Header, first: int) -> None:
+        self._path, self._dialect, self._header, self._first = path, dialect, header, first
+        self._names = header.names or tuple(str(k + 1) for k in range(dialect.wide))
+        self._units = header.units or ("",) * dialect.wide
+
+    def read(self, lines: Sequence[str]) -> tuple[list[RawColumn], Sequence[int], list[str], list[int]]:
+        """Give columns, lines of the rows, what was left out, and rows before which the header stood again."""
+        end = len(lines)
+        while end > self._first and not lines[end - 1].strip():
+            end -= 1
+        body = lines[self._first : end]
+        if (block := self._block(body)) is not None:
+            columns = [self._column(k, Numbers.whole(values)) for k, values in enumerate(block.T.copy())]
+            return columns, range(self._first + 1, end + 1), [], []
+        return self._cell_by_cell(body)
+
+    def _column(self, place: int, content: Sequence[str] | Numbers) -> RawColumn:
+        return RawColumn(self._names[place], content, self._units[place])
+
+    def _block(self, body: Sequence[str]) -> np.ndarray | None:
+        if self._dialect.decimal == ",":
+            if any("." in line for line in body):
+                return None
+            body = [line.replace(",", ".") for line in body]
+        return number_block(body, self._dialect.separator, self._dialect.wide)
+
+    def _cell_by_cell(self, body: Sequence[str]) -> tuple[list[RawColumn], Sequence[int], list[str], list[int]]:
+        separator, wide = self._dialect.separator, self._dialect.wide
+        names = [name.strip() for name in self._names]
+        rows: list[list[str]] = []
+        numbers: list[int] = []
+        restarts: list[int] = []
+        comments: list[int] = []
+        headers: list[int] = []
+        odd: list[tuple[int, int]] = []
+        units = list(self._units)
+        plain = separator is not None and not any('"' in text for text in body)
+        ascii_only = all(map(str.isascii, body))
+        for line, text in enumerate(body, start=self._first + 1):
+            cells = text.split(separator) if plain else split(text, separator)
+            if len(cells) == wide and text[0] not in "#%/!'" and any(cells):
+                if text[0] not in NUMBER_BEGINS and self._is_header(cells, names, units):
+                    headers.append(line)
+                    restarts.append(len(rows))
+                    continue
+                rows.append(cells)
+                numbers.append(line)
+            elif not text.strip():
+                continue
+            elif is_comment(text):
+                comments.append(line)
+                if self._header.names and names_in(text, self._dialect) == self._header.names:
+                    restarts.append(len(rows))
+            elif cells == names or cells[:wide] == names:
+                headers.append(line)
+                restarts.append(len(rows))
+            else:
+                odd.append((line, len(cells)))
+        if len(odd) > max(1.0, MOST_ODD * len(rows)):
+            raise FingervisionError(
+                f"{self._path} must have {wide} cells in each row below line {self._first}, but {len(odd)} of "
+                f"{len(rows) + len(odd)} rows have not (line {odd[0][0]} has {odd[0][1]}): mend them, or state the "
+                "key separator in columns.toml."
+            )
+        left_out = []
+        if comments:
+            left_out.append(f"{_count(len(comments), 'line')} of comment (the first is line {comments[0]})")
+        if headers:
+            left_out.append(f"{_count(len(headers), 'repeated header line')} (the first is line {headers[0]})")
+        if odd:
+            left_out.append(
+                f"{_count(len(odd), 'line')} with another number of cells (line {odd[0][0]} has {odd[0][1]}, not "
+                f"{wide})"
+            )
+        cleaned = ([row[k].strip() for row in rows] for k in range(wide))
+        if not ascii_only:
+            cleaned = ([cell.translate(MINUS) for cell in cells] for cells in cleaned)
+        columns = [self._column(k, cells) for k, cells in enumerate(cleaned)]
+        return columns, numbers, left_out, sorted({row for row in restarts if 0 < row < len(rows)})
+
+    def _is_header(self, cells: Sequence[str], names: Sequence[str], units: Sequence[str]) -> bool:
+        """Whether a row repeats the header, also in another spelling, or the row of units."""
+        cells = [cell.strip() for cell in cells]
+        if cells in (names, units):
+            return True
+        same = sum(a.lower() == b.lower() for a, b in zip(cells, names, strict=True))
+        return same > len(cells) // 2 and not any(is_number(cell, self._dialect.decimal) for cell in cells)
+
+
+def _count(number: int, noun: str) -> str:
+    return f"{number} {noun}{'s' if number != 1 else ''}"

@@ -1,0 +1,193 @@
+"""Dates and times of day, as programs write them, to seconds from the first."""
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from datetime import date, datetime
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fingervision.storage.number_columns import Numbers
+from fingervision.tables.dialect import MISSING
+
+CLOCK = re.compile(r"(?P<h>\d{1,2}):(?P<m>\d{2})(?::(?P<s>\d{2})(?:[.,:](?P<f>\d+))?)?\s*(?P<half>[AaPp]\.?[Mm]\.?)?")
+DAY = re.compile(r"(?P<a>\d{1,4})(?P<mark>[-./])(?P<b>\d{1,2})(?P=mark)(?P<c>\d{1,4})")
+STAMP = re.compile(
+    r"(?P<day>\d{1,4}[-./]\d{1,2}[-./]\d{1,4})[T,;]?\s*(?P<clock>\d{1,2}:\d{2}\S*(?:\s*[AaPp]\.?[Mm]\.?)?)?"
+)
+USUAL = re.compile(r"(\d[\d./-]*)[T ](\d{1,2}):(\d\d):(\d\d)(?:[.,](\d+))?")
+"""A date and time as most programs write it."""
+ZONE = re.compile(r"(Z|[+-]\d{2}:?\d{2})$")
+DAY_S = 86400.0
+HALF_DAY_S = 43200.0
+ORDERS = ("dmy", "mdy")
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Seconds:
+    """A column of dates or times of day.
+
+    Parameters
+    ----------
+    numbers : Numbers
+        Seconds from the first.
+    since : str
+        The first, as written.
+    notes : tuple of str
+        What was assumed, a sentence each.
+    open_order : bool
+        Whether day and month could be exchanged, and that makes a difference.
+    unread : int
+        Cells that are no date.
+    """
+
+    numbers: Numbers
+    since: str
+    notes: tuple[str, ...] = ()
+    open_order: bool = False
+    unread: int = 0
+
+
+def looks_like_time(cells: Sequence[str]) -> bool:
+    """Whether a column's first values are dates or times of day."""
+    some = [cell for cell in cells[:50] if cell.strip().lower() not in MISSING]
+    return bool(some) and all(STAMP.match(cell) or CLOCK.fullmatch(ZONE.sub("", cell).strip()) for cell in some)
+
+
+def seconds_of(cells: Sequence[str], date_order: str = "") -> Seconds:
+    """Read dates and times of day.
+
+    Times of day that fall by more than half a day have passed midnight, once each time. An offset from UTC is taken
+    off; without one, clocks are taken as they stand.
+
+    Parameters
+    ----------
+    cells : sequence of str
+        `2024-05-03T12:00:01.5+02:00`, `03.05.2024 12:00:01,5`, `5/3/2024 1:00:01 PM`, `12:00:01.250`.
+    date_order : str
+        `dmy`, `mdy` or `ymd` where the user has said so.
+    """
+    clock_s, present, codes, words = _taken_apart(cells)
+    days = {order: _days(words, order) for order in ([date_order] if date_order else ORDERS)}
+    usable = [numbers for numbers in days.values() if numbers is not None]
+    if not usable or not present.any():
+        none = np.zeros(len(cells))
+        return Seconds(Numbers(none, none > 0.0), "", unread=len(cells))
+    value = clock_s + np.where(codes >= 0, DAY_S * usable[0][codes], 0.0)
+    notes = []
+    if not words:
+        known = np.flatnonzero(present)
+        falls = np.diff(value[known]) < -HALF_DAY_S
+        if falls.any():
+            value[known[1:]] += DAY_S * np.cumsum(falls)
+            notes.append(f"Times of day pass midnight {int(falls.sum())} time(s): a day was added each time.")
+    first = int(np.argmax(present))
+    unread = sum(cells[row].strip().lower() not in MISSING for row in np.flatnonzero(~present).tolist())
+    return Seconds(
+        Numbers(np.where(present, value - value[first], 0.0), present),
+        cells[first],
+        tuple(notes),
+        len(usable) > 1 and bool(np.any(usable[0] != usable[1])),
+        unread,
+    )
+
+
+def _taken_apart(
+    cells: Sequence[str],
+) -> tuple[NDArray[np.float64], NDArray[np.bool_], NDArray[np.intp], list[str]]:
+    """Seconds of the day of each cell, whether it is a time, the number of its day's word (-1: none), and the words."""
+    clock_s, present = np.zeros(len(cells)), np.zeros(len(cells), dtype=np.bool_)
+    codes = np.full(len(cells), -1, dtype=np.intp)
+    number: dict[str, int] = {}
+    for row, cell in enumerate(cells):
+        if (usual := USUAL.fullmatch(cell)) is not None:
+            day, hours, minutes, whole, fraction = usual.groups()
+            seconds: float | None = 3600 * int(hours) + 60 * int(minutes) + float(f"{whole}.{fraction or 0}")
+        else:
+            day, seconds = _one(cell.strip())
+        if seconds is None:
+            continue
+        clock_s[row], present[row] = seconds, True
+        if day:
+            codes[row] = number.setdefault(day, len(number))
+    return clock_s, present, codes, list(number)
+
+
+def _one(text: str) -> tuple[str, float | None]:
+    """Word of the day ('' for none) and seconds of it; None where a cell is no time."""
+    offset = 0.0
+    if (zone := ZONE.search(text)) is not None and ":" in text[: zone.start()]:
+        offset = _offset(zone[0])
+        text = text[: zone.start()].strip()
+    match = STAMP.fullmatch(text)
+    if match is None and CLOCK.fullmatch(text) is None:
+        return "", None
+    clock = match["clock"] if match else text
+    seconds = 0.0 if clock is None else _clock(clock)
+    return match["day"] if match else "", None if seconds is None else seconds - offset
+
+
+def _days(words: Sequence[str], order: str) -> NDArray[np.float64] | None:
+    """Days from the first of each word (one zero where there is none); None where one does not exist in this order."""
+    numbers = [_ordinal(word, order) for word in words]
+    if None in numbers:
+        return None
+    # Counted from the first: a float holds the microseconds then.
+    known = [number for number in numbers if number is not None]
+    return np.array([number - known[0] for number in known] or [0], dtype=np.float64)
+
+
+def _clock(text: str) -> float | None:
+    match = CLOCK.fullmatch(text.strip())
+    if match is None:
+        return None
+    hours = int(match["h"])
+    if match["half"]:
+        hours = hours % 12 + (12 if match["half"][0] in "pP" else 0)
+    seconds = 3600.0 * hours + 60.0 * int(match["m"]) + int(match["s"] or 0)
+    fraction = match["f"]
+    return seconds + (int(fraction) / 10.0 ** len(fraction) if fraction else 0.0)
+
+
+def _offset(zone: str) -> float:
+    """Seconds that a clock of a zone is ahead of UTC."""
+    if zone == "Z":
+        return 0.0
+    sign = -1.0 if zone[0] == "-" else 1.0
+    return sign * (3600.0 * int(zone[1:3]) + 60.0 * int(zone[-2:]))
+
+
+def _ordinal(text: str, order: str) -> int | None:
+    """Number of a day; None where there is no such day. Dates before 1970 are days like others."""
+    match = DAY.fullmatch(text)
+    if match is None:
+        return None
+    a, b, c = (int(match[part]) for part in "abc")
+    if len(match["a"]) > 2 or order == "ymd":
+        year, month, day = a, b, c
+    elif order == "mdy" and match["mark"] != ".":
+        month, day, year = a, b, c
+    else:
+        day, month, year = a, b, c
+    if year < 100 and len(match["a"]) <= 2:
+        year += 2000 if year < 70 else 1900  # as POSIX's %y
+    try:
+        return date(year, month, day).toordinal()
+    except ValueError:
+        return None
+
+
+def is_epoch(first: float) -> str:
+    """Name the clock that a large number of seconds counts on; empty where it is none that is known.
+
+    Examples
+    --------
+    >>> is_epoch(1714730400.0), is_epoch(3797577600.0), is_epoch(12.5)
+    ('seconds since 1970', 'seconds since 1904', '')
+    """
+    for name, epoch in (("1970", datetime(1970, 1, 1)), ("1904", datetime(1904, 1, 1))):
+        years = first / (365.25 * DAY_S) + epoch.year
+        if 2000.0 <= years <= 2060.0:
+            return f"seconds since {name}"
+    return ""

@@ -1,0 +1,265 @@
+"""A raw table understood: which column is what, in which unit, and what remains open."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fingervision.storage.number_columns import Numbers
+from fingervision.tables.cells import to_numbers
+from fingervision.tables.column_choice import DIMENSION, NEEDED, Findings, choose
+from fingervision.tables.column_names import ColumnName, column_name
+from fingervision.tables.doubts import doubts
+from fingervision.tables.mapping import Entry
+from fingervision.tables.questions import OpenQuestionError, Question
+from fingervision.tables.raw_table import RawColumn, RawTable
+from fingervision.tables.times import is_epoch, looks_like_time, seconds_of
+from fingervision.tables.units import factor, known_unit, spelled
+
+DATE = "date"
+"""Stands for the unit of times that are written as dates or times of day."""
+MOST_UNREAD = 0.05
+"""Share of a column's cells that may be no numbers (a logger's ERR): more are asked about."""
+
+
+@dataclass(frozen=True, slots=True)
+class Taken:
+    """What a column was taken for.
+
+    Parameters
+    ----------
+    name : str
+        As in the file.
+    role : str
+        Its role.
+    unit : str
+        Its unit, as written; empty where it has none.
+    """
+
+    name: str
+    role: str
+    unit: str
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Understood:
+    """A table whose columns have a meaning.
+
+    Parameters
+    ----------
+    raw : RawTable
+        What was read.
+    kind : str
+        `measured`, `drive` or `simulation`.
+    taken : tuple of Taken
+        Columns with a role.
+    columns : mapping of str to Numbers
+        By role, in mm, s and N.
+    runs : tuple of str, or None
+        Name of each row's run.
+    notes : tuple of str
+        What was assumed, a sentence each.
+    left_out : tuple of str
+        What was left out, and why.
+    questions : tuple of Question
+        What is open.
+    """
+
+    raw: RawTable
+    kind: str
+    taken: tuple[Taken, ...]
+    columns: Mapping[str, Numbers]
+    runs: tuple[str, ...] | None = None
+    notes: tuple[str, ...] = ()
+    left_out: tuple[str, ...] = ()
+    questions: tuple[Question, ...] = ()
+
+    @property
+    def path(self) -> Path:
+        """The file."""
+        return self.raw.path
+
+    def decided(self) -> "Understood":
+        """Give the table itself, where nothing is open.
+
+        Raises
+        ------
+        OpenQuestionError
+            Something is.
+        """
+        if self.questions:
+            raise OpenQuestionError(self.path, self.kind, self.questions)
+        return self
+
+
+def understand(raw: RawTable, kind: str, given: Entry) -> Understood:
+    """Say what each column is.
+
+    Parameters
+    ----------
+    raw : RawTable
+        Of any format.
+    kind : str
+        `measured`, `drive` or `simulation`.
+    given : Entry
+        What the user has decided.
+
+    Raises
+    ------
+    FingervisionError
+        What the user has decided does not fit the table.
+    """
+    about = Findings(notes=list(raw.notes), left_out=list(raw.left_out))
+    names = [column_name(column.name) for column in raw.columns]
+    chosen = choose(raw, names, kind, given, about)
+    columns: dict[str, Numbers] = {}
+    taken: list[Taken] = []
+    decimal = given.words.get("decimal") or str(raw.settings.get("decimal", "."))
+    for role, place in chosen.items():
+        column = raw.columns[place]
+        if role in ("run", "date"):
+            taken.append(Taken(column.name, role, ""))
+            continue
+        if role == "time" and (dated := _dated(raw, chosen, given, about)) is not None:
+            columns[role] = dated
+            taken.append(Taken(column.name, role, DATE))
+            continue
+        unit = _unit(column, names[place], role, kind, given, about)
+        values = _numbers(raw, column, decimal, given, about)
+        taken.append(Taken(column.name, role, unit or ""))
+        if unit is None:
+            continue
+        size = factor(unit, DIMENSION[role])
+        if size is None:
+            about.questions.append(_wrong_unit(column, role, unit))
+            continue
+        if role == "time":
+            values = _from_epoch(values, column, about)
+        columns[role] = values if size == 1.0 else Numbers(values.value * size, values.present)
+        if column.since and role == "time":
+            taken[-1] = Taken(column.name, role, DATE)
+        if column.since:
+            about.notes.append(f"{column.name} counts from {column.since}.")
+    run_cells = _runs(raw, chosen, columns, given, about)
+    if not about.questions and "input" in columns:
+        codes = None if run_cells is None else _codes(run_cells)
+        by_date = any(each.role == "time" and each.unit == DATE for each in taken)
+        about.questions += doubts(columns, given, kind, codes, dated=by_date)
+    return Understood(
+        raw, kind, tuple(taken), columns, run_cells, tuple(about.notes), tuple(about.left_out), tuple(about.questions)
+    )
+
+
+def _unit(column: RawColumn, name: ColumnName, role: str, kind: str, given: Entry, about: Findings) -> str | None:
+    """Unit of a column as stated by the user, beside the name, or in it; None where it is open, or not needed."""
+    if role in given.units:
+        return given.units[role]
+    stated = [unit for unit in (spelled(column.unit), name.unit) if unit and unit != "-"]
+    if stated:
+        if len({known_unit(unit) or unit for unit in stated}) > 1:
+            about.questions.append(
+                Question(f"the unit of '{column.name}' is {stated[0]} and {stated[1]}", f"units.{role}={stated[0]}")
+            )
+            return None
+        return stated[0]
+    optional = role not in NEEDED[kind] and role in ("force", "u_gap", "u_random")
+    if optional:
+        about.notes.append(f"{column.name} has no unit and is not used: units.{role} in columns.toml would say it.")
+        return None
+    example = {"length": "mm", "time": "s", "force": "N"}[DIMENSION[role]]
+    about.questions.append(Question(f"the unit of '{column.name}' ({role}) is not stated", f"units.{role}={example}"))
+    return None
+
+
+def _wrong_unit(column: RawColumn, role: str, unit: str) -> Question:
+    dimension = DIMENSION[role]
+    example = {"length": "0.1 um", "time": "ms", "force": "mN"}[dimension]
+    return Question(
+        f"'{column.name}' ({role}) must be a {dimension}, but its unit is '{unit}': say what one of it is worth",
+        f"units.{role}={example}",
+    )
+
+
+def _numbers(raw: RawTable, column: RawColumn, decimal: str, given: Entry, about: Findings) -> Numbers:
+    """Read a column's cells; those that are no numbers are told."""
+    if isinstance(column.content, Numbers):
+        return column.content
+    values, odd = to_numbers(column.content, decimal)
+    if odd.size:
+        at = int(odd[0])
+        words = (
+            f"{odd.size} of {len(column)} cells of '{column.name}' are no numbers ('{column.content[at][:40]}' in "
+            f"{raw.place(at)})"
+        )
+        if odd.size > max(1.0, MOST_UNREAD * len(column)) and "unreadable_cells" not in given.accept:
+            about.questions.append(Question(words, "accept=unreadable_cells"))
+        about.left_out.append(words)
+    return values
+
+
+def _dated(raw: RawTable, chosen: Mapping[str, int], given: Entry, about: Findings) -> Numbers | None:
+    """Time from dates and times of day; None where the column holds numbers."""
+    column = raw.columns[chosen["time"]]
+    if isinstance(column.content, Numbers) or "time" in given.units or not looks_like_time(column.content):
+        return None
+    cells = column.content
+    day = chosen.get("date")
+    if day is None:
+        days = [
+            k
+            for k, other in enumerate(raw.columns)
+            if column_name(other.name).role == "date" and k != chosen["time"] and not isinstance(other.content, Numbers)
+        ]
+        day = days[0] if len(days) == 1 else None
+    if day is not None and not isinstance(dates := raw.columns[day].content, Numbers) and ":" not in dates[0]:
+        cells = [f"{a} {b}" if a and b else "" for a, b in zip(dates, cells, strict=True)]
+        about.notes.append(f"{raw.columns[day].name} and {column.name} are read as one date.")
+    read = seconds_of(cells, given.words.get("date_order", ""))
+    if read.open_order:
+        about.questions.append(Question(f"day and month of '{read.since}' could be either way round", "date_order=dmy"))
+    if read.unread:
+        about.left_out.append(f"{read.unread} cells of '{column.name}' are no times")
+    about.notes += [*read.notes, f"{column.name} counts from {read.since}."]
+    return read.numbers
+
+
+def _from_epoch(values: Numbers, column: RawColumn, about: Findings) -> Numbers:
+    """Count from the first row where a clock counts from 1970 or 1904: such numbers are never a recording's time."""
+    if not values.present.any():
+        return values
+    first = float(values.value[int(np.argmax(values.present))])
+    for scale, unit in ((1.0, "s"), (1e3, "ms"), (1e6, "µs")):
+        if epoch := is_epoch(first / scale):
+            about.notes.append(f"{column.name} counts {epoch} ({unit}): it is taken from its first row, {first:.6f}.")
+            return Numbers(np.where(values.present, values.value - first, 0.0), values.present)
+    return values
+
+
+def _runs(
+    raw: RawTable, chosen: Mapping[str, int], columns: Mapping[str, Numbers], given: Entry, about: Findings
+) -> tuple[str, ...] | None:
+    """Name of each row's run: its own column, or the restarts that the user has said to be runs."""
+    if (place := chosen.get("run")) is not None:
+        content = raw.columns[place].content
+        if isinstance(content, Numbers):
+            return tuple(
+                f"{value:g}" if there else "" for value, there in zip(content.value, content.present, strict=True)
+            )
+        return tuple(cell.strip() for cell in content)
+    if given.words.get("runs") != "restart":
+        return None
+    starts = np.zeros(raw.rows, dtype=np.intp)
+    starts[raw.restarts] = 1
+    if "time" in columns:
+        known = np.flatnonzero(columns["time"].present)
+        starts[known[1:][np.diff(columns["time"].value[known]) < 0.0]] = 1
+    number = np.cumsum(starts) + 1
+    about.notes.append(f"{number[-1]} runs: one from each restart of the time or of the header to the next.")
+    return tuple(str(each) for each in number.tolist())
+
+
+def _codes(runs: Sequence[str]) -> NDArray[np.intp]:
+    number: dict[str, int] = {}
+    return np.array([number.setdefault(run, len(number)) for run in runs], dtype=np.intp)

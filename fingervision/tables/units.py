@@ -1,0 +1,111 @@
+"""Units as tables write them, and their factors to mm, s and N."""
+
+from functools import cache
+from typing import TYPE_CHECKING, Any
+
+from fingervision.domain.errors import FingervisionError
+
+if TYPE_CHECKING:
+    from pint import UnitRegistry
+
+CANONICAL = {"length": "mm", "time": "s", "force": "N"}
+WRITTEN = {
+    "s": "s sec secs second seconds sek sekunde sekunden seconde secondes segundo segundos secondo secondi",
+    "ms": "ms msec millisecond milliseconds millisekunde millisekunden milliseconde millisecondes milisegundos "
+    "millisecondi",
+    "us": "us usec µs microsecond microseconds mikrosekunden",
+    "ns": "ns",
+    "min": "min minute minutes minuten minutos minuti",
+    "h": "h hr hrs hour hours stunde stunden std heures horas ore",
+    "day": "d day days tage",
+    "m": "m meter metre meters metres mètre mètres metro metros metri",
+    "cm": "cm",
+    "mm": "mm millimeter millimetre millimeters millimetres millimètre millimètres milímetro milímetros millimetri",
+    "um": "um µm micron microns mikron micrometer micrometre micrometers micrometres mikrometer micromètre micromètres "
+    "micrómetros micrometri",
+    "nm": "nm nanometer nanometre nanometers",
+    "inch": 'in inch inches zoll "',
+    "thou": "mil mils thou",
+    "N": "n newton newtons",
+    "mN": "mn millinewton",
+    "uN": "un µn",
+    "kN": "kn",
+    "gram_force": "gf",
+    "kgf": "kgf",
+    "lbf": "lbf",
+}
+"""Units by the words that stand for them, in lower case."""
+BY_WORD = {word: unit for unit, words in WRITTEN.items() for word in words.split()}
+CASE_TELLS = {"Mm": None, "MN": None}
+"""Spellings that mean something else than their lower case; they are asked about."""
+NO_UNIT = frozenset({"", "-", "1", "[-]", "\u2013", "none", "n/a"})
+
+
+@cache
+def registry() -> "UnitRegistry[Any]":
+    """Load the library of units, once and only where a foreign table is read."""
+    from pint import UnitRegistry
+
+    return UnitRegistry(cache_folder=None)
+
+
+def spelled(text: str) -> str:
+    """Bring a unit's text into one spelling: one micro sign, no brackets."""
+    text = text.strip().strip("[](){}<>").strip().rstrip(".")
+    return text.replace("\u03bc", "µ").replace("Âµ", "µ").replace("Î¼", "µ")
+
+
+@cache
+def known_unit(text: str) -> str | None:
+    """Name of a unit of length, time or force that is written with a word or sign; None where it is none."""
+    text = spelled(text)
+    if text in CASE_TELLS:
+        return CASE_TELLS[text]
+    return BY_WORD.get(text.lower())
+
+
+@cache
+def factor(text: str, dimension: str) -> float | None:
+    """Factor from a unit, or a multiple of one such as `0.1 µm`, to mm, s or N; None where it is of no such dimension.
+
+    Raises
+    ------
+    FingervisionError
+        The pint library is not there.
+    """
+    try:
+        units = registry()
+    except ImportError as error:
+        raise FingervisionError(
+            "Units of a foreign table need the library pint, which is not installed: pip install pint."
+        ) from error
+    words = spelled(text)
+    amount, _, rest = words.partition(" ")
+    try:
+        size = float(amount)
+    except ValueError:
+        size, rest = 1.0, words
+    unit = known_unit(rest)
+    if unit is None and spelled(rest) in CASE_TELLS:
+        return None
+    try:
+        quantity = units.Quantity(size, unit or spelled(rest).replace("µ", "u"))
+        found = float(quantity.to(CANONICAL[dimension]).magnitude)
+    except Exception:
+        return None
+    return found if found > 0.0 else None
+
+
+@cache
+def is_unit(text: str) -> bool:
+    """Whether a cell of a row of units may be one: of any dimension, or nothing."""
+    words = spelled(text)
+    if words.lower() in NO_UNIT or known_unit(words) is not None or words in {"%", "°", "°C", "C", "V", "A", "Hz"}:
+        return True
+    if len(words) > 12 or any(letter.isdigit() and letter not in "23" for letter in words):
+        return False
+    try:
+        registry().parse_units(words.replace("µ", "u"))
+    except Exception:
+        return False
+    return True

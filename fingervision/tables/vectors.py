@@ -1,0 +1,59 @@
+"""Named vectors and matrices of a file (MATLAB, TDMS) to the columns of tables."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fingervision.storage.number_columns import Numbers
+from fingervision.tables.raw_table import RawColumn
+
+WIDEST = 200
+"""A matrix with more columns is a picture."""
+
+
+def is_numeric(value: Any) -> bool:
+    """Whether it is an array of real numbers."""
+    return isinstance(value, np.ndarray) and value.dtype.kind in "fiub"
+
+
+def numbers(value: NDArray[Any]) -> Numbers:
+    """Take an array of real numbers; what is not finite is no value."""
+    plain = np.asarray(value, dtype=np.float64).ravel()
+    usable = np.isfinite(plain)
+    return Numbers(np.where(usable, plain, 0.0), usable)
+
+
+def tables_of(values: Mapping[str, Any]) -> dict[str, list[RawColumn]]:
+    """Put vectors of one length together; each matrix, and each structure, is a table of its own.
+
+    Parameters
+    ----------
+    values : mapping of str to anything
+        Arrays, and mappings of such for structures; anything else is passed over.
+
+    Returns
+    -------
+    dict of str to list of RawColumn
+        By the name of the structure or matrix; `vectors of N` for the rest.
+    """
+    found: dict[str, list[RawColumn]] = {}
+    loose: dict[int, list[RawColumn]] = {}
+    for name, value in values.items():
+        if isinstance(value, Mapping):
+            for part, columns in tables_of(value).items():
+                key = name if part.startswith("vectors of ") else f"{name}.{part}"
+                if key in found:  # vectors of several lengths in one structure
+                    key = f"{name} ({len(columns[0])} rows)"
+                found[key] = columns
+        elif not is_numeric(value) or value.size < 2:
+            continue
+        elif value.ndim == 1 or (value.ndim == 2 and 1 in value.shape):
+            loose.setdefault(value.size, []).append(RawColumn(name, numbers(value)))
+        elif value.ndim == 2 and value.shape[1] <= WIDEST:
+            found[name] = [RawColumn(str(k + 1), numbers(value[:, k])) for k in range(value.shape[1])]
+    for size, columns in loose.items():
+        if len(columns) > 1:
+            found[f"vectors of {size}"] = columns
+    return found

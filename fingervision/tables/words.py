@@ -1,0 +1,118 @@
+"""What columns are called in English, German, French, Spanish and Italian, and which role each word stands for."""
+
+import re
+import unicodedata
+
+ROLES = {
+    "time": "time t zeit zeitachse temps tempo tiempo uhrzeit timestamp timestamps zeitstempel horodatage elapsed "
+    "clock hora heure ora orario zeitpunkt instant",
+    "date": "date datum fecha data datetime",
+    "input": "input inputs eingang eingabe entree entrees entrada ingresso uin xin x position positions pos stage "
+    "displacement displacements encoder drive travel stroke weg stellweg wege hub verschiebung verfahrweg antrieb "
+    "vorschub lage istposition istweg deplacement deplacements course actionneur codeur posicion desplazamiento "
+    "desplazamientos carrera actuador posizione spostamento spostamenti corsa attuatore u_in actuator",
+    "gap": "gap gaps opening openings abstand abstande oeffnung offnung offnungsweite oeffnungsweite spalt spaltweite "
+    "greiferoffnung greiferoeffnung greifweite fingerabstand backenabstand aperture clearance separation ouverture "
+    "ecartement espacement apertura abertura hueco separacion separazione fessura luce",
+    "left": "left links linke linker linkes gauche izquierda izquierdo sinistra sinistro",
+    "right": "right rechts rechte rechter rechtes droite droit derecha derecho destra destro",
+    "force": "force forces kraft krafte kraefte stellkraft f load effort fuerza fuerzas forza forze carga",
+    "run": "run runs lauf versuch essai ensayo corrida prova messreihe serie series trial",
+    "target": "target targets soll sollposition sollwert sollweg nominal nominale cible objetivo obiettivo consigne "
+    "zielposition ziel",
+    "direction": "direction richtung sens direccion direzione anfahrrichtung approach side",
+    "cycle": "cycle cycles zyklus zyklen ciclo ciclos cicli",
+    "deviation": "deviation deviations abweichung abweichungen desviacion scostamento deviazione positionsabweichung",
+}
+BESIDE = (
+    "the of a an and in at im der die das des de du la le les el los il lo dei del della channel ch kanal canal canale "
+    "axis achse axe eje asse signal signals measured gemessen gemessene mesure mesuree medido medida misurato misurata "
+    "actual ist current aktuell aktuelle actuelle value values wert werte valeur valor valore reading readback number "
+    "no nr num finger fingers fingern zwischen tip tips tisch table linear motor piezo mean mittel mittelwert moyenne "
+    "media laser edge kante edges total relative relativ raw roh stepper gripper greifer pince pinza doigt doigts dedo "
+    "dedos dita dito entre tra fra machine between jaw jaws backen messung data daten donnees datos dati x y z 0 1 "
+    "2 3 4"
+)
+FILLERS = frozenset(BESIDE.split())
+"""Words beside one with a role that do not change it."""
+MEASUREMENT = (
+    "experiment experimental experimentell exp measured measurement measurements messung gemessen mesure mesures "
+    "medido medicion misura misurato test versuch essai"
+)
+OF_MEASUREMENT = frozenset(MEASUREMENT.split())
+SIMULATION = (
+    "simulation simulated sim simuliert simule simulacion simulazione comsol ansys abaqus simmechanics simscape "
+    "simulink matlab fem fea model modell modele modelo modello theory theorie theoretical analytical analytisch "
+    "rechnung calculated berechnet solidworks"
+)
+OF_SIMULATION = frozenset(SIMULATION.split())
+"""What a column of gaps is called after, where several sources stand side by side."""
+BY_TOKEN = {word: role for role, words in ROLES.items() for word in words.split()}
+
+
+def tokens(name: str) -> tuple[str, ...]:
+    """Words of a name: small letters without accents; camelCase is taken apart.
+
+    Examples
+    --------
+    >>> tokens("Öffnungsweite_links")
+    ('offnungsweite', 'links')
+    >>> tokens("stagePosition 1")
+    ('stage', 'position', '1')
+    """
+    if re.fullmatch(r"[uxUX]_in", name.strip()):
+        return ("uin",) if name.strip().lower() == "u_in" else ("xin",)
+    name = re.sub(r"(?<=[a-zà-ÿ])(?=[A-ZÀ-Ý][a-zà-ÿ])", " ", name.replace("ß", "ss"))
+    plain = unicodedata.normalize("NFKD", name)
+    plain = "".join(letter for letter in plain if not unicodedata.combining(letter)).lower()
+    return tuple(re.findall(r"[^\W_]+", plain))
+
+
+def role_of(name: str) -> str | None:
+    """Role that a name without its unit stands for; None where it is no known word, or says two things.
+
+    A name has a role where one of its words has, and every other word is filler. `time stamp` and `start time` differ
+    in that only.
+
+    Examples
+    --------
+    >>> role_of("Abstand der Finger"), role_of("Position Achse 1"), role_of("left finger position")
+    ('gap', 'input', 'left')
+    >>> role_of("room temperature"), role_of("gap error")
+    (None, None)
+    """
+    words = tokens(name)
+    if words in {("time", "stamp"), ("date", "time"), ("marca", "de", "tiempo")}:
+        return "time"
+    roles = [BY_TOKEN[word] for word in words if word in BY_TOKEN]
+    others = [word for word in words if word not in BY_TOKEN]
+    if any(word not in FILLERS for word in others) or not roles:
+        return None
+    found = set(roles)
+    if len(found) > 1:
+        # Words of a place: the left finger's position is not the input; what is about time or date is that.
+        for role in ("left", "right"):
+            if role in found and found <= {role, "input", "gap"}:
+                return role
+        if found == {"time", "date"}:
+            return "time"
+        if found == {"input", "drive"} or ("target" in found and found <= {"target", "input"}):
+            return "target"
+        if "deviation" in found and found <= {"deviation", "input"}:
+            return "deviation"
+        return None
+    return roles[0]
+
+
+def source_of(name: str) -> str | None:
+    """`measured` or `simulation` where a column is called after where its values come from, and after nothing else.
+
+    Examples
+    --------
+    >>> source_of("comsol"), source_of("experiment"), source_of("comsol gap")
+    ('simulation', 'measured', None)
+    """
+    words = [word for word in tokens(name) if not word.isdigit()]
+    if words and all(word in OF_SIMULATION for word in words):
+        return "simulation"
+    return "measured" if words and all(word in OF_MEASUREMENT for word in words) else None
