@@ -16,6 +16,8 @@ GOOD_PX = 0.0106 * 2.0**0.5
 POOR_TIMES = 3.0
 # Refusals of fewer frames than this share (a part that passes, a hand) are counted in the report's first line only.
 FEW_REFUSED = 0.2
+# Where more than this share is refused nothing else matters; where less is, what the others suffer from is the cause.
+MOSTLY_REFUSED = 0.5
 
 
 class Severity(StrEnum):
@@ -65,9 +67,10 @@ class Finding:
 
     @property
     def rank(self) -> tuple[float, bool, float]:
-        """Larger is worse: first what leaves no number, then what is sure, then doubts, each by its cost."""
+        """Larger is worse: what leaves most frames without a number, then what is sure, then doubts, each by cost."""
         sure = self.severity is not Severity.GOOD and not self.is_doubt
-        return self.share_refused, sure, self.cost_px or 0.0
+        first = self.share_refused if self.share_refused > MOSTLY_REFUSED else 0.0
+        return first, sure, self.cost_px or 0.0
 
 
 def severity_of(cost_px: float, good_px: float) -> Severity:

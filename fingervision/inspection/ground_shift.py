@@ -76,7 +76,10 @@ class GroundTracker:
                 self._reference = self._halves(upright[:room])
             return
         if room >= self._rows:
-            self._register(self._halves(upright[: self._rows]))
+            halves = self._halves(upright[: self._rows])
+            # What is cut off at black or white throughout has no detail at all.
+            if all(half.any() for half in (*self._reference, *halves)):
+                self._register(halves)
 
     def shift(self) -> GroundShift:
         """What was found."""

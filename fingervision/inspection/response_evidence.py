@@ -9,8 +9,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
-from fingervision.inspection.flank_profile import flank_profile
+from fingervision.inspection.flank_profile import FlankProfile, flank_profile
 from fingervision.inspection.profile_fit import fit_step
 from fingervision.vision.edge_filters import PIXEL_VARIANCE
 from fingervision.vision.edges import EdgePoints
@@ -18,13 +19,19 @@ from fingervision.vision.grey import GreyImage, top_level
 from fingervision.vision.pipeline import Settings
 from fingervision.vision.profile_choice import WIDER
 
+Floats = NDArray[np.float64]
+
 # Beyond these odds (2 ln of the ratio of likelihoods) it is certain for every purpose.
 LARGEST_ODDS = 60.0
 # Optics are not quite symmetric, and lossy coding less so: no bin is better known than this share of the contrast.
-MODEL_SHARE, LOSSY_SHARE = 0.002, 0.03
+MODEL_SHARE, LOSSY_SHARE = 0.001, 0.03
 # Sharpening in the camera comes after its transfer curve and makes coded edges even: with overshoots beyond the
 # plateaus of this share of the contrast the shape says nothing.
 OVERSHOOT, OVERSHOOT_SIGMAS = 0.03, 3.0
+# Flanks that speak for different responses with more than this (odds of e^2 to one) show something else.
+CONTRADICTING = 4.0
+# Scatter of a plateau is told from so many bins.
+FEWEST_FOR_SCATTER = 4
 # A profile that reaches so near to either end of the scale is cut off, and leans because of that (share of it).
 CUT_OFF_SHARE = 0.995
 
@@ -78,10 +85,10 @@ def response_evidence(
 
 
 def _agreed(odds: list[float]) -> float:
-    """What both flanks say: the weaker one speaks for both, because a fault of one flank alone is no response."""
-    if len(odds) < 2:
+    """What both flanks say together; nothing where one is missing, or where they plainly contradict each other."""
+    if len(odds) < 2 or (odds[0] * odds[1] < 0.0 and min(map(abs, odds)) > CONTRADICTING):
         return 0.0
-    return 2.0 * min(odds, key=abs) if odds[0] * odds[1] > 0.0 else 0.0
+    return sum(odds)
 
 
 def _odds(seen: Sequence[tuple[GreyImage, EdgePoints]], side: int, settings: Settings, floor: float) -> float | None:
@@ -102,7 +109,7 @@ def _odds(seen: Sequence[tuple[GreyImage, EdgePoints]], side: int, settings: Set
     tip_px = float(np.median([edges.blur_px[side, 1] for _, edges in seen]))
     if blur_px**2 + PIXEL_VARIANCE > (1.0 + WIDER) * (tip_px**2 + PIXEL_VARIANCE):
         return None  # what spreads a flank and no tip is no spread of the optics: motion, or a wall
-    u_level = np.hypot(stored.u_level, floor * (high - low))
+    u_level = np.hypot(np.hypot(stored.u_level, floor * (high - low)), _pattern(stored, ends))
     fits = []
     for response in (settings.response, settings.other_response):
         assert response is not None  # noqa: S101 - the caller has looked
@@ -114,3 +121,20 @@ def _odds(seen: Sequence[tuple[GreyImage, EdgePoints]], side: int, settings: Set
     # What neither explains is error of the model: both are judged by the better one's own misfit.
     excess = max(min(fit.chi_square for fit in fits) / fits[0].freedom, 1.0)
     return (fits[0].chi_square - fits[1].chi_square) / excess
+
+
+def _pattern(stored: FlankProfile, ends: int) -> Floats:
+    """What a pattern on the finger or on the ground leaves in each bin: its scatter, where that of the two is seen."""
+    level = stored.level
+    inner, outer = float(np.median(level[:ends])), float(np.median(level[-ends:]))
+    outside = np.clip((level - inner) / (outer - inner), 0.0, 1.0) if outer != inner else np.zeros_like(level)
+    scatter = [_scatter(stored.away_px[part], level[part]) for part in (slice(None, ends), slice(-ends, None))]
+    return np.asarray(np.hypot(scatter[0] * (1.0 - outside), scatter[1] * outside))
+
+
+def _scatter(away: Floats, level: Floats) -> float:
+    """Standard deviation about a straight line; nothing where too few bins are there to tell."""
+    if away.size < FEWEST_FOR_SCATTER:
+        return 0.0
+    slope, at = np.polyfit(away, level, 1)
+    return float(np.sqrt(np.sum((level - at - slope * away) ** 2) / (away.size - 2)))

@@ -6,6 +6,7 @@ from collections import Counter
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -16,14 +17,17 @@ from fingervision.frames.source import Description
 from fingervision.inspection.blocks import BLOCKY, blockiness
 from fingervision.inspection.finding import GOOD_PX
 from fingervision.inspection.ground_shift import GroundShift, GroundTracker
-from fingervision.inspection.noise_bound import GOOD_NOISE, edge_noise_px
+from fingervision.inspection.noise_bound import GOOD_BLUR_PX, GOOD_NOISE, edge_noise_px
 from fingervision.inspection.response_evidence import ResponseEvidence, response_evidence
 from fingervision.measuring.scale import Scale
+from fingervision.vision.binarise import binarise
+from fingervision.vision.denoise import denoise
 from fingervision.vision.edge_filters import PIXEL_VARIANCE
 from fingervision.vision.edges import EdgePoints
 from fingervision.vision.fingers import CoarseFingers
 from fingervision.vision.grey import GreyImage, to_grey, top_level
 from fingervision.vision.pipeline import Settings, look_closely, measure_frame
+from fingervision.vision.profile_choice import WIDER
 from fingervision.vision.residuals import SHARED_POINTS
 
 Floats = NDArray[np.float64]
@@ -31,9 +35,14 @@ Floats = NDArray[np.float64]
 # Frames that are looked at closely, evenly over all that are read: enough to average noise, few enough for 4K.
 CLOSELY = 16
 # Another response than the assumed one is taken for the rest of the inspection where the edges say so as surely.
-SURELY = 0.95
+SURELY = 0.9
 # Rims and walls of a tenth of the contrast are seen below this ratio of noise to contrast.
 SEEING_NOISE = 2.0 * GOOD_NOISE
+# The median step between neighbours is so many times the noise (0.6745 sqrt(2) for a normal one), and outlines are lost
+# where noise has this share of the contrast (five times what is good).
+STEP_OF_NOISE, LOST_NOISE = 0.954, 5.0 * GOOD_NOISE
+# The steepest of the pixels lie on edges; outlines are lost above this spread (twice what is good).
+STEEPEST, LOST_BLUR_PX = 0.995, 2.0 * GOOD_BLUR_PX
 # What a camera's own noise is taken to be where a codec has removed it (levels of 255).
 CAMERA_NOISE = 2.0
 # Fingers and gap fill a picture that they take so much of: the rest is room to move in.
@@ -76,6 +85,12 @@ class Look:
     def focus_blur_px(self) -> float:
         """Spread of the optics, the pixel included: flanks or tips, whichever motion has spread less."""
         return float(np.sqrt(self.edges.blur_px.min(axis=1).max() ** 2 + PIXEL_VARIANCE))
+
+    @property
+    def widened_px2(self) -> Floats:
+        """Variance that motion has added to each finger's flanks, shape (2,): what they have more than the tips."""
+        flanks, tips = (self.edges.blur_px[:, part] ** 2 + PIXEL_VARIANCE for part in (0, 1))
+        return np.asarray(np.where(flanks > (1.0 + WIDER) * tips, flanks - tips, 0.0))
 
     @property
     def flank_blur_px(self) -> float:
@@ -181,6 +196,39 @@ class Sample:
         have.
         """
         return GOOD_PX * min(1.0, self.fill / FILLED) if self.looks else GOOD_PX
+
+    @property
+    def moves(self) -> bool:
+        """Whether most frames show flanks that motion has spread; the rest of an edge's shape cannot be told then."""
+        return self.median(float(look.widened_px2.any()) for look in self.looks) > 0.5
+
+    @property
+    def is_lost_in_noise(self) -> bool:
+        """Whether the first picture without a number has fingers or ground that hardly rise above its noise."""
+        if self.refused_frame is None:
+            return False
+        grey = to_grey(self.refused_frame.pixels)
+        contrast = binarise(denoise(grey), self.top_level).contrast
+        steps = np.abs(np.diff(grey.astype(np.float64), axis=1))
+        return float(np.median(steps)) / STEP_OF_NOISE > LOST_NOISE * contrast
+
+    @property
+    def refused_blur_px(self) -> float:
+        """Spread of the steepest edges of the first picture without a number, roughly: contrast over steepest slope."""
+        if self.refused_frame is None:
+            return 0.0
+        grey = to_grey(self.refused_frame.pixels)
+        contrast = binarise(denoise(grey), self.top_level).contrast
+        soft = cv2.GaussianBlur(grey.astype(np.float32), (0, 0), 1.0)
+        slope = np.hypot(cv2.Sobel(soft, cv2.CV_32F, 1, 0, scale=0.125), cv2.Sobel(soft, cv2.CV_32F, 0, 1, scale=0.125))
+        steepest = float(np.quantile(slope, STEEPEST))
+        spread = contrast / max(steepest, 1e-6) / float(np.sqrt(2.0 * np.pi))
+        return float(np.sqrt(max(spread**2 - 1.0, 0.0)))
+
+    @property
+    def is_lost_in_blur(self) -> bool:
+        """Whether pictures without a number are out of focus: a tip is rounded off by it until it is none."""
+        return not self.is_lost_in_noise and self.refused_blur_px > LOST_BLUR_PX
 
     @property
     def blockiness(self) -> float:

@@ -11,9 +11,13 @@ FORMULA = "sqrt(u^2 - u'^2), u' the random uncertainty with edges of sigma 1.3 p
 
 def find(sample: Sample) -> Finding | None:
     """Compare the spread of the edges, without motion, to that of a lens in focus."""
-    refused = refusing(sample, "focus", (Status.BLURRED,), REMEDY)
+    blurred = (Status.BLURRED, Status.NO_FINGERS) if sample.is_lost_in_blur else (Status.BLURRED,)
+    refused = refusing(sample, "focus", blurred, REMEDY)
     if refused is not None or not sample.looks:
         return refused
+    if sample.moves:
+        words = "The fingers move while the shutter is open: focus cannot be told until they do not."
+        return weighed(sample, "focus", 0.0, words, REMEDY, FORMULA)
     blur_px = sample.median(look.focus_blur_px for look in sample.looks)
     cost_px = sample.median(
         without(look.u_with(blur_px=look.focus_blur_px), look.u_with(blur_px=min(GOOD_BLUR_PX, look.focus_blur_px)))

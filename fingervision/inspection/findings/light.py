@@ -2,7 +2,8 @@
 
 import numpy as np
 
-from fingervision.inspection.finding import Finding, weighed, without
+from fingervision.inspection.blocks import HEAVY
+from fingervision.inspection.finding import Finding, Severity, weighed, without
 from fingervision.inspection.findings.exposure import DIM, WANTED
 from fingervision.inspection.flank_profile import flank_profile
 from fingervision.inspection.noise_bound import GOOD_NOISE
@@ -15,14 +16,14 @@ UNEVEN = "Make the light even across the gap: a diffuser behind the fingers, far
 FORMULA = (
     "sqrt(n^2 + e^2 + s^2); n = sqrt(u^2 - u'^2), u' the random uncertainty with noise of 2 % of the contrast "
     "(Cramer-Rao bound); e the change of the gap when the plateaus beside each edge are let slope; s what noise "
-    "makes the measuring state as u_shift_px"
+    "or uneven light makes the measuring state as u_shift_px"
 )
 
 
 def find(sample: Sample) -> Finding | None:
     """Compare noise to contrast, and fit the edges with sloping plateaus."""
     if not sample.looks:
-        return None
+        return _lost(sample)
     bright = plateaus(sample).bright
     # What a longer exposure would mend is the exposure's.
     factor = WANTED / max(bright, 1e-3) if bright < DIM else 1.0
@@ -32,8 +33,12 @@ def find(sample: Sample) -> Finding | None:
         for look in sample.looks
         for each in (look.noise / factor,)
     )
-    uneven_px = 0.0 if plateaus(sample).is_cut else uneven_light_px(sample)
-    noisy_px = 0.0 if sample.shows_surroundings or bright < DIM else sample.u_shift_px
+    # What is cut off, moved or coded in blocks has no profile of its own.
+    is_spoilt = plateaus(sample).is_cut or sample.moves or sample.blockiness > HEAVY
+    uneven_px = 0.0 if is_spoilt else uneven_light_px(sample)
+    # Uneven light and a soft shadow are one and the same to the measuring; noise looks like anything.
+    is_lights = uneven_px > 0.0 or (not sample.shows_surroundings and bright >= DIM)
+    noisy_px = sample.u_shift_px if is_lights else 0.0
     cost_px = float(np.linalg.norm((weak_px, uneven_px, noisy_px)))
     contrast = sample.median(look.contrast for look in sample.looks) / sample.top_level
     figure = (
@@ -41,6 +46,14 @@ def find(sample: Sample) -> Finding | None:
         f"({100 * GOOD_NOISE:g} % or less is good); uneven light moves the gap by {uneven_px:.3f} px."
     )
     return weighed(sample, "light", cost_px, figure, UNEVEN if uneven_px > weak_px else WEAK, FORMULA)
+
+
+def _lost(sample: Sample) -> Finding | None:
+    """Frames without a number because nothing in them rises above the noise."""
+    if not sample.is_lost_in_noise:
+        return None
+    words = "No frame gave a number, and what is in view hardly rises above the noise."
+    return Finding("light", Severity.POOR, words, None, None, WEAK, "frames without a number", 1.0)
 
 
 def uneven_light_px(sample: Sample) -> float:

@@ -7,7 +7,7 @@ import numpy as np
 
 from calib.limits import Limits, rectangular
 from calib.measured_scale import Calibration
-from fingervision.inspection.finding import Finding, weighed
+from fingervision.inspection.finding import Finding, weighed, without
 from fingervision.inspection.sample import Look, Sample
 from fingervision.vision.profile_lines import INNER, ROWS
 
@@ -19,6 +19,8 @@ FORMULA = (
     "f = gap (1 - cos(theta)), sin(theta) = Z ln(r) / (2 d), r the ratio of the fingers' breadths, d their distance, "
     "Z the camera's"
 )
+# A turn's cost within so many standard uncertainties of the gap is noise.
+NOISE_SIGMAS = 2.0
 # Fingers that stand straighter than this differ for reasons of their own (degrees).
 LEAST_TURN_DEG = 1.0
 # Differences of breadth that ask for more than this are the fingers' own (degrees), and below so many standard
@@ -40,6 +42,8 @@ def find(sample: Sample) -> Finding | None:
         hypot(_slant_px(look, turn), corner_px(look, below_px) if abs(turn) > LEAST_TURN_DEG else 0.0)
         for look, turn in zip(sample.looks, turns, strict=True)
     )
+    # Directions and slants are no surer than the gap itself.
+    turn_px = without(turn_px, NOISE_SIGMAS * sample.median(look.outcome.u_gap_px for look in sample.looks))
     turn = sample.median(turns)
     tilt = tilt_deg(sample)
     gap_px = sample.median(look.outcome.gap_px for look in sample.looks)

@@ -4,7 +4,9 @@ from fingervision.domain.status import Status
 from fingervision.inspection.finding import Finding, Severity, refusing
 from fingervision.inspection.sample import Sample
 
+# Reasons that other findings name.
 NAMED_ELSEWHERE = (Status.OK, Status.BLURRED, Status.SATURATED, Status.LOW_CONTRAST, Status.DUPLICATE)
+WITHOUT_FINGERS = tuple(status for status in Status if status not in NAMED_ELSEWHERE)
 REMEDY = (
     "Bring both fingers with their tips into view, with nothing else beside them; else say where they are with --roi "
     "and where they point with --tips. `fingervision measure --steps 0` shows what was seen."
@@ -13,9 +15,10 @@ REMEDY = (
 
 def find(sample: Sample) -> Finding | None:
     """Count the frames without fingers."""
-    others = tuple(status for status in Status if status not in NAMED_ELSEWHERE)
-    refused = refusing(sample, "view", others, REMEDY)
-    if refused is not None:
+    refused = refusing(sample, "view", WITHOUT_FINGERS, REMEDY)
+    # Where noise or blur has taken the outlines away, light and focus say so.
+    is_told = sample.is_lost_in_blur or (not sample.looks and sample.is_lost_in_noise)
+    if refused is not None and not is_told:
         return refused
     measured = f"{sample.counts[Status.OK]} of {sample.frames} frames show two fingers and were measured."
     return Finding("view", Severity.GOOD, measured, 0.0, 0.0 if sample.scale else None, "", "frames without a number")

@@ -59,7 +59,7 @@ def main() -> None:
     rng = np.random.default_rng(options.seed)
     named, drawn = 0, 0
     print("fault         set-ups  first   stated um   error um   named instead")
-    for name in options.only or FAULTS:
+    for name in (options.only or FAULTS) if options.setups else ():
         count = -(-options.setups // len(options.only or FAULTS))
         right, instead, stated, errors = 0, Counter(), [], []
         for _ in range(count):
@@ -74,7 +74,7 @@ def main() -> None:
                     print(name, bench)
                     for each in findings[:4]:
                         print("    ", each.name, each.severity, each.cost_um, each.figure)
-            cost = next(each.cost_um for each in findings if each.name == name) if findings else None
+            cost = next((each.cost_um for each in findings if each.name == name), None)
             if cost is not None and error_um.size:
                 stated.append(cost)
                 shake_um = 1e3 * bench.shake_px / PX_PER_MM
