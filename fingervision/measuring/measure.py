@@ -3,6 +3,7 @@
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import ExitStack, closing, contextmanager
 from dataclasses import dataclass, field, replace
+from math import isfinite
 from pathlib import Path
 from time import monotonic
 from typing import Any
@@ -18,6 +19,9 @@ from fingervision.domain.status import Status
 from fingervision.frames.ahead import decoded_ahead
 from fingervision.frames.source import Description, FrameSource
 from fingervision.measuring.asked_to_stop import asked_to_stop
+from fingervision.measuring.clock.alignment import ClockOffset, NoClockOffset
+from fingervision.measuring.clock.common_clock import clock_of, join_drive, refusal, sentence
+from fingervision.measuring.clock.common_clock import in_words as clock_in_words
 from fingervision.measuring.gap_figure import draw_gap
 from fingervision.measuring.marked import marked
 from fingervision.measuring.other_camera import other_camera
@@ -59,8 +63,8 @@ class Task:
         The part of the frame that is looked at.
     drive : DriveHistory or None
         The recorded input.
-    drive_offset_s : float
-        Added to the drive's times to get the recording's.
+    drive_offset_s : float or None
+        Added to the drive's times to get the recording's; None finds it from the motion.
     overlay : bool
         Whether a video is written with what was measured drawn in.
     steps_frame : int or None
@@ -79,7 +83,7 @@ class Task:
     direction: Direction | None = None
     region: Region | None = None
     drive: DriveHistory | None = None
-    drive_offset_s: float = 0.0
+    drive_offset_s: float | None = None
     overlay: bool = False
     steps_frame: int | None = None
     response: CameraResponse | None = None
@@ -89,7 +93,7 @@ class Task:
     def __post_init__(self) -> None:
         if not 0.0 < self.below_tip_mm < float("inf"):
             raise UsageError(f"--below-tip-mm must be positive, but is {self.below_tip_mm:g}.")
-        if not -float("inf") < self.drive_offset_s < float("inf"):
+        if self.drive_offset_s is not None and not isfinite(self.drive_offset_s):
             raise UsageError(f"--drive-offset-s must be a number of seconds, but is {self.drive_offset_s:g}.")
         if self.steps_frame is not None and self.steps_frame < 0:
             raise UsageError(f"--steps must be the number of a frame, from 0, but is {self.steps_frame}.")
@@ -192,7 +196,8 @@ def _measured(source: FrameSource, task: Task, out: Path, on_progress: Progress 
     folder = claimed(out, description.files)
     frame_size_px = (description.width_px, description.height_px)
     marks = lost_frames(description.files)
-    row_maker = RowMaker(task.scale, frame_size_px, task.drive, task.drive_offset_s)
+    given_s = task.drive_offset_s
+    row_maker = RowMaker(task.scale, frame_size_px, None if given_s is None else task.drive, given_s or 0.0)
     series = GapSeries()
     stopped = False
     with ExitStack() as stack:
@@ -233,15 +238,23 @@ def _measured(source: FrameSource, task: Task, out: Path, on_progress: Progress 
             stopped = True
     if on_progress is not None:
         on_progress(series.frames, description.frame_count)
-    draw_gap(folder.figure, series)
-    summary = summarise(
-        description, _in_words(task, settings), task.scale, task.scale_file, series, complete=not stopped
-    )
+    clock = None
+    if task.drive is not None and given_s is None:
+        clock = clock_of(series, task.drive)
+        if isinstance(clock, ClockOffset):
+            join_drive(folder.gaps, task.drive, clock)
+            description = replace(description, notes=(*description.notes, sentence(clock), *clock.notes))
+    draw_gap(folder.figure, series, task.drive, clock if isinstance(clock, ClockOffset) else given_s)
+    in_words = {**_in_words(task, settings), **clock_in_words(clock, given_s if task.drive is not None else None)}
+    summary = summarise(description, in_words, task.scale, task.scale_file, series, complete=not stopped)
     write_summary(folder.summary, summary)
-    if task.drive is not None and driven == {False} and not stopped:
+    if isinstance(clock, NoClockOffset) and not stopped and series.counts[Status.OK]:
+        raise refusal(clock, folder.gaps)
+    if task.drive is not None and given_s is not None and driven == {False} and not stopped:
         raise FingervisionError(
             f"No frame lies within the drive's times ({task.drive.time_s[0]:g} to {task.drive.time_s[-1]:g} s, shifted "
-            f"by {task.drive_offset_s:g} s), so no row of {folder.gaps} has an input: give --drive-offset-s."
+            f"by {given_s:g} s), so no row of {folder.gaps} has an input: give another --drive-offset-s, or leave it "
+            "out to have it found from the motion."
         )
     if task.steps_frame is not None and not folder.steps.exists() and not stopped:
         raise UsageError(
@@ -310,5 +323,4 @@ def _in_words(task: Task, settings: Settings) -> dict[str, Any]:
         "bits": task.bits,
         "fingers": {None: "auto", True: "dark", False: "light"}[task.fingers_are_dark],
         "drive": task.drive is not None,
-        "drive_offset_s": task.drive_offset_s if task.drive is not None else None,
     }

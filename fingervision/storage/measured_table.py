@@ -10,6 +10,7 @@ from fingervision.domain.measured_table import MeasuredTable, RecordedPath
 from fingervision.storage.csv_columns import number, read_columns
 from fingervision.storage.iso230_table import read_iso230_table
 from fingervision.storage.reference_slots import slots_beside
+from fingervision.storage.summary_json import u_clock_beside
 
 FEWEST_ROWS = 5
 PATH = ("input_mm", "time_s")
@@ -100,6 +101,7 @@ def read_measured_table(path: Path) -> MeasuredTable:
         notes=tuple(notes),
         slots=slots_beside(path),
         path=along,
+        u_clock_s=u_clock_beside(path),
     )
 
 

@@ -8,6 +8,7 @@ from typing import Any
 from fingervision.domain.errors import FingervisionError
 
 SUMMARY = "summary.json"
+GAPS = "gaps.csv"
 SCHEMA = 1
 
 
@@ -50,3 +51,26 @@ def recording_of(folder: Path) -> str | None:
     except (OSError, ValueError, LookupError, TypeError):
         return None
     return name if isinstance(name, str) else None
+
+
+def u_clock_beside(table: Path) -> float:
+    """Uncertainty of the clock offset that was found for a gaps.csv, from the summary beside it; in s.
+
+    Parameters
+    ----------
+    table : Path
+        gaps.csv, or any other table.
+
+    Returns
+    -------
+    float
+        0 where the table is another, or the offset was given instead of found.
+    """
+    if table.name != GAPS:
+        return 0.0
+    try:
+        settings = json.loads((table.parent / SUMMARY).read_bytes())["settings"]
+        found = float(settings["u_drive_time_s"]) if settings["drive_offset"] == "found" else 0.0
+    except (OSError, ValueError, LookupError, TypeError):
+        return 0.0
+    return found if 0.0 < found < float("inf") else 0.0

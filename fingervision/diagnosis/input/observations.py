@@ -10,6 +10,7 @@ from fingervision.diagnosis.inference.measuring_chain import MeasuringChain, adm
 from fingervision.diagnosis.inference.position_map import PositionMap
 from fingervision.diagnosis.inference.signatures import start_patterns
 from fingervision.diagnosis.inference.uncertain_dimensions import BENT, DrawingRefit, estimated, tangent, with_moved
+from fingervision.diagnosis.input.clock_nuisance import clock_columns
 from fingervision.diagnosis.input.path import dwell_s, input_path, readings_at_rest, turning_readings
 from fingervision.diagnosis.input.path import recorded as recorded_rows
 from fingervision.diagnosis.input.recorded_input import AT_REST_SHARE, RecordedInput, standing_still
@@ -67,6 +68,8 @@ class Observations:
         What a reader must know.
     refit : DrawingRefit
         What the drawing's uncertain numbers do to the prediction.
+    clock : ndarray of float, shape (m, p), or None
+        What the uncertain offset between the clocks of input and pictures does to it.
     """
 
     table: MeasuredTable
@@ -82,6 +85,7 @@ class Observations:
     repeats: NDArray[np.intp] | None = None
     position_map: PositionMap | None = None
     runs_scatter_mm: float = np.inf
+    clock: Array | None = None
 
     @property
     def aim_mm(self) -> Array:
@@ -125,6 +129,7 @@ class Observations:
         passing = np.where(self.recorded.stays, 0.0, error)
         noises = (without_input(noises[0], passing), *noises[1:])
         beside = [] if self.position_map is None else [self.position_map.columns_mm]
+        beside += [self.clock] if self.clock is not None and self.clock.shape[1] else []
         beside += [self.refit.columns] if self.refit.moved else []
         drawing = np.hstack(beside) if beside else None
         whitener = Whitener(
@@ -319,8 +324,25 @@ def prepare(table: MeasuredTable, model: CorrectedModel, without: frozenset[str]
         rows = np.arange(u.size) if table.path is None else table.path.rows
         along_mm, _, along_runs = recorded_rows(table)
         repeats = visits(along_mm, along_runs, rows)
+    if table.u_clock_s > 0.0:
+        notes.append(
+            "the clocks of input and pictures were laid on each other by this motion itself "
+            f"(U = {2.0 * table.u_clock_s:.2g} s, k = 2): a lag that is the same at all times is part of that offset, "
+            "and one is named only beyond its uncertainty."
+        )
     return Observations(
-        table, model, chain, stacked, recorded, able, excluded, distrusted, tuple(notes), refit, repeats
+        table,
+        model,
+        chain,
+        stacked,
+        recorded,
+        able,
+        excluded,
+        distrusted,
+        tuple(notes),
+        refit,
+        repeats,
+        clock=clock_columns(chain, table.u_clock_s),
     )
 
 
