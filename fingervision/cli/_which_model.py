@@ -9,7 +9,7 @@ model_option = click.option(
     "model_path",
     required=True,
     type=click.Path(path_type=Path),
-    help="Simulation .csv, gripper.toml or model.toml.",
+    help="Simulation .csv, gripper.toml, model.toml, .fmu, or a .py with simulate(time_s, input_mm).",
 )
 kind_option = click.option(
     "--kind",

@@ -11,6 +11,7 @@ from fingervision.diagnosis.inference.position_map import PositionMap
 from fingervision.diagnosis.inference.signatures import start_patterns
 from fingervision.diagnosis.inference.uncertain_dimensions import BENT, DrawingRefit, estimated, tangent, with_moved
 from fingervision.diagnosis.input.clock_nuisance import clock_columns
+from fingervision.diagnosis.input.driven_model import at_rest_beside, with_dynamics
 from fingervision.diagnosis.input.path import dwell_s, input_path, readings_at_rest, turning_readings
 from fingervision.diagnosis.input.path import recorded as recorded_rows
 from fingervision.diagnosis.input.recorded_input import AT_REST_SHARE, RecordedInput, standing_still
@@ -27,7 +28,10 @@ from fingervision.domain.measured_table import MeasuredTable
 from fingervision.domain.model import PhysicalModel
 from fingervision.domain.response import Response
 from fingervision.models.corrected import CorrectedModel
+from fingervision.models.function_model import FunctionModel
 
+OF_NOISE = 0.1
+"""Share of the noise that a function of time may be off before it is driven again behind what was found."""
 DOUBTFUL = 2.0
 """Standard uncertainties beyond which a number of the drawing is doubtful."""
 FEWEST_STANDING = 60
@@ -70,6 +74,8 @@ class Observations:
         What the drawing's uncertain numbers do to the prediction.
     clock : ndarray of float, shape (m, p), or None
         What the uncertain offset between the clocks of input and pictures does to it.
+    function : FunctionModel or None
+        The model that is driven in time, of which `model` is the answer at rest.
     """
 
     table: MeasuredTable
@@ -86,6 +92,7 @@ class Observations:
     position_map: PositionMap | None = None
     runs_scatter_mm: float = np.inf
     clock: Array | None = None
+    function: FunctionModel | None = None
 
     @property
     def aim_mm(self) -> Array:
@@ -225,6 +232,14 @@ class Observations:
         chain = replace(self.chain, model=model).with_rest_gap(rest_mm)
         return replace(self, chain=chain, refit=replace(tangent(chain, drawn, moved), known=known))
 
+    def driven_again(self, explanation: Explanation, noise_mm: float) -> "Observations | None":
+        """Drive a function of time along the path behind an explanation; None where that changes nothing of weight."""
+        if self.function is None or self.chain.dynamics is None:
+            return None
+        chain = with_dynamics(self.chain, self.function, explanation.values)
+        changed = chain.stacked(explanation.values) - self.chain.stacked(explanation.values)
+        return replace(self, chain=chain) if float(np.sqrt(np.mean(changed**2))) > OF_NOISE * noise_mm else None
+
     def straight(self, drawn: "Observations", problem: Problem) -> bool:
         """Whether the tangent at other numbers of the drawing foretold this prediction, to within the noise."""
         bent = self.chain.stacked({}) - drawn.chain.stacked({})
@@ -260,6 +275,7 @@ def prepare(table: MeasuredTable, model: CorrectedModel, without: frozenset[str]
     FingervisionError
         The model does not cover the inputs, or the inputs are in another unit.
     """
+    model, function = at_rest_beside(table, model)
     low, high = model.input_range_mm
     u = table.input_mm
     ratio = float(np.ptp(u)) / (high - low)
@@ -303,6 +319,8 @@ def prepare(table: MeasuredTable, model: CorrectedModel, without: frozenset[str]
     path = input_path(table, history, recorded.along_mm, commanded=recorded.commanded)
     fixed = {name: {key: e.value for key, e in values.items()} for name, values in model.effects.items()}
     chain = MeasuringChain(model.base, history, fixed, path=path)
+    if function is not None:
+        chain = with_dynamics(chain, function, {})
     stacked = table.gap_mm
     if table.midline_mm is not None:
         bare: Response = chain.respond({})
@@ -343,6 +361,7 @@ def prepare(table: MeasuredTable, model: CorrectedModel, without: frozenset[str]
         refit,
         repeats,
         clock=clock_columns(chain, table.u_clock_s),
+        function=function,
     )
 
 

@@ -284,8 +284,8 @@ def _stated(motion: Motion, at: Posterior, best: Fit, frame_s: float) -> ClockOf
     u_offset_s, u_rate = float(np.sqrt(variance[-1])), float(np.sqrt(covariance[1, 1]))
     if not np.isfinite(u_time_s) or u_time_s > 0.1 * float(np.ptp(motion.time_s)):
         return NoClockOffset(
-            f"the motion leaves it open by +-{2.0 * u_time_s:.3g} s (k = 2): a move at one speed looks the same at "
-            "every offset. Record a run that starts, stops or turns."
+            f"the motion leaves it open by +-{2.0 * u_time_s:.3g} s (k = 2): a move at one speed, or one that is "
+            "over between two frames, looks the same at every offset near. Record a run that starts, stops or turns."
         )
     if abs(rate) > LARGEST_RATE:
         return NoClockOffset(

@@ -9,14 +9,16 @@ from fingervision.domain.effect import Array
 from fingervision.effects.play_operator import play
 from fingervision.measuring.clock.log_path import LogPath
 
+OFFSET_PRIOR_S, PLAY_PRIOR_MM = 1e3, 1e3
+"""Standard deviations, so large that they say nothing: where nothing moves the normal matrix stays regular."""
 RATE_PRIOR = 6e-4
 """Standard deviation of the clocks' relative rate before anything is seen: that of anything between -0.1 and 0.1 %."""
 START_PRIOR = 0.58
 """Standard deviation of the play's start state: anything between -1 and 1 is as likely."""
 BEND_PRIOR = 0.1
-"""Standard deviation of the change of slope of gap against input at a knot, over the slope: large deflection of a flexure
-gripper bends it by a few per cent in all; more would let any smooth one-way motion be shifted at will. Where the data
-know better, as where the fingers meet, they outweigh it."""
+"""Standard deviation of the change of slope of gap against input at a knot, over the slope: large deflection of a
+flexure gripper bends it by a few per cent in all; more would let any smooth one-way motion be shifted at will.
+Where the data know better, as where the fingers meet, they outweigh it."""
 MOST_KNOTS, FRAMES_A_KNOT = 11, 20
 """Knots of gap against input at most, and frames that each must rest on: the kink of a contact spoils a twelfth of the
 range, which the gate for wrong frames then leaves out."""
@@ -241,7 +243,7 @@ def inflation(motion: Motion, at: Alignment) -> Array:
 
 
 def _prior(size: int) -> Array:
-    return np.diag([0.0, RATE_PRIOR**-2, START_PRIOR**-2, 0.0][:size])
+    return np.diag([OFFSET_PRIOR_S**-2, RATE_PRIOR**-2, START_PRIOR**-2, PLAY_PRIOR_MM**-2][:size])
 
 
 def _information(motion: Motion, at: Alignment, solved: "_Solved", *, free_play: bool) -> tuple[Array, Array]:
