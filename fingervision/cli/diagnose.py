@@ -19,6 +19,7 @@ Examples:
 Files written to --out:
   report.html   the answer on one page       report.json   the same for programs
   model.toml    the corrected model          next_run.toml the run that would settle what is open
+  gap_against_input, gap_over_time, residuals: figures as .svg and .pdf
 """
 
 
@@ -52,6 +53,7 @@ def command(
     from fingervision.storage.measured_table import read_measured_table
     from fingervision.storage.model_toml import read_model
     from fingervision.storage.out_folder import new_out_folder, out_folder
+    from fingervision.storage.provenance import provenance
 
     for name in (*forced, *without):
         if name not in catalogue():
@@ -72,7 +74,8 @@ def command(
             progress=lambda share: bar.update(max(0, int(1000 * share) - bar.pos)),
         )
     with out_folder(out):
-        document = write_answer(out, done, model)
+        made = provenance({"measured table": measured, "model": model_path})
+        document = write_answer(out, done, model, made, measured)
     report = done.report
     if as_json:
         click.echo(json.dumps(document, indent=2))

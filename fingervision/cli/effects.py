@@ -54,6 +54,7 @@ def command(name: str | None, figure: Path | None) -> None:
         click.echo(f"  {p.name} ({p.unit or 'ratio'}): {p.words}, {p.lower:g} to {p.upper:g}, narrowed by the data")
     if figure is not None:
         from fingervision.diagnosis.report.effect_figure import effect_figure
+        from fingervision.diagnosis.report.vector_figure import png_bytes
 
-        figure.write_bytes(effect_figure(name))
+        figure.write_bytes(png_bytes(effect_figure(name)))
         click.echo(f"  picture   {figure}")

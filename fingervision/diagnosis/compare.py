@@ -8,7 +8,8 @@ import numpy as np
 from fingervision.diagnosis.diagnose import by_channel, places
 from fingervision.diagnosis.inference.cross_validation import rms_mm
 from fingervision.diagnosis.input.intersample_interpolation import likelier_interpolation
-from fingervision.diagnosis.input.observations import Observations, prepare
+from fingervision.diagnosis.input.observations import Observations
+from fingervision.diagnosis.input.preparation import prepare
 from fingervision.domain.effect import Array, History
 from fingervision.domain.measured_table import MeasuredTable
 from fingervision.domain.report import Place

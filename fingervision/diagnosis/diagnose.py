@@ -8,14 +8,16 @@ import numpy as np
 from fingervision.diagnosis.design.further_evidence import further_evidence
 from fingervision.diagnosis.design.next_run import next_run
 from fingervision.diagnosis.inference.cross_validation import left_out_rms_mm, rms_mm
+from fingervision.diagnosis.inference.explanation_candidates import Progress
 from fingervision.diagnosis.inference.hypothesis_fit import Problem
 from fingervision.diagnosis.inference.measuring_chain import Settings
 from fingervision.diagnosis.inference.plausibility import gross_mistake, swapped_directions
 from fingervision.diagnosis.inference.position_map import NAME
 from fingervision.diagnosis.inference.refitted_search import refitted_search
-from fingervision.diagnosis.inference.search import Findings, Progress
+from fingervision.diagnosis.inference.search import Findings
 from fingervision.diagnosis.inference.verdict import standing, verdict
-from fingervision.diagnosis.input.observations import Observations, prepare
+from fingervision.diagnosis.input.observations import Observations
+from fingervision.diagnosis.input.preparation import prepare
 from fingervision.diagnosis.input.repeated_targets import NoRepeatedTargets
 from fingervision.diagnosis.noise.replicates import PureError, resolution
 from fingervision.diagnosis.report.force_hint import force_hint
@@ -123,7 +125,7 @@ def diagnose(
     if mistake is not None and mistake.blocks:
         nothing = found.problem.nothing()
         found = replace(found, best=nothing, alternatives=(), unknown=mistake.words.rstrip("."), left_over=None)
-        data = replace(data, position_map=None)
+        data = replace(data, position_map=None, run_gains=None)
     before = data.stacked_mm - data.chain.stacked({})
     after = data.stacked_mm - data.chain.stacked(_values(data, found))
     stands = standing(data, found.problem, before, after)
@@ -133,7 +135,7 @@ def diagnose(
         # its rounding, the same in every hold.
         unknown = None if stands.before_mm < digit else found.unknown
         found = replace(found, best=found.problem.nothing(), alternatives=(), unknown=unknown)
-        data = replace(data, position_map=None)
+        data = replace(data, position_map=None, run_gains=None)
         after, stands = before, standing(data, found.problem, before, before)
     mapped = data.position_map is not None
     decided, unknown = verdict(found, mapped=mapped, stands=stands)

@@ -21,10 +21,19 @@ def covariance(inputs_mm: Array, length_mm: float) -> Array:
     return np.asarray((1.0 + far + far**2 / 3.0) * np.exp(-far))
 
 
-def without_line(inputs_mm: Array) -> Array:
-    """Projector that takes mean and straight line out of values at some inputs; shape (k, k)."""
+def without_line(inputs_mm: Array, read: Array | None = None) -> Array:
+    """Projector that takes mean and straight line out of values at some inputs; shape (k, k).
+
+    Parameters
+    ----------
+    inputs_mm : ndarray of float, shape (k,)
+        Where the values stand.
+    read : ndarray of float, shape (n, k), or None
+        What each of n places takes of each value: mean and line are those over the places. None for the inputs.
+    """
     line = np.stack([np.ones_like(inputs_mm), inputs_mm - inputs_mm.mean()], axis=1)
-    return np.asarray(np.eye(inputs_mm.size) - line @ np.linalg.pinv(line))
+    weight = np.eye(inputs_mm.size) if read is None else read.T @ read
+    return np.asarray(np.eye(inputs_mm.size) - line @ np.linalg.solve(line.T @ weight @ line, line.T @ weight))
 
 
 def curve_values(inputs_mm: Sequence[float], errors_mm: Sequence[float]) -> dict[str, float]:

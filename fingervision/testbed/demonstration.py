@@ -14,6 +14,7 @@ from fingervision.measuring.rehearsal import rehearse
 from fingervision.storage.measured_table import read_measured_table
 from fingervision.storage.model_toml import read_model
 from fingervision.storage.out_folder import make_out_folder, out_folder
+from fingervision.storage.provenance import provenance
 from fingervision.storage.recipe_toml import read_recipe, write_recipe
 from fingervision.testbed.hidden import Hidden
 from fingervision.testbed.hidden_words import usual_values
@@ -136,5 +137,6 @@ def _answer(table: Path, simulation: Path, out: Path, seed: int) -> tuple[Diagno
     model = read_model(simulation)
     done = diagnose(read_measured_table(table), model, seed=seed)
     with out_folder(out):
-        write_answer(out, done, model)
+        made = provenance({"measured table": table, "model": simulation})
+        write_answer(out, done, model, made, table)
     return done, out / PAGE

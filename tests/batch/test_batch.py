@@ -256,6 +256,7 @@ def long_batch(recordings: Path, tmp_path: Path) -> Iterator["subprocess.Popen[s
     process.wait()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("blow", [signal.SIGINT, signal.SIGTERM, signal.SIGKILL])
 def test_a_batch_that_was_stopped_goes_on(
     run: Run, recordings: Path, tmp_path: Path, long_batch: "subprocess.Popen[str]", blow: signal.Signals

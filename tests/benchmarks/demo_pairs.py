@@ -16,7 +16,7 @@ import numpy as np
 
 from fingervision.diagnosis.diagnose import diagnose
 from fingervision.diagnosis.inference.measuring_chain import MeasuringChain
-from fingervision.diagnosis.input.observations import prepare
+from fingervision.diagnosis.input.preparation import prepare
 from fingervision.domain.effect import Effect
 from fingervision.domain.measured_table import MeasuredTable
 from fingervision.effects import catalogue

@@ -7,7 +7,7 @@ import pytest
 from click.testing import CliRunner
 
 from fingervision.cli import cli
-from fingervision.diagnosis.input.observations import prepare
+from fingervision.diagnosis.input.preparation import prepare
 from fingervision.domain.errors import ExitCode, FingervisionError
 from fingervision.storage.measured_table import read_measured_table
 from fingervision.storage.model_toml import read_model

@@ -49,6 +49,7 @@ def diagnosed(tmp_path_factory: pytest.TempPathFactory) -> Diagnosed:
     return run
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("case", "force"),
     [

@@ -13,7 +13,7 @@ from fingervision.diagnosis.inference.model_adequacy import imitated, shapes_of
 from fingervision.diagnosis.inference.null_bootstrap import QUANTILE, linear_thresholds
 from fingervision.diagnosis.inference.probe_basis import probes
 from fingervision.diagnosis.inference.signatures import signatures
-from fingervision.diagnosis.input.observations import prepare
+from fingervision.diagnosis.input.preparation import prepare
 from fingervision.effects.play_operator import play
 from fingervision.effects.stick_slip import stick
 from fingervision.storage.measured_table import read_measured_table

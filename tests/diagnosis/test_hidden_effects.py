@@ -122,6 +122,7 @@ QUESTIONS = [("null", 1), ("null", 2), ("single_3", 1), ("single_3", 2), ("outsi
              ("outside", 2), ("pair_3", 1)]  # fmt: skip
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("row", "number"), QUESTIONS)
 def test_diagnose_answers_as_the_judge_does(row: str, number: int, tmp_path: Path) -> None:
     table = draw_table_of_row(ROWS[row], SEED, number, tmp_path)

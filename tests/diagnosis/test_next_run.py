@@ -13,7 +13,8 @@ from fingervision.diagnosis.design.further_evidence import EVIDENCE, further_evi
 from fingervision.diagnosis.design.next_run import next_run
 from fingervision.diagnosis.inference.hypothesis_fit import Explanation, Problem, fit
 from fingervision.diagnosis.inference.posterior import draws
-from fingervision.diagnosis.input.observations import Observations, prepare
+from fingervision.diagnosis.input.observations import Observations
+from fingervision.diagnosis.input.preparation import prepare
 from fingervision.diagnosis.noise.restricted_likelihood import drawn_noises
 from fingervision.domain.effect import Array
 from fingervision.effects import catalogue

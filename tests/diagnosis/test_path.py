@@ -7,7 +7,7 @@ import pytest
 
 from fingervision.diagnosis.diagnose import Diagnosis, diagnose
 from fingervision.diagnosis.input.commands import is_commanded
-from fingervision.diagnosis.input.observations import prepare
+from fingervision.diagnosis.input.preparation import prepare
 from fingervision.diagnosis.input.stalled_ends import stalled_ends
 from fingervision.domain.report import Verdict
 from fingervision.stage_record.encoder import on_lines
@@ -74,6 +74,7 @@ def moved(folder: Path, u: np.ndarray, gap: np.ndarray, rate_hz: float = 25.0) -
     return diagnose(read_measured_table(folder / "measured.csv"), read_model(folder / "sim.csv"))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("wrong", ["mirrored", "micrometres", "unrelated"])
 def test_columns_that_cannot_be_right_get_a_sentence_and_no_name(tmp_path: Path, wrong: str) -> None:
     rng = np.random.default_rng(8)
@@ -86,6 +87,7 @@ def test_columns_that_cannot_be_right_get_a_sentence_and_no_name(tmp_path: Path,
     assert said in (report.unknown or "")
 
 
+@pytest.mark.slow
 def test_step_commands_are_no_encoder_and_their_dead_time_is_named(tmp_path: Path) -> None:
     rng = np.random.default_rng(9)
     time = np.arange(500) / 25.0

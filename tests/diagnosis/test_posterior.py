@@ -7,7 +7,7 @@ import pytest
 
 from fingervision.diagnosis.inference.hypothesis_fit import Explanation, Problem, fit
 from fingervision.diagnosis.inference.posterior import settled
-from fingervision.diagnosis.input.observations import prepare
+from fingervision.diagnosis.input.preparation import prepare
 from fingervision.storage.measured_table import read_measured_table
 from fingervision.storage.model_toml import read_model
 

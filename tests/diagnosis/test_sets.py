@@ -57,6 +57,7 @@ def answered(
     return diagnose(read_measured_table(folder / "measured.csv"), read_model(folder / "sim.csv")).report
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("straight", [False, True])
 @pytest.mark.parametrize("late_s", [0.03, 0.06])
 def test_a_delay_is_told_from_a_resonance_however_the_stage_went_between_two_samples(

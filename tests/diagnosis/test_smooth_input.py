@@ -45,6 +45,7 @@ def test_leverage_is_the_variance_that_is_left(name: str) -> None:
     assert HONEST[0] < np.mean(errors) / np.mean(claims) < HONEST[1]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", _motions())
 def test_leverage_is_true_of_an_encoder(name: str) -> None:
     t, true = _motions()[name]

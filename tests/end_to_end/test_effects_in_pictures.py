@@ -104,6 +104,7 @@ def test_the_play_of_the_sample_clip_is_named(through: Through) -> None:
     assert abs(play_mm - 0.03) < SIGMAS * u
 
 
+@pytest.mark.slow
 def test_contact_is_named(diagnosed: Diagnosed) -> None:
     report = diagnosed(Film(gap=meeting))
     assert (report["verdict"], report["alternatives"]) == ("named", [["finger_contact"]])
@@ -111,6 +112,7 @@ def test_contact_is_named(diagnosed: Diagnosed) -> None:
     assert abs(floor_mm - FLOOR_MM) < SIGMAS * u
 
 
+@pytest.mark.slow
 def test_a_barrel_lens_is_named(diagnosed: Diagnosed) -> None:
     report = diagnosed(Film(camera=replace(PLAIN, lens=RadialLens(k1=K1))))
     assert (report["verdict"], report["alternatives"]) == ("named", [["lens_distortion"]])
@@ -119,6 +121,7 @@ def test_a_barrel_lens_is_named(diagnosed: Diagnosed) -> None:
     assert abs(k - true) < SIGMAS * u + FORM_SHARE * abs(true)
 
 
+@pytest.mark.slow
 def test_a_tilted_camera_is_named(diagnosed: Diagnosed) -> None:
     tilt = Tilt(about_y_deg=TILT_DEG, distance_px=DISTANCE_MM * PX_PER_MM)
     # The scale is the one that a reference in the middle of the same picture has.
@@ -129,6 +132,7 @@ def test_a_tilted_camera_is_named(diagnosed: Diagnosed) -> None:
     assert abs(k - true) < SIGMAS * u + FORM_SHARE * true
 
 
+@pytest.mark.slow
 def test_late_frames_are_the_cameras_or_the_drives(diagnosed: Diagnosed) -> None:
     """A late picture of a quick gripper is the picture of a late gripper: nothing in it tells the two apart."""
     report = diagnosed(Film(late_s=LATE_S), "--drive-offset-s", 0)

@@ -67,6 +67,7 @@ def recorded(stream: Path, out: Path, task: Task) -> Path:
     return run.path
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("coder", ["h264", "mjpeg"])
 @pytest.mark.parametrize("seed", [1, 2])
 def test_the_recording_of_a_lossy_stream_measures_to_the_live_table(

@@ -19,6 +19,7 @@ PROMPT_AMONG = 500
 CLOCK_TICK_S = 1.5e-5
 
 
+@pytest.mark.slow
 def test_every_frame_of_a_minute_is_measured_and_a_cut_is_a_gap(
     live: Callable[..., Any],
     camera: Any,
@@ -60,6 +61,7 @@ def test_every_frame_of_a_minute_is_measured_and_a_cut_is_a_gap(
     assert set(kept) <= sent
 
 
+@pytest.mark.slow
 def test_a_stream_of_h264_keeps_its_own_times_and_begins_with_a_whole_picture(
     live: Callable[..., Any], camera: Any, measured: Callable[..., str], rows: Callable[[Path], list[dict[str, str]]]
 ) -> None:

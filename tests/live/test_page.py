@@ -105,6 +105,7 @@ def drag(page: Any, box: tuple[int, int, int, int]) -> None:
     page.mouse.up()
 
 
+@pytest.mark.slow
 def test_the_page_shows_records_and_saves(
     live: Callable[..., Any], opened: Callable[..., Any], measured: Callable[..., str]
 ) -> None:
@@ -312,6 +313,7 @@ def test_a_cut_is_said_within_a_second_and_measuring_resumes(
     shown(page, "document.querySelector('#alarm').hidden && Number(document.querySelector('#gap_mm').textContent) > 0")
 
 
+@pytest.mark.slow
 def test_strangers_are_refused(live: Callable[..., Any], browser: Any) -> None:
     view = live("simulated", "--port", "0")
     address = view.address

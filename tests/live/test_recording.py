@@ -17,6 +17,7 @@ LOST_AT_MOST_S = 1.0
 Start = Callable[..., Any]
 
 
+@pytest.mark.slow
 def test_measuring_the_recording_again_gives_the_same_table(live: Start, measured: Callable[..., str]) -> None:
     view = live("simulated", "--no-page", "--json")
     view.until(lambda seen: len(seen.lines()) > 40)
@@ -34,6 +35,7 @@ def test_measuring_the_recording_again_gives_the_same_table(live: Start, measure
     assert events[-1] == "stopped"
 
 
+@pytest.mark.slow
 def test_a_killed_recording_loses_a_second_at_most(
     live: Start, measured: Callable[..., str], rows: Callable[[Path], list[dict[str, str]]]
 ) -> None:
@@ -58,6 +60,7 @@ def whole_rows(runs: list[Path], rows: Callable[[Path], list[dict[str, str]]]) -
     return rows(runs[0] / "gaps.csv") if runs else []
 
 
+@pytest.mark.slow
 def test_a_full_disk_ends_the_recording_and_not_the_measuring(
     live: Start, measured: Callable[..., str], tmp_path: Path
 ) -> None:

@@ -58,6 +58,7 @@ def rtsp_camera(pictures: Path, tmp_path: Path) -> Iterator[RtspCamera]:
     camera.stop()
 
 
+@pytest.mark.slow
 def test_an_rtsp_camera_keeps_its_clock_and_comes_back_after_a_cut(
     live: Callable[..., Any],
     rtsp_camera: RtspCamera,

@@ -33,6 +33,7 @@ def test_longer_lever_arm_opens_less(gripper: Gripper, finite_element: FiniteEle
     assert FiniteElementGripper(other).figures().gap_per_input < finite_element.figures().gap_per_input
 
 
+@pytest.mark.slow
 def test_micro_design_opens_in_the_samples_ratio(finite_element: FiniteElementGripper) -> None:
     micro = FiniteElementGripper(read_gripper(MICRO)).figures()
     assert micro.gap_per_input == pytest.approx(finite_element.figures().gap_per_input, rel=0.02)

@@ -178,6 +178,7 @@ def test_stiffness_matrix_and_lumped_are_the_same_body(gripper: Gripper, lumped:
     assert matrix.input_stiffness_n_mm == pytest.approx(frame.input_stiffness_n_mm, rel=1e-3)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("thickness_mm", [0.9, 1.1])
 def test_thickness_changes_force_and_hardly_the_slope(gripper: Gripper, thickness_mm: float) -> None:
     # Computed by finite elements of other outlines: slope 7.739 and 7.702, force 1.561 and 2.513 against 2.004 N/mm.

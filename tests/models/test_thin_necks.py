@@ -62,6 +62,7 @@ def test_a_whole_gripper_with_thin_necks_is_as_soft_as_finite_elements(gripper: 
     assert lumped.peak_stress().mpa_per_mm == pytest.approx(plane.peak_stress().mpa_per_mm, rel=0.02)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("nu", "width"), [(0.2, 5.5), (0.42, 5.5), (0.34, 18.0)])
 def test_the_width_effect_between_the_tables_nodes_and_for_other_materials(nu: float, width: float) -> None:
     """Bricks at width over thickness, and a Poisson's ratio, that no table has: bending as sure as is said."""
@@ -73,6 +74,7 @@ def test_the_width_effect_between_the_tables_nodes_and_for_other_materials(nu: f
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("width", [20.0, 100.0])
 def test_torsion_of_wide_hinges(width: float) -> None:
     """Beam theory alone is off by 2.8 and 19 times and more; bricks between rigid planes within 5 %."""

@@ -64,6 +64,7 @@ def test_bodies_that_touch_in_a_point_are_refused() -> None:
         _ = region((True, box(0, 1, 0, 1)), (True, box(1, 2, 1, 2))).loops
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("ratio", [0.0125, 0.05])
 def test_thin_necks_are_fine_and_the_rest_is_not(gripper: Gripper, ratio: float) -> None:
     thin = replace(gripper, hinge=replace(gripper.hinge, thickness_mm=4.0 * ratio))
@@ -127,6 +128,7 @@ def manufactured_errors(body_mm: float) -> tuple[float, float]:
     return float(l2), float(h1)
 
 
+@pytest.mark.slow
 def test_rates_of_convergence_to_a_manufactured_solution() -> None:
     """Quadratic elements: error of order h^3 in the displacement and h^2 in its slopes, on meshes of this mesher."""
     errors = np.array([manufactured_errors(h) for h in (0.15, 0.075, 0.0375)])

@@ -106,6 +106,7 @@ def pixel_mean_of_disc(blur_px: float, x_px: float, y_px: float, radius_px: floa
     return along @ across.T
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("blur_px", [0.3, 0.9, 3.0])
 @pytest.mark.parametrize("radius_px", [0.5, 2.0, 13.7])
 def test_a_disc_is_the_integral_over_its_chords(blur_px: float, radius_px: float) -> None:

@@ -42,6 +42,7 @@ def distance_px(pieces: tuple[Piece, ...], points: np.ndarray) -> np.ndarray:
     return nearest
 
 
+@pytest.mark.slow
 @settings(max_examples=25, deadline=None)
 @given(
     k1=st.floats(-0.1, 0.1), k2=st.floats(-0.01, 0.02), about_x=st.floats(-20.0, 20.0), about_y=st.floats(-20.0, 20.0)

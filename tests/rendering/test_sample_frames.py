@@ -29,6 +29,7 @@ def column(path: Path, name: str) -> np.ndarray:
     return np.array([float(row[name]) for row in rows(path)])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("case", ["table1", "reference"])
 def test_a_script_makes_its_pictures_again(case: str, tmp_path: Path) -> None:
     """Same grey levels and tables; the bytes of a PNG also depend on zlib's version."""

@@ -211,6 +211,7 @@ def test_refusals_say_what_must_be() -> None:
         two_fingers(20.0, tip=EllipticTip(0.0))
 
 
+@pytest.mark.slow
 @settings(deadline=None)
 @given(
     tilt_deg=st.floats(-10.0, 10.0),

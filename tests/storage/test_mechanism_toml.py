@@ -62,6 +62,7 @@ def test_a_wrong_mechanism_is_one_sentence(old: str, new: str, named: str) -> No
     assert "\n" not in str(refused.value)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("old", "new", "named"), UNHELD)
 def test_faces_that_hold_nothing_or_too_much_are_refused(old: str, new: str, named: str) -> None:
     assert old in STAGE
@@ -92,6 +93,7 @@ def test_a_gripper_is_no_mechanism_of_bodies() -> None:
     assert not is_mechanism(ROOT / "sample_frames" / "paper" / "gripper.toml")
 
 
+@pytest.mark.slow
 def test_the_command_answers_a_mechanism(tmp_path: Path) -> None:
     arguments = [str(DRAWN / "four_bar_gripper.toml"), "--mesh", "--json", "--out", str(tmp_path)]
     result = CliRunner().invoke(command, arguments, catch_exceptions=False)

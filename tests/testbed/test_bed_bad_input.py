@@ -240,6 +240,7 @@ def test_a_full_disk_is_seen_before_anything_moves(tmp_path: Path, monkeypatch: 
         run(tmp_path, steps(MOVE))
 
 
+@pytest.mark.slow
 def test_a_disk_that_fills_up_ends_the_run_in_a_sentence(tmp_path: Path) -> None:
     recipe = recipe_at(tmp_path)
     program = (

@@ -41,6 +41,7 @@ def whole(tmp_path_factory: pytest.TempPathFactory) -> bytes:
     return (folder / "run" / "samples.csv").read_bytes()
 
 
+@pytest.mark.slow
 def test_a_killed_run_is_gone_on_with_to_the_same_end(tmp_path: Path, whole: bytes) -> None:
     rng = np.random.default_rng(5)
     for k in range(MOMENTS):

@@ -29,6 +29,7 @@ def short(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder / "run"
 
 
+@pytest.mark.slow
 def test_the_gap_is_that_of_the_gripper_at_the_recorded_input(short: Path) -> None:
     table, model = read_measured_table(short / "samples.csv"), read_simulation_table(short / "simulation.csv")
     assert np.max(np.abs(table.gap_mm - model.respond(table.input_mm).gap_mm)) < GAP_MM

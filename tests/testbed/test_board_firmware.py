@@ -186,6 +186,7 @@ def test_the_clocks_are_joined(emulated: EmulatedBoard, board: Board) -> None:
     assert board.clock.u_at(board.driven_board_s) <= 2e-3
 
 
+@pytest.mark.slow
 def test_corrupt_bytes_cost_single_samples_and_no_command(
     emulated: EmulatedBoard, controller: MotorController, board: Board
 ) -> None:

@@ -30,6 +30,7 @@ def answer(folder: Path, hidden: Hidden) -> DiagnosisReport:
     return diagnose(table, read_model(folder / "run" / "simulation.csv")).report
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "parameter", "size"), [("backlash", "play_mm", 0.08), ("lens_distortion", "k_per_mm2", 0.001)]
 )

@@ -204,11 +204,13 @@ def fit(
         free = ~((low & (gradient <= 0.0)) | (high & (gradient >= 0.0))) & (np.diag(normal) > 1e-12)
         if not free.any():
             break
-        part = normal[np.ix_(free, free)]
+        # In units of each parameter's own precision: a time constant in hours beside micrometres is no singular matrix.
+        scale = 1.0 / np.sqrt(np.diag(normal)[free])
+        part, pull = scale[:, None] * normal[np.ix_(free, free)] * scale, scale * gradient[free]
         gained = 0.0
         for _ in range(5):
             trial = x.copy()
-            trial[free] += np.linalg.lstsq(part + damping * np.diag(np.diag(part)), gradient[free], rcond=1e-12)[0]
+            trial[free] += scale * np.linalg.lstsq(part + damping * np.eye(scale.size), pull, rcond=1e-12)[0]
             trial = np.clip(trial, lower, upper)
             rest = aim - problem.whitened(settings(trial))
             new = offsets.squared(rest, metric)
@@ -239,11 +241,12 @@ def fit(
         cost = offsets.squared(residual, offsets.metric(spread))
     covariance = np.zeros_like(normal)
     if free.any():
-        covariance[np.ix_(free, free)] = np.linalg.pinv(normal[np.ix_(free, free)])
+        scale = 1.0 / np.sqrt(np.maximum(np.diag(normal)[free], 1e-300))
+        unit = scale[:, None] * normal[np.ix_(free, free)] * scale
+        covariance[np.ix_(free, free)] = scale[:, None] * np.linalg.pinv(unit) * scale
     own = np.array([parameter.run is None for _, parameter in listed], dtype=bool)
-    starts = free & ~own
-    # A start is anywhere between -1 and 1 beforehand, with a variance of 1/3.
-    price = float(np.sum(np.log1p(np.diag(normal)[starts] * START_VARIANCE)))
+    # A start is anywhere between -1 and 1 beforehand, with a variance of 1/3; one at its end was chosen as well.
+    price = float(np.sum(np.log1p(np.diag(normal)[~own] * START_VARIANCE)))
     names_of = settings(x)
     return Explanation(order, names_of, cost + penalty, residual, covariance, int((free & own).sum()), spread, price)
 

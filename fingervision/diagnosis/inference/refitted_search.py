@@ -6,18 +6,21 @@ from functools import partial
 import numpy as np
 from scipy.stats import t as student
 
+from fingervision.diagnosis.inference.explanation_candidates import Progress
 from fingervision.diagnosis.inference.hypothesis_fit import Explanation, Point, Problem, fit
 from fingervision.diagnosis.inference.position_map import (
     LEAST_GAIN,
     NAME,
-    PositionMap,
+    imitating_effects,
     likeliest_map,
     why_no_map,
 )
 from fingervision.diagnosis.inference.posterior import settled
 from fingervision.diagnosis.inference.reference_gauge import consistent_with_gauges
-from fingervision.diagnosis.inference.search import Findings, Progress, search
-from fingervision.diagnosis.inference.verdict import standing_of, without_passengers
+from fingervision.diagnosis.inference.run_gains import FEWEST_RUNS, likeliest_gains
+from fingervision.diagnosis.inference.run_gains import LEAST_GAIN as LEAST_GAIN_OF_RUNS
+from fingervision.diagnosis.inference.search import Findings, search
+from fingervision.diagnosis.inference.verdict import standing_of, without_unneeded_effects
 from fingervision.diagnosis.input.intersample_interpolation import likelier_interpolation
 from fingervision.diagnosis.input.observations import Observations
 from fingervision.diagnosis.noise.whitening import RunOffsets
@@ -82,6 +85,7 @@ def refitted_search(
     if likelier is not state.data:
         state = look.again(likelier)
     state = _over_the_ends(state, look)
+    state = _beside_gains(state, look)
     if NAME not in without:
         state = _beside_map(state, look)
     state = _common_offset(state, look)
@@ -127,6 +131,46 @@ def _over_the_ends(state: _Searched, look: _Look) -> _Searched:
     return look.again(data) if turned < straight - LEAST_GAIN else state
 
 
+def _beside_gains(state: _Searched, look: _Look) -> _Searched:
+    """Search beside gains that differ from run to run, and keep what is found where it is the far likelier one.
+
+    Such gains are a nuisance beside an effect that does more than they do; alone they are structure with no name.
+    """
+    found = state.found
+    explained = found.unknown is None and standing_of(state.data, found).is_little
+    if explained or len(state.data.chain.history.runs) < FEWEST_RUNS:
+        return state
+    tried = [likeliest_gains(found.problem, one) for one in (found.best, *found.singles[:3])]
+    gains, gain = max(tried, key=lambda one: one[1])
+    if gain < LEAST_GAIN_OF_RUNS:
+        return state
+    known = found.best if found.best.names else None
+    beside = look.again(replace(state.data, run_gains=gains), known)
+    stands = standing_of(beside.data, beside.found)
+    if not stands.is_little:
+        # What all runs share is an effect, and was taken for their scatter.
+        apart = look.again(replace(state.data, run_gains=gains.without_mean()), known)
+        if standing_of(apart.data, apart.found).after_mm < stands.after_mm:
+            beside = apart
+    if not _does_more(beside):
+        return state
+    plain = replace(beside.found.problem, offsets=_offsets_without(beside.found.problem, gains.coefficients.size))
+    rows = max(2, int(plain.measured.size - plain.whitener.aside.sum()))
+    rival = fit(plain, found.best.names, found.best.values, iterations=20) if found.best.names else plain.nothing()
+    gained = rival.bic(rows) - beside.found.best.bic(rows) - gains.price
+    return beside if gained > LEAST_GAIN_OF_RUNS else state
+
+
+def _does_more(beside: _Searched) -> bool:
+    """Whether the named effects change the prediction by more than the scatter of the runs' gains does."""
+    best, gains = beside.found.best, beside.data.run_gains
+    if gains is None or not best.names:
+        return False
+    scatter_mm = gains.refitted(beside.found.problem, best, beside.data.behind_gains).scatter_mm
+    changed_mm = beside.data.chain.stacked(best.values) - beside.data.chain.stacked({})
+    return bool(np.linalg.norm(changed_mm) > np.linalg.norm(scatter_mm))
+
+
 def _beside_map(state: _Searched, look: _Look) -> _Searched:
     """Search beside a map of position errors, and keep what is found where it is the far likelier explanation.
 
@@ -147,14 +191,19 @@ def _beside_map(state: _Searched, look: _Look) -> _Searched:
         first, gain = likeliest_map(found.problem, found.nothing)
     if gain < LEAST_GAIN and not asked:
         return state
-    beside = look.again(replace(state.data, position_map=first), found.best)
-    plain = replace(beside.found.problem, offsets=_offsets_without_map(beside.found.problem, first))
+    imitating = imitating_effects(found.problem, first)
+    effects = {name: effect for name, effect in state.data.effects.items() if name not in imitating}
+    excluded = {**state.data.excluded, **imitating}
+    kept = found.best if not set(found.best.names) & set(imitating) else None
+    beside = look.again(replace(state.data, position_map=first, effects=effects, excluded=excluded), kept)
+    plain = replace(beside.found.problem, offsets=_offsets_without(beside.found.problem, first.coefficients.size))
     second, _ = likeliest_map(plain, _left(plain, beside.found.best))
     if first.is_like(second):
         second = first
     else:
         beside = look.again(replace(beside.data, position_map=second), beside.found.best)
-        plain = replace(beside.found.problem, offsets=_offsets_without_map(beside.found.problem, second))
+        plain = replace(beside.found.problem, offsets=_offsets_without(beside.found.problem, second.coefficients.size))
+    plain = replace(plain, effects=found.problem.effects)
     rows = max(2, int(plain.measured.size - plain.whitener.aside.sum()))
     rival = fit(plain, found.best.names, found.best.values, iterations=20) if found.best.names else plain.nothing()
     gained = rival.bic(rows) - beside.found.best.bic(rows) - second.price
@@ -189,9 +238,9 @@ def _left(problem: Problem, explanation: Explanation) -> Explanation:
     return replace(explanation, residual=residual, sigma_mm=problem.offsets.spread(residual)[0])
 
 
-def _offsets_without_map(problem: Problem, position_map: PositionMap) -> RunOffsets:
+def _offsets_without(problem: Problem, count: int) -> RunOffsets:
+    """Offsets of the runs without the first `count` of the random effects beside them."""
     drawing = problem.whitener.drawing
-    count = position_map.coefficients.size
     kept = None if drawing is None or drawing.shape[1] == count else drawing[:, count:]
     return RunOffsets.of(replace(problem.whitener, drawing=kept))
 
@@ -213,12 +262,15 @@ def _beside_drawing(state: _Searched, look: _Look) -> _Searched:
 
 
 def _settled(state: _Searched, rng: np.random.Generator) -> Refitted:
-    """Drop what only rides along, estimate the map, and give every parameter its posterior."""
-    data, found = state.data, without_passengers(state.data, state.found)
+    """Drop effects that are not needed, estimate the map and the gains, and give every parameter its posterior."""
+    data, found = state.data, without_unneeded_effects(state.data, state.found)
     best, posterior = settled(found.problem, found.best, rng)
     found = _with_best(found, best)
     if data.position_map is not None:
-        data = replace(data, position_map=data.position_map.refitted(found.problem, best, len(data.refit.moved)))
+        data = replace(data, position_map=data.position_map.refitted(found.problem, best, data.behind_map))
+    if data.run_gains is not None:
+        gains = data.run_gains.refitted(found.problem, best, data.behind_gains)
+        data = replace(data, run_gains=gains, notes=(*data.notes, gains.words))
     if data.refit.moved:
         data = data.redrawn(found.problem, best if best.names else found.problem.nothing())
         found = replace(found, problem=_problem_of(data, best))

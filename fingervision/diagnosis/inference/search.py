@@ -7,36 +7,33 @@ import numpy as np
 
 from fingervision.diagnosis.inference.ambiguity_set import ambiguity_set, beside_foretold, odds
 from fingervision.diagnosis.inference.detection_limit import detection_limits
-from fingervision.diagnosis.inference.hypothesis_fit import FORM_SHARE, SMALL_SHARE, Explanation, Problem, fit, scan
+from fingervision.diagnosis.inference.explanation_candidates import (
+    LEAST_GAIN,
+    Progress,
+    added_share,
+    extended,
+    likeliest,
+    simplest,
+    single_effects,
+    swapped,
+    within_a_step,
+)
+from fingervision.diagnosis.inference.hypothesis_fit import SMALL_SHARE, Explanation, Problem, fit
 from fingervision.diagnosis.inference.model_adequacy import imitated, remaining_structure, shapes_of
-from fingervision.diagnosis.inference.null_bootstrap import LONG
 from fingervision.diagnosis.inference.probe_basis import Probes
-from fingervision.diagnosis.inference.signatures import Signatures, signatures, tangents
+from fingervision.diagnosis.inference.signatures import Signatures, signatures
 from fingervision.diagnosis.inference.significance import Evidence
-from fingervision.diagnosis.input.input_uncertainty import below_the_input
 
-Progress = Callable[[float], None]
 TRIPLE_SHARE = 0.15
 """A third effect needs evidence of its own: three effects bend to almost anything."""
 PAIRS_REFITTED = 60
 """Pairs refitted jointly, those first whose signatures take the most: all of 27 effects would be 351."""
-SWAPS_REFITTED = 24
-"""Partners refitted beside the halves of the best pair: each half has at most 26."""
-SCANNED = 6
-"""Explanations beside which an effect that jumps is tried at all its sizes: where it jumps depends on the others."""
-LEAST_GAIN = 4.0
-"""Chi-square that an effect's signature must take for a refit to be tried."""
 PART_OF_UNKNOWN = 9.0
 """Times what still stands, in chi-square, that a part must explain to be told beside *unknown*: it then leaves a
 third of it, as RMS."""
 COMPLETE = 0.05
 """Share of what stands beyond the noise, in chi-square, that a complete explanation leaves: forms that only bend to
 what an effect's form leaves over take less of it."""
-FEW_ROWS = 0.1
-"""Share of the rows on which a stop or a contact acts that only the ends of strokes speak for; what acts on more is
-averaged over many roundings."""
-STEPS_HIDDEN = 1.0
-"""Steps of the encoder within which an effect is not told from its roundings."""
 BASES = 14
 """Single effects to which a second one is added."""
 SHORT = 100
@@ -58,95 +55,6 @@ class Findings:
     problem: Problem
 
 
-def _singles(problem: Problem, atoms: Signatures, iterations: int) -> list[Explanation]:
-    nothing = problem.nothing()
-    gain, coefficient = atoms.gains(nothing.residual, problem.offsets, problem.offsets.metric(nothing.sigma_mm))
-    owner = np.array(atoms.names)
-    found = []
-    for name in problem.effects:
-        mine = np.flatnonzero(owner == name)
-        if not mine.size:
-            continue
-        mine = mine[np.argsort(-gain[mine])]
-        tries = [fit(problem, (name,), {name: atoms.begin(k, coefficient[k])}, iterations=5) for k in mine[:4]]
-        best = min(tries, key=lambda explanation: explanation.score)
-        found.append(fit(problem, (name,), best.values, iterations=iterations))
-    return sorted(found, key=lambda explanation: explanation.score)
-
-
-def _extended(
-    problem: Problem, atoms: Signatures, bases: list[Explanation], most: int, progress: Progress
-) -> list[Explanation]:
-    """Add each effect to each base: starts from signatures on what the base leaves, then joint refits."""
-    owner = np.array(atoms.names)
-    planned: list[tuple[float, Explanation, str, dict[str, float]]] = []
-    scanned = SCANNED if problem.chain.history.input_mm.size <= LONG else 1
-    for place, base in enumerate(bases):
-        metric = problem.offsets.metric(base.sigma_mm)
-        gain, coefficient = atoms.gains(base.residual, problem.offsets, metric, tangents(problem, base))
-        for name in problem.effects:
-            mine = np.flatnonzero(owner == name)
-            if name in base.names or not mine.size:
-                continue
-            if place < scanned and any(parameter.rugged for _, parameter in problem.parameters((name,))):
-                start, score = scan(problem, base, name, [atoms.starts[k] for k in mine])
-                if base.score - score > LEAST_GAIN:
-                    planned.append((score, base, name, start))
-            k = int(mine[np.argmax(gain[mine])])
-            if gain[k] > LEAST_GAIN:
-                planned.append((base.score - float(gain[k]), base, name, atoms.begin(k, float(coefficient[k]))))
-    planned.sort(key=lambda plan: plan[0])
-    found: dict[tuple[str, ...], Explanation] = {}
-    for index, (_, base, name, start) in enumerate(planned[:most]):
-        explanation = fit(problem, (*base.names, name), {**base.values, name: start}, iterations=7)
-        old = found.get(explanation.names)
-        if old is None or explanation.score < old.score:
-            found[explanation.names] = explanation
-        progress((index + 1) / most)
-    ranked = sorted(found.values(), key=lambda explanation: explanation.score)
-    return sorted(
-        [fit(problem, e.names, e.values, iterations=20) for e in ranked[:8]] + ranked[8:], key=lambda e: e.score
-    )
-
-
-def _swapped(problem: Problem, atoms: Signatures, pairs: list[Explanation]) -> list[Explanation]:
-    """Try every other effect beside each half of the best pair, where the pair has put it.
-
-    Alone it had stood elsewhere: fitted to what two effects do, it ends far out in a valley out of which no joint
-    search finds its way.
-    """
-    if not pairs:
-        return pairs
-    best = pairs[0]
-    halves = [fit(problem, (name,), {name: best.values[name]}, iterations=0) for name in best.names]
-    found = {pair.names: pair for pair in pairs}
-    for pair in _extended(problem, atoms, halves, SWAPS_REFITTED, lambda _: None):
-        if pair.names not in found or pair.score < found[pair.names].score:
-            found[pair.names] = pair
-    return sorted(found.values(), key=lambda explanation: explanation.score)
-
-
-def _added(problem: Problem, smaller: Explanation, larger: Explanation) -> float:
-    """Size of what the larger explanation adds, as a share of all that it changes in the prediction, in mm."""
-    bare, before, after = (problem.chain.stacked(values) for values in ({}, smaller.values, larger.values))
-    if below_the_input(problem, float(np.sqrt(np.mean((after - before) ** 2)))):
-        return 0.0
-    return float(np.linalg.norm(after - before) / max(1e-12, float(np.linalg.norm(after - bare))))
-
-
-def _within_a_step(problem: Problem, explanation: Explanation) -> bool:
-    """Whether an effect acts on a few rows by less than an encoder's step: roundings at the end of a stroke do."""
-    history = problem.chain.history
-    if history.input_step_mm == 0.0:
-        return False
-    reach = 0.5 * history.input_step_mm
-    low, high = (problem.chain.with_input(history.input_mm + way).stacked({}) for way in (-reach, reach))
-    change = problem.chain.stacked(explanation.values) - problem.chain.stacked({})
-    largest = float(np.max(np.abs(change)))
-    few = float(np.mean(np.abs(change) > 0.1 * largest)) < FEW_ROWS
-    return few and largest < STEPS_HIDDEN * float(np.max(np.abs(high - low)))
-
-
 def _completes(state: "_State", smaller: Explanation, larger: Explanation) -> bool:
     """Whether the larger explanation takes nearly all that the smaller one left, as a true one does.
 
@@ -156,22 +64,6 @@ def _completes(state: "_State", smaller: Explanation, larger: Explanation) -> bo
     stands = smaller.score - rows
     plain = max(float(rows), state.problem.form_share**2 * (state.nothing.score - smaller.score))
     return stands > plain and larger.score - rows < COMPLETE * stands
-
-
-def _choose(candidates: list[Explanation], samples: int) -> Explanation:
-    return min(candidates, key=lambda explanation: explanation.bic(samples))
-
-
-def _simplest(singles: list[Explanation], samples: int, nothing: Explanation) -> Explanation:
-    """Choose one effect, the simpler form where the richer one gains no more than forms deviate.
-
-    Such a difference is the forms' own fault, and no reason to choose a resonance for a delay that falls between two
-    samples.
-    """
-    best = _choose(singles, samples)
-    within = FORM_SHARE**2 * (nothing.score - best.score)
-    simpler = [e for e in singles if e.free < best.free and e.score - best.score < within]
-    return min(simpler, key=lambda explanation: explanation.score, default=best)
 
 
 def search(
@@ -263,10 +155,10 @@ def _noise_known(problem_beside: Callable[[Explanation | None], Problem], known:
         return _State(problem, signatures(problem), nothing, nothing, [nothing], shapes_of(problem))
     problem = problem_beside(None)
     atoms = signatures(problem)
-    rough = _singles(problem, atoms, 4)
+    rough = single_effects(problem, atoms, 4)
     # A pair fitted to a few samples takes their noise with it, which would then be estimated too small.
     many = problem.chain.history.input_mm.size >= SHORT
-    pairs = _extended(problem, atoms, rough[:3], 16, lambda _: None) if many else []
+    pairs = extended(problem, atoms, rough[:3], 16, lambda _: None) if many else []
     first = [*rough[:1], *pairs[:1]]
     if first:
         problem = problem_beside(min(first, key=lambda e: e.bic(problem.measured.size)))
@@ -278,7 +170,7 @@ def _noise_known(problem_beside: Callable[[Explanation | None], Problem], known:
 def _one_effect(state: _State, rng: np.random.Generator, forced: frozenset[str]) -> _State:
     """Fit every effect alone; the simplest that is as good as the best stands, if noise would not give so much."""
     problem = state.problem
-    singles = [e for e in _singles(problem, state.atoms, 20) if not _within_a_step(problem, e)]
+    singles = [e for e in single_effects(problem, state.atoms, 20) if not within_a_step(problem, e)]
     evidence = Evidence.of(state.problem, state.atoms, state.nothing, rng)
     state = replace(state, singles=singles, evidence=evidence)
     if not singles:
@@ -286,10 +178,10 @@ def _one_effect(state: _State, rng: np.random.Generator, forced: frozenset[str])
     stalled = [e for e in singles if set(e.names) & state.problem.stalled]
     if stalled and stalled[0].score < state.nothing.score:
         near = [e for e in stalled if e.score - stalled[0].score < LEAST_GAIN]
-        return replace(state, best=_simplest(near, state.values, state.nothing), peers=singles)
+        return replace(state, best=simplest(near, state.values, state.nothing), peers=singles)
     if not (state.speaks_for(singles, state.nothing) or forced):
         return state
-    return replace(state, best=_simplest(singles[:6], state.values, state.nothing), peers=singles)
+    return replace(state, best=simplest(singles[:6], state.values, state.nothing), peers=singles)
 
 
 def _two_effects(state: _State, progress: Progress) -> _State:
@@ -297,15 +189,15 @@ def _two_effects(state: _State, progress: Progress) -> _State:
     if not state.best.names:
         return state
     problem, singles = state.problem, state.singles
-    pairs = _extended(problem, state.atoms, singles[:BASES], PAIRS_REFITTED, progress)
-    pairs = _swapped(problem, state.atoms, pairs)
+    pairs = extended(problem, state.atoms, singles[:BASES], PAIRS_REFITTED, progress)
+    pairs = [e for e in swapped(problem, state.atoms, pairs) if not within_a_step(problem, e)]
     state = replace(state, pairs=pairs)
     # Beside a simpler form a second effect would gain what the richest has gained already.
     if not pairs:
         return state
-    large = _added(problem, singles[0], pairs[0]) > SMALL_SHARE or _completes(state, singles[0], pairs[0])
+    large = added_share(problem, singles[0], pairs[0]) > SMALL_SHARE or _completes(state, singles[0], pairs[0])
     if large and state.speaks_for(pairs, singles[0]):
-        return replace(state, best=_choose(pairs[:6], state.values), peers=pairs)
+        return replace(state, best=likeliest(pairs[:6], state.values), peers=pairs)
     return state
 
 
@@ -314,18 +206,19 @@ def _three_effects(state: _State, progress: Progress) -> _State:
     if len(state.best.names) != 2:
         return state
     problem, pairs = state.problem, state.pairs
-    triples = _extended(problem, state.atoms, pairs[:3], 24, progress)
+    tried = extended(problem, state.atoms, pairs[:3], 24, progress)
+    triples = [e for e in tried if not within_a_step(problem, e)]
     state = replace(state, triples=triples)
     if not triples:
         return state
-    large = _added(problem, state.best, triples[0]) > TRIPLE_SHARE
+    large = added_share(problem, state.best, triples[0]) > TRIPLE_SHARE
     if not (large or _completes(state, state.best, triples[0])) or not state.speaks_for(triples, state.best):
         return state
     imitation = imitated(problem, state.shapes, triples[0], [state.nothing, *state.singles[:BASES], *pairs[:3]])
     if imitation is not None:
         # Where it changes little, what the third effect imitates is left over, and the gate will tell it.
         return replace(state, imitation=imitation) if large else state
-    return replace(state, best=_choose(triples[:6], state.values), peers=triples)
+    return replace(state, best=likeliest(triples[:6], state.values), peers=triples)
 
 
 def _without_imitations(state: _State) -> _State:
@@ -384,7 +277,7 @@ def _insisted(state: _State, forced: frozenset[str]) -> _State:
     able = forced & set(problem.effects)
     holding = [explanation for explanation in [*state.singles, *state.pairs] if able <= set(explanation.names)]
     if holding or not able:
-        best = _choose(holding, state.values) if able else problem.nothing()
+        best = likeliest(holding, state.values) if able else problem.nothing()
     else:
         begin = {e.names[0]: e.values[e.names[0]] for e in state.singles if e.names[0] in able}
         best = fit(problem, tuple(begin), begin, iterations=20)

@@ -123,7 +123,7 @@ def start_patterns(history: History) -> tuple[dict[str, float], ...]:
 
 
 def tangents(problem: Problem, explanation: Explanation) -> Array:
-    """Whitened derivatives of an explanation's prediction by its parameters; shape (m, p)."""
+    """Directions in which an explanation's parameters move its whitened prediction, of unit length; shape (m, p)."""
     base = problem.chain.stacked(explanation.values)
     columns = []
     for name, parameter in problem.parameters(explanation.names):
@@ -132,4 +132,5 @@ def tangents(problem: Problem, explanation: Explanation) -> Array:
         step = step if value + step <= parameter.upper else -step
         moved = {**explanation.values, name: {**explanation.values[name], parameter.name: value + step}}
         columns.append((problem.chain.stacked(moved) - base) / step)
-    return problem.whitener.columns(np.stack(columns, axis=1))[0]
+    whitened = problem.whitener.columns(np.stack(columns, axis=1))[0]
+    return np.asarray(whitened / np.maximum(np.linalg.norm(whitened, axis=0), 1e-300))

@@ -44,6 +44,8 @@ class Standing:
         Values that count.
     noise_degrees : int or None
         Degrees of freedom of a noise that comes from repeats; None where it comes from the residual itself.
+    rounding_mm : float
+        Largest error that the rounding of a reading makes: half its last digit.
     """
 
     before_mm: float
@@ -51,6 +53,7 @@ class Standing:
     noise_mm: float
     rows: int
     noise_degrees: int | None
+    rounding_mm: float = 0.0
 
     @property
     def explained_share(self) -> float:
@@ -69,7 +72,9 @@ class Standing:
 
     @property
     def is_noise(self) -> bool:
-        """Whether what stands is no more than repeats scatter, or than the noise may be."""
+        """Whether what stands is no more than repeats scatter, than rounding makes, or than the noise may be."""
+        if self.after_mm <= self.rounding_mm:
+            return True
         ratio = (self.after_mm / max(self.noise_mm, 1e-300)) ** 2
         if self.noise_degrees is None:
             return ratio <= STANDING_NOISES**2
@@ -78,6 +83,8 @@ class Standing:
 
 def standing(data: Observations, problem: Problem, before_mm: Array, after_mm: Array) -> Standing:
     """Judge residuals; `before_mm` and `after_mm` of shape (channels * n,)."""
+    if data.run_gains is not None:
+        after_mm = after_mm - data.run_gains.scatter_mm
     history = data.chain.history
     n, both = history.input_mm.size, history.both_edges
     aside = problem.whitener.aside[:n]
@@ -110,7 +117,8 @@ def standing(data: Observations, problem: Problem, before_mm: Array, after_mm: A
 
     errors = data.measured_pure_errors(np.split(problem.whitener.aside, len(data.channels)))
     degrees = None if errors is None else min(error.degrees for error in errors)
-    return Standing(rms(before_mm), rms(after_mm), noise, int(np.sum(~aside)), degrees)
+    rounding_mm = 0.5 * resolution(data.table.gap_mm) if data.repeats is not None else 0.0
+    return Standing(rms(before_mm), rms(after_mm), noise, int(np.sum(~aside)), degrees, rounding_mm)
 
 
 def short_scatter(residual_mm: Array, runs: tuple[slice, ...]) -> float:
@@ -134,12 +142,14 @@ def standing_of(data: Observations, found: Findings) -> Standing:
     before = data.stacked_mm - data.chain.stacked({})
     left = before if not found.best.names else data.stacked_mm - data.chain.stacked(found.best.values)
     if data.position_map is not None:
-        left = left - data.position_map.refitted(found.problem, found.best, len(data.refit.moved)).fitted_mm
+        left = left - data.position_map.refitted(found.problem, found.best, data.behind_map).fitted_mm
+    if data.run_gains is not None:
+        data = replace(data, run_gains=data.run_gains.refitted(found.problem, found.best, data.behind_gains))
     return standing(data, found.problem, before, left)
 
 
-def without_passengers(data: Observations, found: Findings) -> Findings:
-    """Drop effects that explain less than what still stands: they may only imitate a part of it.
+def without_unneeded_effects(data: Observations, found: Findings) -> Findings:
+    """Drop effects that explain less than what still stands: such an effect may only imitate a part of it.
 
     Where structure remains beside several effects, a further one is fitted to that structure as well as to its own.
     """

@@ -6,27 +6,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fingervision.diagnosis.inference.hypothesis_fit import SMALL_SHARE, Explanation, Problem
-from fingervision.diagnosis.inference.measuring_chain import MeasuringChain, admissible
+from fingervision.diagnosis.inference.measuring_chain import MeasuringChain
 from fingervision.diagnosis.inference.position_map import PositionMap
-from fingervision.diagnosis.inference.signatures import start_patterns
+from fingervision.diagnosis.inference.run_gains import RunGains
 from fingervision.diagnosis.inference.uncertain_dimensions import BENT, DrawingRefit, estimated, tangent, with_moved
-from fingervision.diagnosis.input.clock_nuisance import clock_columns
-from fingervision.diagnosis.input.driven_model import at_rest_beside, with_dynamics
-from fingervision.diagnosis.input.path import dwell_s, input_path, readings_at_rest, turning_readings
-from fingervision.diagnosis.input.path import recorded as recorded_rows
-from fingervision.diagnosis.input.recorded_input import AT_REST_SHARE, RecordedInput, standing_still
-from fingervision.diagnosis.input.row_screening import screened_rows
+from fingervision.diagnosis.input.driven_model import with_dynamics
+from fingervision.diagnosis.input.path import input_path, turning_readings
+from fingervision.diagnosis.input.recorded_input import RecordedInput
 from fingervision.diagnosis.input.stalled_ends import stalled_ends
-from fingervision.diagnosis.noise.noise_model import Noise, gate, white_noise, without_input
-from fingervision.diagnosis.noise.replicates import PureError, pure_error, resolution, visits
-from fingervision.diagnosis.noise.restricted_likelihood import noise_of_short_runs
-from fingervision.diagnosis.noise.spectrum import noise_by_spectrum
+from fingervision.diagnosis.noise.channel_noises import channel_noises, noises_of_repeats
+from fingervision.diagnosis.noise.noise_model import gate, without_input
+from fingervision.diagnosis.noise.replicates import PureError, pure_error, resolution
 from fingervision.diagnosis.noise.whitening import RunOffsets, Whitener
-from fingervision.domain.effect import REZEROED, Array, Effect, Flags, History
-from fingervision.domain.errors import FingervisionError
+from fingervision.domain.effect import Array, Effect, Flags
 from fingervision.domain.measured_table import MeasuredTable
 from fingervision.domain.model import PhysicalModel
-from fingervision.domain.response import Response
 from fingervision.models.corrected import CorrectedModel
 from fingervision.models.function_model import FunctionModel
 
@@ -34,16 +28,12 @@ OF_NOISE = 0.1
 """Share of the noise that a function of time may be off before it is driven again behind what was found."""
 DOUBTFUL = 2.0
 """Standard uncertainties beyond which a number of the drawing is doubtful."""
-FEWEST_STANDING = 60
-"""Samples in all during which the stage must stand for the noise to be taken from them."""
 FORM_SHARE_OF_RIGS = 0.25
 """Share of what an effect explains that its form may leave over where repeats tell the noise: the reversal of real
 stages differs by 19 to 24 % from place to place (ISO 230-2 tables, among them those of `real/rigs`), and readings at
 rest repeat so well that this shows."""
 SHORT = 100
 """Samples below which nothing is set aside before something was explained."""
-SHORT_RUN = 60
-"""Samples of the longest run below which its spectrum says too little about the noise."""
 OUTLIER_SIGMAS, RAW_SIGMAS = 4.5, 7.0
 """Limits on the residual of the best explanation, and on the raw one, where effects still stand out themselves."""
 
@@ -90,6 +80,7 @@ class Observations:
     refit: DrawingRefit
     repeats: NDArray[np.intp] | None = None
     position_map: PositionMap | None = None
+    run_gains: RunGains | None = None
     runs_scatter_mm: float = np.inf
     clock: Array | None = None
     function: FunctionModel | None = None
@@ -106,6 +97,16 @@ class Observations:
         return ("gap", *(["midline"] if history.both_edges else []), *(["force"] if history.force else []))
 
     @property
+    def behind_gains(self) -> int:
+        """Random effects that stand behind the runs' gains in a problem."""
+        return len(self.refit.moved)
+
+    @property
+    def behind_map(self) -> int:
+        """Random effects that stand behind a map of position errors in a problem."""
+        return self.behind_gains + (0 if self.run_gains is None else self.run_gains.coefficients.size)
+
+    @property
     def stalled(self) -> frozenset[str]:
         """Effects for which readings that stand at an end of the range speak."""
         history = self.chain.history
@@ -114,8 +115,9 @@ class Observations:
     def problem(self, residual_mm: Array, degrees: int, *, explained: bool) -> Problem:
         """Estimate outliers and noise from a residual and whiten the measurement with them."""
         history = self.chain.history
-        if self.position_map is not None:
-            residual_mm = residual_mm - self.position_map.fitted_mm
+        for nuisance in (self.position_map, self.run_gains):
+            if nuisance is not None:
+                residual_mm = residual_mm - nuisance.fitted_mm
         n, timed = history.input_mm.size, history.time_s is not None
         sigmas = OUTLIER_SIGMAS if explained else None if timed and n < SHORT else RAW_SIGMAS
         # A reading is known to its last digit at best: rounding has the standard deviation of a step over root 12.
@@ -125,7 +127,12 @@ class Observations:
         floors = [{"gap": floor, "midline": 0.5 * floor, "force": 0.0}[name] for name in self.channels]
         parts = [residual_mm[channel * n : (channel + 1) * n] for channel in range(len(self.channels))]
         aside = [gate(part, history.input_mm, history.runs, timed, sigmas) | self.distrusted for part in parts]
-        noises = self._noises(parts, aside, floors, degrees, explained=explained)
+        repeated = self.measured_pure_errors(aside)
+        noises = (
+            channel_noises(history, parts, aside, floors, degrees, explained=explained)
+            if repeated is None
+            else noises_of_repeats(repeated, floors)
+        )
         if history.both_edges:
             aside[0] = aside[1] = aside[0] | aside[1]
         error = self.recorded.error_mm
@@ -135,7 +142,7 @@ class Observations:
             error = np.zeros_like(error)
         passing = np.where(self.recorded.stays, 0.0, error)
         noises = (without_input(noises[0], passing), *noises[1:])
-        beside = [] if self.position_map is None else [self.position_map.columns_mm]
+        beside = [one.columns_mm for one in (self.position_map, self.run_gains) if one is not None]
         beside += [self.clock] if self.clock is not None and self.clock.shape[1] else []
         beside += [self.refit.columns] if self.refit.moved else []
         drawing = np.hstack(beside) if beside else None
@@ -149,43 +156,9 @@ class Observations:
             drawing,
             self.runs_scatter_mm,
         )
-        share = SMALL_SHARE if self.measured_pure_errors(aside) is None else FORM_SHARE_OF_RIGS
+        share = SMALL_SHARE if repeated is None else FORM_SHARE_OF_RIGS
         offsets = RunOffsets.of(whitener)
         return Problem(self.chain, whitener.one(self.aim_mm), whitener, offsets, self.effects, share, self.stalled)
-
-    def _noises(
-        self, parts: list[Array], aside: list[Flags], floors: list[float], degrees: int, *, explained: bool
-    ) -> tuple[Noise, ...]:
-        """Estimate every channel's noise; what was fitted leaves gap and midline the noise of the same pictures."""
-        history = self.chain.history
-        if history.time_s is None:
-            return tuple(
-                white_noise(part, out, floor, degrees) for part, out, floor in zip(parts, aside, floors, strict=True)
-            )
-        if self.repeats is not None:
-            repeated = self._noises_of_repeats(aside, floors)
-            if repeated is not None:
-                return repeated
-        rate_hz = 1.0 / history.sample_time_s
-        together = 2 if history.both_edges and explained else 1
-        groups = [slice(0, together), *(slice(k, k + 1) for k in range(together, len(parts)))]
-        if max(run.stop - run.start for run in history.runs) < SHORT_RUN:
-            return noise_of_short_runs(parts, history.runs, aside, floors, explained=explained)
-
-        def over(stretches: tuple[slice, ...]) -> tuple[Noise, ...]:
-            return tuple(
-                noise
-                for g in groups
-                for noise in noise_by_spectrum(parts[g], stretches, rate_hz, aside[g], floors[g], explained=explained)
-            )
-
-        everywhere = over(history.runs)
-        standing = () if explained else standing_still(history)
-        if sum(hold.stop - hold.start for hold in standing) < FEWEST_STANDING:
-            return everywhere
-        # What nothing explains yet moves with the stage and passes for noise; where the stage stands, less of it does.
-        holds = over(standing)
-        return holds if holds[0].total_mm < everywhere[0].total_mm else everywhere
 
     def measured_pure_errors(self, aside: list[Flags]) -> list[PureError] | None:
         """Scatter of repeats of each channel, of readings at rest; None where too little repeats."""
@@ -197,17 +170,6 @@ class Observations:
         found = [pure_error(part, clock, self.repeats, out) for part, out in zip(parts, aside, strict=True)]
         kept = [error for error in found if error is not None]
         return kept if len(kept) == len(found) else None
-
-    def _noises_of_repeats(self, aside: list[Flags], floors: list[float]) -> tuple[Noise, ...] | None:
-        """Take the scatter of repeats for the noise: readings seconds apart are no samples of one fast process."""
-        errors = self.measured_pure_errors(aside)
-        if errors is None:
-            return None
-        # The doubt of a standard deviation's square is sqrt(2 / degrees).
-        return tuple(
-            Noise(max(error.sd_mm, floor, 1e-9), 0.0, 0.0, float(np.sqrt(2.0 / error.degrees)))
-            for error, floor in zip(errors, floors, strict=True)
-        )
 
     def with_overshoots(self) -> "Observations":
         """Let the stage run over where it turned between two readings of the same target; itself where it did not."""
@@ -265,119 +227,3 @@ class Observations:
                 f"drawn as {number.value:g} +-{u:.2g}{far}."
             )
         return tuple(out)
-
-
-def prepare(table: MeasuredTable, model: CorrectedModel, without: frozenset[str] = frozenset()) -> Observations:
-    """Put a measured table beside a model.
-
-    Raises
-    ------
-    FingervisionError
-        The model does not cover the inputs, or the inputs are in another unit.
-    """
-    model, function = at_rest_beside(table, model)
-    low, high = model.input_range_mm
-    u = table.input_mm
-    ratio = float(np.ptp(u)) / (high - low)
-    for factor, unit in ((1e3, "micrometres"), (1e-3, "metres")):
-        if 0.1 < ratio / factor < 3.0:
-            raise FingervisionError(
-                f"input_mm must be in millimetres within the model's {low:g} to {high:g}, but runs from {u.min():g} to "
-                f"{u.max():g}, as if in {unit}: convert the column."
-            )
-    slack = 1e-9 * (high - low)
-    if u.min() < low - slack or u.max() > high + slack:
-        raise FingervisionError(
-            f"input_mm must lie within the model's {low:g} to {high:g} mm, but runs from {u.min():g} to {u.max():g}: "
-            "simulate the missing inputs, or leave those rows out."
-        )
-    notes = list(table.notes)
-    recorded = RecordedInput.of(table, model)
-    if table.midline_mm is None:
-        notes.append("only the gap was measured: what moves both fingers together cannot show.")
-    if recorded.is_motion:
-        notes.append("the input's unrest shows in the gap as well: it is real motion and was not smoothed.")
-    zero = model.base.respond(np.zeros(1)).gap_mm[0]
-    opening = model.base.respond(u).gap_mm - zero
-    bare_force = model.base.respond(np.zeros(1)).force_n
-    history = History(
-        input_mm=recorded.smooth_mm,
-        time_s=table.time_s,
-        runs=table.runs,
-        rest_gap_mm=float(zero),
-        opening_mm=float(np.max(np.abs(opening))),
-        closing_mm=float(max(0.0, -np.min(opening))),
-        shared_clock=table.shared_clock,
-        input_sigma_mm=recorded.sigma_mm,
-        input_step_mm=recorded.step_mm,
-        both_edges=table.midline_mm is not None,
-        force=table.force_n is not None and bare_force is not None,
-        rezeroed=_rezeroed(table),
-        dwell_s=dwell_s(table),
-        commanded=recorded.commanded,
-    )
-    path = input_path(table, history, recorded.along_mm, commanded=recorded.commanded)
-    fixed = {name: {key: e.value for key, e in values.items()} for name, values in model.effects.items()}
-    chain = MeasuringChain(model.base, history, fixed, path=path)
-    if function is not None:
-        chain = with_dynamics(chain, function, {})
-    stacked = table.gap_mm
-    if table.midline_mm is not None:
-        bare: Response = chain.respond({})
-        stands_mm = float(np.median(table.midline_mm - bare.midline_mm))
-        seen_mm = float(np.median(bare.midline_mm)) + stands_mm
-        chain = replace(chain, midline_mm=stands_mm, seen_midline_mm=seen_mm)
-        stacked = np.concatenate([table.gap_mm, table.midline_mm])
-    if history.force and table.force_n is not None:
-        stacked = np.concatenate([stacked, table.force_n])
-    chain = _with_starts(chain, stacked)
-    able, excluded = admissible(chain.effects, history, without)
-    distrusted, reasons = screened_rows(table, model.base, float(zero))
-    notes += reasons
-    refit = DrawingRefit(np.zeros((stacked.size, 0)), {})
-    if isinstance(model.base, PhysicalModel) and model.base.uncertain:
-        refit = tangent(chain, model.base, {})
-    repeats = None
-    if np.mean(readings_at_rest(table)) > AT_REST_SHARE:
-        rows = np.arange(u.size) if table.path is None else table.path.rows
-        along_mm, _, along_runs = recorded_rows(table)
-        repeats = visits(along_mm, along_runs, rows)
-    if table.u_clock_s > 0.0:
-        notes.append(
-            "the clocks of input and pictures were laid on each other by this motion itself "
-            f"(U = {2.0 * table.u_clock_s:.2g} s, k = 2): a lag that is the same at all times is part of that offset, "
-            "and one is named only beyond its uncertainty."
-        )
-    return Observations(
-        table,
-        model,
-        chain,
-        stacked,
-        recorded,
-        able,
-        excluded,
-        distrusted,
-        tuple(notes),
-        refit,
-        repeats,
-        clock=clock_columns(chain, table.u_clock_s),
-        function=function,
-    )
-
-
-def _with_starts(chain: MeasuringChain, stacked_mm: Array) -> MeasuringChain:
-    """Let the effects that the model has begin each run where that suits the measurement best: nobody stated it."""
-    catalogued = chain.effects
-    for name in [name for name in chain.fixed if catalogued[name].start]:
-        tried = [
-            replace(chain, fixed={**chain.fixed, name: {**chain.fixed[name], **pattern}})
-            for pattern in start_patterns(chain.history)
-        ]
-        chain = min(tried, key=lambda one: float(np.sum((stacked_mm - one.stacked({})) ** 2)))
-    return chain
-
-
-def _rezeroed(table: MeasuredTable) -> tuple[bool, ...]:
-    """Which runs came after a re-zeroing, by their names; empty where all did: no run shows the zero before."""
-    flags = tuple(REZEROED in name.split() for name in table.run_names)
-    return flags if any(flags) and not all(flags) else ()

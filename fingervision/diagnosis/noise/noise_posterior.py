@@ -7,7 +7,8 @@ import numpy as np
 
 from fingervision.diagnosis.inference.hypothesis_fit import Explanation, Problem
 from fingervision.diagnosis.inference.null_bootstrap import noise_doubt
-from fingervision.diagnosis.input.observations import SHORT_RUN, Observations
+from fingervision.diagnosis.input.observations import Observations
+from fingervision.diagnosis.noise.channel_noises import SHORT_RUN
 from fingervision.diagnosis.noise.noise_model import Noise, without_input
 from fingervision.diagnosis.noise.restricted_likelihood import drawn_noises
 from fingervision.diagnosis.noise.whitening import RunOffsets

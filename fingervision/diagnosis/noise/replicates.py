@@ -17,10 +17,16 @@ one table in a hundred without one."""
 TREND_DEGREE = 3
 """Degree of the polynomial in time that takes a drift or a run-in out of the repeats: it follows either over some
 cycles."""
+OFF_GRID = 0.02
+"""Steps by which a difference may miss a multiple of the smallest one: the last digits that are written are rounded."""
+BY_ACCIDENT = 1e-3
+"""Probability that differences without a grid all come so near a multiple, below which they have one."""
 FEWEST_STEPS = 8
 """Differences between neighbouring values from which a grid is told."""
 LEVELS = 4096
 """Of a reading whose digits do not show: 12 bits, as in the encoders of servos and in cheap converters."""
+MOST_WANDERING = 0.95
+"""Correlation of consecutive readings, beyond which a reading noise that wanders is a drift."""
 ORDINARY_SIGMAS = 6.0
 """Robust standard deviations beyond which a single visit is a gross error and no scatter."""
 
@@ -37,11 +43,15 @@ class PureError:
         Degrees of freedom.
     trend_sigmas : float
         By how many standard deviations visits that follow one another agree better than any two.
+    correlation : float
+        Of what repeats leave in readings that follow one another, wherever they were taken: a reading noise that
+        wanders. 0 where it could be chance.
     """
 
     sd_mm: float
     degrees: int
     trend_sigmas: float
+    correlation: float = 0.0
 
     @property
     def has_trend(self) -> bool:
@@ -108,8 +118,9 @@ def pure_error(values: Array, time_s: Array, label: NDArray[np.intp], aside: Fla
     rest = np.concatenate([values[group] - values[group].mean() for group in groups])
     pooled = float(rest @ rest) / degrees
     trend = _trend_sigmas([values[group] for group in groups], pooled)
+    rows = np.concatenate(groups)
     if trend <= TREND_SIGMAS or degrees - TREND_DEGREE < FEWEST_DEGREES:
-        return PureError(_without_gross_errors(rest, degrees), degrees, trend)
+        return PureError(_without_gross_errors(rest, degrees), degrees, trend, _wandering(rest, rows))
     at = np.concatenate([time_s[group] for group in groups])
     powers = np.vander((at - at.mean()) / max(float(np.ptp(at)), 1e-300), TREND_DEGREE + 1)[:, :-1]
     begin = 0
@@ -118,7 +129,23 @@ def pure_error(values: Array, time_s: Array, label: NDArray[np.intp], aside: Fla
         powers[own] -= powers[own].mean(axis=0)
         begin += group.size
     rest = rest - powers @ np.linalg.lstsq(powers, rest, rcond=None)[0]
-    return PureError(_without_gross_errors(rest, degrees - TREND_DEGREE), degrees - TREND_DEGREE, trend)
+    sd_mm = _without_gross_errors(rest, degrees - TREND_DEGREE)
+    return PureError(sd_mm, degrees - TREND_DEGREE, trend, _wandering(rest, rows))
+
+
+def _wandering(rest: Array, rows: NDArray[np.intp]) -> float:
+    """Correlation of what repeats leave in consecutive rows; 0 where independent readings would show as much.
+
+    Of k independent pairs it has a standard deviation of 1 / sqrt(k) (Bartlett 1946, doi:10.2307/2983611).
+    """
+    ordered = rest[np.argsort(rows)]
+    follows = np.diff(np.sort(rows)) == 1
+    pairs = int(follows.sum())
+    power = float(np.mean(rest**2))
+    if pairs == 0 or power == 0.0:
+        return 0.0
+    share = float(np.mean((ordered[:-1] * ordered[1:])[follows])) / power
+    return min(share, MOST_WANDERING) if share * np.sqrt(pairs) > TREND_SIGMAS else 0.0
 
 
 def _without_gross_errors(rest: Array, degrees: int) -> float:
@@ -146,7 +173,12 @@ def resolution(values: Array) -> float:
     """
     steps = np.diff(np.unique(np.round(values, 10)))
     steps = steps[steps > 1e-9]
-    if steps.size < FEWEST_STEPS:
-        return float(np.ptp(values)) / LEVELS
+    if not steps.size:
+        return 0.0
     least = float(np.min(steps))
-    return least if np.all(np.abs(steps / least - np.round(steps / least)) < 0.02) else 0.0
+    multiples = steps / least
+    on_grid = bool(np.all(np.abs(multiples - np.round(multiples)) < OFF_GRID))
+    further = int(np.sum(multiples > 1.5))
+    if steps.size < FEWEST_STEPS and not (on_grid and (2.0 * OFF_GRID) ** further < BY_ACCIDENT):
+        return float(np.ptp(values)) / LEVELS
+    return least if on_grid else 0.0

@@ -1,21 +1,25 @@
-"""The files of an answer: the page, the report, the corrected model, the next run."""
+"""The files of an answer: the page, the report, its figures, the corrected model, the next run."""
 
 from pathlib import Path
 
-from fingervision.diagnosis.diagnose import Diagnosis
+from fingervision.diagnosis.diagnose import Diagnosis, by_channel
+from fingervision.diagnosis.report.figure_files import write_figures
+from fingervision.diagnosis.report.frame_strip import strip_html
 from fingervision.diagnosis.report.positioning_of_data import positioning_section
-from fingervision.diagnosis.report.report_page import report_page
+from fingervision.diagnosis.report.report_page import curves_of, report_page
+from fingervision.diagnosis.report.residual_figure import residual_figure
 from fingervision.domain.parameter import Estimate
 from fingervision.effects.position_error_map import curve_values
 from fingervision.models.corrected import CorrectedModel
 from fingervision.storage.model_toml import write_model
+from fingervision.storage.provenance import Provenance
 from fingervision.storage.recipe_toml import write_recipe
 from fingervision.storage.report_json import report_document, write_report
 
 PAGE, REPORT, MODEL, NEXT_RUN = "report.html", "report.json", "model.toml", "next_run.toml"
 
 
-def write_answer(out: Path, done: Diagnosis, model: CorrectedModel) -> dict[str, object]:
+def write_answer(out: Path, done: Diagnosis, model: CorrectedModel, made: Provenance, table: Path) -> dict[str, object]:
     """Write them into a folder, in the place of an earlier answer's, and give what report.json holds.
 
     Parameters
@@ -26,6 +30,10 @@ def write_answer(out: Path, done: Diagnosis, model: CorrectedModel) -> dict[str,
         The answer.
     model : CorrectedModel
         What was diagnosed, with the effects that it has already.
+    made : Provenance
+        Files, command and versions behind the answer.
+    table : Path
+        The measured table, beside which its recording is looked for.
     """
     report = done.report
     effects: dict[str, dict[str, Estimate]] = {name: dict(values) for name, values in model.effects.items()}
@@ -39,6 +47,10 @@ def write_answer(out: Path, done: Diagnosis, model: CorrectedModel) -> dict[str,
         write_recipe(out / NEXT_RUN, report.next_run.name, report.next_run.steps)
     document = report_document(report, MODEL, NEXT_RUN if report.next_run else None)
     document["iso230"] = positioning_section(done.positioning)
+    document["provenance"] = made.document()
     write_report(out / REPORT, document)
-    (out / PAGE).write_text(report_page(done), encoding="utf-8")
+    before, after = (by_channel(done.data, mm) for mm in (done.before_mm, done.after_mm))
+    residuals = residual_figure(before, after if report.effects else None, done.data.chain.history)
+    write_figures(out, curves_of(done), residuals, f"{Path(model.base_path).name}: {report.verdict}")
+    (out / PAGE).write_text(report_page(done, made, strip_html(table)), encoding="utf-8")
     return document

@@ -1,6 +1,7 @@
 """How an effect looks in a residual: a made-up straight gripper, opened, held and closed, with and without it."""
 
 import numpy as np
+from matplotlib.figure import Figure
 
 from fingervision.diagnosis.inference.measuring_chain import MeasuringChain
 from fingervision.diagnosis.report.residual_figure import residual_figure
@@ -12,8 +13,8 @@ SHOWN_SHARE = 0.2
 """Parameters are drawn at this share of their range, so that the shape is plain."""
 
 
-def effect_figure(name: str) -> bytes:
-    """Draw the residual that an effect leaves, as bytes of a PNG."""
+def effect_figure(name: str) -> Figure:
+    """Draw the residual that an effect leaves."""
     effect = catalogue()[name]
     input_mm = np.array([-0.6, 1.6])
     gap_mm = 4.0 + 7.7 * input_mm

@@ -1,24 +1,31 @@
 """report.html: the whole answer on one self-contained page."""
 
 import base64
-import math
 from collections.abc import Sequence
 from html import escape
 
+import numpy as np
+
 from fingervision.diagnosis.diagnose import Diagnosis, by_channel
+from fingervision.diagnosis.report.chart_data import charts_of
+from fingervision.diagnosis.report.effect_figure import effect_figure
+from fingervision.diagnosis.report.gap_curves import GapCurves, gap_curves
+from fingervision.diagnosis.report.html_parts import (
+    HINT,
+    bullets,
+    chart,
+    interval,
+    number,
+    page,
+    provenance_html,
+    table,
+)
 from fingervision.diagnosis.report.positioning_of_data import positioning_html
 from fingervision.diagnosis.report.residual_figure import residual_figure
-from fingervision.domain.parameter import Estimate
+from fingervision.diagnosis.report.vector_figure import png_bytes
 from fingervision.domain.report import DiagnosisReport, Verdict
-
-COVERAGE_FACTOR = 1.96
-"""Standard uncertainties in half a 95 % interval."""
-
-STYLE = """body{font:16px/1.5 system-ui,sans-serif;max-width:62rem;margin:2rem auto;padding:0 1rem;color:#222}
-h1{font-size:1.5rem}h2{font-size:1.1rem;margin-top:2rem}table{border-collapse:collapse}
-td,th{padding:.25rem .8rem;border-bottom:1px solid #ddd;text-align:left;vertical-align:top}td.n{text-align:right}
-img{max-width:100%}.verdict{font-size:1.15rem;background:#f2f5f8;padding:1rem;border-left:4px solid #1f618d}"""
-
+from fingervision.effects import catalogue
+from fingervision.storage.provenance import Provenance
 
 HEADINGS = {
     Verdict.AGREES: "Measurement and model agree",
@@ -26,36 +33,109 @@ HEADINGS = {
     Verdict.AMBIGUOUS: "More than one explanation fits",
     Verdict.UNKNOWN: "Something that the catalogue does not hold",
 }
+SIMULATION, CORRECTED = "simulation", "corrected model"
 
 
-def _table(head: list[str], rows: list[list[str]]) -> str:
-    top = "".join(f"<th>{escape(cell)}</th>" for cell in head)
-    body = "".join("<tr>" + "".join(f"<td>{escape(cell)}</td>" for cell in row) + "</tr>" for row in rows)
-    return f"<table><tr>{top}</tr>{body}</table>"
+def curves_of(diagnosis: Diagnosis) -> GapCurves:
+    """Measurement, simulation and, where effects were named, the corrected model."""
+    data = diagnosis.data
+    predictions = {SIMULATION: data.stacked_mm - diagnosis.before_mm}
+    if diagnosis.report.effects:
+        predictions[CORRECTED] = data.stacked_mm - diagnosis.after_mm
+    return gap_curves(data, diagnosis.report.disagreement.noise_rms_mm, predictions)
+
+
+def report_page(diagnosis: Diagnosis, made: Provenance, frames: str) -> str:
+    """Write the report as HTML; `frames` is the strip of frames at the turning points, as HTML."""
+    report = diagnosis.report
+    history = diagnosis.data.chain.history
+    n = history.input_mm.size
+    before, after = (by_channel(diagnosis.data, mm) for mm in (diagnosis.before_mm, diagnosis.after_mm))
+    residual_mm = {SIMULATION: diagnosis.before_mm[:n]}
+    if report.effects:
+        residual_mm[CORRECTED] = diagnosis.after_mm[:n]
+    charts = charts_of(curves_of(diagnosis), residual_mm)
+    by_name = {str(found["id"]): found for found in charts}
+    gap = chart(by_name["gap-input"], "Gap over the input, measured and predicted")
+    if "gap-time" in by_name:
+        gap += chart(by_name["gap-time"], "Gap over time, measured and predicted")
+    residuals = chart(by_name["residual-input"], "Measured minus predicted gap over the input")
+    if "residual-time" in by_name:
+        residuals += chart(by_name["residual-time"], "Measured minus predicted gap over time")
+    if history.both_edges or history.force:
+        figure = png_bytes(residual_figure(before, after if report.effects else None, history))
+        residuals += _picture(figure, "Measured minus predicted of each finger and channel, over input and time")
+    parameters = [
+        [escape(effect.name), escape(name), *interval(e)]
+        for effect in report.effects
+        for name, e in effect.parameters.items()
+    ]
+    sections = [
+        ("Gap against input", f'{gap}<p class="hint">{HINT}</p>'),
+        ("Where they disagree", bullets([place.words for place in report.where])),
+        ("Difference before and after", residuals),
+        ("At the turning points", frames),
+        ("How much", _how_much(report)),
+        ("What was named", _mechanisms(report)),
+        ("Parameters, with 95 % intervals", table(["effect", "parameter", "value", "interval"], parameters)),
+        ("What cannot be told apart", _apart(report.alternatives)),
+        ("The next run", f"<p>{escape(_next_words(report))}</p>"),
+        ("Runners-up", _runners_up(report)),
+        ("What remains", f"<p>{escape(report.remaining)}</p>"),
+        ("Set aside", bullets(list(report.outliers))),
+        ("Smallest size that this data would have shown", _detection_limits(report)),
+        ("Not shown by this data", bullets([f"{e['name']}: {e['reason']}" for e in report.excluded])),
+        ("Notes", bullets(list(report.notes))),
+        ("Where this comes from", provenance_html(made)),
+    ]
+    positioning = positioning_html(diagnosis.positioning)
+    if positioning is not None:
+        sections.insert(7, ("Positioning accuracy and repeatability (ISO 230-2)", positioning))
+    return page(f"fingervision: {report.verdict}", HEADINGS[report.verdict], report.sentence, sections, charts)
+
+
+def _picture(png: bytes, words: str) -> str:
+    image = base64.b64encode(png).decode()
+    return f'<img class="paper" alt="{escape(words, quote=True)}" src="data:image/png;base64,{image}">'
+
+
+def _how_much(report: DiagnosisReport) -> str:
+    d = report.disagreement
+    rows = [
+        ["all rows", number(d.before_rms_mm), number(d.after_rms_mm)],
+        ["runs that the fit did not see", number(d.unseen_before_rms_mm), number(d.unseen_after_rms_mm)],
+        ["random noise", number(d.noise_rms_mm), ""],
+        ["scatter of repeats (pure error)", number(report.pure_error_mm), ""],
+    ]
+    share = f'<data value="{report.explained_share!r}">{100.0 * report.explained_share:.1f}</data> %'
+    return (
+        table(["disagreement, RMS", "before", "after"], rows)
+        + f"<p>The answer explains {share} of the squared disagreement.</p>"
+    )
+
+
+def _mechanisms(report: DiagnosisReport) -> str:
+    """Each named effect in words, with its law, its source and how it looks alone in a residual."""
+    if not report.effects:
+        return "<p>Nothing.</p>"
+    known = catalogue()
+    return "".join(
+        f"<h3>{escape(effect.name)}</h3><p>{escape(known[effect.name].words.capitalize())}: "
+        f"<code>{escape(known[effect.name].formula)}</code> ({escape(known[effect.name].source)}). In measured minus "
+        f"simulated it looks so: {escape(known[effect.name].residual)}.</p>"
+        + _picture(
+            png_bytes(effect_figure(effect.name)), f"{effect.name} alone, on a made-up gripper that opens and closes"
+        )
+        for effect in report.effects
+        if effect.name in known
+    )
 
 
 def _apart(alternatives: Sequence[Sequence[str]]) -> str:
     """The explanations that stand beside each other; one alone is told apart from all others."""
     if len(alternatives) < 2:
         return "<p>Nothing: no other explanation of the catalogue comes near.</p>"
-    return _list([" + ".join(names) for names in alternatives])
-
-
-def _list(items: list[str]) -> str:
-    return "<ul>" + "".join(f"<li>{escape(item)}</li>" for item in items) + "</ul>" if items else "<p>Nothing.</p>"
-
-
-def _interval(e: Estimate) -> list[str]:
-    """Value and 95 % interval, to a tenth of the standard uncertainty."""
-    if e.u is None:
-        return [f"{e.value:.5g} {e.unit}", "at a bound"]
-    places = max(0, 1 - math.floor(math.log10(e.u))) if e.u > 0.0 else 6
-    low, high = e.value - COVERAGE_FACTOR * e.u, e.value + COVERAGE_FACTOR * e.u
-    return [f"{e.value:.{places}f} {e.unit}", f"{low:.{places}f} to {high:.{places}f} {e.unit}"]
-
-
-def _mm(value: float | None) -> str:
-    return "-" if value is None else f"{value:.4g} mm"
+    return bullets([" + ".join(names) for names in alternatives])
 
 
 def _next_words(report: DiagnosisReport) -> str:
@@ -68,59 +148,21 @@ def _next_words(report: DiagnosisReport) -> str:
     return "Nothing is open."
 
 
-def report_page(diagnosis: Diagnosis) -> str:
-    """Write the report as HTML."""
-    report = diagnosis.report
-    d = report.disagreement
-    before, after = (
-        by_channel(diagnosis.data, diagnosis.before_mm),
-        by_channel(diagnosis.data, diagnosis.after_mm),
-    )
-    figure = residual_figure(before, after if report.effects else None, diagnosis.data.chain.history)
-    image = base64.b64encode(figure).decode()
-    parameters = [
-        [effect.name, name, *_interval(e)] for effect in report.effects for name, e in effect.parameters.items()
-    ]
-    numbers = _table(
-        ["disagreement (RMS)", "before", "after"],
+def _runners_up(report: DiagnosisReport) -> str:
+    rows = [
         [
-            ["all runs", _mm(d.before_rms_mm), _mm(d.after_rms_mm)],
-            ["runs that the fit did not see", _mm(d.unseen_before_rms_mm), _mm(d.unseen_after_rms_mm)],
-            ["noise", _mm(d.noise_rms_mm), ""],
-        ],
-    )
-    near = [
-        [
-            " + ".join(str(name) for name in runner["effects"]),  # type: ignore[attr-defined]
+            escape(" + ".join(str(name) for name in runner["effects"])),  # type: ignore[attr-defined]
             f"{runner['chi_square_more_than_best']:.1f}",
             "far" if runner["distance"] is None else f"{runner['distance']:.1f}",
         ]
         for runner in report.runners_up
     ]
-    smallest = [
-        [name, f"{entry['parameter']}", f"{entry['size']:.3g} {entry['unit']}"]
+    return table(["explanation", "chi-square behind", "distance to the answer"], rows)
+
+
+def _detection_limits(report: DiagnosisReport) -> str:
+    rows = [
+        [escape(name), escape(f"{entry['parameter']}"), number(float(np.float64(entry["size"])), f"{entry['unit']}", 3)]  # type: ignore[arg-type]
         for name, entry in report.smallest_seen.items()
     ]
-    sections = [
-        ("Where they disagree", _list([place.words for place in report.where])),
-        ("Residuals", f'<img alt="residuals before and after" src="data:image/png;base64,{image}">'),
-        ("How much", numbers),
-        ("Parameters, with 95 % intervals", _table(["effect", "parameter", "value", "interval"], parameters)),
-        ("What cannot be told apart", _apart(report.alternatives)),
-        ("The next run", f"<p>{escape(_next_words(report))}</p>"),
-        ("Runners-up", _table(["explanation", "chi-square behind", "distance to the answer"], near)),
-        ("What remains", f"<p>{escape(report.remaining)}</p>"),
-        ("Set aside", _list(list(report.outliers))),
-        ("Smallest size that this data would have shown", _table(["effect", "parameter", "size"], smallest)),
-        ("Not shown by this data", _list([f"{e['name']}: {e['reason']}" for e in report.excluded])),
-        ("Notes", _list(list(report.notes))),
-    ]
-    positioning = positioning_html(diagnosis.positioning)
-    if positioning is not None:
-        sections.insert(4, ("Positioning accuracy and repeatability (ISO 230-2)", positioning))
-    body = "".join(f"<h2>{escape(title)}</h2>{content}" for title, content in sections)
-    return (
-        f'<!doctype html><html lang="en"><meta charset="utf-8"><title>fingervision: {report.verdict}</title>'
-        f"<style>{STYLE}</style><h1>{escape(HEADINGS[report.verdict])}</h1>"
-        f'<p class="verdict">{escape(report.sentence)}</p>{body}</html>\n'
-    )
+    return table(["effect", "parameter", "size"], rows)

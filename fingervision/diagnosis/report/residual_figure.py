@@ -1,11 +1,9 @@
-"""Figures of a diagnosis: residuals before and after over input and time; as bytes of a PNG."""
+"""Residuals before and after, over the input and over time."""
 
-import io
-
-import matplotlib as mpl
 import numpy as np
 from matplotlib.figure import Figure
 
+from fingervision.diagnosis.report.vector_figure import plain_style
 from fingervision.domain.effect import Array, History
 
 BEFORE, AFTER = "#c0392b", "#1f618d"
@@ -17,7 +15,7 @@ NAMES = {
 }
 
 
-def residual_figure(before: dict[str, Array], after: dict[str, Array] | None, history: History) -> bytes:
+def residual_figure(before: dict[str, Array], after: dict[str, Array] | None, history: History) -> Figure:
     """Draw measured minus predicted, a row a channel, over the input and (where there are times) over time.
 
     Parameters
@@ -28,7 +26,7 @@ def residual_figure(before: dict[str, Array], after: dict[str, Array] | None, hi
         Input and times.
     """
     timed = history.time_s is not None
-    with mpl.rc_context({"font.size": 9, "axes.spines.top": False, "axes.spines.right": False}):
+    with plain_style():
         figure = Figure(figsize=(10.0, 1.2 + 2.1 * len(before)), layout="constrained")
         grid = figure.subplots(len(before), 2 if timed else 1, squeeze=False, sharey="row")
         for row, channel in enumerate(before):
@@ -51,6 +49,4 @@ def residual_figure(before: dict[str, Array], after: dict[str, Array] | None, hi
                     )
         if after is not None:
             grid[0][0].legend(frameon=False, ncols=2, loc="lower left", bbox_to_anchor=(0.0, 1.0), borderaxespad=0.1)
-        buffer = io.BytesIO()
-        figure.savefig(buffer, format="png", dpi=110)
-    return buffer.getvalue()
+    return figure

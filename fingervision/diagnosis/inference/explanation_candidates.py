@@ -1,0 +1,138 @@
+"""Explanations of one, two and three effects: formed from signatures, then refitted jointly in the chain."""
+
+from collections.abc import Callable
+
+import numpy as np
+
+from fingervision.diagnosis.inference.hypothesis_fit import FORM_SHARE, Explanation, Problem, fit, scan
+from fingervision.diagnosis.inference.null_bootstrap import LONG
+from fingervision.diagnosis.inference.signatures import Signatures, tangents
+from fingervision.diagnosis.input.input_uncertainty import below_the_input
+
+Progress = Callable[[float], None]
+SCANNED = 6
+"""Explanations beside which an effect that jumps is tried at all its sizes: where it jumps depends on the others."""
+LEAST_GAIN = 4.0
+"""Chi-square that an effect's signature must take for a refit to be tried."""
+FEW_ROWS = 0.1
+"""Share of the rows on which a stop or a contact acts that only the ends of strokes speak for; what acts on more is
+averaged over many roundings."""
+STEPS_HIDDEN = 1.0
+"""Steps of the encoder within which an effect is not told from its roundings."""
+SWAPS_REFITTED = 24
+"""Partners refitted beside the halves of the best pair: each half has at most 26."""
+
+
+def single_effects(problem: Problem, atoms: Signatures, iterations: int) -> list[Explanation]:
+    """Fit each effect alone, from its four most promising signatures; best first."""
+    nothing = problem.nothing()
+    gain, coefficient = atoms.gains(nothing.residual, problem.offsets, problem.offsets.metric(nothing.sigma_mm))
+    owner = np.array(atoms.names)
+    found = []
+    for name in problem.effects:
+        mine = np.flatnonzero(owner == name)
+        if not mine.size:
+            continue
+        mine = mine[np.argsort(-gain[mine])]
+        tries = [fit(problem, (name,), {name: atoms.begin(k, coefficient[k])}, iterations=5) for k in mine[:4]]
+        best = min(tries, key=lambda explanation: explanation.score)
+        found.append(fit(problem, (name,), best.values, iterations=iterations))
+    return sorted(found, key=lambda explanation: explanation.score)
+
+
+def extended(
+    problem: Problem, atoms: Signatures, bases: list[Explanation], most: int, progress: Progress
+) -> list[Explanation]:
+    """Add each effect to each base: starts from signatures on what the base leaves, then joint refits."""
+    owner = np.array(atoms.names)
+    planned: list[tuple[float, Explanation, str, dict[str, float]]] = []
+    scanned = SCANNED if problem.chain.history.input_mm.size <= LONG else 1
+    for place, base in enumerate(bases):
+        metric = problem.offsets.metric(base.sigma_mm)
+        gain, coefficient = atoms.gains(base.residual, problem.offsets, metric, tangents(problem, base))
+        for name in problem.effects:
+            mine = np.flatnonzero(owner == name)
+            if name in base.names or not mine.size:
+                continue
+            if place < scanned and any(parameter.rugged for _, parameter in problem.parameters((name,))):
+                start, score = scan(problem, base, name, [atoms.starts[k] for k in mine])
+                if base.score - score > LEAST_GAIN:
+                    planned.append((score, base, name, start))
+            k = int(mine[np.argmax(gain[mine])])
+            if gain[k] > LEAST_GAIN:
+                planned.append((base.score - float(gain[k]), base, name, atoms.begin(k, float(coefficient[k]))))
+    planned.sort(key=lambda plan: plan[0])
+    found: dict[tuple[str, ...], Explanation] = {}
+    for index, (_, base, name, start) in enumerate(planned[:most]):
+        explanation = fit(problem, (*base.names, name), {**base.values, name: start}, iterations=7)
+        old = found.get(explanation.names)
+        if old is None or explanation.score < old.score:
+            found[explanation.names] = explanation
+        progress((index + 1) / most)
+    ranked = sorted(found.values(), key=lambda explanation: explanation.score)
+    return sorted(
+        [fit(problem, e.names, e.values, iterations=20) for e in ranked[:8]] + ranked[8:], key=lambda e: e.score
+    )
+
+
+def swapped(problem: Problem, atoms: Signatures, pairs: list[Explanation]) -> list[Explanation]:
+    """Try every other effect beside each half of the best pair, where the pair has put it.
+
+    Alone it had stood elsewhere: fitted to what two effects do, it ends far out in a valley out of which no joint
+    search finds its way.
+    """
+    if not pairs:
+        return pairs
+    best = pairs[0]
+    halves = [fit(problem, (name,), {name: best.values[name]}, iterations=0) for name in best.names]
+    found = {pair.names: pair for pair in pairs}
+    for pair in extended(problem, atoms, halves, SWAPS_REFITTED, lambda _: None):
+        if pair.names not in found or pair.score < found[pair.names].score:
+            found[pair.names] = pair
+    return sorted(found.values(), key=lambda explanation: explanation.score)
+
+
+def added_share(problem: Problem, smaller: Explanation, larger: Explanation) -> float:
+    """Size of what the larger explanation adds, as a share of all that it changes in the prediction, in mm."""
+    bare, before, after = (problem.chain.stacked(values) for values in ({}, smaller.values, larger.values))
+    if below_the_input(problem, float(np.sqrt(np.mean((after - before) ** 2)))):
+        return 0.0
+    return float(np.linalg.norm(after - before) / max(1e-12, float(np.linalg.norm(after - bare))))
+
+
+def within_a_step(problem: Problem, explanation: Explanation) -> bool:
+    """Whether an effect in it acts by less than an encoder's step, on a few rows or at the ends: as roundings do."""
+    history = problem.chain.history
+    if history.input_step_mm == 0.0:
+        return False
+    reach = 0.5 * history.input_step_mm
+    low, high = (problem.chain.with_input(history.input_mm + way).stacked({}) for way in (-reach, reach))
+    step_mm = STEPS_HIDDEN * float(np.max(np.abs(high - low)))
+    from_end = np.minimum(history.input_mm - history.input_mm.min(), history.input_mm.max() - history.input_mm)
+    at_ends = np.tile(from_end < STEPS_HIDDEN * history.input_step_mm, low.size // from_end.size)
+    whole = problem.chain.stacked(explanation.values)
+    for name in explanation.names:
+        others = {other: values for other, values in explanation.values.items() if other != name}
+        change = np.abs(whole - problem.chain.stacked(others))
+        largest = float(np.max(change))
+        acts = change > 0.1 * largest
+        if largest < step_mm and (float(np.mean(acts)) < FEW_ROWS or not np.any(acts & ~at_ends)):
+            return True
+    return False
+
+
+def likeliest(candidates: list[Explanation], samples: int) -> Explanation:
+    """Choose by Schwarz's criterion (Schwarz 1978)."""
+    return min(candidates, key=lambda explanation: explanation.bic(samples))
+
+
+def simplest(singles: list[Explanation], samples: int, nothing: Explanation) -> Explanation:
+    """Choose one effect, the simpler form where the richer one gains no more than forms deviate.
+
+    Such a difference is the forms' own fault, and no reason to choose a resonance for a delay that falls between two
+    samples.
+    """
+    best = likeliest(singles, samples)
+    within = FORM_SHARE**2 * (nothing.score - best.score)
+    simpler = [e for e in singles if e.free < best.free and e.score - best.score < within]
+    return min(simpler, key=lambda explanation: explanation.score, default=best)

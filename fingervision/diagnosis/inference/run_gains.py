@@ -1,0 +1,117 @@
+"""Gains that differ from run to run: a random effect on the ratio, beside every explanation.
+
+A part that was clamped anew, or a polymer at another temperature, moves a little more or less in each run. Like the
+runs' offsets these gains are zero-mean random effects (Laird & Ware 1982, doi:10.2307/2529876): their common mean is
+a ratio, which has a name in the catalogue.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from fingervision.diagnosis.inference.hypothesis_fit import Explanation, Problem
+from fingervision.domain.effect import Array
+
+FEWEST_RUNS = 2
+"""One run has no scatter of gains."""
+SIZES = np.geomspace(1e-4, 0.2, 34)
+"""Standard deviations of the gain that are tried; runs that differ by more than a fifth are not one experiment."""
+LEAST_GAIN = 10.0
+"""Twice the logarithm of a Bayes factor that is very strong evidence (Kass & Raftery 1995)."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class RunGains:
+    """Gains of the runs as a random effect.
+
+    Parameters
+    ----------
+    columns_mm : ndarray of float, shape (channels * n, runs)
+        What one standard deviation of each run's gain does to the prediction.
+    sd : float
+        Standard deviation of the gain from run to run, as a ratio.
+    price : float
+        Logarithm of the determinant and of the choice of `sd`, on the scale of chi-square.
+    coefficients : ndarray of float, shape (runs,)
+        The gains in units of `sd`, as they were estimated.
+    """
+
+    columns_mm: Array
+    sd: float
+    price: float
+    coefficients: Array
+
+    @property
+    def fitted_mm(self) -> Array:
+        """What the estimated gains do to the prediction; shape (channels * n,)."""
+        return np.asarray(self.columns_mm @ self.coefficients, dtype=np.float64)
+
+    @property
+    def scatter_mm(self) -> Array:
+        """The same of the gains' departures from their mean: what all runs share is no scatter."""
+        return np.asarray(self.columns_mm @ (self.coefficients - self.coefficients.mean()), dtype=np.float64)
+
+    def without_mean(self) -> "RunGains":
+        """Leave their common mean to the effects that have a name for it."""
+        shared = np.full((self.coefficients.size,) * 2, 1.0 / self.coefficients.size)
+        return replace(self, columns_mm=self.columns_mm - self.columns_mm @ shared)
+
+    @property
+    def words(self) -> str:
+        """What was found, as a sentence."""
+        each = ", ".join(f"{100.0 * self.sd * number:+.2g}" for number in self.coefficients - self.coefficients.mean())
+        return (
+            f"the gain differs from run to run (by {each} %): taken as the runs' own scatter, like their offsets, and "
+            "not as an effect."
+        )
+
+    def refitted(self, problem: Problem, explanation: Explanation, behind: int) -> "RunGains":
+        """Estimate the gains beside an explanation; `behind` random effects stand behind them in the problem."""
+        metric = problem.offsets.metric(explanation.sigma_mm)
+        best = metric @ (problem.offsets.design.T @ explanation.residual)
+        return replace(self, coefficients=best[best.size - behind - self.coefficients.size : best.size - behind])
+
+
+def likeliest_gains(problem: Problem, explanation: Explanation) -> tuple[RunGains, float]:
+    """Find how much the runs' gains scatter beside an explanation.
+
+    Parameters
+    ----------
+    problem : Problem
+        Without such gains.
+    explanation : Explanation
+        Whose residual they are to explain, and whose prediction they multiply.
+
+    Returns
+    -------
+    found : RunGains
+        The likeliest.
+    gain : float
+        By how much they lower -2 log of the marginal likelihood, their price paid.
+    """
+    history = problem.chain.history
+    n = history.input_mm.size
+    gap_mm = problem.chain.stacked(explanation.values)[:n]
+    raw = np.zeros((problem.measured.size, len(history.runs)))
+    for column, run in enumerate(history.runs):
+        # About the run's mean: what else a gain does is an offset.
+        raw[run, column] = gap_mm[run] - gap_mm[run].mean()
+    offsets, metric = problem.offsets, problem.offsets.metric(explanation.sigma_mm)
+    white = problem.whitener.columns(raw)[0]
+    moved = white - offsets.design @ (metric @ (offsets.design.T @ white))
+    gram, aim = white.T @ moved, moved.T @ explanation.residual
+    value, vector = np.linalg.eigh(gram)
+    value, share = np.maximum(value, 0.0), (vector.T @ aim) ** 2
+    load = 1.0 + SIZES[:, None] ** 2 * value
+    gained = np.sum(SIZES[:, None] ** 2 * share / load - np.log(load), axis=1)
+    best = int(np.argmax(gained))
+    size = float(SIZES[best])
+    choice = float(np.log(max(2, problem.measured.size)))
+    inner = np.eye(value.size) + size**2 * gram
+    found = RunGains(
+        columns_mm=raw * size,
+        sd=size,
+        price=float(np.linalg.slogdet(inner)[1]) + choice,
+        coefficients=np.asarray(np.linalg.solve(inner, size * aim), dtype=np.float64),
+    )
+    return found, float(gained[best]) - choice

@@ -1,0 +1,74 @@
+"""Noise of every channel, from what repeats, from holds, or from the spectrum of what an explanation leaves."""
+
+import numpy as np
+
+from fingervision.diagnosis.input.recorded_input import standing_still
+from fingervision.diagnosis.noise.noise_model import LEAST_SHARE, Noise, white_noise
+from fingervision.diagnosis.noise.replicates import PureError
+from fingervision.diagnosis.noise.restricted_likelihood import noise_of_short_runs
+from fingervision.diagnosis.noise.spectrum import noise_by_spectrum
+from fingervision.domain.effect import Array, Flags, History
+
+FEWEST_STANDING = 60
+"""Samples in all during which the stage must stand for the noise to be taken from them."""
+SHORT_RUN = 60
+"""Samples of the longest run below which its spectrum says too little about the noise."""
+
+
+def channel_noises(
+    history: History, parts: list[Array], aside: list[Flags], floors: list[float], degrees: int, *, explained: bool
+) -> tuple[Noise, ...]:
+    """Estimate every channel's noise; what was fitted leaves gap and midline the noise of the same pictures.
+
+    Parameters
+    ----------
+    history : History
+        Runs and times.
+    parts : list of ndarray of float, shape (n,)
+        Residual of each channel.
+    aside : list of ndarray of bool, shape (n,)
+        Rows of each channel that do not count.
+    floors : list of float
+        Least noise of each channel: its last digit, or what was stated.
+    degrees : int
+        Parameters that were fitted.
+    explained : bool
+        Whether the residuals are those of an explanation.
+    """
+    if history.time_s is None:
+        return tuple(
+            white_noise(part, out, floor, degrees) for part, out, floor in zip(parts, aside, floors, strict=True)
+        )
+    rate_hz = 1.0 / history.sample_time_s
+    together = 2 if history.both_edges and explained else 1
+    groups = [slice(0, together), *(slice(k, k + 1) for k in range(together, len(parts)))]
+    if max(run.stop - run.start for run in history.runs) < SHORT_RUN:
+        return noise_of_short_runs(parts, history.runs, aside, floors, explained=explained)
+
+    def over(stretches: tuple[slice, ...]) -> tuple[Noise, ...]:
+        return tuple(
+            noise
+            for g in groups
+            for noise in noise_by_spectrum(parts[g], stretches, rate_hz, aside[g], floors[g], explained=explained)
+        )
+
+    everywhere = over(history.runs)
+    standing = () if explained else standing_still(history)
+    if sum(hold.stop - hold.start for hold in standing) < FEWEST_STANDING:
+        return everywhere
+    # What nothing explains yet moves with the stage and passes for noise; where the stage stands, less of it does.
+    holds = over(standing)
+    return holds if holds[0].total_mm < everywhere[0].total_mm else everywhere
+
+
+def noises_of_repeats(errors: list[PureError], floors: list[float]) -> tuple[Noise, ...]:
+    """Take the scatter of repeats for the noise: readings seconds apart are no samples of one fast process.
+
+    The doubt of a standard deviation's square is sqrt(2 / degrees).
+    """
+    found = []
+    for error, floor in zip(errors, floors, strict=True):
+        sd_mm, doubt = max(error.sd_mm, floor, 1e-9), float(np.sqrt(2.0 / error.degrees))
+        slow_mm = float(np.sqrt(1.0 - LEAST_SHARE)) * sd_mm if error.correlation > 0.0 else 0.0
+        found.append(Noise(float(np.sqrt(sd_mm**2 - slow_mm**2)), slow_mm, error.correlation, doubt))
+    return tuple(found)

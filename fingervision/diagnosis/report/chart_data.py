@@ -1,0 +1,90 @@
+"""What the charts of a report's page show, as JSON for the script beside them."""
+
+import json
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fingervision.diagnosis.report.gap_curves import GapCurves
+from fingervision.domain.effect import Array, Flags
+
+MOST_ROWS = 3000
+"""Rows that a chart shows: more than a screen has columns, and few enough for a page of one megabyte."""
+DASHES: tuple[list[int], ...] = ([6, 4], [], [8, 3, 2, 3], [2, 3])
+"""Dashes of the predictions, in their order: they are told apart without colour."""
+
+Chart = dict[str, object]
+
+
+def charts_of(curves: GapCurves, residual_mm: dict[str, Array]) -> list[Chart]:
+    """Lay out the charts: gap and residual over the input, and over time where the runs share a clock.
+
+    Parameters
+    ----------
+    curves : GapCurves
+        Measurement and predictions.
+    residual_mm : dict of ndarray of float, shape (n,)
+        Measured minus predicted gap, by the name of the prediction.
+    """
+    found = [_gap(curves, "gap-input", curves.input_mm, "input, mm", both_ways=True)]
+    if curves.time_s is not None:
+        found.append(_gap(curves, "gap-time", curves.time_s, "time, s", both_ways=False))
+    found.append(_residuals(residual_mm, "residual-input", curves.input_mm, "input, mm"))
+    if curves.time_s is not None:
+        found.append(_residuals(residual_mm, "residual-time", curves.time_s, "time, s"))
+    return found
+
+
+def charts_json(charts: list[Chart]) -> str:
+    """Write the charts so that no name in them can end the script element."""
+    return json.dumps(charts, allow_nan=False, separators=(",", ":")).replace("<", "\\u003c")
+
+
+def _shown(x: Array) -> tuple[NDArray[np.intp], str]:
+    """Rows in ascending order of `x`, thinned evenly; and a remark where some are left out."""
+    step = max(1, -(-x.size // MOST_ROWS))
+    rows = np.arange(0, x.size, step)
+    return rows[np.argsort(x[rows], kind="stable")], "" if step == 1 else f" (each {step}th row)"
+
+
+def _values(values: Array, rows: NDArray[np.intp], where: Flags | None = None) -> list[float | None]:
+    return [
+        round(float(values[k]), 6) if where is None or where[k] else None for k in rows.tolist()  # a nanometre
+    ]  # fmt: skip
+
+
+def _gap(curves: GapCurves, name: str, x: Array, label: str, *, both_ways: bool) -> Chart:
+    rows, thinned = _shown(x)
+    ways: dict[str, Flags | None] = {"": None}
+    if both_ways:
+        found = {"opening": curves.opens, "closing": ~curves.opens}
+        ways = {way: where for way, where in found.items() if where.any()}
+    series: list[dict[str, object]] = [
+        {"label": f"measured {way}".strip(), "points": True, "filled": way == "opening", "colour": 0, "dash": [],
+         "values": _values(curves.gap_mm, rows, where)}
+        for way, where in ways.items()
+    ]  # fmt: skip
+    for number, (model, gap_mm) in enumerate(curves.predictions.items()):
+        dash = DASHES[number % len(DASHES)]
+        for way, where in ways.items():
+            series.append(
+                {"label": f"{model} {way}".strip(), "points": False, "filled": False,
+                 "colour": 1 + number % 5, "dash": dash, "values": _values(gap_mm, rows, where)}
+            )  # fmt: skip
+    return {"id": name, "x": label, "y": f"gap, mm{thinned}", "at": _values(x, rows), "series": series}
+
+
+def _residuals(residual_mm: dict[str, Array], name: str, x: Array, label: str) -> Chart:
+    rows, thinned = _shown(x)
+    series = [
+        {"label": f"measured minus {model}", "points": True, "filled": number > 0, "colour": 1 + number % 5, "dash": [],
+         "values": _values(residual, rows)}
+        for number, (model, residual) in enumerate(residual_mm.items())
+    ]  # fmt: skip
+    return {
+        "id": name,
+        "x": label,
+        "y": f"difference of the gap, mm{thinned}",
+        "at": _values(x, rows),
+        "series": series,
+    }

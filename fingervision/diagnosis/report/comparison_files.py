@@ -1,0 +1,101 @@
+"""The files of a comparison: one page, one table and one figure for all models that were held against a measurement."""
+
+import json
+from collections.abc import Mapping
+from html import escape
+from pathlib import Path
+
+from matplotlib.figure import Figure
+
+from fingervision.diagnosis.compare import Comparison
+from fingervision.diagnosis.report.chart_data import charts_of
+from fingervision.diagnosis.report.figure_files import write_figures
+from fingervision.diagnosis.report.frame_strip import strip_html
+from fingervision.diagnosis.report.gap_curves import GapCurves, gap_curves
+from fingervision.diagnosis.report.html_parts import HINT, bullets, chart, number, page, provenance_html, table
+from fingervision.diagnosis.report.residual_figure import residual_figure
+from fingervision.diagnosis.report.vector_figure import png_bytes
+from fingervision.storage.provenance import Provenance
+
+PAGE, COMPARISON, PICTURE = "compare.html", "compare.json", "compare.png"
+
+
+def comparison_document(found: Mapping[str, Comparison], made: Provenance) -> dict[str, object]:
+    """Lay comparisons out for programs: the first model's at the top, all of them in `models`.
+
+    Parameters
+    ----------
+    found : mapping of str to Comparison
+        By the model's name, in the order in which they were given.
+    made : Provenance
+        Files, command and versions.
+    """
+    first = next(iter(found.values())).document()
+    models = [{"model": name, **comparison.document()} for name, comparison in found.items()]
+    return {**first, "models": models, "provenance": made.document()}
+
+
+def write_comparison(out: Path, found: Mapping[str, Comparison], made: Provenance, measured: Path) -> dict[str, object]:
+    """Write page, figures and compare.json into a folder that is there, and give what compare.json holds.
+
+    The recording behind the table `measured` is looked for beside it.
+    """
+    document = comparison_document(found, made)
+    (out / COMPARISON).write_text(json.dumps(document, indent=2, allow_nan=False) + "\n", encoding="utf-8")
+    curves, residuals = _curves(found), _residuals(found)
+    (out / PICTURE).write_bytes(png_bytes(residuals))
+    write_figures(out, curves, residuals, " and ".join(found))
+    (out / PAGE).write_text(_page(found, curves, made, strip_html(measured)), encoding="utf-8")
+    return document
+
+
+def _curves(found: Mapping[str, Comparison]) -> GapCurves:
+    first = next(iter(found.values()))
+    predictions = {name: one.data.chain.stacked({}) for name, one in found.items()}
+    return gap_curves(first.data, first.noise_mm, predictions)
+
+
+def _residuals(found: Mapping[str, Comparison]) -> Figure:
+    """Residuals of one model by channel; of several, the gap of each."""
+    first = next(iter(found.values()))
+    if len(found) == 1:
+        return residual_figure(first.residual_mm, None, first.data.chain.history)
+    return residual_figure(
+        {name: one.residual_mm["gap"] for name, one in found.items()}, None, first.data.chain.history
+    )
+
+
+def _page(found: Mapping[str, Comparison], curves: GapCurves, made: Provenance, frames: str) -> str:
+    charts = charts_of(curves, {name: one.residual_mm["gap"] for name, one in found.items()})
+    names = {
+        "gap-input": "Gap over the input, measured and predicted",
+        "gap-time": "Gap over time, measured and predicted",
+        "residual-input": "Measured minus predicted gap over the input",
+        "residual-time": "Measured minus predicted gap over time",
+    }
+    drawn = {str(one["id"]): chart(one, names[str(one["id"])]) for one in charts}
+    rows = [
+        [escape(name), number(one.rms_mm), number(one.noise_mm), f"{len(one.places)}"] for name, one in found.items()
+    ]
+    least = min(found, key=lambda name: found[name].rms_mm)
+    verdict = (
+        f"{least}: {found[least].rms_mm:.3g} mm RMS between measurement and model, where random noise is "
+        f"{found[least].noise_mm:.2g} mm."
+    )
+    if len(found) > 1:
+        verdict = f"Nearest of {len(found)} models is {verdict}"
+    places = "".join(
+        f"<h3>{escape(name)}</h3>{bullets([place.words for place in one.places])}" for name, one in found.items()
+    )
+    first = next(iter(found.values()))
+    sections = [
+        ("Gap against input", "".join(html for name, html in drawn.items() if name.startswith("gap"))
+         + f'<p class="hint">{HINT}</p>'),
+        ("Difference", "".join(html for name, html in drawn.items() if name.startswith("residual"))),
+        ("How much", table(["model", "disagreement, RMS", "random noise", "places beyond the noise"], rows)),
+        ("At the turning points", frames),
+        ("Where they disagree", places),
+        ("Notes", bullets([*first.data.notes, *first.data.refitted()])),
+        ("Where this comes from", provenance_html(made)),
+    ]  # fmt: skip
+    return page("fingervision: comparison", "Measurement beside model", verdict, sections, charts)

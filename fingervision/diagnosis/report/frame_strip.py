@@ -1,0 +1,151 @@
+"""Frames at the turning points of a recording, with what was measured there drawn in."""
+
+import base64
+import csv
+import hashlib
+import json
+from dataclasses import dataclass
+from html import escape
+from pathlib import Path
+
+import cv2
+import numpy as np
+
+from fingervision.domain.errors import FingervisionError
+from fingervision.domain.frame import Frame
+from fingervision.frames.source import open_source
+from fingervision.storage.summary_json import SUMMARY
+
+MOST_FRAMES = 6
+"""Frames of a strip: the start, and the first turning points."""
+LOOKED_AT = 2000
+"""Frames of a recording that are decoded for it at most: a second or two of a report's time."""
+TURN = 0.02
+"""Share of the input's range by which it must come back before a turning point counts: an encoder's jitter is less."""
+WIDTH_PX, JPEG_QUALITY = 480, 80
+MARK = (64, 255, 96)
+
+
+@dataclass(frozen=True, slots=True)
+class Turn:
+    """A measured row at which the input turned, with its picture.
+
+    Parameters
+    ----------
+    frame : int
+        Number of the frame.
+    time_s, input_mm, gap_mm : float
+        As in the table; the time may be missing.
+    points_px : tuple of (float, float)
+        Left and right measuring point.
+    jpeg : bytes
+        The frame with the measured distance drawn in; empty before it was decoded.
+    """
+
+    frame: int
+    time_s: float | None
+    input_mm: float
+    gap_mm: float
+    points_px: tuple[tuple[float, float], tuple[float, float]]
+    jpeg: bytes = b""
+
+
+def strip_html(table: Path) -> str:
+    """Lay out the frames at the turning points of the recording behind a gaps.csv; why there is none, otherwise."""
+    recording = _recording_of(table)
+    if recording is None:
+        return (
+            "<p>No frames: they are shown where the measured table is a gaps.csv with its summary.json, and the "
+            "recording lies in the same folder, the one above, or the one in which the command runs.</p>"
+        )
+    turns = _decoded(recording, turning_rows(table))
+    shown = "".join(
+        f'<figure><img alt="Frame {turn.frame}, gap {turn.gap_mm:.3f} mm" '
+        f'src="data:image/jpeg;base64,{base64.b64encode(turn.jpeg).decode()}">'
+        f"<figcaption>frame {turn.frame}{'' if turn.time_s is None else f', {turn.time_s:.2f} s'}: input "
+        f"{turn.input_mm:.3f} mm, gap {turn.gap_mm:.3f} mm</figcaption></figure>"
+        for turn in turns
+    )
+    return f'<div class="strip">{shown}</div><p class="hint">From {escape(recording.name)}.</p>'
+
+
+def turning_rows(table: Path) -> tuple[Turn, ...]:
+    """Find the rows of a gaps.csv at which the input turned, the first one included; none without their columns."""
+    with table.open(encoding="utf-8", newline="") as file:
+        rows = list(csv.DictReader(line for line in file if not line.startswith("#")))
+    found: list[Turn] = []
+    for row in rows[:LOOKED_AT]:
+        try:
+            left = (float(row["left_x_px"]), float(row["left_y_px"]))
+            right = (float(row["right_x_px"]), float(row["right_y_px"]))
+            time_s = float(row["time_s"]) if row["time_s"] else None
+            found.append(Turn(int(row["frame"]), time_s, float(row["input_mm"]), float(row["gap_mm"]), (left, right)))
+        except (KeyError, TypeError, ValueError):
+            continue  # a row without a gap or an input
+    if not found:
+        return ()
+    inputs = np.array([turn.input_mm for turn in found])
+    least_mm = TURN * float(np.ptp(inputs))
+    turns, far, way = [0], 0, 0.0
+    for k in range(1, inputs.size):
+        if way == 0.0:
+            way = float(np.sign(inputs[k] - inputs[0])) if abs(inputs[k] - inputs[0]) > least_mm else 0.0
+        if way * (inputs[k] - inputs[far]) >= 0.0:
+            far = k
+        elif abs(inputs[k] - inputs[far]) > least_mm:
+            turns.append(far)
+            far, way = k, -way
+    turns.append(far)
+    return tuple(found[k] for k in dict.fromkeys(turns))[:MOST_FRAMES]
+
+
+def _recording_of(table: Path) -> Path | None:
+    """The file that a gaps.csv was measured on, known by its hash; None where it is not near."""
+    try:
+        recording = json.loads((table.parent / SUMMARY).read_bytes())["recording"]
+        name, sha256 = recording["name"], recording["sha256"]
+    except (OSError, ValueError, LookupError, TypeError):
+        return None
+    if not isinstance(name, str) or not isinstance(sha256, str):
+        return None
+    for folder in (table.parent, table.parent.parent, Path()):
+        path = folder / Path(name).name
+        if path.is_file():
+            with path.open("rb") as file:
+                if hashlib.file_digest(file, "sha256").hexdigest() == sha256:
+                    return path
+    return None
+
+
+def _decoded(recording: Path, turns: tuple[Turn, ...]) -> tuple[Turn, ...]:
+    """Decode the frames of turning points, and draw what was measured."""
+    wanted = {turn.frame: turn for turn in turns}
+    last = max(wanted, default=-1)
+    found: list[Turn] = []
+    try:
+        for frame in open_source(str(recording)):
+            if isinstance(frame, Frame) and frame.index in wanted:
+                turn = wanted[frame.index]
+                found.append(
+                    Turn(turn.frame, turn.time_s, turn.input_mm, turn.gap_mm, turn.points_px, _drawn(frame, turn))
+                )
+            if frame.index >= last:
+                break
+    except FingervisionError:
+        # What was measured stands in the table; a recording that cannot be read again costs its pictures only.
+        return tuple(found)
+    return tuple(found)
+
+
+def _drawn(frame: Frame, turn: Turn) -> bytes:
+    grey = np.asarray(frame.pixels, dtype=np.float64)
+    top = float(grey.max()) or 1.0
+    levels = np.asarray(255.0 * grey / top, dtype=np.uint8)
+    canvas = cv2.cvtColor(levels, cv2.COLOR_GRAY2BGR if levels.ndim == 2 else cv2.COLOR_RGB2BGR)
+    scale = min(1.0, WIDTH_PX / canvas.shape[1])
+    canvas = cv2.resize(canvas, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA)
+    left, right = ((round(x * scale), round(y * scale)) for x, y in turn.points_px)
+    cv2.line(canvas, left, right, MARK, 2, cv2.LINE_AA)
+    for x, y in (left, right):
+        cv2.drawMarker(canvas, (x, y), MARK, cv2.MARKER_CROSS, 14, 2, cv2.LINE_AA)
+    return bytes(cv2.imencode(".jpg", canvas, [cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY])[1])

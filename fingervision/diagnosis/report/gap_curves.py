@@ -1,0 +1,83 @@
+"""Measured and predicted gaps side by side: what the figures of a report are drawn from."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from fingervision.diagnosis.input.observations import Observations
+from fingervision.domain.effect import Array, Flags
+
+COVERAGE_FACTOR = 1.96
+"""Standard uncertainties in half a 95 % interval."""
+STANDS = 1e-4
+"""Share of the range within which the stage stands; its direction is then that of the move before."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class GapCurves:
+    """A measurement and what models predict for it, row by row.
+
+    Parameters
+    ----------
+    input_mm, gap_mm : ndarray of float, shape (n,)
+        Recorded input and measured gap.
+    interval_mm : ndarray of float, shape (n,)
+        Half of the 95 % interval of each gap, random part.
+    opens : ndarray of bool, shape (n,)
+        Rows to which the input rose.
+    time_s : ndarray of float, shape (n,), or None
+        Time since the first row; None without a clock that the runs share.
+    runs : tuple of slice
+        Rows of each run.
+    predictions : mapping of str to ndarray of float, shape (n,)
+        Predicted gap, by the name that the legend gives it.
+    """
+
+    input_mm: Array
+    gap_mm: Array
+    interval_mm: Array
+    opens: Flags
+    time_s: Array | None
+    runs: tuple[slice, ...]
+    predictions: Mapping[str, Array]
+
+
+def gap_curves(data: Observations, noise_mm: float, predictions: Mapping[str, Array]) -> GapCurves:
+    """Put predictions beside a measurement.
+
+    Parameters
+    ----------
+    data : Observations
+        Measurement and model.
+    noise_mm : float
+        Random noise of one gap, for rows whose uncertainty was not measured.
+    predictions : mapping of str to ndarray of float, shape (channels * n,)
+        Stacked predictions, of which the gap is the first channel.
+    """
+    history, table = data.chain.history, data.table
+    n = history.input_mm.size
+    u_mm = np.full(n, noise_mm) if table.u_random_mm is None else np.asarray(table.u_random_mm, dtype=np.float64)
+    return GapCurves(
+        input_mm=history.input_mm,
+        gap_mm=np.asarray(table.gap_mm, dtype=np.float64),
+        interval_mm=COVERAGE_FACTOR * u_mm,
+        opens=_opens(history.input_mm, history.runs),
+        time_s=history.clock_s if history.time_s is not None and history.shared_clock else None,
+        runs=history.runs,
+        predictions={name: stacked[:n] for name, stacked in predictions.items()},
+    )
+
+
+def _opens(input_mm: Array, runs: tuple[slice, ...]) -> Flags:
+    """Mark rows to which the input rose; a row at rest keeps the direction of the move before, or of the one after."""
+    out = np.zeros(input_mm.size, dtype=bool)
+    least_mm = STANDS * max(float(np.ptp(input_mm)), 1e-300)
+    for run in runs:
+        way = np.diff(input_mm[run], prepend=input_mm[run][:1])
+        moves = np.flatnonzero(np.abs(way) > least_mm)
+        if not moves.size:
+            continue
+        last = np.searchsorted(moves, np.arange(way.size), side="right") - 1
+        out[run] = way[moves[np.maximum(last, 0)]] > 0.0
+    return out

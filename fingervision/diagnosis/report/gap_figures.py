@@ -1,0 +1,69 @@
+"""The paper's figure of gap against input, and the same over time: measurement, simulation, corrected model."""
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from fingervision.diagnosis.report.gap_curves import GapCurves
+from fingervision.diagnosis.report.vector_figure import plain_style
+from fingervision.domain.effect import Array, Flags
+
+MEASURED = "#222222"
+LINES = (("#c0392b", "--"), ("#1f618d", "-"), ("#7d3c98", "-."), ("#117a65", ":"))
+"""Colour and dash of the first, second, ... prediction; told apart in black and white too."""
+FEW_ROWS = 80
+"""Rows up to which each reading has a marker with its error bar; of more, the bars would be a band of ink."""
+
+
+def gap_against_input(curves: GapCurves, title: str) -> Figure:
+    """Draw the gap over the recorded input, opening and closing told apart (Figure 9 of the paper)."""
+    with plain_style():
+        figure = Figure(figsize=(6.3, 4.2), layout="constrained")
+        axes = figure.subplots()
+        for which, marker, face, label in (
+            (curves.opens, "^", MEASURED, "measured, opening"),
+            (~curves.opens, "v", "none", "measured, closing"),
+        ):
+            if which.any():
+                _readings(axes, curves.input_mm[which], curves, which, marker, face, label)
+        for (name, gap_mm), (colour, dash) in zip(curves.predictions.items(), LINES, strict=False):
+            _path(axes, curves.input_mm, gap_mm, curves.runs, colour, dash, name)
+        axes.set_xlabel("input of the stage, mm")
+        axes.set_ylabel("gap between the fingertips, mm")
+        axes.set_title(title)
+        axes.legend(frameon=False)
+    return figure
+
+
+def gap_over_time(curves: GapCurves, title: str) -> Figure | None:
+    """Draw the same over time; None where the runs share no clock."""
+    if curves.time_s is None:
+        return None
+    with plain_style():
+        figure = Figure(figsize=(6.3, 3.2), layout="constrained")
+        axes = figure.subplots()
+        everything = np.ones(curves.gap_mm.size, dtype=bool)
+        _readings(axes, curves.time_s, curves, everything, "o", "none", "measured")
+        for (name, gap_mm), (colour, dash) in zip(curves.predictions.items(), LINES, strict=False):
+            _path(axes, curves.time_s, gap_mm, curves.runs, colour, dash, name)
+        axes.set_xlabel("time, s")
+        axes.set_ylabel("gap, mm")
+        axes.set_title(title)
+        axes.legend(frameon=False)
+    return figure
+
+
+def _readings(axes: Axes, x: Array, curves: GapCurves, which: Flags, marker: str, face: str, label: str) -> None:
+    gap_mm = curves.gap_mm[which]
+    if curves.gap_mm.size <= FEW_ROWS:
+        bars = f"{label}, with 95 % interval"
+        axes.errorbar(
+            x, gap_mm, curves.interval_mm[which], fmt=marker, color=MEASURED, mfc=face, ms=5, lw=0.8, label=bars
+        )
+    else:
+        axes.plot(x, gap_mm, marker, color=MEASURED, mfc=face, ms=2.5, mew=0.5, ls="none", label=label)
+
+
+def _path(axes: Axes, x: Array, gap_mm: Array, runs: tuple[slice, ...], colour: str, dash: str, name: str) -> None:
+    for number, run in enumerate(runs):
+        axes.plot(x[run], gap_mm[run], dash, color=colour, lw=1.3, label=name if number == 0 else None)

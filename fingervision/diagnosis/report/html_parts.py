@@ -1,0 +1,85 @@
+"""Pieces of a report's page: tables, lists, numbers that a program finds again, charts that need no network."""
+
+import math
+from collections.abc import Sequence
+from html import escape
+from pathlib import Path
+
+from fingervision.diagnosis.report.chart_data import Chart, charts_json
+from fingervision.diagnosis.report.gap_curves import COVERAGE_FACTOR
+from fingervision.domain.parameter import Estimate
+from fingervision.storage.provenance import Provenance
+
+PAGE = Path(__file__).parent / "page"
+# The live page's chart library, shipped once (uPlot, MIT).
+CHARTS = Path(__file__).parents[2] / "live" / "page"
+HINT = "Drag to zoom, double-click to see all; with the keyboard: arrows read values, + and - zoom, 0 shows all."
+
+
+def table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    """Lay out cells that are HTML already; wide tables scroll by themselves."""
+    top = "".join(f'<th scope="col">{escape(cell)}</th>' for cell in head)
+    body = "".join("<tr>" + "".join(f"<td>{cell}</td>" for cell in row) + "</tr>" for row in rows)
+    return f'<div class="scroll" tabindex="0" role="group"><table><tr>{top}</tr>{body}</table></div>'
+
+
+def bullets(items: Sequence[str]) -> str:
+    """List sentences; none at all is said."""
+    return "<ul>" + "".join(f"<li>{escape(item)}</li>" for item in items) + "</ul>" if items else "<p>Nothing.</p>"
+
+
+def number(value: float | None, unit: str = "mm", digits: int = 4) -> str:
+    """Write a number for a reader, with its full value for a program (HTML's `data` element)."""
+    if value is None:
+        return "-"
+    return f'<data value="{value!r}">{value:.{digits}g}</data> {escape(unit)}'.rstrip()
+
+
+def interval(e: Estimate) -> list[str]:
+    """Value and 95 % interval, to a tenth of the standard uncertainty."""
+    if e.u is None:
+        return [number(e.value, e.unit, 5), "at a bound"]
+    places = max(0, 1 - math.floor(math.log10(e.u))) if e.u > 0.0 else 6
+    low, high = e.value - COVERAGE_FACTOR * e.u, e.value + COVERAGE_FACTOR * e.u
+    value = f'<data value="{e.value!r}">{e.value:.{places}f}</data> {escape(e.unit)}'
+    return [value, f"{low:.{places}f} to {high:.{places}f} {escape(e.unit)}"]
+
+
+def chart(found: Chart, words: str) -> str:
+    """Leave the room for a chart that the script draws, with its value read out below."""
+    name = escape(str(found["id"]), quote=True)
+    return (
+        f'<div class="chart" id="{name}" tabindex="0" role="group" aria-label="{escape(words, quote=True)}. '
+        f'{HINT}"></div><p class="readout" aria-live="polite"></p>'
+    )
+
+
+def provenance_html(made: Provenance) -> str:
+    """Say which files, which command and which versions a result comes from."""
+    files = table(
+        ["used as", "file", "bytes", "SHA-256"],
+        [
+            [escape(f.role), escape(f.name), f"{f.size_bytes}", f"<code>{f.sha256}</code>"]
+            for f in made.files
+        ],
+    )  # fmt: skip
+    versions = ", ".join(f"{name} {version}" for name, version in made.versions.items())
+    return f"{files}<p>Made {escape(made.made_at)} by <code>{escape(made.command)}</code> with {escape(versions)}.</p>"
+
+
+def page(title: str, heading: str, verdict: str, sections: Sequence[tuple[str, str]], charts: list[Chart]) -> str:
+    """Put a whole page together: styles, charts and data stand in it, so that it opens without a network."""
+    style = (CHARTS / "uPlot.min.css").read_text(encoding="utf-8") + (PAGE / "report.css").read_text(encoding="utf-8")
+    library = (CHARTS / "uPlot.iife.min.js").read_text(encoding="utf-8")
+    script = (PAGE / "charts.js").read_text(encoding="utf-8")
+    body = "".join(f"<section><h2>{escape(name)}</h2>{content}</section>" for name, content in sections)
+    return (
+        '<!doctype html><html lang="en"><head><meta charset="utf-8">'
+        '<meta name="viewport" content="width=device-width, initial-scale=1">'
+        # A page without a picture of its own asks the server for one.
+        '<link rel="icon" href="data:,">'
+        f"<title>{escape(title)}</title><style>{style}</style></head><body><main>"
+        f'<h1>{escape(heading)}</h1><p class="verdict">{escape(verdict)}</p>{body}</main>'
+        f'<script type="application/json" id="figures">{charts_json(charts)}</script>'
+        f"<script>{library}</script><script>{script}</script></body></html>\n"
+    )

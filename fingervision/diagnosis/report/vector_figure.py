@@ -1,0 +1,45 @@
+"""Figures as files that a paper takes: SVG and PDF, the same bytes from the same numbers; PNG for a page."""
+
+import io
+from contextlib import AbstractContextManager
+from pathlib import Path
+
+import matplotlib as mpl
+from matplotlib.figure import Figure
+
+FORMATS = ("svg", "pdf")
+PNG_DPI = 110
+
+
+def plain_style() -> AbstractContextManager[None]:
+    """Give every figure of a report the same style; text stays text, so that it can be searched and set anew."""
+    style: dict[str, object] = {
+        "font.size": 9,
+        "axes.titlesize": 10,
+        "axes.spines.top": False,
+        "axes.spines.right": False,
+        "svg.fonttype": "none",
+        "svg.hashsalt": "fingervision",
+        "pdf.fonttype": 42,
+    }
+    return mpl.rc_context(style)  # type: ignore[arg-type]
+
+
+def write_vector(figure: Figure, stem: Path) -> tuple[Path, ...]:
+    """Write a figure as SVG and as PDF; `stem` is the path without its ending."""
+    written = []
+    for kind in FORMATS:
+        path = stem.with_name(f"{stem.name}.{kind}")
+        metadata = {"Date": None} if kind == "svg" else {"CreationDate": None, "Producer": None}
+        with plain_style():
+            figure.savefig(path, format=kind, metadata=metadata)
+        written.append(path)
+    return tuple(written)
+
+
+def png_bytes(figure: Figure) -> bytes:
+    """Draw a figure as the bytes of a PNG."""
+    buffer = io.BytesIO()
+    with plain_style():
+        figure.savefig(buffer, format="png", dpi=PNG_DPI)
+    return buffer.getvalue()

@@ -1,0 +1,153 @@
+"""The page and the figures of a report: self-contained, vector, and with the numbers that report.json holds."""
+
+import json
+import re
+import shutil
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+from click.testing import CliRunner, Result
+
+from fingervision.cli import cli
+from fingervision.diagnosis.report.frame_strip import strip_html, turning_rows
+
+CHROMIUM = shutil.which("chromium")
+PLAY_MM = 0.05
+
+
+def run(*words: object) -> Result:
+    return CliRunner().invoke(cli, [str(word) for word in words])
+
+
+@pytest.fixture(scope="module")
+def rig(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A straight model, one that is off by a tenth in slope, and a measurement with play in it."""
+    folder = tmp_path_factory.mktemp("rig <b>")
+    rng = np.random.default_rng(11)
+    turns = np.concatenate([np.linspace(0, 1, 80), np.linspace(1, 0, 80)])
+    u = np.concatenate([turns, turns])
+    place = u[0]
+    gap = []
+    for x in u.tolist():
+        place = min(max(place, x - PLAY_MM / 2), x + PLAY_MM / 2)
+        gap.append(2.0 + 3.0 * place + 0.001 * rng.standard_normal())
+    rows = "\n".join(f"{0.1 * k:.2f},{x:.6f},{g:.6f}" for k, (x, g) in enumerate(zip(u.tolist(), gap, strict=True)))
+    (folder / "measured.csv").write_text(f"time_s,input_mm,gap_mm\n{rows}\n", encoding="utf-8")
+    (folder / "straight.csv").write_text("input_mm,gap_mm\n-0.1,1.7\n1.1,5.3\n", encoding="utf-8")
+    (folder / "steep.csv").write_text("input_mm,gap_mm\n-0.1,1.67\n1.1,5.63\n", encoding="utf-8")
+    return folder
+
+
+@pytest.fixture(scope="module")
+def answer(rig: Path) -> Path:
+    out = rig / "answer"
+    done = run("diagnose", rig / "measured.csv", "--model", rig / "straight.csv", "--out", out)
+    assert done.exit_code == 0, done.output
+    return out
+
+
+def numbers_in(document: object) -> Iterator[float]:
+    if isinstance(document, dict):
+        for value in document.values():
+            yield from numbers_in(value)
+    elif isinstance(document, list):
+        for value in document:
+            yield from numbers_in(value)
+    elif isinstance(document, int | float) and not isinstance(document, bool):
+        yield float(document)
+
+
+def test_every_number_of_the_page_is_in_the_report(answer: Path) -> None:
+    page = (answer / "report.html").read_text(encoding="utf-8")
+    known = set(numbers_in(json.loads((answer / "report.json").read_text(encoding="utf-8"))))
+    shown = [float(value) for value in re.findall(r'<data value="([^"]+)"', page)]
+    assert len(shown) > 5
+    assert all(value in known for value in shown)
+
+
+def test_the_page_asks_nobody(answer: Path) -> None:
+    page = (answer / "report.html").read_text(encoding="utf-8")
+    assert not re.findall(r'(?:src|href)="(?!data:|#)[^"]*"', page)
+    assert len(page) < 2_000_000
+
+
+def test_figures_are_vectors_and_the_same_each_time(rig: Path, answer: Path) -> None:
+    again = rig / "again"
+    assert run("diagnose", rig / "measured.csv", "--model", rig / "straight.csv", "--out", again).exit_code == 0
+    for name in ("gap_against_input", "gap_over_time", "residuals"):
+        drawn = (answer / f"{name}.svg").read_bytes()
+        assert drawn == (again / f"{name}.svg").read_bytes()
+        assert b"<image" not in drawn
+        assert b"mm" in drawn
+        pdf = (answer / f"{name}.pdf").read_bytes()
+        assert pdf.startswith(b"%PDF")
+        assert b"/Subtype /Image" not in pdf
+
+
+def test_several_models_stand_in_one_table(rig: Path, answer: Path) -> None:
+    out = rig / "both"
+    models = [rig / "steep.csv", rig / "straight.csv", answer / "model.toml"]
+    words = [word for model in models for word in ("--model", model)]
+    done = run("compare", rig / "measured.csv", *words, "--out", out, "--json")
+    assert done.exit_code == 0, done.output
+    found = json.loads(done.output)["models"]
+    rms = {one["model"]: one["rms_mm"] for one in found}
+    assert list(rms) == ["steep.csv", "straight.csv", "model.toml"]
+    assert rms["model.toml"] < rms["straight.csv"] < rms["steep.csv"]
+    page = (out / "compare.html").read_text(encoding="utf-8")
+    assert all(name in page for name in rms)
+
+
+def test_one_model_is_diagnosed_at_a_time(rig: Path) -> None:
+    done = run("diagnose", rig / "measured.csv", "--model", rig / "straight.csv", "--model", rig / "steep.csv")
+    assert done.exit_code == 2
+    assert "compare" in done.output
+
+
+def test_the_same_model_twice_is_refused(rig: Path) -> None:
+    done = run("compare", rig / "measured.csv", "--model", rig / "steep.csv", "--model", rig / "steep.csv")
+    assert done.exit_code == 2
+
+
+def test_turning_points_are_found_and_their_frames_shown(tmp_path: Path) -> None:
+    sample = Path(__file__).parents[2] / "sample_frames" / "opening"
+    recording = tmp_path / "opening.mp4"
+    shutil.copy(sample / recording.name, recording)
+    words = ("--calibration", sample / "calibration.json", "--drive", sample / "drive.csv", "--out", tmp_path / "gaps")
+    assert run("measure", recording, *words).exit_code == 0
+    table = tmp_path / "gaps" / "gaps.csv"
+    turns = turning_rows(table)
+    drive = np.genfromtxt(sample / "drive.csv", delimiter=",", names=True)["input_mm"]
+    # The drive opens, closes and comes back.
+    assert [turn.input_mm for turn in turns[1:3]] == pytest.approx([drive.max(), drive.min()], abs=0.02)
+    strip = strip_html(table)
+    assert strip.count("<img") == len(turns)
+    assert f"gap {turns[1].gap_mm:.3f} mm" in strip
+    recording.write_bytes(recording.read_bytes()[:-1])
+    assert "<img" not in strip_html(table)  # another file of the same name is no witness
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(CHROMIUM is None, reason="chromium is not installed.")
+@pytest.mark.parametrize(("width", "scheme"), [(390, "dark"), (1280, "light"), (2560, "dark")])
+def test_a_browser_shows_it_without_a_word_or_a_request(answer: Path, width: int, scheme: str) -> None:
+    api = pytest.importorskip("playwright.sync_api", reason="playwright is not installed.")
+    with api.sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox", "--disable-gpu"])
+        page = browser.new_page(viewport={"width": width, "height": 900}, color_scheme=scheme)
+        said: list[str] = []
+        asked: list[str] = []
+        page.on("console", lambda message: said.append(message.text))
+        page.on("pageerror", lambda error: said.append(str(error)))
+        page.on("request", lambda request: asked.append(request.url))
+        page.goto((answer / "report.html").as_uri())
+        page.wait_for_selector("#gap-input canvas")
+        page.focus("#gap-input")
+        page.keyboard.press("ArrowRight")
+        page.wait_for_function("document.querySelector('#gap-input + .readout').textContent.includes('measured')")
+        assert page.evaluate("document.documentElement.scrollWidth") <= width
+        browser.close()
+    assert said == []
+    assert [url for url in asked if not url.startswith(("file:", "data:"))] == []
