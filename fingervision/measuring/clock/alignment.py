@@ -30,7 +30,7 @@ QUICK_PLAYS = (0.0, 0.02, 0.08, 0.3)
 """Plays from which every candidate is fitted, over the largest possible one."""
 OUTLIER_SIGMAS = 6.0
 """Beyond so many (robust) standard deviations a frame's gap is taken for wrong and left out of the fit."""
-SYSTEMATIC = 0.002
+SYSTEMATIC = 0.004
 """Share of the time between two frames and two rows that is known no better: what a curve between two rows is off at a
 turn, found by `python -m tests.benchmarks.clock` as the scatter that many frames do not average out."""
 ONE_PEAK = 0.25
