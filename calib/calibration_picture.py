@@ -4,6 +4,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from calib.line_scale import ScaleLines
 from calib.parallel_edges import ParallelEdges
 
 Floats = NDArray[np.float64]
@@ -56,6 +57,46 @@ def picture_of_edges(grey: NDArray[np.uint8] | NDArray[np.uint16], edges: Parall
         0.03,
     )
     return _signed(canvas, f"{words}   green: edges   orange: residuals x {times}")
+
+
+def picture_of_lines(
+    grey: NDArray[np.uint8] | NDArray[np.uint16],
+    lines: ScaleLines,
+    used: NDArray[np.bool_],
+    residual_um: Floats,
+    words: str,
+) -> Picture:
+    """Draw the middle of every line of a scale, and how far each is off its place, magnified.
+
+    Parameters
+    ----------
+    grey : ndarray, shape (height, width)
+        The picture.
+    lines : ScaleLines
+        What was found in it.
+    used : ndarray of bool, shape (n,)
+        Lines that were used are green, the others orange.
+    residual_um : ndarray, shape (n,)
+        What the scale leaves of each.
+    words : str
+        Written above.
+
+    Returns
+    -------
+    ndarray of uint8, shape (height, width, 3)
+        Red, green and blue.
+    """
+    canvas, zoom = _canvas(grey)
+    along = np.array([-lines.across[1], lines.across[0]])
+    half = 0.5 * (lines.rows[1] - lines.rows[0])
+    times = DRAWN_PX / max(float(np.max(np.abs(residual_um[used]))), 1e-9)
+    for middle, is_used in zip(lines.middle_px, used, strict=True):
+        ends = np.stack([middle - half * along, middle + half * along])
+        _polyline(canvas, _zoomed(ends, zoom), GREEN if is_used else ORANGE)
+    off = lines.middle_px[used] + (times * residual_um[used])[:, None] * along
+    _polyline(canvas, _zoomed(lines.middle_px[used], zoom), WHITE)
+    _polyline(canvas, _zoomed(off, zoom), BLUE)
+    return _signed(canvas, f"{words}   blue: residuals, {1.0 / times:.2g} um a pixel")
 
 
 def picture_of_corners(

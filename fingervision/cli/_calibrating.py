@@ -55,7 +55,7 @@ def calibrate_on_sizes(
         from calib.scale_from_sizes import MeasuredSize, scale_from_sizes
         from fingervision.cli import _calibration_report as report
 
-        _refuse_foreign(out)
+        refuse_foreign(out)
         stored = read_references(items, kind, u_size_mm)
         read_with = PictureResponse.of(response, [path for _, path, _ in named_references(items, kind)])
         pictures = [replace(picture, grey=read_with.light(picture.grey)) for picture in stored]
@@ -74,11 +74,11 @@ def calibrate_on_sizes(
         ]
         height, width = pictures[0].grey.shape
         fit = scale_from_sizes(sizes, (width, height), bench, stated, 0.0 if read_with.is_known else shift_px)
-        calibration = _written(read_with.noted(fit.calibration, shift_px), out, camera)
+        calibration = written(read_with.noted(fit.calibration, shift_px), out, camera)
         if not no_picture:
             for picture, edge in zip(stored, edges, strict=True):
                 words = f"{picture.name}: {picture.size_mm:g} mm = {edge.width_px:.3f} px"
-                _write_picture(out, picture.name, picture_of_edges(picture.grey, edge, words))
+                write_picture(out, picture.name, picture_of_edges(picture.grey, edge, words))
         if as_json:
             more = {
                 "out": str(out),
@@ -130,7 +130,7 @@ def calibrate_on_board(
         from calib.scale_from_board import scale_from_board
         from fingervision.cli import _calibration_report as report
 
-        _refuse_foreign(out)
+        refuse_foreign(out)
         columns, rows = _squares(squares)
         u_square = 0.001 * square_mm if u_square_mm is None else u_square_mm
         board = Board(columns, rows, square_mm, u_square, marker_mm)
@@ -144,12 +144,12 @@ def calibrate_on_board(
         certified = tuple(replace(each, certificate=certificate, date=date) for each in fit.calibration.references)
         # A board's corners lie between equal edges on every side: a response does not move them.
         noted = read_with.noted(replace(fit.calibration, references=certified), 0.0)
-        calibration = _written(noted, out, camera)
+        calibration = written(noted, out, camera)
         if not no_picture:
             residuals = [fit.plane.residual_px] if fit.lens is None else fit.lens.residual_px
             for grey, found, residual in zip(stored, corners, residuals, strict=True):
                 words = f"{found.name}: {len(found.points_px)} corners"
-                _write_picture(out, found.name, picture_of_corners(grey, found.points_px, residual, words))
+                write_picture(out, found.name, picture_of_corners(grey, found.points_px, residual, words))
         if as_json:
             more = {
                 "out": str(out),
@@ -171,7 +171,7 @@ def _squares(squares: str) -> tuple[int, int]:
     return columns, rows
 
 
-def _refuse_foreign(out: Path) -> None:
+def refuse_foreign(out: Path) -> None:
     """Overwrite a calibration, never anything else."""
     if not out.exists():
         return
@@ -183,7 +183,8 @@ def _refuse_foreign(out: Path) -> None:
         raise FingervisionError(f"{out} stands there already and is no calibration; name another file with -o.")
 
 
-def _written(calibration: "Calibration", out: Path, camera: Sequence[str]) -> "Calibration":
+def written(calibration: "Calibration", out: Path, camera: Sequence[str]) -> "Calibration":
+    """Write a calibration with the camera's settings, the date and the software; return it so."""
     from datetime import UTC, datetime
 
     from fingervision.storage.calibration_json import write_calibration
@@ -204,7 +205,8 @@ def _written(calibration: "Calibration", out: Path, camera: Sequence[str]) -> "C
     return complete
 
 
-def _write_picture(out: Path, name: str, picture: "NDArray[np.uint8]") -> None:
+def write_picture(out: Path, name: str, picture: "NDArray[np.uint8]") -> None:
+    """Write a calibration picture beside the calibration."""
     import cv2
 
     path = out.with_name(f"{out.stem}_{Path(name).stem}.png")

@@ -1,78 +1,133 @@
-"""`fingervision model --modes`: natural frequencies and the shapes of the finite elements' modes."""
+"""`fingervision model --modes`: natural frequencies, their shapes drawn, and as a film."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from fractions import Fraction
+from math import ceil, cos, pi
 from pathlib import Path
 from typing import Any
 
+import av
 import click
 import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
-from matplotlib.tri import Triangulation
-from numpy.typing import NDArray
 
-_FAMILIES = (
-    ("drive free", False, 1.0),
-    ("drive held", True, 1.0),
-    ("swaying, drive free across", None, -1.0),
-)
-_MOST_DRAWN = 5
-_SHOWN = 0.08
-"""Of the body's height: the largest motion in a drawn shape."""
+from fingervision.domain.errors import FingervisionError
+from fingervision.models.driven_body import DrivenBody
+from fingervision.models.mode_shapes import ModeShape, ModesWanted, gripper_mode_shapes
+
+_BEST = ("finite_element", "lumped")
+_A_ROW = 6
+_PICTURES, _PERIODS, _A_SECOND = 24, 4, 24
+"""Pictures in a period, periods in the film, pictures a second: one period takes one second, whatever the frequency."""
+_FILM_DPI = 80
+_MARGIN = 0.02
+_MOST_FILM_MODES = 18
 
 
-def write_modes(models: Mapping[str, Any], count: int, name: str, out: Path, *, as_json: bool) -> None:
-    """Write modes.csv for every kind that vibrates, and modes.png of the finite elements."""
+def write_gripper_modes(
+    models: Mapping[str, Any], wanted: ModesWanted, name: str, out: Path, *, film: bool, as_json: bool
+) -> None:
+    """Write modes.csv for every kind that vibrates, and the pictures of the best of them."""
+    found = {
+        kind: gripper_mode_shapes(model, wanted)
+        for kind, model in models.items()
+        if isinstance(getattr(model, "half", None), DrivenBody)
+    }
+    write_modes(found, name, out, film=film, as_json=as_json)
+
+
+def write_modes(found: Mapping[str, Sequence[ModeShape]], name: str, out: Path, *, film: bool, as_json: bool) -> None:
+    """Write modes.csv, modes.png and, where asked for, modes.mp4."""
     lines = ["kind,family,number,frequency_hz"]
-    for kind, model in models.items():
-        half = getattr(model, "half", None)
-        if half is None:
-            continue
-        for family, held, _ in _FAMILIES:
-            rad_s, shapes = half.swaying_modes(count=count) if held is None else half.modes(
-                drive_held=held, count=count)  # fmt: skip
-            lines += [f"{kind},{family.replace(',', '')},{i},{w / (2 * np.pi):.7g}" for i, w in enumerate(rad_s, 1)]
+    for kind, shapes in found.items():
+        lines += [f"{kind},{s.family},{s.number},{s.frequency_hz:.7g}" for s in shapes]
+        for family in dict.fromkeys(s.family for s in shapes):
+            values = ", ".join(f"{s.frequency_hz:.5g}" for s in shapes if s.family == family)
             if not as_json:
-                click.echo(f"{kind}, {family}: " + ", ".join(f"{w / (2 * np.pi):.5g}" for w in rad_s) + " Hz")
-            del shapes
+                click.echo(f"{kind}, {family}: {values} Hz")
     (out / "modes.csv").write_text("\n".join(lines) + "\n", encoding="utf-8")
-    if "finite_element" in models:
-        _draw(models["finite_element"], min(count, _MOST_DRAWN), name, out / "modes.png")
+    drawn = next((found[kind] for kind in _BEST if kind in found), ())
+    if not drawn:
+        click.echo("No mode lies in what --modes asks for: nothing is drawn.", err=True)
+        return
+    title = f"{name}: natural modes in the plane, without the actuator's mass"
+    figure, _ = _panels(drawn, title)
+    figure.savefig(out / "modes.png", dpi=110)
+    if film:
+        _film(drawn[:_MOST_FILM_MODES], title, out / "modes.mp4")
+        if len(drawn) > _MOST_FILM_MODES and not as_json:
+            click.echo(f"modes.mp4 shows the first {_MOST_FILM_MODES} of {len(drawn)} modes.")
 
 
-def _way_to_meeting(x: NDArray[np.float64], across: NDArray[np.float64]) -> float:
-    """How large a shape may be drawn before a point of the half meets the symmetry axis."""
-    closing = (across < 0.0) & (x > 1e-9 * float(x.max()))
-    return float(np.min(-x[closing] / across[closing], initial=np.inf))
-
-
-def _draw(model: Any, count: int, name: str, path: Path) -> None:
-    plate, half = model.plate, model.half
-    corners = plate.corner_triangles
-    nodes = int(corners.max()) + 1
-    x, y = plate.nodes_mm[:, :nodes]
-    figure = Figure(figsize=(2.6 * count + 0.6, 9.5), layout="constrained")
-    figure.suptitle(f"{name}: natural modes in the plane, without the actuator's mass")
-    rows = figure.subplots(len(_FAMILIES), count, squeeze=False)
-    for row, (family, held, mirror) in zip(rows, _FAMILIES, strict=True):
-        rad_s, shapes = half.swaying_modes(count=count) if held is None else half.modes(drive_held=held, count=count)
-        for axes, angular, shape in zip(row, rad_s, shapes.T, strict=True):
-            across, along = shape[plate.x_dofs[:nodes]], shape[plate.y_dofs[:nodes]]
-            scale = _SHOWN * float(np.ptp(y)) / float(np.hypot(across, along).max())
-            if mirror > 0.0:
-                # Halves that mirror each other are drawn opening, and no farther than to where they would meet.
-                ways = [_way_to_meeting(x, sign * across) for sign in (1.0, -1.0)]
-                turned = 1.0 if ways[0] >= ways[1] else -1.0
-                scale = turned * min(scale, max(ways))
-            # The left half mirrors the right one; where both sway the same way its motion is turned round.
-            for side, sign in ((1.0, 1.0), (-1.0, mirror)):
-                moved = side * (x + sign * scale * across), y + sign * scale * along
-                axes.triplot(Triangulation(side * x, y, corners.T), color="0.85", linewidth=0.2)
-                axes.triplot(Triangulation(moved[0], moved[1], corners.T), color="C0", linewidth=0.2)
+def _panels(shapes: Sequence[ModeShape], title: str) -> tuple[Figure, list[tuple[Axes, LineCollection, ModeShape]]]:
+    """Draw every mode in a panel of its own, each family beginning a row; return what moves in it."""
+    families = [[s for s in shapes if s.family == f] for f in dict.fromkeys(s.family for s in shapes)]
+    columns = min(_A_ROW, max(map(len, families)))
+    if columns == 1:
+        families, columns = [list(shapes)], min(_A_ROW, len(shapes))
+    rows = [family[i : i + columns] for family in families for i in range(0, len(family), columns)]
+    every = np.concatenate([(s.lines_mm + sign * s.shift_mm).reshape(-1, 2) for s in shapes for sign in (-1.0, 1.0)])
+    margin = _MARGIN * float(np.ptp(every, axis=0).max())
+    low, high = every.min(axis=0) - margin, every.max(axis=0) + margin
+    ratio = float((high[1] - low[1]) / (high[0] - low[0]))
+    width = 2.6 if ratio > 0.4 else 3.4
+    figure = Figure(figsize=(max(width * columns, 5.0) + 0.6, (width * ratio + 0.9) * len(rows) + 0.5),
+                    layout="constrained")  # fmt: skip
+    figure.suptitle(title, fontsize="medium")
+    grid = figure.subplots(len(rows), columns, squeeze=False)
+    moving = []
+    for place, row in enumerate(rows):
+        for axes, shape in zip(grid[place], [*row, *[None] * (columns - len(row))], strict=True):
+            if shape is None:
+                axes.set_axis_off()
+                continue
+            axes.add_collection(LineCollection(list(shape.lines_mm), colors="0.75", linewidths=0.8))
+            curve = LineCollection(list(shape.lines_mm + shape.shift_mm), colors="C0", linewidths=1.0)
+            axes.add_collection(curve)
+            axes.set_xlim(low[0], high[0])
+            axes.set_ylim(low[1], high[1])
             axes.set_aspect("equal")
-            axes.set_title(f"{family}\n{angular / (2 * np.pi):.4g} Hz", fontsize="small")
+            axes.set_title(f"{shape.family}\n{shape.number}: {shape.frequency_hz:.4g} Hz", fontsize="small")
             axes.tick_params(labelsize="x-small")
-    for axes in rows[-1]:
-        axes.set_xlabel("x / mm", fontsize="small")
-    for row in rows:
-        row[0].set_ylabel("y / mm", fontsize="small")
-    figure.savefig(path, dpi=120)
+            axes.set_xlabel("x / mm", fontsize="x-small")
+            moving.append((axes, curve, shape))
+        grid[place][0].set_ylabel("y / mm", fontsize="x-small")
+    return figure, moving
+
+
+def _film(shapes: Sequence[ModeShape], title: str, path: Path) -> None:
+    """Write every mode swinging at one period a second, side by side."""
+    figure, moving = _panels(shapes, f"{title}; slowed to one swing a second")
+    # H.264 with halved colour needs even sides.
+    sides = [2 * ceil(side * _FILM_DPI / 2) / _FILM_DPI for side in figure.get_size_inches()]
+    figure.set_size_inches(sides[0], sides[1])
+    figure.set_dpi(_FILM_DPI)
+    canvas: Any = FigureCanvasAgg(figure)
+    for _, curve, _ in moving:
+        curve.set_visible(False)
+    canvas.draw()
+    still = canvas.copy_from_bbox(figure.bbox)
+    pictures = []
+    for picture in range(_PICTURES):
+        canvas.restore_region(still)
+        swing = cos(2.0 * pi * picture / _PICTURES)
+        for axes, curve, shape in moving:
+            curve.set_visible(True)
+            curve.set_segments(list(shape.lines_mm + swing * shape.shift_mm))
+            axes.draw_artist(curve)
+        pictures.append(np.ascontiguousarray(np.asarray(canvas.buffer_rgba())[..., :3]))
+    try:
+        with av.open(f"file:{path}", "w") as container:
+            stream = container.add_stream("libx264", rate=_A_SECOND, options={"crf": "20", "preset": "veryfast"})
+            stream.height, stream.width = pictures[0].shape[:2]
+            stream.pix_fmt = "yuv420p"
+            for place in range(_PERIODS * _PICTURES):
+                frame = av.VideoFrame.from_ndarray(pictures[place % _PICTURES], format="rgb24")
+                frame.pts, frame.time_base = place, Fraction(1, _A_SECOND)
+                container.mux(stream.encode(frame))
+            container.mux(stream.encode(None))
+    except (av.FFmpegError, OSError) as error:
+        raise FingervisionError(f"The film of the modes could not be written to {path}: {error}.") from error

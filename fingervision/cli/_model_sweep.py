@@ -1,63 +1,110 @@
 """`fingervision model --vary`: a table and a plot over numbers of the drawing."""
 
 import json
+from collections.abc import Sequence
 from pathlib import Path
 
 import click
+import matplotlib as mpl
 import numpy as np
+from matplotlib.cm import ScalarMappable
+from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
+from numpy.typing import NDArray
 
-from fingervision.domain.errors import FingervisionError
 from fingervision.domain.gripper import Gripper
+from fingervision.models.gripper_figures import label_of, unit_of
 from fingervision.models.hinge_correction import HingeTheory
-from fingervision.models.parameter_sweep import COLUMNS, parse_variation, sweep_answers
-
-_LABELS = (
-    "gap per input / (mm/mm)",
-    "force per input / (N/mm)",
-    "largest stress per input / (MPa/mm)",
-    "input at yield / mm",
+from fingervision.models.parameter_sweep import (
+    COLUMNS,
+    Variation,
+    mechanism_sweep_answers,
+    parse_variation,
+    sweep_answers,
 )
+from fingervision.storage.mechanism_toml import MechanismDrawing
+from fingervision.storage.out_folder import out_folder
+
 _MOST_ROWS_PRINTED = 40
+_MOST_PANELS = 6
+_ENDS = {"_mm": "mm", "_deg": "degrees", "_mpa": "MPa", "_kg_m3": "kg/m3", "_per_k": "1/K"}
+Array = NDArray[np.float64]
 
 
 def sweep(
     gripper: Gripper, name: str, texts: tuple[str, ...], theory: HingeTheory, out: Path, *, as_json: bool
 ) -> None:
-    """Write vary.csv and vary.png, and print the table."""
+    """Write vary.csv and vary.png of a gripper, and print the table."""
     variations = [parse_variation(text) for text in texts]
     values, answers = sweep_answers(gripper, variations, theory)
-    try:
-        out.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise FingervisionError(f"--out must be a folder that can be written, but {out}: {error.strerror}.") from error
-    header = [*(variation.name for variation in variations), *COLUMNS]
+    _write(name, variations, values, COLUMNS, answers, out, as_json=as_json)
+
+
+def sweep_mechanism(drawing: MechanismDrawing, texts: tuple[str, ...], out: Path, *, as_json: bool) -> None:
+    """Write vary.csv and vary.png of a mechanism drawn by bodies, and print the table."""
+    variations = [parse_variation(text) for text in texts]
+    values, columns, answers = mechanism_sweep_answers(
+        lambda changes: drawing.mechanism(changes, absolute=True), variations
+    )
+    _write(drawing.mechanism().name, variations, values, columns, answers, out, as_json=as_json)
+
+
+def number_unit(name: str) -> str:
+    """Return the unit of a drawing's number by its name; lengths that a drawing names itself are in mm."""
+    return next((unit for end, unit in _ENDS.items() if name.endswith(end)), "mm" if "lengths." in name else "1")
+
+
+def _write(
+    name: str, variations: Sequence[Variation], values: Array, columns: Sequence[str], answers: Array, out: Path,
+    *, as_json: bool,
+) -> None:  # fmt: skip
+    varied = [variation.name for variation in variations]
     table = np.concatenate([values, answers], axis=1)
+    header = [*varied, *columns]
     lines = [",".join(header), *(",".join(f"{v:.7g}" if np.isfinite(v) else "" for v in row) for row in table)]
-    (out / "vary.csv").write_text("\n".join(lines) + "\n", encoding="utf-8")
-    figure = Figure(figsize=(9.0, 6.5), layout="constrained")
-    figure.suptitle(f"{name}: lumped model over {variations[-1].name}")
-    last = variations[-1].values
-    others = values[:: len(last), :-1]
-    for place, (axes, label) in enumerate(zip(figure.subplots(2, 2, sharex=True).ravel(), _LABELS, strict=True)):
-        for row, other in enumerate(others):
-            curve = answers[row * len(last) : (row + 1) * len(last), place]
-            axes.plot(last, curve, marker=".", label=", ".join(f"{v:.4g}" for v in other) or None)
-        axes.set_ylabel(label)
-        axes.set_xlabel(variations[-1].name)
-        axes.grid(alpha=0.3)
-    if len(variations) > 1 and len(others) <= 12:
-        axes.legend(title=", ".join(v.name for v in variations[:-1]), fontsize="x-small")
-    figure.savefig(out / "vary.png", dpi=130)
+    with out_folder(out):
+        (out / "vary.csv").write_text("\n".join(lines) + "\n", encoding="utf-8")
+        _draw(name, variations, values, columns, answers, out / "vary.png")
     if as_json:
-        rows = [
-            {k: (v if np.isfinite(v) else None) for k, v in zip(header, row, strict=True)} for row in table.tolist()
-        ]
+        rows = [{k: (v if np.isfinite(v) else None) for k, v in zip(header, row, strict=True)}
+                for row in table.tolist()]  # fmt: skip
         click.echo(json.dumps(rows, indent=2))
         return
-    widths = [max(len(text), 10) for text in header]
-    click.echo("  ".join(f"{text:>{width}}" for text, width in zip(header, widths, strict=True)))
+    shown = [f"{n} [{number_unit(n)}]" for n in varied]
+    shown += [c if c.endswith("]") else f"{c} [{unit_of(c)}]" for c in columns]
+    widths = [max(len(text), 10) for text in shown]
+    click.echo("  ".join(f"{text:>{width}}" for text, width in zip(shown, widths, strict=True)))
     for row in table[:_MOST_ROWS_PRINTED].tolist():
-        click.echo("  ".join(f"{value:>{width}.5g}" for value, width in zip(row, widths, strict=True)))
+        cells = (f"{value:.5g}" if np.isfinite(value) else "-" for value in row)
+        click.echo("  ".join(f"{cell:>{width}}" for cell, width in zip(cells, widths, strict=True)))
     if len(table) > _MOST_ROWS_PRINTED:
         click.echo(f"... {len(table) - _MOST_ROWS_PRINTED} more rows in {out / 'vary.csv'}")
+
+
+def _draw(
+    name: str, variations: Sequence[Variation], values: Array, columns: Sequence[str], answers: Array, path: Path
+) -> None:
+    """Draw every column over the number that runs fastest; the first number colours the curves of a grid."""
+    last = variations[-1]
+    count = len(last.values)
+    first = values[::count, 0]
+    colours = mpl.colormaps["viridis"]
+    scale = Normalize(float(first.min()), float(first.max()) if np.ptp(first) > 0.0 else float(first.min()) + 1.0)
+    panels = [place for place in range(len(columns)) if np.isfinite(answers[:, place]).any()][:_MOST_PANELS]
+    figure = Figure(figsize=(12.5, 3.4 * ((len(panels) + 2) // 3) + 0.6), layout="constrained")
+    figure.suptitle(f"{name}: lumped model over {' and '.join(v.name for v in variations)}")
+    grid = figure.subplots((len(panels) + 2) // 3, 3, squeeze=False).ravel()
+    for axes, place in zip(grid, panels, strict=False):
+        for row, value in enumerate(first):
+            curve = answers[row * count : (row + 1) * count, place]
+            colour = colours(scale(value)) if len(variations) > 1 else "C0"
+            axes.plot(last.values, np.where(np.isfinite(curve), curve, np.nan), marker=".", color=colour)
+        axes.set_ylabel(label_of(columns[place]), fontsize="small")
+        axes.set_xlabel(f"{last.name} / {number_unit(last.name)}", fontsize="small")
+        axes.grid(alpha=0.3)
+    for axes in grid[len(panels) :]:
+        axes.set_axis_off()
+    if len(variations) > 1:
+        label = f"{variations[0].name} / {number_unit(variations[0].name)}"
+        figure.colorbar(ScalarMappable(scale, colours), ax=list(grid), label=label)
+    figure.savefig(path, dpi=130)

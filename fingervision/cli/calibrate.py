@@ -41,6 +41,12 @@ Examples:
   fingervision calibrate response e05.png=0.5 e10.png=1 e20.png=2 e40.png=4 -o response.csv
   fingervision measure run.mkv --calibration calibration.json --response response.csv
 """
+SCALE_EXAMPLES = """
+\b
+Examples:
+  fingervision calibrate scale micrometer.png --pitch-mm 0.01 -o calibration.json
+  fingervision calibrate scale micrometer.png --pitch-mm 0.1 --roi 0,200,1280,300 --u-length-mm 0.0005
+"""
 CHECK_EXAMPLES = """
 \b
 Example:
@@ -165,6 +171,27 @@ def charuco(marker_mm: float | None, square_mm: float, **options: Any) -> None:
     As `chessboard`, but --squares counts squares.
     """
     calibrate_on_board(marker_mm=0.75 * square_mm if marker_mm is None else marker_mm, square_mm=square_mm, **options)
+
+
+@command.command("scale", epilog=SCALE_EXAMPLES)
+@click.argument("image", type=click.Path(path_type=Path))
+@click.option("--pitch-mm", type=float, required=True, help="Certified distance of neighbouring lines, mm.")
+@click.option("--u-line-mm", default=0.0003, show_default=True, help="Standard uncertainty of every line's place, mm.")
+@click.option(
+    "--u-length-mm", default=0.001, show_default=True, help="Standard uncertainty of the length over all lines, mm."
+)
+@click.option("--roi", metavar="X,Y,W,H", help="Look in this part of the picture.")
+@limit_options
+@_output_options
+def scale(**options: Any) -> None:
+    """Calibrate on a line scale (stage micrometer) over all its lines, in any direction.
+
+    The middles of the lines give the scale: blooming and the camera's response move a line's two edges in opposite
+    senses and leave its middle alone. The edge bias of a gap stays in the budget, with its limit.
+    """
+    from fingervision.cli._calibrating_lines import calibrate_on_lines
+
+    calibrate_on_lines(**options)
 
 
 @command.command("response", epilog=RESPONSE_EXAMPLES)

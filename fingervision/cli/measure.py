@@ -64,6 +64,13 @@ Exit codes: 0 done; 1 could not, or no frame gave a number; 2 wrong usage;
     show_default=True,
     help="Whether the fingers are darker or lighter than their ground.",
 )
+@click.option(
+    "--face",
+    type=click.Choice(["front", "outline"]),
+    default="front",
+    show_default=True,
+    help="Edge of a thick part: of the face towards the camera, or of its outline, side walls included.",
+)
 @click.option("--overlay", is_flag=True, help="Also write overlay.mp4.")
 @click.option("--steps", "steps_frame", type=int, metavar="FRAME", help="Also write every step of this frame (from 0).")
 @click.option(
@@ -85,6 +92,7 @@ def command(
     response: str,
     bits: int | None,
     fingers: str,
+    face: str,
     overlay: bool,
     steps_frame: int | None,
     out: Path | None,
@@ -114,6 +122,7 @@ def command(
         response=response_named(response),
         bits=bits,
         fingers_are_dark={"auto": None, "dark": True, "light": False}[fingers],
+        is_outline=face == "outline",
     )
     source = open_source(recording, Wish(rate_hz=rate_hz))
     with _Bar() as bar:

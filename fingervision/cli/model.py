@@ -22,6 +22,10 @@ Examples:
   fingervision model gripper.toml --kind all --drive drive.csv --out model
   fingervision model gripper.toml --kind finite_element --large-rotation --contact --mesh --out model
   fingervision model gripper.toml --kind lumped --vary hinge.thickness_mm=0.6:1.4:9
+  fingervision model gripper.toml --kind lumped --drive drive.csv --damping paper --rate-hz 2000
+  fingervision model gripper.toml --kind lumped --object-mm 3 --object-n-mm 50
+  fingervision model gripper.toml --kind lumped --frequency 1:500 --modes 500Hz --film
+  fingervision model mechanism.toml --vary lengths.t=0.2:0.4:5
   fingervision model mechanism.toml --large-rotation --mesh --out model
 """
 
@@ -37,7 +41,16 @@ Examples:
               help="Hinge compliance: beam theory corrected by finite elements, or beam theory alone.")  # fmt: skip
 @click.option("--large-rotation", is_flag=True, help="Equilibrium in the deformed shape (not for stiffness_matrix).")
 @click.option("--contact", is_flag=True, help="Fingers touch and stop (not for stiffness_matrix).")
-@click.option("--modes", type=click.IntRange(1, 40), help="How many natural modes of each family to write and draw.")
+@click.option("--modes", metavar="N|F", help="Write and draw N natural modes of each family, or all up to a frequency "
+              "such as 500Hz.")  # fmt: skip
+@click.option("--film", is_flag=True, help="With --modes: the modes in motion too, modes.mp4.")
+@click.option("--frequency", metavar="A:B", help="Response to a drive that shakes it at A to B Hz: frequency.csv and "
+              "frequency.png.")  # fmt: skip
+@click.option("--damping", default="modal:0.025", show_default=True, metavar="LAW", help="In motion: modal:RATIO, "
+              "loss:FACTOR, rayleigh:RATIO:HZ:HZ or paper[:GAMMA] (equation 4 above the lowest mode).")  # fmt: skip
+@click.option("--rate-hz", type=float, help="Rows a second of response.csv, beside the drive's own samples.")
+@click.option("--object-mm", type=float, help="Width of a part between the fingers: grip.csv and grip.png.")
+@click.option("--object-n-mm", type=float, help="Stiffness of that part in N/mm; rigid where left out.")
 @click.option("--mesh", is_flag=True, help="Draw the mesh of the finite elements to mesh.png.")
 @click.option("--vary", multiple=True, metavar="NAME=A:B:N", help="Table over one number of the drawing, N values from "
               "A to B; several make a grid. Writes vary.csv and vary.png, by the lumped model.")  # fmt: skip
@@ -50,7 +63,13 @@ def command(
     hinge: str,
     large_rotation: bool,
     contact: bool,
-    modes: int | None,
+    modes: str | None,
+    film: bool,
+    frequency: str | None,
+    damping: str,
+    rate_hz: float | None,
+    object_mm: float | None,
+    object_n_mm: float | None,
     mesh: bool,
     vary: tuple[str, ...],
     as_json: bool,
@@ -58,12 +77,16 @@ def command(
     """Predict gap, force, stress and vibration from a drawing, by one model or all of them.
 
     Writes models.csv, simulation.csv (in a folder per model with --kind all), models.png (the paper's Figure 9, with
-    differences) and deformed.png (with finite elements). A mechanism drawn by bodies (mechanism.toml) is answered by
-    finite elements: mechanism.csv, deformed.png.
+    differences) and deformed.png (with finite elements). With --drive also response.csv, the gap and the force over
+    the drive's time, which compare and diagnose take as measured, and response.png. A mechanism drawn by bodies
+    (mechanism.toml) is answered by finite elements: mechanism.csv, deformed.png.
     """
-    from fingervision.cli._model_report import loaded_rows, print_table, say_what_limits, write_table
-    from fingervision.domain.errors import FingervisionError
+    from fingervision.cli._model_grip import part_asked, write_grip
+    from fingervision.cli._model_motion import motion_asked, move
+    from fingervision.cli._model_report import print_table, say_what_limits, write_table
+    from fingervision.domain.errors import FingervisionError, UsageError
     from fingervision.models.agreement import disagreements
+    from fingervision.models.gripper_figures import gripper_figures
     from fingervision.models.hinge_correction import HingeTheory
     from fingervision.models.kinds import build_model, kinds
     from fingervision.models.physics import LINEAR, Physics
@@ -71,19 +94,28 @@ def command(
     from fingervision.storage.mechanism_toml import is_mechanism
     from fingervision.storage.simulation_csv import write_simulation
 
+    asked = motion_asked(drive, modes, frequency, damping, rate_hz, film=film)
     if is_mechanism(gripper_toml):
         from fingervision.cli._mechanism import predict
 
+        if object_mm is not None or object_n_mm is not None:
+            raise UsageError("--object-mm is known for grippers alone; leave it out for a mechanism drawn by bodies.")
         predict(
-            gripper_toml, kind, drive, out, large_rotation=large_rotation, contact=contact, mesh=mesh, as_json=as_json
-        )
+            gripper_toml, kind, drive, out, asked, vary,
+            large_rotation=large_rotation, contact=contact, mesh=mesh, as_json=as_json,
+        )  # fmt: skip
         return
     gripper = read_gripper(gripper_toml)
+    part = part_asked(object_mm, object_n_mm, gripper.body.rest_gap_mm)
     if vary:
         from fingervision.cli._model_sweep import sweep
 
         sweep(gripper, gripper_toml.stem, vary, HingeTheory(hinge), out, as_json=as_json)
         return
+    if uncertain := any(u > 0.0 for u in gripper.uncertainties.values()):
+        from fingervision.models.gripper_uncertainty import check_uncertainties
+
+        check_uncertainties(gripper)
     wanted = kinds() if kind == "all" else (kind,)
     physics = Physics(large_rotation=large_rotation, contact=contact)
     inputs = None if drive is None else _inputs_mm(drive, gripper)
@@ -101,7 +133,7 @@ def command(
             figures[name] = model.figures()
             given = _inputs_until_touch(figures[name]) if inputs is None else inputs
             answers[name] = model.respond(given)
-            row = loaded_rows(gripper, model, figures[name], given)
+            row = gripper_figures(gripper, model, given, figures[name])
         except FingervisionError as error:
             # One kind's failure leaves the others their results.
             figures.pop(name, None)
@@ -121,10 +153,17 @@ def command(
     _draw(gripper_toml.stem, gripper, inputs, models, answers, out, mesh=mesh)
     write_table(rows, out / "models.csv")
     print_table(rows, as_json=as_json)
-    if modes is not None:
-        from fingervision.cli._model_modes import write_modes
+    if uncertain:
+        from fingervision.cli._model_uncertainty import write_uncertainty
+        from fingervision.models.gripper_uncertainty import gripper_uncertainty
 
-        write_modes(models, modes, gripper_toml.stem, out, as_json=as_json)
+        spread = gripper_uncertainty(gripper, inputs, HingeTheory(hinge), physics)
+        write_uncertainty(spread, rows, gripper_toml.stem, out, as_json=as_json)
+    folders = {name: out / name if kind == "all" else out for name in models}
+    move(models, asked, gripper_toml.stem, folders, out, as_json=as_json)
+    if part is not None:
+        given_inputs = None if drive is None else inputs
+        write_grip(gripper, models, part, given_inputs, gripper_toml.stem, out, as_json=as_json)
     for sentence in disagreements(figures):
         click.echo(f"Warning: {sentence}", err=True)
     say_what_limits(gripper, models, figures, inputs, physics, as_json=as_json)

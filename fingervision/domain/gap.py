@@ -61,6 +61,14 @@ class GapMeasurement:
     response_shift_px : float
         How much larger `gap_px` is than it would be if the other camera response that is possible were the true one;
         zero where the response is known.
+    roughness_px : float
+        Standard deviation of the edges about their mean line where they are rough or printed with a texture; zero where
+        they stray no more than their noise. What is measured is the mean line; a contact is made by the crests.
+    fields_apart_px : float
+        How far apart even and odd rows see the faster finger; zero where they agree. The gap is that of the middle.
+    beside : str
+        What stands beside the edges or has moved them: wall, shadow, glare, motion, sharpening; empty where nothing is
+        seen.
     """
 
     left: FingerEdge
@@ -70,6 +78,9 @@ class GapMeasurement:
     light_gap: bool
     u_shift_px: float = 0.0
     response_shift_px: float = 0.0
+    roughness_px: float = 0.0
+    fields_apart_px: float = 0.0
+    beside: str = ""
 
     @property
     def u_picture_px(self) -> float:

@@ -8,6 +8,25 @@ PointMm = tuple[float, float]
 
 
 @dataclass(frozen=True, slots=True)
+class SNLine:
+    """How many cycles a material endures: a straight line of stress amplitude over cycles, both logarithmic.
+
+    Parameters
+    ----------
+    cycles : (float, float)
+        Where the line begins and ends, rising; nothing is said beyond.
+    amplitude_mpa : (float, float)
+        Stress amplitudes there, falling.
+    stress_ratio : float
+        Smallest over largest stress of the cycles that the line was measured with; -1 is fully reversed, 0 pulsating.
+    """
+
+    cycles: tuple[float, float]
+    amplitude_mpa: tuple[float, float]
+    stress_ratio: float = -1.0
+
+
+@dataclass(frozen=True, slots=True)
 class Material:
     """An isotropic elastic material.
 
@@ -21,6 +40,10 @@ class Material:
         Mass per volume.
     yield_mpa : float
         Stress beyond which the answer of an elastic model is wrong.
+    thermal_expansion_per_k : float or None
+        Linear, where it is stated.
+    sn_line : SNLine or None
+        Endurance, where it is stated.
     """
 
     name: str
@@ -28,6 +51,8 @@ class Material:
     poisson_ratio: float
     density_kg_m3: float
     yield_mpa: float
+    thermal_expansion_per_k: float | None = None
+    sn_line: SNLine | None = None
 
     @property
     def shear_modulus_mpa(self) -> float:

@@ -13,8 +13,8 @@ import av
 import cv2
 
 from fingervision.domain.errors import FingervisionError
-from fingervision.domain.frame import Coding, Frame, LostFrame, Pixels
-from fingervision.frames.camera_settings import READ, requests, settled
+from fingervision.domain.frame import Frame, LostFrame, Pixels
+from fingervision.frames.camera_settings import READ, coding_of, requests, settled
 from fingervision.frames.received import Received
 from fingervision.frames.source import Description, Wish
 
@@ -148,7 +148,7 @@ class CameraFrames:
             name=self.name,
             kind=f"camera ({backend})",
             codec=found.settings["format"],
-            coding=Coding.LOSSLESS,
+            coding=coding_of(found.settings),
             width_px=size_px[0],
             height_px=size_px[1],
             rate_hz=rate_hz if rate_hz > 0.0 else None,

@@ -18,12 +18,18 @@ from math import isclose, log2
 
 import cv2
 
+from fingervision.domain.frame import Coding
 from fingervision.frames.source import Wish
 
 V4L2, MSMF = "V4L2", "MSMF"
 UNSUPPORTED = -1.0
 # Grey levels as the sensor gave them, which every camera of the USB video class has at some size.
 RAW_FORMAT = "YUYV"
+# Formats in which a camera compresses its pictures before they arrive: each by itself, or from one to the next.
+CODINGS = {
+    **dict.fromkeys(("MJPG", "JPEG", "AVRn", "dmb1"), Coding.INTRAFRAME),
+    **dict.fromkeys(("H264", "HEVC", "X264", "avc1"), Coding.INTERFRAME),
+}
 # One picture is filled while the other is read; more would only be older.
 BUFFERED_PICTURES = 2
 V4L2_MANUAL_EXPOSURE, V4L2_MANUAL_NORMALISED = 1.0, 0.25
@@ -142,8 +148,8 @@ def settled(backend: str, wish: Wish, read: Mapping[int, float]) -> Settled:
         notes.append(f"The camera was asked for the format {wish.camera.format} and gives {settings['format']}.")
     if settings["format"] == "MJPG":
         notes.append(
-            "The camera compresses its pictures (MJPG) before they arrive here: what that adds to the error is not in "
-            "the uncertainty; choose a size or rate that it delivers raw (--format YUYV)."
+            "The camera compresses its pictures (MJPG) before they arrive here: they count as lossy, and the "
+            "uncertainty is larger for it; choose a size or rate that it delivers raw (--format YUYV)."
         )
     rate_hz = read.get(cv2.CAP_PROP_FPS, UNSUPPORTED)
     if wish.rate_hz is not None and not isclose(rate_hz, wish.rate_hz, rel_tol=SAME_SHARE):
@@ -170,6 +176,11 @@ def settled(backend: str, wish: Wish, read: Mapping[int, float]) -> Settled:
     listed = ", ".join(f"{name} {value}" for name, value in settings.items())
     notes.append(f"The camera reads back: {listed}.")
     return Settled(settings, tuple(notes))
+
+
+def coding_of(settings: Mapping[str, str]) -> Coding:
+    """What compression a camera's pictures went through before they arrived, by the format that it reads back."""
+    return CODINGS.get(settings.get("format", ""), Coding.LOSSLESS)
 
 
 def four_letters(number: float) -> str:

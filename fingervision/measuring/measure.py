@@ -12,11 +12,12 @@ from calib.camera_response import CameraResponse
 from fingervision.domain.direction import Direction
 from fingervision.domain.drive import DriveHistory
 from fingervision.domain.errors import ExitCode, FingervisionError, UsageError
-from fingervision.domain.frame import Frame, LostFrame
+from fingervision.domain.frame import Coding, Frame, LostFrame
 from fingervision.domain.gap import GapMeasurement, NoGap
 from fingervision.domain.region import Region
 from fingervision.domain.status import Status
 from fingervision.frames.ahead import decoded_ahead
+from fingervision.frames.camera_settings import coding_of
 from fingervision.frames.source import Description, FrameSource
 from fingervision.measuring.asked_to_stop import asked_to_stop
 from fingervision.measuring.clock.alignment import ClockOffset, NoClockOffset
@@ -75,6 +76,8 @@ class Task:
         Depth of levels that are stored in 16 bits; None finds it in every frame.
     fingers_are_dark : bool or None
         Whether the fingers are darker than the ground; None finds out in every frame.
+    is_outline : bool
+        Whether a thick part is measured at its whole outline, side walls included, and not at its front face.
     """
 
     scale: Scale
@@ -89,6 +92,7 @@ class Task:
     response: CameraResponse | None = None
     bits: int | None = None
     fingers_are_dark: bool | None = None
+    is_outline: bool = False
 
     def __post_init__(self) -> None:
         if not 0.0 < self.below_tip_mm < float("inf"):
@@ -107,7 +111,16 @@ class Task:
         """What vision needs of it for a recording of these files, and a warning where there is one."""
         response, other, words = choose_response(self.response, self.scale, files)
         below_px = self.below_tip_mm * self.scale.px_per_mm
-        settings = Settings(below_px, self.direction, self.region, response, other, self.bits, self.fingers_are_dark)
+        settings = Settings(
+            below_px,
+            self.direction,
+            self.region,
+            response,
+            other,
+            self.bits,
+            self.fingers_are_dark,
+            self.is_outline,
+        )
         return settings, words
 
     @property
@@ -181,7 +194,7 @@ def measure(source: FrameSource, task: Task, out: Path, on_progress: Progress | 
             f"measure needs a recording, which ends, but {source.description.name} is a camera, which does not: record "
             f"it with `fingervision live {source.description.name} --no-page --out runs`."
         )
-    _check(task, source.description)
+    check_task(task, source.description)
     with _held(out):
         return _measured(source, task, out, on_progress)
 
@@ -190,6 +203,10 @@ def _measured(source: FrameSource, task: Task, out: Path, on_progress: Progress 
     description = source.description
     if words := other_camera(task.scale, recorded_camera(description.files)):
         description = replace(description, notes=(words, *description.notes))
+    # What is stored without loss may have come compressed from the camera.
+    coding = coding_of(recorded_camera(description.files))
+    if coding is not Coding.LOSSLESS and not description.lossy:
+        description = replace(description, coding=coding)
     settings, words = task.settings_for(description.files)
     if words:
         description = replace(description, notes=(words, *description.notes))
@@ -219,7 +236,7 @@ def _measured(source: FrameSource, task: Task, out: Path, on_progress: Progress 
         stack.callback(hand_over)
         handed_over_at = monotonic()
         try:
-            for item, outcome in _outcomes(marked(source, marks) if marks else source, settings):
+            for item, outcome in _outcomes(marked(source, marks) if marks else source, settings, description.coding):
                 result = Result(item.index, item.time_s, outcome)
                 pending.append(result)
                 if video is not None and isinstance(item, Frame):
@@ -276,16 +293,26 @@ def _held(out: Path) -> Iterator[None]:
 
 
 def _outcomes(
-    source: Iterable[Frame | LostFrame], settings: Settings
+    source: Iterable[Frame | LostFrame], settings: Settings, coding: Coding
 ) -> Iterator[tuple[Frame | LostFrame, GapMeasurement | NoGap | LostFrame]]:
     """Every frame with what it says; the decoder runs ahead and is stopped when this is."""
     with closing(decoded_ahead(source)) as frames:
         for item in frames:
+            if isinstance(item, Frame) and item.coding is Coding.LOSSLESS and coding is not Coding.LOSSLESS:
+                item = replace(item, coding=coding)
             yield item, measure_frame(item, settings) if isinstance(item, Frame) else item
 
 
-def _check(task: Task, description: Description) -> None:
-    """Refuse what cannot be meant for these frames."""
+def check_task(task: Task, description: Description) -> None:
+    """Refuse what cannot be meant for these frames.
+
+    Raises
+    ------
+    UsageError
+        The region lies outside the frame, or a drive is given to a recording without times.
+    FingervisionError
+        The scale is for other frames.
+    """
     width_px, height_px = description.width_px, description.height_px
     region = task.region
     if region is not None and not (
@@ -322,5 +349,6 @@ def _in_words(task: Task, settings: Settings) -> dict[str, Any]:
         "response_known": settings.other_response is None,
         "bits": task.bits,
         "fingers": {None: "auto", True: "dark", False: "light"}[task.fingers_are_dark],
+        "face": "outline" if task.is_outline else "front",
         "drive": task.drive is not None,
     }

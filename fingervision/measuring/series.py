@@ -10,9 +10,13 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from fingervision.domain.gap import GapMeasurement
 from fingervision.domain.status import Status
 from fingervision.measuring.rows import Result
 from fingervision.storage.gaps_csv import GapRow
+
+# Even and odd rows that see a finger farther apart than this (pixels) are fields; colour sensors leave smaller combs.
+COMB_PX = 0.2
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,6 +50,9 @@ class GapSeries:
         The first frame with each status but ok, and why.
     fingers : Counter of str
         Frames with dark and with light fingers.
+    beside : Counter of str
+        Frames in which something stands beside the edges or has moved them, by what it is; rough edges and fields of
+        interlaced pictures among them.
     has_budget : bool
         Whether the scale said how surely it is known.
     """
@@ -53,6 +60,7 @@ class GapSeries:
     counts: Counter[Status] = field(default_factory=Counter)
     first_without: dict[Status, FirstBad] = field(default_factory=dict)
     fingers: Counter[str] = field(default_factory=Counter)
+    beside: Counter[str] = field(default_factory=Counter)
     has_budget: bool = False
     _frame: array[int] = field(default_factory=lambda: array("q"))
     _time_s: array[float] = field(default_factory=lambda: array("d"))
@@ -77,6 +85,7 @@ class GapSeries:
                     self.first_without[row.status] = FirstBad(row.frame, row.time_s, words)
                 continue
             self.fingers[row.fingers] += 1
+            self.beside.update(_beside(result.outcome))
             self._frame.append(row.frame)
             self._time_s.append(time_s)
             self._gap_mm.append(row.gap_mm)
@@ -125,3 +134,15 @@ class GapSeries:
     def frame_numbers(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
         """Numbers of the frames with and without a gap."""
         return np.array(self._frame, dtype=np.int64), np.array(self._bad_frame, dtype=np.int64)
+
+
+def _beside(outcome: object) -> list[str]:
+    """What one measurement says of its edges."""
+    if not isinstance(outcome, GapMeasurement):
+        return []
+    seen = [outcome.beside] if outcome.beside else []
+    if outcome.roughness_px:
+        seen.append("roughness")
+    if outcome.fields_apart_px > COMB_PX:
+        seen.append("interlaced")
+    return seen

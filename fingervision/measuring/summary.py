@@ -24,6 +24,24 @@ LOSSLESS_ADVICE = (
     "The recording is lossy ({codec}): its errors are several times those of the camera's noise and correlated from "
     "pixel to pixel and frame to frame. Record losslessly (FFV1 or raw) where the last hundredth of a pixel counts."
 )
+# What stands beside an edge or has moved it: what it means, and what takes it away.
+BESIDE = {
+    "wall": "the side wall of a thick part stands beside the edge: which edge is measured is stated by --face; "
+    "what cannot be told apart is in u_shift_px. A longer lens, light from behind or a mask over the wall "
+    "removes it.",
+    "shadow": "a soft shadow lies beside the edges; it is taken off, and what is not sure of it is in u_shift_px. "
+    "Light from behind, or from both sides, removes it.",
+    "glare": "a bright line lies along the edges; it is taken off, and what it may be instead (a bevel) is in "
+    "u_shift_px. Diffuse light, or light from behind, removes it.",
+    "motion": "the fingers move while the shutter is open; what that may do at round tips is in u_shift_px. A "
+    "shorter exposure removes it.",
+    "sharpening": "the camera sharpens its pictures; what that moves the edges by is taken off, and what is not sure "
+    "of it is in u_shift_px. Switch sharpening off in the camera's settings.",
+    "roughness": "the edges stray from a mean line more than their noise (rough, printed, or with a texture): the mean "
+    "line is measured, with the scatter in the uncertainty. A contact is made by the crests, farther out.",
+    "interlaced": "even and odd rows were seen at two times (interlaced): the gap is that of the middle. Record "
+    "progressive pictures.",
+}
 BYTES_AT_ONCE = 1 << 20
 
 
@@ -78,6 +96,7 @@ def summarise(
         "frames": series.frames,
         "counts": {status.value: series.counts[status] for status in Status},
         "fingers": dict(series.fingers),
+        "beside_edges": dict(series.beside),
         "first_damaged": None if first is None else asdict(first),
         "why": {
             status.value: {"first_frame": found.frame, "words": found.words}
@@ -88,6 +107,7 @@ def summarise(
         "advice": [
             *([LOSSLESS_ADVICE.format(codec=description.codec)] if description.lossy else []),
             *_about_fingers(series),
+            *(f"In {count} frames {BESIDE[what]}" for what, count in series.beside.most_common()),
             *description.notes,
         ],
     }

@@ -41,6 +41,22 @@ class ComplianceChain:
             member = self.skeleton.members[member].parent
         return path[::-1]
 
+    @cached_property
+    def _whole(self) -> Array:
+        """Motion of every member's end by a load at every other's, in blocks of 6, shape (6 members, 6 members)."""
+        members = self.skeleton.members
+        paths = [set(self.path(place)) for place in range(len(members))]
+        total = np.zeros((6 * len(members), 6 * len(members)))
+        for place, compliance in enumerate(self._global):
+            if compliance.any():
+                carry = np.zeros((len(members), 6, 6))
+                for end in range(len(members)):
+                    if place in paths[end]:
+                        carry[end] = carried(_arm(members[place], members[end]))
+                stacked = carry.reshape(-1, 6)
+                total += stacked @ compliance @ stacked.T
+        return total
+
     def flexibility(self, moved: int, loaded: int) -> Array:
         """Motion of one member's end by a load at another's: the sum of (12) over the members that both paths share.
 
@@ -49,14 +65,7 @@ class ComplianceChain:
         ndarray of float, shape (6, 6)
             Its transpose is the flexibility with both exchanged (Maxwell and Betti).
         """
-        members = self.skeleton.members
-        shared = set(self.path(moved)) & set(self.path(loaded))
-        total = np.zeros((6, 6))
-        for place in shared:
-            to_moved = carried(_arm(members[place], members[moved]))
-            to_loaded = carried(_arm(members[place], members[loaded]))
-            total += to_moved @ self._global[place] @ to_loaded.T
-        return total
+        return self._whole[6 * moved : 6 * moved + 6, 6 * loaded : 6 * loaded + 6]
 
 
 def _arm(known: Member, wanted: Member) -> Array:

@@ -81,13 +81,13 @@ class PaperDamping:
 
     Parameters
     ----------
-    reference_rad_s : float
-        The frequency w0.
+    reference_rad_s : float or None
+        The frequency w0; the lowest of the modes that it is asked for where None.
     gamma : float
         Dimensionless factor; zeta(w0) = 0.045 gamma.
     """
 
-    reference_rad_s: float
+    reference_rad_s: float | None = None
     gamma: float = 0.5
 
     def ratios(self, rad_s: Array) -> Array:
@@ -98,10 +98,11 @@ class PaperDamping:
         FingervisionError
             Where a mode lies below w0 or its ratio outside (0, 0.3).
         """
-        relative = rad_s / self.reference_rad_s
+        reference_rad_s = float(rad_s.min()) if self.reference_rad_s is None else self.reference_rad_s
+        relative = rad_s / reference_rad_s
         if np.any(relative < 1.0 - 1e-9):
             raise FingervisionError(
-                f"Equation (4) damps negatively below its reference frequency, {self.reference_rad_s:g} rad/s, "
+                f"Equation (4) damps negatively below its reference frequency, {reference_rad_s:g} rad/s, "
                 f"but the lowest mode is at {rad_s.min():g} rad/s; lower the reference to it."
             )
         return checked(np.array([0.5 * self.gamma * paper_rate(w) / w for w in relative.tolist()]))

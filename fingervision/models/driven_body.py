@@ -68,6 +68,10 @@ class DrivenBody:
         Unknowns whose weighted sum is the motion of the measuring point across the symmetry plane.
     measured_rest_mm : float
         Its distance from the symmetry plane at rest.
+    nodes : ndarray of int, shape (nodes, 2)
+        Unknowns along x and y of every node.
+    nodes_mm : ndarray of float, shape (nodes, 2)
+        Their places at rest.
     nodal_force : callable or None
         Displacements to internal forces alone, where that is less work than with the tangent.
     """
@@ -83,6 +87,8 @@ class DrivenBody:
     measured: Indices
     weights: Array
     measured_rest_mm: float
+    nodes: Indices
+    nodes_mm: Array
     nodal_force: Callable[[Array], Array] | None = None
 
     def internal_force_n(self, displacement: Array) -> Array:
@@ -112,6 +118,10 @@ class DrivenBody:
     @cached_property
     def _solver(self) -> SuperLU:
         return factorised(self.stiffness_n_mm[self.free][:, self.free])
+
+    def solve_free(self, load_n: Array) -> Array:
+        """Small displacements of the free unknowns by a load on them, the drive held."""
+        return np.asarray(self._solver.solve(load_n))
 
     @cached_property
     def unit_displacement_mm(self) -> Array:

@@ -98,11 +98,12 @@ class FiniteElementGripper:
 
     def loaded(self, inputs_mm: Sequence[float]) -> list[LoadedState]:
         """Gap, forces and largest stress at some inputs, in the deformed shape where the model has it."""
-        found = []
-        for state in self.equilibria(inputs_mm):
-            stress = self.plate.von_mises_mpa(state.displacement_mm, large=self.physics.large_rotation)
-            found.append(loaded_state(self.half, state, *self._peak(stress)))
-        return found
+        return [self.stressed(state) for state in self.equilibria(inputs_mm)]
+
+    def stressed(self, state: Equilibrium) -> LoadedState:
+        """Gap, forces and largest stress of one equilibrium."""
+        stress = self.plate.von_mises_mpa(state.displacement_mm, large=self.physics.large_rotation)
+        return loaded_state(self.half, state, *self._peak(stress))
 
     def _peak(self, stress: NDArray[np.float64]) -> tuple[float, PointMm]:
         x, y = self.plate.nodes_mm[:, self.plate.corner_triangles]

@@ -10,7 +10,8 @@ import numpy as np
 
 from fingervision.domain.errors import FingervisionError
 from fingervision.domain.gripper import Gripper, Hinge, Lever, Links, PointMm
-from fingervision.models.planar_region import Ellipse, Loop, PlanarRegion, Polygon, Shape, bar, box
+from fingervision.models.planar_region import PlanarRegion
+from fingervision.models.plane_shapes import Ellipse, Polygon, Shape, bar, box
 
 _ON = 1e-6
 """Of the height: how far beside a face material and void are looked for."""
@@ -122,7 +123,7 @@ def _check_hinge(gripper: Gripper, number: int, origin: str) -> None:
     x0, x1, y0, _ = links.pillar_and_root_mm
     foot = (0.5 * (x0 + x1), y0 + apart) if number == 1 else (apart, gripper.lever.drive_mm[1])
     tip = (gripper.tip_corner_mm[0] + apart, gripper.measuring_point_mm[1])
-    parted = any(_encloses(piece, foot) and not _encloses(piece, tip) for piece in pieces)
+    parted = any(piece.holds(foot) and not piece.holds(tip) for piece in pieces)
     if len(pieces) != 2 or not parted:
         end = "clamp" if number == 1 else "drive"
         raise FingervisionError(
@@ -130,12 +131,6 @@ def _check_hinge(gripper: Gripper, number: int, origin: str) -> None:
             f"neck of {hinge.thickness_mm:g} mm at ({x:g}, {y:g}) mm other material does; check "
             f"lever.hinge{number}_mm, lever.hinge{number}_axis_deg and hinge.radius_mm against the link that it cuts."
         )
-
-
-def _encloses(loop: Loop, point: PointMm) -> bool:
-    along = [curve.at(np.linspace(curve.t0, curve.t1, 33))[:, :-1] for curve in loop.curves]
-    corners = tuple((float(x), float(y)) for x, y in np.concatenate(along, axis=1).T)
-    return bool(Polygon(corners).holds(np.array(point)[:, None])[0])
 
 
 def _check_faces(gripper: Gripper, region: PlanarRegion, origin: str) -> None:

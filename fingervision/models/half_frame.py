@@ -59,6 +59,8 @@ def half_frame(gripper: Gripper, skeleton: Skeleton, frame: CorotationalFrame | 
         measured=np.array([3 * (skeleton.measured + 1)]),
         weights=np.ones(1),
         measured_rest_mm=gripper.measuring_point_mm[0],
+        nodes=3 * np.arange(len(nodes))[:, None] + np.arange(2),
+        nodes_mm=nodes,
     )
 
 

@@ -59,6 +59,8 @@ def half_plate(gripper: Gripper, plate: PlaneStressPlate) -> DrivenBody:
         measured=plate.x_dofs[nodes],
         weights=weights,
         measured_rest_mm=gripper.measuring_point_mm[0],
+        nodes=np.column_stack([plate.x_dofs, plate.y_dofs]),
+        nodes_mm=plate.nodes_mm.T,
         nodal_force=plate.nodal_force_n,
     )
 

@@ -1,4 +1,8 @@
-"""The gripper's motion in time to a drive history, small displacements: modes on top of the static answer."""
+"""The motion in time of a driven mechanism, small displacements: modes on top of the static answer."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -6,58 +10,102 @@ from scipy.linalg import expm
 
 from fingervision.domain.drive import DriveHistory
 from fingervision.models.damping import Damping, ModalDamping
-from fingervision.models.driven_body import DrivenBody
+from fingervision.models.modal_model import ModalModel
 
 Array = NDArray[np.float64]
 
-_MODES = 3
 _ALIKE_S = 1e-9
 
 
-def modal_gap_mm(body: DrivenBody, drive: DriveHistory, damping: Damping | None = None, modes: int = _MODES) -> Array:
-    """Gap over time, the drive's motion prescribed and straight between its samples.
-
-    The drive moves the body by its static shape; each mode of the held body is shaken by that shape's inertia. Every
-    step is the exact solution of the mode's equation, so that sparse samples lose nothing; the first sample is at rest.
+@dataclass(frozen=True, slots=True, eq=False)
+class Motion:
+    """What a mechanism does over a drive history.
 
     Parameters
     ----------
-    body : DrivenBody
-        The right half.
+    drive : DriveHistory
+        The inputs.
+    observed_mm : mapping of str to ndarray of float, shape (n,)
+        Lengths over time.
+    static_mm : mapping of str to ndarray of float, shape (n,)
+        The same at rest at each input.
+    force_n : ndarray of float, shape (n,)
+        At the drive, the mean of the two pieces that meet at each sample. The mass that no mode carries adds an impulse
+        where the drive's speed jumps between two straight pieces, which belongs to no sample and is left out.
+    inertia_n : ndarray of float, shape (n,)
+        What vibration adds to the force.
+    damping_ratios : ndarray of float, shape (modes,)
+        Of the modes kept.
+    modes_hz : ndarray of float, shape (modes,)
+        Natural frequencies of the modes kept.
+    """
+
+    drive: DriveHistory
+    observed_mm: Mapping[str, Array]
+    static_mm: Mapping[str, Array]
+    force_n: Array
+    inertia_n: Array
+    damping_ratios: Array
+    modes_hz: Array
+
+    def vibration_mm(self, name: str) -> float:
+        """Largest difference from the static answer."""
+        return float(np.abs(self.observed_mm[name] - self.static_mm[name]).max(initial=0.0))
+
+
+def modal_motion(model: ModalModel, drive: DriveHistory, damping: Damping | None = None) -> Motion:
+    """Follow a drive history, straight between its samples; each run begins at rest at its first input.
+
+    Every step is the exact solution of the modes' equations, so that sparse samples lose nothing.
+
+    Parameters
+    ----------
+    model : ModalModel
+        The reduced mechanism.
     drive : DriveHistory
         Inputs over time.
-    damping : Damping or None
+    damping : ModalDamping, LossFactor, RayleighDamping or PaperDamping
         Modal damping of 0.025 where None.
-    modes : int
-        How many modes of the held body.
-
-    Returns
-    -------
-    ndarray of float, shape (n,)
-        Gap in mm.
     """
-    rad_s, shapes = body.modes(drive_held=True, count=modes)
-    ratios = (damping or ModalDamping()).ratios(rad_s)
-    static = body.unit_displacement_mm
-    shaken = shapes.T @ (body.mass_t @ static)
-    seen = body.weights @ shapes[body.measured]
-    inputs, steps_s = drive.input_mm, np.diff(drive.time_s)
-    speed = np.diff(inputs) / steps_s
-    # A mode's coordinate obeys q'' + 2 zeta w q' + w^2 q = -shaken * input''; where the speed jumps, q' jumps with it.
-    state = np.zeros((2, modes))
-    coordinate = np.zeros((inputs.size, modes))
-    before = 0.0
+    model, ratios = model.damped(damping or ModalDamping())
+    inputs = drive.input_mm
+    coordinate, acceleration = np.zeros((2, inputs.size, ratios.size))
+    for rows in run_rows(drive):
+        coordinate[rows], acceleration[rows] = _run(model, ratios, drive.time_s[rows], inputs[rows])
+    static = {name: seen.rest_mm + seen.per_input * inputs for name, seen in model.observed.items()}
+    observed = {name: static[name] + coordinate @ seen.by_mode for name, seen in model.observed.items()}
+    inertia = acceleration @ model.participation
+    return Motion(drive, observed, static, model.stiffness_n_mm * inputs + inertia, inertia, ratios, model.modes_hz)
+
+
+def run_rows(drive: DriveHistory) -> list[slice]:
+    """Rows of each run, in order; one slice where the drive states no runs."""
+    if drive.run is None:
+        return [slice(0, drive.time_s.size)]
+    names = np.array(drive.run)
+    starts = [0, *(np.flatnonzero(names[1:] != names[:-1]) + 1).tolist(), names.size]
+    return [slice(a, b) for a, b in pairwise(starts)]
+
+
+def _run(model: ModalModel, ratios: Array, time_s: Array, inputs: Array) -> tuple[Array, Array]:
+    """Modal coordinates and accelerations, shape (n, modes)."""
+    rad_s, participation = model.rad_s, model.participation
+    steps_s = np.diff(time_s)
+    jumps = np.diff(np.diff(inputs) / steps_s, prepend=0.0)
+    # Between the samples the modes are free; where the drive's speed jumps, theirs jump with it.
+    state = np.zeros((2, rad_s.size))
+    states = np.zeros((inputs.size, 2, rad_s.size))
     powers: dict[int, Array] = {}
     for place, step_s in enumerate(steps_s.tolist()):
         key = round(step_s / _ALIKE_S)
         if key not in powers:
             powers[key] = _decay(rad_s, ratios, step_s)
-        state[1] -= shaken * (speed[place] - before)
-        before = speed[place]
+        state[1] -= participation * jumps[place]
         state = np.einsum("ijm,jm->im", powers[key], state)
-        coordinate[place + 1] = state[0]
-    slope = body.measured_mm(static) - body.measured_rest_mm
-    return np.asarray(2.0 * (body.measured_rest_mm + slope * inputs + coordinate @ seen))
+        states[place + 1] = state
+    after = np.append(jumps, 0.0)[: inputs.size]
+    coordinate, speed = states[:, 0], states[:, 1] - 0.5 * np.outer(after, participation)
+    return coordinate, -2.0 * ratios * rad_s * speed - rad_s**2 * coordinate
 
 
 def _decay(rad_s: Array, ratios: Array, step_s: float) -> Array:

@@ -57,11 +57,6 @@ class Notch:
         return self.half_length_mm == self.depth_mm
 
     @property
-    def slenderness(self) -> float:
-        """Thickness over half length: t / R of a circular notch."""
-        return self.thickness_mm / self.half_length_mm
-
-    @property
     def curvature_ratio(self) -> float:
         """Thickness over the radius of curvature at the neck: t / R of a circular notch, t c / a^2 of an elliptic."""
         return self.thickness_mm * self.depth_mm / self.half_length_mm**2
@@ -116,11 +111,6 @@ def notches_of(gripper: Gripper) -> tuple[Notch, Notch]:
         for web_mm in (x1 - x0, links.shuttle_width_mm)
     )
     return first, second
-
-
-def segment_mass_t(notch: Notch, material: Material, segments: int) -> Array:
-    """Masses of equal segments of the notch; see `masses_t`."""
-    return masses_t(notch, material, np.linspace(-notch.reach_mm, notch.reach_mm, segments + 1))
 
 
 def masses_t(notch: Notch, material: Material, edges_mm: Array) -> Array:

@@ -1,6 +1,6 @@
 """A grid over numbers of a drawing, each variant answered by the lumped model."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product
 from operator import attrgetter
@@ -8,18 +8,31 @@ from operator import attrgetter
 import numpy as np
 from numpy.typing import NDArray
 
-from fingervision.domain.errors import UsageError
+from fingervision.domain.errors import FingervisionError, UsageError
 from fingervision.domain.gripper import Gripper
 from fingervision.models.gripper_outline import check_outline
 from fingervision.models.hinge_correction import HingeTheory
 from fingervision.models.lumped import LumpedGripper
+from fingervision.models.mechanism import Mechanism
+from fingervision.models.mechanism_figures import mechanism_figures
+from fingervision.models.mechanism_frame import MechanismFrame
+from fingervision.models.mechanism_plate import MechanismPlate
 from fingervision.models.redrawn import redrawn
 from fingervision.models.static_answer import gap_per_input
 
 Array = NDArray[np.float64]
 
-COLUMNS = ("gap_per_input", "input_stiffness_n_mm", "peak_stress_mpa_per_mm", "input_at_yield_mm", "contact_input_mm")
+COLUMNS = (
+    "gap_per_input",
+    "input_stiffness_n_mm",
+    "peak_stress_mpa_per_mm",
+    "input_at_yield_mm",
+    "contact_input_mm",
+    "first_mode_drive_free_hz",
+)
 _MOST_VARIANTS = 2000
+_MOST_MECHANISMS = 400
+"""Of half a second each."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,7 +105,7 @@ def sweep_answers(gripper: Gripper, variations: Sequence[Variation], theory: Hin
     -------
     values : ndarray of float, shape (n, k)
         Of the numbers varied.
-    answers : ndarray of float, shape (n, 5)
+    answers : ndarray of float, shape (n, 6)
         In the order of `COLUMNS`; a contact that never comes is infinite.
 
     Raises
@@ -112,8 +125,56 @@ def sweep_answers(gripper: Gripper, variations: Sequence[Variation], theory: Hin
         stress, touch = model.peak_stress().mpa_per_mm, model.half.first_touch_mm()
         force = model.half.equilibrium(1.0).force_n
         at_yield = drawn.material.yield_mpa / stress
-        rows.append((gap_per_input(model.half), force, stress, at_yield, -np.inf if touch is None else touch))
+        mode = model.modes_hz(drive_held=False, count=1)[0]
+        rows.append((gap_per_input(model.half), force, stress, at_yield, -np.inf if touch is None else touch, mode))
     return np.array(grid), np.array(rows)
+
+
+def mechanism_sweep_answers(
+    redrawn_to: Callable[[Mapping[str, float]], Mechanism], variations: Sequence[Variation]
+) -> tuple[Array, tuple[str, ...], Array]:
+    """Answer every combination of the values for a mechanism drawn by bodies.
+
+    Parameters
+    ----------
+    redrawn_to : callable
+        Numbers by dotted name to the drawing that has them.
+    variations : sequence of Variation
+        Each an axis of the grid; the last runs fastest.
+
+    Returns
+    -------
+    values : ndarray of float, shape (n, k)
+        Of the numbers varied.
+    columns : tuple of str
+        Names of the figures, of `mechanism_figures`.
+    answers : ndarray of float, shape (n, columns)
+        Infinite where a variant has no such figure.
+
+    Raises
+    ------
+    FingervisionError
+        Where a variant is no mechanism, or the grid is too large.
+    """
+    grid = list(product(*(variation.values for variation in variations)))
+    if len(grid) > _MOST_MECHANISMS:
+        raise UsageError(f"--vary must give at most {_MOST_MECHANISMS} mechanisms, but gives {len(grid)}.")
+    rows: list[dict[str, float]] = []
+    # The corners of the grid come first: where they are no mechanisms, nothing has been waited for.
+    corners = list(product(*((v.values[0], v.values[-1]) for v in variations)))
+    for values in [*corners, *grid]:
+        try:
+            mechanism = redrawn_to({v.name: value for v, value in zip(variations, values, strict=True)})
+            if len(rows) >= len(corners):
+                model = MechanismFrame(mechanism) if mechanism.flexures else MechanismPlate(mechanism)
+                rows.append(mechanism_figures(model))
+            else:
+                rows.append({})
+        except FingervisionError as error:
+            raise FingervisionError(f"The variant {_spelt(variations, values)} has no answer: {error}") from error
+    found = rows[len(corners) :]
+    columns = tuple(dict.fromkeys(name for row in found for name in row if not name.startswith("model_error")))
+    return np.array(grid), columns, np.array([[row.get(name, np.inf) for name in columns] for row in found])
 
 
 def _spelt(variations: Sequence[Variation], values: Sequence[float]) -> str:

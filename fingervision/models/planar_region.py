@@ -13,106 +13,17 @@ from numpy.typing import NDArray
 
 from fingervision.domain.errors import FingervisionError
 from fingervision.models.outline_curves import Curve, crossings
+from fingervision.models.plane_shapes import Point, Polygon, Shape
 
 Array = NDArray[np.float64]
-Point = tuple[float, float]
 
 _BESIDE = 1e-6
 """Of the body's size: how far beside a piece its two sides are looked at. Finer details than this do not exist."""
 _TURNS_IN = -0.2
 """Sine of the turn to the right beyond which a corner turns into the body."""
+_CHORDS = 33
 _SAME = 1e-8
 """Of the body's size: corners closer than this are one."""
-
-
-@dataclass(frozen=True, slots=True)
-class Polygon:
-    """A straight-sided shape.
-
-    Parameters
-    ----------
-    corners_mm : tuple of (float, float)
-        In order, either way round.
-    """
-
-    corners_mm: tuple[Point, ...]
-
-    def curves(self) -> list[Curve]:
-        """Sides."""
-        corners = np.array(self.corners_mm)
-        pairs = zip(corners, np.roll(corners, -1, axis=0), strict=True)
-        return [Curve(a, b - a, None, 0.0, 1.0) for a, b in pairs if np.hypot(*(b - a)) > 0.0]
-
-    def holds(self, points: Array) -> NDArray[np.bool_]:
-        """Whether points, shape (2, n), lie inside: an odd number of sides to the right of them."""
-        x, y = points
-        inside = np.zeros(x.shape, dtype=bool)
-        corners = np.array(self.corners_mm)
-        for (xa, ya), (xb, yb) in zip(corners, np.roll(corners, -1, axis=0), strict=True):
-            if ya != yb:
-                inside ^= ((ya > y) != (yb > y)) & (x < xa + (xb - xa) * (y - ya) / (yb - ya))
-        return inside
-
-
-@dataclass(frozen=True, slots=True)
-class Ellipse:
-    """A disc or an ellipse.
-
-    Parameters
-    ----------
-    centre_mm : (float, float)
-        Its middle.
-    half_axes_mm : (float, float)
-        Along its own axis and across it; equal for a disc.
-    axis_deg : float
-        Direction of its own axis from x.
-    """
-
-    centre_mm: Point
-    half_axes_mm: Point
-    axis_deg: float = 0.0
-
-    def _axes(self) -> tuple[Array, Array]:
-        angle = np.radians(self.axis_deg)
-        along = np.array([np.cos(angle), np.sin(angle)])
-        return self.half_axes_mm[0] * along, self.half_axes_mm[1] * np.array([-along[1], along[0]])
-
-    def curves(self) -> list[Curve]:
-        """Four arcs."""
-        u, v = self._axes()
-        quarters = np.pi / 2.0 * np.arange(5.0)
-        return [Curve(np.array(self.centre_mm), u, v, a, b) for a, b in pairwise(quarters.tolist())]
-
-    def holds(self, points: Array) -> NDArray[np.bool_]:
-        """Whether points, shape (2, n), lie inside."""
-        return np.asarray(self.curves()[0].level(points) < 0.0)
-
-
-Shape = Polygon | Ellipse
-
-
-def crosses_itself(corners_mm: tuple[Point, ...]) -> bool:
-    """Whether two sides of a polygon that are no neighbours meet."""
-    sides = Polygon(corners_mm).curves()
-    count = len(sides)
-    return any(
-        crossings(sides[i], sides[j])
-        for i in range(count)
-        for j in range(i + 2, count)
-        if not (i == 0 and j == count - 1)
-    )
-
-
-def bar(x0: float, y0: float, x1: float, y1: float, width_mm: float) -> Polygon:
-    """Return a straight bar about the line between two points."""
-    length = float(np.hypot(x1 - x0, y1 - y0))
-    nx, ny = -(y1 - y0) / length * width_mm / 2.0, (x1 - x0) / length * width_mm / 2.0
-    return Polygon(((x0 - nx, y0 - ny), (x1 - nx, y1 - ny), (x1 + nx, y1 + ny), (x0 + nx, y0 + ny)))
-
-
-def box(x0: float, x1: float, y0: float, y1: float) -> Polygon:
-    """Return an upright rectangle."""
-    return Polygon(((x0, y0), (x1, y0), (x1, y1), (x0, y1)))
 
 
 @dataclass(frozen=True, slots=True)
@@ -129,6 +40,12 @@ class Loop:
 
     curves: tuple[Curve, ...]
     area_mm2: float
+
+    def holds(self, point: Point) -> bool:
+        """Whether a point lies inside, arcs taken as their chords."""
+        along = [curve.at(np.linspace(curve.t0, curve.t1, _CHORDS))[:, :-1] for curve in self.curves]
+        corners = tuple((float(x), float(y)) for x, y in np.concatenate(along, axis=1).T)
+        return bool(Polygon(corners).holds(np.array(point)[:, None])[0])
 
 
 @dataclass(frozen=True, eq=False)

@@ -75,10 +75,14 @@ class PlaneStressPlate:
 
     @cached_property
     def outline_edges(self) -> Indices:
-        """Edges of the outline as places in `nodes_mm`: two ends and the middle, shape (3, k)."""
+        """Edges of the outline as places in `nodes_mm`: two ends and the middle, the void on the left; shape (3, k)."""
         facets = self._mesh.boundary_facets()
         corners = int(self._basis.nodal_dofs.shape[1])
-        return np.vstack([self._mesh.facets[:, facets], corners + facets])
+        ends = self._mesh.facets[:, facets]
+        a, b = (self.nodes_mm[:, row] for row in ends)
+        inner = self.nodes_mm[:, self._mesh.t[:3, self._mesh.f2t[0, facets]]].mean(axis=1)
+        left = (b - a)[0] * (inner - a)[1] - (b - a)[1] * (inner - a)[0] > 0.0
+        return np.vstack([np.where(left, ends[::-1], ends), corners + facets])
 
     @cached_property
     def _slopes(self) -> tuple[Array, Array]:
@@ -88,7 +92,7 @@ class PlaneStressPlate:
         return np.ascontiguousarray(slopes.transpose(2, 3, 1, 0)), np.asarray(scalar.dx) * self.plate_mm
 
     @cached_property
-    def _unknowns_of(self) -> Indices:
+    def unknowns_of_triangles(self) -> Indices:
         """Unknowns of every triangle, first along x, then along y; shape (m, 12)."""
         corners, edges = self._mesh.t[:3], self._mesh.t2f
         nodes = np.vstack([corners, int(self._basis.nodal_dofs.shape[1]) + edges])
@@ -133,7 +137,7 @@ class PlaneStressPlate:
         elements = np.sum(np.swapaxes(strains, 2, 3) @ ((self._law * weighted) @ strains), axis=1)
         elements[:, :6, :6] += turned
         elements[:, 6:, 6:] += turned
-        unknowns = self._unknowns_of
+        unknowns = self.unknowns_of_triangles
         rows, columns = np.repeat(unknowns, 12, axis=1), np.tile(unknowns, (1, 12))
         shape = (self.unknowns, self.unknowns)
         tangent = coo_matrix((elements.ravel(), (rows.ravel(), columns.ravel())), shape=shape)
@@ -146,7 +150,7 @@ class PlaneStressPlate:
     def _strained(self, displacement_mm: Array) -> tuple[Array, Array]:
         """Change of Green's strain by unknown, shape (m, q, 3, 12), and second Piola-Kirchhoff stress (m, q, 3)."""
         slopes, _ = self._slopes
-        moved = displacement_mm[self._unknowns_of].reshape(-1, 1, 2, 6)
+        moved = displacement_mm[self.unknowns_of_triangles].reshape(-1, 1, 2, 6)
         gradient = moved @ np.swapaxes(slopes, 2, 3)  # (m, q, 2, 2): row the component, column the direction
         deformation = gradient + np.eye(2)
         dx, dy = slopes[..., 0, :], slopes[..., 1, :]
@@ -161,7 +165,9 @@ class PlaneStressPlate:
 
     def _collected(self, strains: Array, stress: Array) -> Array:
         element = np.sum(np.swapaxes(strains, 2, 3) @ (stress * self._slopes[1][..., None])[..., None], axis=1)
-        return np.asarray(np.bincount(self._unknowns_of.ravel(), element.ravel(), self.unknowns), dtype=np.float64)
+        return np.asarray(
+            np.bincount(self.unknowns_of_triangles.ravel(), element.ravel(), self.unknowns), dtype=np.float64
+        )
 
     def von_mises_mpa(self, displacement_mm: Array, *, large: bool = False) -> Array:
         """Von Mises stress at the triangles' corners, shape (3, m).

@@ -25,9 +25,11 @@ from fingervision.domain.response import Response
 from fingervision.models.answer_figures import ModelFigures
 from fingervision.models.compliance_chain import ComplianceChain
 from fingervision.models.covered_inputs import covered_inputs_mm
+from fingervision.models.grip import Part
 from fingervision.models.hinge_correction import HingeTheory
 from fingervision.models.physics import LINEAR, Physics
 from fingervision.models.skeleton import Member, skeleton_of
+from fingervision.models.steady_loads import STANDARD_GRAVITY_MM_S2
 
 Array = NDArray[np.float64]
 
@@ -35,8 +37,7 @@ KIND = "stiffness_matrix"
 
 _X, _Y, _Z, _ABOUT_X, _ABOUT_Y, _ABOUT_Z = range(6)
 _ALL = (_X, _Y, _Z, _ABOUT_X, _ABOUT_Y, _ABOUT_Z)
-_STANDARD_GRAVITY_MM_S2 = 9806.65
-_SLOPE_ERROR, _FORCE_ERROR = 0.02, 0.05
+_SLOPE_ERROR, _FORCE_ERROR = 0.01, 0.03
 """Of bars joined at points, as of `lumped`."""
 _OUT_OF_PLANE_ERROR = 0.2
 """Bricks give 62 Hz where this has 72; a stiff variant is 17 % too high."""
@@ -117,10 +118,11 @@ class StiffnessMatrixGripper:
         corner = self.skeleton.corner
         return 1.0 / float(self._held_flexibility(corner, corner, _ALL)[_X, _X])
 
-    def grip_force_n(self, input_mm: float, object_mm: float) -> float:
-        """Force of each finger on a rigid object of a given width between the tips; 0 where it is not touched."""
-        closed_mm = object_mm - (self.rest_gap_mm + self.gap_per_input * input_mm)
-        return max(0.0, 0.5 * closed_mm * self.finger_stiffness_n_mm)
+    def grip_force_n(self, input_mm: float, part: Part) -> float:
+        """Force of each finger on a part between the tips' corners; 0 where it is not touched."""
+        corner_mm = 2.0 * self.gripper.tip_corner_mm[0] + 2.0 * self._corner_per_input * input_mm
+        yielding_mm_n = 1.0 / self.finger_stiffness_n_mm + 0.5 / part.stiffness_n_mm
+        return max(0.0, 0.5 * (part.width_mm - corner_mm) / yielding_mm_n)
 
     def gravity_sag_mm(self, *, drive_held: bool = True) -> tuple[float, float]:
         """Out-of-plane sag of the measuring point in a horizontal plate, and the tip's twist about the finger (y).
@@ -138,7 +140,7 @@ class StiffnessMatrixGripper:
         held = _ALL if drive_held else tuple(direction for direction in _ALL if direction != _Z)
         sag = np.zeros(6)
         for place, member in enumerate(self.skeleton.members):
-            weight_n = member.mass_t * _STANDARD_GRAVITY_MM_S2
+            weight_n = member.mass_t * STANDARD_GRAVITY_MM_S2
             if weight_n > 0.0:
                 load = np.zeros(6)
                 load[_Z] = weight_n
@@ -163,21 +165,21 @@ class StiffnessMatrixGripper:
         inverse = np.linalg.eigvalsh(root.T @ flexibility @ root)[::-1][:count]
         return tuple((1.0 / (2.0 * np.pi * np.sqrt(inverse))).tolist())
 
-    def camera_scale_change(self, distance_mm: float) -> float:
-        """Relative change of the image scale by the tips' sag, for a camera at some distance above the plate."""
-        sag_mm, _ = self.gravity_sag_mm()
-        return -sag_mm / (distance_mm + sag_mm)
-
     def respond(self, input_mm: Array) -> Response:
         """Answer statically at each input."""
         inputs = np.asarray(input_mm, dtype=float)
         right = 0.5 * (self.rest_gap_mm + self.gap_per_input * inputs)
         return Response(left_mm=-right, right_mm=right, force_n=self.input_stiffness_n_mm * inputs)
 
+    @cached_property
+    def _corner_per_input(self) -> float:
+        """Motion of one tip's corner across the gap by 1 mm of input."""
+        flexibility = self._chain.flexibility(self.skeleton.corner, self.skeleton.drive)
+        return float((flexibility @ self._load_by_input)[_X])
+
     def first_touch_mm(self) -> float | None:
         """Input at which the tip's corner meets the symmetry plane; None where it does not move."""
-        flexibility = self._chain.flexibility(self.skeleton.corner, self.skeleton.drive)
-        slope = float((flexibility @ self._load_by_input)[_X])
+        slope = self._corner_per_input
         return -self.gripper.tip_corner_mm[0] / slope if slope > 0.0 else None
 
     def figures(self) -> ModelFigures:

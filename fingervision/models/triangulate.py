@@ -6,56 +6,25 @@ triangulated anew as they go, and end at the centres of their neighbours' circum
 al., Variational tetrahedral meshing, ACM Trans. Graphics 24 (2005) 617, in the plane). Midside nodes lie on the arcs.
 """
 
-from dataclasses import dataclass
-from itertools import pairwise
-
-import numpy as np
-from numpy.typing import NDArray
-from scipy.spatial import Delaunay, cKDTree
-
 from fingervision.domain.errors import FingervisionError
-from fingervision.models.mesh_size import SizeField, size_field
-from fingervision.models.outline_curves import Curve
+from fingervision.models.mesh_size import size_field
+from fingervision.models.node_relaxation import MOST_NODES, relaxed_nodes, seeded_nodes
+from fingervision.models.outline_division import (
+    divided_outline,
+    flat_sides,
+    halved,
+    missing_sides,
+    outline_points,
+    with_middles,
+)
 from fingervision.models.planar_region import PlanarRegion
+from fingervision.models.plane_mesh import LEAST_QUALITY, PlaneMesh
 
-Array = NDArray[np.float64]
-Indices = NDArray[np.int64]
+__all__ = ["LEAST_QUALITY", "PlaneMesh", "triangulate"]
 
-LEAST_QUALITY = 0.3
-"""Twice the inscribed over the circumscribed radius, 1 for an equilateral triangle: a 30-degree angle has 0.7."""
-_OF_SQUARE = 0.93
-"""Side of a square that holds as much as one node of equilateral triangles of edge 1: sqrt(sqrt(3) / 2)."""
-_PRESSURE = 1.2
-"""Rest length over wanted length: the nodes press on the outline (Persson and Strang)."""
-_STEP = 0.2
-_ROUNDS, _MOVES_A_ROUND = 5, 6
-_SETTLING = 3
 _MENDING = 12
 _REFINED = 4
 """Rounds of dividing the outline where triangles are flat; at sharp corners they must stay so."""
-_MOST_NODES = 60_000
-_CLEAR = 0.55
-"""Of the edge length: how far a node inside stays from the outline's nodes at first."""
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class PlaneMesh:
-    """Quadratic triangles in the plane; curved edges follow the notches.
-
-    Parameters
-    ----------
-    nodes_mm : ndarray of float, shape (2, n)
-        Places of corners and edge midpoints.
-    triangles : ndarray of int, shape (6, m)
-        Corners 0, 1, 2 and the midpoints of the edges 01, 12, 02.
-    """
-
-    nodes_mm: NDArray[np.float64]
-    triangles: NDArray[np.int64]
-
-    def quality(self) -> Array:
-        """Twice the inscribed over the circumscribed radius of every triangle, shape (m,)."""
-        return _quality(self.nodes_mm, self.triangles[:3])
 
 
 def triangulate(region: PlanarRegion, across: float, body_mm: float) -> PlaneMesh:
@@ -76,253 +45,21 @@ def triangulate(region: PlanarRegion, across: float, body_mm: float) -> PlaneMes
         Where the body is so fine beside its size that no sensible number of triangles fills it.
     """
     field = size_field(region, across, body_mm)
-    sides = _divided(region, field)
+    sides = divided_outline(region, field)
     refined = 0
     for _ in range(_MENDING):
-        inside = _seeded(region, field, _outline_points(sides))
-        if inside.shape[1] + len(sides) > _MOST_NODES:
+        inside = seeded_nodes(region, field, outline_points(sides))
+        if inside.shape[1] + len(sides) > MOST_NODES:
             raise FingervisionError(
-                f"The body must be meshed by at most {_MOST_NODES} nodes, but {inside.shape[1] + len(sides)} are "
+                f"The body must be meshed by at most {MOST_NODES} nodes, but {inside.shape[1] + len(sides)} are "
                 "needed: its thinnest part is too thin beside its length."
             )
-        corners, triangles = _relaxed(region, field, _outline_points(sides), inside)
-        missing = _missing(sides, triangles)
+        corners, triangles = relaxed_nodes(region, field, outline_points(sides), inside)
+        missing = missing_sides(sides, triangles)
         if not missing and refined < _REFINED:
             # Flat triangles on the outline alone: its edges differ too much there.
-            missing, refined = _flat_sides(sides, corners, triangles), refined + 1
+            missing, refined = flat_sides(sides, corners, triangles), refined + 1
         if not missing:
-            return _with_middles(corners, triangles, sides)
-        sides = _halved(sides, missing)
+            return with_middles(corners, triangles, sides)
+        sides = halved(sides, missing)
     raise FingervisionError("The outline could not be meshed; check that its shapes do not nearly touch each other.")
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class _Side:
-    """An edge of the outline between two of its nodes."""
-
-    curve: Curve
-    t0: float
-    t1: float
-    first: int
-    second: int
-
-
-def _divided(region: PlanarRegion, field: SizeField) -> list[_Side]:
-    sides: list[_Side] = []
-    count = 0
-    for loop in region.loops:
-        begin = count
-        spans = [(curve, a, b) for curve in loop.curves for a, b in pairwise(_stations(curve, field).tolist())]
-        for place, (curve, a, b) in enumerate(spans):
-            following = begin if place == len(spans) - 1 else count + 1
-            sides.append(_Side(curve, a, b, count, following))
-            count += 1
-    return sides
-
-
-def _stations(curve: Curve, field: SizeField) -> Array:
-    """Parameters that divide a curve into edges as long as the field asks."""
-    t = np.linspace(curve.t0, curve.t1, 60)
-    for _ in range(2):  # the second time the samples lie as close as the edges are short
-        at = curve.at(t)
-        length = np.hypot(*np.diff(at, axis=1))
-        edge = field.at(at)
-        edges = np.concatenate([[0.0], np.cumsum(length * 0.5 * (1.0 / edge[1:] + 1.0 / edge[:-1]))])
-        fine = np.linspace(0.0, edges[-1], max(60, int(4 * edges[-1])))
-        t = np.interp(fine, edges, t)
-    return np.asarray(np.interp(np.linspace(0.0, edges[-1], max(1, round(float(edges[-1]))) + 1), fine, t))
-
-
-def _outline_points(sides: list[_Side]) -> Array:
-    points = np.zeros((2, len(sides)))
-    for side in sides:
-        points[:, side.first] = side.curve.at(np.array([side.t0]))[:, 0]
-    return points
-
-
-def _halved(sides: list[_Side], missing: set[int]) -> list[_Side]:
-    """Divide some edges of the outline in two."""
-    parts: list[_Side] = []
-    count = len(sides)
-    for place, side in enumerate(sides):
-        if place not in missing:
-            parts.append(side)
-            continue
-        middle = 0.5 * (side.t0 + side.t1)
-        parts += [_Side(side.curve, side.t0, middle, side.first, count),
-                  _Side(side.curve, middle, side.t1, count, side.second)]  # fmt: skip
-        count += 1
-    return parts
-
-
-def _seeded(region: PlanarRegion, field: SizeField, outline: Array) -> Array:
-    """Nodes inside: centres of squares that are divided until they are as small as the field asks."""
-    low, high = outline.min(axis=1), outline.max(axis=1)
-    side = float(field.body_mm)
-    counts = np.ceil((high - low) / side).astype(int)
-    grid = np.meshgrid(*(np.arange(c) for c in counts), indexing="ij")
-    centres = low[:, None] + side * (np.stack([g.ravel() for g in grid]) + 0.5)
-    random = np.random.default_rng(0)
-    found = []
-    tree = cKDTree(outline.T)
-    while centres.size:
-        wanted = field.at(centres)
-        done = side <= _OF_SQUARE * wanted
-        share = (side / (_OF_SQUARE * wanted[done])) ** 2
-        found.append(centres[:, done][:, random.random(share.size) < share])
-        rest = centres[:, ~done]
-        # Squares that lie wholly outside are dropped where their middle is far from the outline and not inside.
-        near = tree.query(rest.T)[0] < 1.5 * side + 2.0 * field.at(rest) if rest.size else np.zeros(0, dtype=bool)
-        rest = rest[:, near | region.holds(rest)]
-        side *= 0.5
-        shifts = 0.5 * side * np.array([[-1, -1], [-1, 1], [1, -1], [1, 1]])
-        centres = (rest[:, :, None] + shifts.T[:, None, :]).reshape(2, -1)
-        if centres.shape[1] > 8 * _MOST_NODES:
-            return np.asarray(centres)
-    points = np.concatenate(found, axis=1)
-    points = points[:, region.holds(points)]
-    return _clear_of(points, outline, field)
-
-
-def _clear_of(points: Array, outline: Array, field: SizeField) -> Array:
-    if points.size == 0:
-        return points
-    return np.asarray(points[:, cKDTree(outline.T).query(points.T)[0] > _CLEAR * field.at(points)])
-
-
-def _relaxed(region: PlanarRegion, field: SizeField, outline: Array, inside: Array) -> tuple[Array, Indices]:
-    fixed = outline.shape[1]
-    points = np.concatenate([outline, inside], axis=1)
-    for _ in range(_ROUNDS):
-        triangles = _inner_triangles(region, points)
-        edges = _edges(triangles)
-        at_nodes = field.at(points)
-        wanted = 0.5 * (at_nodes[edges[0]] + at_nodes[edges[1]])
-        for _ in range(_MOVES_A_ROUND):
-            way = points[:, edges[0]] - points[:, edges[1]]
-            length = np.hypot(*way)
-            scale = _PRESSURE * np.sqrt(np.sum(length**2) / np.sum(wanted**2))
-            push = np.maximum(scale * wanted - length, 0.0) / length * way
-            for axis in (0, 1):
-                force = np.bincount(edges[0], push[axis], points.shape[1])
-                force -= np.bincount(edges[1], push[axis], points.shape[1])
-                points[axis, fixed:] += _STEP * force[fixed:]
-        kept = np.concatenate([np.ones(fixed, dtype=bool), region.holds(points[:, fixed:])])
-        points = points[:, kept]
-    for _ in range(_SETTLING):
-        triangles = _inner_triangles(region, points)
-        points = _settled(points, triangles, fixed)
-    for _ in range(_MENDING):
-        triangles = _inner_triangles(region, points)
-        bad = _quality(points, triangles) < LEAST_QUALITY
-        mended = _mended(points, triangles[:, bad], fixed)
-        if mended is None:
-            break
-        points = mended
-        for _ in range(2):
-            points = _settled(points, _inner_triangles(region, points), fixed)
-    else:
-        triangles = _inner_triangles(region, points)
-    return points, triangles
-
-
-def _mended(points: Array, bad: Indices, fixed: int) -> Array | None:
-    """Take out the inner node nearest to each flat triangle's longest side; None where there is none to take."""
-    if bad.shape[1] == 0:
-        return None
-    inner = np.unique(bad[bad >= fixed])
-    if inner.size == 0:
-        return None
-    # One of neighbouring nodes at a time.
-    taken: list[int] = []
-    for place in inner.tolist():
-        beside = bad[:, np.any(bad == place, axis=0)]
-        if not set(beside.ravel().tolist()) & set(taken):
-            taken.append(place)
-    return np.delete(points, taken, axis=1)
-
-
-def _settled(points: Array, triangles: Indices, fixed: int) -> Array:
-    """Move every inner node to the area-weighted mean of its triangles' circumcentres, held within reason."""
-    a, b, c = (points[:, row] for row in triangles)
-    ab, ac = b - a, c - a
-    twice = ab[0] * ac[1] - ab[1] * ac[0]
-    ab2, ac2 = np.sum(ab**2, axis=0), np.sum(ac**2, axis=0)
-    centre = a + np.stack([ac[1] * ab2 - ab[1] * ac2, ab[0] * ac2 - ac[0] * ab2]) / (2.0 * twice)
-    # Of a flat triangle the circumcentre lies far off: its centroid is taken.
-    flat = _quality(points, triangles) < 0.5
-    centre = np.where(flat, (a + b + c) / 3.0, centre)
-    weight = np.abs(twice)
-    total = np.bincount(triangles.ravel(), np.tile(weight, 3), points.shape[1])
-    moved = points.copy()
-    for axis in (0, 1):
-        mean = np.bincount(triangles.ravel(), np.tile(weight * centre[axis], 3), points.shape[1])
-        moved[axis, fixed:] = mean[fixed:] / np.maximum(total[fixed:], 1e-300)
-    lost = total[fixed:] == 0.0
-    moved[:, fixed:][:, lost] = points[:, fixed:][:, lost]
-    return moved
-
-
-def _inner_triangles(region: PlanarRegion, points: Array) -> Indices:
-    """Triangles of Delaunay's triangulation whose middle lies in the body, anticlockwise; shape (3, m)."""
-    triangles = Delaunay(points.T).simplices.T.astype(np.int64)
-    middle = points[:, triangles].mean(axis=1)
-    triangles = triangles[:, region.holds(middle)]
-    a, b, c = (points[:, row] for row in triangles)
-    twice = (b - a)[0] * (c - a)[1] - (b - a)[1] * (c - a)[0]
-    triangles[:, twice < 0.0] = triangles[:, twice < 0.0][[0, 2, 1]]
-    return np.asarray(triangles[:, np.abs(twice) > 1e-12 * np.sum((b - a) ** 2 + (c - a) ** 2, axis=0)])
-
-
-def _edges(triangles: Indices) -> Indices:
-    pairs = np.sort(np.hstack([triangles[[0, 1]], triangles[[1, 2]], triangles[[0, 2]]]), axis=0)
-    # As single numbers pairs sort ten times as fast.
-    count = int(triangles.max()) + 1
-    return np.asarray(np.stack(np.divmod(np.unique(pairs[0] * count + pairs[1]), count)))
-
-
-def _quality(points: Array, triangles: Indices) -> Array:
-    a, b, c = (points[:, row] for row in triangles)
-    la, lb, lc = np.hypot(*(b - c)), np.hypot(*(c - a)), np.hypot(*(a - b))
-    return np.asarray((lb + lc - la) * (lc + la - lb) * (la + lb - lc) / (la * lb * lc))
-
-
-def _missing(sides: list[_Side], triangles: Indices) -> set[int]:
-    """Edges of the outline that are no triangle's, or that have triangles on both sides."""
-    pairs = np.sort(np.hstack([triangles[[0, 1]], triangles[[1, 2]], triangles[[0, 2]]]), axis=0)
-    count = int(triangles.max()) + 1
-    numbers, times = np.unique(pairs[0] * count + pairs[1], return_counts=True)
-    once = set(zip(*(part.tolist() for part in np.divmod(numbers[times == 1], count)), strict=True))
-    return {place for place, side in enumerate(sides)
-            if (min(side.first, side.second), max(side.first, side.second)) not in once}  # fmt: skip
-
-
-def _flat_sides(sides: list[_Side], points: Array, triangles: Indices) -> set[int]:
-    """Longest edges of flat triangles, where they are edges of the outline."""
-    bad = triangles[:, _quality(points, triangles) < LEAST_QUALITY]
-    place_of = {frozenset((side.first, side.second)): place for place, side in enumerate(sides)}
-    found = set()
-    for triangle in bad.T.tolist():
-        pairs = [(triangle[i], triangle[j]) for i, j in ((0, 1), (1, 2), (0, 2))]
-        longest = max(pairs, key=lambda pair: float(np.hypot(*(points[:, pair[0]] - points[:, pair[1]]))))
-        if frozenset(longest) in place_of:
-            found.add(place_of[frozenset(longest)])
-    return found
-
-
-def _with_middles(points: Array, triangles: Indices, sides: list[_Side]) -> PlaneMesh:
-    used, packed = np.unique(triangles, return_inverse=True)
-    place_of = np.full(points.shape[1], -1)
-    place_of[used] = np.arange(used.size)
-    corners, triangles = points[:, used], packed.reshape(3, -1)
-    pairs = np.sort(np.hstack([triangles[[0, 1]], triangles[[1, 2]], triangles[[0, 2]]]), axis=0)
-    numbers, place = np.unique(pairs[0] * used.size + pairs[1], return_inverse=True)
-    edges = np.stack(np.divmod(numbers, used.size))
-    middles = 0.5 * (corners[:, edges[0]] + corners[:, edges[1]])
-    place_of_edge = {(a, b): i for i, (a, b) in enumerate(edges.T.tolist())}
-    for side in sides:
-        if not side.curve.is_straight:
-            a, b = sorted((int(place_of[side.first]), int(place_of[side.second])))
-            middles[:, place_of_edge[a, b]] = side.curve.at(np.array([0.5 * (side.t0 + side.t1)]))[:, 0]
-    nodes = np.concatenate([corners, middles], axis=1)
-    return PlaneMesh(nodes, np.vstack([triangles, used.size + place.reshape(3, -1)]))

@@ -4,7 +4,7 @@ import difflib
 import math
 import tomllib
 from collections.abc import Mapping
-from dataclasses import fields
+from dataclasses import MISSING, fields
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
@@ -12,25 +12,36 @@ from typing import Any
 from fingervision.domain.errors import FingervisionError
 from fingervision.domain.gripper import Body, Gripper, Hinge, Lever, Links, Material
 from fingervision.models.gripper_outline import check_outline, check_stated_size
-from fingervision.models.planar_region import crosses_itself
+from fingervision.models.plane_shapes import crosses_itself
 from fingervision.storage.finite import is_number
+from fingervision.storage.sn_line_toml import check_below_yield, read_sn_line
 
 _SECTIONS: Mapping[str, type] = MappingProxyType(
     {"material": Material, "body": Body, "hinge": Hinge, "lever": Lever, "links": Links}
 )
 _MAY_BE_ANY_SIGN = frozenset({"lever.l1_mm", "lever.l2_mm", "lever.l3_mm", "lever.l4_mm", "lever.hinge1_axis_deg",
-                              "lever.hinge2_axis_deg", "lever.drive_face_y_mm"})  # fmt: skip
+                              "lever.hinge2_axis_deg", "lever.drive_face_y_mm",
+                              "material.thermal_expansion_per_k"})  # fmt: skip
 _MEET_MM = 0.02
 _METRES_BELOW_MM = 2.0
 _LEAST_YIELD_STRAIN, _MOST_YIELD_STRAIN = 1e-4, 0.1
 """Lead yields at 5e-4, rubber-like polymers beyond 0.1: what lies outside is a modulus in another unit."""
 _LIMITS: Mapping[str, tuple[float, float]] = MappingProxyType(
-    {"_mm": (1e-4, 1e5), "_deg": (0.0, 720.0), "_mpa": (1e-3, 1e13), "_kg_m3": (1.0, 3e4), "_ratio": (0.0, 0.5)}
+    {
+        "_mm": (1e-4, 1e5),
+        "_deg": (0.0, 720.0),
+        "_mpa": (1e-3, 1e13),
+        "_kg_m3": (1.0, 3e4),
+        "_ratio": (0.0, 0.5),
+        "_per_k": (1e-9, 1e-2),
+    }
 )
 """Magnitudes by the unit at a name's end: nothing outside them is a gripper, and larger numbers overflow. Lengths from
-a tenth of a micrometre to 100 m, moduli up to ten times diamond's in Pa, which is asked
-about where the yield stress stands beside it, densities from aerogel to osmium."""
-_SPELT: Mapping[str, str] = MappingProxyType({"_mm": "mm", "_deg": "degrees", "_mpa": "MPa", "_kg_m3": "kg/m3"})
+a tenth of a micrometre to 100 m, moduli up to ten times diamond's in Pa, which is asked about where the yield stress
+stands beside it, densities from aerogel to osmium, thermal expansions from glass ceramics' to ten times rubber's."""
+_SPELT: Mapping[str, str] = MappingProxyType(
+    {"_mm": "mm", "_deg": "degrees", "_mpa": "MPa", "_kg_m3": "kg/m3", "_per_k": "1/K"}
+)
 
 
 def read_gripper(path: Path) -> Gripper:
@@ -78,10 +89,12 @@ def _read_sections(
         table = tables.get(section)
         if not isinstance(table, dict):
             raise FingervisionError(f"{origin} must have a section [{section}], but has none.")
-        names = {field.name: field.type for field in fields(record)}
+        names = {field.name: field.default is not MISSING for field in fields(record)}
         _refuse_unknown(table, names, origin, f"key in [{section}]")
         values: dict[str, Any] = {}
-        for name in names:
+        for name, may_be_left_out in names.items():
+            if name not in table and may_be_left_out:
+                continue
             if name not in table:
                 raise FingervisionError(f"{origin} must state {section}.{name}, but does not.")
             values[name] = _value(table[name], f"{section}.{name}", origin, uncertainties)
@@ -101,6 +114,8 @@ def _value(raw: Any, name: str, origin: str, uncertainties: dict[str, float]) ->
         if not isinstance(raw, str):
             raise FingervisionError(f"{name} in {origin} must be a text, but is {raw!r}.")
         return raw
+    if name == "material.sn_line":
+        return read_sn_line(raw, name, origin)
     if isinstance(raw, dict):
         if set(raw) != {"value", "u"}:
             raise FingervisionError(
@@ -109,8 +124,13 @@ def _value(raw: Any, name: str, origin: str, uncertainties: dict[str, float]) ->
         u = _number(raw["u"], f"The uncertainty of {name}", origin)
         if u < 0.0:
             raise FingervisionError(f"The uncertainty of {name} in {origin} must not be negative, but is {u:g}.")
-        uncertainties[name] = u
         raw = raw["value"]
+        if isinstance(raw, list):
+            raise FingervisionError(
+                f"The uncertainty of {name} in {origin} must belong to a single number, but {name} is a list; "
+                "state it at lever.l1_mm to l4_mm, which move hinges and drive."
+            )
+        uncertainties[name] = u
     if name.startswith("links.") and not name.endswith("width_mm"):
         if name == "links.tip_polygon_mm":
             if not isinstance(raw, list) or len(raw) < 3:
@@ -194,6 +214,8 @@ def check_material(material: Material, origin: str) -> None:
         raise FingervisionError(
             f"material.poisson_ratio in {origin} must be below 0.5, but is {material.poisson_ratio:g}."
         )
+    if material.sn_line is not None:
+        check_below_yield(material.sn_line, material.yield_mpa, origin)
     strain = material.yield_mpa / material.youngs_modulus_mpa
     if not _LEAST_YIELD_STRAIN <= strain <= _MOST_YIELD_STRAIN:
         guess = "GPa" if strain > _MOST_YIELD_STRAIN else "Pa"

@@ -3,14 +3,21 @@
 import difflib
 import tomllib
 from collections.abc import Mapping
+from dataclasses import dataclass
 from math import hypot
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 from fingervision.domain.errors import FingervisionError
-from fingervision.models.mechanism import Drive, Face, Flexure, Mechanism, check_mechanism
-from fingervision.models.planar_region import Ellipse, Polygon, Shape, bar, box, crosses_itself
+from fingervision.domain.parameter import Estimate
+from fingervision.models.flexure import Flexure
+from fingervision.models.mechanism import Contact, Drive, Face, Mechanism, check_mechanism
+from fingervision.models.plane_shapes import Ellipse, Polygon, Shape, bar, box, crosses_itself
 from fingervision.storage.arithmetic import number
+from fingervision.storage.drawing_numbers import bare_tables, changed_tables, numbers_of
+from fingervision.storage.drawing_reader import DrawingReader, as_table
+from fingervision.storage.gripper_template import mechanism_from_gripper
 from fingervision.storage.gripper_toml import check_material, read_material
 
 _TOP = (
@@ -26,6 +33,7 @@ _TOP = (
     "drive",
     "probe",
     "pair",
+    "contact",
 )
 _SHAPES = {"bar_mm": 4, "box_mm": 4, "disc_mm": 3, "ellipse_mm": 5}
 _FLEXURES = {
@@ -37,13 +45,74 @@ _FLEXURES = {
 
 
 def is_mechanism(path: Path) -> bool:
-    """Whether a TOML file draws a mechanism by bodies, and not a gripper by its template."""
+    """Whether a TOML file draws a mechanism by bodies or by a template, and is not a gripper.toml itself."""
     try:
-        return "body" in (tables := tomllib.loads(path.read_text(encoding="utf-8-sig"))) and isinstance(
-            tables["body"], list
-        )
+        tables = tomllib.loads(path.read_text(encoding="utf-8-sig"))
     except (OSError, ValueError):
         return False
+    return isinstance(tables.get("body"), list) or isinstance(tables.get("gripper"), dict)
+
+
+@dataclass(frozen=True, slots=True)
+class MechanismDrawing:
+    """A mechanism as its file draws it, and how it looks with some of its numbers changed.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    tables : mapping
+        Its tables with bare numbers.
+    uncertainties : mapping of str to float
+        Standard uncertainties of numbers by dotted name, such as `lengths.t`.
+    """
+
+    path: Path
+    tables: Mapping[str, Any]
+    uncertainties: Mapping[str, float]
+
+    def mechanism(self, changes: Mapping[str, float] = MappingProxyType({}), *, absolute: bool = False) -> Mechanism:
+        """Build and check the mechanism, some numbers changed by so much, or to so much where `absolute`.
+
+        Raises
+        ------
+        FingervisionError
+            A number is unknown, or the drawing cannot be a mechanism.
+        """
+        tables = changed_tables(self.tables, changes, str(self.path), absolute=absolute) if changes else self.tables
+        if "gripper" in tables:
+            return mechanism_from_gripper(tables, self.path)
+        return mechanism_from_tables(tables, str(self.path))
+
+    @property
+    def estimates(self) -> dict[str, Estimate]:
+        """Uncertain numbers with their values and standard uncertainties."""
+        lengths: dict[str, float] = {}
+        for name, raw in as_table(self.tables.get("lengths", {}), f"[lengths] in {self.path}").items():
+            lengths[name] = number(raw, lengths, f"lengths.{name} in {self.path}")
+        values = numbers_of(self.tables)
+        found = {}
+        for name, u in self.uncertainties.items():
+            raw = values[name]
+            found[name] = Estimate(number(raw, lengths, f"{name} in {self.path}") if isinstance(raw, str) else raw, u)
+        return found
+
+
+def read_drawing(path: Path) -> MechanismDrawing:
+    """Read a mechanism's file without building it.
+
+    Raises
+    ------
+    FingervisionError
+        The file cannot be read, or states an uncertainty that is none.
+    """
+    try:
+        tables = tomllib.loads(path.read_text(encoding="utf-8-sig"))
+    except FileNotFoundError:
+        raise FingervisionError(f"There is no mechanism {path}.") from None
+    except (OSError, ValueError, RecursionError) as error:
+        raise FingervisionError(f"{path} must be TOML in UTF-8, but is not: {error}.") from error
+    return MechanismDrawing(path, *bare_tables(tables, str(path)))
 
 
 def read_mechanism(path: Path) -> Mechanism:
@@ -54,13 +123,7 @@ def read_mechanism(path: Path) -> Mechanism:
     FingervisionError
         The file cannot be read, a key is missing, unknown or no number, or the drawing cannot be a mechanism.
     """
-    try:
-        tables = tomllib.loads(path.read_text(encoding="utf-8-sig"))
-    except FileNotFoundError:
-        raise FingervisionError(f"There is no mechanism {path}.") from None
-    except (OSError, ValueError) as error:
-        raise FingervisionError(f"{path} must be TOML in UTF-8, but is not: {error}.") from error
-    return mechanism_from_tables(tables, str(path))
+    return read_drawing(path).mechanism()
 
 
 def mechanism_from_tables(tables: Mapping[str, Any], origin: str) -> Mechanism:
@@ -70,7 +133,7 @@ def mechanism_from_tables(tables: Mapping[str, Any], origin: str) -> Mechanism:
             near = difflib.get_close_matches(key, _TOP, 1, cutoff=0.0)[0]
             raise FingervisionError(f"{origin} has an unknown section or key, {key}; did you mean {near}?")
     lengths: dict[str, float] = {}
-    for name, raw in _table(tables.get("lengths", {}), f"[lengths] in {origin}").items():
+    for name, raw in as_table(tables.get("lengths", {}), f"[lengths] in {origin}").items():
         lengths[name] = number(raw, lengths, f"lengths.{name} in {origin}")
     reader = _Reader(lengths, origin)
     material = read_material(tables, origin)
@@ -87,6 +150,7 @@ def mechanism_from_tables(tables: Mapping[str, Any], origin: str) -> Mechanism:
         drive=reader.drive(tables),
         probes={name: p for t in reader.sections(tables, "probe", least=0) for name, p in [reader.probe(t)]},
         pairs={},
+        contacts=tuple(reader.contact(t, i) for i, t in enumerate(reader.sections(tables, "contact", least=0), 1)),
     )
     pairs = {name: ends for t in reader.sections(tables, "pair", least=0) for name, ends in [reader.pair(t, mechanism)]}
     mechanism.pairs.update(pairs)
@@ -95,47 +159,7 @@ def mechanism_from_tables(tables: Mapping[str, Any], origin: str) -> Mechanism:
     return mechanism
 
 
-def _table(raw: Any, what: str) -> Mapping[str, Any]:
-    if not isinstance(raw, dict):
-        raise FingervisionError(f"{what} must be a table, but is {raw!r}.")
-    return raw
-
-
-class _Reader:
-    def __init__(self, lengths: Mapping[str, float], origin: str) -> None:
-        self.lengths, self.origin = lengths, origin
-
-    def sections(self, tables: Mapping[str, Any], name: str, least: int = 1) -> list[Mapping[str, Any]]:
-        raw = tables.get(name, [])
-        if not isinstance(raw, list) or len(raw) < least:
-            raise FingervisionError(f"{self.origin} must have [[{name}]] sections, at least {least}, but has {raw!r}.")
-        return [_table(table, f"[[{name}]] in {self.origin}") for table in raw]
-
-    def known(self, table: Mapping[str, Any], keys: tuple[str, ...], what: str) -> None:
-        for key in table:
-            if key not in keys:
-                near = difflib.get_close_matches(key, keys, 1, cutoff=0.0)[0]
-                raise FingervisionError(f"{what} in {self.origin} has an unknown key, {key}; did you mean {near}?")
-
-    def value(self, table: Mapping[str, Any], key: str, what: str) -> float:
-        name = f"{what}.{key}" if what else key
-        if key not in table:
-            raise FingervisionError(f"{self.origin} must state {name}, but does not.")
-        return number(table[key], self.lengths, f"{name} in {self.origin}")
-
-    def positive(self, table: Mapping[str, Any], key: str, what: str) -> float:
-        value = self.value(table, key, what)
-        if value <= 0.0:
-            name = f"{what}.{key}" if what else key
-            raise FingervisionError(f"{name} in {self.origin} must be positive, but is {value:g}.")
-        return value
-
-    def numbers(self, table: Mapping[str, Any], key: str, count: int, what: str) -> tuple[float, ...]:
-        raw = table.get(key)
-        if not isinstance(raw, list) or len(raw) != count:
-            raise FingervisionError(f"{what}.{key} in {self.origin} must be a list of {count} numbers, but is {raw!r}.")
-        return tuple(number(part, self.lengths, f"{what}.{key} in {self.origin}") for part in raw)
-
+class _Reader(DrawingReader):
     def body(self, table: Mapping[str, Any], place: int) -> list[tuple[bool, Shape]]:
         what = f"body {table.get('name', place)}"
         self.known(table, ("name", "cut", "width_mm", "polygon_mm", *_SHAPES), what)
@@ -170,21 +194,11 @@ class _Reader:
                 raise FingervisionError(f"{what}.bar_mm in {self.origin} must have some length, but has none.")
             return bar(values[0], values[1], values[2], values[3], width_mm)
         if key == "box_mm":
-            return box(*self._grown(values, f"{what}.box_mm"))
+            return box(*self.grown(values, f"{what}.box_mm"))
         radii = (values[2], values[2]) if key == "disc_mm" else (values[2], values[3])
         if min(radii) <= 0.0:
             raise FingervisionError(f"{what}.{key} in {self.origin} must have positive radii, but has {min(radii):g}.")
         return Ellipse((values[0], values[1]), radii, values[4] if key == "ellipse_mm" else 0.0)
-
-    def _grown(self, values: tuple[float, ...], what: str, *, flat: bool = False) -> tuple[float, float, float, float]:
-        x0, x1, y0, y1 = values
-        fine = x1 >= x0 and y1 >= y0 if flat else x1 > x0 and y1 > y0
-        if not fine:
-            raise FingervisionError(
-                f"{what} in {self.origin} must be x from, x to, y from, y to, both growing, but is "
-                f"[{x0:g}, {x1:g}, {y0:g}, {y1:g}]."
-            )
-        return x0, x1, y0, y1
 
     def flexure(self, table: Mapping[str, Any], place: int) -> Flexure:
         name = str(table.get("name", place))
@@ -208,7 +222,7 @@ class _Reader:
 
     def face(self, table: Mapping[str, Any], what: str) -> Face:
         name = str(table.get("name", what))
-        return Face(name, self._grown(self.numbers(table, "box_mm", 4, what), f"{what}.box_mm", flat=True))
+        return Face(name, self.grown(self.numbers(table, "box_mm", 4, what), f"{what}.box_mm", flat=True))
 
     def slide(self, table: Mapping[str, Any], place: int) -> tuple[Face, str]:
         if table.get("holds") not in ("x", "y"):
@@ -217,8 +231,26 @@ class _Reader:
             )
         return self.face(table, f"slide {place}"), table["holds"]
 
+    def contact(self, table: Mapping[str, Any], place: int) -> Contact:
+        name = str(table.get("name", f"contact {place}"))
+        what = f"contact {name}"
+        self.known(table, ("name", "box_mm", "against_box_mm", "wall_mm"), what)
+        if ("against_box_mm" in table) == ("wall_mm" in table):
+            raise FingervisionError(
+                f"{what} in {self.origin} must be against one of against_box_mm, a face, and wall_mm, two points of a "
+                f"rigid wall, but has {'both' if 'wall_mm' in table else 'none'}."
+            )
+        face = self.face({**table, "name": name}, what)
+        if "wall_mm" in table:
+            x0, y0, x1, y1 = self.numbers(table, "wall_mm", 4, what)
+            if hypot(x1 - x0, y1 - y0) == 0.0:
+                raise FingervisionError(f"{what}.wall_mm in {self.origin} must be two points, but they are one.")
+            return Contact(name, face, None, ((x0, y0), (x1, y1)))
+        box_mm = self.grown(self.numbers(table, "against_box_mm", 4, what), f"{what}.against_box_mm", flat=True)
+        return Contact(name, face, Face(f"{name}, other face", box_mm))
+
     def drive(self, tables: Mapping[str, Any]) -> Drive:
-        table = _table(tables.get("drive", None), f"[drive] in {self.origin}")
+        table = as_table(tables.get("drive", None), f"[drive] in {self.origin}")
         self.known(table, ("name", "box_mm", "direction", "across"), "drive")
         x, y = self.numbers(table, "direction", 2, "drive")
         across = table.get("across", "held")
@@ -238,9 +270,10 @@ class _Reader:
 
     def pair(self, table: Mapping[str, Any], mechanism: Mechanism) -> tuple[str, tuple[str, str]]:
         name, of = str(table.get("name", "")), table.get("of")
-        if not isinstance(of, list) or len(of) != 2 or not all(end in mechanism.probes for end in of) or of[0] == of[1]:
+        ends = [end for end in of if isinstance(end, str) and end in mechanism.probes] if isinstance(of, list) else []
+        if len(ends) != 2 or ends != of or mechanism.probes[ends[0]] == mechanism.probes[ends[1]]:
             raise FingervisionError(
-                f"pair {name}.of in {self.origin} must be two of the probes {', '.join(mechanism.probes)}, "
-                f"but is {of!r}."
+                f"pair {name}.of in {self.origin} must be two of the probes {', '.join(mechanism.probes)} at different "
+                f"places, but is {of!r}."
             )
-        return name, (of[0], of[1])
+        return name, (ends[0], ends[1])

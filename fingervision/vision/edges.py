@@ -72,6 +72,8 @@ class EdgePoints:
         Neighbouring lines that share their noise.
     noise_flat : float
         Standard deviation of the light in the flat parts beside the edges; 0 where none is in view.
+    beside : str
+        What stands beside the edges or has moved them, where anything is seen: wall, shadow, glare, motion, sharpening.
     """
 
     lines: ProfileLines
@@ -87,9 +89,12 @@ class EdgePoints:
     inside: tuple[float, float]
     shared_lines: float = 1.0
     noise_flat: float = 0.0
+    beside: str = ""
 
 
-def fit_edges(upright: GreyImage, lines: ProfileLines, light: Floats, top_level: int) -> EdgePoints:
+def fit_edges(
+    upright: GreyImage, lines: ProfileLines, light: Floats, top_level: int, is_shared_known: bool = False
+) -> EdgePoints:
     """Sub-pixel position of the edge on every line of two fingers.
 
     Parameters
@@ -102,6 +107,8 @@ def fit_edges(upright: GreyImage, lines: ProfileLines, light: Floats, top_level:
         Light of every grey level, on the levels' own scale.
     top_level : int
         End of the scale.
+    is_shared_known : bool
+        Whether a codec is known to share noise over many lines.
 
     Returns
     -------
@@ -115,7 +122,7 @@ def fit_edges(upright: GreyImage, lines: ProfileLines, light: Floats, top_level:
     coarse = lines.coarse + lines.outward * np.floor(position).astype(np.intp)
     lines = ProfileLines(lines.fixed, coarse, lines.slope, lines.weight, lines.outward)
     levels = line_levels(upright, lines, light, filters.reach_px)
-    return _fit(upright, light, levels, lines, blur, filters, float(top_level))
+    return _fit(upright, light, levels, lines, blur, filters, float(top_level), is_shared_known)
 
 
 def _fit(
@@ -126,6 +133,7 @@ def _fit(
     blur_px: float,
     filters: EdgeFilters,
     top_level: float,
+    is_shared_known: bool,
 ) -> EdgePoints:
     """Gauss-Newton over every line's two levels and position, and the blur of flanks and tips."""
     pixels, real = levels.shape[-1], lines.weight.ravel() > 0
@@ -169,7 +177,7 @@ def _fit(
         filters.reach_px,
         marks,
         (_inside(levels[0], lines.weight[0]), _inside(levels[1], lines.weight[1])),
-        *flat_noise(upright, light, lines, filters, *filters.middle(blur[0])),
+        *flat_noise(upright, light, lines, filters, *filters.middle(blur[0]), is_shared_known),
     )
 
 

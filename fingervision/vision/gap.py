@@ -1,5 +1,7 @@
 """Step 8, the gap: the distance between the two measuring points, and how surely it is known."""
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -19,6 +21,7 @@ from fingervision.vision.median import middle
 from fingervision.vision.outline_points import OutlinePoints, finger_origin, outline_points
 from fingervision.vision.profile_lines import IS_INNER, IS_ROW
 from fingervision.vision.residuals import SHARED_POINTS, has_flanks, shape_holds, shared_points, spread
+from fingervision.vision.roughness import roughness, shared_along, with_roughness
 
 Floats = NDArray[np.float64]
 
@@ -69,13 +72,24 @@ def measure_gap(
     points = outline_points(fingers, edges)
     if min(len(p.x) for p in points) < FEWEST_LINES:
         return NoGap(Status.NO_FINGERS, "Too little of a finger's outline is in view to be measured.")
-    left, right = (squared(fit_finger_end(p, *first_guess(p, below_tip_px))) for p in points)
+    guesses = [first_guess(p, below_tip_px) for p in points]
+    fits = [fit_finger_end(p, *guess) for p, guess in zip(points, guesses, strict=True)]
     noise_shared = max(SHARED_POINTS[coding], edges.shared_lines)
+    rough = roughness(points, (fits[0], fits[1]))
+    if rough is not None:
+        bare, points = points, (with_roughness(points[0], rough), with_roughness(points[1], rough))
+        fits = [
+            shared_along(p, fit_finger_end(p, *guess), guess[2], own, rough)
+            for p, guess, own in zip(points, guesses, bare, strict=True)
+        ]
+        noise_shared = max(noise_shared, rough.shared_px)
+    left, right = squared(fits[0]), squared(fits[1])
     shared = max(shared_points(points, (left, right), coding), noise_shared)
     fitted = [
         measuring_point(end, below_tip_px, float(p.blur[0])) for p, end in zip(points, (left, right), strict=True)
     ]
-    holds = [shape_holds(*one, below_tip_px) for one in zip(points, (left, right), fitted, strict=True)]
+    stray = 1.0 if rough is None else rough.shared_px
+    holds = [shape_holds(*one, below_tip_px, stray) for one in zip(points, (left, right), fitted, strict=True)]
     refusal = _no_fingers(fingers, points, (left, right), holds, below_tip_px)
     if refusal is not None:
         return refusal
@@ -87,12 +101,15 @@ def measure_gap(
         if own is None and does_hold:
             if found.apex < p.x.min() - 1.0:
                 return NoGap(Status.TIP_OUT_OF_VIEW, "A finger's tip lies beyond the picture's border.")
-            covariance = found.covariance * spread(end) * shared
+            covariance = found.covariance * (spread(end) * shared if rough is None else 1.0)
             own = MeasuringPoint(found.tip, found.apex, found.edge, found.slope, covariance)
         if own is None:
             return NoGap(Status.NO_FINGERS, "The outline near the measuring height is broken.")
         measured.append(own)
-    return _assemble(fingers, edges, measured, below_tip_px, light_gap)
+    outcome = _assemble(fingers, edges, measured, below_tip_px, light_gap)
+    if rough is None or isinstance(outcome, NoGap):
+        return outcome
+    return replace(outcome, roughness_px=rough.deviation_px)
 
 
 def _refuse(edges: EdgePoints, full_scale: int, light_gap: bool) -> NoGap | None:

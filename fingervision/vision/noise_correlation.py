@@ -25,12 +25,19 @@ LAGS = 3
 GROUND, FINGER = 0, 1
 # A square whose noise is so many times that of the quietest of its side shows something: an edge, not texture.
 QUIETEST_TIMES = 4.0
-# Correlations below this many standard uncertainties of their sum are none.
-SIGNIFICANT = 3.0
+# Correlations below this many standard uncertainties of their sum are none. The nearest pixels are looked at first:
+# where none of their correlations is so many times its own uncertainty, interpolation and filters have shared nothing.
+SIGNIFICANT, NEAREST, NEAR_SIGNIFICANT = 3.0, 1, 2.5
 
 
 def flat_noise(
-    upright: GreyImage, light: Floats, lines: ProfileLines, filters: EdgeFilters, row: int, column: int
+    upright: GreyImage,
+    light: Floats,
+    lines: ProfileLines,
+    filters: EdgeFilters,
+    row: int,
+    column: int,
+    is_shared_known: bool = False,
 ) -> tuple[float, float]:
     """Neighbouring lines that share their noise (1 where every line's noise is its own), and that noise.
 
@@ -46,6 +53,8 @@ def flat_noise(
         For the window that is used.
     row, column : int
         Which filter of the table an edge of this blur, in the middle of its window, uses.
+    is_shared_known : bool
+        Whether a codec shares noise over more lines than are looked at here, so that the noise alone is wanted.
 
     Returns
     -------
@@ -60,11 +69,15 @@ def flat_noise(
     weight = filters.shift[row, column]
     shared, quietest = 1.0, 0.0
     for side in (GROUND, FINGER):
-        covariance, pixels = _autocovariance(upright, light, corners[corners[:, 2] == side])
+        own = corners[corners[:, 2] == side]
+        covariance, pixels = _autocovariance(upright, light, own, 0 if is_shared_known else NEAREST)
         variance = covariance[LAGS, LAGS] / max(pixels, 1.0)
         if variance <= 0.0:
             continue
         quietest = variance if quietest == 0.0 else min(quietest, variance)
+        if is_shared_known or not _is_any(covariance, NEAR_SIGNIFICANT * covariance[LAGS, LAGS] / np.sqrt(pixels)):
+            continue
+        covariance, pixels = _autocovariance(upright, light, own, LAGS)
         correlation = covariance / covariance[LAGS, LAGS]
         # Each correlation of white noise is uncertain by the root of the number of pixels.
         limit = 1.0 + SIGNIFICANT * float(np.sqrt(2.0 * LAGS / pixels))
@@ -111,8 +124,20 @@ def _squares(fixed: Ints, coarse: Ints, weight: Floats, reach: int, rows: int, c
 
 
 @compiled
-def _autocovariance(upright: GreyImage, light: Floats, corners: NDArray[np.int64]) -> tuple[Floats, float]:
+def _is_any(covariance: Floats, limit: float) -> bool:
+    """Whether a pixel has a covariance beyond this with any of those beside it."""
+    across, down = abs(covariance[LAGS + 1, LAGS]), abs(covariance[LAGS, LAGS + 1])
+    aslant = max(abs(covariance[LAGS + 1, LAGS + 1]), abs(covariance[LAGS - 1, LAGS + 1]))
+    return bool(max(across, down, aslant) > limit)
+
+
+@compiled
+def _autocovariance(
+    upright: GreyImage, light: Floats, corners: NDArray[np.int64], farthest: int
+) -> tuple[Floats, float]:
     """Sum of the squares' autocovariances, each without its plane of light; and how many pixels they hold.
+
+    Only lags up to `farthest` are summed; the others are left at zero.
 
     The first index is the lag along a row plus `LAGS`, the second that from row to row.
     """
@@ -147,8 +172,8 @@ def _autocovariance(upright: GreyImage, light: Floats, corners: NDArray[np.int64
             continue
         used += 1
         square = squares[k]
-        for down in range(LAGS + 1):
-            for right in range(-LAGS, LAGS + 1):
+        for down in range(farthest + 1):
+            for right in range(-farthest, farthest + 1):
                 if down == 0 and right < 0:
                     continue
                 total = 0.0

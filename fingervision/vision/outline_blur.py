@@ -26,7 +26,9 @@ def outline_blur(blur_px: Floats, slope: Floats, gain: Floats) -> Floats:
     """Blur (sigma_e, the pixel included) that the curvature of the outline is felt through, shape (2, PLACES).
 
     Blur along the edge moves a curved edge's half-level, blur across it does not. Motion makes the two differ: what is
-    seen on the flanks is the blur across the fingers, what is seen on the tips that along them.
+    seen on the flanks is the blur across the fingers, what is seen on the tips that along them. What counts is the
+    variance along the edge of what stays on it: det S / n' S n for a covariance S and the edge's normal n. What a fit
+    with free levels adds on a slanted line comes from the blur across the edge, n' S n.
 
     Parameters
     ----------
@@ -35,7 +37,8 @@ def outline_blur(blur_px: Floats, slope: Floats, gain: Floats) -> Floats:
     slope, gain : ndarray of float, shape (2, PLACES)
         Of every line, and what `curvature_gain` says of it.
     """
-    across, along = blur_px[:, :1] ** 2, blur_px[:, 1:] ** 2
+    across, along = blur_px[:, :1] ** 2 + PIXEL_VARIANCE, blur_px[:, 1:] ** 2 + PIXEL_VARIANCE
     steep = slope**2
-    own = np.where(IS_ROW, across * steep + along, across + along * steep) / (1.0 + steep)
-    return np.asarray(np.sqrt((own + PIXEL_VARIANCE) * gain))
+    normal = np.where(IS_ROW, across + along * steep, along + across * steep) / (1.0 + steep)
+    # A short window takes a little of a slanted line's share away: never all that stays on the edge.
+    return np.asarray(np.sqrt(np.maximum(across * along / normal + (gain - 1.0) * normal, PIXEL_VARIANCE)))

@@ -21,9 +21,12 @@ from fingervision.vision.edges import EdgePoints, fit_edges
 from fingervision.vision.fingers import CoarseFingers, find_fingers
 from fingervision.vision.gap import measure_gap
 from fingervision.vision.grey import GreyImage, to_grey, top_level
+from fingervision.vision.interlace import at_half_way
+from fingervision.vision.longer_flanks import is_surer, with_longer_flanks
 from fingervision.vision.overlay import draw_boundary, draw_edge_points, draw_overlay, in_eight_bits
 from fingervision.vision.profile_choice import with_profile
 from fingervision.vision.profile_lines import profile_lines
+from fingervision.vision.residuals import SHARED_POINTS
 from fingervision.vision.response_shift import gap_shift_px
 from fingervision.vision.stripes import with_stripes
 
@@ -38,6 +41,8 @@ SMALLEST_SIDE_PX = 16
 FINAL = (Status.SATURATED, Status.BLURRED)
 # What is taken of a camera that says nothing, and what it may be as well.
 LINEAR, SRGB = standard_response("linear"), standard_response("srgb")
+# A codec that shares noise over more lines than this leaves nothing to be learnt of it in one picture.
+FARTHEST_SHARED = 7.0
 # The outline is followed so far below the measuring height (pixels, or in units of that height).
 REACH_BELOW_PX, REACH_BELOW_HEIGHTS = 45.0, 1.5
 
@@ -62,6 +67,8 @@ class Settings:
         Depth of levels that are stored in 16 bits; None finds it in the picture.
     fingers_are_dark : bool or None
         Whether the fingers are darker than the ground; None finds out in every frame.
+    is_outline : bool
+        Whether a thick part is measured at its whole outline, side walls included, and not at its front face.
     """
 
     below_tip_px: float
@@ -71,6 +78,7 @@ class Settings:
     other_response: CameraResponse | None = SRGB
     bits: int | None = None
     fingers_are_dark: bool | None = None
+    is_outline: bool = False
 
 
 def measure_frame(frame: Frame, settings: Settings) -> GapMeasurement | NoGap:
@@ -95,6 +103,31 @@ def measure_frame(frame: Frame, settings: Settings) -> GapMeasurement | NoGap:
         cv2.setNumThreads(1)
     grey = _part(to_grey(frame.pixels), settings.region)
     return _shifted(_attempt(grey, settings, frame.coding).outcome, settings.region)
+
+
+def look_closely(
+    frame: Frame, settings: Settings
+) -> tuple[GapMeasurement | NoGap, CoarseFingers | None, EdgePoints | None]:
+    """Measure one frame and keep what was found on the way, for whoever asks what limits the measurement.
+
+    Parameters
+    ----------
+    frame : Frame
+        The picture.
+    settings : Settings
+        What the user chose.
+
+    Returns
+    -------
+    outcome : GapMeasurement or NoGap
+        As of `measure_frame`, in pixels of the full frame.
+    fingers : CoarseFingers or None
+        Where they were found, in pixels of the region; None where they were not.
+    edges : EdgePoints or None
+        Their sub-pixel outlines, likewise.
+    """
+    attempt = _attempt(_part(to_grey(frame.pixels), settings.region), settings, frame.coding)
+    return _shifted(attempt.outcome, settings.region), attempt.fingers, attempt.edges
 
 
 def steps(frame: Frame, settings: Settings) -> list[tuple[str, Pixels]]:
@@ -166,11 +199,11 @@ def _attempt(grey: GreyImage, settings: Settings, coding: Coding) -> _Attempt:
             attempt = _Attempt(fingers, split)
         else:
             upright = fingers.orientation.view(grey)
-            light = _light(settings.response, scale, int(np.iinfo(grey.dtype).max) + 1)
-            lines = profile_lines((fingers.left, fingers.right))
-            edges = with_profile(upright, fit_edges(upright, lines, light, scale), light, scale)
-            edges = with_stripes(upright, edges, light)
-            outcome = measure_gap(fingers, edges, settings.below_tip_px, scale, light_gap, coding)
+            how = (settings, scale, light_gap, coding)
+            edges, outcome = _measured(upright, fingers, *how)
+            if isinstance(outcome, GapMeasurement) and outcome.roughness_px:
+                longer = _measured(upright, with_longer_flanks(fingers, settings.below_tip_px), *how)
+                edges, outcome = longer if is_surer(longer[1], outcome) else (edges, outcome)
             if settings.other_response is not None and isinstance(outcome, GapMeasurement):
                 shift = gap_shift_px(outcome, edges, settings.response, settings.other_response, scale)
                 outcome = replace(outcome, response_shift_px=shift)
@@ -179,6 +212,24 @@ def _attempt(grey: GreyImage, settings: Settings, coding: Coding) -> _Attempt:
             return attempt
         first = first or attempt
     return first or _Attempt(NoGap(Status.NO_FINGERS, "Nothing in the picture looks like two fingers."), binary)
+
+
+def _measured(
+    upright: GreyImage, fingers: CoarseFingers, settings: Settings, scale: int, light_gap: bool, coding: Coding
+) -> tuple[EdgePoints, GapMeasurement | NoGap]:
+    """Edges of fingers that were found, and what they say."""
+    light = _light(settings.response, scale, int(np.iinfo(upright.dtype).max) + 1)
+    lines = profile_lines((fingers.left, fingers.right))
+    is_shared_known = SHARED_POINTS[coding] > FARTHEST_SHARED
+    edges, apart_px = fit_edges(upright, lines, light, scale, is_shared_known), 0.0
+    if fingers.orientation.direction.is_vertical:
+        edges, apart_px = at_half_way(edges)
+    edges = with_profile(upright, edges, light, scale, settings.is_outline)
+    edges = with_stripes(upright, edges, light)
+    outcome = measure_gap(fingers, edges, settings.below_tip_px, scale, light_gap, coding)
+    if (apart_px or edges.beside) and isinstance(outcome, GapMeasurement):
+        outcome = replace(outcome, fields_apart_px=apart_px, beside=edges.beside)
+    return edges, outcome
 
 
 def _scale(grey: GreyImage, settings: Settings) -> int:

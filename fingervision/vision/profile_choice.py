@@ -11,12 +11,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from fingervision.vision.beside_edge import without_additions
 from fingervision.vision.edge_filters import PIXEL_VARIANCE
 from fingervision.vision.edge_profile import EdgeMark
 from fingervision.vision.edges import EdgePoints
 from fingervision.vision.grey import GreyImage
 from fingervision.vision.profile_lines import INNER, IS_INNER, IS_ROW, ROWS
 from fingervision.vision.profile_models import GLARE, SHADOW, STARTS_PX, STEP, WALL, ProfileFit, fit_profile
+from fingervision.vision.sharpening import U_SHIFT, Profile, is_curved, sharpening
 
 Floats = NDArray[np.float64]
 
@@ -60,7 +62,9 @@ class _Profile:
     count: Floats
 
 
-def with_profile(upright: GreyImage, edges: EdgePoints, light: Floats, top_level: int) -> EdgePoints:
+def with_profile(
+    upright: GreyImage, edges: EdgePoints, light: Floats, top_level: int, is_outline: bool = False
+) -> EdgePoints:
     """The same points, moved to the finger's own edge where something beside it has drawn the fitted step away.
 
     Parameters
@@ -73,6 +77,8 @@ def with_profile(upright: GreyImage, edges: EdgePoints, light: Floats, top_level
         Light of every grey level.
     top_level : int
         End of the scale.
+    is_outline : bool
+        Whether a thick part's edge is that of its whole outline, side walls included, and not that of its front face.
     """
     flank, tip = edges.blur_px[:, 0].max(), edges.blur_px[:, 1].min()
     is_unlike_tip = flank**2 > (1.0 + WIDER) * (tip**2 + PIXEL_VARIANCE)
@@ -84,6 +90,8 @@ def with_profile(upright: GreyImage, edges: EdgePoints, light: Floats, top_level
         return edges
     if any(p.light.max() > top_level - CUT_OFF_SIGMAS * edges.noise or p.light.min() <= 0.0 for p in inner if p):
         return edges  # a flank that is cut off at the end of the scale is none of these
+    if is_curved(light, top_level) and (sharp := _sharpened(upright, edges, light, top_level, room)) is not None:
+        return sharp
     weight = 1.0 / edges.noise_flat**2
     blur = [float(np.hypot(edges.blur_px[k, 0], np.sqrt(PIXEL_VARIANCE))) for k in range(2)]
     fits = [[_best(kind, profile, weight, blur[k]) for kind in range(4)] for k, profile in enumerate(inner) if profile]
@@ -96,30 +104,63 @@ def with_profile(upright: GreyImage, edges: EdgePoints, light: Floats, top_level
     margin = CLEARLY * np.maximum(left / bins, 1.0)
     is_shadow = left[SHADOW] < enough and left[SHADOW] + margin[SHADOW] < min(left[WALL], left[GLARE])
     if not is_step and is_shadow and _are_of_size(shadow, -1.0):
-        return _moved(edges, shadow, U_SHADOW, all_around)
+        moved = _moved(edges, shadow, U_SHADOW, all_around, "shadow")
+        return without_additions(upright, moved, light, SHADOW, shadow)
     if not is_step and left[GLARE] < enough and left[GLARE] + margin[GLARE] < left[WALL] and _are_of_size(glare, 1.0):
-        return _moved(edges, glare, U_GLARE, all_around)
+        moved = _moved(edges, glare, U_GLARE, all_around, "glare")
+        return without_additions(upright, moved, light, GLARE, glare)
     outer = [_profile(upright, edges, light, k, slice(INNER, ROWS), REACH_PX) for k in range(2)]
     if outer[0] is None or outer[1] is None:
         is_wall = not is_step and left[WALL] < enough and _are_of_size(wall, -1.0)
-        return _unsure(edges, [abs(fit.position) for fit in wall]) if is_wall else edges
+        chosen = [_beyond_wall(fit) for fit in wall] if is_outline else wall
+        return _unsure(edges, [abs(fit.position) for fit in chosen], "wall") if is_wall else edges
+    # A shadow that the inner flanks alone cannot tell from a wall falls on the outer side as well.
+    beyond = np.array(
+        [[_best(kind, p, weight, blur[k]).squares for kind in range(3)] for k, p in enumerate(outer) if p]
+    )
+    both = left[:3] + beyond.sum(axis=0)
+    if not is_step and left[SHADOW] < enough and both[SHADOW] + margin[SHADOW] < both[WALL]:
+        is_shadow = both[SHADOW] < both[STEP] / MODEL_TIMES and _are_of_size(shadow, -1.0)
+        if is_shadow:
+            moved = _moved(edges, shadow, U_SHADOW, all_around, "shadow")
+            return without_additions(upright, moved, light, SHADOW, shadow)
     widths = [_best(STEP, profile, weight, blur[k]).blur for k, profile in enumerate(outer) if profile]
     if all(each[STEP].blur ** 2 > (1.0 + WIDER) * width**2 for each, width in zip(fits, widths, strict=True)):
         narrow = [_best(WALL, p, weight, width, True) for p, width in zip(inner, widths, strict=True) if p]
         remains = sum(fit.squares for fit in narrow)
         if remains < min(enough, left[STEP] - SIGNIFICANT) and _are_of_size(narrow, -1.0):
-            return _with_blur(_moved(edges, narrow, U_WALL, _across(edges)), widths)
+            chosen = [_beyond_wall(fit) for fit in narrow] if is_outline else narrow
+            return _with_blur(_moved(edges, chosen, U_WALL, _across(edges), "wall"), widths)
     flanks, tips = (edges.blur_px[:, part] ** 2 + PIXEL_VARIANCE for part in (0, 1))
     widened = np.maximum(flanks - (1.0 + WIDER) * tips, 0.0).tolist()
     if any(widened):
-        return _unsure(edges, [0.5 * more / MOTION_RADIUS_PX for more in widened])
+        return _unsure(edges, [0.5 * more / MOTION_RADIUS_PX for more in widened], "motion")
     is_resolved = all(fit.breadth > RESOLVED_BLURS * fit.blur for fit in wall)
     if is_step or left[GLARE] > enough or not is_resolved or not _are_of_size(glare, 1.0):
         return edges
     # Glare on the finger, or a bevel around it: the outline is in between.
     bevel = [abs(w.position + w.breadth - g.position) / np.sqrt(3.0) for w, g in zip(wall, glare, strict=True)]
-    moved = _moved(edges, glare, U_GLARE, all_around)
+    moved = _moved(edges, glare, U_GLARE, all_around, "glare")
+    moved = without_additions(upright, moved, light, GLARE, glare)
     return replace(moved, marks=_stated(moved, [max(m.shift_px, u) for m, u in zip(moved.marks, bevel, strict=True)]))
+
+
+def _sharpened(upright: GreyImage, edges: EdgePoints, light: Floats, top_level: int, room: int) -> EdgePoints | None:
+    """The same points without what sharpening of the stored levels has moved them by; None where there is none."""
+    stored = np.arange(float(light.size))
+    left, right = (_profile(upright, edges, stored, k, slice(0, INNER), room) for k in range(2))
+    if left is None or right is None:
+        return None
+    blur = float(np.hypot(edges.blur_px[:, 0].mean(), np.sqrt(PIXEL_VARIANCE)))
+    profiles = Profile(left.t, left.light, left.count), Profile(right.t, right.light, right.count)
+    found = sharpening(profiles, light, top_level, blur)
+    if found is None:
+        return None
+    moves = np.array(found.shift_px)
+    by_pixel = np.hypot(1.0, edges.lines.slope)
+    moved = replace(edges, position=edges.position + edges.lines.outward * moves[:, None] * by_pixel)
+    u_px = [U_SHIFT * abs(move) for move in moves.tolist()]
+    return replace(moved, marks=_stated(moved, u_px), beside="sharpening")
 
 
 def _are_of_size(fits: list[ProfileFit], sign: float) -> bool:
@@ -187,11 +228,17 @@ def _across(edges: EdgePoints) -> Floats:
     return np.where(IS_INNER, 1.0, np.where(IS_ROW, 0.0, np.maximum(towards_gap, 0.0)))
 
 
-def _moved(edges: EdgePoints, fits: list[ProfileFit], u_relative: float, by_pixel: Floats) -> EdgePoints:
+def _beyond_wall(fit: ProfileFit) -> ProfileFit:
+    """The far edge of a wall, where the near one was found."""
+    return fit._replace(position=fit.position + fit.breadth)
+
+
+def _moved(edges: EdgePoints, fits: list[ProfileFit], u_relative: float, by_pixel: Floats, beside: str) -> EdgePoints:
     """Edges at the place that a model gives; what is not known of it is stated."""
     moves = np.array([fit.position for fit in fits])[:, None] * by_pixel
     u_px = [float(np.hypot(fit.u_position, u_relative * fit.position)) for fit in fits]
-    return replace(edges, position=edges.position + edges.lines.outward * moves, marks=_stated(edges, u_px))
+    position = edges.position + edges.lines.outward * moves
+    return replace(edges, position=position, marks=_stated(edges, u_px), beside=beside)
 
 
 def _with_blur(edges: EdgePoints, widths: list[float]) -> EdgePoints:
@@ -202,10 +249,10 @@ def _with_blur(edges: EdgePoints, widths: list[float]) -> EdgePoints:
     return replace(edges, blur_px=blur_px)
 
 
-def _unsure(edges: EdgePoints, limit_px: list[float]) -> EdgePoints:
+def _unsure(edges: EdgePoints, limit_px: list[float], beside: str) -> EdgePoints:
     """Edges that stay, with what nobody can tell: anywhere up to the limit."""
     u_px = [max(abs(m.shift_px), limit / np.sqrt(3.0)) for m, limit in zip(edges.marks, limit_px, strict=True)]
-    return replace(edges, marks=_stated(edges, u_px))
+    return replace(edges, marks=_stated(edges, u_px), beside=beside)
 
 
 def _stated(edges: EdgePoints, u_px: list[float]) -> tuple[EdgeMark, EdgeMark]:

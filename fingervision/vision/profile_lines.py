@@ -104,6 +104,8 @@ def _fill(outline: Outline, inner_sign: int, fixed: Ints, coarse: Ints, slope: F
         place = first
         for n in range(0, kept, max(thinning, 1)):
             # A tip is thinned out from its inner side, so that a mirrored finger has the mirrored lines.
-            i = keep[kept - 1 - n] if side == 2 and inner_sign > 0 else keep[n]
+            # Flanks that are thinned out have even and odd rows all the same: an interlaced picture's two fields.
+            other = 1 if side < 2 and thinning % 2 == 0 and (place - first) % 2 == 1 and n + 1 < kept else 0
+            i = keep[kept - 1 - n] if side == 2 and inner_sign > 0 else keep[n + other]
             fixed[place], coarse[place], slope[place], weight[place] = i + lowest, sense * reach[i], change[i], 1.0
             place += 1

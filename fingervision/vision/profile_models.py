@@ -72,7 +72,7 @@ def _cumulative(z: float) -> float:
 
 
 @compiled
-def _addition(kind: int, t: float, blur: float, breadth: float) -> float:
+def addition(kind: int, t: float, blur: float, breadth: float) -> float:
     """The part beside the step, blurred, at a distance from the edge outwards."""
     if kind == WALL:  # what lies between the first step and the second
         return _cumulative(t / blur) - _cumulative((t - breadth) / blur)
@@ -92,7 +92,7 @@ def _row(kind: int, t: float, p: Floats, out: Floats) -> None:
     step = _cumulative(away / blur)
     out[0], out[1] = 1.0, step
     out[2] = _cumulative(away / (TAIL_BLURS * blur)) - step
-    out[3] = _addition(kind, away, blur, p[BREADTH])
+    out[3] = addition(kind, away, blur, p[BREADTH])
 
 
 @compiled

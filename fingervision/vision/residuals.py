@@ -71,13 +71,25 @@ def shared_points(
     return max(0.5 * sum(seen), SHARED_POINTS[coding])
 
 
-def shape_holds(points: OutlinePoints, end: FingerEnd, found: MeasuringPoint, below_tip_px: float) -> bool:
-    """Whether the three-sided shape leaves nothing systematic near the measuring point and near the tip."""
+def shape_holds(
+    points: OutlinePoints, end: FingerEnd, found: MeasuringPoint, below_tip_px: float, stray: float = 1.0
+) -> bool:
+    """Whether the three-sided shape leaves nothing systematic near the measuring point and near the tip.
+
+    Parameters
+    ----------
+    points, end, found : OutlinePoints, FingerEnd, MeasuringPoint
+        One finger.
+    below_tip_px : float
+        Height of measuring below the tip.
+    stray : float
+        So many neighbouring points of a rough edge stray together, which is no matter of shape.
+    """
     if np.count_nonzero(end.robust) < PARAMETERS or not is_on_outline(points, found.edge, found.tip + below_tip_px):
         return False
-    limit = max(_roughness(end.residual, end.robust), 1.0)
+    limit = max(_roughness(end.residual, end.robust), 1.0) * np.sqrt(stray)
     systematic = _systematic(points.x, points.y, end.residual, end.robust, found.edge, found.tip, below_tip_px)
-    return systematic < SHAPE_LIMIT * limit and end.misfit < MISFIT_LIMIT * limit
+    return bool(systematic < SHAPE_LIMIT * limit and end.misfit < MISFIT_LIMIT * limit)
 
 
 def has_flanks(points: OutlinePoints, end: FingerEnd) -> bool:

@@ -4,8 +4,8 @@ import numpy as np
 
 from fingervision.domain.gripper import Material
 from fingervision.models.hinge_compliance import bar_compliance, beam_compliance
-from fingervision.models.hinge_solid import plane_compliance, solid_compliance
 from fingervision.models.notch import circular_notch
+from tests.benchmarks.hinge_solid import plane_compliance, solid_compliance
 
 MATERIAL = Material("PA2200", 1650.0, 0.34, 930.0, 48.0)
 PLANAR = [0, 1, 5]

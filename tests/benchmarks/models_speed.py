@@ -10,7 +10,7 @@ from fingervision.domain.drive import DriveHistory
 from fingervision.models.finite_element import FiniteElementGripper
 from fingervision.models.lumped import LumpedGripper
 from fingervision.models.mesh_outline import ElementSize, mesh_outline
-from fingervision.models.modal_response import modal_gap_mm
+from fingervision.models.motion_in_time import gripper_motion
 from fingervision.models.physics import Physics
 from fingervision.storage.gripper_toml import read_gripper
 
@@ -26,7 +26,7 @@ def main() -> None:
     lumped = LumpedGripper(gripper)
     large = LumpedGripper(gripper, Physics(large_rotation=True, contact=True))
     _row("lumped, 60 s of drive at 25 Hz in motion (at most 0.1 s)",
-         lambda: modal_gap_mm(lumped.half, DriveHistory(time_s, inputs)))  # fmt: skip
+         lambda: gripper_motion(lumped, DriveHistory(time_s, inputs)))  # fmt: skip
     _row("lumped, the same at rest, large rotation and contact", lambda: large.respond(inputs))
     _row("lumped, building", lambda: LumpedGripper(gripper))
     unknowns: list[int] = []

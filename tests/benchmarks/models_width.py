@@ -5,8 +5,8 @@ from dataclasses import replace
 
 from fingervision.domain.gripper import Material
 from fingervision.models.hinge_correction import plane_strain_share
-from fingervision.models.hinge_solid import plane_compliance, solid_compliance
 from fingervision.models.notch import circular_notch
+from tests.benchmarks.hinge_solid import plane_compliance, solid_compliance
 
 PA2200 = Material("PA2200", 1650.0, 0.34, 930.0, 48.0)
 ABOUT_Z = 5

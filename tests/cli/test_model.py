@@ -180,3 +180,49 @@ def test_modes_are_written_and_drawn(tmp_path: Path) -> None:
     assert found["finite_element", "drive free", "1"] == pytest.approx(44.6 * 1.013, rel=0.005)
     assert found["finite_element", "drive held", "1"] == pytest.approx(357.9, rel=0.01)
     assert (tmp_path / "modes.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_a_part_is_gripped(tmp_path: Path) -> None:
+    output = run(GRIPPER, "--kind", "lumped", "--object-mm", "3", "--object-n-mm", "50", "--out", tmp_path)
+    assert "lumped: a part of 3 mm (50 N/mm) is touched at -0.1285 mm of input" in output
+    with (tmp_path / "grip.csv").open() as file:
+        rows = list(csv.DictReader(file))
+    held = [row for row in rows if row["held_width_mm"]]
+    assert held
+    for row in held:
+        # The part gives way by its grip over its stiffness.
+        assert float(row["held_width_mm"]) == pytest.approx(3.0 - float(row["grip_n"]) / 50.0, abs=1e-6)
+    assert all(float(row["grip_n"]) == 0.0 for row in rows if float(row["input_mm"]) > -0.128)
+    assert (tmp_path / "grip.png").read_bytes().startswith(b"\x89PNG")
+
+
+@pytest.mark.parametrize(
+    ("options", "sentence"),
+    [
+        (("--object-mm", "-1"), "--object-mm must be the positive width"),
+        (("--object-mm", "nan"), "--object-mm must be the positive width"),
+        (("--object-mm", "3000"), "is it in micrometres"),
+        (("--object-mm", "3", "--object-n-mm", "0"), "--object-n-mm must be a positive stiffness"),
+        (("--object-n-mm", "5"), "--object-n-mm needs --object-mm"),
+    ],
+)
+def test_what_cannot_be_gripped_is_refused(tmp_path: Path, options: tuple[str, ...], sentence: str) -> None:
+    with pytest.raises(UsageError, match=sentence):
+        run(GRIPPER, "--kind", "lumped", "--out", tmp_path, *options)
+    assert not (tmp_path / "grip.csv").exists()
+
+
+def test_endurance_and_warmth_where_the_material_states_them(tmp_path: Path) -> None:
+    stated = (
+        "yield_mpa = 48.0\nthermal_expansion_per_k = 1e-4\nsn_line = { cycles = [1e3, 1e6], amplitude_mpa = [30, 12] }"
+    )
+    (tmp_path / "g.toml").write_text(GRIPPER.read_text().replace("yield_mpa = 48.0", stated))
+    given = drive(tmp_path / "drive.csv", [-0.5, 1.5])
+    output = run(tmp_path / "g.toml", "--kind", "lumped", "--drive", given, "--out", tmp_path)
+    assert "Endurance between -0.5 and 1.5 mm (lumped, the material's S-N line, no scatter): about" in output
+    with (tmp_path / "models.csv").open() as file:
+        (row,) = csv.DictReader(file)
+    # 19.08 MPa/mm: +-19.08 about 9.54 MPa, fully reversed 23.8 MPa.
+    expected = 1e3 * (19.08 / (1 - 9.54 / 48) / 30) ** (np.log(1e3) / np.log(12 / 30))
+    assert float(row["endurance_cycles"]) == pytest.approx(expected, rel=0.02)
+    assert row["gap_per_kelvin_mm"] == ""

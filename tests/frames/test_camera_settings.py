@@ -8,8 +8,9 @@ import cv2
 import pytest
 
 from fingervision.domain.errors import FingervisionError, UsageError
+from fingervision.domain.frame import Coding
 from fingervision.frames.camera import CameraFrames
-from fingervision.frames.camera_settings import MSMF, READ, V4L2, Settled, requests, settled
+from fingervision.frames.camera_settings import MSMF, READ, V4L2, Settled, coding_of, requests, settled
 from fingervision.frames.source import CameraWish, Wish
 
 YUYV, MJPG = (float(cv2.VideoWriter.fourcc(*letters)) for letters in ("YUYV", "MJPG"))
@@ -167,3 +168,15 @@ def test_what_is_no_camera_is_refused_and_opencv_keeps_its_words_to_itself(
     with pytest.raises(FingervisionError, match=f"The camera {device} cannot be opened: it is in use"):
         CameraFrames(str(device), Wish())
     assert capfd.readouterr().err == ""
+
+
+@pytest.mark.parametrize(
+    ("pixel_format", "coding"),
+    [("YUYV", Coding.LOSSLESS), ("MJPG", Coding.INTRAFRAME), ("H264", Coding.INTERFRAME), ("GREY", Coding.LOSSLESS)],
+)
+def test_a_camera_that_compresses_is_lossy(pixel_format: str, coding: Coding) -> None:
+    assert coding_of({"format": pixel_format}) is coding
+
+
+def test_a_camera_that_says_nothing_counts_as_raw() -> None:
+    assert coding_of({}) is Coding.LOSSLESS

@@ -5,6 +5,7 @@ from hypothesis import strategies as st
 
 from fingervision.domain.gripper import Gripper
 from fingervision.models.compliance_chain import ComplianceChain
+from fingervision.models.grip import Part
 from fingervision.models.hinge_compliance import beam_compliance
 from fingervision.models.hinge_correction import HingeTheory
 from fingervision.models.notch import notches_of
@@ -56,12 +57,15 @@ def test_the_plane_and_the_space_do_not_mix(gripper: Gripper) -> None:
 
 def test_grip_force_starts_at_the_object(gripper: Gripper) -> None:
     model = StiffnessMatrixGripper(gripper)
-    touching = -1.0 / model.gap_per_input
-    assert model.grip_force_n(touching, 3.0) == pytest.approx(0.0, abs=1e-12)
-    assert model.grip_force_n(touching + 0.1, 3.0) == 0.0
-    # Half of 0.1 mm of lost gap for each finger.
-    expected = 0.05 * model.gap_per_input * model.finger_stiffness_n_mm
-    assert model.grip_force_n(touching - 0.1, 3.0) == pytest.approx(expected)
+    # The corner, 0.3 mm above the measuring point, opens by a little more than it.
+    touching = 0.25 * (model.first_touch_mm() or 0.0)
+    assert model.grip_force_n(touching, Part(3.0)) == pytest.approx(0.0, abs=1e-12)
+    assert model.grip_force_n(touching + 0.1, Part(3.0)) == 0.0
+    expected = 0.1 * -2.0 / (model.first_touch_mm() or 0.0) * model.finger_stiffness_n_mm
+    assert model.grip_force_n(touching - 0.1, Part(3.0)) == pytest.approx(expected)
+    # A part as stiff as both fingers one after the other halves the grip.
+    soft = Part(3.0, 0.5 * model.finger_stiffness_n_mm)
+    assert model.grip_force_n(touching - 0.1, soft) == pytest.approx(0.5 * expected)
 
 
 def test_gravity_sag_scales_with_density_and_plate(gripper: Gripper) -> None:
@@ -70,4 +74,3 @@ def test_gravity_sag_scales_with_density_and_plate(gripper: Gripper) -> None:
     assert 0.0 < sag < loose
     # Brick elements give 0.156 mm with the drive free out of the plane; bars joined at points come within a tenth.
     assert loose == pytest.approx(0.156, rel=0.1)
-    assert StiffnessMatrixGripper(gripper).camera_scale_change(100.0) == pytest.approx(-sag / (100.0 + sag))

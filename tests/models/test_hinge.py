@@ -5,11 +5,11 @@ from hypothesis import strategies as st
 
 from fingervision.domain.errors import FingervisionError
 from fingervision.domain.gripper import Material
-from fingervision.models import hinge_closed_forms as closed
 from fingervision.models.hinge_compliance import bar_compliance, beam_compliance
 from fingervision.models.hinge_correction import corrected_compliance
-from fingervision.models.hinge_solid import plane_compliance, solid_compliance
-from fingervision.models.notch import Notch, circular_notch, segment_mass_t
+from fingervision.models.notch import Notch, circular_notch, masses_t
+from tests.benchmarks.hinge_solid import plane_compliance, solid_compliance
+from tests.models import hinge_closed_forms as closed
 
 PA2200 = Material("PA2200", 1650.0, 0.34, 930.0, 48.0)
 PLANAR = np.ix_([0, 1, 5], [0, 1, 5])
@@ -147,6 +147,6 @@ def test_segments_of_middle_height_converge_to_the_integral() -> None:
 def test_segment_masses_add_up_to_the_notch(segments: int, ratio: float) -> None:
     notch = circular_notch(1.0, ratio, 1.0)
     area = 2.0 * (ratio + 2.0) - np.pi
-    masses = segment_mass_t(notch, PA2200, segments)
+    masses = masses_t(notch, PA2200, np.linspace(-notch.reach_mm, notch.reach_mm, segments + 1))
     assert masses.sum() == pytest.approx(PA2200.density_t_mm3 * area, rel=1e-12)
     assert masses == pytest.approx(masses[::-1], rel=1e-9)

@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.optimize import least_squares
 
 from fingervision.diagnosis.inference.measuring_chain import MeasuringChain, obeyed
 from fingervision.domain.effect import History
@@ -137,7 +138,17 @@ def test_contact_is_the_bodys_own_with_its_force(drawn: PhysicalGripper, gripper
 
 def test_large_rotation_is_the_bodys_own_with_its_force(drawn: PhysicalGripper, gripper: Gripper) -> None:
     bent = LumpedGripper(gripper, Physics(large_rotation=True)).respond(INPUT)
-    arc = {"reach_mm": 126.4, "cross": 0.1245}  # least squares on this gripper's equilibria
+    # The arc nearest to the equilibria over the inputs that the drawn body is meant for.
+    inputs = np.linspace(*LumpedGripper(gripper).input_range_mm, 201)
+    straight_mm = LumpedGripper(gripper).respond(inputs).gap_mm - 4.0
+    bent_mm = LumpedGripper(gripper, Physics(large_rotation=True)).respond(inputs).gap_mm - 4.0
+
+    def off(arc: np.ndarray) -> np.ndarray:
+        angle = straight_mm / arc[0]
+        return arc[0] * np.sin(angle) + arc[1] * arc[0] * (1.0 - np.cos(angle)) - bent_mm
+
+    reach_mm, cross = least_squares(off, [120.0, 0.1], x_scale=[100.0, 0.1]).x
+    arc = {"reach_mm": float(reach_mm), "cross": float(cross)}
     agree(obeying(drawn, {"large_deflection": arc}), bent, BENT_MM, BENT)
 
 

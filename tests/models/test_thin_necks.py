@@ -9,15 +9,15 @@ from scipy.integrate import quad
 
 from fingervision.domain.errors import FingervisionError
 from fingervision.domain.gripper import Gripper, Material
-from fingervision.models import hinge_closed_forms as closed
 from fingervision.models.finite_element import FiniteElementGripper
 from fingervision.models.hinge_compliance import beam_compliance
 from fingervision.models.hinge_correction import HingeTheory, corrected_compliance
-from fingervision.models.hinge_solid import solid_compliance
 from fingervision.models.lumped import LumpedGripper
 from fingervision.models.notch import Notch, circular_notch
 from fingervision.models.skeleton import skeleton_of
 from fingervision.models.width_effect import force_uncertainty, held_moduli
+from tests.benchmarks.hinge_solid import solid_compliance
+from tests.models import hinge_closed_forms as closed
 
 PA2200 = Material("PA2200", 1650.0, 0.34, 930.0, 48.0)
 ROUNDING = 1e-10

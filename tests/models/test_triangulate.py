@@ -11,7 +11,8 @@ from fingervision.domain.errors import FingervisionError
 from fingervision.domain.gripper import Gripper, Material
 from fingervision.models.finite_element import FiniteElementGripper
 from fingervision.models.mesh_outline import ElementSize, mesh_outline
-from fingervision.models.planar_region import Ellipse, PlanarRegion, Polygon, Shape, bar, box
+from fingervision.models.planar_region import PlanarRegion
+from fingervision.models.plane_shapes import Ellipse, Polygon, Shape, bar, box
 from fingervision.models.plane_stress import PlaneStressPlate
 from fingervision.models.triangulate import LEAST_QUALITY, PlaneMesh, triangulate
 

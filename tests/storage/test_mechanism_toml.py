@@ -106,8 +106,108 @@ def test_the_command_answers_a_mechanism(tmp_path: Path) -> None:
     assert header.startswith("input_mm,force_n,tip_x_mm,tip_y_mm")
 
 
-def test_kinds_that_know_grippers_alone_say_so(tmp_path: Path) -> None:
+def test_a_loop_has_no_stiffness_matrix_and_says_so(tmp_path: Path) -> None:
     arguments = [str(DRAWN / "four_bar_gripper.toml"), "--kind", "stiffness_matrix", "--out", str(tmp_path / "o")]
-    with pytest.raises(FingervisionError, match="must be finite_element for a mechanism drawn by bodies"):
+    with pytest.raises(FingervisionError, match="that of a chain, but the flexures of four-bar gripper, one jaw form"):
+        CliRunner().invoke(command, arguments, catch_exceptions=False)
+    assert not (tmp_path / "o").exists()
+
+
+def test_the_lumped_kind_answers_a_mechanism_beside_finite_elements(tmp_path: Path) -> None:
+    arguments = [str(DRAWN / "bridge_amplifier.toml"), "--json", "--out", str(tmp_path)]
+    table = json.loads(CliRunner().invoke(command, arguments, catch_exceptions=False).output)
+    assert list(table) == ["finite_element", "lumped"]
+    for figure in ("input_stiffness_n_mm", "output: y per input [mm/mm]", "mode_1_drive_free_hz"):
+        assert table["lumped"][figure] == pytest.approx(table["finite_element"][figure], rel=0.005)
+    assert (tmp_path / "mechanism.csv").exists()
+    assert (tmp_path / "lumped" / "mechanism.csv").exists()
+
+
+TEMPLATE = """name = "one finger softer"
+[gripper]
+file = "gripper.toml"
+[gripper.left]
+"hinge1.thickness_mm" = 0.9
+[gripper.right.lever]
+l2_mm = 18.0
+"""
+WRONG_TEMPLATES = [
+    ('"gripper.toml"', "3", "gripper.file"),
+    ('"gripper.toml"', '"nowhere.toml"', "nowhere.toml"),
+    ("hinge1.thickness_mm", "hinge3.thickness_mm", "gripper.left.hinge3.thickness_mm"),
+    ("hinge1.thickness_mm", "hinge1.height_mm", "thickness_mm and radius_mm"),
+    ("= 0.9", "= -0.9", "must be positive, but is -0.9"),
+    ("= 0.9", "= nan", "must be a number"),
+    ("= 0.9", '= "thin"', "arithmetic with names"),
+    ("= 0.9", "= 9.0", "neck"),
+    ("l2_mm = 18.0", "l3_mm = 18.0", "the same in both halves"),
+    ("[gripper.left]", "[gripper.middle]", "unknown key, middle"),
+]
+
+
+def with_sample(folder: Path, text: str) -> Path:
+    (folder / "gripper.toml").write_bytes((ROOT / "sample_frames" / "paper" / "gripper.toml").read_bytes())
+    (folder / "m.toml").write_text(text)
+    return folder / "m.toml"
+
+
+def test_a_gripper_is_a_template_of_a_mechanism(tmp_path: Path) -> None:
+    path = with_sample(tmp_path, TEMPLATE)
+    assert is_mechanism(path)
+    mechanism = read_mechanism(path)
+    thickness = {flexure.name: flexure.thickness_mm for flexure in mechanism.flexures}
+    assert thickness == {"left hinge 1": 0.9, "left hinge 2": 1.0, "right hinge 1": 1.0, "right hinge 2": 1.0}
+    places = {flexure.name: flexure.at_mm[0] for flexure in mechanism.flexures}
+    assert places["right hinge 1"] + places["left hinge 1"] == pytest.approx(18.0 - 17.82)
+
+
+@pytest.mark.parametrize(("old", "new", "named"), WRONG_TEMPLATES, ids=[named for *_, named in WRONG_TEMPLATES])
+def test_a_wrong_template_is_one_sentence(tmp_path: Path, old: str, new: str, named: str) -> None:
+    assert old in TEMPLATE
+    with pytest.raises(FingervisionError) as refused:
+        read_mechanism(with_sample(tmp_path, TEMPLATE.replace(old, new, 1)))
+    assert named in str(refused.value)
+    assert "\n" not in str(refused.value)
+
+
+CONTACT = """
+[[contact]]
+name = "stop"
+box_mm = ["apart / 2 + 5", "apart / 2 + 5", "leaf", "leaf + block"]
+wall_mm = [22, 0, 22, 100]
+"""
+WRONG_CONTACTS = [
+    ("wall_mm = [22, 0, 22, 100]", "", "against_box_mm, a face, and wall_mm"),
+    ("wall_mm = [22, 0, 22, 100]", "wall_mm = [22, 0, 22, 0]", "two points, but they are one"),
+    ("wall_mm = [22, 0, 22, 100]", "wall_mm = [22, 0, 22]", "list of 4 numbers"),
+    ("wall_mm = [22, 0, 22, 100]", "wall = [22, 0, 22, 100]", "did you mean wall_mm?"),
+    ("wall_mm = [22, 0, 22, 100]", "against_box_mm = [5, 1, 0, 1]", "both growing"),
+]
+
+
+@pytest.mark.parametrize(("old", "new", "named"), WRONG_CONTACTS, ids=[named for *_, named in WRONG_CONTACTS])
+def test_a_wrong_contact_is_one_sentence(old: str, new: str, named: str) -> None:
+    with pytest.raises(FingervisionError) as refused:
+        mechanism_from_tables(tomllib.loads(STAGE + CONTACT.replace(old, new, 1)), "m.toml")
+    assert named in str(refused.value)
+    assert "\n" not in str(refused.value)
+
+
+def test_a_stop_holds_the_stage() -> None:
+    """The wall is 2 mm from the stage: of 3 mm of input the leaves' other end has 2, and the block is pressed by 1."""
+    mechanism = mechanism_from_tables(tomllib.loads(STAGE + CONTACT), "m.toml")
+    model = MechanismPlate(mechanism)
+    assert model.touch_input_mm() == pytest.approx({"stop": 2.0}, rel=1e-4)
+    assert model.state(1.9, contact=True).contact_n == {"stop": 0.0}
+    held = model.state(2.01, contact=True)
+    assert held.contact_n["stop"] > 0.0
+    # A bar of 40 by 12 by 0.5 mm pressed by 0.01 mm between two flat faces: E A / L times 0.01 mm, and the leaves'.
+    assert held.contact_n["stop"] == pytest.approx(210e3 * 12 * 0.5 / 40 * 0.01, rel=0.03)
+    assert held.force_n == pytest.approx(held.contact_n["stop"] + 2.0 * model.stiffness_n_mm, rel=0.02)
+
+
+def test_contact_without_a_contact_is_wrong_usage(tmp_path: Path) -> None:
+    arguments = [str(DRAWN / "parallel_leaf_stage.toml"), "--contact", "--out", str(tmp_path / "o")]
+    with pytest.raises(FingervisionError, match=r"--contact needs a \[\[contact\]\] section"):
         CliRunner().invoke(command, arguments, catch_exceptions=False)
     assert not (tmp_path / "o").exists()

@@ -1,5 +1,6 @@
 """Shadow, wall, glare and motion beside the edges, drawn by the third renderer: taken off, or stated."""
 
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -75,3 +76,21 @@ def test_a_profile_gives_back_what_it_was_drawn_with(kind: int, breadth: float, 
     assert best.blur == pytest.approx(blur, abs=0.1)
     assert best.squares < 2.0 * t.size
     assert fit_profile(STEP, t, seen, weight, 1.3, 0.0).squares > 5.0 * best.squares
+
+
+def test_a_wall_is_part_of_the_outline_where_that_is_asked() -> None:
+    """The wall is seen on the gap's side of either finger: the outline's gap is two breadths smaller."""
+    rng = np.random.default_rng([15, 4])
+    breadth_px, seen = 4.0, 0
+    for _ in range(FRAMES):
+        shot = wall(rng, breadth_px)
+        front, outline = (
+            measure_frame(Frame(shot.picture, 0), replace(KNOWN, is_outline=is_outline)) for is_outline in (False, True)
+        )
+        assert isinstance(front, GapMeasurement)
+        assert isinstance(outline, GapMeasurement)
+        assert front.beside == outline.beside == "wall"
+        u = np.hypot(outline.u_gap_px, outline.u_shift_px)
+        assert abs(outline.gap_px - shot.gap_px + 2.0 * breadth_px) < max(UNSAID_PX, 2.0 * u)
+        seen += front.gap_px - outline.gap_px > breadth_px
+    assert seen >= FRAMES - 1  # where the outer flank is out of view nothing is taken off, and the wall is stated

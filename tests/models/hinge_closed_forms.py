@@ -42,15 +42,6 @@ def paros_weisbord_simplified_bending(notch: Notch, material: Material) -> float
     )
 
 
-def paros_weisbord_simplified_axial(notch: Notch, material: Material) -> float:
-    """Lengthening per axial force in mm/N: (pi sqrt(R / t) - 2.57) / (E b).
-
-    Beam theory: 17 to 23 % too stiff between t / R = 0.2 and 0.65 against real end blocks, 8 % against rigid ones.
-    """
-    ratio = _radius_mm(notch) / notch.thickness_mm
-    return (pi * sqrt(ratio) - 2.57) / (material.youngs_modulus_mpa * notch.plate_mm)
-
-
 def wu_zhou_bending(notch: Notch, material: Material) -> float:
     """Rotation per moment about z in rad/(N mm): Wu and Zhou, Rev. Sci. Instrum. 73 (2002) 3101.
 

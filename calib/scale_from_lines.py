@@ -1,0 +1,210 @@
+"""Scale from the lines of a line scale: one straight line through all their places."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import chdtrc
+
+from calib.errors import CalibrationError
+from calib.limits import Limits, rectangular
+from calib.line_scale import ScaleLines
+from calib.measured_scale import Calibration, Reference, Response, ScalePart
+from calib.picture_shift import lens_shift_px, tilt_shift_px
+from calib.scale_from_sizes import CHANCE
+
+Floats = NDArray[np.float64]
+
+# A line off its place by more than so many robust standard deviations, and so much of the pitch, is dirt or a digit.
+OUTLIER_SIGMAS, OUTLIER_SHARE = 6.0, 0.02
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LineScaleFit:
+    """The calibration and how well the lines agree.
+
+    Parameters
+    ----------
+    calibration : Calibration
+        The result.
+    index : ndarray of int, shape (n,)
+        Number of each line's place on the scale, from the first.
+    used : ndarray of bool, shape (n,)
+        Whether the line was used.
+    residual_um : ndarray of float, shape (n,)
+        Each line's place as measured, less its place on the scale (micrometres).
+    by_edge : (float, float)
+        Scale from the edges at which the level rises alone, and from those at which it falls (px/mm).
+    width_mm, u_width_mm : float or None
+        Mean width of the lines as they look, and its standard uncertainty without the edge bias; None where they are
+        too narrow to tell.
+    chi_square : float
+        Of the residuals.
+    freedom : int
+        Degrees of freedom.
+    probability : float
+        Chance of so large a `chi_square`.
+    """
+
+    calibration: Calibration
+    index: NDArray[np.int_]
+    used: NDArray[np.bool_]
+    residual_um: Floats
+    by_edge: tuple[float, float]
+    width_mm: float | None
+    u_width_mm: float | None
+    chi_square: float
+    freedom: int
+    probability: float
+
+
+def scale_from_lines(
+    lines: ScaleLines,
+    pitch_mm: float,
+    u_line_mm: float,
+    u_length_mm: float,
+    frame_size_px: tuple[int, int],
+    limits: Limits,
+    reference: Reference,
+    stated: frozenset[str] = frozenset(),
+) -> LineScaleFit:
+    """Fit the places of all lines to whole numbers of the pitch.
+
+    Parameters
+    ----------
+    lines : ScaleLines
+        As measured.
+    pitch_mm : float
+        Certified distance of neighbouring lines.
+    u_line_mm : float
+        Standard uncertainty of every line's place, each its own.
+    u_length_mm : float
+        Standard uncertainty of the length from the first line used to the last, shared by all of them.
+    frame_size_px : tuple of int
+        Width and height of the picture.
+    limits, stated
+        What the user states about the bench, and which of it is not a default.
+    reference : Reference
+        The scale's name and certificate; its size is filled in.
+
+    Raises
+    ------
+    CalibrationError
+        The pitch or an uncertainty cannot be one, or the lines do not stand at equal distances.
+    """
+    if not 0.0 < pitch_mm < float("inf"):
+        raise CalibrationError(f"The pitch of a line scale must be positive, but is {pitch_mm} mm.")
+    for name, value in (("u_line_mm", u_line_mm), ("u_length_mm", u_length_mm)):
+        if not 0.0 <= value < float("inf"):
+            raise CalibrationError(f"{name} must be a number of zero or more, but is {value}.")
+    index, used = _numbered(lines.at_px)
+    span_mm = pitch_mm * float(np.ptp(index[used]))
+    at: Floats = lines.at_px[used]
+    k: Floats = np.asarray(pitch_mm * index[used], dtype=np.float64)
+    rough = float(np.ptp(at) / np.ptp(k))
+    # A phase error of the edge finder moves either edge of a line, so its middle by half of two independent ones.
+    estimator = rectangular(limits.estimator_px) / np.sqrt(2.0)
+    u_edges: Floats = np.hypot(lines.u_at_px[used], estimator)
+    u_places: Floats = np.hypot(u_edges, rough * u_line_mm)
+    weight = 1.0 / u_places**2
+    centred = np.asarray(k - np.average(k, weights=weight), dtype=np.float64)
+    gain = weight * centred / float(np.sum(weight * centred**2))
+    slope = float(gain @ at)
+    intercept = float(np.average(at, weights=weight) - slope * np.average(k, weights=weight))
+    residual: Floats = np.asarray(lines.at_px - intercept - slope * pitch_mm * index, dtype=np.float64)
+    parts = [
+        _part("reference size", slope * u_length_mm / span_mm, "length of the scale, the certificate (--u-length-mm)"),
+        _part("reference lines", slope * u_line_mm * float(np.linalg.norm(gain)), "(--u-line-mm)"),
+        _part("reference edges", float(np.linalg.norm(gain * u_edges)), "the fit of the lines"),
+        ScalePart(
+            "edge bias",
+            np.diag([0.0, rectangular(limits.edge_bias_px) ** 2]),
+            f"+-{limits.edge_bias_px:g} px ({'stated' if 'edge_bias_px' in stated else 'default'}); a pitch does not "
+            "know it; a bar and a slot would find it",
+        ),
+    ]
+    points = lines.middle_px[used]
+    lens = lens_shift_px(points, frame_size_px) @ lines.across
+    distance_px = limits.camera_distance_mm * slope
+    tilts = [tilt_shift_px(points, frame_size_px, distance_px, axis) @ lines.across for axis in (0, 1)]
+    chi_square, freedom = _chi_square(residual[used], k, u_places, (lens, *tilts), limits)
+    probability = float(chdtrc(freedom, chi_square)) if freedom > 0 else 1.0
+    if probability < CHANCE:
+        found = parts[1].covariance + parts[2].covariance
+        parts.append(
+            ScalePart("misfit of the lines", (chi_square / freedom - 1.0) * found, "the lines' residuals (Birge ratio)")
+        )
+    calibration = Calibration(
+        px_per_mm=slope,
+        edge_bias_px=0.0,
+        parts=tuple(parts),
+        frame_size_px=frame_size_px,
+        limits=limits,
+        stated=stated,
+        response=Response(
+            lens=np.array([float(gain @ lens), 0.0]), tilt=np.array([[float(gain @ each), 0.0] for each in tilts])
+        ),
+        references=(Reference(reference.what, span_mm, u_length_mm, reference.certificate, reference.date),),
+    )
+    by_edge = tuple(float(gain @ edge[used]) for edge in (lines.rising_px, lines.falling_px))
+    width = None if lines.width_px is None else lines.width_px[used] / slope
+    return LineScaleFit(
+        calibration=calibration,
+        index=index,
+        used=used,
+        residual_um=1e3 * residual / slope,
+        by_edge=(by_edge[0], by_edge[1]),
+        width_mm=None if width is None else float(np.mean(width)),
+        u_width_mm=None if width is None else float(np.std(width, ddof=1) / np.sqrt(width.size)),
+        chi_square=chi_square,
+        freedom=freedom,
+        probability=probability,
+    )
+
+
+def _part(source: str, u_scale: float, supplied: str) -> ScalePart:
+    return ScalePart(source, np.diag([u_scale**2, 0.0]), supplied)
+
+
+def _numbered(at_px: Floats) -> tuple[NDArray[np.int_], NDArray[np.bool_]]:
+    """Which line of the scale each one is, and whether it stands where that line must."""
+    steps = np.diff(at_px)
+    pitch = float(np.median(steps))
+    index = np.concatenate([[0], np.cumsum(np.maximum(np.rint(steps / pitch), 1.0))]).astype(np.int_)
+    used = np.ones(at_px.size, dtype=bool)
+    for look in range(5):
+        if look == 0:
+            # A line that a third of the places may be wrong about: medians (Theil and Sen).
+            apart = index[:, None] - index
+            slope = float(np.median((at_px[:, None] - at_px)[apart > 0] / apart[apart > 0]))
+            at = float(np.median(at_px - slope * index))
+        else:
+            slope, at = (float(value) for value in np.polyfit(index[used], at_px[used], 1))
+        # From the whole scale's pitch: many small errors of single steps would add up to a line too many.
+        index = np.rint((at_px - at) / slope).astype(np.int_)
+        left = at_px - at - slope * index
+        spread = 1.4826 * float(np.median(np.abs(left[used])))
+        again = np.abs(left) <= OUTLIER_SIGMAS * spread + OUTLIER_SHARE * slope
+        if np.count_nonzero(again) < 3:
+            break
+        if look and np.array_equal(again, used):
+            break
+        used = again
+    if np.count_nonzero(used) < max(3, 0.7 * at_px.size) or len(set(index[used].tolist())) < np.count_nonzero(used):
+        raise CalibrationError(
+            f"The lines of a scale must stand at equal distances, but {np.count_nonzero(~used)} of {at_px.size} do "
+            "not: choose a part with lines of one kind with --roi."
+        )
+    return index - index[used].min(), used
+
+
+def _chi_square(residual: Floats, k: Floats, u: Floats, bends: tuple[Floats, ...], limits: Limits) -> tuple[float, int]:
+    """Residuals against lines and edges, and against what lens and tilt may do within their limits."""
+    covariance = np.diag(u**2) + np.outer(bends[0], bends[0]) * rectangular(limits.lens_relative) ** 2
+    for bend in bends[1:]:
+        covariance += np.outer(bend, bend) * rectangular(limits.tilt_rad) ** 2
+    inverse = np.linalg.inv(covariance)
+    design = np.stack([np.ones_like(k), k], axis=1)
+    refit = np.linalg.solve(design.T @ inverse @ design, design.T @ inverse @ residual)
+    left = residual - design @ refit
+    return float(left @ inverse @ left), residual.size - 2

@@ -1,0 +1,184 @@
+"""`fingervision model --frequency`: how a mechanism answers a drive that shakes it."""
+
+import csv
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import partial
+from math import isfinite, pi
+from pathlib import Path
+from typing import Any
+
+import click
+import numpy as np
+from matplotlib.figure import Figure
+
+from fingervision.domain.errors import UsageError
+from fingervision.models.damping_text import parse_damping
+from fingervision.models.driven_body import DrivenBody
+from fingervision.models.frequency_response import FrequencyResponse, frequency_response, resolved_frequencies_hz
+from fingervision.models.mechanism_plate import MechanismPlate
+from fingervision.models.modal_model import GAP, FreeModes, ModalModel, described, gripper_free_modes, gripper_modes
+from fingervision.models.motion_in_time import MODES
+
+_MOST_MODES = 60
+_STYLES = ("-", "--", "-.")
+
+
+@dataclass(frozen=True, slots=True)
+class Band:
+    """Frequencies from one to another, in Hz."""
+
+    first_hz: float
+    last_hz: float
+
+
+def parse_band(text: str) -> Band:
+    """Read `A:B` in Hz.
+
+    Raises
+    ------
+    UsageError
+        Where it is none.
+    """
+    try:
+        first, last = (float(part) for part in text.split(":"))
+    except ValueError:
+        first, last = 0.0, 0.0
+    if not (isfinite(first) and isfinite(last) and 0.0 < first < last):
+        raise UsageError(
+            f"--frequency must be A:B, two rising positive frequencies in Hz such as 1:500, but is {text}."
+        )
+    return Band(first, last)
+
+
+def answer_frequencies(
+    models: Mapping[str, Any], band: Band, damping: str, name: str, out: Path, *, as_json: bool
+) -> None:
+    """Write frequency.csv and frequency.png of every kind with masses."""
+    found: dict[str, FrequencyResponse] = {}
+    for kind, model in models.items():
+        if isinstance(getattr(model, "half", None), DrivenBody):
+            half = model.half
+            reduced = modes_to(partial(gripper_modes, half), 2.0 * band.last_hz, half.free.size)
+            free = gripper_free_modes(half, reduced.rad_s.size)
+            found[kind] = respond_to(reduced, free, band, damping)
+        elif not as_json:
+            click.echo(f"{kind} has no masses in the plane: no frequency response.")
+    if not found:
+        raise UsageError("--frequency must have a kind with masses, lumped or finite_element, but has none.")
+    write_frequencies(found, ("gap_mm",), out / "frequency.csv")
+    draw_frequencies(found, "gap_mm", f"{name}, damping {damping}", out / "frequency.png")
+    if not as_json:
+        for kind, answer in found.items():
+            click.echo(f"{kind}: {peaks_of(answer, 'gap_mm')}")
+
+
+def modes_to(reduce: Callable[[int], ModalModel], highest_hz: float, unknowns: int) -> ModalModel:
+    """Take as many modes as lie below a frequency, and one more."""
+    count = min(MODES, unknowns - 2)
+    while True:
+        reduced = reduce(count)
+        if reduced.modes_hz[-1] > highest_hz or count >= min(_MOST_MODES, unknowns - 2):
+            break
+        count = min(2 * count, _MOST_MODES, unknowns - 2)
+    if reduced.modes_hz[-1] < 0.5 * highest_hz:
+        raise UsageError(
+            f"--frequency must end within the first {count} modes, below {reduced.modes_hz[-1]:.4g} Hz, but ends at "
+            f"{0.5 * highest_hz:.4g} Hz."
+        )
+    return reduced
+
+
+def respond_to(reduced: ModalModel, free: FreeModes, band: Band, damping: str) -> FrequencyResponse:
+    """Answer a band, resolved about every resonance."""
+    law = parse_damping(damping)
+    for rad_s in (reduced.rad_s, free.rad_s):
+        known = described(law, rad_s).size
+        if known < rad_s.size and rad_s[known] / (2.0 * pi) < band.last_hz:
+            raise UsageError(
+                f"--damping {damping} describes modes up to {rad_s[known - 1] / (2.0 * pi):.4g} Hz alone (its ratio "
+                f"leaves 0 to 0.3 beyond), but --frequency goes to {band.last_hz:g} Hz past the mode at "
+                f"{rad_s[known] / (2.0 * pi):.4g} Hz; end it before, or take modal:0.025."
+            )
+    frequencies = resolved_frequencies_hz(reduced, free, law, band.first_hz, band.last_hz)
+    return frequency_response(reduced, free, frequencies, law)
+
+
+def peaks_of(answer: FrequencyResponse, column: str) -> str:
+    """Say where the response peaks, with the drive held to its motion and free under its force."""
+    words = []
+    for what, curve in (
+        ("per input", answer.per_input[column]), ("per force", answer.per_force_mm_n[column]),
+    ):  # fmt: skip
+        size = np.abs(curve)
+        unit = "mm/mm" if what == "per input" else "mm/N"
+        at = np.flatnonzero((size[1:-1] > size[:-2]) & (size[1:-1] >= size[2:])) + 1
+        tops = ", ".join(f"{size[i]:.4g} {unit} at {answer.frequency_hz[i]:.4g} Hz" for i in at[:4]) or "no peak"
+        words.append(f"{column.removesuffix('_mm')} {what}: {tops}")
+    return "; ".join(words)
+
+
+def write_frequencies(found: Mapping[str, FrequencyResponse], columns: tuple[str, ...], path: Path) -> None:
+    """Write amplitude and phase of every length by input and by force, and of the drive by force."""
+    header = ["kind", "frequency_hz"]
+    for column in columns:
+        stem = column.removesuffix("_mm")
+        header += [f"{stem}_per_input_mm_mm", f"{stem}_phase_deg", f"{stem}_per_force_mm_n", f"{stem}_force_phase_deg"]
+    header += ["drive_per_force_mm_n", "drive_force_phase_deg"]
+    with path.open("w", encoding="utf-8", newline="") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(header)
+        for kind, answer in found.items():
+            curves = [curve for c in columns for curve in (answer.per_input[c], answer.per_force_mm_n[c])]
+            curves.append(answer.drive_per_force_mm_n)
+            parts = [part for curve in curves for part in (np.abs(curve), np.degrees(np.angle(curve)))]
+            for row in zip(answer.frequency_hz, *parts, strict=True):
+                writer.writerow([kind, *(f"{value:.7g}" for value in row)])
+
+
+def draw_frequencies(found: Mapping[str, FrequencyResponse], column: str, title: str, path: Path) -> None:
+    """Draw amplitude and phase by input (drive held to its motion) and by force (drive free)."""
+    figure = Figure(figsize=(10.0, 7.0), layout="constrained")
+    (upper, upper_force), (lower, lower_force) = figure.subplots(2, 2, sharex=True, height_ratios=(3, 2))
+    label = column.removesuffix("_mm").replace("_", " ")
+    for place, (kind, answer) in enumerate(found.items()):
+        style = {"linestyle": _STYLES[place % 3], "color": f"C{place}", "linewidth": 1.0}
+        for axes, phases, curve in (
+            (upper, lower, answer.per_input[column]), (upper_force, lower_force, answer.per_force_mm_n[column]),
+        ):  # fmt: skip
+            axes.semilogy(answer.frequency_hz, np.abs(curve), label=kind, **style)
+            phases.plot(answer.frequency_hz, np.degrees(np.unwrap(np.angle(curve))), **style)
+    upper.set_title("drive moved by a stiff stage", fontsize="medium")
+    upper.set_ylabel(f"{label} per input / (mm/mm)")
+    upper_force.set_title("drive pushed by a force, free to move", fontsize="medium")
+    upper_force.set_ylabel(f"{label} per force / (mm/N)")
+    for axes in (lower, lower_force):
+        axes.set_ylabel("phase / degrees")
+        axes.set_xlabel("frequency / Hz")
+    for axes in (upper, lower, upper_force, lower_force):
+        axes.grid(alpha=0.3, which="both")
+    upper.legend()
+    figure.suptitle(title)
+    figure.savefig(path, dpi=130)
+
+
+def mechanism_frequencies(model: MechanismPlate, band: Band, damping: str, out: Path, *, as_json: bool) -> None:
+    """Write frequency.csv and frequency.png of a mechanism drawn by bodies."""
+    name = model.mechanism.name
+    reduced = modes_to(model.modal_model, 2.0 * band.last_hz, model.plate.unknowns)
+    if not reduced.observed:
+        raise UsageError(f"{name} must have a [[probe]] or a [[pair]] to answer by frequency, but has none.")
+    answer = respond_to(reduced, model.free_modes(reduced.rad_s.size), band, damping)
+    columns = tuple(answer.per_input)
+    main = main_column(reduced)
+    write_frequencies({"finite_element": answer}, columns, out / "frequency.csv")
+    draw_frequencies({"finite_element": answer}, main, f"{name}, damping {damping}", out / "frequency.png")
+    if not as_json:
+        click.echo(peaks_of(answer, main))
+
+
+def main_column(reduced: ModalModel) -> str:
+    """Return the gap where there is one, else the length that moves most."""
+    if GAP in reduced.observed:
+        return GAP
+    return max(reduced.observed, key=lambda column: abs(reduced.observed[column].per_input))

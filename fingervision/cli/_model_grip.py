@@ -1,0 +1,127 @@
+"""`fingervision model --object-mm`: the grip on a part between the fingers, as a table and a figure."""
+
+import csv
+from collections.abc import Mapping
+from math import isfinite
+from pathlib import Path
+from typing import Any
+
+import click
+import numpy as np
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+from fingervision.domain.errors import UsageError
+from fingervision.domain.gripper import Gripper
+from fingervision.models.driven_body import DrivenBody
+from fingervision.models.grip import Part, first_grip_mm, grip_equilibrium
+
+_COLUMNS = ("kind", "input_mm", "gap_mm", "held_width_mm", "grip_n", "force_n", "stress_mpa")
+_ROWS = 61
+_BEYOND_MM = 1e-9
+
+
+def part_asked(width_mm: float | None, stiffness_n_mm: float | None, rest_gap_mm: float) -> Part | None:
+    """Read and check the part.
+
+    Raises
+    ------
+    UsageError
+        Where it has no width or stiffness, or the fingers squeeze it at rest already by more than they open.
+    """
+    if width_mm is None:
+        if stiffness_n_mm is not None:
+            raise UsageError("--object-n-mm needs --object-mm: the width of what is that stiff.")
+        return None
+    if not (isfinite(width_mm) and width_mm > 0.0):
+        raise UsageError(f"--object-mm must be the positive width of a part, but is {width_mm:g}.")
+    if stiffness_n_mm is not None and not (isfinite(stiffness_n_mm) and stiffness_n_mm > 0.0):
+        raise UsageError(f"--object-n-mm must be a positive stiffness in N/mm, but is {stiffness_n_mm:g}.")
+    if width_mm > 10.0 * rest_gap_mm:
+        raise UsageError(
+            f"--object-mm must be a part that fits between the fingers, but is {width_mm:g} mm at a rest gap of "
+            f"{rest_gap_mm:g} mm; is it in micrometres?"
+        )
+    return Part(width_mm) if stiffness_n_mm is None else Part(width_mm, stiffness_n_mm)
+
+
+def write_grip(
+    gripper: Gripper, models: Mapping[str, Any], part: Part, inputs: NDArray[np.float64] | None, name: str, out: Path,
+    *, as_json: bool,
+) -> None:  # fmt: skip
+    """Write grip.csv and grip.png of every kind, and say what holds the part; small displacements."""
+    rows: dict[str, NDArray[np.float64]] = {}
+    said = []
+    for kind, model in models.items():
+        touch = first_grip_mm(model.half, part) if isinstance(getattr(model, "half", None), DrivenBody) else None
+        limit = _closing_limit_mm(gripper, model, touch)
+        at = np.linspace(limit, 0.3 * abs(limit) + (touch or 0.0), _ROWS) if inputs is None else np.sort(inputs)
+        rows[kind] = np.array([_row(model, float(value), part) for value in at])
+        if touch is not None:
+            said.append(_words(gripper, kind, model, part, touch))
+    with (out / "grip.csv").open("w", encoding="utf-8", newline="") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(_COLUMNS)
+        for kind, table in rows.items():
+            writer.writerows([kind, *("" if np.isnan(v) else f"{v:.7g}" for v in row)] for row in table.tolist())
+    _draw(rows, part, name, out / "grip.png")
+    if not as_json:
+        for words in said:
+            click.echo(words)
+
+
+def _closing_limit_mm(gripper: Gripper, model: Any, touch_mm: float | None) -> float:
+    """Return an input by which the part is held well: half as far again as from rest to the touch of the fingers."""
+    touch = model.half.first_touch_mm() if hasattr(model, "half") else model.first_touch_mm()
+    reach = abs(touch) if touch is not None else 0.01 * gripper.body.height_mm
+    return (touch_mm or 0.0) - 0.5 * reach
+
+
+def _row(model: Any, input_mm: float, part: Part) -> tuple[float, ...]:
+    if not hasattr(model, "half"):
+        grip = model.grip_force_n(input_mm, part)
+        return input_mm, np.nan, part.squeezed_mm(grip) if grip > 0.0 else np.nan, grip, np.nan, np.nan
+    state = grip_equilibrium(model.half, input_mm, part)
+    loaded = model.stressed(state)
+    held = part.squeezed_mm(loaded.grip_n) if loaded.grip_n > _BEYOND_MM else np.nan
+    return input_mm, loaded.gap_mm, held, loaded.grip_n, loaded.force_n, loaded.stress_mpa
+
+
+def _words(gripper: Gripper, kind: str, model: Any, part: Part, touch_mm: float) -> str:
+    """Say when a part is touched, how fast the grip rises, and where the hinges would yield."""
+    limit = gripper.material.yield_mpa
+    step = 0.2 * abs(model.half.first_touch_mm() or touch_mm)
+    near = [model.stressed(grip_equilibrium(model.half, touch_mm - by, part)) for by in (0.0, step)]
+    per_input = (near[1].grip_n - near[0].grip_n) / step
+    at, most = touch_mm, near[1]
+    while most.stress_mpa < limit and abs(at - touch_mm) < 50.0 * step:
+        at -= step
+        most = model.stressed(grip_equilibrium(model.half, at, part))
+    before = model.stressed(grip_equilibrium(model.half, at + step, part))
+    share = (limit - before.stress_mpa) / (most.stress_mpa - before.stress_mpa)
+    grip = before.grip_n + share * (most.grip_n - before.grip_n)
+    where = before.input_mm + share * (most.input_mm - before.input_mm)
+    stiff = f"{part.stiffness_n_mm:g} N/mm" if isfinite(part.stiffness_n_mm) else "rigid"
+    return (
+        f"{kind}: a part of {part.width_mm:g} mm ({stiff}) is touched at {touch_mm:.4g} mm of input; each finger grips "
+        f"it by {per_input:.4g} N per mm beyond, at most {grip:.3g} N at {where:.4g} mm, where the hinges yield "
+        f"(the drive then pulls {abs(before.force_n + share * (most.force_n - before.force_n)):.3g} N)."
+    )
+
+
+def _draw(rows: Mapping[str, NDArray[np.float64]], part: Part, name: str, path: Path) -> None:
+    figure = Figure(figsize=(8.0, 7.0), layout="constrained")
+    upper, lower = figure.subplots(2, 1, sharex=True)
+    for place, (kind, table) in enumerate(rows.items()):
+        style = {"color": f"C{place}", "linestyle": ("-", "--", "-.")[place % 3]}
+        upper.plot(table[:, 0], table[:, 3], label=kind, **style)
+        lower.plot(table[:, 0], table[:, 4], **style)
+    stiff = f"{part.stiffness_n_mm:g} N/mm" if isfinite(part.stiffness_n_mm) else "rigid"
+    upper.set_title(f"{name}: grip on a part of {part.width_mm:g} mm ({stiff}), small displacements")
+    upper.set_ylabel("grip of each finger / N")
+    lower.set_ylabel("force at the drive / N")
+    lower.set_xlabel("input / mm")
+    upper.legend()
+    for axes in (upper, lower):
+        axes.grid(alpha=0.3)
+    figure.savefig(path, dpi=130)

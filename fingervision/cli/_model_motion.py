@@ -1,0 +1,208 @@
+"""`fingervision model --drive` and `--frequency`: a mechanism in motion, as tables and figures."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from math import isfinite
+from pathlib import Path
+from typing import Any
+
+import click
+import numpy as np
+from matplotlib.figure import Figure
+from scipy.interpolate import PchipInterpolator
+
+from fingervision.cli._model_frequency import Band, answer_frequencies, main_column, mechanism_frequencies, parse_band
+from fingervision.domain.drive import DriveHistory
+from fingervision.domain.errors import UsageError
+from fingervision.models.damping_text import parse_damping
+from fingervision.models.driven_body import DrivenBody
+from fingervision.models.mechanism_plate import MechanismPlate
+from fingervision.models.modal_response import Motion, modal_motion
+from fingervision.models.mode_shapes import ModesWanted, mechanism_mode_shapes, parse_modes
+from fingervision.models.motion_in_time import MODES, about_equilibria, gripper_motion
+from fingervision.storage.drive_csv import read_drive
+from fingervision.storage.motion_csv import write_motion
+
+_MOST_ROWS = 2_000_000
+_STYLES = ("-", "--", "-.")
+
+
+def at_rate(drive: DriveHistory, rate_hz: float | None) -> DriveHistory:
+    """Put samples between the drive's own, straight between them, where a rate is asked for."""
+    if rate_hz is None:
+        return drive
+    if not (isfinite(rate_hz) and rate_hz > 0.0):
+        raise UsageError(f"--rate-hz must be a positive number of rows a second, but is {rate_hz:g}.")
+    span_s = float(drive.time_s[-1] - drive.time_s[0])
+    if span_s * rate_hz > _MOST_ROWS:
+        raise UsageError(
+            f"--rate-hz must give at most {_MOST_ROWS} rows, but {rate_hz:g} Hz over {span_s:g} s gives "
+            f"{span_s * rate_hz:.3g}."
+        )
+    runs = np.array(drive.run) if drive.run is not None else np.full(drive.time_s.size, "")
+    times, inputs, names = [], [], []
+    for name in dict.fromkeys(runs.tolist()):
+        own, values = drive.time_s[runs == name], drive.input_mm[runs == name]
+        # The drive's samples stay: kinks lie at them.
+        at = np.union1d(np.arange(own[0], own[-1], 1.0 / rate_hz), own)
+        times.append(at)
+        inputs.append(np.interp(at, own, values))
+        names += [name] * at.size
+    return DriveHistory(np.concatenate(times), np.concatenate(inputs), tuple(names) if drive.run is not None else None)
+
+
+@dataclass(frozen=True, slots=True)
+class MotionAsked:
+    """What `model` was asked for in motion, read and checked before anything is computed."""
+
+    drive: DriveHistory | None
+    modes: ModesWanted | None
+    band: Band | None
+    damping: str
+    film: bool
+
+    @property
+    def moves(self) -> bool:
+        """Whether anything in motion was asked for."""
+        return self.drive is not None or self.modes is not None or self.band is not None
+
+
+def motion_asked(
+    drive: Path | None, modes: str | None, frequency: str | None, damping: str, rate_hz: float | None, *, film: bool
+) -> MotionAsked:
+    """Read what was asked for.
+
+    Raises
+    ------
+    UsageError
+        Where an option is wrong, or does nothing without another.
+    """
+    parse_damping(damping)
+    if film and modes is None:
+        raise UsageError("--film needs --modes: it shows the modes in motion.")
+    if rate_hz is not None and drive is None:
+        raise UsageError("--rate-hz needs --drive: it is the rate of response.csv.")
+    return MotionAsked(
+        None if drive is None else at_rate(read_drive(drive), rate_hz),
+        None if modes is None else parse_modes(modes),
+        None if frequency is None else parse_band(frequency),
+        damping,
+        film,
+    )
+
+
+def move(
+    models: Mapping[str, Any], asked: MotionAsked, name: str, folders: Mapping[str, Path], out: Path, *, as_json: bool
+) -> None:
+    """Answer all that was asked for in motion of a gripper's models."""
+    if asked.drive is not None:
+        follow_drive(models, asked.drive, asked.damping, name, folders, out, as_json=as_json)
+    if asked.band is not None:
+        answer_frequencies(models, asked.band, asked.damping, name, out, as_json=as_json)
+    if asked.modes is not None:
+        from fingervision.cli._model_modes import write_gripper_modes
+
+        write_gripper_modes(models, asked.modes, name, out, film=asked.film, as_json=as_json)
+
+
+def move_mechanism(
+    model: MechanismPlate, asked: MotionAsked, static: PchipInterpolator | None, out: Path, *, as_json: bool
+) -> None:
+    """Answer all that was asked for in motion of a mechanism drawn by bodies."""
+    name = model.mechanism.name
+    if asked.drive is not None:
+        mechanism_motion(model, asked.drive, asked.damping, static, out, as_json=as_json)
+    if asked.band is not None:
+        mechanism_frequencies(model, asked.band, asked.damping, out, as_json=as_json)
+    if asked.modes is not None:
+        from fingervision.cli._model_modes import write_modes
+
+        shapes = mechanism_mode_shapes(model, asked.modes)
+        write_modes({"finite_element": shapes}, name, out, film=asked.film, as_json=as_json)
+
+
+def follow_drive(
+    models: Mapping[str, Any], drive: DriveHistory, damping: str, name: str, folders: Mapping[str, Path], out: Path,
+    *, as_json: bool,
+) -> None:  # fmt: skip
+    """Write response.csv of every kind with masses, and response.png of all of them."""
+    motions: dict[str, Motion] = {}
+    for kind, model in models.items():
+        if not isinstance(getattr(model, "half", None), DrivenBody):
+            if not as_json:
+                click.echo(f"{kind} has no masses in the plane: it answers a drive at rest alone (simulation.csv).")
+            continue
+        found = gripper_motion(model, drive, parse_damping(damping))
+        motions[kind] = found.motion
+        write_motion(folders[kind] / "response.csv", drive, found.motion.observed_mm, found.motion.force_n,
+                     symmetric=True)  # fmt: skip
+        if not as_json:
+            click.echo(f"{kind} in time by {found.method}; {words_of(found.motion, 'gap_mm')}")
+    if motions:
+        draw_motion(motions, "gap_mm", f"{name}, damping {damping}", out / "response.png")
+
+
+def words_of(motion: Motion, column: str) -> str:
+    """Say how far a mechanism vibrates, and with which damping."""
+    pairs = ", ".join(
+        f"{z:.3g} at {f:.4g} Hz" for z, f in zip(motion.damping_ratios[:3], motion.modes_hz[:3], strict=True)
+    )
+    more = ", ..." if motion.modes_hz.size > 3 else ""
+    return (
+        f"damping ratio {pairs}{more}; {column.removesuffix('_mm')} leaves the static answer by at most "
+        f"{motion.vibration_mm(column):.3g} mm."
+    )
+
+
+def draw_motion(motions: Mapping[str, Motion], column: str, title: str, path: Path) -> None:
+    """Draw input, one length, its difference from the static answer, and the force over time."""
+    figure = Figure(figsize=(8.0, 9.0), layout="constrained")
+    panels = figure.subplots(4, 1, sharex=True)
+    label = column.removesuffix("_mm").replace("_", " ")
+    for place, (kind, motion) in enumerate(motions.items()):
+        style = {"linestyle": _STYLES[place % 3], "color": f"C{place}", "linewidth": 1.0}
+        time_s = motion.drive.time_s
+        if place == 0:
+            panels[0].plot(time_s, motion.drive.input_mm, color="0.3", linewidth=1.0)
+        panels[1].plot(time_s, motion.observed_mm[column], label=kind, **style)
+        panels[2].plot(time_s, 1e3 * (motion.observed_mm[column] - motion.static_mm[column]), **style)
+        panels[3].plot(time_s, motion.force_n, **style)
+    names = ("input / mm", f"{label} / mm", f"{label} minus static / µm", "force at the drive / N")
+    for axes, name in zip(panels, names, strict=True):
+        axes.set_ylabel(name)
+        axes.grid(alpha=0.3)
+    panels[1].legend()
+    panels[-1].set_xlabel("time / s")
+    panels[0].set_title(title)
+    figure.savefig(path, dpi=130)
+
+
+def mechanism_motion(
+    model: MechanismPlate,
+    drive: DriveHistory,
+    damping: str,
+    static: PchipInterpolator | None,
+    out: Path,
+    *,
+    as_json: bool,
+) -> None:
+    """Write response.csv and response.png of a mechanism drawn by bodies.
+
+    With large rotation or contact `static` gives the equilibria: the observed lengths in their order, then the force.
+    """
+    name = model.mechanism.name
+    reduced = model.modal_model(MODES)
+    if not reduced.observed:
+        raise UsageError(f"{name} must have a [[probe]] or a [[pair]] to follow in time, but has none.")
+    motion = modal_motion(reduced, drive, parse_damping(damping))
+    if static is not None:
+        *lengths, force = static(drive.input_mm).T
+        touches = model.touch_input_mm().values()
+        apart = np.all([drive.input_mm / at < 1.0 for at in touches], axis=0) if touches else None
+        motion = about_equilibria(motion, dict(zip(motion.observed_mm, lengths, strict=True)), force, apart)
+    write_motion(out / "response.csv", drive, motion.observed_mm, motion.force_n)
+    column = main_column(reduced)
+    draw_motion({"finite_element": motion}, column, f"{name}, damping {damping}", out / "response.png")
+    if not as_json:
+        about = " about the equilibria, where nothing touches" if static is not None else ""
+        click.echo(f"In time by {motion.modes_hz.size} modes{about}; {words_of(motion, column)}")

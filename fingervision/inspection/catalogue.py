@@ -1,0 +1,32 @@
+"""Every limit that is looked for: the modules of `findings`, found by looking into that package."""
+
+import importlib
+import pkgutil
+
+import fingervision.inspection.findings
+from fingervision.inspection.finding import Finding, Severity
+from fingervision.inspection.sample import Sample
+
+
+def inspect(sample: Sample) -> list[Finding]:
+    """All findings of a sample, the worst first.
+
+    Parameters
+    ----------
+    sample : Sample
+        Frames, measured.
+    """
+    package = fingervision.inspection.findings
+    names = sorted(module.name for module in pkgutil.iter_modules(package.__path__))
+    found = [importlib.import_module(f"{package.__name__}.{name}").find(sample) for name in names]
+    return sorted((finding for finding in found if finding is not None), key=lambda each: each.rank, reverse=True)
+
+
+def to_mend(findings: list[Finding]) -> list[Finding]:
+    """Those that are surely there and worth mending, the worst first."""
+    return [finding for finding in findings if finding.severity is not Severity.GOOD and not finding.is_doubt]
+
+
+def doubts(findings: list[Finding]) -> list[Finding]:
+    """Those that may be there, and would be worth mending if they were."""
+    return [finding for finding in findings if finding.severity is not Severity.GOOD and finding.is_doubt]

@@ -1,0 +1,35 @@
+"""Compression: what a codec, or processing in the camera, did to the picture."""
+
+import numpy as np
+
+from fingervision.inspection.blocks import BLOCK_PX, BLOCKY, HEAVY
+from fingervision.inspection.finding import Finding, weighed, without
+from fingervision.inspection.sample import CAMERA_NOISE, Look, Sample
+
+REMEDY = "Record losslessly (raw or FFV1; PNG or TIFF for pictures), or at several times the bit rate."
+FORMULA = (
+    "sqrt(u^2 - u'^2), u' the random uncertainty if neither the codec's errors at the edges nor their correlation "
+    "were there; where blocks are plain, also what they make the measuring state as u_shift_px"
+)
+
+
+def find(sample: Sample) -> Finding | None:
+    """Look for a codec's blocks, and compare the stated uncertainty to that of the camera alone."""
+    if not sample.looks:
+        return None
+    blocks = sample.blockiness
+    lossy = sample.description.lossy
+    is_coded = lossy or blocks > BLOCKY
+    cost_px = sample.median(_cost_px(look, sample.top_level) for look in sample.looks) if is_coded else 0.0
+    if blocks > HEAVY:
+        cost_px = float(np.hypot(cost_px, sample.u_shift_px))
+    how = f"stored with loss ({sample.description.codec})" if lossy else "stored without loss"
+    seen = f"steps between blocks of {BLOCK_PX} px are {100 * max(blocks, 0.0):.0f} % larger than within them"
+    before = "" if lossy or blocks <= BLOCKY else ", but they were coded before"
+    return weighed(sample, "compression", cost_px, f"Pictures are {how}; {seen}{before}.", REMEDY, FORMULA)
+
+
+def _cost_px(look: Look, top: int) -> float:
+    """The fit's own residual is the codec's error; its share above the camera's noise goes away."""
+    camera = min(look.edges.noise, max(look.edges.noise_flat, CAMERA_NOISE * top / 255.0))
+    return without(look.outcome.u_gap_px, look.u_camera_px * camera / max(look.edges.noise, 1e-9))

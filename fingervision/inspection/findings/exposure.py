@@ -1,0 +1,44 @@
+"""Exposure: levels cut off at the end of the scale, or only a small part of the scale used."""
+
+from math import hypot
+
+from fingervision.domain.status import Status
+from fingervision.inspection.finding import Finding, refusing, weighed, without
+from fingervision.inspection.noise_bound import GOOD_NOISE
+from fingervision.inspection.plateaus import plateaus
+from fingervision.inspection.sample import Sample
+
+# The brighter plateau should stand about here (share of full scale), and is dim below this.
+WANTED, DIM = 0.8, 0.5
+LESS = "Expose shorter, or dim the light, until no level stands at full scale; keep automatic exposure off."
+MORE = "Expose longer, or give more light, until the ground stands at about 80 % of full scale."
+UNDER = (
+    "sqrt(u^2 - u'^2), u' the random uncertainty with the contrast that full exposure gives (Cramer-Rao bound), and "
+    "what noise makes the measuring state as u_shift_px"
+)
+OVER = "the shift that a step cut off at the end of the scale suffers, as u_shift_px states it"
+
+
+def find(sample: Sample) -> Finding | None:
+    """Read the plateaus beside the edges."""
+    refused = refusing(sample, "exposure", (Status.SATURATED,), LESS) or refusing(
+        sample, "exposure", (Status.LOW_CONTRAST,), MORE
+    )
+    if refused is not None or not sample.looks:
+        return refused
+    levels = plateaus(sample)
+    if levels.is_cut:
+        shift_px = sample.median(look.outcome.u_shift_px for look in sample.looks)
+        end = "white" if levels.at_top >= levels.at_zero else "black"
+        share = max(levels.at_top, levels.at_zero)
+        figure = f"{100 * share:.0f} % of the pixels beside the edges are {end}: what lies beyond is cut off."
+        return weighed(sample, "exposure", shift_px, figure, LESS if end == "white" else MORE, OVER)
+    factor = WANTED / max(levels.bright, 1e-3) if levels.bright < DIM else 1.0
+    cost_px = sample.median(
+        without(look.u_with(), look.u_with(noise=max(look.noise / factor, min(GOOD_NOISE, look.noise))))
+        for look in sample.looks
+    )
+    if levels.bright < DIM and not sample.shows_surroundings:
+        cost_px = hypot(cost_px, sample.u_shift_px)
+    figure = f"The brighter side of the edges stands at {100 * levels.bright:.0f} % of full scale (50 to 90 % is good)."
+    return weighed(sample, "exposure", cost_px, figure, MORE, UNDER)

@@ -1,0 +1,23 @@
+"""Focus: edges that the optics spread are known less surely."""
+
+from fingervision.domain.status import Status
+from fingervision.inspection.finding import Finding, refusing, weighed, without
+from fingervision.inspection.noise_bound import GOOD_BLUR_PX
+from fingervision.inspection.sample import Sample
+
+REMEDY = "Focus on the tips and fix the focus, or stop the lens down; keep automatic focus off."
+FORMULA = "sqrt(u^2 - u'^2), u' the random uncertainty with edges of sigma 1.3 px (Cramer-Rao bound)"
+
+
+def find(sample: Sample) -> Finding | None:
+    """Compare the spread of the edges, without motion, to that of a lens in focus."""
+    refused = refusing(sample, "focus", (Status.BLURRED,), REMEDY)
+    if refused is not None or not sample.looks:
+        return refused
+    blur_px = sample.median(look.focus_blur_px for look in sample.looks)
+    cost_px = sample.median(
+        without(look.u_with(blur_px=look.focus_blur_px), look.u_with(blur_px=min(GOOD_BLUR_PX, look.focus_blur_px)))
+        for look in sample.looks
+    )
+    figure = f"Edges are spread over {blur_px:.2f} px (sigma; {GOOD_BLUR_PX:g} px or less is sharp)."
+    return weighed(sample, "focus", cost_px, figure, REMEDY, FORMULA)

@@ -1,0 +1,35 @@
+"""Gamma: the camera's transfer curve, where it is assumed and not measured."""
+
+from fingervision.inspection.finding import Finding, weighed
+from fingervision.inspection.sample import SURELY, Sample
+
+REMEDY = (
+    "Switch the camera's gamma off, or measure its curve (`fingervision calibrate response`) and give it to calibrate "
+    "and measure with --response."
+)
+FORMULA = "probability of the other response, by the edges' own shape, times the shift that it means for the gap"
+
+
+def find(sample: Sample) -> Finding | None:
+    """Ask the edges' shape which response they were stored with."""
+    seen = sample.response
+    if not seen.other:
+        words = f"The camera's response is known ({seen.assumed})."
+        return weighed(sample, "gamma", 0.0, words, "", FORMULA) if sample.looks else None
+    if not sample.looks:
+        return None
+    share = seen.share_other
+    cost_px = share * abs(seen.shift_px)
+    is_doubt = share < SURELY
+    if not 1.0 - SURELY < share < SURELY:
+        more_even = seen.other if share > 0.5 else seen.assumed
+        figure = (
+            f"The edges look as those of a camera with {more_even} levels do; they are taken as {seen.assumed}, and "
+            f"the other would change the gap by {abs(seen.shift_px):.2f} px."
+        )
+    else:
+        figure = (
+            f"The edges' shape does not tell {seen.assumed} from {seen.other} levels "
+            f"({100 * share:.0f} % for {seen.other}); the two differ by {abs(seen.shift_px):.2f} px."
+        )
+    return weighed(sample, "gamma", cost_px, figure, REMEDY, FORMULA, is_doubt=is_doubt)

@@ -1,0 +1,72 @@
+"""Light: fingers that hardly stand out from their ground, noise, and light that is uneven across an edge."""
+
+import numpy as np
+
+from fingervision.inspection.finding import Finding, weighed, without
+from fingervision.inspection.findings.exposure import DIM, WANTED
+from fingervision.inspection.flank_profile import flank_profile
+from fingervision.inspection.noise_bound import GOOD_NOISE
+from fingervision.inspection.plateaus import plateaus
+from fingervision.inspection.profile_fit import fit_step
+from fingervision.inspection.sample import Sample
+
+WEAK = "Light the ground from behind, or darken the fingers, and lower the camera's gain."
+UNEVEN = "Make the light even across the gap: a diffuser behind the fingers, farther from them."
+FORMULA = (
+    "sqrt(n^2 + e^2 + s^2); n = sqrt(u^2 - u'^2), u' the random uncertainty with noise of 2 % of the contrast "
+    "(Cramer-Rao bound); e the change of the gap when the plateaus beside each edge are let slope; s what noise "
+    "makes the measuring state as u_shift_px"
+)
+
+
+def find(sample: Sample) -> Finding | None:
+    """Compare noise to contrast, and fit the edges with sloping plateaus."""
+    if not sample.looks:
+        return None
+    bright = plateaus(sample).bright
+    # What a longer exposure would mend is the exposure's.
+    factor = WANTED / max(bright, 1e-3) if bright < DIM else 1.0
+    noise = sample.median(look.noise / factor for look in sample.looks)
+    weak_px = sample.median(
+        without(look.u_with(noise=each), look.u_with(noise=min(GOOD_NOISE, each)))
+        for look in sample.looks
+        for each in (look.noise / factor,)
+    )
+    uneven_px = 0.0 if plateaus(sample).is_cut else uneven_light_px(sample)
+    noisy_px = 0.0 if sample.shows_surroundings or bright < DIM else sample.u_shift_px
+    cost_px = float(np.linalg.norm((weak_px, uneven_px, noisy_px)))
+    contrast = sample.median(look.contrast for look in sample.looks) / sample.top_level
+    figure = (
+        f"Contrast is {100 * contrast:.0f} % of full scale, noise {100 * noise:.1f} % of the contrast "
+        f"({100 * GOOD_NOISE:g} % or less is good); uneven light moves the gap by {uneven_px:.3f} px."
+    )
+    return weighed(sample, "light", cost_px, figure, UNEVEN if uneven_px > weak_px else WEAK, FORMULA)
+
+
+def uneven_light_px(sample: Sample) -> float:
+    """How far the slopes of the light beside both inner edges move the gap."""
+    seen = [(look.upright, look.edges) for look in sample.looks]
+    levels = int(np.iinfo(seen[0][0].dtype).max) + 1
+    light = sample.settings.response.table(sample.top_level, levels)
+    moved = 0.0
+    for side in range(2):
+        profile = flank_profile(seen, side, light)
+        if profile is None:
+            return 0.0
+        blur_px = sample.median(edges.blur_px[side, 0] for _, edges in seen)
+        flat, sloping = (fit_step(profile, blur_px, sloping=slopes) for slopes in (False, True))
+        # Slopes that do not explain the profile clearly better are noise, and small ones a pattern or a codec's waves.
+        if sloping.slope_share < LEAST_SLOPE:
+            continue
+        if flat.chi_square - sloping.chi_square < SIGNIFICANT * max(sloping.chi_square / sloping.freedom, 1.0):
+            continue
+        moved += flat.position_px - sloping.position_px
+    return without(abs(moved), PATTERN_PX)
+
+
+# Chi-square of two slopes that chance gives once in ten thousand.
+SIGNIFICANT = 18.4
+# Light counts as uneven where it changes by so much of the contrast within the window of an edge.
+LEAST_SLOPE = 0.05
+# A ground with a pattern of its own leans somewhere by as much (`tests.benchmarks.faulty_setups`, good ones).
+PATTERN_PX = 0.05

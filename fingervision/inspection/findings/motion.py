@@ -1,0 +1,44 @@
+"""Motion: fingers that move while the shutter is open."""
+
+import numpy as np
+
+from fingervision.inspection.finding import Finding, weighed, without
+from fingervision.inspection.sample import Look, Sample
+from fingervision.vision.edge_filters import PIXEL_VARIANCE
+from fingervision.vision.profile_choice import MOTION_RADIUS_PX, WIDER
+
+REMEDY = "Expose shorter (with more light, or flashes), or move slower while frames are taken."
+FORMULA = (
+    "sqrt(c^2 + n^2); c = sum over both fingers of (sigma_flank^2 - sigma_tip^2) / (2 R), R = 15 px, the half-level's "
+    "way on a fillet; n = sqrt(u^2 - u'^2), u' the random uncertainty with flanks as sharp as the tips"
+)
+
+
+def find(sample: Sample) -> Finding | None:
+    """Compare the flanks' spread to the tips': motion across the fingers spreads flanks alone."""
+    if not sample.looks:
+        return None
+    way_px = sample.median(float(np.sqrt(12.0 * _widened(look).max())) for look in sample.looks)
+    cost_px = sample.median(_cost_px(look) for look in sample.looks)
+    gap_px = sample.track[:, 2] - sample.track[:, 1]
+    consecutive = np.diff(sample.track[:, 0]) == 1.0
+    speed = np.abs(np.diff(gap_px))[consecutive] if len(gap_px) > 1 else np.zeros(0)
+    fastest = float(np.quantile(speed, 0.95)) if speed.size else 0.0
+    between = f"; the gap changes by up to {fastest:.2f} px from frame to frame" if speed.size else ""
+    figure = f"The fingers move by {way_px:.1f} px while the shutter is open{between}."
+    return weighed(sample, "motion", cost_px, figure, REMEDY, FORMULA)
+
+
+def _widened(look: Look) -> np.ndarray:
+    """Variance that motion has added to each finger's flanks (px^2), shape (2,)."""
+    flanks, tips = (look.edges.blur_px[:, part] ** 2 + PIXEL_VARIANCE for part in (0, 1))
+    more: np.ndarray = np.where(flanks > (1.0 + WIDER) * tips, flanks - tips, 0.0)
+    return more
+
+
+def _cost_px(look: Look) -> float:
+    more = _widened(look)
+    if not more.any():
+        return 0.0
+    bias = float(more.sum()) / (2.0 * MOTION_RADIUS_PX)
+    return float(np.hypot(bias, without(look.u_camera_px, look.u_with(blur_px=look.focus_blur_px))))

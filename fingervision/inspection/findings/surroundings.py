@@ -1,0 +1,26 @@
+"""Surroundings of the edges: a side wall in view, a soft shadow, glare, a bright rim."""
+
+from fingervision.inspection.blocks import HEAVY
+from fingervision.inspection.finding import Finding, weighed
+from fingervision.inspection.findings.motion import find as motion_of
+from fingervision.inspection.plateaus import plateaus
+from fingervision.inspection.sample import Sample
+
+REMEDY = (
+    "Light from behind with a diffuser and keep light off the fingers' front; use a longer lens against side walls, "
+    "paint or a mask against glare."
+)
+FORMULA = "u_shift_px: how far what stands beside the edges may have moved them (vision/profile_choice, edge_profile)"
+
+
+def find(sample: Sample) -> Finding | None:
+    """Take what the measuring itself states of the edges' surroundings."""
+    if not sample.looks:
+        return None
+    cost_px = sample.u_shift_px if sample.shows_surroundings and sample.blockiness < HEAVY else 0.0
+    motion = motion_of(sample)
+    # Levels that are cut off, and motion, are stated in the same number, and have findings of their own.
+    if plateaus(sample).is_cut or (motion is not None and (motion.cost_px or 0.0) > 0.0):
+        cost_px = 0.0
+    figure = f"What stands beside the edges may have moved the gap by {cost_px:.3f} px."
+    return weighed(sample, "surroundings", cost_px, figure, REMEDY, FORMULA)

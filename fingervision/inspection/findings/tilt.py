@@ -1,0 +1,138 @@
+"""Tilt: a camera that is turned against the fingers, in its own plane or out of it."""
+
+from math import atan, cos, degrees, hypot, radians, sqrt
+from typing import NamedTuple
+
+import numpy as np
+
+from calib.limits import Limits, rectangular
+from calib.measured_scale import Calibration
+from fingervision.inspection.finding import Finding, weighed
+from fingervision.inspection.sample import Look, Sample
+from fingervision.vision.profile_lines import INNER, ROWS
+
+TURN = "Turn the camera about its own axis until the fingers stand straight in the picture."
+SQUARE = "Set the camera squarely: both fingers, if they are alike, then look equally wide."
+FORMULA = (
+    "sqrt(t^2 + k^2 + f^2); t = gap - gap measured at right angles to the inner edges; k what a round corner adds "
+    "where the turn has put the other corner on top, R |cos(a) - cos(b)|, a and b the edges' slants at the points; "
+    "f = gap (1 - cos(theta)), sin(theta) = Z ln(r) / (2 d), r the ratio of the fingers' breadths, d their distance, "
+    "Z the camera's"
+)
+# Fingers that stand straighter than this differ for reasons of their own (degrees).
+LEAST_TURN_DEG = 1.0
+# Differences of breadth that ask for more than this are the fingers' own (degrees), and below so many standard
+# uncertainties there is none.
+LARGEST_DEG, SIGMAS = 30.0, 4.0
+# A flank needs so many rows for its breadth and slope.
+FEWEST_ROWS = 6
+# Neighbouring rows of a flank that share one error, on a ground with a pattern.
+ALIKE = 3.0
+
+
+def find(sample: Sample) -> Finding | None:
+    """Ask the inner edges for the turn, and the fingers' breadths for the tilt."""
+    if not sample.looks:
+        return None
+    turns = [turn_deg(look) for look in sample.looks]
+    below_px = sample.settings.below_tip_px
+    turn_px = sample.median(
+        hypot(_slant_px(look, turn), corner_px(look, below_px) if abs(turn) > LEAST_TURN_DEG else 0.0)
+        for look, turn in zip(sample.looks, turns, strict=True)
+    )
+    turn = sample.median(turns)
+    tilt = tilt_deg(sample)
+    gap_px = sample.median(look.outcome.gap_px for look in sample.looks)
+    tilt_px = 0.0 if tilt is None else gap_px * (1.0 - cos(radians(tilt)))
+    figure = f"The fingers stand turned by {turn:+.1f} degrees in the picture"
+    figure += "" if tilt is None else f"; if they are alike, the camera looks {tilt:.0f} degrees from the side"
+    remedy = TURN if turn_px >= tilt_px else SQUARE
+    return weighed(sample, "tilt", hypot(turn_px, tilt_px), f"{figure}.", remedy, FORMULA)
+
+
+def turn_deg(look: Look) -> float:
+    """Mean direction of both inner flanks against the picture's axis (degrees); what fingers spread is not in it."""
+    slopes = []
+    for side in range(2):
+        real = np.flatnonzero(look.edges.lines.weight[side, :INNER] > 0)
+        rows = real[real.size // 3 :]
+        if rows.size < FEWEST_ROWS:
+            return 0.0
+        slopes.append(float(np.polyfit(look.edges.lines.fixed[side, rows], look.edges.position[side, rows], 1)[0]))
+    return degrees(atan(0.5 * (slopes[0] + slopes[1])))
+
+
+def _slant_px(look: Look, turn: float) -> float:
+    """How much longer the gap between the two measuring points is than at right angles to the turned edges."""
+    m = look.outcome
+    dx, dy = m.right.x_px - m.left.x_px, m.right.y_px - m.left.y_px
+    across, along = (dx, dy) if m.direction.is_vertical else (dy, dx)
+    if look.fingers.orientation.is_flipped:
+        along = -along
+    slope = np.tan(radians(turn))
+    return float(abs(m.gap_px - abs(across - slope * along) / hypot(1.0, slope)))
+
+
+def corner_px(look: Look, below_px: float) -> float:
+    """How far the turn moves one measuring point along a round corner.
+
+    Turned, one finger's outer corner is its highest point: its inner edge is then measured higher up the fillet than
+    the other finger's. On a circle of radius R an edge of slope m lies R (1 - m / sqrt(1 + m^2)) below the top, which
+    is the measuring height for the finger with the inner corner on top, and R (1 - 1 / sqrt(1 + m^2)) inside its flank.
+    """
+    slopes = sorted(abs(m) for m in (look.outcome.left.slope, look.outcome.right.slope))
+    radius_px = below_px / (1.0 - slopes[0] / hypot(1.0, slopes[0]))
+    return radius_px * abs(1.0 / hypot(1.0, slopes[0]) - 1.0 / hypot(1.0, slopes[1]))
+
+
+def tilt_deg(sample: Sample) -> float | None:
+    """Angle at which the camera looks from the side, from how much broader one finger looks; None where not told."""
+    ratios, spreads, apart = [], [], []
+    for look in sample.looks:
+        left, right = (_breadth(look, side) for side in range(2))
+        if left is None or right is None:
+            return None
+        ratios.append(float(np.log(left.px / right.px)))
+        spreads.append(hypot(left.u_px / left.px, right.u_px / right.px))
+        apart.append(abs(right.at_px - left.at_px))
+    middle, u_middle = float(np.median(ratios)), float(np.median(spreads))
+    if abs(middle) < SIGMAS * u_middle or sample.scale is None:
+        return None
+    limits = sample.scale.limits if isinstance(sample.scale, Calibration) else Limits()
+    distance_px = limits.camera_distance_mm * sample.scale.px_per_mm
+    # Across, the picture of a tilted plane grows as 1 / z^2: it is nearer, and seen less obliquely.
+    sine = 0.5 * abs(middle) * distance_px / float(np.median(apart))
+    return degrees(np.arcsin(sine)) if sine < np.sin(radians(LARGEST_DEG)) else None
+
+
+class _Breadth(NamedTuple):
+    """Breadth of a finger (pixels), its standard uncertainty, and the place of its middle across the fingers."""
+
+    px: float
+    u_px: float
+    at_px: float
+
+
+def _breadth(look: Look, side: int) -> _Breadth | None:
+    """Breadth of a finger where both flanks are seen.
+
+    What shifts rows of one flank together (a pattern on the ground, the fit's own phase error) is the same in every
+    frame: the scatter of one frame's rows counts, as if few of them were independent.
+    """
+    edges = look.edges
+    lines, variance = [], 0.0
+    for part in (slice(0, INNER), slice(INNER, ROWS)):
+        real = np.flatnonzero(edges.lines.weight[side, part] > 0) + part.start
+        rows = real[real.size // 2 :]
+        if rows.size < FEWEST_ROWS:
+            return None
+        fixed, found = edges.lines.fixed[side, rows].astype(float), edges.position[side, rows]
+        slope, at = np.polyfit(fixed, found, 1)
+        scatter = float(np.sum((found - at - slope * fixed) ** 2)) / (rows.size - 2)
+        variance += scatter * ALIKE / rows.size + rectangular(Limits().estimator_px) ** 2
+        lines.append((float(slope), float(at), float(fixed.mean())))
+    (inner_slope, inner_at, inner_row), (outer_slope, outer_at, outer_row) = lines
+    row = 0.5 * (inner_row + outer_row)
+    inner, outer = inner_at + inner_slope * row, outer_at + outer_slope * row
+    slope = 0.5 * (inner_slope + outer_slope)
+    return _Breadth(abs(inner - outer) / hypot(1.0, slope), sqrt(variance), 0.5 * (inner + outer))

@@ -1,0 +1,60 @@
+"""Vibration: a camera or stand that shakes, by registration of the ground against the first frame."""
+
+import numpy as np
+
+from fingervision.inspection.finding import Finding, weighed, without
+from fingervision.inspection.sample import Sample
+
+REMEDY = "Fix camera and gripper to one plate, away from fans and motors; tighten the camera's mount and cable."
+FORMULA = (
+    "sqrt(s^2 - u^2), s the standard deviation of the ground's shift across the fingers (or along them, where larger), "
+    "u that of the registration; it acts on left_mm and right_mm, and on the gap as blur"
+)
+# Second differences of a random walk-free jitter have six times its variance; a drive's smooth motion has none.
+SECOND_DIFFERENCE = 6.0**0.5
+# Fewer frames in a row say nothing about shaking.
+FEWEST = 6
+# Fingers whose gap bends by more than this between three frames (pixels) are driven in steps: their middle jumps, too.
+STEADY_PX = 1.0
+# A jitter within so many standard uncertainties of the measurement's own is none.
+SIGMAS = 3.0
+
+
+def find(sample: Sample) -> Finding | None:
+    """Ask the ground, or where it is plain both fingers together."""
+    if not sample.looks:
+        return None
+    ground = sample.ground
+    if ground.u_px is not None and len(ground.across_px) >= FEWEST:
+        spread = [float(np.std(shift)) for shift in (ground.across_px, ground.along_px)]
+        worst = max(spread)
+        cost_px = without(worst, SIGMAS * ground.u_px) if worst > SIGMAS * ground.u_px else 0.0
+        figure = f"The ground shifts by {spread[0]:.3f} px across and {spread[1]:.3f} px along the fingers (RMS)."
+        return weighed(sample, "vibration", cost_px, figure, REMEDY, FORMULA)
+    found = _common_jitter(sample)
+    if found is None:
+        return weighed(sample, "vibration", 0.0, "Too few frames in a row to see the camera shake.", "", FORMULA)
+    jitter, u_px = found
+    cost_px = without(jitter, SIGMAS * u_px) if jitter > SIGMAS * u_px else 0.0
+    figure = f"The ground is too plain to be followed; both fingers jitter together by {jitter:.3f} px (RMS)."
+    return weighed(sample, "vibration", cost_px, figure, REMEDY, FORMULA)
+
+
+def _common_jitter(sample: Sample) -> tuple[float, float] | None:
+    """Jitter that both fingers share, from second differences of their middle, and the measurement's own."""
+    track = sample.track
+    if len(track) < FEWEST:
+        return None
+    in_a_row = (np.diff(track[:, 0])[1:] == 1.0) & (np.diff(track[:, 0])[:-1] == 1.0)
+    in_a_row &= np.abs(np.diff(track[:, 2] - track[:, 1], n=2)) < STEADY_PX
+    if np.count_nonzero(in_a_row) < FEWEST - 2:
+        return None
+    jitter, u_px = 0.0, 0.0
+    for first, second, u in ((1, 2, 5), (3, 4, 6)):
+        middle = 0.5 * (track[:, first] + track[:, second])
+        bends = np.diff(middle, n=2)[in_a_row]
+        # Robust: a drive that turns round bends once, a camera that shakes bends all the time.
+        own = float(1.4826 * np.median(np.abs(bends))) / SECOND_DIFFERENCE
+        if own > jitter:
+            jitter, u_px = own, float(np.median(track[:, u]))
+    return jitter, u_px

@@ -1,0 +1,21 @@
+"""View: frames in which no two fingers were found."""
+
+from fingervision.domain.status import Status
+from fingervision.inspection.finding import Finding, Severity, refusing
+from fingervision.inspection.sample import Sample
+
+NAMED_ELSEWHERE = (Status.OK, Status.BLURRED, Status.SATURATED, Status.LOW_CONTRAST, Status.DUPLICATE)
+REMEDY = (
+    "Bring both fingers with their tips into view, with nothing else beside them; else say where they are with --roi "
+    "and where they point with --tips. `fingervision measure --steps 0` shows what was seen."
+)
+
+
+def find(sample: Sample) -> Finding | None:
+    """Count the frames without fingers."""
+    others = tuple(status for status in Status if status not in NAMED_ELSEWHERE)
+    refused = refusing(sample, "view", others, REMEDY)
+    if refused is not None:
+        return refused
+    measured = f"{sample.counts[Status.OK]} of {sample.frames} frames show two fingers and were measured."
+    return Finding("view", Severity.GOOD, measured, 0.0, 0.0 if sample.scale else None, "", "frames without a number")

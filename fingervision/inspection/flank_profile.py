@@ -1,0 +1,111 @@
+"""The mean profile of light across both inner flanks, over all frames and their many sub-pixel phases."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fingervision.vision.edges import EdgePoints
+from fingervision.vision.grey import GreyImage
+from fingervision.vision.profile_lines import INNER
+
+Floats = NDArray[np.float64]
+
+# Bins across the edge (pixels), the fewest pixels in one, and the fewest bins of a profile.
+BIN_PX, FEWEST_IN_BIN, FEWEST_BINS = 0.25, 6, 12
+# The profile reaches so many blurs and so many pixels to either side, at most so far.
+REACH_BLURS, REACH_EXTRA_PX, FARTHEST_PX = 4.0, 3.0, 20.0
+# A flank's far half is straight: rows scatter about its line by no more than this (pixels).
+STRAIGHT_PX, FEWEST_ROWS = 0.4, 6
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FlankProfile:
+    """Mean levels across one flank; arrays of shape (n,).
+
+    Parameters
+    ----------
+    away_px : ndarray of float
+        Outwards from the fitted edge, across it.
+    level : ndarray of float
+        Mean light there, on the levels' own scale.
+    u_level : ndarray of float
+        Its standard uncertainty from the scatter within the bin.
+    pixel_px : float
+        Width of a pixel across the edge.
+    """
+
+    away_px: Floats
+    level: Floats
+    u_level: Floats
+    pixel_px: float
+
+
+def flank_profile(seen: Sequence[tuple[GreyImage, EdgePoints]], side: int, light: Floats) -> FlankProfile | None:
+    """Mean profile of the left (0) or right (1) inner flank; None where it is too short, bent, or out of view.
+
+    Parameters
+    ----------
+    seen : sequence of (ndarray, EdgePoints)
+        Pictures with the tips up, and the edges found in them.
+    side : int
+        Which finger.
+    light : ndarray of float, shape (levels,)
+        Light of every grey level, rising.
+    """
+    away, levels, pixel = [], [], 1.0
+    for upright, edges in seen:
+        found = _one(upright, edges, side)
+        if found is not None:
+            away.append(found[0])
+            levels.append(found[1])
+            pixel = found[2]
+    if not away:
+        return None
+    t, stored = np.concatenate(away), np.concatenate(levels)
+    value = stored.astype(np.float64)
+    place = np.floor((t - t.min()) / BIN_PX).astype(int)
+    count = np.bincount(place)
+    full = count >= FEWEST_IN_BIN
+    if np.count_nonzero(full) < FEWEST_BINS:
+        return None
+    n = np.maximum(count, 1)
+    middle, mean = np.bincount(place, t) / n, np.bincount(place, value) / n
+    # Scatter about the bin's own slope, so that the edge's steepness is no noise.
+    dt = t - middle[place]
+    slope = np.bincount(place, dt * value) / np.maximum(np.bincount(place, dt * dt), 1e-9)
+    left = value - mean[place] - slope[place] * dt
+    variance = np.bincount(place, left**2) / np.maximum(count - 2, 1)
+    usual = float(np.median(variance[full]))
+    u_level = np.sqrt(np.maximum(variance[full], usual) / count[full])
+    # The noise is the levels'; light has it multiplied by the curve's slope, so that responses are judged alike.
+    gain = np.interp(mean[full], np.arange(light.size), np.gradient(light))
+    in_light = np.bincount(place, light[stored])[full] / count[full]
+    return FlankProfile(middle[full], in_light, np.maximum(u_level * gain, 1e-6), pixel)
+
+
+def _one(upright: GreyImage, edges: EdgePoints, side: int) -> tuple[Floats, GreyImage, float] | None:
+    """Distances from the edge, stored levels, and a pixel's width across it."""
+    real = np.flatnonzero(edges.lines.weight[side, :INNER] > 0)
+    rows = real[real.size // 2 :]
+    if rows.size < FEWEST_ROWS:
+        return None
+    fixed, found = edges.lines.fixed[side, rows].astype(float), edges.position[side, rows]
+    slope, at = np.polyfit(fixed, found, 1)
+    scatter = found - at - slope * fixed
+    if 1.4826 * float(np.median(np.abs(scatter))) > STRAIGHT_PX:
+        return None
+    blur = float(edges.blur_px[side, 0])
+    other = edges.position[1 - side, :INNER][edges.lines.weight[1 - side, :INNER] > 0]
+    apart = float(np.min(np.abs(other - np.median(found)))) if other.size else FARTHEST_PX
+    reach = int(min(REACH_BLURS * blur + REACH_EXTRA_PX, FARTHEST_PX))
+    outside = int(min(reach, 0.5 * apart))
+    every = np.arange(int(fixed.min()), int(fixed.max()) + 1)
+    line = at + slope * every
+    outward = int(edges.lines.outward[side, rows[0]])
+    columns = np.rint(line).astype(int)[:, None] + outward * np.arange(-reach, outside + 1)
+    inside = (columns >= 0) & (columns < upright.shape[1])
+    levels = upright[np.broadcast_to(every[:, None], columns.shape)[inside], columns[inside]]
+    cosine = float(1.0 / np.hypot(1.0, slope))
+    return (outward * (columns - line[:, None]) * cosine)[inside], levels, cosine

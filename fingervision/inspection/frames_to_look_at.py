@@ -1,0 +1,35 @@
+"""The frames of a recording or camera that are looked at: those of its first seconds, and not too many."""
+
+from collections.abc import Iterator
+from time import monotonic
+
+from fingervision.domain.frame import Frame, LostFrame
+from fingervision.frames.source import FrameSource
+
+# However fast a camera is, so many frames tell enough.
+MOST_FRAMES = 150
+
+
+def frames_to_look_at(source: FrameSource, seconds: float, most: int = MOST_FRAMES) -> Iterator[Frame | LostFrame]:
+    """Frames of the first seconds: by their own times, and by the clock where a camera sends none.
+
+    Parameters
+    ----------
+    source : FrameSource
+        The recording or camera.
+    seconds : float
+        How long to look.
+    most : int
+        The most frames.
+    """
+    first_s: float | None = None
+    is_live = not source.description.files
+    began = monotonic()
+    for number, item in enumerate(source):
+        if first_s is None:
+            first_s = item.time_s
+        elif item.time_s is not None and item.time_s - first_s > seconds:
+            return
+        yield item
+        if number + 1 >= most or (is_live and monotonic() - began > seconds):
+            return

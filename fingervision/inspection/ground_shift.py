@@ -1,0 +1,114 @@
+"""How a camera shakes: the ground above the fingers' tips registered against the first frame's.
+
+Two halves of the ground are registered each by itself. The camera moves both alike; where they disagree the ground is
+too plain to be followed, and their disagreement is the uncertainty of their mean.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from fingervision.domain.direction import Direction
+from fingervision.domain.frame import Frame
+from fingervision.domain.gap import GapMeasurement
+from fingervision.vision.grey import to_grey
+from fingervision.vision.orientation import Orientation
+
+Floats = NDArray[np.float64]
+
+# The ground ends so far above the higher tip (pixels): beyond the blur of its edge.
+MARGIN_PX = 12
+# A strip of so few rows is too narrow to follow; more than this says no more.
+FEWEST_ROWS, MOST_ROWS = 24, 256
+# Registration is refined to this part of a pixel; whole transforms of more frames than this say no more.
+UPSAMPLED, MOST_FRAMES = 50, 60
+# Detail is what is finer than so many pixels: light that is uneven does not move with the ground.
+COARSE_PX = 8.0
+# Halves that disagree by more than this (pixels, standard deviation) follow noise.
+AGREE_PX = 0.3
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class GroundShift:
+    """Movement of the ground.
+
+    Parameters
+    ----------
+    across_px, along_px : ndarray of float, shape (n,)
+        Of each frame against the first, across and along the fingers.
+    u_px : float or None
+        Standard uncertainty of each, from the two halves; None where the ground cannot be followed.
+    """
+
+    across_px: Floats
+    along_px: Floats
+    u_px: float | None
+
+
+@dataclass(slots=True)
+class GroundTracker:
+    """Follows the ground from frame to frame."""
+
+    _reference: list[Floats] | None = None
+    _rows: int = 0
+    _direction: Direction | None = None
+    _found: list[Floats] = field(default_factory=list)
+
+    def add(self, frame: Frame, outcome: GapMeasurement) -> None:
+        """Look at one more frame that gave a number."""
+        if len(self._found) >= MOST_FRAMES or (self._direction not in (None, outcome.direction)):
+            return
+        grey = to_grey(frame.pixels)
+        orientation = Orientation(outcome.direction, *grey.shape)
+        upright = orientation.view(grey)
+        tips = [edge.tip_px for edge in (outcome.left, outcome.right)]
+        if orientation.is_flipped:
+            tips = [orientation.along_size - 1 - tip for tip in tips]
+        room = int(min(tips)) - MARGIN_PX
+        if self._reference is None:
+            # Some room, because tips move.
+            self._rows, self._direction = min(room - MARGIN_PX, MOST_ROWS), outcome.direction
+            if self._rows >= FEWEST_ROWS:
+                self._reference = self._halves(upright[:room])
+            return
+        if room >= self._rows:
+            self._register(self._halves(upright[: self._rows]))
+
+    def shift(self) -> GroundShift:
+        """What was found."""
+        if len(self._found) < 2:
+            return GroundShift(np.zeros(0), np.zeros(0), None)
+        both = np.array(self._found)
+        # Rounding of the refinement is no agreement: fixed dirt on a sensor stays at exactly nothing.
+        apart = max(float(np.std(both[:, 0] - both[:, 1])) / 2.0, 0.5 / UPSAMPLED)
+        middle = np.vstack([np.zeros((1, 2)), both.mean(axis=1)])
+        return GroundShift(middle[:, 1], middle[:, 0], apart if apart < AGREE_PX else None)
+
+    def _halves(self, strip: NDArray[np.uint8] | NDArray[np.uint16]) -> list[Floats]:
+        strip = strip[: self._rows]
+        middle = strip.shape[1] // 2
+        return [_detail(part.astype(np.float32)) for part in (strip[:, :middle], strip[:, middle:])]
+
+    def _register(self, halves: list[Floats]) -> None:
+        assert self._reference is not None  # noqa: S101 - made from the first frame
+        self._found.append(
+            np.array([-_registered(first, now) for first, now in zip(self._reference, halves, strict=True)])
+        )
+
+
+def _registered(first: Floats, now: Floats) -> Floats:
+    from skimage.registration import phase_cross_correlation
+
+    register: Callable[..., Any] = phase_cross_correlation
+    return np.asarray(register(first, now, upsample_factor=UPSAMPLED, normalization=None)[0], dtype=np.float64)
+
+
+def _detail(levels: NDArray[np.float32]) -> Floats:
+    """Detail of a piece of ground, fading to nothing at its border."""
+    fine = cv2.GaussianBlur(levels, (0, 0), 1.0) - cv2.GaussianBlur(levels, (0, 0), COARSE_PX)
+    window = np.hanning(levels.shape[0])[:, None] * np.hanning(levels.shape[1])
+    return np.asarray(fine * window, dtype=np.float64)

@@ -1,0 +1,28 @@
+"""How the random uncertainty of an edge goes with noise, blur and rows: the Cramer-Rao bound, used for its ratios."""
+
+from math import pi, sqrt
+
+# A good set-up: noise over contrast (2 of 100 levels), and blur of an edge (sigma_e, pixels) that is neither soft nor
+# under-sampled (measuring.md, section 2: below 0.5 px the pixels show).
+GOOD_NOISE, GOOD_BLUR_PX = 0.02, 1.3
+# The window of a fit reaches so many blurs, and so many pixels more, to either side.
+REACH_BLURS, REACH_EXTRA_PX = 4.0, 4.0
+
+
+def edge_noise_px(noise: float, blur_px: float, rows: int = 1) -> float:
+    """Standard uncertainty of one edge of unknown levels and blur.
+
+    sigma_x^2 = r^2 / (N (1 / (2 sqrt(pi) sigma_e) - 1 / W)); Gatherer, Stanford CSL-TR-93-560; Kakarala & Hero, IEEE
+    PAMI 14(7), 1992, doi:10.1109/34.142910.
+
+    Parameters
+    ----------
+    noise : float
+        Standard deviation of the grey levels over the contrast of the edge, r.
+    blur_px : float
+        Standard deviation of the edge's spread, the pixel included, sigma_e.
+    rows : int
+        Independent rows, N.
+    """
+    window_px = 2.0 * (REACH_BLURS * blur_px + REACH_EXTRA_PX)
+    return noise / sqrt(rows * (1.0 / (2.0 * sqrt(pi) * blur_px) - 1.0 / window_px))

@@ -1,0 +1,74 @@
+"""How bright ground and fingers are in the stored levels, and how much of them stands at the ends of the scale."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fingervision.inspection.sample import Look, Sample
+from fingervision.vision.profile_lines import INNER
+
+Floats = NDArray[np.float64]
+
+# Plateaus are read in a strip of so many pixels beyond so many blurs from the inner edge.
+STRIP_PX, BEYOND_BLURS = 6, 3.0
+# Half of the sensor's noise already lies beyond the end of the scale where so many pixels stand at it.
+AT_END_SHARE = 0.25
+
+
+@dataclass(frozen=True, slots=True)
+class Plateaus:
+    """Levels beside the inner edges, shares of full scale.
+
+    Parameters
+    ----------
+    bright, dark : float
+        The brighter plateau (ground, or light fingers) and the darker one.
+    at_top, at_zero : float
+        Share of the pixels of each that stand at the end of the scale.
+    """
+
+    bright: float
+    dark: float
+    at_top: float
+    at_zero: float
+
+    @property
+    def is_cut(self) -> bool:
+        """Whether the ground, or the finger, lies beyond the end of the scale."""
+        return self.at_top > AT_END_SHARE or self.at_zero > AT_END_SHARE
+
+
+def plateaus(sample: Sample) -> Plateaus:
+    """Read the plateaus beside both inner edges in every frame that was looked at closely."""
+    found = [_of(look, sample.top_level) for look in sample.looks]
+    return Plateaus(*(float(np.median([each[k] for each in found])) for k in range(4)))
+
+
+def _of(look: Look, top: int) -> tuple[float, float, float, float]:
+    outside: list[Floats] = []
+    inside: list[Floats] = []
+    edges = look.edges
+    start = int(np.ceil(BEYOND_BLURS * look.flank_blur_px)) + 1
+    for side in range(2):
+        real = np.flatnonzero(edges.lines.weight[side, :INNER] > 0)
+        if not real.size:
+            continue
+        rows = edges.lines.fixed[side, real].astype(int)
+        at = np.rint(edges.position[side, real]).astype(int)
+        outward = int(edges.lines.outward[side, real[0]])
+        for sense, strip in ((outward, outside), (-outward, inside)):
+            columns = at[:, None] + sense * np.arange(start, start + STRIP_PX)
+            use = (columns >= 0) & (columns < look.upright.shape[1])
+            levels = look.upright[np.broadcast_to(rows[:, None], columns.shape)[use], columns[use]]
+            strip.append(levels.astype(np.float64))
+    if not outside or not sum(part.size for part in outside) or not sum(part.size for part in inside):
+        return (float(look.upright.max()) / top, float(look.upright.min()) / top, 0.0, 0.0)
+    out, ins = np.concatenate(outside), np.concatenate(inside)
+    bright, dark = (out, ins) if np.median(out) > np.median(ins) else (ins, out)
+    return (
+        float(np.median(bright)) / top,
+        float(np.median(dark)) / top,
+        float(np.mean(bright >= top)),
+        float(np.mean(dark <= 0)),
+    )

@@ -1,0 +1,93 @@
+"""The symmetric blurred step between two plateaus that may slope, fitted to the mean profile of a flank."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import least_squares
+from scipy.special import ndtr
+
+from fingervision.inspection.flank_profile import FlankProfile
+
+Floats = NDArray[np.float64]
+
+# A symmetric spread that is not Gaussian (a disc, a box, sharpening) is a Gaussian and a share of a wider one.
+WIDER = 1.8
+# Blur is looked for within these limits (pixels).
+LEAST_BLUR_PX, LARGEST_BLUR_PX = 0.2, 8.0
+
+
+@dataclass(frozen=True, slots=True)
+class ProfileFit:
+    """Best fit of one profile.
+
+    Parameters
+    ----------
+    position_px : float
+        The edge, outwards from where the profile has its zero.
+    chi_square : float
+        What is left, in units of the bins' own noise.
+    freedom : int
+        Bins less parameters.
+    slope_share : float
+        Larger change of either plateau over its part of the window, as a share of the contrast; 0 where they are level.
+    """
+
+    position_px: float
+    chi_square: float
+    freedom: int
+    slope_share: float = 0.0
+
+
+def fit_step(profile: FlankProfile, blur_px: float, *, sloping: bool) -> ProfileFit:
+    """Fit a step to a profile by least squares.
+
+    Parameters
+    ----------
+    profile : FlankProfile
+        Mean light across the flank.
+    blur_px : float
+        Where the search for the blur begins.
+    sloping : bool
+        Whether the plateaus may slope (uneven light).
+    """
+    weight = 1.0 / profile.u_level
+
+    def residual(p: Floats) -> Floats:
+        design = _design(profile, p[0], float(np.exp(p[1])), sloping) * weight[:, None]
+        value = profile.level * weight
+        solved, *_ = np.linalg.lstsq(design, value, rcond=None)
+        return np.asarray(value - design @ solved)
+
+    start = np.array([0.0, np.log(np.clip(blur_px, 1.1 * LEAST_BLUR_PX, 0.9 * LARGEST_BLUR_PX))])
+    limits = ([-3.0, np.log(LEAST_BLUR_PX)], [3.0, np.log(LARGEST_BLUR_PX)])
+    found = least_squares(residual, start, bounds=limits, xtol=1e-8, ftol=1e-8, max_nfev=60)
+    parameters = 7 if sloping else 5
+    share = _slope_share(profile, float(found.x[0]), float(np.exp(found.x[1]))) if sloping else 0.0
+    return ProfileFit(float(found.x[0]), float(2.0 * found.cost), max(profile.level.size - parameters, 1), share)
+
+
+def _slope_share(profile: FlankProfile, position: float, blur: float) -> float:
+    weight = 1.0 / profile.u_level
+    design = _design(profile, position, blur, sloping=True)
+    solved, *_ = np.linalg.lstsq(design * weight[:, None], profile.level * weight, rcond=None)
+    reach = position - profile.away_px[0], profile.away_px[-1] - position
+    changes = [abs(slope) * part for slope, part in zip(solved[3:], reach, strict=True)]
+    return float(max(changes) / max(abs(solved[1]), 1e-9))
+
+
+def _design(profile: FlankProfile, position: float, blur: float, sloping: bool) -> Floats:
+    away = profile.away_px - position
+    step = _pixel_step(away, blur, profile.pixel_px)
+    wide = _pixel_step(away, WIDER * blur, profile.pixel_px)
+    columns = [np.ones_like(away), step, wide - step]
+    if sloping:
+        columns += [away * (1.0 - step), away * step]
+    return np.stack(columns, axis=1)
+
+
+def _pixel_step(away: Floats, sigma: float, pixel: float) -> Floats:
+    """A Gaussian-blurred unit step, averaged over a pixel of this width across the edge."""
+    upper, lower = (away + 0.5 * pixel) / sigma, (away - 0.5 * pixel) / sigma
+    density = (np.exp(-0.5 * upper**2) - np.exp(-0.5 * lower**2)) / np.sqrt(2.0 * np.pi)
+    return np.asarray(sigma / pixel * (upper * ndtr(upper) - lower * ndtr(lower) + density))

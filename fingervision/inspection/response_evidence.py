@@ -1,0 +1,116 @@
+"""Which camera response the edges themselves speak for: optics spread an edge evenly in light, not in coded levels.
+
+Both inner flanks are fitted with a symmetric step, once in the light of the assumed response and once in that of the
+other one. The likelihood ratio of the two says how likely the other one is. An aberration (coma) leans the same way on
+both fingers, and a response leans towards the dark on both, so that the two flanks together tell them apart.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from fingervision.inspection.flank_profile import flank_profile
+from fingervision.inspection.profile_fit import fit_step
+from fingervision.vision.edge_filters import PIXEL_VARIANCE
+from fingervision.vision.edges import EdgePoints
+from fingervision.vision.grey import GreyImage, top_level
+from fingervision.vision.pipeline import Settings
+from fingervision.vision.profile_choice import WIDER
+
+# Beyond these odds (2 ln of the ratio of likelihoods) it is certain for every purpose.
+LARGEST_ODDS = 60.0
+# Optics are not quite symmetric, and lossy coding less so: no bin is better known than this share of the contrast.
+MODEL_SHARE, LOSSY_SHARE = 0.002, 0.03
+# Sharpening in the camera comes after its transfer curve and makes coded edges even: with overshoots beyond the
+# plateaus of this share of the contrast the shape says nothing.
+OVERSHOOT, OVERSHOOT_SIGMAS = 0.03, 3.0
+# A profile that reaches so near to either end of the scale is cut off, and leans because of that (share of it).
+CUT_OFF_SHARE = 0.995
+
+
+@dataclass(frozen=True, slots=True)
+class ResponseEvidence:
+    """What the shape of the edges says.
+
+    Parameters
+    ----------
+    share_other : float
+        Probability of the other response, 0 to 1; one half where the edges cannot tell.
+    assumed, other : str
+        Names of both; `other` is empty where the response is known.
+    shift_px : float
+        How much larger the gap is read than if the other one were true.
+    flanks : int
+        Flanks that could be used.
+    """
+
+    share_other: float
+    assumed: str
+    other: str
+    shift_px: float
+    flanks: int
+
+
+def response_evidence(
+    seen: Sequence[tuple[GreyImage, EdgePoints]], settings: Settings, shift_px: float, *, lossy: bool = False
+) -> ResponseEvidence:
+    """Weigh the assumed response against the other one.
+
+    Parameters
+    ----------
+    seen : sequence of (ndarray, EdgePoints)
+        Pictures with the tips up, and the edges found in them.
+    settings : Settings
+        With both responses.
+    shift_px : float
+        What the other one would change.
+    lossy : bool
+        Whether a lossy codec stood between the sensor and the pixels.
+    """
+    assumed, other = settings.response, settings.other_response
+    if other is None:
+        return ResponseEvidence(0.0, assumed.name, "", 0.0, 0)
+    floor = LOSSY_SHARE if lossy else MODEL_SHARE
+    found = [each for side in range(2 if seen else 0) if (each := _odds(seen, side, settings, floor)) is not None]
+    odds = float(np.clip(_agreed(found), -LARGEST_ODDS, LARGEST_ODDS))
+    return ResponseEvidence(1.0 / (1.0 + float(np.exp(-0.5 * odds))), assumed.name, other.name, shift_px, len(found))
+
+
+def _agreed(odds: list[float]) -> float:
+    """What both flanks say: the weaker one speaks for both, because a fault of one flank alone is no response."""
+    if len(odds) < 2:
+        return 0.0
+    return 2.0 * min(odds, key=abs) if odds[0] * odds[1] > 0.0 else 0.0
+
+
+def _odds(seen: Sequence[tuple[GreyImage, EdgePoints]], side: int, settings: Settings, floor: float) -> float | None:
+    """Twice the logarithm of the likelihood ratio for the other response, of one flank; None where it cannot tell."""
+    levels = int(np.iinfo(seen[0][0].dtype).max) + 1
+    top = settings.response.top_level or top_level(seen[0][0], settings.bits)
+    identity = np.arange(levels, dtype=np.float64)
+    stored = flank_profile(seen, side, identity)
+    if stored is None or stored.level.max() > CUT_OFF_SHARE * top or stored.level.min() < 0.5:
+        return None
+    ends = max(2, stored.level.size // 6)
+    low, high = sorted((float(np.median(stored.level[:ends])), float(np.median(stored.level[-ends:]))))
+    scatter = max(float(np.std(stored.level[:ends])), float(np.std(stored.level[-ends:])))
+    over = max(OVERSHOOT * (high - low), OVERSHOOT_SIGMAS * scatter)
+    if stored.level.max() > high + over or stored.level.min() < low - over:
+        return None
+    blur_px = float(np.median([edges.blur_px[side, 0] for _, edges in seen]))
+    tip_px = float(np.median([edges.blur_px[side, 1] for _, edges in seen]))
+    if blur_px**2 + PIXEL_VARIANCE > (1.0 + WIDER) * (tip_px**2 + PIXEL_VARIANCE):
+        return None  # what spreads a flank and no tip is no spread of the optics: motion, or a wall
+    u_level = np.hypot(stored.u_level, floor * (high - low))
+    fits = []
+    for response in (settings.response, settings.other_response):
+        assert response is not None  # noqa: S101 - the caller has looked
+        table = response.table(top, levels)
+        profile = flank_profile(seen, side, table)
+        assert profile is not None  # noqa: S101 - as `stored`
+        gain = np.interp(stored.level, identity, np.gradient(table))
+        fits.append(fit_step(replace(profile, u_level=np.maximum(u_level * gain, 1e-6)), blur_px, sloping=True))
+    # What neither explains is error of the model: both are judged by the better one's own misfit.
+    excess = max(min(fit.chi_square for fit in fits) / fits[0].freedom, 1.0)
+    return (fits[0].chi_square - fits[1].chi_square) / excess

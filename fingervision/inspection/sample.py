@@ -1,0 +1,287 @@
+"""What is looked at: some frames of a recording, measured, with what the measuring found on the way."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fingervision.domain.frame import Frame, LostFrame
+from fingervision.domain.gap import GapMeasurement, NoGap
+from fingervision.domain.status import Status
+from fingervision.frames.source import Description
+from fingervision.inspection.blocks import BLOCKY, blockiness
+from fingervision.inspection.finding import GOOD_PX
+from fingervision.inspection.ground_shift import GroundShift, GroundTracker
+from fingervision.inspection.noise_bound import GOOD_NOISE, edge_noise_px
+from fingervision.inspection.response_evidence import ResponseEvidence, response_evidence
+from fingervision.measuring.scale import Scale
+from fingervision.vision.edge_filters import PIXEL_VARIANCE
+from fingervision.vision.edges import EdgePoints
+from fingervision.vision.fingers import CoarseFingers
+from fingervision.vision.grey import GreyImage, to_grey, top_level
+from fingervision.vision.pipeline import Settings, look_closely, measure_frame
+from fingervision.vision.residuals import SHARED_POINTS
+
+Floats = NDArray[np.float64]
+
+# Frames that are looked at closely, evenly over all that are read: enough to average noise, few enough for 4K.
+CLOSELY = 16
+# Another response than the assumed one is taken for the rest of the inspection where the edges say so as surely.
+SURELY = 0.95
+# Rims and walls of a tenth of the contrast are seen below this ratio of noise to contrast.
+SEEING_NOISE = 2.0 * GOOD_NOISE
+# What a camera's own noise is taken to be where a codec has removed it (levels of 255).
+CAMERA_NOISE = 2.0
+# Fingers and gap fill a picture that they take so much of: the rest is room to move in.
+FILLED = 0.6
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Look:
+    """One frame that was looked at closely.
+
+    Parameters
+    ----------
+    frame : Frame
+        The picture.
+    upright : ndarray or None
+        Its grey levels, seen with the tips up; None where no fingers were found.
+    outcome : GapMeasurement
+        What it measured.
+    fingers : CoarseFingers
+        Where the fingers are.
+    edges : EdgePoints
+        Their outlines.
+    top_level : int
+        Full scale of the picture.
+    """
+
+    frame: Frame
+    upright: GreyImage
+    outcome: GapMeasurement
+    fingers: CoarseFingers
+    edges: EdgePoints
+    top_level: int
+
+    @property
+    def contrast(self) -> float:
+        """Levels between the plateaus of the weaker finger (in light, on the levels' own scale)."""
+        return min(abs(self.outcome.left.contrast), abs(self.outcome.right.contrast))
+
+    @property
+    def focus_blur_px(self) -> float:
+        """Spread of the optics, the pixel included: flanks or tips, whichever motion has spread less."""
+        return float(np.sqrt(self.edges.blur_px.min(axis=1).max() ** 2 + PIXEL_VARIANCE))
+
+    @property
+    def flank_blur_px(self) -> float:
+        """Spread of the flanks, the pixel included."""
+        return float(np.sqrt(self.edges.blur_px[:, 0].max() ** 2 + PIXEL_VARIANCE))
+
+    @property
+    def u_camera_px(self) -> float:
+        """Random uncertainty of the gap as far as noise of the camera makes it, without what a codec shares."""
+        return self.outcome.u_gap_px / float(np.sqrt(SHARED_POINTS[self.frame.coding]))
+
+    @property
+    def noise(self) -> float:
+        """Noise over contrast; of the flat parts beside the edges, where they are in view.
+
+        A codec leaves flat parts without any: there it is the camera's, as far as the edges do not show less.
+        """
+        flat = self.edges.noise_flat
+        if self.frame.lossy or not flat:
+            flat = min(self.edges.noise, max(flat, CAMERA_NOISE * self.top_level / 255.0))
+        return flat / max(self.contrast, 1e-9)
+
+    def u_with(self, noise: float | None = None, blur_px: float | None = None) -> float:
+        """Random uncertainty of the gap with another ratio of noise to contrast or another blur of the flanks (pixels).
+
+        The Cramer-Rao bound gives the ratio; what is stated for this frame gives the size.
+        """
+        now = edge_noise_px(self.noise, self.flank_blur_px)
+        then = edge_noise_px(self.noise if noise is None else noise, self.flank_blur_px if blur_px is None else blur_px)
+        return self.u_camera_px * then / now if now > 0.0 else 0.0
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Sample:
+    """All that findings are made from.
+
+    Parameters
+    ----------
+    description : Description
+        The recording.
+    settings : Settings
+        What it was measured with; the response is the one that the edges speak for.
+    scale : Scale or None
+        From pixels to millimetres; None where nobody has stated it.
+    looks : tuple of Look
+        Frames that gave a number, looked at closely.
+    refused : dict of Status to NoGap
+        The first refusal of each kind.
+    refused_frame : Frame or None
+        The first picture that gave no number.
+    counts : Counter of Status
+        Frames with each status.
+    track : ndarray, shape (n, 7)
+        Of every frame that gave a number: its place, x of the left and right measuring point across the fingers, both
+        tips along them, standard uncertainty across and of the tips (pixels).
+    ground : GroundShift
+        How the ground moved against the first frame.
+    response : ResponseEvidence
+        What the edges' shape says of the camera's response.
+    last_frame : Frame or None
+        For the picture.
+    """
+
+    description: Description
+    settings: Settings
+    scale: Scale | None
+    looks: tuple[Look, ...]
+    refused: dict[Status, NoGap]
+    refused_frame: Frame | None
+    counts: Counter[Status]
+    track: Floats
+    ground: GroundShift
+    response: ResponseEvidence
+
+    @property
+    def frames(self) -> int:
+        """Frames that were read."""
+        return sum(self.counts.values())
+
+    @property
+    def top_level(self) -> int:
+        """Full scale of the pictures."""
+        if self.settings.response.top_level is not None:
+            return self.settings.response.top_level
+        frame = self.looks[0].frame if self.looks else self.refused_frame
+        return 255 if frame is None else top_level(to_grey(frame.pixels), self.settings.bits)
+
+    @property
+    def fill(self) -> float:
+        """Share of the picture across the fingers that both fingers and the gap take; 1 where they leave it."""
+        shares = [0.0]
+        for look in self.looks:
+            found = [finger.outline[:, 0] for finger in (look.fingers.left, look.fingers.right)]
+            extent = max(float(x.max()) for x in found) - min(float(x.min()) for x in found)
+            shares.append(extent / look.fingers.orientation.across_size)
+        return max(shares)
+
+    @property
+    def good_px(self) -> float:
+        """Cost that is not worth mending, in pixels of this picture.
+
+        A picture that is not filled has larger pixels than it need have: what is good is judged by those that it could
+        have.
+        """
+        return GOOD_PX * min(1.0, self.fill / FILLED) if self.looks else GOOD_PX
+
+    @property
+    def blockiness(self) -> float:
+        """How plainly a coder's blocks are seen."""
+        return self.median(blockiness(look.frame.pixels) for look in self.looks)
+
+    @property
+    def u_shift_px(self) -> float:
+        """What the measuring states for things beside the edges and levels that are cut off."""
+        return self.median(look.outcome.u_shift_px for look in self.looks)
+
+    @property
+    def shows_surroundings(self) -> bool:
+        """Whether noise is low enough to see what stands beside an edge; above, noise itself looks like something."""
+        return self.median(look.noise for look in self.looks) <= SEEING_NOISE
+
+    def median(self, values: Iterable[float]) -> float:
+        """Median over the frames that were looked at closely; 0 where there are none."""
+        each = list(values)
+        return float(np.median(each)) if each else 0.0
+
+
+def take_sample(
+    frames: Iterable[Frame | LostFrame], description: Description, settings: Settings, scale: Scale | None
+) -> Sample:
+    """Measure frames and keep what findings are made from.
+
+    Parameters
+    ----------
+    frames : iterable of Frame or LostFrame
+        Already as few as are looked at.
+    description : Description
+        The recording.
+    settings : Settings
+        How frames are measured.
+    scale : Scale or None
+        From pixels to millimetres.
+    """
+    kept: list[Frame] = []
+    every, read = 1, 0
+    counts: Counter[Status] = Counter()
+    refused: dict[Status, NoGap] = {}
+    refused_frame: Frame | None = None
+    track: list[tuple[float, ...]] = []
+    tracker = GroundTracker()
+    for item in frames:
+        if isinstance(item, LostFrame):
+            counts[item.status] += 1
+            refused.setdefault(item.status, NoGap(item.status, item.words))
+            continue
+        outcome = measure_frame(item, settings)
+        counts[outcome.status] += 1
+        if isinstance(outcome, NoGap):
+            refused.setdefault(outcome.status, outcome)
+            refused_frame = refused_frame or item
+            continue
+        track.append(_place(item.index, outcome))
+        tracker.add(item, outcome)
+        if read % every == 0:
+            kept.append(item)
+            if len(kept) > 2 * CLOSELY:
+                kept, every = kept[::2], 2 * every
+        read += 1
+    kept = kept[:: max(1, -(-len(kept) // CLOSELY))]
+    looks = _looks(kept, settings)
+    evidence = response_evidence(
+        [(look.upright, look.edges) for look in looks],
+        settings,
+        _median_shift(looks),
+        lossy=description.lossy or any(blockiness(look.frame.pixels) > BLOCKY for look in looks),
+    )
+    if evidence.share_other > SURELY and settings.other_response is not None:
+        settings = replace(settings, response=settings.other_response, other_response=None)
+        looks = _looks(kept, settings) or looks
+    found = np.array(track, dtype=np.float64).reshape(-1, 7)
+    return Sample(description, settings, scale, looks, refused, refused_frame, counts, found, tracker.shift(), evidence)
+
+
+def _looks(frames: Iterable[Frame], settings: Settings) -> tuple[Look, ...]:
+    looks = []
+    for frame in frames:
+        outcome, fingers, edges = look_closely(frame, settings)
+        if isinstance(outcome, GapMeasurement) and fingers is not None and edges is not None:
+            grey = to_grey(frame.pixels)
+            if settings.region is not None:
+                r = settings.region
+                grey = grey[r.y_px : r.y_px + r.height_px, r.x_px : r.x_px + r.width_px]
+            top = settings.response.top_level or top_level(grey, settings.bits)
+            looks.append(Look(frame, fingers.orientation.view(grey), outcome, fingers, edges, top))
+    return tuple(looks)
+
+
+def _median_shift(looks: Iterable[Look]) -> float:
+    shifts = [look.outcome.response_shift_px for look in looks]
+    return float(np.median(shifts)) if shifts else 0.0
+
+
+def _place(index: int, m: GapMeasurement) -> tuple[float, ...]:
+    across = (m.left.x_px, m.right.x_px) if m.direction.is_vertical else (m.left.y_px, m.right.y_px)
+    u_across, u_tip = (
+        float(np.hypot(a, b)) / 2.0
+        for a, b in ((m.left.u_across_px, m.right.u_across_px), (m.left.u_tip_px, m.right.u_tip_px))
+    )
+    return (float(index), *across, m.left.tip_px, m.right.tip_px, u_across, u_tip)

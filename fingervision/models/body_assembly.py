@@ -1,0 +1,195 @@
+"""What the flexures of a mechanism join: its bodies cut from the drawing, meshed and condensed to their frames."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import csr_matrix, lil_matrix
+
+from fingervision.domain.errors import FingervisionError
+from fingervision.models.body_frames import Frame, face_frame, nodes_of, pieces_of, section_frame
+from fingervision.models.condensed_bodies import CondensedBody, condensed
+from fingervision.models.corotational_body import CorotationalBody, turned_axes
+from fingervision.models.flexure_span import FlexureSpan
+from fingervision.models.mechanism import Mechanism
+from fingervision.models.mechanism_faces import driven_components, nodes_on, supports_of, turns_with
+from fingervision.models.plane_stress import PlaneStressPlate
+
+Array = NDArray[np.float64]
+Indices = NDArray[np.int64]
+
+_NEAR = 1e-7
+"""Of the body's size: how near a node must be to a cut."""
+_OVER = 1.1
+"""Of a cut's height: nodes within it are the section's."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class BodyAssembly:
+    """Bodies, and what of their frames is held or driven.
+
+    Parameters
+    ----------
+    plate : PlaneStressPlate
+        All bodies, meshed.
+    piece : ndarray of int
+        Body of every node of the plate.
+    frames : tuple of Frame
+        Of all bodies.
+    bodies, turning : tuple
+        Condensed, and the same in large rotation.
+    ends : tuple of (int, int)
+        Frames at both ends of every flexure.
+    held : tuple of int
+        Motions that supports hold, three to a frame.
+    by_input : dict of int to float
+        Motions that the drive prescribes, by 1 mm of input.
+    """
+
+    plate: PlaneStressPlate
+    piece: Indices
+    frames: tuple[Frame, ...]
+    bodies: tuple[CondensedBody, ...]
+    turning: tuple[CorotationalBody, ...]
+    ends: tuple[tuple[int, int], ...]
+    held: tuple[int, ...]
+    by_input: dict[int, float]
+
+    def field(self, moved: Array) -> tuple[Array, csr_matrix]:
+        """Displacement of every node of the bodies in the deformed shape, and its change by the frames' motions."""
+        plate = self.plate
+        field = np.zeros(plate.unknowns)
+        slopes = lil_matrix((plate.unknowns, moved.size))
+        for number, (body, turning) in enumerate(zip(self.bodies, self.turning, strict=True)):
+            nodes = np.flatnonzero(self.piece == number)
+            x, y = plate.x_dofs[nodes], plate.y_dofs[nodes]
+            own = moved[body.unknowns]
+            local, by_motion = turning.strained(own), turning.slope(own)
+            turn = turned_axes(float(own[2]))
+            bent = np.stack([body.shapes_mm[x], body.shapes_mm[y]])
+            arm = turn @ (plate.nodes_mm[:, nodes] - turning.places_mm[0][:, None] + bent @ local)
+            field[x], field[y] = arm + (turning.places_mm[0] + own[:2])[:, None] - plate.nodes_mm[:, nodes]
+            slope = np.einsum("ij,jnk->ink", turn, bent @ by_motion)
+            slope[0, :, 0] += 1.0
+            slope[1, :, 1] += 1.0
+            slope[0, :, 2] -= arm[1]
+            slope[1, :, 2] += arm[0]
+            slopes[np.ix_(x, body.unknowns)], slopes[np.ix_(y, body.unknowns)] = slope[0], slope[1]
+        return field, csr_matrix(slopes)
+
+    def motion_mm(self, moved: Array, point: tuple[float, float], *, large: bool) -> tuple[float, float]:
+        """Displacement of a point of the nearest body by the frames' motions."""
+        nearest = int(np.argmin(np.hypot(*(self.plate.nodes_mm - np.array(point)[:, None]))))
+        number = int(self.piece[nearest])
+        body, turning = self.bodies[number], self.turning[number]
+        own = moved[body.unknowns]
+        bent = body.shapes_mm @ (turning.strained(own) if large else own)
+        carried = self._interpolated(bent, point, self.piece == number)
+        if not large:
+            return float(carried[0]), float(carried[1])
+        first = turning.places_mm[0]
+        x, y = first + own[:2] + turned_axes(float(own[2])) @ (np.array(point) + carried - first) - np.array(point)
+        return float(x), float(y)
+
+    def _interpolated(self, field: Array, point: tuple[float, float], own: NDArray[np.bool_]) -> Array:
+        """Quadratic through the nearest nodes of one body."""
+        plate = self.plate
+        places = np.flatnonzero(own)
+        x, y = plate.nodes_mm[:, places] - np.array(point)[:, None]
+        near = places[np.argsort(np.hypot(x, y))[:12]]
+        x, y = plate.nodes_mm[:, near] - np.array(point)[:, None]
+        around = np.column_stack([np.ones(near.size), x, y, x**2, y**2, x * y])
+        scale = np.abs(around).max(axis=0)
+        return np.array([np.linalg.lstsq(around / scale, field[dofs[near]], rcond=None)[0][0] / scale[0]
+                         for dofs in (plate.x_dofs, plate.y_dofs)])  # fmt: skip
+
+
+class _Frames:
+    """Frames as they are found, each with its body and what of it is kept."""
+
+    def __init__(self, plate: PlaneStressPlate, mechanism: Mechanism, size_mm: float) -> None:
+        self.plate, self.mechanism, self.size_mm = plate, mechanism, size_mm
+        self.piece = pieces_of(plate)
+        self.found: list[Frame] = []
+        self.owner: list[int] = []
+        self.held: list[int] = []
+        self.by_input: dict[int, float] = {}
+        self._taken: set[int] = set()
+
+    def add(self, frame: Frame, body: int) -> int:
+        """Keep a frame; the first of its three motions."""
+        self.found.append(frame)
+        self.owner.append(body)
+        return 3 * len(self.found) - 3
+
+    def face(self, nodes: Indices, tied: tuple[str, ...]) -> list[tuple[int, bool]]:
+        """Frames of a face, one a body that it touches: their first motions, and whether the face cannot turn."""
+        added = []
+        for body in np.unique(self.piece[nodes]).tolist():
+            frame, turns = face_frame(self.plate, nodes[self.piece[nodes] == body], tied, self._taken)
+            added.append((self.add(frame, body), turns))
+        return added
+
+    def supports(self) -> None:
+        """Fixed, driven and sliding faces."""
+        mechanism = self.mechanism
+        supports = supports_of(self.plate, mechanism, self.size_mm)
+        for nodes in supports.fixed:
+            for at, turns in self.face(nodes, ("x", "y")):
+                self.held += [at, at + 1] + [at + 2] * turns
+        kept = driven_components(mechanism)
+        in_the_mean = len(kept) == 1 and turns_with(self.plate, supports.driven, kept[0])
+        for at, turns in self.face(supports.driven, () if in_the_mean else kept):
+            self.by_input |= {at + "xy".index(c): mechanism.drive.direction["xy".index(c)] for c in kept}
+            self.by_input |= {at + 2: 0.0} if turns else {}
+        for nodes, component in supports.slides:
+            for at, turns in self.face(nodes, (component,)):
+                self.held += [at + "xy".index(component)] + [at + 2] * turns
+
+    def contacts(self) -> None:
+        """Faces that may be pressed: what presses on one must be able to bend the body that carries it."""
+        for contact in self.mechanism.contacts:
+            for face in (contact.face, contact.other):
+                if face is not None:
+                    self.face(nodes_on(self.plate, face, self.mechanism, self.size_mm), ())
+
+    def cuts(self, span: FlexureSpan) -> tuple[int, int]:
+        """Both ends of a flexure."""
+        angle = np.radians(span.flexure.axis_deg)
+        axis = np.array([np.cos(angle), np.sin(angle)])
+        ends = []
+        for cut_mm, height_mm in zip(span.cut_mm, span.heights_mm, strict=True):
+            at_mm = np.array(span.flexure.point_mm(cut_mm, 0.0))
+            frame = section_frame(self.plate, at_mm, axis, _OVER * height_mm, _NEAR * self.size_mm)
+            ends.append(self.add(frame, int(self.piece[nodes_of(self.plate, frame)[0]])) // 3)
+        return ends[0], ends[1]
+
+
+def assemble_bodies(
+    plate: PlaneStressPlate, mechanism: Mechanism, spans: tuple[FlexureSpan, ...], size_mm: float
+) -> BodyAssembly:
+    """Condense every body to its supports, its contact faces and the ends of its flexures.
+
+    Raises
+    ------
+    FingervisionError
+        Where a face holds nothing or a body is joined to nothing.
+    """
+    frames = _Frames(plate, mechanism, size_mm)
+    frames.supports()
+    frames.contacts()
+    ends = tuple(frames.cuts(span) for span in spans)
+    piece, owner = frames.piece, np.array(frames.owner)
+    bodies = []
+    for body in range(int(piece.max()) + 1):
+        own = np.flatnonzero(owner == body).tolist()
+        nodes = np.flatnonzero(piece == body)
+        if not own:
+            x, y = plate.nodes_mm[:, nodes[0]]
+            raise FingervisionError(f"The body of {mechanism.name} at ({x:.4g}, {y:.4g}) mm is joined to nothing.")
+        unknowns = np.concatenate([plate.x_dofs[nodes], plate.y_dofs[nodes]])
+        bodies.append(condensed(plate, unknowns, [frames.found[i] for i in own], own))
+    turning = [CorotationalBody(np.array([frames.found[i].at_mm for i in body.frames]), body.stiffness_n_mm)
+               for body in bodies]  # fmt: skip
+    return BodyAssembly(plate, piece, tuple(frames.found), tuple(bodies), tuple(turning), ends, tuple(frames.held),
+                        frames.by_input)  # fmt: skip

@@ -1,0 +1,153 @@
+"""Where two faces of a mechanism may touch, without friction: gaps of nodes from segments, and their slopes.
+
+Node to segment (Wriggers, Computational Contact Mechanics, chapter 9): every node of the one face keeps its distance
+from the nearest straight piece of the other, or from a rigid wall.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import csr_matrix, diags
+
+from fingervision.domain.errors import FingervisionError
+from fingervision.models.mechanism import Contact, Mechanism
+from fingervision.models.mechanism_faces import nodes_on
+from fingervision.models.plane_stress import PlaneStressPlate
+
+Array = NDArray[np.float64]
+Indices = NDArray[np.int64]
+Bend = Callable[[Array], csr_matrix]
+
+_OVERHANG = 0.05
+"""Of the other face's length: a node that lies farther beyond its end meets nothing. Corners that meet corners slide a
+little past each other, and would else lose hold; the face is then taken for that much longer."""
+_PENETRATES = 1e-6
+"""Of the body's size: faces that overlap by more at rest are drawn wrongly."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ContactPair:
+    """One pair of faces, or a face and a wall.
+
+    Parameters
+    ----------
+    name : str
+        For messages and results.
+    nodes : ndarray of int, shape (k,)
+        Nodes that may touch.
+    segments : ndarray of int, shape (2, s)
+        Nodes at the ends of the other face's pieces, the void on their left; none where it is a wall.
+    wall_mm : ndarray of float, shape (2, 2), or None
+        Two points of a rigid wall, the void on its left.
+    """
+
+    name: str
+    nodes: Indices
+    segments: Indices
+    wall_mm: Array | None
+
+    @property
+    def _is_end(self) -> NDArray[np.bool_]:
+        """Whether a segment's first and second node end the face, shape (2, s)."""
+        if self.wall_mm is not None:
+            return np.zeros((2, 1), dtype=bool)
+        nodes, place, count = np.unique(self.segments, return_inverse=True, return_counts=True)
+        del nodes
+        return np.asarray(count[place].reshape(self.segments.shape) == 1)
+
+    def gaps_mm(self, plate: PlaneStressPlate, moved: Array) -> tuple[Array, csr_matrix, Bend]:
+        """Gap of every node, infinite where it faces nothing, with its first and second derivatives.
+
+        Returns
+        -------
+        ndarray of float, shape (k,)
+            Gaps.
+        sparse matrix, shape (k, unknowns)
+            Slopes.
+        callable
+            Forces on the nodes to the sum of these times the gaps' second derivatives, shape (unknowns, unknowns): the
+            other face turns its normal with it.
+        """
+        at = plate.nodes_mm + np.stack([moved[plate.x_dofs], moved[plate.y_dofs]])
+        points = at[:, self.nodes]
+        if self.wall_mm is not None:
+            first, second = self.wall_mm[:, :1], self.wall_mm[:, 1:]
+        else:
+            first, second = at[:, self.segments[0]], at[:, self.segments[1]]
+        chord = second - first
+        length = np.hypot(*chord)
+        along = chord / length
+        apart = points[:, :, None] - first[:, None, :]
+        way = np.sum(apart * along[:, None, :], axis=0)
+        inside = way
+        if self.wall_mm is None:
+            past = _OVERHANG * float(length.sum())
+            inside = np.clip(way, np.where(self._is_end[0], -past, 0.0), length + np.where(self._is_end[1], past, 0.0))
+        distance = np.hypot(*(apart - inside * along[:, None, :]))
+        nearest = np.argmin(distance, axis=1)
+        row = np.arange(self.nodes.size)
+        share = (inside / length)[row, nearest]
+        normal = np.stack([-along[1], along[0]])[:, nearest]
+        gap = np.sum(apart[:, row, nearest] * normal, axis=0)
+        beyond = self._is_end[:, nearest].any(axis=0) & (np.abs(way - inside)[row, nearest] > 1e-9 * length[nearest])
+        gap = np.where(beyond, np.inf, gap)
+        segments = self.segments[:, nearest] if self.wall_mm is None else np.tile(self.nodes, (2, 1))
+        held = self.wall_mm is None
+        places = np.stack([self.nodes, *segments])
+
+        def combined(weights: Array, direction: Array) -> csr_matrix:
+            """Weighted motions of a node and of its segment's ends along a direction, one row a node."""
+            values = weights[:, None, :] * direction[None]
+            columns = np.stack([plate.x_dofs[places], plate.y_dofs[places]], axis=1)
+            rows = np.broadcast_to(row, values.shape)
+            return csr_matrix((values.ravel(), (rows.ravel(), columns.ravel())), shape=(row.size, plate.unknowns))
+
+        ends = np.stack([np.ones(row.size), (share - 1.0) * held, -share * held])
+        slope = combined(ends, normal)
+
+        def bend(forces: Array) -> csr_matrix:
+            if not held:
+                return csr_matrix((plate.unknowns, plate.unknowns))
+            turned = combined(np.stack([np.zeros(row.size), -np.ones(row.size), np.ones(row.size)]), normal)
+            slid = combined(ends, along[:, nearest])
+            half = turned.T @ diags(-forces / length[nearest]) @ slid
+            return csr_matrix(half + half.T)
+
+        return gap, slope, bend
+
+
+def contact_pair(plate: PlaneStressPlate, contact: Contact, mechanism: Mechanism, size_mm: float) -> ContactPair:
+    """Find the nodes of a drawn contact.
+
+    Raises
+    ------
+    FingervisionError
+        Where a face holds none, or the faces overlap at rest.
+    """
+    nodes = nodes_on(plate, contact.face, mechanism, size_mm)
+    if contact.wall_mm is not None:
+        wall = np.array(contact.wall_mm).T
+        middle = plate.nodes_mm[:, nodes].mean(axis=1) - wall[:, 0]
+        along = wall[:, 1] - wall[:, 0]
+        if along[0] * middle[1] - along[1] * middle[0] < 0.0:
+            wall = wall[:, ::-1]
+        pair = ContactPair(contact.name, nodes, np.zeros((2, 0), dtype=np.int64), wall)
+    else:
+        wanted = nodes_on(plate, contact.other or contact.face, mechanism, size_mm)
+        edges = plate.outline_edges[:, np.all(np.isin(plate.outline_edges, wanted), axis=0)]
+        if edges.shape[1] == 0 or np.intersect1d(nodes, wanted).size:
+            raise FingervisionError(
+                f"contact {contact.name} of {mechanism.name} must be between two faces that share nothing, but they do."
+            )
+        # The body lies on the right of an edge that runs so that the void is on its left.
+        segments = np.hstack([edges[[0, 2]], edges[[2, 1]]])
+        pair = ContactPair(contact.name, nodes, segments, None)
+    gap, _, _ = pair.gaps_mm(plate, np.zeros(plate.unknowns))
+    if gap.min() < -_PENETRATES * size_mm:
+        raise FingervisionError(
+            f"The faces of contact {contact.name} of {mechanism.name} must be apart or touch at rest, but overlap by "
+            f"{-gap.min():.4g} mm."
+        )
+    return pair

@@ -1,0 +1,80 @@
+"""A condensed body in large rotation: its axes turn with its first frame, and in them it stays linear.
+
+The corotational formulation of Crisfield (Non-linear Finite Element Analysis of Solids and Structures, volume 1,
+section 7.3) for an element of any number of nodes: energy d' K d / 2 with d the frames' motions as seen from the first.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+_TURN = np.array([[0.0, -1.0], [1.0, 0.0]])
+
+
+def turned_axes(angle: float) -> Array:
+    """Matrix of a rotation, shape (2, 2)."""
+    c, s = np.cos(angle), np.sin(angle)
+    return np.array([[c, -s], [s, c]])
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class CorotationalBody:
+    """One body.
+
+    Parameters
+    ----------
+    places_mm : ndarray of float, shape (m, 2)
+        Its frames at rest.
+    stiffness_n_mm : ndarray of float, shape (3 m, 3 m)
+        Of small motions; rigid ones cost nothing.
+    """
+
+    places_mm: Array
+    stiffness_n_mm: Array
+
+    def strained(self, moved: Array) -> Array:
+        """Motions of the frames as seen from the first one, shape (3 m,), by their motions."""
+        local = moved.reshape(-1, 3)
+        at_rest = self.places_mm - self.places_mm[0]
+        drift = local[:, :2] - local[0, :2]
+        # R' (X + drift) - X without a difference of large numbers: (R' - 1) X by the half angle.
+        angle = local[0, 2]
+        back = turned_axes(-angle)
+        half = np.sin(0.5 * angle)
+        less = 2.0 * half * (-half * np.eye(2) - np.cos(0.5 * angle) * _TURN)
+        apart = local[:, 2] - angle
+        return np.column_stack([drift @ back.T + at_rest @ less.T, apart]).ravel()
+
+    def slope(self, moved: Array) -> Array:
+        """Change of `strained` by the frames' motions, shape (3 m, 3 m)."""
+        local = moved.reshape(-1, 3)
+        back = turned_axes(-float(local[0, 2]))
+        chord = self.places_mm - self.places_mm[0] + local[:, :2] - local[0, :2]
+        found = np.zeros((local.size, local.size))
+        for i in range(1, len(local)):
+            at = slice(3 * i, 3 * i + 2)
+            found[at, at], found[at, 0:2] = back, -back
+            found[at, 2] = -_TURN @ back @ chord[i]
+            found[3 * i + 2, 3 * i + 2], found[3 * i + 2, 2] = 1.0, -1.0
+        return found
+
+    def forces_n(self, moved: Array) -> tuple[Array, Array]:
+        """Tangent stiffness, shape (3 m, 3 m), and forces, shape (3 m,), at some motions of the frames."""
+        local = moved.reshape(-1, 3)
+        loads = self.stiffness_n_mm @ self.strained(moved)
+        slope = self.slope(moved)
+        back = turned_axes(-float(local[0, 2]))
+        chord = self.places_mm - self.places_mm[0] + local[:, :2] - local[0, :2]
+        bent = np.zeros_like(slope)
+        for i in range(1, len(local)):
+            at = slice(3 * i, 3 * i + 2)
+            pulled = (-_TURN @ back).T @ loads[at]
+            bent[at, 2] += pulled
+            bent[0:2, 2] -= pulled
+            bent[2, at] += pulled
+            bent[2, 0:2] -= pulled
+            bent[2, 2] -= loads[at] @ (back @ chord[i])
+        return slope.T @ self.stiffness_n_mm @ slope + bent, slope.T @ loads

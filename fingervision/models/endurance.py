@@ -1,0 +1,77 @@
+"""How many cycles a flexure endures, by the S-N line that its material states.
+
+Basquin's line: log amplitude falls straight with log cycles. Cycles about a mean stress are turned into fully reversed
+ones by Soderberg's line, amplitude / (1 - mean / yield) (Shigley, Mechanical Engineering Design, chapter 6), which is
+on the safe side of Goodman's and needs no other strength than the yield stress.
+"""
+
+from dataclasses import dataclass
+from math import exp, log
+
+from fingervision.domain.gripper import Material, SNLine
+
+
+@dataclass(frozen=True, slots=True)
+class Endurance:
+    """Cycles that a flexure endures.
+
+    Parameters
+    ----------
+    amplitude_mpa, mean_mpa : float
+        Of the stress in the cycle.
+    reversed_mpa : float
+        Fully reversed amplitude that does the same damage; infinite where the cycle yields.
+    cycles : float or None
+        Median life; None where the S-N line does not say.
+    at_least, at_most : float or None
+        What is known where the line ends: more than its last, fewer than its first cycles.
+    """
+
+    amplitude_mpa: float
+    mean_mpa: float
+    reversed_mpa: float
+    cycles: float | None
+    at_least: float | None = None
+    at_most: float | None = None
+
+    @property
+    def words(self) -> str:
+        """The answer in words."""
+        if self.cycles is not None:
+            return f"about {self.cycles:.2g} cycles"
+        if self.at_least is not None:
+            return f"more than {self.at_least:.2g} cycles, where the S-N line ends"
+        return f"fewer than {self.at_most:.2g} cycles, where the S-N line begins"
+
+
+def endurance(material: Material, lowest_mpa: float, highest_mpa: float) -> Endurance | None:
+    """Read the life at a stress that goes to and fro between two values off the material's S-N line.
+
+    Parameters
+    ----------
+    material : Material
+        With its S-N line; None is returned without one.
+    lowest_mpa, highest_mpa : float
+        Signed stress at the two ends of the cycle.
+    """
+    line = material.sn_line
+    if line is None:
+        return None
+    amplitude, mean = 0.5 * (highest_mpa - lowest_mpa), 0.5 * abs(highest_mpa + lowest_mpa)
+    reversed_mpa = _reversed(amplitude, mean, material.yield_mpa)
+    first, last = (_reversed(a, _mean(a, line), material.yield_mpa) for a in line.amplitude_mpa)
+    n_first, n_last = line.cycles
+    if reversed_mpa > first:
+        return Endurance(amplitude, mean, reversed_mpa, None, at_most=n_first)
+    if reversed_mpa < last:
+        return Endurance(amplitude, mean, reversed_mpa, None, at_least=n_last)
+    share = log(first / reversed_mpa) / log(first / last)
+    return Endurance(amplitude, mean, reversed_mpa, exp(log(n_first) + share * log(n_last / n_first)))
+
+
+def _mean(amplitude_mpa: float, line: SNLine) -> float:
+    return abs(amplitude_mpa * (1.0 + line.stress_ratio) / (1.0 - line.stress_ratio))
+
+
+def _reversed(amplitude_mpa: float, mean_mpa: float, yield_mpa: float) -> float:
+    return amplitude_mpa / (1.0 - mean_mpa / yield_mpa) if mean_mpa < yield_mpa else float("inf")

@@ -1,0 +1,182 @@
+"""The stretch of a drawn flexure that bends as a beam: where it begins and ends, and the compliance of its segments.
+
+A notch is a beam between the places where it meets its body, corrected by the hinge tables. Of a leaf and of a straight
+neck the beam ends one and a half thicknesses before the roots: by Saint-Venant's principle stress is a beam's there,
+and how the roots yield is left to the elastic bodies.
+"""
+
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import numpy as np
+from numpy.polynomial.legendre import leggauss
+from numpy.typing import NDArray
+
+from fingervision.domain.errors import FingervisionError
+from fingervision.domain.gripper import Material
+from fingervision.models.flexure import Flexure
+from fingervision.models.hinge_compliance import beam_compliance
+from fingervision.models.hinge_correction import HingeTheory, hinge_ratio
+from fingervision.models.notch import Notch
+from fingervision.models.planar_region import PlanarRegion
+from fingervision.models.plane_shapes import Polygon
+
+Array = NDArray[np.float64]
+
+_PLANAR = np.ix_([0, 1, 5], [0, 1, 5])
+_SEGMENTS, _SEGMENTS_OF_LEAF = 10, 20
+"""Of a notch, whose bending is at its neck, and of what bends all along: a chord is shorter than its arc by 1 / n^2."""
+_SAMPLES = 401
+_BESIDE = 1e-4
+"""Of the thickness: how far beside a flexure's surface material and void are looked for."""
+_SAINT_VENANT = 1.5
+"""Thicknesses from the root: a self-balanced load of a strip decays by exp(-2.1 x / (t / 2)) at least (Timoshenko and
+Goodier, article 26), to 0.2 % there."""
+_LEAST_SHARE = 0.3
+"""Of the free length: a short neck keeps that much of its own as a beam."""
+_OVER = 1.02
+"""A cut reaches beyond the section by so much on either side, into the void."""
+_WITHIN = 0.95
+"""Of a notch that opens into something wider than itself: the cut lies that far out, still inside the notch."""
+_BEYOND = 0.02
+"""Thicknesses beyond a notch's end: the cut, square through the link."""
+_NARROW = 0.25
+"""Width over thickness at which the tables are those of plane stress."""
+_GAUSS = leggauss(12)
+_SHEAR = 6.0 / 5.0
+
+
+@dataclass(frozen=True, slots=True)
+class FlexureSpan:
+    """A flexure between its two cuts.
+
+    Parameters
+    ----------
+    flexure : Flexure
+        As drawn.
+    free_mm : (float, float)
+        Stations along the axis, from the flexure's middle, between which nothing but the flexure stands.
+    cut_mm : (float, float)
+        Stations of the cuts.
+    heights_mm : (float, float)
+        Heights of the sections at the cuts.
+    """
+
+    flexure: Flexure
+    free_mm: tuple[float, float]
+    cut_mm: tuple[float, float]
+    heights_mm: tuple[float, float]
+
+    @property
+    def slab(self) -> Polygon:
+        """What parts the bodies on either side where it is cut away."""
+        (a, b), (low, high) = self.cut_mm, self.heights_mm
+        corners = ((a, -0.5), (b, -0.5), (b, 0.5), (a, 0.5))
+        heights = (low, high, high, low)
+        return Polygon(tuple(self.flexure.point_mm(x, s * h * _OVER) for (x, s), h in zip(corners, heights,
+                                                                                         strict=True)))  # fmt: skip
+
+    def notch(self, plate_mm: float) -> Notch:
+        """Return the notch that it is or that bends as it does."""
+        web_mm = max(float(self.flexure.height_mm(np.array([end]))[0]) for end in self.free_mm)
+        notch = self.flexure.notch(plate_mm)
+        return replace(notch, web_mm=web_mm) if self.flexure.is_notch else notch
+
+    def stations_mm(self, plate_mm: float) -> Array:
+        """Ends of the segments, close together where a notch bends; shape (segments + 1,)."""
+        if not self.flexure.is_notch:
+            return np.linspace(*self.cut_mm, _SEGMENTS_OF_LEAF + 1)
+        # A notch may meet its bodies sooner on the one side than on the other.
+        halves = []
+        for free_mm, cut_mm in zip(self.free_mm, self.cut_mm, strict=True):
+            web_mm = float(self.flexure.height_mm(np.array([free_mm]))[0])
+            outer = replace(self.flexure.notch(plate_mm), web_mm=web_mm).stations_mm(_SEGMENTS)[_SEGMENTS // 2 :]
+            halves.append(outer * (abs(cut_mm) / outer[-1]))
+        return np.concatenate([-halves[0][:0:-1], halves[1]])
+
+    def compliances(self, plate_mm: float, material: Material, theory: HingeTheory, *, width_effect: bool) -> Array:
+        """Compliance of each segment at its end, along, across and in rotation; shape (segments, 3, 3)."""
+        spans = list(pairwise(self.stations_mm(plate_mm).tolist()))
+        corrected = theory is HingeTheory.CORRECTED
+        if self.flexure.is_notch:
+            notch = self.notch(plate_mm)
+            wide = notch if width_effect else replace(notch, plate_mm=_NARROW * notch.thickness_mm)
+            root = np.sqrt(hinge_ratio(wide, material, theory)[[0, 1, 5]])
+            parts = [beam_compliance(notch, material, span)[_PLANAR] for span in spans]
+            return np.asarray(root[:, None] * np.array(parts) * root)
+        share = self.flexure.zone(plate_mm).share if corrected and width_effect else 0.0
+        held = 1.0 - share * material.poisson_ratio**2
+        return np.array([_segment(self.flexure, span, plate_mm, material, held) for span in spans])
+
+
+def _segment(flexure: Flexure, span: tuple[float, float], plate_mm: float, material: Material, held: float) -> Array:
+    """Timoshenko beam of varying height between two stations."""
+    nodes, weights = _GAUSS
+    half = 0.5 * (span[1] - span[0])
+    x, dx = 0.5 * (span[0] + span[1]) + half * nodes, half * weights
+    h, arm = flexure.height_mm(x), span[1] - x
+    E, G, b = material.youngs_modulus_mpa / held, material.shear_modulus_mpa, plate_mm
+    bending = [float(np.sum(dx * arm**k * 12.0 / (E * b * h**3))) for k in range(3)]
+    shear = float(_SHEAR * np.sum(dx / (G * b * h)))
+    return np.array([[float(np.sum(dx / (E * b * h))), 0.0, 0.0],
+                     [0.0, bending[2] + shear, bending[1]],
+                     [0.0, bending[1], bending[0]]])  # fmt: skip
+
+
+def span_of(flexure: Flexure, region: PlanarRegion, name: str) -> FlexureSpan:
+    """Find where a flexure is free of the bodies that it joins, and where it is to be cut.
+
+    Raises
+    ------
+    FingervisionError
+        Where it joins nothing at one end.
+    """
+    stations = np.linspace(0.0, flexure.half_length_mm * (1.0 - 1e-9), _SAMPLES)
+    free, cuts, heights = [], [], []
+    for side in (-1.0, 1.0):
+        alone = _alone(flexure, region, side * stations)
+        if flexure.kind == "leaf" and alone.all():
+            x, y = flexure.point_mm(side * flexure.half_length_mm, 0.0)
+            raise FingervisionError(
+                f"flexure {flexure.name} of {name} must end inside a body at both ends, but at ({x:g}, {y:g}) mm it "
+                "ends in the void; make it longer or move the body."
+            )
+        last = len(stations) - 1 if alone.all() else int(np.argmin(alone)) - 1
+        low, high = stations[max(last, 0)], stations[min(last + 1, len(stations) - 1)]
+        for _ in range(40):
+            middle = 0.5 * (low + high)
+            low, high = (middle, high) if _alone(flexure, region, np.array([side * middle]))[0] else (low, middle)
+        cut, height = _cut(flexure, region, side, float(low))
+        free.append(side * float(low))
+        cuts.append(side * cut)
+        heights.append(height)
+    return FlexureSpan(flexure, (free[0], free[1]), (cuts[0], cuts[1]), (heights[0], heights[1]))
+
+
+def _alone(flexure: Flexure, region: PlanarRegion, stations: Array) -> NDArray[np.bool_]:
+    """Whether at each station the flexure's own height is all that is there: material just inside, void just beside."""
+    half = 0.5 * flexure.height_mm(stations)
+    apart = _BESIDE * flexure.thickness_mm
+    found = np.ones(stations.size, dtype=bool)
+    for side in (-1.0, 1.0):
+        for beyond, wanted in ((-apart, True), (apart, False)):
+            points = np.stack(flexure.point_mm(stations, side * (half + beyond)))
+            found &= region.holds(points) == wanted
+    return found
+
+
+def _cut(flexure: Flexure, region: PlanarRegion, side: float, end_mm: float) -> tuple[float, float]:
+    """Station and height of the cut on one side."""
+    t = flexure.thickness_mm
+    if not flexure.is_notch:
+        straight = min(end_mm, flexure.half_length_mm - flexure.fillet_mm)
+        station = max(straight - _SAINT_VENANT * t, _LEAST_SHARE * end_mm)
+        return station, float(flexure.height_mm(np.array([station]))[0])
+    web_mm = float(flexure.height_mm(np.array([end_mm]))[0])
+    station = end_mm + _BEYOND * t
+    across = 0.5 * web_mm * np.array([-2.0 * _OVER + 1.0, -0.98, 0.0, 0.98, 2.0 * _OVER - 1.0])
+    points = np.stack(flexure.point_mm(np.full(across.size, side * station), across))
+    if region.holds(points).tolist() == [False, True, True, True, False]:
+        return station, web_mm
+    station = _WITHIN * end_mm
+    return station, float(flexure.height_mm(np.array([station]))[0])

@@ -1,0 +1,49 @@
+"""Nominal stress in a lumped flexure: bending and tension of the section, with the factors of a notch."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fingervision.models.flexure_span import FlexureSpan
+from fingervision.models.hinge_correction import HingeTheory, plane_strain_share
+from fingervision.models.hinge_stress import notch_factors
+from fingervision.models.mechanism import Mechanism
+
+Array = NDArray[np.float64]
+
+_SAMPLES = 401
+
+
+def nominal_stress_mpa(span: FlexureSpan, end_loads: Array, mechanism: Mechanism, theory: HingeTheory) -> float:
+    """Find the largest stress |N| / (b h) + 6 |M| / (b h^2) between the ends where the flexure meets its bodies.
+
+    Parameters
+    ----------
+    span : FlexureSpan
+        The flexure.
+    end_loads : ndarray of float, shape (segments, 3)
+        Tension in N and moments in N mm at both ends of every segment, as `CorotationalFrame.end_loads` has them.
+    mechanism : Mechanism
+        For plate and material.
+    theory : HingeTheory
+        Nominal stress of a straight bar by beam theory; with Neuber's factors and the width's share where corrected.
+    """
+    plate_mm = mechanism.plate_mm
+    stations = span.stations_mm(plate_mm)
+    at_ends = np.concatenate([-end_loads[:, 1], end_loads[-1:, 2]])
+    # The moment of a beam is linear between its segments' ends, and on to its roots.
+    x = np.linspace(*span.free_mm, _SAMPLES)
+    moment = np.interp(x, stations, at_ends)
+    for beyond, (i, j) in ((x < stations[0], (0, 1)), (x > stations[-1], (-2, -1))):
+        slope = (at_ends[j] - at_ends[i]) / (stations[j] - stations[i])
+        moment[beyond] = at_ends[i] + slope * (x[beyond] - stations[i])
+    tension = np.interp(x, 0.5 * (stations[1:] + stations[:-1]), end_loads[:, 0])
+    height = span.flexure.height_mm(x)
+    factors = (1.0, 1.0)
+    held = 1.0
+    if theory is HingeTheory.CORRECTED:
+        factors = notch_factors(span.notch(plate_mm)) if span.flexure.is_notch else factors
+        across = plane_strain_share(span.notch(plate_mm)) * mechanism.material.poisson_ratio
+        held = float(np.sqrt(1.0 - across + across**2))
+    stress = factors[0] * np.abs(tension) / (plate_mm * height)
+    stress += factors[1] * 6.0 * np.abs(moment) / (plate_mm * height**2)
+    return float(held * stress.max())

@@ -1,0 +1,118 @@
+"""How a mechanism answers a drive that shakes it: amplitude and phase over frequency, small displacements."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from math import pi
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fingervision.models.damping import Damping, ModalDamping
+from fingervision.models.modal_model import FreeModes, ModalModel, described
+
+Array = NDArray[np.float64]
+ComplexArray = NDArray[np.complex128]
+
+_ACROSS_A_PEAK = 12
+"""Frequencies within the half-power width of every peak: its height is then met within 0.4 %."""
+_WIDTHS = 6.0
+_LEAST_ROWS = 400
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FrequencyResponse:
+    """Steady answers to a sinusoidal drive.
+
+    Parameters
+    ----------
+    frequency_hz : ndarray of float, shape (n,)
+        Of the drive.
+    per_input : mapping of str to ndarray of complex, shape (n,)
+        Amplitude of a length by 1 mm of the drive's amplitude (its stage follows exactly): peaks at the modes with the
+        drive held.
+    per_force_mm_n : mapping of str to ndarray of complex, shape (n,)
+        Amplitude of a length by 1 N at a drive that is free to move: peaks at the modes with the drive free.
+    drive_per_force_mm_n : ndarray of complex, shape (n,)
+        Amplitude of the drive by 1 N.
+    modes_hz, free_modes_hz, damping_ratios, free_damping_ratios : ndarray of float
+        Natural frequencies with the drive held and free, of the modes kept, and their damping ratios.
+    """
+
+    frequency_hz: Array
+    per_input: Mapping[str, ComplexArray]
+    per_force_mm_n: Mapping[str, ComplexArray]
+    drive_per_force_mm_n: ComplexArray
+    modes_hz: Array
+    free_modes_hz: Array
+    damping_ratios: Array
+    free_damping_ratios: Array
+
+
+def frequency_response(
+    model: ModalModel, free: FreeModes, frequency_hz: Array, damping: Damping | None = None
+) -> FrequencyResponse:
+    """Answer a sinusoidal drive at some frequencies.
+
+    Modes beyond those given are answered as if at rest, so that both curves are exact at 0 Hz.
+
+    Parameters
+    ----------
+    model : ModalModel
+        The mechanism with its drive held; its modes should reach to twice the highest frequency.
+    free : FreeModes
+        The same with its drive free.
+    frequency_hz : ndarray of float, shape (n,)
+        Of the drive.
+    damping : ModalDamping, LossFactor, RayleighDamping or PaperDamping
+        Modal damping of 0.025 where None.
+    """
+    law = damping or ModalDamping()
+    model, ratios = model.damped(law)
+    free_ratios = described(law, free.rad_s)
+    kept = slice(0, free_ratios.size)
+    w = 2.0 * pi * np.asarray(frequency_hz, dtype=np.float64)[:, None]
+    shaken = _complex(w**2 * _pliance(w, model.rad_s, ratios) * model.participation)
+    per_input = {name: _complex(seen.per_input + shaken @ seen.by_mode) for name, seen in model.observed.items()}
+    rad_s, drive = free.rad_s[kept], free.drive[kept]
+    pushed = _pliance(w, rad_s, free_ratios) * drive
+    at_rest = drive / rad_s**2
+
+    def receptance(static: float, by_mode: Array) -> ComplexArray:
+        return _complex(static + pushed @ by_mode - at_rest @ by_mode)
+
+    k = model.stiffness_n_mm
+    return FrequencyResponse(
+        frequency_hz=w[:, 0] / (2.0 * pi),
+        per_input=per_input,
+        per_force_mm_n={n: receptance(s.per_input / k, free.by_mode[n][kept]) for n, s in model.observed.items()},
+        drive_per_force_mm_n=receptance(1.0 / k, drive),
+        modes_hz=model.modes_hz,
+        free_modes_hz=rad_s / (2.0 * pi),
+        damping_ratios=ratios,
+        free_damping_ratios=free_ratios,
+    )
+
+
+def _pliance(w: Array, rad_s: Array, ratios: Array) -> ComplexArray:
+    return _complex(1.0 / (rad_s**2 - w**2 + 2j * ratios * rad_s * w))
+
+
+def _complex(values: Any) -> ComplexArray:
+    return np.asarray(values, dtype=np.complex128)
+
+
+def resolved_frequencies_hz(
+    model: ModalModel, free: FreeModes, damping: Damping, first_hz: float, last_hz: float
+) -> Array:
+    """Frequencies between two, close enough together that no resonance, drive held or free, falls between them."""
+    kept, ratios = model.damped(damping)
+    free_ratios = described(damping, free.rad_s)
+    places = [np.linspace(first_hz, last_hz, _LEAST_ROWS)]
+    free_hz = free.rad_s[: free_ratios.size] / (2.0 * pi)
+    for centre, ratio in [*zip(kept.modes_hz, ratios, strict=True), *zip(free_hz, free_ratios, strict=True)]:
+        half = ratio * centre
+        around = np.linspace(-_WIDTHS * half, _WIDTHS * half, int(_WIDTHS * _ACROSS_A_PEAK) + 1)
+        places.append(centre + around)
+    found = np.unique(np.concatenate(places))
+    return np.asarray(found[(found >= first_hz) & (found <= last_hz)])

@@ -1,0 +1,91 @@
+"""A part held between the fingers: how hard they press it, by small displacements.
+
+The part is a block with flat sides, of some width and stiffness, in the middle between the fingers. Each finger meets a
+plane at half the part's width that yields by its own force over twice the part's stiffness: Signorini's problem, with
+that compliance added to every pair of points on the finger's face.
+"""
+
+from dataclasses import dataclass
+from math import inf
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fingervision.models.driven_body import DrivenBody, Equilibrium
+from fingervision.models.signorini import contact_forces_n
+
+Array = NDArray[np.float64]
+
+_BEYOND_TOUCH = 0.05
+"""Of the way to the touch: far enough that rounding is nothing, too near for more of the face to touch."""
+
+
+@dataclass(frozen=True, slots=True)
+class Part:
+    """A part between the fingers.
+
+    Parameters
+    ----------
+    width_mm : float
+        Unloaded.
+    stiffness_n_mm : float
+        Force by which it is squeezed over the width that it loses; infinite where it is rigid.
+    """
+
+    width_mm: float
+    stiffness_n_mm: float = inf
+
+    def squeezed_mm(self, grip_n: float) -> float:
+        """Width under a grip."""
+        return self.width_mm - grip_n / self.stiffness_n_mm
+
+
+def grip_equilibrium(body: DrivenBody, input_mm: float, part: Part) -> Equilibrium:
+    """Find the small displacements with a part between the fingers.
+
+    Parameters
+    ----------
+    body : DrivenBody
+        The right half.
+    input_mm : float
+        Of the drive.
+    part : Part
+        Between the fingers.
+
+    Returns
+    -------
+    Equilibrium
+        Its contact forces are those of the part on each point of one finger's face; their sum is the grip.
+    """
+    moved = input_mm * body.unit_displacement_mm
+    free_gap = body.face_gap_mm(moved) - 0.5 * part.width_mm
+    pressed = np.zeros(body.face.size)
+    if free_gap.min() < 0.0:
+        compliance = body.face_displacement_mm[body.face]
+        yielding = 0.5 * (compliance + compliance.T) + 0.5 / part.stiffness_n_mm
+        pressed = contact_forces_n(yielding, free_gap)
+        moved = moved + body.face_displacement_mm @ pressed
+    force_n = 2.0 * float((body.stiffness_n_mm @ moved)[body.driven].sum())
+    return Equilibrium(input_mm, moved, force_n, pressed)
+
+
+def first_grip_mm(body: DrivenBody, part: Part) -> float | None:
+    """Input at which a part is first touched; None where no finger moves towards it."""
+    slope = body.unit_displacement_mm[body.face]
+    closing = slope > 0.0
+    if not closing.any():
+        return None
+    return float(np.max((0.5 * part.width_mm - body.face_rest_mm[closing]) / slope[closing]))
+
+
+def mechanical_advantage(body: DrivenBody) -> float | None:
+    """Grip of each finger by the drive's force, beyond the input at which the fingers touch each other.
+
+    The rest of the drive's work bends hinges and fingers; None where the fingers do not close.
+    """
+    touch = body.first_touch_mm()
+    if touch is None:
+        return None
+    states = [body.equilibrium(touch * (1.0 + by), contact=True) for by in (0.0, _BEYOND_TOUCH)]
+    grip = [float(state.contact_n.sum()) for state in states]
+    return (grip[1] - grip[0]) / abs(states[1].force_n - states[0].force_n)

@@ -1,0 +1,124 @@
+"""All figures of one model of a gripper by their names: at rest, at the ends of a range of inputs, and its limits."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, fields
+from math import copysign
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fingervision.domain.gripper import Gripper
+from fingervision.models.answer_figures import ModelFigures
+from fingervision.models.driven_body import DrivenBody
+from fingervision.models.endurance import Endurance, endurance
+from fingervision.models.finite_element import FiniteElementGripper
+from fingervision.models.operating_figures import OperatingFigures, operating_figures
+from fingervision.models.stiffness_matrix import StiffnessMatrixGripper
+from fingervision.models.yield_limit import opening_at_yield_mm
+
+_UNITS = {
+    "gap_per_input": "mm/mm",
+    "input_stiffness_n_mm": "N/mm",
+    "peak_stress_mpa_per_mm": "MPa/mm",
+    "mechanical_advantage": "N/N",
+    "tip_along_per_input": "mm/mm",
+    "tip_turn_deg_per_mm": "degrees/mm",
+    "gap_per_kelvin_mm": "mm/K",
+    "force_per_kelvin_n": "N/K",
+    "endurance_cycles": "cycles",
+    "seconds": "s",
+}
+_ENDS: Mapping[str, str] = {"_mm": "mm", "_hz": "Hz", "_n": "N", "_mpa": "MPa", "_percent": "%"}
+
+
+def gripper_figures(
+    gripper: Gripper, model: Any, inputs: Sequence[float] | NDArray[np.float64], figures: ModelFigures | None = None
+) -> dict[str, float | None]:
+    """Compute a model's column of `models.csv`: small displacements at rest, and the loads at both ends of the inputs.
+
+    Parameters
+    ----------
+    gripper : Gripper
+        The drawing.
+    model : StiffnessMatrixGripper, LumpedGripper or FiniteElementGripper
+        Of that drawing, with its physics.
+    inputs : sequence of float
+        Whose smallest and largest are the ends; a cycle between them is what the hinges endure.
+    figures : ModelFigures or None
+        `model.figures()` where known already.
+
+    Returns
+    -------
+    dict of str to float or None
+        By name, units at its end (`unit_of`); None where the model does not know.
+    """
+    figures = figures or model.figures()
+    peak = figures.peak_stress
+    row: dict[str, float | None] = {
+        "gap_per_input": figures.gap_per_input,
+        "input_stiffness_n_mm": figures.input_stiffness_n_mm,
+        "peak_stress_mpa_per_mm": None if peak is None else peak.mpa_per_mm,
+        "peak_x_mm": None if peak is None else peak.place_mm[0],
+        "peak_y_mm": None if peak is None else peak.place_mm[1],
+        "input_at_yield_mm": None if peak is None else opening_at_yield_mm(model, gripper.material.yield_mpa),
+        "first_mode_drive_free_hz": next(iter(figures.free_modes_hz), None),
+        "first_mode_drive_held_hz": next(iter(figures.locked_modes_hz), None),
+        "first_swaying_mode_hz": next(iter(figures.swaying_modes_hz), None),
+        "first_out_of_plane_mode_hz": next(iter(figures.out_of_plane_modes_hz), None),
+        "contact_input_mm": figures.contact_input_mm,
+    }
+    at_yield = row["input_at_yield_mm"]
+    row["gap_at_yield_mm"] = None if at_yield is None else model.loaded([at_yield])[0].gap_mm
+    half = getattr(model, "half", None)
+    own = asdict(operating_figures(gripper, half)) if isinstance(half, DrivenBody) else {}
+    row |= {field.name: own.get(field.name) for field in fields(OperatingFigures)}
+    if not isinstance(model, FiniteElementGripper):
+        # Bars that end where their axes meet grow otherwise: by more than the sample's gap does.
+        row["gap_per_kelvin_mm"] = row["force_per_kelvin_n"] = None
+    row["sag_out_of_plane_mm"] = model.gravity_sag_mm()[0] if isinstance(model, StiffnessMatrixGripper) else None
+    ends = [float(min(inputs)), float(max(inputs))]
+    if peak is not None:
+        states = model.loaded(ends)
+        loads = [(s.input_mm, s.gap_mm, s.force_n, s.grip_n, s.stress_mpa) for s in states]
+    else:
+        answer = model.respond(np.array(ends))
+        loads = [(ends[i], float(answer.gap_mm[i]), float(answer.force_n[i]), None, None) for i in (0, 1)]
+    for end, load in zip(("lowest", "highest"), loads, strict=True):
+        names = (f"{end}_input_mm", f"{end}_gap_mm", f"{end}_force_n", f"{end}_grip_n", f"{end}_stress_mpa")
+        row |= dict(zip(names, load, strict=True))
+    life = None if peak is None else life_between(gripper, loads[0], loads[1])
+    row["endurance_cycles"] = None if life is None else life.cycles
+    row |= {
+        "model_error_slope_percent": 100.0 * figures.slope_error,
+        "model_error_force_percent": 100.0 * figures.force_error,
+        "model_error_modes_percent": 100.0 * figures.mode_error if figures.free_modes_hz else None,
+        "model_error_out_of_plane_percent": 100.0 * figures.out_of_plane_error
+        if figures.out_of_plane_modes_hz
+        else None,
+    }
+    return row
+
+
+def life_between(gripper: Gripper, low: Sequence[float | None], high: Sequence[float | None]) -> Endurance | None:
+    """Endurance of the hinges between two loads (input, gap, force, grip, stress); the stress turns with the input."""
+    ends = sorted(copysign(load[4] or 0.0, load[0] or 0.0) for load in (low, high))
+    return endurance(gripper.material, ends[0], ends[1])
+
+
+def unit_of(name: str) -> str:
+    """Return the unit of a row, by its name."""
+    if name.endswith("]"):
+        return name[name.rindex("[") + 1 : -1]
+    return _UNITS.get(name) or next((unit for end, unit in _ENDS.items() if name.endswith(end)), "1")
+
+
+def label_of(name: str) -> str:
+    """Return a row's name in words, without its unit, and the unit behind a stroke: for the axis of a figure."""
+    unit = unit_of(name)
+    bare = name[: name.rindex(" [")] if name.endswith("]") else name
+    for end in ("_mpa_per_mm", "_n_mm", "_deg_per_mm", *_ENDS):
+        if bare.endswith(end):
+            bare = bare.removesuffix(end) + (" per input" if end in ("_mpa_per_mm", "_deg_per_mm") else "")
+            break
+    return f"{bare.replace('_', ' ')} / {f'({unit})' if '/' in unit else unit}"

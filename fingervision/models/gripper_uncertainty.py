@@ -1,0 +1,99 @@
+"""The figures of a gripper with the uncertainty that its drawing's stated numbers give them."""
+
+from collections.abc import Mapping, Sequence
+from operator import attrgetter
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fingervision.domain.errors import FingervisionError
+from fingervision.domain.gripper import Gripper
+from fingervision.domain.parameter import Estimate
+from fingervision.models.gripper_figures import gripper_figures
+from fingervision.models.gripper_outline import check_outline
+from fingervision.models.hinge_correction import HingeTheory
+from fingervision.models.lumped import LumpedGripper
+from fingervision.models.physics import LINEAR, Physics
+from fingervision.models.redrawn import redrawn
+from fingervision.models.stiffness_matrix import StiffnessMatrixGripper
+from fingervision.models.uncertainty import FigureUncertainty, propagate
+
+_ANY_SIGN = ("_deg", "l1_mm", "l2_mm", "l3_mm", "l4_mm", "face_y_mm", "_per_k")
+_MOST_POISSON = 0.5
+
+
+def gripper_uncertainty(
+    gripper: Gripper,
+    inputs: Sequence[float] | NDArray[np.float64],
+    theory: HingeTheory = HingeTheory.CORRECTED,
+    physics: Physics = LINEAR,
+) -> dict[str, FigureUncertainty]:
+    """Propagate the stated uncertainties of a drawing to every figure of `gripper_figures`.
+
+    Changed drawings are answered by the frame of bars (and by the stiffness matrix out of the plane) in small
+    displacements, with contact where the physics has it: a mesh of each would cost minutes, and an uncertainty needs
+    two digits. The same u stands beside another kind's figures.
+
+    Parameters
+    ----------
+    gripper : Gripper
+        With its `uncertainties`.
+    inputs : sequence of float
+        Whose smallest and largest are the ends.
+    theory : HingeTheory
+        Of the hinges.
+    physics : Physics
+        Of the figures.
+    """
+    check_uncertainties(gripper)
+    numbers = _numbers(gripper)
+
+    def in_plane(changes: Mapping[str, float]) -> dict[str, float | None]:
+        drawn = _changed(gripper, changes)
+        return gripper_figures(drawn, LumpedGripper(drawn, Physics(contact=physics.contact), theory), inputs)
+
+    def out_of_plane(changes: Mapping[str, float]) -> dict[str, float | None]:
+        flat = StiffnessMatrixGripper(_changed(gripper, changes), theory)
+        return {
+            "first_out_of_plane_mode_hz": flat.out_of_plane_modes_hz()[0],
+            "sag_out_of_plane_mm": flat.gravity_sag_mm()[0],
+        }
+
+    return propagate(in_plane, numbers) | propagate(out_of_plane, numbers)
+
+
+def check_uncertainties(gripper: Gripper) -> None:
+    """Refuse stated uncertainties by which the drawing cannot be redrawn.
+
+    Raises
+    ------
+    FingervisionError
+        Where one standard uncertainty either way leaves no gripper.
+    """
+    for name, estimate in _numbers(gripper).items():
+        for by in (-(estimate.u or 0.0), estimate.u or 0.0):
+            try:
+                drawn = _changed(gripper, {name: by})
+                check_outline(drawn, "the drawing so changed")
+            except FingervisionError as error:
+                raise FingervisionError(
+                    f"The uncertainty of {name} must leave a drawing that works, but at {estimate.value + by:g} (one "
+                    f"standard uncertainty away) it does not: {error}"
+                ) from error
+
+
+def _numbers(gripper: Gripper) -> dict[str, Estimate]:
+    return {name: Estimate(attrgetter(name)(gripper), u) for name, u in gripper.uncertainties.items() if u > 0.0}
+
+
+def _changed(gripper: Gripper, changes: Mapping[str, float]) -> Gripper:
+    """Redraw a gripper, and refuse numbers that no gripper has."""
+    for name, by in changes.items():
+        value = attrgetter(name)(gripper) + by
+        if not name.endswith(_ANY_SIGN) and value <= 0.0:
+            raise FingervisionError(f"{name} must be positive, but would be {value:g}.")
+        if name == "material.poisson_ratio" and value >= _MOST_POISSON:
+            raise FingervisionError(f"{name} must be below 0.5, but would be {value:g}.")
+    for name, by in changes.items():
+        gripper = redrawn(gripper, name, by)
+    return gripper

@@ -1,0 +1,252 @@
+"""A mechanism that is a chain by its stiffness matrix: rigid bodies, flexures' compliances carried to the drive.
+
+The paper's equations (5) to (15) in the plane for any chain from what is fixed to what is driven: C = sum T C_i T' at
+the drive, and the stiffness that of the directions which the drive and its guides hold. A loop has no such sum, and is
+refused.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fingervision.domain.errors import FingervisionError
+from fingervision.models.flexure_span import FlexureSpan, span_of
+from fingervision.models.flexure_stress import nominal_stress_mpa
+from fingervision.models.hinge_correction import HingeTheory
+from fingervision.models.mechanism import Face, Mechanism, check_mechanism
+from fingervision.models.mechanism_faces import driven_components
+from fingervision.models.mechanism_state import MechanismState, pair_distances_mm
+from fingervision.models.planar_region import PlanarRegion
+
+Array = NDArray[np.float64]
+
+_FORCE_ERROR = 0.15
+"""Of rigid bodies: the paper's sample is 10 % too stiff without its links' own compliance (mechanics.md, section 5)."""
+_SAMPLES = 65
+_ON = 1e-6
+_BESIDE = 0.05
+
+
+class MechanismChain:
+    """A chain of rigid bodies and flexures.
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+        The drawing.
+    theory : HingeTheory
+        Of the notches.
+
+    Raises
+    ------
+    FingervisionError
+        Where the drawing is no mechanism, or its flexures form a loop or hold other bodies than the driven one.
+    """
+
+    kind = "stiffness_matrix"
+
+    def __init__(self, mechanism: Mechanism, *, theory: HingeTheory = HingeTheory.CORRECTED) -> None:
+        self.mechanism, self.theory = mechanism, theory
+        region = mechanism.region
+        check_mechanism(mechanism, region)
+        self._size_mm = region.size_mm
+        spans = [span_of(flexure, region, mechanism.name) for flexure in mechanism.flexures]
+        cut = PlanarRegion((*region.steps, *((False, span.slab) for span in spans)), region.marks_mm)
+        self._bodies = [loop for loop in cut.loops if loop.area_mm2 > 0.0]
+        # Bodies are rigid: of a leaf all that is free bends.
+        self.spans = [span if span.flexure.is_notch else replace(span, cut_mm=span.free_mm) for span in spans]
+        self._joins = [self._joined(span) for span in spans]
+        self._ground = {body for face in mechanism.fixed for body in self._touching(face)}
+        self._path = self._path_from(self._ground, self._only(mechanism.drive.face))
+        self._support()
+
+    def _body_of(self, point: Array, what: str) -> int:
+        for number, loop in enumerate(self._bodies):
+            if loop.holds((float(point[0]), float(point[1]))):
+                return number
+        raise FingervisionError(f"{what} of {self.mechanism.name} must lie on a body, but does not.")
+
+    def _joined(self, span: FlexureSpan) -> tuple[int, int]:
+        flexure, apart = span.flexure, _BESIDE * span.flexure.thickness_mm
+        ends = (span.cut_mm[0] - apart, span.cut_mm[1] + apart)
+        first, last = (self._body_of(np.array(flexure.point_mm(x, 0.0)), f"flexure {flexure.name}") for x in ends)
+        return first, last
+
+    def _touching(self, face: Face) -> set[int]:
+        x0, x1, y0, y1 = face.box_mm
+        near = _ON * self._size_mm
+        found = set()
+        for number, loop in enumerate(self._bodies):
+            x, y = np.concatenate([c.at(np.linspace(c.t0, c.t1, _SAMPLES)) for c in loop.curves], axis=1)
+            if np.any((x >= x0 - near) & (x <= x1 + near) & (y >= y0 - near) & (y <= y1 + near)):
+                found.add(number)
+        return found
+
+    def _only(self, face: Face) -> int:
+        bodies = self._touching(face)
+        if len(bodies) != 1:
+            raise FingervisionError(
+                f"face {face.name} of {self.mechanism.name} must lie on one body, but lies on {len(bodies)}."
+            )
+        return bodies.pop()
+
+    def _path_from(self, ground: set[int], driven: int) -> list[int]:
+        """Flexures from the ground to the driven body, in order.
+
+        A chain has one flexure less than it has bodies, the ground counted once.
+        """
+        name = self.mechanism.name
+        merged = [tuple(-1 if body in ground else body for body in join) for join in self._joins]
+        bodies = {body for join in merged for body in join}
+        if len(merged) != len(bodies) - 1 or any(first == last for first, last in merged):
+            raise FingervisionError(
+                f"The stiffness matrix is that of a chain, but the flexures of {name} form a loop; take --kind lumped "
+                "or finite_element."
+            )
+        reached: dict[int, list[int]] = {-1: []}
+        while driven not in reached:
+            grown = False
+            for place, (first, last) in enumerate(merged):
+                for known, other in ((first, last), (last, first)):
+                    if known in reached and other not in reached:
+                        reached[other], grown = [*reached[known], place], True
+            if not grown:
+                raise FingervisionError(
+                    f"The stiffness matrix is that of a chain from a fixed face to the drive, but {name} has none; "
+                    "take --kind lumped or finite_element."
+                )
+        self._reached = reached
+        return reached[driven]
+
+    def _support(self) -> None:
+        """Directions at the drive's middle that the drive and the guides of its body hold: x, y, rotation."""
+        mechanism = self.mechanism
+        driven = self._only(mechanism.drive.face)
+        held = {"x": False, "y": False, "turn": False}
+        faces = [(mechanism.drive.face, component) for component in driven_components(mechanism)]
+        for face, component in mechanism.slides:
+            if self._touching(face) != {driven}:
+                raise FingervisionError(
+                    f"The stiffness matrix is that of a chain, but {mechanism.name} is held at {face.name} too; take "
+                    "--kind lumped or finite_element."
+                )
+            faces.append((face, component))
+        for face, component in faces:
+            x0, x1, y0, y1 = face.box_mm
+            held[component] = True
+            # A flat face square to the component keeps the body from turning.
+            held["turn"] |= (y1 - y0 if component == "x" else x1 - x0) > _ON * self._size_mm
+        self._held = [i for i, name in enumerate(("x", "y", "turn")) if held[name]]
+        x0, x1, y0, y1 = mechanism.drive.face.box_mm
+        self._at = np.array([0.5 * (x0 + x1), 0.5 * (y0 + y1)])
+        compliance = self.compliance_at(self._at, self._path)
+        motion = np.array([*mechanism.drive.direction, 0.0])[self._held]
+        self._load = np.zeros(3)
+        self._load[self._held] = np.linalg.solve(compliance[np.ix_(self._held, self._held)], motion)
+
+    def compliance_at(self, point: Array, path: list[int], loaded: Array | None = None) -> Array:
+        """Motion (x, y, rotation) of a point beyond some flexures by a load at another, shape (3, 3).
+
+        Parameters
+        ----------
+        point : ndarray of float, shape (2,)
+            That moves.
+        path : list of int
+            Flexures between it and the ground that the load passes too.
+        loaded : ndarray of float, shape (2,), or None
+            Where the load acts; the same point where None.
+        """
+        mechanism = self.mechanism
+        total = np.zeros((3, 3))
+        for place in path:
+            span = self.spans[place]
+            stations = span.stations_mm(mechanism.plate_mm)
+            parts = span.compliances(mechanism.plate_mm, mechanism.material, self.theory, width_effect=True)
+            angle = np.radians(span.flexure.axis_deg)
+            axes = np.array([[np.cos(angle), -np.sin(angle), 0.0], [np.sin(angle), np.cos(angle), 0.0], [0, 0, 1.0]])
+            for x, part in zip(stations[1:].tolist(), parts, strict=True):
+                at = np.array(span.flexure.point_mm(x, 0.0))
+                moved, pressed = _carried(point - at), _carried((point if loaded is None else loaded) - at)
+                total += moved @ axes @ part @ axes.T @ pressed.T
+        return total
+
+    @property
+    def stiffness_n_mm(self) -> float:
+        """Force at the drive by 1 mm of input."""
+        return float(self._load[:2] @ self.mechanism.drive.direction)
+
+    @property
+    def force_error(self) -> float:
+        """Relative model error of the force: of bodies that do not yield."""
+        return _FORCE_ERROR
+
+    def touch_input_mm(self) -> dict[str, float]:
+        """No contact is known here."""
+        return {}
+
+    def modes_hz(self, *, drive_held: bool, count: int = 3) -> tuple[float, ...]:
+        """No masses are known here."""
+        del drive_held, count
+        return ()
+
+    def state(self, input_mm: float, *, large_rotation: bool = False, contact: bool = False) -> MechanismState:
+        """Small displacements at one input.
+
+        Raises
+        ------
+        FingervisionError
+            Where large rotation or contact is asked for.
+        """
+        if large_rotation or contact:
+            raise FingervisionError(
+                "The stiffness matrix knows small displacements without contact alone; take --kind lumped or "
+                "finite_element."
+            )
+        mechanism, load = self.mechanism, input_mm * self._load
+        probes = {}
+        for name, point in mechanism.probes.items():
+            own = self._reached_by(self._body_of(np.array(point) + self._inward(point), f"probe {name}"))
+            shared = [place for place in self._path if place in own]
+            moved = self.compliance_at(np.array(point), shared, self._at) @ load
+            probes[name] = (float(moved[0]), float(moved[1]))
+        stress = max(self._stress_mpa(self.spans[place], load) for place in self._path)
+        pairs = pair_distances_mm(mechanism, probes, large=False)
+        return MechanismState(input_mm, float(load[:2] @ mechanism.drive.direction), probes, pairs, stress, load, {})
+
+    def _reached_by(self, body: int) -> list[int]:
+        if body in self._ground:
+            return []
+        while body not in self._reached:
+            before = len(self._reached)
+            for place, join in enumerate(self._joins):
+                known = [-1 if b in self._ground else b for b in join]
+                for one, other in (known, known[::-1]):
+                    if one in self._reached and other not in self._reached:
+                        self._reached[other] = [*self._reached[one], place]
+            if len(self._reached) == before:
+                raise FingervisionError(f"A probe of {self.mechanism.name} lies on a body that hangs on nothing.")
+        return self._reached[body]
+
+    def _inward(self, point: tuple[float, float]) -> Array:
+        """A tiny way from a point on the outline into the body."""
+        for angle in np.linspace(0.0, 2.0 * np.pi, 9)[:-1]:
+            way = 1e-5 * self._size_mm * np.array([np.cos(angle), np.sin(angle)])
+            x, y = np.array(point) + way
+            if any(loop.holds((float(x), float(y))) for loop in self._bodies):
+                return way
+        return np.zeros(2)
+
+    def _stress_mpa(self, span: FlexureSpan, load: Array) -> float:
+        stations = span.stations_mm(self.mechanism.plate_mm)
+        angle = np.radians(span.flexure.axis_deg)
+        tension = float(load[0] * np.cos(angle) + load[1] * np.sin(angle))
+        x, y = (np.array(part) for part in span.flexure.point_mm(stations, 0.0))
+        moment = load[2] + (self._at[0] - x) * load[1] - (self._at[1] - y) * load[0]
+        rows = np.column_stack([np.full(stations.size - 1, tension), -moment[:-1], moment[1:]])
+        return nominal_stress_mpa(span, rows, self.mechanism, self.theory)
+
+
+def _carried(arm: Array) -> Array:
+    """Motion at a point from the motion where the arm begins; its transpose carries loads the other way."""
+    return np.array([[1.0, 0.0, -arm[1]], [0.0, 1.0, arm[0]], [0.0, 0.0, 1.0]])

@@ -1,0 +1,253 @@
+"""Equilibria of a driven mechanism, whatever it is made of: small or large displacements, with or without contact."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import csr_matrix, vstack
+from scipy.sparse.linalg import SuperLU
+
+from fingervision.domain.errors import FingervisionError
+from fingervision.models.driven_body import factorised
+from fingervision.models.signorini import contact_forces_n
+
+Array = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+Gaps = tuple[Array, csr_matrix, Callable[[Array], csr_matrix]]
+Pairs = tuple[Callable[[Array], Gaps], ...]
+
+_LOAD_STEPS, _NEWTON_STEPS, _SET_CHANGES = 5, 20, 30
+_LEAST_STEP = 1e-3
+_BLOWN_UP = 1e6
+_RESIDUAL = 1e-8
+_ON = 1e-6
+"""Of the input: how near a touching node must be, and how far one may pass before it is held."""
+_SLOW = 0.1
+"""A residual that falls to less than a tenth in a step needs no new tangent, which costs as much as ten steps."""
+_MOST_MOTION = 1e6
+"""Millimetres by 1 mm of input: no mechanism amplifies so, but one that nothing holds."""
+_STILL = 1e-9
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class MechanismEquilibrium:
+    """A mechanism at one input.
+
+    Parameters
+    ----------
+    displacement : ndarray of float, shape (unknowns,)
+        In mm, and rad where unknowns are rotations.
+    force_n : float
+        At the drive, along its direction.
+    pressed_n : tuple of ndarray of float
+        Force on each node of every contact pair; none where contact is left out.
+    """
+
+    displacement: Array
+    force_n: float
+    pressed_n: tuple[Array, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class DrivenMechanism:
+    """A driven elastic mechanism.
+
+    Parameters
+    ----------
+    name : str
+        For messages.
+    tangent : callable
+        Displacements to tangent stiffness and internal forces, in the deformed shape.
+    internal : callable
+        Displacements to internal forces alone.
+    motions : sparse matrix, shape (unknowns, n)
+        Motions that nothing holds: displacements are these times what is sought, and the input times `by_input`.
+    by_input : ndarray of float, shape (unknowns,)
+        Prescribed motion by 1 mm of input.
+    gaps : tuple of callable
+        For every contact pair, displacements to the gaps of its nodes, infinite where they face nothing, and slopes.
+    """
+
+    name: str
+    tangent: Callable[[Array], tuple[csr_matrix, Array]]
+    internal: Callable[[Array], Array]
+    motions: csr_matrix
+    by_input: Array
+    gaps: Pairs = ()
+
+    @cached_property
+    def stiffness_n_mm(self) -> csr_matrix:
+        """Of small motions."""
+        return self.tangent(np.zeros(self.by_input.size))[0]
+
+    @cached_property
+    def _solver(self) -> SuperLU:
+        return factorised(self.motions.T @ self.stiffness_n_mm @ self.motions)
+
+    @cached_property
+    def unit_displacement(self) -> Array:
+        """Small displacements by 1 mm of input.
+
+        Raises
+        ------
+        FingervisionError
+            Where nothing holds the mechanism.
+        """
+        try:
+            load = self.motions.T @ (self.stiffness_n_mm @ self.by_input)
+            moved = self.by_input - self.motions @ self._solver.solve(load)
+        except RuntimeError:  # exactly singular
+            moved = np.full(self.by_input.size, np.inf)
+        if not np.all(np.isfinite(moved)) or np.abs(moved).max() > _MOST_MOTION:
+            raise FingervisionError(f"{self.name} must be held by its fixed faces, but can move freely.")
+        return np.asarray(moved)
+
+    @cached_property
+    def input_stiffness_n_mm(self) -> float:
+        """Force at the drive by 1 mm of input, at rest."""
+        moved = self.unit_displacement
+        return float(moved @ (self.stiffness_n_mm @ moved))
+
+    def touch_inputs_mm(self) -> list[float | None]:
+        """Input nearest to rest at which each pair first touches, in small displacements; None where it never does."""
+        found: list[float | None] = []
+        for gaps in self.gaps:
+            gap, slope, _ = gaps(np.zeros(self.by_input.size))
+            speed = slope @ self.unit_displacement
+            facing = np.isfinite(gap) & (np.abs(speed) > _STILL)
+            touches = -gap[facing] / speed[facing]
+            found.append(float(touches[np.argmin(np.abs(touches))]) if touches.size else None)
+        return found
+
+    def equilibrium(self, input_mm: float, *, large_rotation: bool, contact: bool) -> MechanismEquilibrium:
+        """Find the equilibrium at one input.
+
+        Raises
+        ------
+        FingervisionError
+            Where it cannot be followed from rest.
+        """
+        gaps = self.gaps if contact else ()
+        if large_rotation:
+            return self._followed(input_mm, gaps)
+        moved, pressed = input_mm * self.unit_displacement, ()
+        if not gaps:
+            return MechanismEquilibrium(moved, self.input_stiffness_n_mm * input_mm, pressed)
+        gap, slope, by_force = self._touching
+        apart, facing = gap + slope @ moved, np.isfinite(gap)
+        forces = np.zeros(gap.size)
+        if np.any(apart[facing] < 0.0):
+            compliance = (slope @ by_force)[np.ix_(facing, facing)]
+            forces[facing] = contact_forces_n(0.5 * (compliance + compliance.T), apart[facing])
+            moved = moved + by_force @ forces
+        force = float(self.by_input @ (self.stiffness_n_mm @ moved - slope.T @ forces))
+        return MechanismEquilibrium(moved, force, self._by_pair(forces))
+
+    @cached_property
+    def _touching(self) -> tuple[Array, Array, Array]:
+        """Gaps at rest of all nodes that may touch, their slopes, and displacements by unit forces there."""
+        gap, sparse, _ = self._all_gaps(self.gaps, np.zeros(self.by_input.size))
+        slope = np.where(np.isfinite(gap)[:, None], sparse.toarray(), 0.0)
+        return gap, slope, self.motions @ self._solver.solve(np.ascontiguousarray(self.motions.T @ slope.T))
+
+    def _by_pair(self, forces: Array) -> tuple[Array, ...]:
+        sizes = [gaps(np.zeros(self.by_input.size))[0].size for gaps in self.gaps]
+        return tuple(np.split(forces, np.cumsum(sizes)[:-1]))
+
+    def _all_gaps(self, pairs: Pairs, moved: Array) -> Gaps:
+        parts = [gaps(moved) for gaps in pairs]
+        gap = np.concatenate([np.zeros(0), *(part[0] for part in parts)])
+        slope = vstack([csr_matrix((0, moved.size)), *(part[1] for part in parts)], format="csr")
+        sizes = np.cumsum([part[0].size for part in parts])[:-1]
+
+        def bend(forces: Array) -> csr_matrix:
+            shares = np.split(forces, sizes) if parts else []
+            whole = csr_matrix((moved.size, moved.size))
+            return csr_matrix(sum((part[2](own) for part, own in zip(parts, shares, strict=True)), whole))
+
+        return gap, slope, bend
+
+    def _followed(self, input_mm: float, pairs: Pairs) -> MechanismEquilibrium:
+        """Follow the equilibria from rest, in steps that grow while they converge and are halved where they do not."""
+        moved = np.zeros(self.by_input.size)
+        path = [(0.0, moved)]
+        touching = np.zeros(self._all_gaps(pairs, moved)[0].size, dtype=bool)
+        pressed = np.zeros(touching.size)
+        reached, step = 0.0, 1.0 / _LOAD_STEPS
+        while input_mm != 0.0 and reached < 1.0:
+            to = min(1.0, reached + step)
+            found = self._settled(self._predicted(path, to * input_mm), touching, pressed, to * input_mm, pairs)
+            if found is not None:
+                moved, touching, pressed = found
+                path, reached, step = [*path[-2:], (to * input_mm, moved)], to, 1.5 * step
+                continue
+            step *= 0.5
+            if step < _LEAST_STEP:
+                raise FingervisionError(
+                    f"The equilibrium of {self.name} was followed to an input of {reached * input_mm:.4g} mm and no "
+                    f"farther, but {input_mm:g} mm are asked for; take a smaller input."
+                )
+        loads = self.internal(moved) - self._all_gaps(pairs, moved)[1].T @ pressed
+        return MechanismEquilibrium(moved, float(self.by_input @ loads), self._by_pair(pressed) if pairs else ())
+
+    def _predicted(self, path: list[tuple[float, Array]], input_mm: float) -> Array:
+        """Extrapolate the path; small displacements at first. Slender leaves would else be stretched by every step."""
+        if len(path) == 1:
+            return input_mm * self.unit_displacement
+        inputs = [at for at, _ in path]
+        moved = np.zeros_like(path[0][1])
+        for place, (at, displacement) in enumerate(path):
+            others = inputs[:place] + inputs[place + 1 :]
+            moved += np.prod([(input_mm - other) / (at - other) for other in others]) * displacement
+        return moved
+
+    def _settled(
+        self, moved: Array, touching: Flags, pressed: Array, input_mm: float, pairs: Pairs
+    ) -> tuple[Array, Flags, Array] | None:
+        """Hold the nodes that would pass and let go those that are pulled, until neither is left."""
+        for _ in range(_SET_CHANGES):
+            found = self._newton(moved, touching, pressed, input_mm, pairs)
+            if found is None:
+                return None
+            moved, pressed = found
+            gap, _, _ = self._all_gaps(pairs, moved)
+            wanted = (touching & (pressed > 0.0) & np.isfinite(gap)) | (gap < -_ON * abs(input_mm))
+            if np.array_equal(wanted, touching):
+                return moved, touching, pressed
+            touching, pressed = wanted, np.where(wanted, pressed, 0.0)
+        return None
+
+    def _newton(
+        self, moved: Array, touching: Flags, pressed: Array, input_mm: float, pairs: Pairs
+    ) -> tuple[Array, Array] | None:
+        """Newton's method with a given set of touching nodes; None where it does not converge."""
+        motions = self.motions
+        scale = float(np.abs(self.stiffness_n_mm @ self.unit_displacement).max()) * abs(input_mm)
+        solver, before = None, np.inf
+        for _ in range(_NEWTON_STEPS):
+            gap, slopes, bend = self._all_gaps(pairs, moved)
+            held = touching & np.isfinite(gap)
+            slope, gap = slopes[held], gap[held]
+            loads = motions.T @ (self.internal(moved) - slope.T @ pressed[held])
+            residual = float(np.abs(loads).max())
+            if residual <= _RESIDUAL * scale and np.all(np.abs(gap) <= _ON * abs(input_mm)):
+                return moved, pressed
+            if not residual <= _BLOWN_UP * scale:
+                return None
+            if solver is None or residual > _SLOW * before:
+                tangent = self.tangent(moved)[0]
+                if gap.size:
+                    tangent = tangent - bend(np.where(held, pressed, 0.0))
+                solver = factorised(motions.T @ tangent @ motions)
+            step = -solver.solve(loads)
+            if gap.size:
+                across = (slope @ motions).toarray()
+                by_force = solver.solve(np.ascontiguousarray(across.T))
+                more = np.linalg.solve(across @ by_force, -gap - across @ step)
+                step = step + by_force @ more
+                pressed = pressed.copy()
+                pressed[held] += more
+            moved, before = moved + motions @ step, residual
+        return None

@@ -1,0 +1,116 @@
+"""Which nodes of a meshed mechanism are held, slide and are driven, and whether that holds it."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fingervision.domain.errors import FingervisionError
+from fingervision.models.mechanism import Face, Mechanism
+from fingervision.models.plane_stress import PlaneStressPlate
+
+Array = NDArray[np.float64]
+Indices = NDArray[np.int64]
+
+_ON = 1e-7
+"""Of the body's size: how near a node must be to a face's box."""
+
+_LEVER = 1e-6
+"""Of a face's extent: shorter arms across a component leave the face free to turn."""
+
+
+def nodes_on(plate: PlaneStressPlate, face: Face, mechanism: Mechanism, size_mm: float) -> Indices:
+    """Nodes of the outline in a face's box.
+
+    Raises
+    ------
+    FingervisionError
+        Where there is no part of the outline.
+    """
+    x, y = plate.nodes_mm
+    x0, x1, y0, y1 = face.box_mm
+    near = _ON * size_mm
+    outline = np.unique(plate.outline_edges)
+    inside = (x >= x0 - near) & (x <= x1 + near) & (y >= y0 - near) & (y <= y1 + near)
+    nodes = outline[inside[outline]]
+    if nodes.size < 2:
+        raise FingervisionError(
+            f"face {face.name} of {mechanism.name} must hold a part of the outline, but its box "
+            f"[{x0:g}, {x1:g}, {y0:g}, {y1:g}] mm holds none."
+        )
+    return np.asarray(nodes)
+
+
+def mean_weights(plate: PlaneStressPlate, nodes: Indices) -> Array:
+    """Weights of nodes in the mean motion of a face, as a uniform load has them; shape (k,), their sum 1."""
+    edges = plate.outline_edges[:, np.all(np.isin(plate.outline_edges, nodes), axis=0)]
+    x, y = plate.nodes_mm
+    length = np.hypot(x[edges[1]] - x[edges[0]], y[edges[1]] - y[edges[0]])
+    total = np.zeros(x.size)
+    for row, share in zip(edges, (1.0 / 6.0, 1.0 / 6.0, 4.0 / 6.0), strict=True):
+        np.add.at(total, row, share * length)
+    weights = total[nodes]
+    return np.asarray(weights / weights.sum() if weights.sum() > 0.0 else np.full(nodes.size, 1.0 / nodes.size))
+
+
+def turns_with(plate: PlaneStressPlate, nodes: Indices, component: str) -> bool:
+    """Whether a face lies along a component, so that keeping it at every node would not keep the face from turning.
+
+    Such a face is driven in the mean: in large rotation it would else have to stretch in order to turn.
+    """
+    places = plate.nodes_mm[:, nodes]
+    spread = np.ptp(places, axis=1)
+    return bool(spread[1 if component == "x" else 0] < _LEVER * np.hypot(*spread))
+
+
+def driven_components(mechanism: Mechanism) -> tuple[str, ...]:
+    """Components that every node of the drive's face keeps: both where it is guided, else that of its direction."""
+    if mechanism.drive.across == "held":
+        return "x", "y"
+    return ("x",) if mechanism.drive.direction[0] != 0.0 else ("y",)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Supports:
+    """Nodes on the faces of a mechanism.
+
+    Parameters
+    ----------
+    fixed : tuple of ndarray of int
+        Of every fixed face.
+    slides : tuple of (ndarray of int, str)
+        Of every sliding face, with the component that is held.
+    driven : ndarray of int
+        Of the drive's face.
+    """
+
+    fixed: tuple[Indices, ...]
+    slides: tuple[tuple[Indices, str], ...]
+    driven: Indices
+
+
+def supports_of(plate: PlaneStressPlate, mechanism: Mechanism, size_mm: float) -> Supports:
+    """Find the nodes on every face.
+
+    Raises
+    ------
+    FingervisionError
+        Where a face holds none, the drive's is fixed, or nothing is.
+    """
+    fixed = tuple(nodes_on(plate, face, mechanism, size_mm) for face in mechanism.fixed)
+    slides = tuple((nodes_on(plate, face, mechanism, size_mm), held) for face, held in mechanism.slides)
+    driven = nodes_on(plate, mechanism.drive.face, mechanism, size_mm)
+    if not fixed and not slides:
+        raise FingervisionError(f"{mechanism.name} must have a [[fixed]] face, but has none.")
+    moving = dict(zip("xy", mechanism.drive.direction, strict=True))
+    held = {"x": list(fixed), "y": list(fixed)}
+    for nodes, component in slides:
+        held[component].append(nodes)
+    for component in driven_components(mechanism):
+        both = any(np.intersect1d(nodes, driven).size for nodes in held[component])
+        if both and moving[component] != 0.0:
+            raise FingervisionError(
+                f"The drive of {mechanism.name} must be free to move, but its face {mechanism.drive.face.name} is "
+                "fixed too."
+            )
+    return Supports(fixed, slides, driven)

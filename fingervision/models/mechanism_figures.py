@@ -1,0 +1,40 @@
+"""The figures of a mechanism drawn by bodies, whatever its kind of model."""
+
+from fingervision.models.mechanism_chain import MechanismChain
+from fingervision.models.mechanism_frame import MechanismFrame
+from fingervision.models.mechanism_plate import MechanismPlate
+
+MechanismModel = MechanismPlate | MechanismFrame | MechanismChain
+
+
+def mechanism_figures(model: MechanismModel) -> dict[str, float]:
+    """Compute small displacements by 1 mm of input, the range to yield, touches and natural frequencies.
+
+    Parameters
+    ----------
+    model : MechanismPlate, MechanismFrame or MechanismChain
+        Of the drawing.
+
+    Returns
+    -------
+    dict of str to float
+        By name, with the unit at its end.
+    """
+    unit, rest = model.state(1.0), model.state(0.0)
+    figures = {
+        "input_stiffness_n_mm": model.stiffness_n_mm,
+        "peak_stress_mpa_per_mm": unit.stress_mpa,
+        "input_at_yield_mm": model.mechanism.material.yield_mpa / unit.stress_mpa,
+    }
+    for name, (x, y) in unit.probes_mm.items():
+        figures[f"{name}: x per input [mm/mm]"] = x
+        figures[f"{name}: y per input [mm/mm]"] = y
+    for name, value in unit.pairs_mm.items():
+        figures[f"{name}: at rest [mm]"] = rest.pairs_mm[name]
+        figures[f"{name}: per input [mm/mm]"] = value - rest.pairs_mm[name]
+    for name, value in model.touch_input_mm().items():
+        figures[f"{name}: input at contact [mm]"] = value
+    for held, label in ((False, "drive_free"), (True, "drive_held")):
+        for place, value in enumerate(model.modes_hz(drive_held=held), 1):
+            figures[f"mode_{place}_{label}_hz"] = value
+    return figures | {"model_error_force_percent": 100.0 * model.force_error}

@@ -1,0 +1,222 @@
+"""A planar mechanism of lumped flexures between elastic bodies: any topology, loops included.
+
+The paper's lumped model for any drawing. Flexures are chains of beam segments, corrected by the hinge tables; what they
+join is cut from the drawing and condensed to a few frames (`condensed_bodies`). Flexures and bodies turn as far as they
+will.
+"""
+
+from collections.abc import Callable
+from dataclasses import replace
+from functools import cached_property
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import eigh
+from scipy.sparse import coo_matrix, csr_matrix, identity
+
+from fingervision.domain.errors import FingervisionError
+from fingervision.models.body_assembly import assemble_bodies
+from fingervision.models.condensed_bodies import own_modes
+from fingervision.models.contact_pairs import contact_pair
+from fingervision.models.corotational_body import turned_axes
+from fingervision.models.corotational_frame import CorotationalFrame
+from fingervision.models.flexure_span import span_of
+from fingervision.models.flexure_stress import nominal_stress_mpa
+from fingervision.models.hinge_correction import HingeTheory
+from fingervision.models.mechanism import Contact, Mechanism, check_mechanism
+from fingervision.models.mechanism_equilibrium import DrivenMechanism, Gaps
+from fingervision.models.mechanism_state import MechanismState, pair_distances_mm
+from fingervision.models.planar_region import PlanarRegion
+from fingervision.models.plane_stress import PlaneStressPlate
+from fingervision.models.triangulate import triangulate
+from fingervision.models.width_effect import force_uncertainty
+
+Array = NDArray[np.float64]
+
+_ACROSS, _BODY = 2.0, 0.05
+"""Triangles across what is thin, and edge length over the size: bodies bend little, and their stress is not
+asked."""
+_TINY = 1e-7
+_FORCE_ERROR = 0.015
+"""Of the tables of hinges between blocks, beside finite elements (`tests/benchmarks/models_held_out.py`)."""
+
+
+class MechanismFrame:
+    """A mechanism of lumped flexures.
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+        The drawing.
+    width_effect : bool
+        Whether the plate's width holds the flexures back; plane stress where not.
+    theory : HingeTheory
+        Of the notches.
+
+    Raises
+    ------
+    FingervisionError
+        Where the drawing is no mechanism, has no flexure, or a flexure does not join two bodies.
+    """
+
+    kind = "lumped"
+
+    def __init__(
+        self, mechanism: Mechanism, *, width_effect: bool = True, theory: HingeTheory = HingeTheory.CORRECTED
+    ) -> None:
+        self.mechanism, self.theory, self._width_effect = mechanism, theory, width_effect
+        region = mechanism.region
+        check_mechanism(mechanism, region)
+        if not mechanism.flexures:
+            raise FingervisionError(
+                f"{mechanism.name} must have flexures to be a lumped model, but has none; take --kind finite_element."
+            )
+        self.spans = tuple(span_of(flexure, region, mechanism.name) for flexure in mechanism.flexures)
+        cut = PlanarRegion((*region.steps, *((False, span.slab) for span in self.spans)), region.marks_mm)
+        mesh = triangulate(cut, _ACROSS, _BODY * region.size_mm)
+        zones = tuple(f.zone(mechanism.plate_mm) for f in mechanism.flexures if not f.is_notch)
+        self.plate = PlaneStressPlate(mesh, mechanism.material, mechanism.plate_mm, zones if width_effect else ())
+        self._size_mm = region.size_mm
+        self.assembly = assemble_bodies(self.plate, mechanism, self.spans, self._size_mm)
+        self._make_flexures()
+
+    def _make_flexures(self) -> None:
+        mechanism, assembly = self.mechanism, self.assembly
+        places = [frame.at_mm for frame in assembly.frames]
+        ends: list[tuple[int, int]] = []
+        compliances: list[Array] = []
+        self._segments: list[range] = []
+        self._masses: list[tuple[tuple[int, int], float, float]] = []
+        for span, (first, last) in zip(self.spans, assembly.ends, strict=True):
+            stations = span.stations_mm(mechanism.plate_mm)
+            nodes = [first, *range(len(places), len(places) + len(stations) - 2), last]
+            places += [np.array(span.flexure.point_mm(x, 0.0)) for x in stations[1:-1].tolist()]
+            self._segments.append(range(len(ends), len(ends) + len(stations) - 1))
+            own = list(pairwise(nodes))
+            ends += own
+            compliances += list(span.compliances(mechanism.plate_mm, mechanism.material, self.theory,
+                                                 width_effect=self._width_effect))  # fmt: skip
+            weight = mechanism.material.density_t_mm3 * mechanism.plate_mm
+            lengths = np.diff(stations)
+            masses = weight * lengths * span.flexure.height_mm(0.5 * (stations[1:] + stations[:-1]))
+            self._masses += list(zip(own, masses.tolist(), lengths.tolist(), strict=True))
+        self.frame = CorotationalFrame(np.array(places), np.array(ends), np.array(compliances))
+        prescribed = list(assembly.by_input)
+        self._unit = np.zeros(self.frame.unknowns)
+        self._unit[prescribed] = list(assembly.by_input.values())
+        self._free = np.setdiff1d(np.arange(self.frame.unknowns), [*assembly.held, *prescribed])
+
+    def _tangent(self, moved: Array) -> tuple[csr_matrix, Array]:
+        tangent, force = self.frame.internal_force_n(moved)
+        rows, columns, values = [], [], []
+        for body, turning in zip(self.assembly.bodies, self.assembly.turning, strict=True):
+            dofs = body.unknowns
+            stiffness, forces = turning.forces_n(moved[dofs])
+            rows.append(np.repeat(dofs, dofs.size))
+            columns.append(np.tile(dofs, dofs.size))
+            values.append(stiffness.ravel())
+            force[dofs] += forces
+        entries = (np.concatenate(values), (np.concatenate(rows), np.concatenate(columns)))
+        return csr_matrix(tangent + coo_matrix(entries, shape=tangent.shape)), force
+
+    @cached_property
+    def driven(self) -> DrivenMechanism:
+        """Its equilibria."""
+        every = identity(self.frame.unknowns, format="csc")
+        return DrivenMechanism(
+            self.mechanism.name, self._tangent, lambda moved: self._tangent(moved)[1], csr_matrix(every[:, self._free]),
+            self._unit, tuple(map(self._gaps_of, self.mechanism.contacts)),
+        )  # fmt: skip
+
+    def _gaps_of(self, contact: Contact) -> Callable[[Array], Gaps]:
+        """Gaps of a contact by the motions of the frames: of the two nodes of its face that lie farthest apart."""
+        plate = self.plate
+        pair = contact_pair(plate, contact, self.mechanism, self._size_mm)
+        places = plate.nodes_mm[:, pair.nodes]
+        apart = places - places[:, :1]
+        first = int(np.argmax(np.hypot(*apart)))
+        second = int(np.argmax(np.hypot(*(places - places[:, [first]]))))
+        ends = replace(pair, nodes=pair.nodes[[first, second]])
+
+        def gaps(moved: Array) -> Gaps:
+            field, slope = self.assembly.field(moved)
+            gap, by_node, bend = ends.gaps_mm(plate, field)
+            # The frames' own turning is left out of the second derivative: Newton's method is then a little slower.
+            return gap, csr_matrix(by_node @ slope), lambda forces: csr_matrix(slope.T @ bend(forces) @ slope)
+
+        return gaps
+
+    @property
+    def stiffness_n_mm(self) -> float:
+        """Force at the drive by 1 mm of input, at rest."""
+        return self.driven.input_stiffness_n_mm
+
+    def touch_input_mm(self) -> dict[str, float]:
+        """Input nearest to rest at which each contact first touches, in small displacements; absent where never."""
+        names = [contact.name for contact in self.mechanism.contacts]
+        return {n: at for n, at in zip(names, self.driven.touch_inputs_mm(), strict=True) if at is not None}
+
+    @property
+    def force_error(self) -> float:
+        """Relative model error of the force: of the hinge tables and the width effect."""
+        return _FORCE_ERROR + 2.0 * force_uncertainty(self.mechanism.material)
+
+    def state(self, input_mm: float, *, large_rotation: bool = False, contact: bool = False) -> MechanismState:
+        """Find the equilibrium at one input."""
+        mechanism = self.mechanism
+        found = self.driven.equilibrium(input_mm, large_rotation=large_rotation, contact=contact)
+        moved = found.displacement
+        probes = {name: self._motion(moved, point, large=large_rotation) for name, point in mechanism.probes.items()}
+        # Small displacements leave the axes of every segment where they are: loads are those of a tiny share of them.
+        share = 1.0 if large_rotation else _TINY * self._size_mm / max(float(np.abs(moved).max()), _TINY)
+        loads = self.frame.end_loads(share * moved) / share
+        stress = max(nominal_stress_mpa(span, loads[list(own)], mechanism, self.theory)
+                     for span, own in zip(self.spans, self._segments, strict=True))  # fmt: skip
+        pairs = pair_distances_mm(mechanism, probes, large=large_rotation)
+        pressed = {c.name: float(part.sum()) for c, part in zip(mechanism.contacts, found.pressed_n, strict=False)}
+        return MechanismState(input_mm, found.force_n, probes, pairs, stress, moved, pressed)
+
+    def _motion(self, moved: Array, point: tuple[float, float], *, large: bool) -> tuple[float, float]:
+        """Displacement of a point: of the body that it lies on, or with the nearest section of its flexure."""
+        for span, own in zip(self.spans, self._segments, strict=True):
+            if span.slab.holds(np.array(point)[:, None])[0]:
+                nodes = np.unique(self.frame.ends[list(own)])
+                node = nodes[np.argmin(np.hypot(*(self.frame.nodes_mm[nodes] - point).T))]
+                x, y, angle = moved[3 * node : 3 * node + 3]
+                arm = np.array(point) - self.frame.nodes_mm[node]
+                turn = turned_axes(angle) - np.eye(2) if large else angle * np.array([[0.0, -1.0], [1.0, 0.0]])
+                way = np.array([x, y]) + turn @ arm
+                return float(way[0]), float(way[1])
+        return self.assembly.motion_mm(moved, point, large=large)
+
+    def modes_hz(self, *, drive_held: bool, count: int = 3) -> tuple[float, ...]:
+        """First natural frequencies in the plane, the drive held or free to move along its direction.
+
+        The bodies' own vibrations between their frames are added to the condensed motions (Craig and Bampton, AIAA
+        Journal 6 (1968) 1313).
+        """
+        size = self.frame.unknowns
+        inner = [own_modes(self.plate, body, count) for body in self.assembly.bodies]
+        total = size + sum(len(modes.squared) for modes in inner)
+        mass, stiffness = np.zeros((total, total)), np.zeros((total, total))
+        stiffness[:size, :size] = self.driven.stiffness_n_mm.toarray()
+        at = size
+        for body, modes in zip(self.assembly.bodies, inner, strict=True):
+            dofs, own = body.unknowns, np.arange(at, at + len(modes.squared))
+            mass[np.ix_(dofs, dofs)] += body.mass_t
+            mass[own, own], stiffness[own, own] = 1.0, modes.squared
+            mass[np.ix_(dofs, own)], mass[np.ix_(own, dofs)] = modes.coupling_t, modes.coupling_t.T
+            at += own.size
+        for ends, weight, length_mm in self._masses:
+            for node in ends:
+                place = np.arange(3 * node, 3 * node + 3)
+                mass[place, place] += 0.5 * weight * np.array([1.0, 1.0, length_mm**2 / 12.0])
+        columns = np.eye(total)[:, np.concatenate([self._free, np.arange(size, total)])]
+        if not drive_held:
+            columns = np.column_stack([columns, np.append(self._unit, np.zeros(total - size))])
+        K, M = columns.T @ stiffness @ columns, columns.T @ mass @ columns
+        # The reciprocal problem: masses may be zero, the stiffness is positive definite.
+        last = K.shape[0] - 1
+        inverse = eigh(M, K, eigvals_only=True, subset_by_index=(last + 1 - count, last))[::-1]
+        return tuple((1.0 / (2.0 * np.pi * np.sqrt(inverse))).tolist())

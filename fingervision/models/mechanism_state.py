@@ -1,0 +1,64 @@
+"""What a mechanism's models answer at one input, whatever their kind."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from fingervision.models.mechanism import Mechanism
+
+
+@dataclass(frozen=True, slots=True)
+class MechanismState:
+    """A mechanism at one input.
+
+    Parameters
+    ----------
+    input_mm, force_n : float
+        Motion of the drive along its direction, and the force there.
+    probes_mm : dict of str to (float, float)
+        Displacements of the probes.
+    pairs_mm : dict of str to float
+        Distances of the pairs.
+    stress_mpa : float
+        Largest stress in the flexures: von Mises's, half a thickness and more from sharp corners, where it has no
+        limit; or the nominal one of beams, with the notch's factors.
+    displacement_mm : ndarray of float, shape (unknowns,)
+        Of every node; of every frame where the model is lumped.
+    contact_n : dict of str to float
+        Force of every contact pair.
+    """
+
+    input_mm: float
+    force_n: float
+    probes_mm: dict[str, tuple[float, float]]
+    pairs_mm: dict[str, float]
+    stress_mpa: float
+    displacement_mm: Any
+    contact_n: dict[str, float]
+
+
+def pair_distances_mm(
+    mechanism: Mechanism, probes_mm: dict[str, tuple[float, float]], *, large: bool
+) -> dict[str, float]:
+    """Distances of the pairs of probes, negative where they have passed each other.
+
+    For small displacements they are linear in these, along the line that joins the probes at rest.
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+        The drawing.
+    probes_mm : dict of str to (float, float)
+        Displacements of its probes.
+    large : bool
+        Whether displacements are large.
+    """
+    found = {}
+    for name, (a, b) in mechanism.pairs.items():
+        apart = np.array(mechanism.probes[b]) - mechanism.probes[a]
+        moved = np.array(probes_mm[b]) - probes_mm[a]
+        length = np.hypot(*apart)
+        along = length + moved @ apart / length
+        found[name] = float(np.copysign(np.hypot(*(apart + moved)), along) if large else along)
+    return found

@@ -1,0 +1,154 @@
+"""A driven elastic body reduced to its static shape and its natural modes: the basis of every answer in motion.
+
+The drive's motion u is prescribed. The body follows it by its static shape s; each mode r of the body with its drive
+held is shaken by that shape's inertia (Craig and Bampton, AIAA J. 6 (1968) 1313, with one interface unknown):
+
+    q_r'' + 2 zeta_r w_r q_r' + w_r^2 q_r = -L_r u''
+    force at the drive = k u + m u'' + sum_r L_r q_r''
+
+with L_r = phi_r' M s, k = s' K s and m = s' M s. Damping acts on what moves beside the static shape. A drive that is
+free to move and pushed by a force f vibrates in other modes (those with the drive free), with d_r their motion of the
+drive:
+
+    q_r'' + 2 zeta_r w_r q_r' + w_r^2 q_r = d_r f
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from math import pi, sqrt
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fingervision.domain.errors import FingervisionError
+from fingervision.models.damping import Damping
+from fingervision.models.driven_body import DrivenBody
+
+Array = NDArray[np.float64]
+
+GAP = "gap_mm"
+_HALVES = 2.0
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Observable:
+    """A length that a mechanism is asked for: a gap, or a component of a probe's displacement.
+
+    Parameters
+    ----------
+    rest_mm : float
+        At rest.
+    per_input : float
+        Change by 1 mm of input, at rest at each input.
+    by_mode : ndarray of float, shape (modes,)
+        Change by a unit of each mode's coordinate.
+    """
+
+    rest_mm: float
+    per_input: float
+    by_mode: Array
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ModalModel:
+    """The reduced body.
+
+    Parameters
+    ----------
+    stiffness_n_mm, mass_t : float
+        Of the static shape, by 1 mm of input: k and m.
+    rad_s, participation : ndarray of float, shape (modes,)
+        Angular frequencies of the body with its drive held, rising, and L, by modes of unit modal mass.
+    observed : mapping of str to Observable
+        What is asked for, by its column's name.
+    """
+
+    stiffness_n_mm: float
+    mass_t: float
+    rad_s: Array
+    participation: Array
+    observed: Mapping[str, Observable]
+
+    @property
+    def modes_hz(self) -> Array:
+        """Natural frequencies with the drive held."""
+        return self.rad_s / (2.0 * pi)
+
+    def with_modes(self, count: int) -> "ModalModel":
+        """Keep the first modes; what the others would add follows the drive at once."""
+        observed = {name: replace(seen, by_mode=seen.by_mode[:count]) for name, seen in self.observed.items()}
+        return replace(self, rad_s=self.rad_s[:count], participation=self.participation[:count], observed=observed)
+
+    def damped(self, damping: Damping) -> tuple["ModalModel", Array]:
+        """Keep the modes that a damping law describes, with their damping ratios; see `described`."""
+        ratios = described(damping, self.rad_s)
+        return self.with_modes(ratios.size), ratios
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FreeModes:
+    """Modes with the drive free along its direction.
+
+    Parameters
+    ----------
+    rad_s, drive : ndarray of float, shape (modes,)
+        Angular frequencies, rising, and the drive's motion in modes of unit modal mass.
+    by_mode : mapping of str to ndarray of float, shape (modes,)
+        Change of each observed length by a unit of each mode's coordinate.
+    """
+
+    rad_s: Array
+    drive: Array
+    by_mode: Mapping[str, Array]
+
+
+def described(damping: Damping, rad_s: Array) -> Array:
+    """Damping ratios of the modes that a law describes, from the lowest.
+
+    A law whose ratio leaves what a solid can have, as equation (4) does a few times above its reference, describes the
+    modes below that.
+
+    Raises
+    ------
+    FingervisionError
+        Where it does not describe the lowest mode.
+    """
+    for count in range(rad_s.size, 1, -1):
+        try:
+            return damping.ratios(rad_s[:count])
+        except FingervisionError:
+            continue
+    return damping.ratios(rad_s[:1])
+
+
+def gripper_modes(body: DrivenBody, count: int) -> ModalModel:
+    """Reduce a gripper: both halves, which mirror each other.
+
+    Parameters
+    ----------
+    body : DrivenBody
+        The right half.
+    count : int
+        How many modes of the held body.
+    """
+    rad_s, shapes = body.modes(drive_held=True, count=count)
+    static = body.unit_displacement_mm
+    inertia = body.mass_t @ static
+    slope = body.measured_mm(static) - body.measured_rest_mm
+    gap = Observable(
+        _HALVES * body.measured_rest_mm, _HALVES * slope, sqrt(_HALVES) * (body.weights @ shapes[body.measured])
+    )
+    return ModalModel(
+        stiffness_n_mm=_HALVES * float(static @ (body.stiffness_n_mm @ static)),
+        mass_t=_HALVES * float(static @ inertia),
+        rad_s=rad_s,
+        participation=sqrt(_HALVES) * (shapes.T @ inertia),
+        observed={GAP: gap},
+    )
+
+
+def gripper_free_modes(body: DrivenBody, count: int) -> FreeModes:
+    """Return a gripper's modes with its drive free, both halves mirroring each other."""
+    rad_s, shapes = body.modes(drive_held=False, count=count)
+    drive = shapes[body.driven[0]] / sqrt(_HALVES)
+    return FreeModes(rad_s, drive, {GAP: sqrt(_HALVES) * (body.weights @ shapes[body.measured])})

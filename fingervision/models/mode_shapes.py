@@ -1,0 +1,182 @@
+"""The natural modes of a mechanism in its plane, by families, with their shapes as lines to draw."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from math import inf, pi
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fingervision.domain.errors import UsageError
+from fingervision.models.driven_body import DrivenBody
+from fingervision.models.plane_stress import PlaneStressPlate
+
+Array = NDArray[np.float64]
+Solve = Callable[[int], tuple[Array, Array]]
+
+MOST_MODES = 40
+_SHOWN = 0.08
+"""Of the body's height: the largest motion in a drawn shape."""
+_FIRST = 4
+
+
+@dataclass(frozen=True, slots=True)
+class ModesWanted:
+    """How many modes of each family, or up to which frequency in Hz."""
+
+    count: int | None = None
+    highest_hz: float = inf
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ModeShape:
+    """One natural mode.
+
+    Parameters
+    ----------
+    family : str
+        What holds the drive, and whether the halves of a gripper mirror each other.
+    number : int
+        From 1.
+    frequency_hz : float
+        Natural frequency, undamped.
+    lines_mm, shift_mm : ndarray of float, shape (n, 2, 2)
+        The body's outline or bars as pieces from one point to another, at rest, and their displacements at the
+        greatest deflection that is drawn (its size means nothing).
+    """
+
+    family: str
+    number: int
+    frequency_hz: float
+    lines_mm: Array
+    shift_mm: Array
+
+
+class MeshedMechanism(Protocol):
+    """A mechanism drawn by bodies."""
+
+    plate: PlaneStressPlate
+
+    def modes(self, *, drive_held: bool, count: int) -> tuple[Array, Array]:
+        """First natural modes in the plane."""
+        ...
+
+
+def parse_modes(text: str) -> ModesWanted:
+    """Read how many modes are wanted: `6`, or all up to a frequency, `500Hz`.
+
+    Raises
+    ------
+    UsageError
+        Where it is neither.
+    """
+    bare = text.strip()
+    try:
+        if bare.lower().endswith("hz"):
+            highest = float(bare[:-2])
+            if 0.0 < highest < inf:
+                return ModesWanted(None, highest)
+        elif 1 <= int(bare) <= MOST_MODES:
+            return ModesWanted(int(bare))
+    except ValueError:
+        pass
+    raise UsageError(
+        f"--modes must be a number from 1 to {MOST_MODES}, or a positive frequency such as 500Hz up to which all modes "
+        f"are wanted, but is {text}."
+    )
+
+
+def gripper_mode_shapes(model: Any, wanted: ModesWanted) -> list[ModeShape]:
+    """Modes of a gripper: both halves mirroring each other, drive free or held, and both swaying the same way.
+
+    Parameters
+    ----------
+    model : LumpedGripper or FiniteElementGripper
+        The gripper.
+    wanted : ModesWanted
+        How many of each family.
+    """
+    half: DrivenBody = model.half
+    lines, points = _lines_of_half(model)
+    # The symmetry axis is no edge of the body.
+    real = np.abs(lines[..., 0]).max(axis=1) > 1e-9 * float(np.abs(lines).max())
+    lines, points = lines[real], points[real]
+    families: tuple[tuple[str, Solve, float], ...] = (
+        ("drive free", lambda count: half.modes(drive_held=False, count=count), 1.0),
+        ("drive held", lambda count: half.modes(drive_held=True, count=count), 1.0),
+        ("swaying drive free across", lambda count: half.swaying_modes(count=count), -1.0),
+    )
+    found = []
+    for family, solve, mirror in families:
+        rad_s, shapes = _wanted_modes(solve, wanted, half.free.size)
+        for number, (angular, shape) in enumerate(zip(rad_s, shapes.T, strict=True), 1):
+            shift = _scaled(lines, shape[points], mirrored=mirror > 0.0)
+            # The left half mirrors the right one; where both sway the same way its motion is turned round.
+            flip = np.array([-1.0, 1.0])
+            both = np.concatenate([lines, flip * lines]), np.concatenate([shift, mirror * flip * shift])
+            found.append(ModeShape(family, number, float(angular / (2.0 * pi)), *both))
+    return found
+
+
+def mechanism_mode_shapes(model: MeshedMechanism, wanted: ModesWanted) -> list[ModeShape]:
+    """Modes of a mechanism drawn by bodies, its drive free or held."""
+    lines, points = _lines_of_plate(model.plate)
+    found = []
+    for family, held in (("drive free", False), ("drive held", True)):
+        rad_s, shapes = _wanted_modes(
+            lambda count, held=held: model.modes(drive_held=held, count=count),  # type: ignore[misc]
+            wanted,
+            model.plate.unknowns,
+        )
+        for number, (angular, shape) in enumerate(zip(rad_s, shapes.T, strict=True), 1):
+            shift = _scaled(lines, shape[points], mirrored=False)
+            found.append(ModeShape(family, number, float(angular / (2.0 * pi)), lines, shift))
+    return found
+
+
+def _wanted_modes(solve: Solve, wanted: ModesWanted, unknowns: int) -> tuple[Array, Array]:
+    if wanted.count is not None:
+        return solve(min(wanted.count, unknowns - 2))
+    count = _FIRST
+    while True:
+        rad_s, shapes = solve(count)
+        below = rad_s <= 2.0 * pi * wanted.highest_hz
+        if not below.all():
+            return rad_s[below], shapes[:, below]
+        if count == min(MOST_MODES, unknowns - 2):
+            raise UsageError(
+                f"--modes must end within {count} modes of each family, below {rad_s[-1] / (2.0 * pi):.4g} Hz, but "
+                f"goes to {wanted.highest_hz:g} Hz; take a lower frequency."
+            )
+        count = min(2 * count, MOST_MODES, unknowns - 2)
+
+
+def _lines_of_half(model: Any) -> tuple[Array, NDArray[np.int64]]:
+    """Pieces to draw, shape (n, 2, 2), and the unknowns of their ends along x and y."""
+    if hasattr(model, "plate"):
+        return _lines_of_plate(model.plate)
+    frame = model.frame
+    return frame.nodes_mm[frame.ends], 3 * frame.ends[:, :, None] + np.arange(2)
+
+
+def _lines_of_plate(plate: PlaneStressPlate) -> tuple[Array, NDArray[np.int64]]:
+    a, b, middle = plate.outline_edges
+    ends = np.concatenate([np.stack([a, middle], axis=1), np.stack([middle, b], axis=1)])
+    return plate.nodes_mm.T[ends], np.stack([plate.x_dofs[ends], plate.y_dofs[ends]], axis=-1)
+
+
+def _scaled(lines: Array, shape: Array, *, mirrored: bool) -> Array:
+    """Scale a shape to be seen; mirrored halves are drawn opening, and no farther than until they meet."""
+    scale = _SHOWN * float(np.ptp(lines[..., 1])) / float(np.hypot(shape[..., 0], shape[..., 1]).max())
+    if not mirrored:
+        return scale * shape
+    ways = [_way_to_meeting(lines[..., 0], sign * shape[..., 0]) for sign in (1.0, -1.0)]
+    turned = 1.0 if ways[0] >= ways[1] else -1.0
+    return turned * min(scale, max(ways)) * shape
+
+
+def _way_to_meeting(x: Array, across: Array) -> float:
+    """How large a shape may be drawn before a point of the half meets the symmetry axis."""
+    closing = (across < 0.0) & (x > 1e-9 * float(x.max()))
+    return float(np.min(-x[closing] / across[closing], initial=np.inf))

@@ -1,0 +1,145 @@
+"""A gripper's answer to a drive history in time, with the physics that its model was built with."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fingervision.domain.drive import DriveHistory
+from fingervision.domain.errors import FingervisionError
+from fingervision.domain.response import Response
+from fingervision.models.damping import Damping, ModalDamping
+from fingervision.models.driven_body import DrivenBody
+from fingervision.models.modal_model import GAP, gripper_modes
+from fingervision.models.modal_response import Motion, modal_motion, run_rows
+from fingervision.models.physics import Physics
+from fingervision.models.static_answer import contact_onset_mm
+from fingervision.models.stepped_response import step_for, stepped_motion
+
+Array = NDArray[np.float64]
+
+MODES = 8
+"""Of the held body. The sample's ninth has 9.6 kHz and a tenth of a per cent of the moving mass."""
+_MOST_STEPS, _MOST_UNKNOWNS = 20_000, 400
+"""Steps in time that cost no more than half a minute: those of a frame of bars."""
+_FAST = 0.05
+"""Of the travel of the gap: vibrations larger than this are not small beside the motion that bends the shape."""
+
+
+class VibratingModel(Protocol):
+    """A model with masses."""
+
+    physics: Physics
+    half: DrivenBody
+
+    def respond(self, input_mm: Array) -> Response:
+        """Answer statically."""
+        ...
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class GripperMotion:
+    """A gripper over time.
+
+    Parameters
+    ----------
+    motion : Motion
+        Gap and force, the static answer with the same physics, damping.
+    method : str
+        How it was computed, for the reader.
+    """
+
+    motion: Motion
+    method: str
+
+    @property
+    def gap_mm(self) -> Array:
+        """Gap at the drive's samples, shape (n,)."""
+        return self.motion.observed_mm[GAP]
+
+    @property
+    def response(self) -> Response:
+        """Both measuring points and the force."""
+        return Response(-0.5 * self.gap_mm, 0.5 * self.gap_mm, self.motion.force_n)
+
+
+def gripper_motion(
+    model: VibratingModel, drive: DriveHistory, damping: Damping | None = None, *, modes: int = MODES
+) -> GripperMotion:
+    """Follow a drive history; each run begins at rest at its first input.
+
+    With small displacements the modes' equations are solved exactly. With large rotation or contact a frame of bars is
+    followed step by step where that takes at most 20 000 steps; otherwise the gripper passes through its equilibria,
+    and the modes at rest vibrate about them where the fingers do not touch, which is right while they vibrate little.
+
+    Parameters
+    ----------
+    model : LumpedGripper or FiniteElementGripper
+        With its physics.
+    drive : DriveHistory
+        Inputs over time, straight between samples.
+    damping : ModalDamping, LossFactor, RayleighDamping or PaperDamping
+        Modal damping of 0.025 where None.
+    modes : int
+        How many of the held body.
+
+    Raises
+    ------
+    FingervisionError
+        Where large rotation or contact meets vibrations that neither way can follow.
+    """
+    law = damping or ModalDamping()
+    small = modal_motion(gripper_modes(model.half, modes), drive, law)
+    if not model.physics.large_rotation and not model.physics.contact:
+        return GripperMotion(small, f"{small.modes_hz.size} modes, exact between the drive's samples")
+    answer = model.respond(drive.input_mm)
+    force = np.zeros_like(answer.gap_mm) if answer.force_n is None else answer.force_n
+    static = {GAP: answer.gap_mm}
+    spans_s = [float(np.ptp(drive.time_s[rows])) for rows in run_rows(drive)]
+    step_s = step_for(model.half)
+    if model.half.unknowns <= _MOST_UNKNOWNS and sum(spans_s) / step_s <= _MOST_STEPS:
+        gap = np.zeros_like(answer.gap_mm)
+        for rows in run_rows(drive):
+            run = DriveHistory(drive.time_s[rows], drive.input_mm[rows])
+            gap[rows], force[rows] = stepped_motion(model.half, run, model.physics, law, step_s)
+        return GripperMotion(
+            replace(small, observed_mm={GAP: gap}, static_mm=static, force_n=force),
+            f"generalised-alpha steps of {1e3 * step_s:.3g} ms",
+        )
+    travel = float(np.ptp(answer.gap_mm))
+    if small.vibration_mm(GAP) > _FAST * travel:
+        raise FingervisionError(
+            f"With large rotation or contact this drive must be shorter than {_MOST_STEPS * step_s:.3g} s (a frame of "
+            f"bars, --kind lumped), or shake the gap by at most {_FAST:g} of its travel of {travel:.3g} mm, but it "
+            f"takes {sum(spans_s):.3g} s and shakes it by {small.vibration_mm(GAP):.3g} mm; shorten it, slow it down "
+            "or leave --large-rotation and --contact off."
+        )
+    onset_mm = contact_onset_mm(model.half, model.physics) if model.physics.contact else None
+    apart = np.ones_like(force, dtype=bool) if onset_mm is None else drive.input_mm > onset_mm
+    motion = about_equilibria(small, static, force, apart)
+    return GripperMotion(
+        motion, f"equilibria, and about them {small.modes_hz.size} modes at rest where the fingers do not touch"
+    )
+
+
+def about_equilibria(
+    small: Motion, static_mm: Mapping[str, Array], force_n: Array, apart: NDArray[np.bool_] | None = None
+) -> Motion:
+    """Let the modes at rest vibrate about other equilibria than those of small displacements.
+
+    Parameters
+    ----------
+    small : Motion
+        By small displacements.
+    static_mm, force_n
+        Lengths and force at rest at each input, in the deformed shape or with contact.
+    apart : ndarray of bool, shape (n,), or None
+        Where the modes vibrate: where nothing touches; everywhere where None.
+    """
+    free = np.ones(force_n.shape, dtype=bool) if apart is None else apart
+    shaken = {name: np.where(free, small.observed_mm[name] - small.static_mm[name], 0.0) for name in static_mm}
+    observed = {name: static_mm[name] + shaken[name] for name in static_mm}
+    force = force_n + np.where(free, small.inertia_n, 0.0)
+    return replace(small, observed_mm=observed, static_mm=dict(static_mm), force_n=force)

@@ -1,0 +1,61 @@
+"""A mesh of quadratic triangles in the plane, and how good they are."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import Delaunay
+
+from fingervision.models.planar_region import PlanarRegion
+
+Array = NDArray[np.float64]
+Indices = NDArray[np.int64]
+
+LEAST_QUALITY = 0.3
+"""Twice the inscribed over the circumscribed radius, 1 for an equilateral triangle: a 30-degree angle has 0.7."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PlaneMesh:
+    """Quadratic triangles in the plane; curved edges follow the notches.
+
+    Parameters
+    ----------
+    nodes_mm : ndarray of float, shape (2, n)
+        Places of corners and edge midpoints.
+    triangles : ndarray of int, shape (6, m)
+        Corners 0, 1, 2 and the midpoints of the edges 01, 12, 02.
+    """
+
+    nodes_mm: NDArray[np.float64]
+    triangles: NDArray[np.int64]
+
+    def quality(self) -> Array:
+        """Twice the inscribed over the circumscribed radius of every triangle, shape (m,)."""
+        return triangle_quality(self.nodes_mm, self.triangles[:3])
+
+
+def inner_triangles(region: PlanarRegion, points: Array) -> Indices:
+    """Triangles of Delaunay's triangulation whose middle lies in the body, anticlockwise; shape (3, m)."""
+    triangles = Delaunay(points.T).simplices.T.astype(np.int64)
+    middle = points[:, triangles].mean(axis=1)
+    triangles = triangles[:, region.holds(middle)]
+    a, b, c = (points[:, row] for row in triangles)
+    twice = (b - a)[0] * (c - a)[1] - (b - a)[1] * (c - a)[0]
+    triangles[:, twice < 0.0] = triangles[:, twice < 0.0][[0, 2, 1]]
+    return np.asarray(triangles[:, np.abs(twice) > 1e-12 * np.sum((b - a) ** 2 + (c - a) ** 2, axis=0)])
+
+
+def edges_of(triangles: Indices) -> Indices:
+    """List every edge of triangles once; shape (2, k)."""
+    pairs = np.sort(np.hstack([triangles[[0, 1]], triangles[[1, 2]], triangles[[0, 2]]]), axis=0)
+    # As single numbers pairs sort ten times as fast.
+    count = int(triangles.max()) + 1
+    return np.asarray(np.stack(np.divmod(np.unique(pairs[0] * count + pairs[1]), count)))
+
+
+def triangle_quality(points: Array, triangles: Indices) -> Array:
+    """Twice the inscribed over the circumscribed radius; shape (m,)."""
+    a, b, c = (points[:, row] for row in triangles)
+    la, lb, lc = np.hypot(*(b - c)), np.hypot(*(c - a)), np.hypot(*(a - b))
+    return np.asarray((lb + lc - la) * (lc + la - lb) * (la + lb - lc) / (la * lb * lc))

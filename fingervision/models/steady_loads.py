@@ -1,0 +1,90 @@
+"""Small displacements of an elastic body under its own weight, and by a uniform change of temperature."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fingervision.models.driven_body import DrivenBody, factorised
+
+Array = NDArray[np.float64]
+
+STANDARD_GRAVITY_MM_S2 = 9806.65
+
+
+def weight_displacement_mm(body: DrivenBody, direction: tuple[float, float], *, swaying: bool = False) -> Array:
+    """Displacements by one standard gravity in the plane, the drive held.
+
+    Parameters
+    ----------
+    body : DrivenBody
+        The right half.
+    direction : (float, float)
+        Unit vector along which gravity pulls.
+    swaying : bool
+        Whether both halves move the same way sideways, the drive with them; else they mirror each other.
+    """
+    pulled = np.zeros(body.unknowns)
+    pulled[body.nodes[:, 0]], pulled[body.nodes[:, 1]] = direction
+    moved = np.zeros_like(pulled)
+    load_n = STANDARD_GRAVITY_MM_S2 * (body.mass_t @ pulled)
+    if swaying:
+        inside = body.swaying
+        moved[inside] = factorised(body.stiffness_n_mm[inside][:, inside]).solve(load_n[inside])
+    else:
+        moved[body.free] = body.solve_free(load_n[body.free])
+    return moved
+
+
+def thermal_displacement_mm(body: DrivenBody, strain: float, held_mm: Array) -> tuple[Array, Array]:
+    """Displacements and nodal forces by a uniform thermal strain.
+
+    A body that is free grows by `strain` times its nodes' places, without stress: K (u - that) = 0 where nothing holds.
+
+    Parameters
+    ----------
+    body : DrivenBody
+        The right half.
+    strain : float
+        Expansion times change of temperature.
+    held_mm : ndarray of float, shape (unknowns,)
+        Displacements of what is not free: zero for supports that do not grow.
+
+    Returns
+    -------
+    displacement_mm, force_n : ndarray of float, shape (unknowns,)
+        Forces are those of the supports on the body.
+    """
+    grown = np.zeros(body.unknowns)
+    grown[body.nodes[:, 0]], grown[body.nodes[:, 1]] = strain * body.nodes_mm.T
+    moved = np.array(held_mm, dtype=np.float64)
+    moved[body.free] = 0.0
+    load_n = body.stiffness_n_mm @ (grown - moved)
+    moved[body.free] = body.solve_free(load_n[body.free])
+    return moved, np.asarray(body.stiffness_n_mm @ (moved - grown))
+
+
+def gap_by_weight_mm(body: DrivenBody) -> float:
+    """Change of a gripper's gap when its plate stands upright, fingers up, drive held: by one standard gravity."""
+    return 2.0 * (body.measured_mm(weight_displacement_mm(body, (0.0, -1.0))) - body.measured_rest_mm)
+
+
+def midline_by_weight_mm(body: DrivenBody) -> float:
+    """Shift of the middle between the fingers when the plate stands on its side: both halves sway the same way.
+
+    The drive is held along its axis and free across, as the actuator guides nothing there.
+    """
+    return body.measured_mm(weight_displacement_mm(body, (1.0, 0.0), swaying=True)) - body.measured_rest_mm
+
+
+def gap_and_force_by_strain(body: DrivenBody, drive_face_y_mm: float) -> tuple[float, float]:
+    """Change of a gripper's gap in mm, and of the force at the held drive in N, by a thermal strain of one.
+
+    Clamp and actuator stay where they are: the gripper grows between them. The actuator holds the drive's face; a model
+    that is driven at a point above it moves that point by what the block between them grows. A frame of bars has its
+    bars end where their axes meet, and errs by some millimetres times the strain: take finite elements.
+    """
+    held = np.zeros(body.unknowns)
+    height = np.zeros(body.unknowns)
+    height[body.nodes[:, 1]] = body.nodes_mm[:, 1]
+    held[body.driven] = height[body.driven] - drive_face_y_mm
+    moved, force = thermal_displacement_mm(body, 1.0, held)
+    return 2.0 * (body.measured_mm(moved) - body.measured_rest_mm), 2.0 * float(force[body.driven].sum())

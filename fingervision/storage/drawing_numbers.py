@@ -1,0 +1,126 @@
+"""The numbers of a drawing's tables by their dotted names: read with their uncertainty, and changed.
+
+A number may be written `{ value = 1.0, u = 0.1 }`, with its standard uncertainty, wherever a number or arithmetic may
+stand alone. Sections that repeat go by their name, or by their place from 1: `flexure.left.thickness_mm`,
+`body.2.width_mm`.
+"""
+
+import copy
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+from fingervision.domain.errors import FingervisionError
+from fingervision.storage.finite import is_number
+
+Path = tuple[str | int, ...]
+
+_KEYS = frozenset({"value", "u"})
+
+
+def bare_tables(tables: Mapping[str, Any], origin: str) -> tuple[dict[str, Any], dict[str, float]]:
+    """Take the uncertainties out of a drawing.
+
+    Parameters
+    ----------
+    tables : mapping
+        As TOML has them.
+    origin : str
+        The file, for errors.
+
+    Returns
+    -------
+    tables : dict
+        With bare numbers in place of those that state an uncertainty.
+    uncertainties : dict of str to float
+        Positive standard uncertainties by dotted name, each in its number's own unit.
+
+    Raises
+    ------
+    FingervisionError
+        Where an uncertainty is no positive number, or belongs to a list.
+    """
+    bare = copy.deepcopy(dict(tables))
+    uncertainties = {}
+    for name, path, raw in list(_walk(bare)):
+        if isinstance(raw, dict):
+            u, value = raw["u"], raw["value"]
+            if not is_number(u) or u < 0.0:
+                raise FingervisionError(
+                    f"The uncertainty of {name} in {origin} must be a number that is not negative, but is {u!r}."
+                )
+            if isinstance(value, list | dict):
+                raise FingervisionError(
+                    f"The uncertainty of {name} in {origin} must belong to a single number, but its value is {value!r}."
+                )
+            _put(bare, path, value)
+            if u > 0.0:
+                uncertainties[name] = float(u)
+    return bare, uncertainties
+
+
+def changed_tables(
+    tables: Mapping[str, Any], changes: Mapping[str, float], origin: str, *, absolute: bool = False
+) -> dict[str, Any]:
+    """Change some numbers of a drawing.
+
+    Parameters
+    ----------
+    tables : mapping
+        With bare numbers.
+    changes : mapping of str to float
+        By dotted name: how much is added, or the number itself.
+    origin : str
+        The file, for errors.
+    absolute : bool
+        Whether the numbers are replaced.
+
+    Raises
+    ------
+    FingervisionError
+        Where a name is that of no number.
+    """
+    changed = copy.deepcopy(dict(tables))
+    places = {name: (path, raw) for name, path, raw in _walk(changed)}
+    for name, by in changes.items():
+        if name not in places:
+            raise FingervisionError(
+                f"{origin} has no number {name}; it has {', '.join(sorted(places)[:8])} and others like them."
+            )
+        path, raw = places[name]
+        if absolute:
+            _put(changed, path, by)
+        else:
+            _put(changed, path, f"({raw}) + ({by!r})" if isinstance(raw, str) else raw + by)
+    return changed
+
+
+def numbers_of(tables: Mapping[str, Any]) -> dict[str, float | str]:
+    """Return every bare number, or its arithmetic, by dotted name."""
+    return {name: raw if isinstance(raw, str) else float(raw) for name, _, raw in _walk(tables)}
+
+
+def _walk(tables: Mapping[str, Any]) -> Iterator[tuple[str, Path, Any]]:
+    """Every number, arithmetic or uncertain number: its dotted name, its path and what stands there."""
+    yield from _walk_in(tables, "", ())
+
+
+def _walk_in(node: Any, name: str, path: Path) -> Iterator[tuple[str, Path, Any]]:
+    if isinstance(node, Mapping):
+        if set(node) == _KEYS:
+            yield name, path, node
+            return
+        for key, value in node.items():
+            if key != "name":
+                yield from _walk_in(value, f"{name}.{key}" if name else key, (*path, key))
+    elif isinstance(node, list):
+        for place, value in enumerate(node):
+            own = str(value["name"]) if isinstance(value, Mapping) and "name" in value else str(place + 1)
+            yield from _walk_in(value, f"{name}.{own}", (*path, place))
+    elif is_number(node) or isinstance(node, str):
+        yield name, path, node
+
+
+def _put(tables: Any, path: Path, value: Any) -> None:
+    for step in path[:-1]:
+        tables = tables[step]
+    tables[path[-1]] = value

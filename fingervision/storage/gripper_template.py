@@ -1,0 +1,97 @@
+"""A gripper.toml as a template of a mechanism: both fingers drawn, each half with what differs in it."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+from operator import attrgetter
+from pathlib import Path
+from typing import Any
+
+from fingervision.domain.errors import FingervisionError
+from fingervision.domain.gripper import Gripper
+from fingervision.models.gripper_mechanism import whole_mechanism
+from fingervision.models.gripper_outline import check_outline
+from fingervision.models.mechanism import Mechanism, check_mechanism
+from fingervision.models.redrawn import redrawn
+from fingervision.storage.drawing_reader import DrawingReader, as_table
+from fingervision.storage.gripper_toml import read_gripper
+
+_TOP = ("schema", "name", "gripper")
+_TABLE = ("file", "left", "right")
+_HINGES = ("hinge1", "hinge2")
+_OF_HINGE = ("thickness_mm", "radius_mm")
+_SHARED = ("body.plate_mm", "material", "lever.l3_mm", "lever.drive")
+
+
+def mechanism_from_gripper(tables: Mapping[str, Any], path: Path) -> Mechanism:
+    """Build a mechanism whose [gripper] names a gripper.toml, and what differs in its left and its right half.
+
+    Keys of [gripper.left] and [gripper.right] are dotted names as in gripper.toml (`"lever.l2_mm"`), or hinge1 and
+    hinge2 with thickness_mm or radius_mm; `redrawn` says what else of the drawing moves with a number.
+
+    Raises
+    ------
+    FingervisionError
+        Where a key is unknown, a number is no number, or the drawing cannot be a mechanism.
+    """
+    origin = str(path)
+    reader = DrawingReader({}, origin)
+    reader.known(tables, _TOP, "the top level")
+    table = as_table(tables["gripper"], f"[gripper] in {origin}")
+    reader.known(table, _TABLE, "[gripper]")
+    file = table.get("file")
+    if not isinstance(file, str):
+        raise FingervisionError(f"gripper.file in {origin} must name a gripper.toml beside it, but is {file!r}.")
+    gripper = read_gripper(path.parent / file)
+    halves, hinges = [], {}
+    for side in ("left", "right"):
+        changes = _flat(as_table(table.get(side, {}), f"[gripper.{side}] in {origin}"))
+        half = gripper
+        for key in changes:
+            what = f"gripper.{side}.{key}"
+            value = reader.positive(changes, key, f"gripper.{side}")
+            section, _, name = key.partition(".")
+            if section in _HINGES:
+                if name not in _OF_HINGE:
+                    raise FingervisionError(f"{what} in {origin} must be one of {' and '.join(_OF_HINGE)} of a hinge.")
+                hinges[f"{side} hinge {section[-1]}", name] = value
+                continue
+            half = _changed(half, key, value, what, origin)
+        halves.append(half)
+    left, right = halves
+    mechanism = whole_mechanism(left, right, str(tables.get("name", path.stem)))
+    flexures = []
+    for flexure in mechanism.flexures:
+        t = hinges.get((flexure.name, "thickness_mm"), flexure.thickness_mm)
+        r = hinges.get((flexure.name, "radius_mm"), flexure.half_length_mm)
+        flexures.append(replace(flexure, thickness_mm=t, half_length_mm=r, depth_mm=r))
+    mechanism = replace(mechanism, flexures=tuple(flexures))
+    check_mechanism(mechanism, mechanism.region)
+    return mechanism
+
+
+def _flat(table: Mapping[str, Any]) -> dict[str, Any]:
+    """Dotted names to values, whether they are written in quotes or as tables."""
+    found: dict[str, Any] = {}
+    for key, value in table.items():
+        if isinstance(value, dict):
+            found |= {f"{key}.{inner}": deep for inner, deep in value.items()}
+        else:
+            found[key] = value
+    return found
+
+
+def _changed(half: Gripper, key: str, value: float, what: str, origin: str) -> Gripper:
+    if key.startswith(_SHARED):
+        raise FingervisionError(f"{what} in {origin} must be the same in both halves; change it in the gripper.toml.")
+    try:
+        now = attrgetter(key)(half)
+    except AttributeError:
+        now = None
+    if not isinstance(now, float):
+        raise FingervisionError(
+            f"{what} in {origin} must name a number as gripper.toml does, such as lever.l2_mm or "
+            "hinge1.thickness_mm, but does not."
+        )
+    changed = redrawn(half, key, value - now)
+    check_outline(changed, f"{what} of {origin}")
+    return changed

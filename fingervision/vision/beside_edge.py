@@ -1,0 +1,108 @@
+"""The edges once more, without what stands beside them: each line's share of a shadow or of glare is taken off first.
+
+What the mean profile of the flanks has told (breadth, size, blur) holds all around a finger, at the same distance from
+its edge. On a slanted line it is stretched as the edge is. Taking it off and fitting the step again leaves no line with
+a window that holds more of it than another one's.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fingervision.domain.compiled import compiled
+from fingervision.vision.edge_filters import PIXEL_VARIANCE, Lines, edge_filters, reach_for
+from fingervision.vision.edges import BLUR_OF_LINE, ROUNDING, EdgePoints
+from fingervision.vision.grey import GreyImage
+from fingervision.vision.line_levels import line_levels
+from fingervision.vision.median import middle
+from fingervision.vision.outline_blur import curvature_gain
+from fingervision.vision.profile_lines import ProfileLines
+from fingervision.vision.profile_models import GLARE, ProfileFit, addition
+
+Floats = NDArray[np.float64]
+
+# Edge and what stands beside it settle within so many looks.
+LOOKS = 5
+# The blur that a look finds is near the profile's own: never below this share of it.
+LEAST_BLUR_SHARE = 0.5
+
+
+def without_additions(
+    upright: GreyImage, edges: EdgePoints, light: Floats, kind: int, fits: list[ProfileFit]
+) -> EdgePoints:
+    """The edges of both fingers, each without the addition that its own mean profile shows.
+
+    Parameters
+    ----------
+    upright : ndarray, shape (rows, columns)
+        Grey levels, seen with the tips up.
+    edges : EdgePoints
+        At the places that the mean profiles give.
+    light : ndarray of float, shape (levels,)
+        Light of every grey level.
+    kind : int
+        What it is: SHADOW or GLARE.
+    fits : list of ProfileFit
+        The mean profile of the left and of the right finger.
+    """
+    blur = np.array([np.sqrt(max(fit.blur**2 - PIXEL_VARIANCE, 0.04)) for fit in fits])
+    filters = edge_filters(reach_for(float(blur.max())))
+    lines = edges.lines
+    coarse = np.rint(edges.position).astype(np.intp)
+    position = lines.outward * (edges.position - coarse)
+    lines = ProfileLines(lines.fixed, coarse, lines.slope, lines.weight, lines.outward)
+    levels = line_levels(upright, lines, light, filters.reach_px)
+    shape, pixels = coarse.shape, levels.shape[-1]
+    contrast = np.repeat([[_contrast(edges, k)] for k in range(2)], shape[1], axis=1)
+    shared = Lines(lines.slope.ravel(), lines.weight.ravel(), BLUR_OF_LINE)
+    sizes = np.array([fit.share * (fit.blur * np.sqrt(2.0 * np.pi) if kind == GLARE else 1.0) for fit in fits])
+    breadths, blurs = np.array([fit.breadth for fit in fits]), np.array([fit.blur for fit in fits])
+    found = np.repeat(blur, 2)
+    for number in range(LOOKS):
+        seen = _without(levels, lines.slope, position, contrast, kind, sizes, breadths, blurs)
+        look = filters.look(seen.reshape(-1, pixels), shared, found, position.ravel())
+        position, contrast = look.position.reshape(shape), look.contrast.reshape(shape)
+        if number < LOOKS - 1:
+            found = np.maximum(look.blur, LEAST_BLUR_SHARE * np.repeat(blur, 2))
+    mean_square, gain = filters.mean_square(seen.reshape(-1, pixels), look)
+    variance = max(middle(mean_square[lines.weight.ravel() > 0]), ROUNDING)
+    u_position = np.sqrt(np.maximum(mean_square, variance)) / (np.abs(look.contrast) * gain)
+    return replace(
+        edges,
+        lines=lines,
+        position=lines.coarse + lines.outward * position,
+        u_position=u_position.reshape(shape),
+        contrast=contrast,
+        blur_px=found.reshape(2, 2),
+        noise=float(np.sqrt(variance)),
+        curvature_gain=curvature_gain(lines.slope, filters.reach_px / look.sigma.reshape(shape)),
+        reach_px=filters.reach_px,
+    )
+
+
+def _contrast(edges: EdgePoints, k: int) -> float:
+    return middle(edges.contrast[k][edges.lines.weight[k] > 0])
+
+
+@compiled
+def _without(
+    levels: Floats,
+    slope: Floats,
+    position: Floats,
+    contrast: Floats,
+    kind: int,
+    sizes: Floats,
+    breadths: Floats,
+    blurs: Floats,
+) -> Floats:
+    """Light along every line without the addition, which lies as the edge does and has its share of the contrast."""
+    fingers, lines, pixels = levels.shape
+    seen = levels.copy()
+    for k in range(fingers):
+        for i in range(lines):
+            stretch = np.sqrt(1.0 + slope[k, i] ** 2)
+            for j in range(pixels):
+                away = (j - pixels // 2 - position[k, i]) / stretch
+                seen[k, i, j] -= contrast[k, i] * sizes[k] * addition(kind, away, blurs[k], breadths[k])
+    return seen

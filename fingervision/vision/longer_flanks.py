@@ -1,0 +1,41 @@
+"""Rough flanks are followed farther down: what strays over many pixels is averaged over many more of them.
+
+A finger's flank is straight near its tip; farther down it may bend or end. So the longer flank counts only where it
+says the same, surely enough, as the near part (Hausman, Econometrica 46, 1978, 1251: the difference of a surer and a
+less sure estimate has the difference of their variances).
+"""
+
+from math import sqrt
+
+import numpy as np
+
+from fingervision.domain.gap import GapMeasurement, NoGap
+from fingervision.vision.fingers import CoarseFinger, CoarseFingers
+from fingervision.vision.flanks import follow_down
+
+# Lengths of a flank that is followed: the measuring height and so many pixels below the tip.
+LONG_PX = 180.0
+# Two results agree where their difference is no more than so many of its standard uncertainties.
+AGREES = 2.5
+
+
+def with_longer_flanks(fingers: CoarseFingers, below_tip_px: float) -> CoarseFingers:
+    """The same fingers, their outlines as far down as a long flank goes."""
+    left, right = (_longer(finger, below_tip_px + LONG_PX) for finger in (fingers.left, fingers.right))
+    return CoarseFingers(left, right, fingers.orientation, fingers.score, fingers.is_rooted)
+
+
+def is_surer(longer: GapMeasurement | NoGap, near: GapMeasurement) -> bool:
+    """Whether longer flanks say the same as the near ones, and say it more surely."""
+    if not isinstance(longer, GapMeasurement) or longer.u_gap_px >= near.u_gap_px:
+        return False
+    return abs(longer.gap_px - near.gap_px) <= AGREES * sqrt(near.u_gap_px**2 - longer.u_gap_px**2)
+
+
+def _longer(finger: CoarseFinger, reach_px: float) -> CoarseFinger:
+    top = finger.top
+    start, stop = (follow_down(top.outline, top.index, step, top.along_px + reach_px) for step in (-1, 1))
+    piece = top.outline[start : stop + 1]
+    if finger.inner_sign * (piece[0, 0] - piece[-1, 0]) < 0:
+        piece = piece[::-1]
+    return CoarseFinger(np.ascontiguousarray(piece), finger.inner_sign, top)

@@ -1,0 +1,165 @@
+"""Sharpening inside a camera with a curved response: it works on stored levels, and so moves the edge in light.
+
+An unsharp mask adds as much to the light side of an edge as it takes from the dark side, in levels. Seen in light the
+two are unlike, and a step that is fitted there lies off the edge. The mean profile of a flank, in levels, shows the
+mask: it is fitted as a blurred step of light, coded by the response, plus a share of what a blur leaves of it. The
+same profile, decoded, tells where the step that was fitted in light lies. The difference is taken off all around.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import ndtr
+
+from fingervision.domain.compiled import compiled
+
+Floats = NDArray[np.float64]
+
+# A response is curved where half-way in levels lies so far from half-way in light (share of the range).
+CURVED = 0.02
+# The profile is modelled on a grid of so many pixels' spacing, so far to either side.
+GRID_PX, REACH_PX = 0.25, 20.0
+# Starts: amount of the mask and its radius (pixels). Cameras use radii near one pixel: the logarithm is that of one
+# pixel within so much (standard deviation), the amount is moderate within so much, because one profile tells blur,
+# amount and radius apart but badly. Limits of position (pixels), blur, amount and logarithm of the radius.
+START_AMOUNT, U_LOG_RADIUS, U_AMOUNT = 0.4, 0.2, 0.5
+LEAST = np.array([-5.0, -5.0, 0.3, -0.2, -0.7])
+MOST = np.array([5.0, 5.0, 5.0, 3.0, 1.4])
+BLUR, AMOUNT, LOG_RADIUS = 2, 3, 4
+ITERATIONS, STEP, SETTLED = 12, 1e-3, 1e-4
+# A mask is there where it explains so many times the variance that is left, and adds so much to a step.
+SIGNIFICANT, LEAST_AMOUNT = 12.0, 0.1
+# Cameras' masks are not quite Gaussian: this share of the shift is its standard uncertainty.
+U_SHIFT = 0.4
+
+
+@dataclass(frozen=True, slots=True)
+class Sharpening:
+    """What a camera's mask has done.
+
+    Parameters
+    ----------
+    shift_px : (float, float)
+        From the step that was fitted in light outwards to the edge, left and right finger.
+    amount, radius_px : float
+        Of the unsharp mask.
+    """
+
+    shift_px: tuple[float, float]
+    amount: float
+    radius_px: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Profile:
+    """Mean stored level across a flank: places outwards from the step that was fitted in light, and their pixels."""
+
+    t: Floats
+    level: Floats
+    count: Floats
+
+
+def is_curved(light: Floats, top_level: int) -> bool:
+    """Whether levels are not in proportion to light."""
+    return abs(float(light[top_level // 2]) / float(light[top_level]) - 0.5) > CURVED
+
+
+def sharpening(profiles: tuple[Profile, Profile], light: Floats, top_level: int, blur_px: float) -> Sharpening | None:
+    """What the mean profiles of both inner flanks show of an unsharp mask; None where they show nothing.
+
+    Parameters
+    ----------
+    profiles : (Profile, Profile)
+        Left and right finger.
+    light : ndarray of float, shape (levels,)
+        Light of every level.
+    top_level : int
+        End of the scale.
+    blur_px : float
+        Blur of the step that was fitted in light, the pixel included.
+    """
+    stored = np.arange(top_level + 1.0)
+    curve = np.ascontiguousarray(light[: top_level + 1])
+    grid = np.arange(-REACH_PX, REACH_PX + GRID_PX, GRID_PX)
+    ends = [
+        np.interp([p.level[p.t < p.t.min() + 6.0].mean(), p.level[p.t > p.t.max() - 6.0].mean()], stored, curve)
+        for p in profiles
+    ]
+
+    def residuals(p: Floats) -> Floats:
+        found = []
+        for k, (profile, (inside, outside)) in enumerate(zip(profiles, ends, strict=True)):
+            levels = np.interp(inside + (outside - inside) * ndtr((grid - p[k]) / p[BLUR]), curve, stored)
+            if p[AMOUNT]:
+                levels = levels + p[AMOUNT] * (levels - _softened(levels, float(np.exp(p[LOG_RADIUS])) / GRID_PX))
+            found.append(_adjusted(np.interp(profile.t, grid, levels), profile.level, np.sqrt(profile.count)))
+        return np.concatenate(found)
+
+    start = np.array([0.0, 0.0, blur_px, 0.0, 0.0])
+    plain = _fitted(residuals, start, 3)
+    bins = sum(profile.t.size for profile in profiles)
+    squares = float(np.sum(residuals(plain) ** 2))
+    scale = np.sqrt(squares / bins)
+
+    def held(p: Floats) -> Floats:
+        return np.append(residuals(p), [scale * p[AMOUNT] / U_AMOUNT, scale * p[LOG_RADIUS] / U_LOG_RADIUS])
+
+    start = plain + np.array([0.0, 0.0, 0.15 * plain[BLUR], START_AMOUNT, 0.0])
+    p = _fitted(held, start, 5)
+    left = float(np.sum(residuals(p) ** 2))
+    if squares - left < SIGNIFICANT * left / bins or p[AMOUNT] < LEAST_AMOUNT:
+        return None
+    return Sharpening((float(p[0]), float(p[1])), float(p[AMOUNT]), float(np.exp(p[LOG_RADIUS])))
+
+
+def _fitted(residuals: Callable[[Floats], Floats], start: Floats, free: int) -> Floats:
+    """Least squares by Levenberg and Marquardt over the first `free` parameters."""
+    p, damping = start.copy(), 1e-2
+    base = residuals(p)
+    left = float(base @ base)
+    for _iteration in range(ITERATIONS):
+        jacobian = np.empty((base.size, free))
+        for a in range(free):
+            moved = p.copy()
+            moved[a] += STEP
+            jacobian[:, a] = (residuals(moved) - base) / STEP
+        gradient, normal = jacobian.T @ base, jacobian.T @ jacobian
+        before = left
+        for _try in range(5):
+            move = np.linalg.solve(normal + damping * np.diag(np.diag(normal) + 1e-9), -gradient)
+            new = p.copy()
+            new[:free] = np.clip(p[:free] + np.clip(move, -0.7, 0.7), LEAST[:free], MOST[:free])
+            other = residuals(new)
+            squares = float(other @ other)
+            if squares < left:
+                p, base, left, damping = new, other, squares, 0.3 * damping
+                break
+            damping *= 5.0
+        if before - left < SETTLED * before:
+            break
+    return p
+
+
+def _adjusted(model: Floats, level: Floats, root: Floats) -> Floats:
+    """Weighted residuals with the offset and the size of the model at their best."""
+    basis = np.column_stack((root, root * model))
+    seen = root * level
+    return np.asarray(basis @ np.linalg.solve(basis.T @ basis, basis.T @ seen) - seen)
+
+
+@compiled
+def _softened(levels: Floats, sigma: float) -> Floats:
+    """Gaussian blur of a row, its ends repeated."""
+    reach = int(np.ceil(3.5 * sigma))
+    kernel = np.exp(-0.5 * (np.arange(-reach, reach + 1) / sigma) ** 2)
+    kernel /= kernel.sum()
+    n = levels.size
+    soft = np.empty(n)
+    for i in range(n):
+        total = 0.0
+        for j in range(-reach, reach + 1):
+            total += kernel[j + reach] * levels[min(max(i + j, 0), n - 1)]
+        soft[i] = total
+    return soft

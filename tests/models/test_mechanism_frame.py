@@ -1,0 +1,114 @@
+"""Lumped mechanisms of any topology: against finite elements of the same drawing, the paper's matrix, invariances."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from fingervision.domain.errors import FingervisionError
+from fingervision.domain.gripper import Gripper
+from fingervision.models.corotational_body import CorotationalBody, turned_axes
+from fingervision.models.finite_element import FiniteElementGripper
+from fingervision.models.gripper_mechanism import half_mechanism, whole_mechanism
+from fingervision.models.mechanism_chain import MechanismChain
+from fingervision.models.mechanism_frame import MechanismFrame
+from fingervision.models.mechanism_plate import MechanismPlate
+from fingervision.models.physics import Physics
+from fingervision.models.redrawn import redrawn
+from fingervision.models.static_answer import gap_per_input
+from fingervision.models.stiffness_matrix import StiffnessMatrixGripper
+
+SLOPE = 5e-4
+"""Of bodies condensed to frames: ten times better than the bar that the lumped model is held to."""
+FORCE = 0.01
+SAME_DRAWING = 2e-4
+"""Two meshes of one outline: the packaged one and the one that the mechanism makes."""
+
+
+def test_the_template_has_the_gripper_s_figures(gripper: Gripper, finite_element: FiniteElementGripper) -> None:
+    unit = MechanismPlate(half_mechanism(gripper)).state(1.0)
+    assert 2.0 * unit.probes_mm["tip"][0] == pytest.approx(gap_per_input(finite_element.half), rel=SAME_DRAWING)
+    assert 2.0 * unit.force_n == pytest.approx(finite_element.half.equilibrium(1.0).force_n, rel=SAME_DRAWING)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("thickness", "radius", "plate"), [(1.0, 4.0, 3.0), (2.0, 5.0, 20.0), (0.2, 8.0, 1.0)])
+def test_lumped_half_beside_finite_elements(gripper: Gripper, thickness: float, radius: float, plate: float) -> None:
+    drawn = replace(
+        gripper,
+        hinge=replace(gripper.hinge, thickness_mm=thickness, radius_mm=radius),
+        body=replace(gripper.body, plate_mm=plate),
+    )
+    frame, solid = MechanismFrame(half_mechanism(drawn)), FiniteElementGripper(drawn)
+    unit = frame.state(1.0)
+    assert 2.0 * unit.probes_mm["tip"][0] == pytest.approx(gap_per_input(solid.half), rel=SLOPE)
+    assert 2.0 * unit.force_n == pytest.approx(solid.half.equilibrium(1.0).force_n, rel=FORCE)
+    assert unit.stress_mpa == pytest.approx(solid.peak_stress().mpa_per_mm, rel=FORCE)
+    for held in (False, True):
+        ours = frame.modes_hz(drive_held=held, count=2)
+        assert ours == pytest.approx(solid.modes_hz(drive_held=held, count=2), rel=FORCE)
+
+
+@pytest.mark.slow
+def test_contact_and_large_rotation(gripper: Gripper) -> None:
+    """Pushed 1.5 mm beyond the first touch, in the deformed shape: the gripper's own finite elements and both kinds."""
+    ours = FiniteElementGripper(gripper, Physics(large_rotation=True, contact=True)).loaded([-2.0])[0]
+    half = half_mechanism(gripper)
+    for kind, stress in ((MechanismPlate, FORCE), (MechanismFrame, 0.1)):
+        state = kind(half).state(-2.0, large_rotation=True, contact=True)
+        assert 2.0 * state.force_n == pytest.approx(ours.force_n, rel=FORCE)
+        assert state.contact_n["tip"] == pytest.approx(ours.grip_n, rel=FORCE)
+        assert state.stress_mpa == pytest.approx(ours.stress_mpa, rel=stress)
+
+
+@pytest.mark.slow
+def test_an_asymmetric_gripper_mirrors_with_its_drawing(gripper: Gripper) -> None:
+    other = redrawn(gripper, "lever.l2_mm", 0.5)
+    one, two = (MechanismFrame(whole_mechanism(a, b, "g")).state(1.0) for a, b in ((gripper, other), (other, gripper)))
+    assert one.probes_mm["left tip"][0] == pytest.approx(-two.probes_mm["right tip"][0], rel=1e-4)
+    assert one.probes_mm["right tip"][1] == pytest.approx(two.probes_mm["left tip"][1], rel=1e-4)
+    assert one.force_n == pytest.approx(two.force_n, rel=1e-4)
+    assert one.probes_mm["right tip"][0] < 0.98 * -one.probes_mm["left tip"][0]
+
+
+def test_the_chain_is_the_paper_s_matrix(gripper: Gripper) -> None:
+    chain, paper = MechanismChain(half_mechanism(gripper)), StiffnessMatrixGripper(gripper, rigid_links=True)
+    unit = chain.state(1.0)
+    assert 2.0 * unit.force_n == pytest.approx(paper.input_stiffness_n_mm, rel=1e-4)
+    assert 2.0 * unit.probes_mm["tip"][0] == pytest.approx(paper.gap_per_input, rel=1e-4)
+
+
+def test_a_loop_is_no_chain(gripper: Gripper) -> None:
+    with pytest.raises(FingervisionError, match="form a loop"):
+        MechanismChain(whole_mechanism(gripper, gripper, "both"))
+
+
+def stiff_triangle() -> CorotationalBody:
+    """Three frames with a random positive definite law between them."""
+    random = np.random.default_rng(4)
+    places = np.array([[0.0, 0.0], [3.0, 1.0], [-1.0, 4.0]])
+    motions = np.zeros((9, 3))
+    for i, (x, y) in enumerate(places):
+        motions[3 * i : 3 * i + 3] = [[1.0, 0.0, -y], [0.0, 1.0, x], [0.0, 0.0, 1.0]]
+    free = np.eye(9) - motions @ np.linalg.pinv(motions)
+    root = random.standard_normal((9, 9)) @ free
+    return CorotationalBody(places, root.T @ root)
+
+
+def test_a_rigid_turn_costs_a_body_nothing() -> None:
+    body = stiff_triangle()
+    for angle in (0.3, 2.0):
+        moved = (body.places_mm @ turned_axes(angle).T + [5.0, -2.0]) - body.places_mm
+        motion = np.column_stack([moved, np.full(3, angle)]).ravel()
+        _, force = body.forces_n(motion)
+        assert force == pytest.approx(np.zeros(9), abs=1e-12 * np.abs(body.stiffness_n_mm).max())
+
+
+def test_the_tangent_is_the_slope_of_the_forces() -> None:
+    body = stiff_triangle()
+    at = np.random.default_rng(5).standard_normal(9)
+    tangent, _ = body.forces_n(at)
+    step = 1e-6
+    by_hand = np.array([(body.forces_n(at + step * e)[1] - body.forces_n(at - step * e)[1]) / (2 * step)
+                        for e in np.eye(9)]).T  # fmt: skip
+    assert tangent == pytest.approx(by_hand, rel=1e-6, abs=1e-6)

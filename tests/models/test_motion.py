@@ -1,0 +1,221 @@
+"""Motion in time and by frequency, against integrations and solutions that share nothing with it but the matrices."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from fingervision.domain.drive import DriveHistory
+from fingervision.domain.errors import FingervisionError, UsageError
+from fingervision.domain.gripper import Gripper
+from fingervision.models.damping import Damping, LossFactor, ModalDamping, PaperDamping, RayleighDamping
+from fingervision.models.damping_text import parse_damping
+from fingervision.models.frequency_response import frequency_response, resolved_frequencies_hz
+from fingervision.models.lumped import LumpedGripper
+from fingervision.models.mechanism_plate import MechanismPlate
+from fingervision.models.modal_model import gripper_free_modes, gripper_modes
+from fingervision.models.modal_response import modal_motion
+from fingervision.models.motion_in_time import gripper_motion
+from fingervision.models.physics import Physics
+from fingervision.storage.mechanism_toml import read_mechanism
+
+HALF_PERCENT, ONE_PERCENT = 0.005, 0.01
+STAGE = Path(__file__).parents[2] / "fingervision" / "models" / "mechanisms" / "parallel_leaf_stage.toml"
+
+
+def steps(*corners: tuple[float, float], rows: int = 400) -> DriveHistory:
+    times, inputs = np.array(corners).T
+    at = np.union1d(np.linspace(times[0], times[-1], rows), times)
+    return DriveHistory(at, np.interp(at, times, inputs))
+
+
+@pytest.mark.parametrize("damping", [ModalDamping(0.025), LossFactor(0.1), PaperDamping()], ids=["modal", "loss", "4"])
+def test_step_response_against_an_adaptive_integration(lumped: LumpedGripper, damping: Damping) -> None:
+    """A step of 0.5 mm within 2 ms: scipy's DOP853 on the modes' equations, the drive's kinks as jumps of speed."""
+    model = gripper_modes(lumped.half, 3)
+    drive = steps((0.0, 0.0), (0.002, 0.5), (0.03, 0.5))
+    found = modal_motion(model, drive, damping)
+    kept, ratios = found.modes_hz.size, found.damping_ratios
+    w, participation = model.rad_s[:kept], model.participation[:kept]
+
+    def slope(_: float, state: np.ndarray) -> np.ndarray:
+        q, v = state.reshape(2, -1)
+        return np.concatenate([v, -2 * ratios * w * v - w**2 * q])
+
+    state, gap = np.zeros(2 * kept), []
+    for (begin, end), jump in (((0.0, 0.002), 250.0), ((0.002, 0.03), -250.0)):
+        state[kept:] -= participation * jump
+        inside = drive.time_s[(drive.time_s >= begin) & (drive.time_s <= end)]
+        way = solve_ivp(slope, (begin, end), state, "DOP853", inside, rtol=1e-10, atol=1e-14)
+        gap.append(way.y[:kept].T if not gap else way.y[:kept].T[1:])
+        state = way.y[:, -1]
+    seen = model.observed["gap_mm"]
+    expected = seen.rest_mm + seen.per_input * drive.input_mm + np.concatenate(gap) @ seen.by_mode[:kept]
+    vibration = np.ptp(expected - found.static_mm["gap_mm"])
+    assert vibration > 0.1
+    assert np.abs(found.observed_mm["gap_mm"] - expected).max() < HALF_PERCENT * vibration
+
+
+@pytest.mark.parametrize("ratio", [0.005, 0.025, 0.1])
+def test_logarithmic_decrement_is_the_damping_asked_for(lumped: LumpedGripper, ratio: float) -> None:
+    """Peak to peak of what a struck gripper rings down by, read off its gap."""
+    period = 1.0 / lumped.modes_hz(drive_held=True)[0] / np.sqrt(1 - ratio**2)
+    peaks = 0.001 + 0.37 * period + np.arange(8) * period
+    drive = DriveHistory(np.concatenate([[0.0, 0.001], peaks]), np.array([0.0, 0.1, *[0.1] * 8]))
+    found = modal_motion(gripper_modes(lumped.half, 1), drive, ModalDamping(ratio))
+    ring = (found.observed_mm["gap_mm"] - found.static_mm["gap_mm"])[2:]
+    decrement = np.log(ring[:-1] / ring[1:])
+    assert decrement == pytest.approx(2 * np.pi * ratio / np.sqrt(1 - ratio**2), rel=ONE_PERCENT)
+
+
+def test_force_of_a_sine_is_the_dynamic_stiffness(lumped: LumpedGripper) -> None:
+    """The force in time against the full matrices at one frequency, without damping but the modes' own."""
+    frequency, half = 120.0, lumped.half
+    time_s = np.arange(0.0, 0.5, 5e-5)
+    drive = DriveHistory(time_s, 0.1 * np.sin(2 * np.pi * frequency * time_s))
+    found = modal_motion(gripper_modes(half, 8), drive, ModalDamping(0.02))
+    K, M = half.stiffness_n_mm.toarray(), half.mass_t.toarray()
+    w2 = (2 * np.pi * frequency) ** 2
+    dynamic = K - w2 * M
+    moved = np.zeros(half.unknowns)
+    moved[half.driven] = 1.0
+    inside = np.ix_(half.free, half.free)
+    moved[half.free] = np.linalg.solve(dynamic[inside], -(dynamic @ moved)[half.free])
+    # The last quarter is steady; the inertia that no mode carries meets the drive in its kinks alone.
+    steady = time_s > 0.375
+    model = gripper_modes(half, 8)
+    rest_t = model.mass_t - float(np.sum(model.participation**2))
+    expected = 2.0 * float((dynamic @ moved)[half.driven].sum()) + rest_t * w2
+    turning = np.exp(-2j * np.pi * frequency * time_s[steady])
+    amplitude = 2.0 * np.abs(np.mean(found.force_n[steady] * turning))
+    assert amplitude == pytest.approx(0.1 * abs(expected), rel=0.02)
+
+
+def test_frequency_response_against_the_full_matrices(lumped: LumpedGripper) -> None:
+    """(K - w^2 M + i w C) u = f of the whole frame, C of all its modes, held and free."""
+    half, ratio = lumped.half, 0.025
+    at = np.array([5.0, 45.0, 46.06, 47.0, 200.0, 340.0, 347.0, 354.0, 450.0])
+    found = frequency_response(gripper_modes(half, 12), gripper_free_modes(half, 12), at, ModalDamping(ratio))
+    K, M = half.stiffness_n_mm.toarray(), half.mass_t.toarray()
+
+    def damping(count: int, *, held: bool) -> np.ndarray:
+        rad_s, shapes = half.modes(drive_held=held, count=count)
+        return (M @ shapes * (2 * ratio * rad_s)) @ (M @ shapes).T
+
+    static = half.unit_displacement_mm
+    held, free = damping(40, held=True), damping(40, held=False)
+    for place, f in enumerate(at):
+        w = 2 * np.pi * f
+        inside = np.ix_(half.free, half.free)
+        # Damping acts on what moves beside the static shape.
+        dynamic = K - w**2 * M + 1j * w * held
+        beside = np.zeros(half.unknowns, complex)
+        beside[half.free] = np.linalg.solve(dynamic[inside], (w**2 * M @ static)[half.free])
+        gap = 2.0 * (static + beside)[half.measured] @ half.weights
+        assert abs(found.per_input["gap_mm"][place] - gap[()]) < HALF_PERCENT * abs(gap)
+        every = np.union1d(half.free, half.driven)
+        push = np.zeros(half.unknowns)
+        push[half.driven] = 0.5
+        moved = np.zeros(half.unknowns, complex)
+        moved[every] = np.linalg.solve((K - w**2 * M + 1j * w * free)[np.ix_(every, every)], push[every])
+        gap = 2.0 * moved[half.measured] @ half.weights
+        assert abs(found.per_force_mm_n["gap_mm"][place] - gap) < HALF_PERCENT * abs(gap)
+        drive = moved[half.driven][0]
+        assert abs(found.drive_per_force_mm_n[place] - drive) < HALF_PERCENT * abs(drive)
+
+
+def test_half_power_width_is_the_damping_asked_for(lumped: LumpedGripper) -> None:
+    model, free, law = gripper_modes(lumped.half, 6), gripper_free_modes(lumped.half, 6), ModalDamping(0.01)
+    at = resolved_frequencies_hz(model, free, law, 40.0, 52.0)
+    size = np.abs(frequency_response(model, free, at, law).per_force_mm_n["gap_mm"])
+    wide = at[size > size.max() / np.sqrt(2.0)]
+    fine = np.linspace(wide[0] - 0.5, wide[-1] + 0.5, 20001)
+    size = np.abs(frequency_response(model, free, fine, law).per_force_mm_n["gap_mm"])
+    wide = fine[size > size.max() / np.sqrt(2.0)]
+    assert np.ptp(wide) / (2.0 * fine[size.argmax()]) == pytest.approx(0.01, rel=ONE_PERCENT)
+
+
+def test_equation_4_describes_the_lowest_modes_alone(lumped: LumpedGripper) -> None:
+    found = modal_motion(gripper_modes(lumped.half, 8), steps((0.0, 0.0), (0.01, 0.1)), PaperDamping())
+    # zeta(1) = 0.045 gamma by the dimensionless equation, gamma 0.5; the second mode would have 0.45.
+    assert found.damping_ratios == pytest.approx([0.0225], rel=0.01)
+    assert found.modes_hz.size == 1
+
+
+def test_time_steps_and_modes_agree(gripper: Gripper) -> None:
+    """Contact that never comes: the same linear body, once by modes and once by steps in time."""
+    drive = steps((0.0, 0.0), (0.005, 0.2), (0.02, 0.2), rows=200)
+    modal = gripper_motion(LumpedGripper(gripper), drive)
+    stepped = gripper_motion(LumpedGripper(gripper, Physics(contact=True)), drive)
+    assert "steps" in stepped.method
+    travel = np.ptp(modal.gap_mm)
+    assert np.abs(stepped.gap_mm - modal.gap_mm).max() < HALF_PERCENT * travel
+
+
+def test_a_slow_drive_passes_through_the_equilibria(gripper: Gripper) -> None:
+    model = LumpedGripper(gripper, Physics(large_rotation=True, contact=True))
+    drive = steps((0.0, 0.0), (30.0, 1.8), (60.0, -0.7), rows=100)
+    found = gripper_motion(model, drive)
+    answer = model.respond(drive.input_mm)
+    assert "equilibria" in found.method
+    assert found.gap_mm == pytest.approx(answer.gap_mm, abs=1e-3)
+    assert found.motion.force_n == pytest.approx(answer.force_n, abs=0.02)
+    assert found.gap_mm.min() > -1e-3
+
+
+def test_a_drive_too_long_and_too_fast_for_large_rotation_is_refused(gripper: Gripper) -> None:
+    model = LumpedGripper(gripper, Physics(large_rotation=True))
+    time_s = np.linspace(0.0, 4.0, 4001)
+    drive = DriveHistory(time_s, 0.2 * np.sin(2 * np.pi * 300.0 * time_s))
+    with pytest.raises(FingervisionError, match=r"must be shorter than .* s .* but it takes 4 s and shakes it by"):
+        gripper_motion(model, drive)
+
+
+def test_runs_begin_at_rest_each(lumped: LumpedGripper) -> None:
+    one = steps((0.0, 0.0), (0.004, 0.3), (0.01, 0.3))
+    twice = DriveHistory(
+        np.concatenate([one.time_s, one.time_s + 0.02]),
+        np.concatenate([one.input_mm] * 2),
+        tuple(["a"] * one.time_s.size + ["b"] * one.time_s.size),
+    )
+    found = gripper_motion(lumped, twice).gap_mm
+    assert found[: one.time_s.size] == pytest.approx(found[one.time_s.size :], abs=1e-9)
+    assert found[: one.time_s.size] == pytest.approx(gripper_motion(lumped, one).gap_mm, abs=1e-12)
+
+
+def test_heavier_material_vibrates_slower(gripper: Gripper) -> None:
+    heavy = replace(gripper, material=replace(gripper.material, density_kg_m3=4 * 930.0))
+    modes = [gripper_modes(LumpedGripper(g).half, 2).modes_hz for g in (gripper, heavy)]
+    assert modes[0] == pytest.approx(2.0 * modes[1], rel=1e-9)
+
+
+@pytest.mark.slow
+def test_stage_on_two_leaves_vibrates_as_mass_and_spring() -> None:
+    """Pushed by a force: 1 / (k - m w^2) below its first mode, the mass from the mode, the spring from statics."""
+    plate = MechanismPlate(read_mechanism(STAGE))
+    frequency = 2 * np.pi * plate.modes_hz(drive_held=False, count=1)[0]
+    at = np.linspace(0.1, 0.9, 5) * frequency / (2 * np.pi)
+    found = frequency_response(plate.modal_model(4), plate.free_modes(4), at, ModalDamping(1e-6))
+    expected = 1.0 / (plate.stiffness_n_mm * (1.0 - (2 * np.pi * at / frequency) ** 2))
+    assert found.drive_per_force_mm_n.real == pytest.approx(expected, rel=ONE_PERCENT)
+    assert found.per_force_mm_n["stage_x_mm"].real == pytest.approx(expected, rel=2 * ONE_PERCENT)
+
+
+@pytest.mark.parametrize(
+    "text",
+    ["", "modal", "modal:0", "modal:-0.1", "modal:0.5", "modal:nan", "loss:0.6", "rayleigh:0.02", "rayleigh:0.02:50:40",
+     "paper:x", "viscous:0.1", "modal:0.02:3"],
+)  # fmt: skip
+def test_no_damping_law(text: str) -> None:
+    with pytest.raises(UsageError, match=r"--damping .*must"):
+        parse_damping(text)
+
+
+def test_damping_laws_by_their_text() -> None:
+    rad_s = 2 * np.pi * np.array([45.0, 360.0])
+    assert parse_damping("loss:0.05").ratios(rad_s) == pytest.approx(0.025)
+    assert parse_damping("rayleigh:0.03:45:360").ratios(rad_s) == pytest.approx(0.03)
+    assert isinstance(parse_damping("rayleigh:0.03:45:360"), RayleighDamping)
+    assert parse_damping("paper:0.4").ratios(rad_s[:1]) == pytest.approx(0.4 * 0.045, rel=0.01)

@@ -1,0 +1,134 @@
+"""Grip, leverage, weight, warmth and endurance, against closed forms and against solutions of other code."""
+
+from dataclasses import replace
+from math import inf, log
+
+import numpy as np
+import pytest
+from scipy.optimize import minimize
+
+from fingervision.domain.gripper import Gripper, SNLine
+from fingervision.models.endurance import endurance
+from fingervision.models.finite_element import FiniteElementGripper
+from fingervision.models.grip import Part, first_grip_mm, grip_equilibrium, mechanical_advantage
+from fingervision.models.lumped import LumpedGripper
+from fingervision.models.operating_figures import operating_figures
+from fingervision.models.steady_loads import gap_by_weight_mm, midline_by_weight_mm, thermal_displacement_mm
+from fingervision.models.stiffness_matrix import StiffnessMatrixGripper
+
+ONE_PERCENT = 0.01
+
+
+@pytest.mark.parametrize("stiffness", [inf, 50.0, 1.0])
+def test_grip_is_the_least_energy(lumped: LumpedGripper, stiffness: float) -> None:
+    """Scipy's SLSQP on the energy of finger and part, the face's points kept outside the squeezed part."""
+    half, width, input_mm = lumped.half, 3.0, -0.3
+    state = grip_equilibrium(half, input_mm, Part(width, stiffness))
+    compliance = half.face_displacement_mm[half.face]
+    K = np.linalg.inv(0.5 * (compliance + compliance.T))
+    free = half.face_gap_mm(input_mm * half.unit_displacement_mm)
+    soft = min(stiffness, 1e4)
+
+    def energy(x: np.ndarray) -> float:
+        moved, squeezed = x[:-1], x[-1]
+        return float(0.5 * moved @ K @ moved + 0.5 * (2.0 * soft) * squeezed**2)
+
+    outside = {"type": "ineq", "fun": lambda x: free + x[:-1] - 0.5 * width + x[-1]}
+    best = minimize(energy, np.array([0.2] * free.size + [0.0]), constraints=[outside], options={"ftol": 1e-14})
+    grip = 2.0 * soft * best.x[-1]
+    assert float(state.contact_n.sum()) == pytest.approx(grip, rel=ONE_PERCENT)
+    assert first_grip_mm(half, Part(width)) == pytest.approx(0.25 * half.first_touch_mm(), rel=1e-9)
+    assert grip_equilibrium(half, 0.0, Part(width)).contact_n.sum() == 0.0
+
+
+def test_kinds_grip_alike(gripper: Gripper, lumped: LumpedGripper) -> None:
+    """One corner touches: the stiffness matrix's finger and the frame's are the same bars."""
+    for part in (Part(3.0), Part(3.0, 20.0)):
+        by_matrix = StiffnessMatrixGripper(gripper).grip_force_n(-0.2, part)
+        assert float(grip_equilibrium(lumped.half, -0.2, part).contact_n.sum()) == pytest.approx(by_matrix, rel=0.01)
+
+
+def test_mechanical_advantage_is_reciprocal(lumped: LumpedGripper) -> None:
+    """Betti: pressing on the tips with the drive held pulls the drive by the gap's own ratio.
+
+    Then grip by force = (a / c) / (k + 2 a^2 / c) with a the tip's motion by input, c its compliance, drive held.
+    """
+    half = lumped.half
+    place = int(np.argmin(half.face_gap_mm(-0.5 * half.unit_displacement_mm)))
+    a = half.unit_displacement_mm[half.face[place]]
+    c = half.face_displacement_mm[half.face[place], place]
+    k = half.equilibrium(1.0).force_n
+    assert mechanical_advantage(half) == pytest.approx((a / c) / (k + 2.0 * a**2 / c), rel=1e-6)
+
+
+def test_tip_moves_and_turns_as_a_lever(lumped: LumpedGripper) -> None:
+    """Rigid links turn by 1 / l2 by input about hinge 1: the tip goes along by its distance from it across."""
+    own, lever = operating_figures(lumped.gripper, lumped.half), lumped.gripper.lever
+    turn = 1.0 / lever.l2_mm
+    assert np.radians(own.tip_turn_deg_per_mm) == pytest.approx(turn, rel=0.03)
+    assert own.tip_along_per_input == pytest.approx(turn * (lever.hinge1_mm[0] - 2.0), rel=0.03)
+
+
+def test_weight_is_that_of_the_density_and_kinds_agree(
+    gripper: Gripper, lumped: LumpedGripper, finite_element: FiniteElementGripper
+) -> None:
+    heavy = replace(gripper, material=replace(gripper.material, density_kg_m3=2 * 930.0))
+    assert gap_by_weight_mm(LumpedGripper(heavy).half) == pytest.approx(2.0 * gap_by_weight_mm(lumped.half), rel=1e-9)
+    for of in (gap_by_weight_mm, midline_by_weight_mm):
+        assert of(lumped.half) == pytest.approx(of(finite_element.half), rel=0.07)
+    # Rayleigh: one mode carries the swaying, so that the shift is about g / w^2 of it.
+    (first,) = lumped.swaying_modes_hz()
+    assert midline_by_weight_mm(lumped.half) == pytest.approx(9806.65 / (2 * np.pi * first) ** 2, rel=0.6)
+
+
+def test_a_body_whose_supports_grow_too_only_grows(finite_element: FiniteElementGripper) -> None:
+    half = finite_element.half
+    grown = np.zeros(half.unknowns)
+    grown[half.nodes[:, 0]], grown[half.nodes[:, 1]] = 1e-3 * half.nodes_mm.T
+    moved, force = thermal_displacement_mm(half, 1e-3, grown)
+    assert moved == pytest.approx(grown, abs=1e-12)
+    assert np.abs(force).max() < 1e-8
+    # The gap then grows by its own strain.
+    assert 2.0 * (half.measured_mm(moved) - half.measured_rest_mm) == pytest.approx(4e-3, rel=1e-6)
+
+
+def test_thermal_growth_by_a_second_way(gripper: Gripper, finite_element: FiniteElementGripper) -> None:
+    """Clamp and drive face stay: the free body grows, then the clamp's face is pressed back and the drive is pushed."""
+    warm = replace(gripper, material=replace(gripper.material, thermal_expansion_per_k=1e-4))
+    own = operating_figures(warm, finite_element.half)
+    # Growing about the clamp's middle puts the drive's face 2.57 mm up and both pillars 35.5 mm out, by their strain;
+    # brought back along the drive that costs its slope, and back across the pillars' own way, in the gap.
+    slope = 7.7196
+    expected = 1e-4 * (4.0 - 2.57 * slope)
+    pillars_mm = 1e-4 * 2.0 * 35.5
+    assert own.gap_per_kelvin_mm is not None
+    assert abs(own.gap_per_kelvin_mm - expected) < pillars_mm
+    assert operating_figures(gripper, finite_element.half).gap_per_kelvin_mm is None
+
+
+@pytest.mark.parametrize("low", [-20.0, -5.0, 0.0])
+def test_endurance_on_the_line(gripper: Gripper, low: float) -> None:
+    """Basquin's line through two points, Soderberg for the mean, worked out by hand."""
+    material = replace(gripper.material, sn_line=SNLine((1e3, 1e6), (40.0, 10.0)))
+    found = endurance(material, low, 25.0)
+    amplitude, mean = (25.0 - low) / 2, (25.0 + low) / 2
+    same = amplitude / (1 - mean / 48.0)
+    slope = log(1e6 / 1e3) / log(10.0 / 40.0)
+    assert found is not None
+    assert found.cycles == pytest.approx(1e3 * (same / 40.0) ** slope)
+
+
+def test_endurance_beyond_the_line_is_a_limit(gripper: Gripper) -> None:
+    material = replace(gripper.material, sn_line=SNLine((1e3, 1e6), (40.0, 10.0), 0.0))
+    # The pulsating line's own points give its own cycles.
+    end = endurance(material, 0.0, 20.0)
+    assert end is not None
+    assert end.cycles == pytest.approx(1e6)
+    little, much = endurance(material, 0.0, 5.0), endurance(material, -47.0, 47.0)
+    assert little is not None
+    assert much is not None
+    assert (little.cycles, little.at_least) == (None, 1e6)
+    assert "more than 1e+06 cycles" in little.words
+    # Pulsating to 80 MPa lies beyond the yield stress: no amplitude is beyond such a line's beginning.
+    assert much.cycles is not None
+    assert endurance(gripper.material, 0.0, 5.0) is None

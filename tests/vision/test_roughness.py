@@ -1,0 +1,100 @@
+"""Rough edges: their deviation and length against waves that were drawn with known ones, and what it is for."""
+
+from dataclasses import replace
+from functools import partial
+
+import numpy as np
+import pytest
+
+from fingervision.domain.direction import Direction
+from fingervision.domain.frame import Frame
+from fingervision.domain.gap import GapMeasurement
+from fingervision.vision.finger_end import FingerEnd, fit_finger_end
+from fingervision.vision.first_guess import first_guess
+from fingervision.vision.longer_flanks import is_surer
+from fingervision.vision.outline_points import OutlinePoints
+from fingervision.vision.pipeline import Settings, measure_frame
+from fingervision.vision.roughness import Roughness, roughness
+from tests.benchmarks.camera_artefacts.classes import BELOW_PX, plain, texture
+from tests.benchmarks.camera_artefacts.optics import Surface
+
+U_POINT, WIDTH, BLUR = 0.05, 90.0, 1.0
+
+
+def finger(rng: np.random.Generator, deviation: float, length: float) -> tuple[OutlinePoints, FingerEnd]:
+    """A square finger, every side with waves of its own: Gaussian correlation exp(-d^2 / 2 length^2)."""
+
+    def waves(count: int) -> np.ndarray:
+        place = np.arange(count)
+        covariance = deviation**2 * np.exp(-0.5 * ((place[:, None] - place) / max(length, 1e-3)) ** 2)
+        lower = np.linalg.cholesky(covariance + U_POINT**2 * np.eye(count))
+        return lower @ rng.standard_normal(count)
+
+    rows, columns = np.arange(4.0, 64.0), np.arange(-WIDTH + 4.0, -3.0)
+    x = np.concatenate((waves(60), columns, -WIDTH + waves(60)))
+    y = np.concatenate((rows, waves(columns.size), rows))
+    side = np.repeat([0, 1, 2], [60, columns.size, 60])
+    points = OutlinePoints(x, y, np.full(x.size, U_POINT), side, np.full(x.size, BLUR))
+    return points, fit_finger_end(points, *first_guess(points, 10.0))
+
+
+def found(rng: np.random.Generator, deviation: float, length: float) -> Roughness | None:
+    (left, left_end), (right, right_end) = (finger(rng, deviation, length) for _ in range(2))
+    return roughness((left, right), (left_end, right_end))
+
+
+@pytest.mark.parametrize("length", [1.5, 3.0, 4.0])
+def test_waves_give_back_what_they_were_drawn_with(length: float) -> None:
+    """Four flanks of 60 points hold 240 / (2.5 length) independent waves: the deviation is known to 1 / sqrt(2 n).
+
+    The product does not know that the correlation is a Gaussian's.
+    """
+    deviation, waves = 0.25, 240.0 / (np.sqrt(2.0 * np.pi) * length)
+    rng = np.random.default_rng(int(10 * length))
+    seen = [found(rng, deviation, length) for _ in range(12)]
+    values = np.array([one.deviation_px for one in seen if one is not None])
+    assert len(values) == 12
+    # The product's process has longer tails than a Gaussian's: up to 1.5 times wide, never narrow.
+    u_mean = deviation / np.sqrt(2.0 * waves * 12)
+    assert deviation - 3.0 * u_mean < values.mean() < 1.5 * deviation + 3.0 * u_mean
+    shared = np.array([one.shared_px for one in seen if one is not None])
+    assert 0.8 < np.median(shared) / (np.sqrt(2.0 * np.pi) * length) < 2.0
+
+
+def test_noise_alone_is_not_rough() -> None:
+    rng = np.random.default_rng(3)
+    assert all(found(rng, 0.0, 1.0) is None for _ in range(20))
+
+
+def test_longer_flanks_count_where_they_agree() -> None:
+    near = measured_plain()
+    surer = GapMeasurement(near.left, near.right, near.direction, 0.5 * near.u_gap_px, near.light_gap)
+    assert is_surer(surer, near)
+    assert not is_surer(near, surer)
+    assert not is_surer(replace(surer, right=replace(near.right, x_px=near.right.x_px + 1.0)), near)
+
+
+def measured_plain() -> GapMeasurement:
+    shot = plain(np.random.default_rng(1), Surface())
+    outcome = measure_frame(Frame(shot.picture, 0), Settings(BELOW_PX, Direction.UP, other_response=None))
+    assert isinstance(outcome, GapMeasurement)
+    assert outcome.roughness_px == 0.0
+    return outcome
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("rough_px", "rms_px"), [(0.0, 0.25), (0.3, 0.6)])
+def test_a_printed_finger_is_as_sure_as_it_says(rough_px: float, rms_px: float) -> None:
+    """Twelve pictures of the third renderer: errors in units of what is stated."""
+    rng = np.random.default_rng([9, int(10 * rough_px)])
+    draw = partial(texture, rough_px=rough_px)
+    errors, ratios = [], []
+    for _ in range(12):
+        shot = draw(rng)
+        outcome = measure_frame(Frame(shot.picture, 0), Settings(BELOW_PX, Direction.UP, other_response=None))
+        assert isinstance(outcome, GapMeasurement), outcome
+        errors.append(outcome.gap_px - shot.gap_px)
+        ratios.append(errors[-1] / outcome.u_gap_px)
+    assert np.sqrt(np.mean(np.square(errors))) < rms_px
+    # Twelve ratios of unit variance: chi-square of 12 lies below 28 in 99.5 of 100 cases.
+    assert np.sum(np.square(ratios)) < 28.3
