@@ -4,7 +4,7 @@ from pathlib import Path
 
 import click
 
-HELP = "Simulation .csv, gripper.toml or model.toml"
+HELP = "Simulation .csv, gripper.toml, model.toml, .fmu, or .py with simulate(time_s, input_mm)"
 
 
 def _single(context: click.Context, parameter: click.Parameter, value: tuple[Path, ...]) -> Path:

@@ -22,6 +22,7 @@ Examples:
   fingervision measure opening.mp4 --px-per-mm 34 --overlay --out results/opening
   fingervision measure frames/ --rate-hz 25 --px-per-mm 34
   fingervision measure 'frames/*.png' --px-per-mm 34 --tips down --roi 100,80,400,300
+  fingervision measure run.mkv --calibration calibration.json --drive drive.csv
   fingervision measure run.mkv --calibration calibration.json --drive drive.csv --drive-offset-s 0.12
   fingervision measure run.mkv --px-per-mm 34 --steps 10
 
@@ -52,9 +53,7 @@ Exit codes: 0 done; 1 could not, or no frame gave a number; 2 wrong usage;
 @click.option(
     "--drive-offset-s",
     type=float,
-    default=0.0,
-    show_default=True,
-    help="Added to the drive's times to get the recording's.",
+    help="Added to the drive's times to get the recording's; found from the motion if not given.",
 )
 @click.option(
     "--response",
@@ -96,7 +95,7 @@ def command(
     rate_hz: float | None,
     drive: Path | None,
     columns: Path | None,
-    drive_offset_s: float,
+    drive_offset_s: float | None,
     response: str,
     bits: int | None,
     fingers: str,

@@ -35,6 +35,9 @@ from fingervision.models.corrected import CorrectedModel
 MEMBERS_SEPARATED = 5
 """Explanations, best first, that the next run is designed to separate: the time it takes grows with their square."""
 
+MOST_DRIVES = 2
+"""Times that a model which is a function of time is driven again behind the effects that were found."""
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Diagnosis:
@@ -109,6 +112,13 @@ def diagnose(
     data = prepare(table, model, without)
     mistake = gross_mistake(data)
     refitted = refitted_search(data, rng, forced, without, progress)
+    for _ in range(MOST_DRIVES):
+        # A model that is a function of time answers to the path behind what was found.
+        noise_mm = min(noise.total_mm for noise in refitted.found.problem.whitener.noises)
+        again = refitted.data.driven_again(refitted.found.best, noise_mm)
+        if again is None:
+            break
+        refitted = refitted_search(again, rng, forced, without, progress)
     data, found = refitted.data, refitted.found
     if mistake is None and (found.unknown is not None or not found.best.names):
         mistake = swapped_directions(data, found.problem)

@@ -55,6 +55,9 @@ class MeasuredTable:
         Widths that are known, measured through the same camera.
     path : RecordedPath or None
         The rows with those that have an input and no gap; None where there are none of these, or no times.
+    u_clock_s : float
+        Standard uncertainty of the offset between the input's clock and the gap's, where that was found from this
+        table's own motion; 0 where they share a clock, or nothing is stated.
     """
 
     input_mm: NDArray[np.float64]
@@ -68,6 +71,7 @@ class MeasuredTable:
     notes: tuple[str, ...] = ()
     slots: tuple[ReferenceSlot, ...] = ()
     path: RecordedPath | None = None
+    u_clock_s: float = 0.0
 
     @property
     def shared_clock(self) -> bool:

@@ -37,6 +37,12 @@ class Response:
         half_mm = 0.5 * (gap_mm - self.gap_mm)
         return replace(self, left_mm=self.left_mm - half_mm, right_mm=self.right_mm + half_mm)
 
+    def plus(self, more: "Response") -> "Response":
+        """Add what moves each point, and the force where both have one."""
+        both = self.force_n is not None and more.force_n is not None
+        force_n = self.force_n + more.force_n if both else self.force_n  # type: ignore[operator]
+        return Response(self.left_mm + more.left_mm, self.right_mm + more.right_mm, force_n)
+
     def shifted(self, by_mm: NDArray[np.float64] | float) -> "Response":
         """Both points moved together, to the right where `by_mm` is positive."""
         return replace(self, left_mm=self.left_mm + by_mm, right_mm=self.right_mm + by_mm)

@@ -8,8 +8,10 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
+from fingervision.domain.drive import DriveHistory
 from fingervision.domain.errors import FingervisionError
 from fingervision.domain.status import Status
+from fingervision.measuring.clock.alignment import ClockOffset
 from fingervision.measuring.series import GapSeries
 
 SIZE_INCHES, DOTS_PER_INCH = (9.0, 5.5), 130
@@ -17,14 +19,18 @@ SIZE_INCHES, DOTS_PER_INCH = (9.0, 5.5), 130
 MOST_POINTS = 2000
 COVERAGE_FACTOR = 2.0
 GAP_COLOUR, BAND_COLOUR, FAILURE_COLOUR = "#11507a", "#8fbcdb", "#c0392b"
+INPUT_COLOUR = "#9a5b00"
 
 Floats = NDArray[np.float64]
 
 
-def draw_gap(path: Path, series: GapSeries) -> None:
+def draw_gap(
+    path: Path, series: GapSeries, drive: DriveHistory | None = None, clock: ClockOffset | float | None = None
+) -> None:
     """Draw the gap with the band of its expanded uncertainty, and below it that uncertainty alone.
 
-    Frames without a number are marked at the lower edge.
+    Frames without a number are marked at the lower edge. With a drive and its clock offset the input is drawn over the
+    gap, on the recording's clock, and the offset is written above.
 
     Raises
     ------
@@ -56,6 +62,8 @@ def draw_gap(path: Path, series: GapSeries) -> None:
             clip_on=False,
         )
         upper.legend(loc="best", framealpha=0.8, fontsize="small")
+    if drive is not None and clock is not None and series.times_s() is not None:
+        _draw_input(upper, drive, clock)
     upper.set_ylabel("gap (mm)")
     lower.set_ylabel("U, k = 2 (µm)")
     lower.set_ylim(0.0, 1.15 * float(expanded_um.max()) if gap_mm.size else 1.0)
@@ -72,6 +80,22 @@ def draw_gap(path: Path, series: GapSeries) -> None:
         raise FingervisionError(
             f"{path} could not be written ({error.strerror}): make room or name another --out, and measure again."
         ) from error
+
+
+def _draw_input(axes: Axes, drive: DriveHistory, clock: ClockOffset | float) -> None:
+    """Draw the input over the recording's times, with an axis of its own at the right, and state the offset."""
+    if isinstance(clock, ClockOffset):
+        times = clock.recording_time_s(drive.time_s)
+        said = f"clock offset {clock.offset_s:.4f} s, U = {2.0 * clock.u_offset_s:.2g} s (k = 2), found from the motion"
+    else:
+        times, said = drive.time_s + clock, f"clock offset {clock:g} s, as given"
+    low, high = axes.get_xlim()
+    beside = axes.twinx()
+    beside.plot(times, drive.input_mm, "--", color=INPUT_COLOUR, linewidth=1.0)
+    beside.set_ylabel("input (mm), dashed", color=INPUT_COLOUR)
+    beside.ticklabel_format(useOffset=False)
+    axes.set_xlim(low, high)
+    axes.set_title(said, fontsize="small")
 
 
 def _axis(series: GapSeries) -> tuple[Floats, Floats, str]:

@@ -15,6 +15,9 @@ from fingervision.frames.ahead import decoded_ahead
 from fingervision.frames.camera_settings import coding_of
 from fingervision.frames.source import FrameSource
 from fingervision.measuring.asked_to_stop import asked_to_stop
+from fingervision.measuring.clock.alignment import ClockOffset, NoClockOffset
+from fingervision.measuring.clock.common_clock import clock_of, join_drive, refusal, sentence
+from fingervision.measuring.clock.common_clock import in_words as clock_in_words
 from fingervision.measuring.gap_figure import draw_gap
 from fingervision.measuring.marked import marked
 from fingervision.measuring.other_camera import other_camera
@@ -120,7 +123,8 @@ def _measured(source: FrameSource, task: Task, out: Path, on_progress: Progress 
     folder = claimed(out, description.files)
     frame_size_px = (description.width_px, description.height_px)
     marks = lost_frames(description.files)
-    row_maker = RowMaker(task.scale, frame_size_px, task.drive, task.drive_offset_s)
+    given_s = task.drive_offset_s
+    row_maker = RowMaker(task.scale, frame_size_px, None if given_s is None else task.drive, given_s or 0.0)
     series = GapSeries()
     stopped = False
     with ExitStack() as stack:
@@ -161,15 +165,23 @@ def _measured(source: FrameSource, task: Task, out: Path, on_progress: Progress 
             stopped = True
     if on_progress is not None:
         on_progress(series.frames, description.frame_count)
-    draw_gap(folder.figure, series)
-    summary = summarise(
-        description, in_words(task, settings), task.scale, task.scale_file, series, complete=not stopped
-    )
+    clock = None
+    if task.drive is not None and given_s is None:
+        clock = clock_of(series, task.drive)
+        if isinstance(clock, ClockOffset):
+            join_drive(folder.gaps, task.drive, clock)
+            description = replace(description, notes=(*description.notes, sentence(clock), *clock.notes))
+    draw_gap(folder.figure, series, task.drive, clock if isinstance(clock, ClockOffset) else given_s)
+    words_of_task = {**in_words(task, settings), **clock_in_words(clock, given_s if task.drive is not None else None)}
+    summary = summarise(description, words_of_task, task.scale, task.scale_file, series, complete=not stopped)
     write_summary(folder.summary, summary)
-    if task.drive is not None and driven == {False} and not stopped:
+    if isinstance(clock, NoClockOffset) and not stopped and series.counts[Status.OK]:
+        raise refusal(clock, folder.gaps)
+    if task.drive is not None and given_s is not None and driven == {False} and not stopped:
         raise FingervisionError(
             f"No frame lies within the drive's times ({task.drive.time_s[0]:g} to {task.drive.time_s[-1]:g} s, shifted "
-            f"by {task.drive_offset_s:g} s), so no row of {folder.gaps} has an input: give --drive-offset-s."
+            f"by {given_s:g} s), so no row of {folder.gaps} has an input: give another --drive-offset-s, or leave it "
+            "out to have it found from the motion."
         )
     if task.steps_frame is not None and not folder.steps.exists() and not stopped:
         raise UsageError(

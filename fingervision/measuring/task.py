@@ -1,6 +1,7 @@
 """What shall be measured in a recording or live view, and how."""
 
 from dataclasses import dataclass
+from math import isfinite
 from pathlib import Path
 from typing import Any
 
@@ -33,8 +34,8 @@ class Task:
         The part of the frame that is looked at.
     drive : DriveHistory or None
         The recorded input.
-    drive_offset_s : float
-        Added to the drive's times to get the recording's.
+    drive_offset_s : float or None
+        Added to the drive's times to get the recording's; None finds it from the motion.
     overlay : bool
         Whether a video is written with what was measured drawn in.
     steps_frame : int or None
@@ -55,7 +56,7 @@ class Task:
     direction: Direction | None = None
     region: Region | None = None
     drive: DriveHistory | None = None
-    drive_offset_s: float = 0.0
+    drive_offset_s: float | None = None
     overlay: bool = False
     steps_frame: int | None = None
     response: CameraResponse | None = None
@@ -66,7 +67,7 @@ class Task:
     def __post_init__(self) -> None:
         if not 0.0 < self.below_tip_mm < float("inf"):
             raise UsageError(f"--below-tip-mm must be positive, but is {self.below_tip_mm:g}.")
-        if not -float("inf") < self.drive_offset_s < float("inf"):
+        if self.drive_offset_s is not None and not isfinite(self.drive_offset_s):
             raise UsageError(f"--drive-offset-s must be a number of seconds, but is {self.drive_offset_s:g}.")
         if self.steps_frame is not None and self.steps_frame < 0:
             raise UsageError(f"--steps must be the number of a frame, from 0, but is {self.steps_frame}.")

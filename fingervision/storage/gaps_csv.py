@@ -1,10 +1,13 @@
 """gaps.csv: one row a frame, written while it is measured, valid whenever the program is stopped."""
 
-from collections.abc import Sequence
+import csv
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
+from typing import Protocol
 
+from fingervision.domain.errors import FingervisionError
 from fingervision.domain.status import Status
 from fingervision.storage.line_file import LineFile, cell, quoted
 
@@ -142,3 +145,59 @@ class GapsCsv:
         if "force_n" in self._drive_columns:
             cells.append(cell(row.force_n, FORCE_PLACES))
         return ",".join(cells)
+
+
+class Driven(Protocol):
+    """What the drive did at a frame's time."""
+
+    @property
+    def run(self) -> str:
+        """Name of the run."""
+
+    @property
+    def input_mm(self) -> float:
+        """Input displacement."""
+
+    @property
+    def force_n(self) -> float | None:
+        """Force, where it was recorded."""
+
+
+def with_drive(path: Path, state: Callable[[float], Driven | None], *, has_force: bool) -> None:
+    """Fill the drive's columns of a table whose rows were written without them, line by line.
+
+    Parameters
+    ----------
+    path : Path
+        gaps.csv with the columns run, input_mm and, with `has_force`, force_n at its end; replaced when it is whole.
+    state : callable
+        The drive at a frame's time; None where it was not recorded.
+    has_force : bool
+        Whether there is a column force_n.
+
+    Raises
+    ------
+    FingervisionError
+        The table cannot be read or written again; the old one stays.
+    """
+    part = path.with_name(f".{path.name}.part")
+    columns = 3 if has_force else 2
+    try:
+        with path.open(encoding="utf-8", newline="") as old, part.open("w", encoding="utf-8", newline="") as new:
+            new.write(next(old))
+            for line in old:
+                cells = next(csv.reader([line]))
+                found = state(float(cells[1])) if cells[1] else None
+                if found is None:
+                    new.write(line)
+                    continue
+                drive = [quoted(found.run), cell(found.input_mm, MM_PLACES), cell(found.force_n, FORCE_PLACES)]
+                kept = line.rstrip("\r\n").rsplit(",", columns)[0]
+                new.write(",".join([kept, *drive[:columns]]) + "\n")
+        part.replace(path)
+    except OSError as error:
+        part.unlink(missing_ok=True)
+        raise FingervisionError(
+            f"{path} could not be written again with the drive's inputs ({error.strerror}); the gaps are in it: make "
+            "room and measure again."
+        ) from error

@@ -12,6 +12,7 @@ from fingervision.storage.csv_columns import read_block, read_columns
 from fingervision.storage.iso230_table import Iso230Rows, read_iso230_table
 from fingervision.storage.number_columns import Numbers, numbers_in
 from fingervision.storage.reference_slots import slots_beside
+from fingervision.storage.summary_json import u_clock_beside
 
 FEWEST_ROWS = 5
 PATH = ("input_mm", "time_s")
@@ -139,6 +140,7 @@ def measured_rows(
         notes=tuple(notes),
         slots=slots_beside(path),
         path=along,
+        u_clock_s=u_clock_beside(path),
     )
 
 

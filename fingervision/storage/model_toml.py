@@ -14,6 +14,7 @@ from fingervision.domain.parameter import Estimate
 from fingervision.effects import catalogue
 from fingervision.effects.position_error_map import curve_points, curve_values
 from fingervision.models.corrected import CorrectedModel
+from fingervision.models.function_model import SUFFIXES, FunctionModel
 from fingervision.models.kinds import kinds
 from fingervision.models.physical_gripper import PhysicalGripper
 from fingervision.models.table import TableModel
@@ -51,6 +52,8 @@ def read_model(
     FingervisionError
         The file is neither, or its base is missing.
     """
+    if path.suffix.lower() in SUFFIXES:
+        return _function(path, {})
     if path.suffix.lower() != ".toml":
         simulation = table(path)
         return CorrectedModel(simulation.name, simulation, str(path), simulation.input_range_mm, {})
@@ -71,6 +74,9 @@ def read_model(
         raise FingervisionError(f"The base of {path} must be another model, but leads back to itself: mend `base`.")
     kind = str(document.get("kind", kind))
     base = read_model(path.parent / str(document["base"]), kind, (*inside, place), table)
+    names: dict[str, str] = {key: str(document[key]) for key in ("input", "gap") if key in document}
+    if names and isinstance(base.base, FunctionModel):
+        base = _function(base.base.path, names)
     effects: dict[str, Mapping[str, Estimate]] = dict(base.effects)
     entries = document.get("effect", [])
     if not isinstance(entries, list):
@@ -94,6 +100,14 @@ def read_model(
         _check(name, values, path)
         _check_curve(name, values, path)
     return CorrectedModel(base.name, base.base, base.base_path, base.input_range_mm, effects, base.kind)
+
+
+def _function(path: Path, names: Mapping[str, str]) -> CorrectedModel:
+    """Take an FMU or a Python file as a model, which covers whatever it answers."""
+    if not path.is_file():
+        raise FingervisionError(f"There is no model {path}.")
+    everywhere = (-float("inf"), float("inf"))
+    return CorrectedModel(path.name, FunctionModel(path, names), str(path), everywhere, {})
 
 
 def _check(name: str, values: Mapping[str, Estimate], path: Path) -> None:

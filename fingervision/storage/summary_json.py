@@ -8,6 +8,7 @@ from typing import Any
 from fingervision.domain.errors import FingervisionError, UsageError
 
 SUMMARY = "summary.json"
+GAPS = "gaps.csv"
 SCHEMA = 1
 
 
@@ -74,3 +75,26 @@ def refuse_other_recording(folder: Path, recording: str) -> None:
     if not Path(of).exists() and Path(of).name == Path(recording).name:
         return
     raise UsageError(f"--out must be a folder of its own, but {folder} holds the results of {of}: name another folder.")
+
+
+def u_clock_beside(table: Path) -> float:
+    """Uncertainty of the clock offset that was found for a gaps.csv, from the summary beside it; in s.
+
+    Parameters
+    ----------
+    table : Path
+        gaps.csv, or any other table.
+
+    Returns
+    -------
+    float
+        0 where the table is another, or the offset was given instead of found.
+    """
+    if table.name != GAPS:
+        return 0.0
+    try:
+        settings = json.loads((table.parent / SUMMARY).read_bytes())["settings"]
+        found = float(settings["u_drive_time_s"]) if settings["drive_offset"] == "found" else 0.0
+    except (OSError, ValueError, LookupError, TypeError):
+        return 0.0
+    return found if 0.0 < found < float("inf") else 0.0

@@ -11,8 +11,8 @@ from itertools import pairwise
 
 import numpy as np
 
-from fingervision.diagnosis.input.encoder import input_sigma
-from fingervision.diagnosis.input.local_polynomial_smoothing import smoothed
+from fingervision.stage_record.encoder import input_sigma
+from fingervision.stage_record.local_polynomial_smoothing import smoothed
 from tests.benchmarks.hidden.design import Kind, draw_design
 from tests.benchmarks.hidden.gripper_table import draw_table
 from tests.benchmarks.hidden.noise import draw_noise, rounded

@@ -90,7 +90,7 @@ def test_what_is_no_table_is_a_sentence(tmp_path: Path, clip: Path) -> None:
     (tmp_path / "loop").symlink_to("loop")
     (tmp_path / "drive.csv").write_text("time_s,input_mm\n100,0\n101,1\n")
     (tmp_path / "quote.csv").write_text('time_s,input_mm,run\n0,0,"a\n1,1,a\n')
-    measure = ("measure", str(clip), *SCALE, "--drive")
+    measure = ("measure", str(clip), *SCALE, "--drive-offset-s", "0", "--drive")
     assert "is a folder or a pipe" in said(tmp_path, *measure, "pipe.csv")
     assert "No frame lies within the drive's times (100 to 101 s" in said(tmp_path, *measure, "drive.csv")
     assert "quote" in said(tmp_path, *measure, "quote.csv")

@@ -7,10 +7,10 @@ import pytest
 
 from fingervision.diagnosis.diagnose import Diagnosis, diagnose
 from fingervision.diagnosis.input.commands import is_commanded
-from fingervision.diagnosis.input.encoder import on_lines
 from fingervision.diagnosis.input.preparation import prepare
 from fingervision.diagnosis.input.stalled_ends import stalled_ends
 from fingervision.domain.report import Verdict
+from fingervision.stage_record.encoder import on_lines
 from fingervision.storage.measured_table import read_measured_table
 from fingervision.storage.model_toml import read_model
 

@@ -6,8 +6,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from fingervision.diagnosis.input.encoder import input_sigma
-from fingervision.diagnosis.input.local_polynomial_smoothing import smoothed
+from fingervision.stage_record.encoder import input_sigma
+from fingervision.stage_record.local_polynomial_smoothing import smoothed
 
 Array = NDArray[np.float64]
 RATE_HZ = 8.0

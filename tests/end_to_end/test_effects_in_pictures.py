@@ -28,7 +28,7 @@ HALF_DIAGONAL_MM = hypot(*FRAME) / 2.0 / PX_PER_MM
 FORM_SHARE = 0.02
 """The catalogue's lens and keystone act on the row alone; the picture's act on the outline, whose edges lean."""
 
-Through = Callable[[Path, str, float], dict[str, Any]]
+Through = Callable[..., dict[str, Any]]
 Diagnosed = Callable[..., dict[str, Any]]
 
 
@@ -56,10 +56,10 @@ def through(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Through:
             main()
         assert ended.value.code in (None, 0)
 
-    def command(folder: Path, recording: str, px_per_mm: float) -> dict[str, Any]:
+    def command(folder: Path, recording: str, px_per_mm: float, *clock: object) -> dict[str, Any]:
         measured, diagnosis = tmp_path / "measured", tmp_path / "diagnosis"
         drive, model = folder / "drive.csv", folder / "simulation.csv"
-        run("measure", folder / recording, "--px-per-mm", px_per_mm, "--drive", drive, "--out", measured)
+        run("measure", folder / recording, "--px-per-mm", px_per_mm, "--drive", drive, "--out", measured, *clock)
         run("diagnose", measured / "gaps.csv", "--model", model, "--out", diagnosis)
         report: dict[str, Any] = json.loads((diagnosis / "report.json").read_text())
         return report
@@ -71,9 +71,9 @@ def through(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Through:
 def diagnosed(tmp_path: Path, through: Through) -> Diagnosed:
     """Shoot a film, and send it through the two commands."""
 
-    def command(film: Film, px_per_mm: float = PX_PER_MM) -> dict[str, Any]:
+    def command(film: Film, *clock: object, px_per_mm: float = PX_PER_MM) -> dict[str, Any]:
         shoot(film, tmp_path, SEED)
-        return through(tmp_path, "film.mkv", px_per_mm)
+        return through(tmp_path, "film.mkv", px_per_mm, *clock)
 
     return command
 
@@ -125,7 +125,7 @@ def test_a_barrel_lens_is_named(diagnosed: Diagnosed) -> None:
 def test_a_tilted_camera_is_named(diagnosed: Diagnosed) -> None:
     tilt = Tilt(about_y_deg=TILT_DEG, distance_px=DISTANCE_MM * PX_PER_MM)
     # The scale is the one that a reference in the middle of the same picture has.
-    report = diagnosed(Film(camera=replace(PLAIN, tilt=tilt)), PX_PER_MM * cos(radians(TILT_DEG)))
+    report = diagnosed(Film(camera=replace(PLAIN, tilt=tilt)), px_per_mm=PX_PER_MM * cos(radians(TILT_DEG)))
     assert (report["verdict"], report["alternatives"]) == ("named", [["camera_tilt"]])
     k, u = parameter(report, "k_per_mm")
     true = sin(radians(TILT_DEG)) / DISTANCE_MM
@@ -135,7 +135,7 @@ def test_a_tilted_camera_is_named(diagnosed: Diagnosed) -> None:
 @pytest.mark.slow
 def test_late_frames_are_the_cameras_or_the_drives(diagnosed: Diagnosed) -> None:
     """A late picture of a quick gripper is the picture of a late gripper: nothing in it tells the two apart."""
-    report = diagnosed(Film(late_s=LATE_S))
+    report = diagnosed(Film(late_s=LATE_S), "--drive-offset-s", 0)
     assert report["verdict"] == "ambiguous"
     assert sorted(report["alternatives"]) == [["camera_latency"], ["drive_lag"]]
     delay_s, u = parameter(report, "delay_s")

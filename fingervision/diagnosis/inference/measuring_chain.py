@@ -36,6 +36,8 @@ class MeasuringChain:
         Whether stage and fingers went along curves between two samples, as a delay shows, or along straight lines.
     path : InputPath or None
         The way between and besides the measured rows; None where the rows are all of it.
+    dynamics : (ndarray of float, Response) or None
+        What a model that is a function of time adds to its answer at rest along a path, with that path's times.
     """
 
     model: Model
@@ -45,6 +47,7 @@ class MeasuringChain:
     seen_midline_mm: float | None = None
     curved: bool = False
     path: InputPath | None = None
+    dynamics: tuple[Array, Response] | None = None
 
     @cached_property
     def effects(self) -> Mapping[str, Effect]:
@@ -81,6 +84,8 @@ class MeasuringChain:
             elif isinstance(effect, PointEffect):
                 points.append(effect)
         response = self.model.respond(input_mm)
+        if self.dynamics is not None and self.dynamics[0] is history.time_s:
+            response = response.plus(self.dynamics[1])
         cameras = [effect for effect in points if effect.stage == "camera"]
         for effect in points:
             if effect.stage != "camera":

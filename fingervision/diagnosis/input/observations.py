@@ -10,6 +10,7 @@ from fingervision.diagnosis.inference.measuring_chain import MeasuringChain
 from fingervision.diagnosis.inference.position_map import PositionMap
 from fingervision.diagnosis.inference.run_gains import RunGains
 from fingervision.diagnosis.inference.uncertain_dimensions import BENT, DrawingRefit, estimated, tangent, with_moved
+from fingervision.diagnosis.input.driven_model import with_dynamics
 from fingervision.diagnosis.input.path import input_path, turning_readings
 from fingervision.diagnosis.input.recorded_input import RecordedInput
 from fingervision.diagnosis.input.stalled_ends import stalled_ends
@@ -21,7 +22,10 @@ from fingervision.domain.effect import Array, Effect, Flags
 from fingervision.domain.measured_table import MeasuredTable
 from fingervision.domain.model import PhysicalModel
 from fingervision.models.corrected import CorrectedModel
+from fingervision.models.function_model import FunctionModel
 
+OF_NOISE = 0.1
+"""Share of the noise that a function of time may be off before it is driven again behind what was found."""
 DOUBTFUL = 2.0
 """Standard uncertainties beyond which a number of the drawing is doubtful."""
 FORM_SHARE_OF_RIGS = 0.25
@@ -58,6 +62,10 @@ class Observations:
         What a reader must know.
     refit : DrawingRefit
         What the drawing's uncertain numbers do to the prediction.
+    clock : ndarray of float, shape (m, p), or None
+        What the uncertain offset between the clocks of input and pictures does to it.
+    function : FunctionModel or None
+        The model that is driven in time, of which `model` is the answer at rest.
     """
 
     table: MeasuredTable
@@ -74,6 +82,8 @@ class Observations:
     position_map: PositionMap | None = None
     run_gains: RunGains | None = None
     runs_scatter_mm: float = np.inf
+    clock: Array | None = None
+    function: FunctionModel | None = None
 
     @property
     def aim_mm(self) -> Array:
@@ -133,6 +143,7 @@ class Observations:
         passing = np.where(self.recorded.stays, 0.0, error)
         noises = (without_input(noises[0], passing), *noises[1:])
         beside = [one.columns_mm for one in (self.position_map, self.run_gains) if one is not None]
+        beside += [self.clock] if self.clock is not None and self.clock.shape[1] else []
         beside += [self.refit.columns] if self.refit.moved else []
         drawing = np.hstack(beside) if beside else None
         whitener = Whitener(
@@ -182,6 +193,14 @@ class Observations:
         rest_mm = float(model.respond(np.zeros(1)).gap_mm[0])
         chain = replace(self.chain, model=model).with_rest_gap(rest_mm)
         return replace(self, chain=chain, refit=replace(tangent(chain, drawn, moved), known=known))
+
+    def driven_again(self, explanation: Explanation, noise_mm: float) -> "Observations | None":
+        """Drive a function of time along the path behind an explanation; None where that changes nothing of weight."""
+        if self.function is None or self.chain.dynamics is None:
+            return None
+        chain = with_dynamics(self.chain, self.function, explanation.values)
+        changed = chain.stacked(explanation.values) - self.chain.stacked(explanation.values)
+        return replace(self, chain=chain) if float(np.sqrt(np.mean(changed**2))) > OF_NOISE * noise_mm else None
 
     def straight(self, drawn: "Observations", problem: Problem) -> bool:
         """Whether the tangent at other numbers of the drawing foretold this prediction, to within the noise."""

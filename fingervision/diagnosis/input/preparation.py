@@ -7,6 +7,8 @@ import numpy as np
 from fingervision.diagnosis.inference.measuring_chain import MeasuringChain, admissible
 from fingervision.diagnosis.inference.signatures import start_patterns
 from fingervision.diagnosis.inference.uncertain_dimensions import DrawingRefit, tangent
+from fingervision.diagnosis.input.clock_nuisance import clock_columns
+from fingervision.diagnosis.input.driven_model import at_rest_beside, with_dynamics
 from fingervision.diagnosis.input.observations import Observations
 from fingervision.diagnosis.input.path import dwell_s, input_path, readings_at_rest
 from fingervision.diagnosis.input.path import recorded as recorded_rows
@@ -29,6 +31,7 @@ def prepare(table: MeasuredTable, model: CorrectedModel, without: frozenset[str]
     FingervisionError
         The model does not cover the inputs, or the inputs are in another unit.
     """
+    model, function = at_rest_beside(table, model)
     low, high = model.input_range_mm
     u = table.input_mm
     ratio = float(np.ptp(u)) / (high - low)
@@ -72,6 +75,8 @@ def prepare(table: MeasuredTable, model: CorrectedModel, without: frozenset[str]
     path = input_path(table, history, recorded.along_mm, commanded=recorded.commanded)
     fixed = {name: {key: e.value for key, e in values.items()} for name, values in model.effects.items()}
     chain = MeasuringChain(model.base, history, fixed, path=path)
+    if function is not None:
+        chain = with_dynamics(chain, function, {})
     stacked = table.gap_mm
     if table.midline_mm is not None:
         bare: Response = chain.respond({})
@@ -93,8 +98,26 @@ def prepare(table: MeasuredTable, model: CorrectedModel, without: frozenset[str]
         rows = np.arange(u.size) if table.path is None else table.path.rows
         along_mm, _, along_runs = recorded_rows(table)
         repeats = visits(along_mm, along_runs, rows)
+    if table.u_clock_s > 0.0:
+        notes.append(
+            "the clocks of input and pictures were laid on each other by this motion itself "
+            f"(U = {2.0 * table.u_clock_s:.2g} s, k = 2): a lag that is the same at all times is part of that offset, "
+            "and one is named only beyond its uncertainty."
+        )
     return Observations(
-        table, model, chain, stacked, recorded, able, excluded, distrusted, tuple(notes), refit, repeats
+        table,
+        model,
+        chain,
+        stacked,
+        recorded,
+        able,
+        excluded,
+        distrusted,
+        tuple(notes),
+        refit,
+        repeats,
+        clock=clock_columns(chain, table.u_clock_s),
+        function=function,
     )
 
 

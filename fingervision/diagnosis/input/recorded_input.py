@@ -6,13 +6,13 @@ from itertools import pairwise
 import numpy as np
 
 from fingervision.diagnosis.input.commands import is_commanded
-from fingervision.diagnosis.input.encoder import input_sigma, on_lines
-from fingervision.diagnosis.input.local_polynomial_smoothing import smoothed
 from fingervision.diagnosis.input.path import readings_at_rest, recorded
 from fingervision.diagnosis.noise.spectrum import LEAST_RUN
 from fingervision.domain.effect import Array, Flags, History
 from fingervision.domain.measured_table import MeasuredTable
 from fingervision.models.corrected import CorrectedModel
+from fingervision.stage_record.encoder import input_sigma, on_lines
+from fingervision.stage_record.local_polynomial_smoothing import smoothed
 
 HELD_SAMPLES, SLOW_SAMPLES = 15, 5
 """Samples over which a stage that stands, or turns back, stays on one encoder step or two."""

@@ -1,0 +1,40 @@
+"""The clock offset between input and pictures as a random effect, where it was found from the same motion."""
+
+import numpy as np
+
+from fingervision.diagnosis.inference.measuring_chain import MeasuringChain
+from fingervision.domain.effect import Array
+
+FREEDOM = 3.0
+"""Times its uncertainty that the offset is left to be refitted within. It was found from these very data, so that its
+uncertainty is no knowledge besides them: within 3 u the prior adds a ninth to what the data say, where u itself would
+count them twice and state a play that is entangled with the offset too surely."""
+
+
+def clock_columns(chain: MeasuringChain, u_clock_s: float) -> Array:
+    """Change of the stacked prediction by one standard deviation of the offset's prior; shape (m, 1), or (m, 0).
+
+    Parameters
+    ----------
+    chain : MeasuringChain
+        Model over the recorded input.
+    u_clock_s : float
+        Standard uncertainty of the offset; 0 where the clocks are one.
+    """
+    history = chain.history
+    if u_clock_s == 0.0 or history.time_s is None:
+        return np.zeros((chain.stacked({}).size, 0))
+    # Over no more than half a sample the record is straight, and over no less than the offset's doubt is it meant.
+    step_s = min(u_clock_s, 0.5 * history.sample_time_s)
+    ends = [chain.with_input(_moved(chain, by_s)).stacked({}) for by_s in (-step_s, step_s)]
+    return np.asarray((ends[1] - ends[0]) * (FREEDOM * u_clock_s / (2.0 * step_s)))[:, None]
+
+
+def _moved(chain: MeasuringChain, by_s: float) -> Array:
+    """The recorded input so much later, run by run."""
+    history = chain.history
+    out = np.empty_like(history.input_mm)
+    for run in history.runs:
+        time_s = history.times[run]
+        out[run] = np.interp(time_s + by_s, time_s, history.input_mm[run])
+    return out

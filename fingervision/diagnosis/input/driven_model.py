@@ -1,0 +1,75 @@
+"""A model that is a function of time, laid along a measured table: its static answer, and what it adds in time.
+
+The chain of effects runs thousands of times and a function of time costs seconds. It is therefore split: its answer at
+rest is a table, which every effect before it moves, and beside it stands the remainder that the same function gives
+over the path that was driven. The remainder is taken again along the path behind the effects that were found.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+
+from fingervision.diagnosis.inference.measuring_chain import MeasuringChain, Settings
+from fingervision.domain.effect import Array, DriveEffect, History
+from fingervision.domain.errors import FingervisionError
+from fingervision.domain.measured_table import MeasuredTable
+from fingervision.domain.response import Response
+from fingervision.models.corrected import CorrectedModel
+from fingervision.models.function_model import HOLDS_S, FunctionModel
+
+PREPARED_S = HOLDS_S[0]
+"""Seconds that the model is held at a run's first input before the run begins."""
+
+
+def at_rest_beside(table: MeasuredTable, model: CorrectedModel) -> tuple[CorrectedModel, FunctionModel | None]:
+    """Put the static answer in the place of a function of time, over the inputs of a table.
+
+    Raises
+    ------
+    FingervisionError
+        The table has no times.
+    """
+    if not isinstance(model.base, FunctionModel):
+        return model, None
+    if table.time_s is None:
+        raise FingervisionError(
+            f"{model.base_path} is driven in time, but the measured table has no time_s: add it, or give a table of "
+            "the model's answer at rest."
+        )
+    inputs = table.input_mm if table.path is None else table.path.input_mm
+    static = model.base.at_rest(float(inputs.min()), float(inputs.max()))
+    return replace(model, base=static, input_range_mm=static.input_range_mm), model.base
+
+
+def with_dynamics(chain: MeasuringChain, function: FunctionModel, settings: Settings) -> MeasuringChain:
+    """Add what the function gives beyond its answer at rest, along the path behind the drive effects of `settings`."""
+    history = chain.history if chain.path is None else chain.path.history
+    driven_mm = _behind_drive(chain, history, {**chain.fixed, **settings})
+    jobs = []
+    for run in history.runs:
+        time_s = _rising(history.times[run] - history.times[run][0]) + PREPARED_S
+        inputs = driven_mm[run]
+        jobs.append((np.concatenate([[0.0], time_s]), np.concatenate([inputs[:1], inputs])))
+    answers = function.simulate(jobs)
+    left, right = np.empty(driven_mm.size), np.empty(driven_mm.size)
+    force = None if answers[0].force_n is None else np.empty(driven_mm.size)
+    for run, answer in zip(history.runs, answers, strict=True):
+        left[run], right[run] = answer.left_mm[1:], answer.right_mm[1:]
+        if force is not None and answer.force_n is not None:
+            force[run] = answer.force_n[1:]
+    rest = chain.model.respond(driven_mm)
+    more = None if force is None or rest.force_n is None else force - rest.force_n
+    return replace(chain, dynamics=(history.times, Response(left - rest.left_mm, right - rest.right_mm, more)))
+
+
+def _behind_drive(chain: MeasuringChain, history: History, acting: Settings) -> Array:
+    input_mm = history.input_mm
+    for name, effect in chain.effects.items():
+        if name in acting and isinstance(effect, DriveEffect):
+            input_mm = effect.act(input_mm, history, acting[name])
+    return input_mm
+
+
+def _rising(time_s: Array) -> Array:
+    """Times that repeat are moved apart by a nanosecond: a function of time wants them to rise."""
+    return np.asarray(np.maximum.accumulate(time_s) + 1e-9 * np.arange(1, time_s.size + 1))

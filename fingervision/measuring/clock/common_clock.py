@@ -1,0 +1,84 @@
+"""The drive joined to a finished table of gaps on one clock, once the offset of its clock has been found."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any
+
+from fingervision.domain.drive import DriveHistory
+from fingervision.domain.errors import FingervisionError
+from fingervision.measuring.clock.alignment import ClockOffset, NoClockOffset, find_clock_offset
+from fingervision.measuring.drive_at import DriveState, drive_at
+from fingervision.measuring.series import GapSeries
+from fingervision.storage.gaps_csv import with_drive
+
+NOTHING_STATED: Mapping[str, Any] = MappingProxyType({"drive_offset": None, "u_drive_offset_s": None})
+
+
+def clock_of(series: GapSeries, drive: DriveHistory) -> ClockOffset | NoClockOffset:
+    """Find the offset of the drive's clock from the frames that have a gap and a time."""
+    times = series.times_s()
+    if times is None:
+        return NoClockOffset("the recording has no times: give --rate-hz, or a times.csv beside the images.")
+    return find_clock_offset(times[0], series.gap_mm, drive)
+
+
+def join_drive(table: Path, drive: DriveHistory, clock: ClockOffset) -> bool:
+    """Write the drive's state at each frame into a table of gaps; tell whether any frame got one.
+
+    Raises
+    ------
+    FingervisionError
+        The table cannot be written again; the old one is still there.
+    """
+    joined: list[bool] = []
+
+    def state(time_s: float) -> DriveState | None:
+        found = drive_at(drive, clock.log_time_s(time_s))
+        joined.append(found is not None)
+        return found
+
+    with_drive(table, state, has_force=drive.force_n is not None)
+    return any(joined)
+
+
+def in_words(clock: ClockOffset | NoClockOffset | None, given_s: float | None) -> dict[str, Any]:
+    """Put the offset as it stands in the summary's settings: found, given, or neither."""
+    if isinstance(clock, ClockOffset):
+        return {
+            "drive_offset": "found",
+            "drive_offset_s": clock.offset_s,
+            "u_drive_offset_s": clock.u_offset_s,
+            "drive_offset_at_s": clock.reference_s,
+            "drive_clock_rate": clock.rate,
+            "u_drive_clock_rate": clock.u_rate,
+            "u_drive_time_s": clock.u_time_s,
+            "drive_play_mm": clock.play_mm,
+            "u_drive_play_mm": clock.u_play_mm,
+            "drive_explained_share": clock.explained_share,
+        }
+    if isinstance(clock, NoClockOffset):
+        return {
+            **NOTHING_STATED,
+            "drive_offset": "not found",
+            "drive_offset_s": None,
+            "drive_offset_candidates_s": list(clock.candidates_s),
+        }
+    given = None if given_s is None else "given"
+    return {**NOTHING_STATED, "drive_offset": given, "drive_offset_s": given_s}
+
+
+def sentence(clock: ClockOffset) -> str:
+    """Say the offset with its expanded uncertainty."""
+    return (
+        f"Clock offset: {clock.offset_s:.4f} s, U = {2.0 * clock.u_offset_s:.2g} s (k = 2), found from the motion; it "
+        "was added to the drive's times. A lag that is the same at all times is part of it."
+    )
+
+
+def refusal(found: NoClockOffset, table: Path) -> FingervisionError:
+    """Why the table has no input."""
+    return FingervisionError(
+        f"The offset between the recording's clock and the drive's was not found: {found.words} The gaps are in "
+        f"{table}, without an input; --drive-offset-s S states the offset (0 where both share a clock)."
+    )

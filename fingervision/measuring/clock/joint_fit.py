@@ -1,0 +1,317 @@
+"""Offset and rate of two clocks, play, start and scale fitted together: variable projection over the motion."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from fingervision.domain.drive import DriveHistory
+from fingervision.domain.effect import Array
+from fingervision.effects.play_operator import play
+from fingervision.measuring.clock.log_path import LogPath
+
+OFFSET_PRIOR_S, PLAY_PRIOR_MM = 1e3, 1e3
+"""Standard deviations, so large that they say nothing: where nothing moves the normal matrix stays regular."""
+RATE_PRIOR = 6e-4
+"""Standard deviation of the clocks' relative rate before anything is seen: that of anything between -0.1 and 0.1 %."""
+START_PRIOR = 0.58
+"""Standard deviation of the play's start state: anything between -1 and 1 is as likely."""
+BEND_PRIOR = 0.1
+"""Standard deviation of the change of slope of gap against input at a knot, over the slope: large deflection of a
+flexure gripper bends it by a few per cent in all; more would let any smooth one-way motion be shifted at will.
+Where the data know better, as where the fingers meet, they outweigh it."""
+MOST_KNOTS, FRAMES_A_KNOT = 11, 20
+"""Knots of gap against input at most, and frames that each must rest on: the kink of a contact spoils a twelfth of the
+range, which the gate for wrong frames then leaves out."""
+STEPS = 12
+"""Gauss-Newton steps at most; from the correlation's peak three to five suffice."""
+CLUSTERS = 24
+"""Stretches of the recording whose pulls are taken for independent: their scatter is known to a fifth, and a stretch of
+an ordinary recording holds a move or two."""
+SETTLED = 1e-3
+"""Step, in standard uncertainties, below which a search has settled."""
+OFFSET_STEP_S, RATE_STEP, START_STEP, PLAY_STEP = 1e-4, 1e-7, 0.02, 1e-5
+"""Steps of the derivatives: small beside a frame, a clock's rate, the state's range and an encoder's step (mm)."""
+
+
+@dataclass(frozen=True, slots=True)
+class Alignment:
+    """Where one record lies on the other, with the play between them.
+
+    Parameters
+    ----------
+    offset_s : float
+        Recording's time minus log's time at `Motion.middle_s`.
+    rate : float
+        Growth of that offset over the recording's time.
+    play_mm : float
+        Full width of the play.
+    start : float
+        State of the play at the log's first sample, in half widths.
+    """
+
+    offset_s: float
+    rate: float
+    play_mm: float
+    start: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Noise:
+    """Noise of the gap from frame to frame.
+
+    Parameters
+    ----------
+    terms : ndarray of float, shape (p,)
+        Of an autoregression; empty for white noise.
+    weights : ndarray of float, shape (n - p,)
+        Of the whitened rows: below 1 where the input is known badly; empty where all weigh the same.
+    """
+
+    terms: Array
+    weights: Array
+
+
+WHITE = Noise(np.empty(0), np.empty(0))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Motion:
+    """Frames that lie within the log, and the log.
+
+    Parameters
+    ----------
+    time_s, gap_mm : ndarray of float, shape (n,)
+        Frames.
+    path : LogPath
+        Log.
+    middle_s : float
+        Recording's time at which the offset is stated.
+    noise : Noise
+        From frame to frame.
+    """
+
+    time_s: Array
+    gap_mm: Array
+    path: LogPath
+    middle_s: float
+    noise: Noise
+
+    @property
+    def drive(self) -> DriveHistory:
+        """The log, finely interpolated."""
+        return self.path.drive
+
+    def log_time_s(self, at: Alignment) -> Array:
+        """Times of the frames on the log's clock; shape (n,)."""
+        return np.asarray(self.time_s - at.offset_s - at.rate * (self.time_s - self.middle_s))
+
+    def input_at(self, at: Alignment) -> Array:
+        """Input behind the play at the frames; exact for a log that goes straight from sample to sample.
+
+        Between two samples the input is monotone, so that the play operator is one clip of its state at the earlier.
+        """
+        log_s = self.log_time_s(at)
+        inputs = np.interp(log_s, self.drive.time_s, self.drive.input_mm)
+        if at.play_mm == 0.0:
+            return np.asarray(inputs)
+        states = play(self.drive.input_mm, at.play_mm, at.start)
+        before = np.clip(np.searchsorted(self.drive.time_s, log_s, side="right") - 1, 0, states.size - 1)
+        half = 0.5 * at.play_mm
+        return np.asarray(np.clip(states[before], inputs - half, inputs + half))
+
+    def design(self, inputs: Array) -> Array:
+        """Columns 1, z and max(0, z - z_k) at knots z_k of the input z over the log's range; shape (n, 2 + knots).
+
+        Gap against input is a line that may bend at every knot: a gripper's curve, and the kink where fingers meet.
+        """
+        low, high = float(self.drive.input_mm.min()), float(self.drive.input_mm.max())
+        z = (2.0 * inputs - (low + high)) / max(high - low, 1e-12)
+        count = min(MOST_KNOTS, self.time_s.size // FRAMES_A_KNOT)
+        knots = np.linspace(-1.0, 1.0, count + 2)[1:-1]
+        return np.concatenate([np.stack([np.ones_like(z), z], axis=1), np.maximum(z[:, None] - knots, 0.0)], axis=1)
+
+    def whitened(self, columns: Array) -> Array:
+        """Take the autoregression out along time; the first frames, which have no past, are left out."""
+        terms, weights = self.noise.terms, self.noise.weights
+        out = columns[terms.size :].copy()
+        for k, share in enumerate(terms, start=1):
+            out -= share * columns[terms.size - k : columns.shape[0] - k]
+        if not weights.size:
+            return np.asarray(out)
+        return np.asarray(out * (weights if out.ndim == 1 else weights[:, None]))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Fit:
+    """A fit of the motion.
+
+    Parameters
+    ----------
+    at : Alignment
+        Estimates.
+    squares : float
+        Whitened residual's sum of squares with the priors' part, in mm^2.
+    degrees : int
+        Degrees of freedom.
+    normal : ndarray of float, shape (3, 3) or (4, 4)
+        Normal matrix of offset, rate, start (and play) over the residual's variance.
+    residual_mm : ndarray of float, shape (n,)
+        Gap minus prediction, not whitened.
+    scale : float
+        Change of gap over the log's half range, in mm; negative where the gap closes as the input grows.
+    """
+
+    at: Alignment
+    squares: float
+    degrees: int
+    normal: Array
+    residual_mm: Array
+    scale: float
+
+    @property
+    def variance_mm2(self) -> float:
+        """Variance of the whitened residual."""
+        return self.squares / self.degrees
+
+
+def fit(motion: Motion, start: Alignment, *, free_play: bool) -> Fit:
+    """Fit offset, rate, start state (and play) by Gauss-Newton; scale and bend are solved for on the way.
+
+    Parameters
+    ----------
+    motion : Motion
+        Frames and log.
+    start : Alignment
+        Where to begin.
+    free_play : bool
+        Whether the play is fitted too; else it stays.
+
+    Notes
+    -----
+    Variable projection: Golub & Pereyra 1973, doi:10.1137/0710036, with Kaufman's approximation.
+    """
+    at = start
+    solved = _solve(motion, at)
+    longest_mm = 0.9 * float(np.ptp(motion.drive.input_mm))
+    damping = 1e-6
+    for _ in range(STEPS):
+        jacobian = _jacobian(motion, at, solved, free_play=free_play)
+        variance = solved.squares / max(solved.degrees, 1)
+        prior = _prior(jacobian.shape[1]) * variance
+        pull = prior @ np.array([0.0, at.rate, at.start, 0.0][: jacobian.shape[1]])
+        normal = jacobian.T @ jacobian + prior
+        root = np.sqrt(np.maximum(np.diag(normal), 1e-30))
+        scaled = normal / np.outer(root, root)
+        for _ in range(6):
+            step = np.linalg.solve(scaled + damping * np.eye(root.size), (jacobian.T @ solved.white - pull) / root)
+            moved = _moved(at, step / root, longest_mm)
+            tried = _solve(motion, moved)
+            if _total(tried, moved, variance) <= _total(solved, at, variance):
+                break
+            damping = max(10.0 * damping, 1e-3)
+        else:
+            break
+        at, solved = moved, tried
+        damping *= 0.1
+        if float(np.max(np.abs(step))) < SETTLED * np.sqrt(variance):
+            break
+    normal, _ = _information(motion, at, solved, free_play=free_play)
+    squares = _total(solved, at, solved.squares / max(solved.degrees, 1))
+    return Fit(at, squares, solved.degrees, normal, solved.residual_mm, float(solved.weights[1]))
+
+
+def inflation(motion: Motion, at: Alignment) -> Array:
+    """Ratio by which offset, rate and play scatter more than independent residuals would make them, as variances.
+
+    An input that is off stays off while the stage stands, or until it turns, and the motion's form is never quite the
+    model's: the residual's pull on the parameters is summed over stretches of the recording, and the scatter of these
+    sums taken for what it is (White 1980, doi:10.2307/1912934, for clusters).
+    """
+    solved = _solve(motion, at)
+    rows = solved.white.size - solved.weights.size + 2
+    clusters = min(CLUSTERS, rows // 8)
+    free_play = at.play_mm > 10.0 * PLAY_STEP
+    normal, jacobian = _information(motion, at, solved, free_play=free_play)
+    variance = solved.squares / max(solved.degrees, 1)
+    parts = np.array_split(jacobian[:rows] * solved.white[:rows, None] / variance, clusters)
+    pulls = np.stack([part.sum(axis=0) for part in parts])
+    meat = pulls.T @ pulls * (clusters / max(clusters - pulls.shape[1], 1)) + _prior(pulls.shape[1])
+    bread = np.linalg.pinv(normal)
+    ratio = np.diag(bread @ meat @ bread) / np.maximum(np.diag(bread), 1e-300)
+    kept = ratio[[0, 1, 3]] if free_play else np.array([ratio[0], ratio[1], max(ratio[0], ratio[1])])
+    return np.maximum(kept, 1.0)
+
+
+def _prior(size: int) -> Array:
+    return np.diag([OFFSET_PRIOR_S**-2, RATE_PRIOR**-2, START_PRIOR**-2, PLAY_PRIOR_MM**-2][:size])
+
+
+def _information(motion: Motion, at: Alignment, solved: "_Solved", *, free_play: bool) -> tuple[Array, Array]:
+    """Normal matrix over the residual's variance, priors included, and the jacobian."""
+    jacobian = _jacobian(motion, at, solved, free_play=free_play)
+    variance = solved.squares / max(solved.degrees, 1)
+    return jacobian.T @ jacobian / variance + _prior(jacobian.shape[1]), jacobian
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Solved:
+    weights: Array
+    white: Array
+    residual_mm: Array
+    basis: Array
+    squares: float
+    degrees: int
+
+
+def _solve(motion: Motion, at: Alignment) -> _Solved:
+    """Solve for scale and bend, the bend held small beside the scale."""
+    design = motion.design(motion.input_at(at))
+    white_design, white_gap = motion.whitened(design), motion.whitened(motion.gap_mm)
+    straight = np.linalg.lstsq(white_design[:, :2], white_gap, rcond=None)[0]
+    left = white_gap - white_design[:, :2] @ straight
+    spread = float(np.sqrt(left @ left / max(left.size - 2, 1)))
+    # A row more for each bend: it is zero with a standard deviation of a share of the straight part.
+    bends = design.shape[1] - 2
+    hold = spread / (BEND_PRIOR * max(abs(float(straight[1])), 1e-12))
+    rows = np.hstack([np.zeros((bends, 2)), hold * np.eye(bends)])
+    whole, aim = np.vstack([white_design, rows]), np.concatenate([white_gap, np.zeros(bends)])
+    basis, triangle = np.linalg.qr(whole)
+    if np.min(np.abs(np.diag(triangle))) < 1e-12 * np.max(np.abs(np.diag(triangle))):
+        weights = np.linalg.lstsq(whole, aim, rcond=None)[0]
+    else:
+        weights = np.linalg.solve(triangle, basis.T @ aim)
+    white = aim - whole @ weights
+    degrees = max(white_gap.size - 5 - bends, 1)
+    return _Solved(weights, white, motion.gap_mm - design @ weights, basis, float(white @ white), degrees)
+
+
+def _jacobian(motion: Motion, at: Alignment, solved: _Solved, *, free_play: bool) -> Array:
+    """Change of the whitened prediction, without what scale and bend take up; shape (m + knots, 3 or 4)."""
+    columns = []
+    for name, step in (
+        ("offset_s", OFFSET_STEP_S),
+        ("rate", RATE_STEP),
+        ("start", START_STEP if at.start < 0.5 else -START_STEP),
+        *((("play_mm", PLAY_STEP),) if free_play else ()),
+    ):
+        ends = [
+            motion.design(motion.input_at(replace(at, **{name: getattr(at, name) + by}))) @ solved.weights
+            for by in ((0.0, step) if name in ("start", "play_mm") else (-0.5 * step, 0.5 * step))
+        ]
+        columns.append(np.concatenate([motion.whitened((ends[1] - ends[0]) / step), np.zeros(solved.weights.size - 2)]))
+    jacobian = np.stack(columns, axis=1)
+    return np.asarray(jacobian - solved.basis @ (solved.basis.T @ jacobian))
+
+
+def _moved(at: Alignment, by: Array, longest_mm: float) -> Alignment:
+    play_mm = at.play_mm + (float(by[3]) if by.size == 4 else 0.0)
+    return Alignment(
+        at.offset_s + float(by[0]),
+        at.rate + float(by[1]),
+        float(np.clip(play_mm, 0.0, longest_mm)),
+        float(np.clip(at.start + by[2], -1.0, 1.0)),
+    )
+
+
+def _total(solved: _Solved, at: Alignment, variance: float) -> float:
+    return solved.squares + variance * ((at.rate / RATE_PRIOR) ** 2 + (at.start / START_PRIOR) ** 2)

@@ -1,0 +1,202 @@
+"""A Functional Mock-up Unit (FMI 2 or 3, model exchange or co-simulation) as a function of time, by FMPy."""
+
+import re
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from fingervision.domain.effect import Array
+
+UNITS_MM: Mapping[str, float] = {"m": 1e3, "cm": 10.0, "mm": 1.0, "um": 1e-3, "µm": 1e-3, "μm": 1e-3, "nm": 1e-6}
+"""Millimetres in a unit of length, by the unit's name."""
+INPUTS = ("input_mm", "input", "u_in", "u", "position", "displacement", "stroke", "x", "in")
+GAPS = ("gap_mm", "gap", "opening", "y", "out", "output")
+OTHERS = ("left_mm", "right_mm", "force_n")
+FINER = 4
+"""Steps of a co-simulation between two times: it holds its input over a step, read at the step's middle."""
+MOST_STEPS = 200_000
+LONGEST_STEP_S = 0.01
+"""A step is no longer, however far apart the times: what rings at 10 Hz is then still read ten times a period."""
+
+
+def fmu_function(path: Path, names: Mapping[str, str]) -> Callable[[Array, Array], dict[str, Array]]:
+    """Make a function of an FMU.
+
+    Parameters
+    ----------
+    path : Path
+        The `.fmu`.
+    names : mapping of str to str
+        Names of the variables `input` and `gap`, where they are stated.
+
+    Returns
+    -------
+    callable
+        Times (s) and inputs (mm) in; gap_mm or left_mm and right_mm, and force_n where there is one, out.
+
+    Raises
+    ------
+    ValueError
+        FMPy is missing, the file is no FMU for this system, or its variables leave it open which is which.
+    """
+    try:
+        from fmpy import extract, read_model_description, supported_platforms
+    except ImportError:
+        raise ValueError("is an FMU, which FMPy reads: install it with `pip install fingervision[fmu]`.") from None
+    if not path.is_file():
+        raise ValueError("must be a file, but is not there.")
+    try:
+        description = read_model_description(str(path))
+        platforms = supported_platforms(str(path))
+    except Exception as error:
+        raise ValueError(f"must be an FMU, but cannot be read as one ({_first_line(error)}).") from error
+    if description.fmiVersion[:1] not in "23":
+        raise ValueError(f"must be an FMU of FMI 2 or 3, but is of FMI {description.fmiVersion}: export it again.")
+    here = _platform()
+    if here not in platforms:
+        there = ", ".join(platforms) or "no system at all"
+        raise ValueError(f"must hold a binary for this system ({here}), but has one for {there}: export it for {here}.")
+    kind = "ModelExchange" if description.modelExchange is not None else "CoSimulation"
+    if description.coSimulation is not None:
+        kind = "CoSimulation"
+    chosen = _choose(description.modelVariables, "input", names.get("input"), INPUTS)
+    outputs = _outputs(description.modelVariables, names)
+    unpacked = extract(str(path))
+
+    def function(time_s: Array, input_mm: Array) -> dict[str, Array]:
+        return _run(unpacked, description, kind, chosen, outputs, time_s, input_mm)
+
+    return function
+
+
+def _run(
+    unpacked: str,
+    description: Any,
+    kind: str,
+    chosen: Any,
+    outputs: Mapping[str, Any],
+    time_s: Array,
+    input_mm: Array,
+) -> dict[str, Array]:
+    """Simulate one run and read its outputs at the run's times."""
+    from fmpy import simulate_fmu
+
+    _drive_between_steps()
+    span_s = float(time_s[-1] - time_s[0])
+    step_s = min(float(np.median(np.diff(time_s))) / FINER, LONGEST_STEP_S)
+    steps = int(np.ceil(min(span_s / step_s, MOST_STEPS)))
+    step_s = span_s / steps
+    ahead_s = 0.5 * step_s if kind == "CoSimulation" else 0.0
+    signal = np.empty(time_s.size + 1, dtype=[("time", "f8"), (chosen.name, "f8")])
+    signal["time"] = np.concatenate([time_s[:1] - time_s[0] - step_s, time_s - time_s[0] - ahead_s])
+    signal[chosen.name] = np.concatenate([input_mm[:1], input_mm]) / _mm(chosen)
+    start = {chosen.name: float(input_mm[0]) / _mm(chosen)}
+    try:
+        found = simulate_fmu(
+            unpacked,
+            validate=False,
+            start_time=0.0,
+            stop_time=span_s,
+            output_interval=step_s,
+            step_size=step_s if kind == "CoSimulation" else None,
+            fmi_type=kind,
+            start_values=start,
+            input=signal,
+            output=[variable.name for variable in outputs.values()],
+            model_description=description,
+            remote_platform=None,
+        )
+    except Exception as error:
+        raise ValueError(f"could not be simulated: {_first_line(error)}") from error
+    at_s, kept = np.unique(found["time"][::-1], return_index=True)
+    out = {}
+    for name, variable in outputs.items():
+        values = np.asarray(found[variable.name], dtype=np.float64)[::-1][kept]
+        factor = 1.0 if name == "force_n" else _mm(variable)
+        out[name] = np.interp(time_s - time_s[0], at_s, values) * factor
+    return out
+
+
+def _drive_between_steps() -> None:
+    """Let FMPy's integrator see the input at the time that it asks for, and not that of the last step.
+
+    FMPy 0.3 sets inputs before a step and in the root function alone; over a step of CVode an input that moves then
+    lags, and the error test fails where it jumps. This holds for the process of the model, which runs nothing else.
+    """
+    from fmpy import sundials
+
+    if getattr(sundials.CVodeSolver, "sees_input", False):
+        return
+
+    class Driven(sundials.CVodeSolver):  # type: ignore[misc]
+        sees_input = True
+
+        def f(self, t: float, y: Any, ydot: Any, user_data: Any) -> int:
+            self.input.apply(t, discrete=False)
+            return int(super().f(t, y, ydot, user_data))
+
+    sundials.CVodeSolver = Driven
+
+
+def _outputs(variables: list[Any], names: Mapping[str, str]) -> dict[str, Any]:
+    """Choose the gap, or both fingers, and the force where there is one."""
+    listed = {variable.name.lower(): variable for variable in variables if variable.causality == "output"}
+    out = {name: listed[name] for name in OTHERS if name in listed}
+    if not ({"left_mm", "right_mm"} <= set(out)) or "gap" in names:
+        out = {name: out[name] for name in ("force_n",) if name in out}
+        out["gap_mm"] = _choose(variables, "output", names.get("gap"), GAPS)
+    return out
+
+
+def _choose(variables: list[Any], causality: str, stated: str | None, usual: tuple[str, ...]) -> Any:
+    """Choose the stated variable, the one of a usual name, or the only one that there is."""
+    word = "input" if causality == "input" else "gap"
+    real = [one for one in variables if one.causality == causality and one.type in ("Real", "Float64", "Float32")]
+    if stated is not None:
+        for one in variables:
+            if one.name == stated:
+                return one
+        raise ValueError(f"must have the variable {stated} (as `{word}` states), but has {_listed(real)}.")
+    by_name = {one.name.lower(): one for one in real}
+    for name in usual:
+        if name in by_name:
+            return by_name[name]
+    continuous = [one for one in real if one.variability in (None, "continuous")]
+    for found in (real, continuous):
+        if len(found) == 1:
+            return found[0]
+    if not real:
+        raise ValueError(f"must have a real {causality} to be driven in time, but has none.")
+    raise ValueError(
+        f"has {len(real)} {causality}s ({_listed(real)}), and it is not said which is the {word}: name it in a "
+        f'model.toml with base = "the.fmu" and {word} = "its name".'
+    )
+
+
+def _listed(variables: list[Any]) -> str:
+    return ", ".join(one.name for one in variables[:8]) or "none"
+
+
+def _mm(variable: Any) -> float:
+    """Millimetres in one unit of a variable: as it declares, by its name's ending, else taken for millimetres."""
+    unit = variable.unit or (variable.declaredType.unit if variable.declaredType is not None else None)
+    if unit is None:
+        ending = re.search(r"_(m|cm|mm|um|nm)$", variable.name)
+        unit = ending.group(1) if ending else "mm"
+    if unit not in UNITS_MM:
+        raise ValueError(
+            f"must have lengths as input and gap, but {variable.name} is in {unit}: choose another variable."
+        )
+    return UNITS_MM[unit]
+
+
+def _platform() -> str:
+    from fmpy import platform
+
+    return str(platform)
+
+
+def _first_line(error: Exception) -> str:
+    return (str(error).strip().splitlines() or [type(error).__name__])[0][:300]

@@ -1,0 +1,145 @@
+"""A model that is a function of time: an FMU, or a Python file with `simulate(time_s, input_mm)`."""
+
+import json
+import signal
+import subprocess
+import sys
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+
+from fingervision.domain.effect import Array
+from fingervision.domain.errors import FingervisionError
+from fingervision.domain.response import Response
+from fingervision.models.table import TableModel
+
+SUFFIXES = (".fmu", ".py")
+LONGEST_S = 120.0
+"""Seconds of wall time that a call may take: an ordinary gripper of some hundred states needs one or two."""
+STEPS = 21
+"""Inputs at which the model is let come to rest: linear between them, with the rest in the remainder over time."""
+HOLDS_S = (2.0, 8.0, 32.0)
+"""Holds that are tried until the gap has settled; grippers ring for less than a second and creep for a minute."""
+SETTLED = 1e-4
+"""Share of the gap's range that it may still move in the second half of a hold."""
+
+
+@dataclass(frozen=True, slots=True)
+class FunctionModel:
+    """A file that predicts the gap over time from the input over time.
+
+    Parameters
+    ----------
+    path : Path
+        `.fmu` (FMI 2 or 3, model exchange or co-simulation) or `.py`.
+    names : mapping of str to str
+        Which variable of an FMU is the `input` and which the `gap`, where its names do not say so.
+    """
+
+    path: Path
+    names: Mapping[str, str] = field(default_factory=lambda: MappingProxyType({}))
+
+    def respond(self, input_mm: Array) -> Response:
+        """Answer at rest at each input: held there until the gap has settled; `input_mm` of shape (n,)."""
+        if np.ptp(input_mm) == 0.0:
+            time_s = np.array([0.0, 0.5, 1.0]) * HOLDS_S[0]
+            (held,) = self.simulate([(time_s, np.full(3, float(input_mm[0])))])
+            last = np.full(input_mm.size, 2)
+            return held.at(last)
+        return self.at_rest(float(input_mm.min()), float(input_mm.max())).respond(input_mm)
+
+    def at_rest(self, low_mm: float, high_mm: float) -> TableModel:
+        """Tabulate the gap at rest, as the mean of the way up and the way down.
+
+        Raises
+        ------
+        FingervisionError
+            The model fails, or its gap does not depend on the input, or never settles.
+        """
+        up = np.linspace(low_mm, high_mm, STEPS)
+        places = np.concatenate([up, up[::-1]])
+        for hold_s in HOLDS_S:
+            begin = np.arange(places.size) * hold_s
+            offsets = hold_s * np.array([0.1, 0.55, 1.0])
+            time_s = (begin[:, None] + offsets).ravel()
+            (answer,) = self.simulate([(np.insert(time_s, 0, 0.0), np.insert(np.repeat(places, 3), 0, places[0]))])
+            gap = answer.gap_mm[1:].reshape(-1, 3)
+            reach = float(np.ptp(gap[:, 2]))
+            if reach == 0.0:
+                raise FingervisionError(
+                    f"The gap of {self.path} must depend on its input, but is {gap[0, 2]:g} mm from {low_mm:g} to "
+                    f"{high_mm:g} mm: check its units and which variables are input and gap."
+                )
+            if float(np.max(np.abs(gap[:, 2] - gap[:, 1]))) < SETTLED * reach:
+                break
+        else:
+            raise FingervisionError(
+                f"The gap of {self.path} must come to rest at a held input, but still moves after {HOLDS_S[-1]:g} s: "
+                "give a model that is stable, or a table of its static answer."
+            )
+        last = answer.at(np.arange(3, 3 * places.size + 1, 3))
+
+        def mean(column: Array) -> Array:
+            return np.asarray(0.5 * (column[:STEPS] + column[STEPS:][::-1]))
+
+        force = None if last.force_n is None else mean(last.force_n)
+        return TableModel(self.path.name, up, mean(last.left_mm), mean(last.right_mm), force)
+
+    def simulate(self, runs: Sequence[tuple[Array, Array]]) -> list[Response]:
+        """Drive the model in time, each run from its own start, in a process of its own.
+
+        Parameters
+        ----------
+        runs : sequence of (ndarray of float, ndarray of float), each of shape (n,)
+            Times, strictly increasing from 0, and inputs in mm; straight between them.
+
+        Raises
+        ------
+        FingervisionError
+            The file cannot be run, crashes, does not end, or answers what is no number.
+        """
+        with TemporaryDirectory(prefix="fingervision-") as folder:
+            asked, answered = Path(folder) / "asked.npz", Path(folder) / "answered.npz"
+            arrays: dict[str, Any] = {
+                f"{name}{k}": run[i] for k, run in enumerate(runs) for i, name in enumerate(("time", "input"))
+            }
+            np.savez(asked, **arrays)
+            command = [sys.executable, "-m", "fingervision.models.function_worker", str(self.path.resolve())]
+            command += [str(asked), str(answered), json.dumps(dict(self.names))]
+            try:
+                ended = subprocess.run(
+                    command, capture_output=True, timeout=LONGEST_S, check=False, stdin=subprocess.DEVNULL
+                )
+            except subprocess.TimeoutExpired:
+                raise FingervisionError(
+                    f"{self.path} must answer within {LONGEST_S:g} s, but was still running and was ended: look for an "
+                    "endless loop, or simulate a table with it."
+                ) from None
+            if ended.returncode != 0 or not answered.is_file():
+                raise FingervisionError(self._failure(ended.returncode, ended.stderr))
+            with np.load(answered) as found:
+                return [_response(found, k) for k in range(len(runs))]
+
+    def _failure(self, code: int, stderr: bytes) -> str:
+        """Say how the process ended."""
+        said = stderr.decode(errors="replace").strip().splitlines()
+        if said and said[-1].startswith(SAYS):
+            return f"{self.path} {said[-1].removeprefix(SAYS)}"
+        if code < 0:
+            name = signal.Signals(-code).name if -code in set(signal.Signals) else f"signal {-code}"
+            return f"{self.path} must answer, but crashed ({name}): the fault is in the model; nothing was lost."
+        last = f" Its last words: {said[-1][:300]}" if said else ""
+        return f"{self.path} must answer, but its process ended with code {code}: mend the model.{last}"
+
+
+SAYS = "fingervision-model: "
+"""Begins the line in which the process of a model says why it could not answer."""
+
+
+def _response(found: Mapping[str, Array], k: int) -> Response:
+    return Response(found[f"left_mm{k}"], found[f"right_mm{k}"], found.get(f"force_n{k}"))

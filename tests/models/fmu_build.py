@@ -1,0 +1,88 @@
+"""Build small FMUs with gcc: a gripper of FMI 2 or 3, for model exchange or co-simulation."""
+
+import re
+import shutil
+import subprocess
+import zipfile
+from pathlib import Path
+
+SOURCE = Path(__file__).parent / "fmu_gripper.c"
+TOKEN = "{8c4e810f-3df3-4a00-8276-176fa3c9f000}"
+KINDS = {"cs": ("CoSimulation",), "me": ("ModelExchange",)}
+
+
+def can_build():
+    """Whether gcc and FMPy, whose list of functions the stubs are made from, are there."""
+    try:
+        import fmpy  # noqa: F401
+    except ImportError:
+        return False
+    return shutil.which("gcc") is not None
+
+
+def build_fmu(folder, version=2, kind="cs", name="gripper", more=(), platform=None, unit="m", extra=""):
+    """Compile the gripper and pack it; `more` are options of gcc."""
+    import fmpy
+
+    library = folder / f"{name}.so"
+    code = SOURCE.read_text()
+    package = Path(fmpy.__file__).parent
+    wanted = set(re.findall(rf"\bfmi{version}[A-Z]\w+", (package / f"c-code/fmi{version}Functions.h").read_text()))
+    wanted = {one for one in wanted if not one.endswith("TYPE") and "FullName" not in one}
+    missing = sorted(one for one in wanted if not re.search(rf"\b{one}\(", code))
+    stubs = folder / "stubs.c"
+    stubs.write_text("\n".join(f"int {one}(void) {{ return 3; }}" for one in missing))
+    options = ["-shared", "-fPIC", "-O1", "-w", f"-DFMI={version}", *more]
+    subprocess.run(["gcc", *options, str(SOURCE), str(stubs), "-o", str(library), "-lm"], check=True)
+    here = platform or ("linux64" if version == 2 else "x86_64-linux")
+    document = _fmi2(kind, unit, extra) if version == 2 else _fmi3(kind, unit, extra)
+    target = folder / f"{name}.fmu"
+    with zipfile.ZipFile(target, "w") as packed:
+        packed.writestr("modelDescription.xml", document)
+        packed.write(library, f"binaries/{here}/gripper{'.dll' if 'win' in here else '.so'}")
+    return target
+
+
+def _fmi2(kind, unit, extra):
+    kinds = "".join(f'<{one} modelIdentifier="gripper"/>' for one in KINDS[kind])
+    return f"""<?xml version="1.0" encoding="UTF-8"?>
+<fmiModelDescription fmiVersion="2.0" modelName="gripper" guid="{TOKEN}" numberOfEventIndicators="0">
+{kinds}
+<UnitDefinitions><Unit name="{unit}"/></UnitDefinitions>
+<ModelVariables>
+<ScalarVariable name="u" valueReference="1" causality="input" variability="continuous">
+<Real unit="{unit}" start="0"/></ScalarVariable>
+<ScalarVariable name="gap" valueReference="2" causality="output" variability="continuous">
+<Real unit="{unit}"/></ScalarVariable>
+<ScalarVariable name="x" valueReference="3" causality="local" variability="continuous"><Real/></ScalarVariable>
+<ScalarVariable name="v" valueReference="4" causality="local" variability="continuous"><Real/></ScalarVariable>
+<ScalarVariable name="der(x)" valueReference="5" causality="local" variability="continuous">
+<Real derivative="3"/></ScalarVariable>
+<ScalarVariable name="der(v)" valueReference="6" causality="local" variability="continuous">
+<Real derivative="4"/></ScalarVariable>
+{extra}
+</ModelVariables>
+<ModelStructure><Outputs><Unknown index="2"/></Outputs>
+<Derivatives><Unknown index="5"/><Unknown index="6"/></Derivatives></ModelStructure>
+</fmiModelDescription>"""
+
+
+def _fmi3(kind, unit, extra):
+    kinds = "".join(f'<{one} modelIdentifier="gripper"/>' for one in KINDS[kind])
+    return f"""<?xml version="1.0" encoding="UTF-8"?>
+<fmiModelDescription fmiVersion="3.0" modelName="gripper" instantiationToken="{TOKEN}">
+{kinds}
+<UnitDefinitions><Unit name="{unit}"/></UnitDefinitions>
+<ModelVariables>
+<Float64 name="time" valueReference="0" causality="independent" variability="continuous"/>
+<Float64 name="u" valueReference="1" causality="input" variability="continuous" unit="{unit}" start="0"/>
+<Float64 name="gap" valueReference="2" causality="output" variability="continuous" unit="{unit}"/>
+<Float64 name="x" valueReference="3" causality="local" variability="continuous" start="0" initial="exact"/>
+<Float64 name="v" valueReference="4" causality="local" variability="continuous" start="0" initial="exact"/>
+<Float64 name="der(x)" valueReference="5" causality="local" variability="continuous" derivative="3"/>
+<Float64 name="der(v)" valueReference="6" causality="local" variability="continuous" derivative="4"/>
+{extra}
+</ModelVariables>
+<ModelStructure><Output valueReference="2"/>
+<ContinuousStateDerivative valueReference="5"/><ContinuousStateDerivative valueReference="6"/></ModelStructure>
+</fmiModelDescription>"""
