@@ -42,6 +42,22 @@ class FingerEdge:
 
 
 @dataclass(frozen=True, slots=True)
+class HeldPart:
+    """A part between the fingers that both hold.
+
+    Parameters
+    ----------
+    width_px : float
+        How far the fingers' inner edges are apart where they hold it, across the fingers.
+    u_width_px : float
+        Standard uncertainty from frame to frame.
+    """
+
+    width_px: float
+    u_width_px: float
+
+
+@dataclass(frozen=True, slots=True)
 class GapMeasurement:
     """The two measuring points of one frame and the distance between them.
 
@@ -61,6 +77,8 @@ class GapMeasurement:
     response_shift_px : float
         How much larger `gap_px` is than it would be if the other camera response that is possible were the true one;
         zero where the response is known.
+    held : HeldPart or None
+        The part that is held, where one is seen.
     """
 
     left: FingerEdge
@@ -70,6 +88,7 @@ class GapMeasurement:
     light_gap: bool
     u_shift_px: float = 0.0
     response_shift_px: float = 0.0
+    held: HeldPart | None = None
 
     @property
     def u_picture_px(self) -> float:
@@ -110,7 +129,10 @@ class NoGap:
         The reason, as it stands in the table.
     words : str
         The reason in a sentence.
+    held : HeldPart or None
+        The part that hides the inner edges, where its width is known all the same.
     """
 
     status: Status
     words: str
+    held: HeldPart | None = None

@@ -1,5 +1,8 @@
 """Step 8, the gap: the distance between the two measuring points, and how surely it is known."""
 
+from dataclasses import replace
+from math import atan, degrees
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -9,10 +12,12 @@ from fingervision.domain.status import Status
 from fingervision.vision.edge_filters import PIXEL_VARIANCE
 from fingervision.vision.edges import EdgePoints
 from fingervision.vision.finger_end import FingerEnd, fit_finger_end
-from fingervision.vision.finger_shape import PARAMETERS
+from fingervision.vision.finger_shape import OUTER_M, PARAMETERS
 from fingervision.vision.fingers import CoarseFinger, CoarseFingers
 from fingervision.vision.first_guess import first_guess
-from fingervision.vision.flanks import has_straight_flanks
+from fingervision.vision.held_part import held_part, is_hidden
+from fingervision.vision.flanks import STEEPEST, has_straight_flanks
+from fingervision.vision.likeness import FARTHEST_TURNED, common_turn
 from fingervision.vision.local_outline import local_measuring_point
 from fingervision.vision.measuring_point import MeasuringPoint, measuring_point, squared
 from fingervision.vision.median import middle
@@ -67,8 +72,9 @@ def measure_gap(
     if refusal is not None:
         return refusal
     points = outline_points(fingers, edges)
+    behind = _gripping(fingers, below_tip_px)
     if min(len(p.x) for p in points) < FEWEST_LINES:
-        return NoGap(Status.NO_FINGERS, "Too little of a finger's outline is in view to be measured.")
+        return behind or NoGap(Status.NO_FINGERS, "Too little of a finger's outline is in view to be measured.")
     left, right = (squared(fit_finger_end(p, *first_guess(p, below_tip_px))) for p in points)
     noise_shared = max(SHARED_POINTS[coding], edges.shared_lines)
     shared = max(shared_points(points, (left, right), coding), noise_shared)
@@ -79,6 +85,11 @@ def measure_gap(
     refusal = _no_fingers(fingers, points, (left, right), holds, below_tip_px)
     if refusal is not None:
         return refusal
+    held = None
+    if all(holds) or behind is not None:
+        held = held_part(fingers, (left, right), (spread(left) * shared, spread(right) * shared))
+    if behind is not None:
+        return replace(behind, held=held)
     measured: list[MeasuringPoint] = []
     for p, end, found, does_hold in zip(points, (left, right), fitted, holds, strict=True):
         own = None
@@ -92,7 +103,21 @@ def measure_gap(
         if own is None:
             return NoGap(Status.NO_FINGERS, "The outline near the measuring height is broken.")
         measured.append(own)
-    return _assemble(fingers, edges, measured, below_tip_px, light_gap)
+    outcome = _assemble(fingers, edges, measured, below_tip_px, light_gap)
+    return replace(outcome, held=held) if held is not None else outcome
+
+
+def _gripping(fingers: CoarseFingers, below_tip_px: float) -> NoGap | None:
+    """Say so where a part hides an inner edge at the measuring height."""
+    sides = [
+        name
+        for name, finger in (("left", fingers.left), ("right", fingers.right))
+        if is_hidden(finger, finger.top_along_px + below_tip_px)
+    ]
+    if not sides:
+        return None
+    edges = "inner edges" if len(sides) == 2 else f"{sides[0]} finger's inner edge"
+    return NoGap(Status.GRIPPING, f"A part between the fingers hides the {edges} at the measuring height.")
 
 
 def _refuse(edges: EdgePoints, full_scale: int, light_gap: bool) -> NoGap | None:
@@ -125,10 +150,19 @@ def _no_fingers(
     below_tip_px: float,
 ) -> NoGap | None:
     """Say so where what was measured is round all over: a finger has straight flanks."""
+    pair = (fingers.left, fingers.right)
+    turn = common_turn([finger.inner_sign * end.parameters[OUTER_M] for finger, end in zip(pair, ends, strict=True)])
     are_fingers = [
-        (does_hold and has_flanks(p, end)) or has_straight_flanks(finger.top, below_tip_px)
-        for finger, p, end, does_hold in zip((fingers.left, fingers.right), points, ends, holds, strict=True)
+        (does_hold and has_flanks(p, end, finger.inner_sign * turn))
+        or has_straight_flanks(finger.top, below_tip_px, STEEPEST + abs(turn))
+        for finger, p, end, does_hold in zip(pair, points, ends, holds, strict=True)
     ]
+    if abs(turn) > FARTHEST_TURNED and any(are_fingers):
+        return NoGap(
+            Status.NO_FINGERS,
+            f"The fingers are turned by {degrees(atan(abs(turn))):.0f} degrees in the picture, and at most 25 are "
+            "measured: turn the camera.",
+        )
     if all(are_fingers):
         return None
     if any(are_fingers):

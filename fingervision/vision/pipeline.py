@@ -18,10 +18,12 @@ from fingervision.domain.status import Status
 from fingervision.vision.binarise import Binary, binarise, binarise_local
 from fingervision.vision.denoise import denoise
 from fingervision.vision.edges import EdgePoints, fit_edges
-from fingervision.vision.fingers import CoarseFingers, find_fingers
+from fingervision.vision.fingers import MORE_THAN_TWO, UNLIKE, CoarseFingers, find_fingers
 from fingervision.vision.gap import measure_gap
 from fingervision.vision.grey import GreyImage, to_grey, top_level
+from fingervision.vision.held_part import visible_lines
 from fingervision.vision.overlay import draw_boundary, draw_edge_points, draw_overlay, in_eight_bits
+from fingervision.vision.part_removal import without_part
 from fingervision.vision.profile_choice import with_profile
 from fingervision.vision.profile_lines import profile_lines
 from fingervision.vision.response_shift import gap_shift_px
@@ -29,6 +31,8 @@ from fingervision.vision.stripes import with_stripes
 
 # A picture whose two classes differ by less (share of full scale, and in units of the spread within) shows nothing.
 CONTRAST_FLOOR, SEPARATION_FLOOR = 0.03, 3.0
+# Classes that stand so far apart are not two halves of uneven light: another split would find the same things again.
+CLEAR_SEPARATION = 8.0
 SATURATED_SHARE = 0.99
 # An edge at the limit of blur (5 px) makes half of its contrast within so many pixels to either side, shade does not.
 EDGE_REACH_PX, EDGE_SHARE = 3, 0.2
@@ -38,6 +42,12 @@ SMALLEST_SIDE_PX = 16
 FINAL = (Status.SATURATED, Status.BLURRED)
 # What is taken of a camera that says nothing, and what it may be as well.
 LINEAR, SRGB = standard_response("linear"), standard_response("srgb")
+UNIFORM = NoGap(Status.LOW_CONTRAST, "The picture is uniform: nothing in it differs from anything else.")
+# Light ground left and right of one dark thing looks like two light fingers that the border cuts off.
+MAY_BE_GROUND = NoGap(
+    Status.NO_FINGERS,
+    "Light on both sides of something dark reaches the picture's borders: state --fingers light if these are two fingers.",
+)
 # The outline is followed so far below the measuring height (pixels, or in units of that height).
 REACH_BELOW_PX, REACH_BELOW_HEIGHTS = 45.0, 1.5
 
@@ -155,9 +165,8 @@ def _attempt(grey: GreyImage, settings: Settings, coding: Coding) -> _Attempt:
     if binary.full_scale_share > 0.9 and np.count_nonzero(grey == scale) > SATURATED_SHARE * grey.size:
         words = "The picture is white: nearly every pixel is at full scale."
         return _Attempt(NoGap(Status.SATURATED, words), binary)
-    if binary.contrast < CONTRAST_FLOOR * scale or binary.separation < SEPARATION_FLOOR:
-        words = "The picture is uniform: nothing in it differs from anything else."
-        return _Attempt(NoGap(Status.LOW_CONTRAST, words), binary)
+    if binary.contrast < CONTRAST_FLOOR * scale:
+        return _Attempt(UNIFORM, binary)
     first: _Attempt | None = None
     for split, fingers, light_gap in _candidates(denoised, binary, settings):
         if isinstance(fingers, NoGap):
@@ -167,7 +176,7 @@ def _attempt(grey: GreyImage, settings: Settings, coding: Coding) -> _Attempt:
         else:
             upright = fingers.orientation.view(grey)
             light = _light(settings.response, scale, int(np.iinfo(grey.dtype).max) + 1)
-            lines = profile_lines((fingers.left, fingers.right))
+            lines = visible_lines(profile_lines((fingers.left, fingers.right)), fingers)
             edges = with_profile(upright, fit_edges(upright, lines, light, scale), light, scale)
             edges = with_stripes(upright, edges, light)
             outcome = measure_gap(fingers, edges, settings.below_tip_px, scale, light_gap, coding)
@@ -178,7 +187,7 @@ def _attempt(grey: GreyImage, settings: Settings, coding: Coding) -> _Attempt:
         if isinstance(attempt.outcome, GapMeasurement) or attempt.outcome.status in FINAL:
             return attempt
         first = first or attempt
-    return first or _Attempt(NoGap(Status.NO_FINGERS, "Nothing in the picture looks like two fingers."), binary)
+    return first or _Attempt(UNIFORM, binary)
 
 
 def _scale(grey: GreyImage, settings: Settings) -> int:
@@ -207,21 +216,31 @@ def _candidates(
     directions = tuple(Direction) if settings.direction is None else (settings.direction,)
     below = settings.below_tip_px
     reach = below + max(REACH_BELOW_PX, REACH_BELOW_HEIGHTS * below)
+    clear = False
     for is_local in (False, True):
         split = binarise_local(denoised) if is_local else binary
+        if split.separation < SEPARATION_FLOOR:
+            continue
         dark_first = _border_is_light(split)
         unsure: list[tuple[Binary, CoarseFingers | NoGap, bool]] = []
         for light_gap in (dark_first, not dark_first):
             if settings.fingers_are_dark not in (None, light_gap):
                 continue
             fingers = find_fingers(split.dark if light_gap else split.light, directions, below, reach)
-            if isinstance(fingers, CoarseFingers) and not fingers.is_rooted:
+            if isinstance(fingers, NoGap) and fingers is not UNLIKE:
+                fingers = without_part(split.dark if light_gap else split.light, directions, below, reach) or fingers
+            if not light_gap and settings.fingers_are_dark is None and isinstance(fingers, CoarseFingers) and fingers.are_cut:
+                fingers = MAY_BE_GROUND
+            if isinstance(fingers, CoarseFingers) and not (fingers.is_rooted or fingers.is_joined):
                 unsure.append(
                     (split, fingers, light_gap)
                 )  # something may come in from the border in the other polarity
             else:
                 yield split, fingers, light_gap
+                clear = clear or fingers is UNLIKE or (fingers is MORE_THAN_TWO and split.separation > CLEAR_SEPARATION)
         yield from unsure
+        if clear:
+            break
 
 
 def _has_edges(denoised: GreyImage, split: Binary, contrast: float) -> bool:

@@ -80,9 +80,19 @@ def shape_holds(points: OutlinePoints, end: FingerEnd, found: MeasuringPoint, be
     return systematic < SHAPE_LIMIT * limit and end.misfit < MISFIT_LIMIT * limit
 
 
-def has_flanks(points: OutlinePoints, end: FingerEnd) -> bool:
-    """Whether enough of the outline that was fitted belongs to flanks that stand nearly along the axis."""
-    if max(abs(end.parameters[INNER_M]), abs(end.parameters[OUTER_M])) > STEEPEST:
+def has_flanks(points: OutlinePoints, end: FingerEnd, turn: float = 0.0) -> bool:
+    """Whether enough of the outline that was fitted belongs to flanks that stand nearly along the axis.
+
+    Parameters
+    ----------
+    points : OutlinePoints
+        Sub-pixel outline.
+    end : FingerEnd
+        The shape that was fitted to it.
+    turn : float
+        How both fingers of a turned camera lean, in this finger's own axes.
+    """
+    if max(abs(end.parameters[INNER_M] - turn), abs(end.parameters[OUTER_M] - turn)) > STEEPEST:
         return False
     seen = end.robust > 0.0
     share = float(on_flanks(end.parameters, end.origin, points.x, points.y)[seen].mean())
