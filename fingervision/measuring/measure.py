@@ -1,5 +1,6 @@
 """A recording goes in; the gap over time, its summary and its figure come out."""
 
+from collections import Counter
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import ExitStack, closing, contextmanager
 from dataclasses import dataclass, field, replace
@@ -20,6 +21,7 @@ from fingervision.frames.source import Description, FrameSource
 from fingervision.measuring.asked_to_stop import asked_to_stop
 from fingervision.measuring.gap_figure import draw_gap
 from fingervision.measuring.marked import marked
+from fingervision.measuring.one_polarity import one_polarity
 from fingervision.measuring.other_camera import other_camera
 from fingervision.measuring.output_folder import OutputFolder, claimed
 from fingervision.measuring.overlay_video import OverlayVideo
@@ -35,7 +37,7 @@ from fingervision.storage.lost_frames import lost_frames
 from fingervision.storage.out_folder import make_out_folder
 from fingervision.storage.recorded_camera import recorded_camera
 from fingervision.storage.summary_json import write_summary
-from fingervision.vision.pipeline import Settings, measure_frame
+from fingervision.vision.pipeline import Settings
 
 # Rows are made for so many frames at once, or for what has come in so many seconds, and then handed to the table.
 FRAMES_AT_ONCE, SECONDS_AT_ONCE = 128, 0.4
@@ -214,7 +216,7 @@ def _measured(source: FrameSource, task: Task, out: Path, on_progress: Progress 
         stack.callback(hand_over)
         handed_over_at = monotonic()
         try:
-            for item, outcome in _outcomes(marked(source, marks) if marks else source, settings):
+            for item, outcome in _outcomes(marked(source, marks) if marks else source, settings, series.votes):
                 result = Result(item.index, item.time_s, outcome)
                 pending.append(result)
                 if video is not None and isinstance(item, Frame):
@@ -263,12 +265,11 @@ def _held(out: Path) -> Iterator[None]:
 
 
 def _outcomes(
-    source: Iterable[Frame | LostFrame], settings: Settings
+    source: Iterable[Frame | LostFrame], settings: Settings, votes: Counter[str]
 ) -> Iterator[tuple[Frame | LostFrame, GapMeasurement | NoGap | LostFrame]]:
     """Every frame with what it says; the decoder runs ahead and is stopped when this is."""
     with closing(decoded_ahead(source)) as frames:
-        for item in frames:
-            yield item, measure_frame(item, settings) if isinstance(item, Frame) else item
+        yield from one_polarity(frames, settings, votes)
 
 
 def _check(task: Task, description: Description) -> None:

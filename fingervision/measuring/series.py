@@ -46,6 +46,8 @@ class GapSeries:
         The first frame with each status but ok, and why.
     fingers : Counter of str
         Frames with dark and with light fingers.
+    votes : Counter of str
+        The same among the first frames, before they agreed on one answer.
     has_budget : bool
         Whether the scale said how surely it is known.
     """
@@ -53,6 +55,7 @@ class GapSeries:
     counts: Counter[Status] = field(default_factory=Counter)
     first_without: dict[Status, FirstBad] = field(default_factory=dict)
     fingers: Counter[str] = field(default_factory=Counter)
+    votes: Counter[str] = field(default_factory=Counter)
     has_budget: bool = False
     _frame: array[int] = field(default_factory=lambda: array("q"))
     _time_s: array[float] = field(default_factory=lambda: array("d"))

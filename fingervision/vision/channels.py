@@ -118,7 +118,7 @@ def _straight(chain: Ints) -> Channel | None:
 
 @compiled
 def _line(t: Floats, v: Floats) -> tuple[float, float, float]:
-    """Line v = c + m t by slopes from one half of the rows to the other (Theil and Sen), and the share of rows on it."""
+    """Line v = c + m t by slopes from one half of the rows to the other (Theil, Sen), and the share of rows on it."""
     half = t.size // 2
     m = middle((v[t.size - half :] - v[:half]) / np.maximum(t[t.size - half :] - t[:half], 1.0))
     c = middle(v - m * t)
@@ -181,10 +181,14 @@ def _chain(runs: Ints, previous: Ints, end: int, length: int) -> Ints:
 
 @compiled
 def _runs(upright: Mask) -> tuple[Ints, Ints, Ints, NDArray[np.bool_]]:
-    """All bounded runs of ground, the run below each that it goes on from, how many it is the last of, and which go on."""
+    """All bounded runs of ground; the run below that each goes on from, its place in its chain, and which go on."""
     rows, columns = upright.shape
     most = 4096
-    runs, previous, length = np.empty((most, 3), dtype=np.int64), np.empty(most, dtype=np.int64), np.ones(most, dtype=np.int64)
+    runs, previous, length = (
+        np.empty((most, 3), dtype=np.int64),
+        np.empty(most, dtype=np.int64),
+        np.ones(most, dtype=np.int64),
+    )
     has_next = np.zeros(most, dtype=np.bool_)
     count, below_first, below_past = 0, 0, 0
     for row in range(rows - 1, -1, -1):

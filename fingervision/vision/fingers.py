@@ -34,7 +34,7 @@ ROOTED_BONUS = 2.0
 LYING_HEIGHTS = 6.0
 # Of things that lie in view only those that are so many times as long as wide may be fingers: coins are not.
 LYING_SLENDER = 1.5
-# A gripper that lies in view is the only thing of its size: beside a third outline of this share of its length it is not.
+# A gripper that lies in view is the only thing of its size: no third outline has this share of its length.
 COMPANY_SHARE = 0.4
 # A lone finger that comes in from the border for so many times the measuring height makes everything else a thing.
 ROOTED_HEIGHTS = 2.0
@@ -225,7 +225,8 @@ def _best_pair(
 
 def _has_company(own: Outline, outlines: list[Outline]) -> bool:
     """Whether something else of about this size lies in view, as letters and the like do."""
-    return sum(outline.shape[0] > COMPANY_SHARE * own.shape[0] for outline in outlines) > 2
+    longest_px = COMPANY_SHARE * len(own)
+    return sum(len(outline) > longest_px for outline in outlines) > 2
 
 
 def _is_third(top: Top, fingers: CoarseFingers, below_tip_px: float) -> bool:
@@ -327,3 +328,8 @@ def _inner_places(
         for finger, height in zip((left, right), heights, strict=True)
     )
     return first, second
+
+
+def is_hidden(finger: CoarseFinger, along: float) -> bool:
+    """Whether a part hides a finger's inner edge at a place along the fingers."""
+    return bool(np.isin(round(along), finger.hidden))

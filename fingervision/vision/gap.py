@@ -9,14 +9,15 @@ from numpy.typing import NDArray
 from fingervision.domain.frame import Coding
 from fingervision.domain.gap import FingerEdge, GapMeasurement, NoGap
 from fingervision.domain.status import Status
+from fingervision.vision.cornered_outline import cornered_measuring_point
 from fingervision.vision.edge_filters import PIXEL_VARIANCE
 from fingervision.vision.edges import EdgePoints
 from fingervision.vision.finger_end import FingerEnd, fit_finger_end
 from fingervision.vision.finger_shape import OUTER_M, PARAMETERS
-from fingervision.vision.fingers import CoarseFinger, CoarseFingers
+from fingervision.vision.fingers import CoarseFinger, CoarseFingers, is_hidden
 from fingervision.vision.first_guess import first_guess
-from fingervision.vision.held_part import held_part, is_hidden
 from fingervision.vision.flanks import STEEPEST, has_straight_flanks
+from fingervision.vision.held_part import held_part
 from fingervision.vision.likeness import FARTHEST_TURNED, common_turn
 from fingervision.vision.local_outline import local_measuring_point
 from fingervision.vision.measuring_point import MeasuringPoint, measuring_point, squared
@@ -37,8 +38,12 @@ FEWEST_LINES = 2 * PARAMETERS
 CUT_OFF_LIMIT = 0.08
 # A tip has at least this share of the flanks' contrast.
 TIP_CONTRAST = 0.2
-# A gap that is less sure than this (pixels) is no measurement.
+# A gap that is less sure than this (pixels) is no measurement; beside a part, whose edges may be taken for a finger's.
 LEAST_SURE_PX = 5.0
+LEAST_SURE_BESIDE_PX = 0.5
+# Corners are cut off both fingers alike: their sides at the measuring height lean alike to this (slope).
+CUT_ALIKE = 0.35
+BROKEN = "The outline near the measuring height is neither smooth nor straight: clean the fingers, or change the light."
 # Below this ratio of contrast to noise nothing is measured.
 CONTRAST_TO_NOISE = 3.0
 
@@ -87,10 +92,11 @@ def measure_gap(
         return refusal
     held = None
     if all(holds) or behind is not None:
-        held = held_part(fingers, (left, right), (spread(left) * shared, spread(right) * shared))
+        held = held_part(fingers, (left, right), (spread(left) * shared, spread(right) * shared), light_gap)
     if behind is not None:
         return replace(behind, held=held)
     measured: list[MeasuringPoint] = []
+    cornered = 0
     for p, end, found, does_hold in zip(points, (left, right), fitted, holds, strict=True):
         own = None
         if not all(holds):  # both in the same way: what a method does to a shape, it does to either
@@ -101,9 +107,19 @@ def measure_gap(
             covariance = found.covariance * spread(end) * shared
             own = MeasuringPoint(found.tip, found.apex, found.edge, found.slope, covariance)
         if own is None:
-            return NoGap(Status.NO_FINGERS, "The outline near the measuring height is broken.")
+            own = cornered_measuring_point(p, below_tip_px, shared)
+            cornered += 1
+        if own is None:
+            return NoGap(Status.NO_FINGERS, BROKEN)
         measured.append(own)
+    if cornered and abs(measured[0].slope - measured[1].slope) > CUT_ALIKE:
+        return NoGap(Status.NO_FINGERS, BROKEN)
     outcome = _assemble(fingers, edges, measured, below_tip_px, light_gap)
+    has_part = any(finger.hidden.size for finger in (fingers.left, fingers.right))
+    if has_part and isinstance(outcome, GapMeasurement) and outcome.u_gap_px > LEAST_SURE_BESIDE_PX:
+        return NoGap(
+            Status.GRIPPING, "A part between the fingers leaves too little of their inner edges in view.", held
+        )
     return replace(outcome, held=held) if held is not None else outcome
 
 

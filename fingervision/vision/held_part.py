@@ -2,18 +2,19 @@
 
 import numpy as np
 
-from fingervision.domain.compiled import compiled
 from fingervision.domain.gap import HeldPart
 from fingervision.vision.finger_end import FingerEnd
-from fingervision.vision.finger_shape import PARAMETERS, inner_edge
+from fingervision.vision.finger_shape import INNER_C, INNER_M
 from fingervision.vision.fingers import CoarseFinger, CoarseFingers
 from fingervision.vision.outline_points import finger_origin
-from fingervision.vision.profile_lines import INNER, ROWS, Floats, ProfileLines
+from fingervision.vision.profile_lines import INNER, ROWS, ProfileLines
 
 # A part that stands beside a tip spoils the columns within so many pixels of the inner edge.
 BESIDE_TIP_PX = 5
-# Derivatives are taken over so much of each parameter to either side; a width that is less sure is not given (pixels).
-STEP, LEAST_SURE_PX = 1e-3, 2.0
+# A width that is less sure is not given (pixels).
+LEAST_SURE_PX = 2.0
+# The middle of the part along the fingers (standard uncertainty, pixels).
+U_ALONG_PX = 1.0
 
 
 def visible_lines(lines: ProfileLines, fingers: CoarseFingers) -> ProfileLines:
@@ -21,9 +22,7 @@ def visible_lines(lines: ProfileLines, fingers: CoarseFingers) -> ProfileLines:
     pair = (fingers.left, fingers.right)
     if not any(finger.hidden.size for finger in pair):
         return lines
-    fixed, coarse, slope, weight, outward = (
-        a.copy() for a in (lines.fixed, lines.coarse, lines.slope, lines.weight, lines.outward)
-    )
+    fixed, coarse, slope, weight = lines.fixed.copy(), lines.coarse.copy(), lines.slope.copy(), lines.weight.copy()
     for k, finger in enumerate(pair):
         if not finger.hidden.size:
             continue
@@ -34,13 +33,11 @@ def visible_lines(lines: ProfileLines, fingers: CoarseFingers) -> ProfileLines:
             keep[ROWS:] &= finger.inner_sign * (at - fixed[k, ROWS:]) > BESIDE_TIP_PX
         for first, past in ((0, INNER), (ROWS, lines.fixed.shape[1])):
             kept = first + np.flatnonzero(keep[first:past])
-            for values in (fixed, coarse, slope):
-                moved = values[k, kept]
-                values[k, first:past] = 0
-                values[k, first : first + kept.size] = moved
+            places = slice(first, first + kept.size)
+            fixed[k, places], coarse[k, places], slope[k, places] = fixed[k, kept], coarse[k, kept], slope[k, kept]
             weight[k, first:past] = 0.0
-            weight[k, first : first + kept.size] = 1.0
-    return ProfileLines(fixed, coarse, slope, weight, outward)
+            weight[k, places] = 1.0
+    return ProfileLines(fixed, coarse, slope, weight, lines.outward)
 
 
 def _inner_across(finger: CoarseFinger) -> int:
@@ -49,13 +46,8 @@ def _inner_across(finger: CoarseFinger) -> int:
     return int(near.max() if finger.inner_sign > 0 else near.min())
 
 
-def is_hidden(finger: CoarseFinger, along: float) -> bool:
-    """Whether a part hides a finger's inner edge at a place along the fingers."""
-    return bool(np.isin(round(along), finger.hidden))
-
-
 def held_part(
-    fingers: CoarseFingers, ends: tuple[FingerEnd, FingerEnd], spread: tuple[float, float]
+    fingers: CoarseFingers, ends: tuple[FingerEnd, FingerEnd], spread: tuple[float, float], light_gap: bool
 ) -> HeldPart | None:
     """Width of a held part: how far the two inner flanks are apart where they hold it.
 
@@ -67,6 +59,8 @@ def held_part(
         The shapes of both.
     spread : (float, float)
         Variance of each finger's residuals, shared ones counted once, in units of their stated one.
+    light_gap : bool
+        Whether the fingers are dark.
 
     Returns
     -------
@@ -75,30 +69,25 @@ def held_part(
     """
     if fingers.held_along_px is None:
         return None
-    across, variance = [], 0.0
+    across, variance, opening = [], 0.0, 0.0
     for finger, end, factor in zip((fingers.left, fingers.right), ends, spread, strict=True):
         across0, along0 = finger_origin(finger)
-        edge, edge_variance = _edge(end.parameters, end.covariance, end.origin, fingers.held_along_px - along0)
+        edge, edge_variance = _flank(end, fingers.held_along_px - along0)
         across.append(across0 + finger.inner_sign * edge)
         variance += edge_variance * factor
+        opening += float(end.parameters[INNER_M])
+    # Where between the fingers it is held is known to a pixel.
+    variance += U_ALONG_PX**2 * opening**2
     width = across[1] - across[0]
     if width <= 0.0 or not variance < LEAST_SURE_PX**2:
         return None
-    return HeldPart(float(width), float(np.sqrt(variance)))
+    left, right = (fingers.orientation.to_pixels(float(at), fingers.held_along_px) for at in across)
+    return HeldPart(*left, *right, float(np.sqrt(variance)), light_gap)
 
 
-@compiled
-def _edge(p: Floats, covariance: Floats, origin: Floats, height: float) -> tuple[float, float]:
-    """Inner edge at a height, and its variance."""
-    edge, _ = inner_edge(p, origin, height)
-    gradient = np.empty(PARAMETERS)
-    for a in range(PARAMETERS):
-        more, less = p.copy(), p.copy()
-        more[a] += STEP
-        less[a] -= STEP
-        gradient[a] = (inner_edge(more, origin, height)[0] - inner_edge(less, origin, height)[0]) / (2.0 * STEP)
-    variance = 0.0
-    for a in range(PARAMETERS):
-        for b in range(PARAMETERS):
-            variance += gradient[a] * covariance[a, b] * gradient[b]
-    return edge, variance
+def _flank(end: FingerEnd, height: float) -> tuple[float, float]:
+    """The straight inner flank at a height, also where a fillet begins above it, and its variance."""
+    arm = height - float(end.origin[1])
+    edge = end.parameters[INNER_C] + end.parameters[INNER_M] * arm
+    c = end.covariance
+    return float(edge), float(c[INNER_C, INNER_C] + 2.0 * arm * c[INNER_C, INNER_M] + arm**2 * c[INNER_M, INNER_M])

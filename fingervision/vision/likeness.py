@@ -30,7 +30,7 @@ STEP_HEIGHTS_CUT = 1.0
 LEANS_ALIKE, FARTHEST_TURNED = 0.2, 0.49
 # Fingers that lean by less are not turned in any way that matters (slope).
 LEAST_TURN = 0.05
-# Widths and leans are taken in so many rows, in this part of the finger's height, which leaves out the top and the root.
+# Widths and leans are taken in so many rows, in this part of the finger's height, without the top and the root.
 ROWS, FROM_SHARE, TO_SHARE, FEWEST_ROWS = 24, 0.4, 0.9, 4
 
 

@@ -5,8 +5,8 @@
 
 Every frame is measured without options (any direction, dark or light fingers). Columns: frames; with a value; refused
 as `gripping`; values off by more than 0.25 px and by more than 3 u (all parts of the uncertainty together); median
-absolute error; parts whose width is given, off by more than 3 u; milliseconds a frame; statuses of the others. --save writes
-the pictures of values that are wrong and of refusals.
+absolute error; parts whose width is given, off by more than 3 u; milliseconds a frame; statuses of the others. --save
+writes the pictures of values that are wrong and of refusals.
 """
 
 import argparse
@@ -49,9 +49,12 @@ class Tally:
 
     def line(self, name: str) -> str:
         median = f"{np.median(self.errors):7.4f}" if self.errors else "      -"
+        counts = (self.frames, self.valued, self.gripping, self.off, self.wrong, self.unsaid)
+        columns = " ".join(f"{count:{width}d}" for count, width in zip(counts, (5, 6, 6, 5, 5, 5), strict=True))
+        milliseconds = 1e3 * self.seconds / max(self.frames, 1)
         return (
-            f"{name:24s} {self.frames:5d} {self.valued:6d} {self.gripping:6d} {self.off:5d} {self.wrong:5d} {self.unsaid:5d} {median}  "
-            f"{self.held:5d} {self.held_wrong:5d} {1e3 * self.seconds / max(self.frames, 1):6.1f}  {dict(self.lost) or ''}"
+            f"{name:24s} {columns} {median}  {self.held:5d} {self.held_wrong:5d} {milliseconds:6.1f}  "
+            f"{dict(self.lost) or ''}"
         )
 
 
@@ -117,7 +120,8 @@ def _take(shot: Shot, tallies: tuple[Tally, Tally]) -> str:
         tally.unsaid += error > max(0.25, 2.0 * u)
         if error > max(0.25, 2.0 * u) or error > 3.0 * u:
             truth = "none" if shot.gap_px is None else f"{shot.gap_px:.2f}"
-            words = f"gap {found.gap_px:.2f} +- {u:.3f} px, truth {truth}; points {found.left.x_px:.1f},{found.left.y_px:.1f} {found.right.x_px:.1f},{found.right.y_px:.1f}"
+            points = " ".join(f"{edge.x_px:.1f},{edge.y_px:.1f}" for edge in (found.left, found.right))
+            words = f"gap {found.gap_px:.2f} +- {u:.3f} px, truth {truth}; points {points}"
     return words
 
 

@@ -82,14 +82,15 @@ def cable(rng: Rng, kind: str) -> Shot:
     """A cable: across the ground above the tips, beside the fingers, into a root, behind both fingers, or on them."""
     s = Scene(rng)
     tone, breadth = s.some_tone(), rng.uniform(3, 14)
-    low, high = 40.0, max(s.tip - 25.0, 45.0)
+    low, high, left = 40.0, max(s.tip - 25.0, 45.0), max(s.left - 20, 10)
+    across = [-20.0, 200.0, 430.0, 660.0]
     ways = {
-        "above": [(-20, rng.uniform(low, high)), (200, rng.uniform(low, high)), (430, rng.uniform(low, high)), (660, rng.uniform(low, high))],
-        "beside": [(rng.uniform(5, 40), -20), (rng.uniform(5, max(s.left - 20, 10)), 200), (rng.uniform(5, 60), 500)],
+        "above": [(x, rng.uniform(low, high)) for x in across],
+        "beside": [(rng.uniform(5, 40), -20), (rng.uniform(5, left), 200), (rng.uniform(5, 60), 500)],
         "root": [(-20, rng.uniform(250, 400)), (s.left - 20, rng.uniform(330, 420)), (s.left + 60, 440)],
-        "behind": [(-20, rng.uniform(300, 420)), (220, rng.uniform(300, 420)), (430, rng.uniform(300, 420)), (660, rng.uniform(300, 420))],
-        "on": [(-20, rng.uniform(300, 420)), (220, rng.uniform(300, 420)), (430, rng.uniform(300, 420)), (660, rng.uniform(300, 420))],
-    }  # fmt: skip
+        "behind": [(x, rng.uniform(300, 420)) for x in across],
+        "on": [(x, rng.uniform(300, 420)) for x in across],
+    }
     way = smooth_way(np.array(ways[kind], dtype=float))
     if kind == "on":
         s.paint()
@@ -225,9 +226,7 @@ def turned_fingers(rng: Rng, kind: str) -> Shot:
         lean = rng.uniform(6, 14)
         s.pair = fingers(rng, (60.0, 160.0), 0.0, tip_px=rng.uniform(110, 170))
         s.pair = tuple(  # type: ignore[assignment]
-            Finger(
-                f.middle_px, f.tip_px, f.width_px, f.inner_corner_px, f.outer_corner_px, -f.side * lean, f.side
-            )
+            Finger(f.middle_px, f.tip_px, f.width_px, f.inner_corner_px, f.outer_corner_px, -f.side * lean, f.side)
             for f in s.pair
         )
     s.paint()
@@ -280,13 +279,14 @@ def spot(rng: Rng, where: str) -> Shot:
     level = rng.uniform(200, 300) if s.tones.finger < s.tones.ground else 255.0
     if where == "ground":
         y = rng.uniform(20, HEIGHT - 20)
-    mask = s.canvas.coverage(disc(x, y, r))
-    if where != "ground":
-        mask = mask * covered[s.pair.index(finger)]  # glare lies on the finger alone
-    else:
-        mask = mask * (1.0 - np.maximum(*covered))
-    soft = cv2.GaussianBlur(mask, (0, 0), rng.uniform(0.5, 3))
-    s.canvas.light += (soft if where == "finger" else mask) * (level - s.canvas.light)
+    shine = s.canvas.coverage(disc(x, y, r))
+    if where == "finger":
+        shine = np.asarray(cv2.GaussianBlur(shine, (0, 0), rng.uniform(0.5, 3)))
+    if where == "ground":
+        s.canvas.light += shine * (1.0 - np.maximum(*covered)) * (level - s.canvas.light)
+    else:  # glare lies on the finger alone
+        own = covered[s.pair.index(finger)]
+        s.canvas.light += own * shine * (level - s.tones.finger)
     return s.done()
 
 
@@ -294,23 +294,13 @@ def pad(rng: Rng, kind: str) -> Shot:
     """A pad of another tone on each finger's inner side: its face is the finger's inner edge."""
     s = Scene(rng, (70.0, 180.0))
     tone = s.tones.between(rng.uniform(0.25, 0.6) if kind == "grey" else rng.uniform(-0.15, 0.1))
-    s.paint()
     for finger in s.pair:
-        # The pad is the inner part of the finger itself.
-        covered = s.canvas.coverage(finger.outline())
-        strip = s.canvas.coverage(
-            turned(
-                box(
-                    finger.middle_px - (0.5 * finger.width_px if finger.side > 0 else -0.5 * finger.width_px + 14.0),
-                    finger.tip_px - 20.0,
-                    finger.middle_px - (0.5 * finger.width_px - 14.0 if finger.side > 0 else -0.5 * finger.width_px),
-                    finger.tip_px + rng.uniform(50, 140),
-                ),
-                finger.tilt_deg,
-                (finger.middle_px, finger.tip_px),
-            )
-        )
-        s.canvas.light += covered * strip * (tone - s.canvas.light)
+        middle, half, breadth = finger.middle_px, 0.5 * finger.width_px, 14.0
+        edge = middle - finger.side * half  # of the finger that the pad covers, and beyond it
+        x0, x1 = sorted((edge - finger.side * 20.0, edge + finger.side * breadth))
+        strip = box(x0, finger.tip_px - 20.0, x1, finger.tip_px + rng.uniform(50, 140))
+        covered = s.canvas.coverage(turned(strip, finger.tilt_deg, (middle, finger.tip_px)))
+        s.canvas.fill(finger.outline(), s.tones.finger + covered * (tone - s.tones.finger))
     return s.done()
 
 
@@ -377,7 +367,8 @@ CLUTTER: dict[str, Callable[[Rng], Shot]] = {
     **{f"table-{kind}": partial(table, side=kind) for kind in ("tips", "roots", "side")},
     **{f"label-{kind}": partial(label, where=kind) for kind in ("ground", "finger", "text", "stamp")},
     **{f"part-{kind}": partial(part, where=kind) for kind in ("beside", "above", "standing", "housing", "screws")},
-    **{f"shape-{kind}": partial(shaped, kind=kind) for kind in ("cut-inner", "cut-both", "cut-outer", "taper", "unequal")},
+    **{f"shape-{kind}": partial(shaped, kind=kind) for kind in ("cut-inner", "cut-both", "cut-outer")},
+    **{f"shape-{kind}": partial(shaped, kind=kind) for kind in ("taper", "unequal")},
     **{f"turned-{kind}": partial(turned_fingers, kind=kind) for kind in ("together", "inwards")},
     **{f"shadow-{kind}": partial(drop_shadow, kind=kind) for kind in ("dark", "faint")},
     **{f"crumbs-{kind}": partial(crumbs, where=kind) for kind in ("edge", "tip")},

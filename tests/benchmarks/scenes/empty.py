@@ -57,7 +57,11 @@ def one(rng: Rng, beside: str) -> Shot:
         r = rng.uniform(25, 60)
         canvas.fill(disc(x, other.tip_px + r + rng.uniform(-30, 60), r), thing)
     elif beside == "cable":
-        way = smooth_way(np.array([(x + side * 150, 500), (x + side * 20, 380), (x, 250), (x + side * 60, 120), (x + side * 300, 60)]))
+        way = smooth_way(
+            np.array(
+                [(x + side * 150, 500), (x + side * 20, 380), (x, 250), (x + side * 60, 120), (x + side * 300, 60)]
+            )
+        )
         canvas.stroke(way, rng.uniform(4, 14), thing)
     elif beside == "hand":
         canvas.fill(blob(x + side * 120, rng.uniform(150, 350), 120, rng, 0.2), thing, soft_px=rng.uniform(0.5, 3))

@@ -39,8 +39,11 @@ def _between(pair: tuple[Finger, Finger], top: float, bottom: float) -> Points:
 
 
 def _held(pair: tuple[Finger, Finger], height: float) -> float:
+    """Room between the two straight flanks at a height."""
     left, right = pair
-    return right.inner(height) - left.inner(height)
+    low = height + 60.0
+    slope = [(finger.inner(low + 50.0) - finger.inner(low)) / 50.0 for finger in pair]
+    return right.inner(low) - left.inner(low) - (low - height) * (slope[1] - slope[0])
 
 
 def _tone(rng: Rng, finger: float, ground: float, kind: str) -> float:
@@ -58,7 +61,7 @@ def bar(rng: Rng, top: tuple[float, float], length: tuple[float, float], kind: s
     canvas.fill(_between(pair, upper, lower), _tone(rng, finger, ground, kind))
     _paint(canvas, pair, finger)
     hidden = upper < tip + BELOW_PX + 1.0 and lower > tip + BELOW_PX - 1.0 and kind == "alike"
-    held = _held(pair, 0.5 * (max(upper, tip + pair[0].inner_corner_px + 1.0) + min(lower, HEIGHT - 1.0)))
+    held = _held(pair, 0.5 * (max(upper, tip) + min(lower, HEIGHT - 1.0)))
     return shot(canvas, rng, pair, held_px=held, is_hidden=hidden)
 
 

@@ -40,9 +40,9 @@ def tones(rng: Rng, light_fingers: float = 0.25) -> Tones:
     return Tones(light, dark) if rng.random() < light_fingers else Tones(dark, light)
 
 
-def fingers(rng: Rng, gap: tuple[float, float] = (40.0, 200.0), tilt_deg: float = 4.0, **options: object) -> tuple[
-    Finger, Finger
-]:
+def fingers(
+    rng: Rng, gap: tuple[float, float] = (40.0, 200.0), tilt_deg: float = 4.0, **options: object
+) -> tuple[Finger, Finger]:
     """Two fingers that point up."""
     between, middle = rng.uniform(*gap), 0.5 * WIDTH + rng.uniform(-25, 25)
     width, corner = rng.uniform(45, 105), rng.uniform(2, 22)
