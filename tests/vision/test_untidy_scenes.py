@@ -10,10 +10,12 @@ from fingervision.domain.gap import GapMeasurement, NoGap
 from fingervision.domain.region import Region
 from fingervision.domain.status import Status
 from fingervision.vision.pipeline import Settings, measure_frame
+from tests.benchmarks.scenes.canvas import Canvas
 from tests.benchmarks.scenes.clutter import CLUTTER
 from tests.benchmarks.scenes.empty import DRAWN
 from tests.benchmarks.scenes.gripped import GRIPPED
 from tests.benchmarks.scenes.gripper import BELOW_PX, Shot
+from tests.benchmarks.scenes.shapes import Finger
 from tests.benchmarks.scenes.whole import whole
 
 SETTINGS = Settings(BELOW_PX)
@@ -102,9 +104,6 @@ def test_without_two_fingers_there_is_no_number(name: str) -> None:
 
 
 def test_a_camera_that_is_turned_too_far_is_told_so() -> None:
-    from tests.benchmarks.scenes.canvas import Canvas
-    from tests.benchmarks.scenes.shapes import Finger
-
     canvas = Canvas(640, 480, 190.0)
     for side, x, y in ((-1, 250.0, 240.0), (1, 352.0, 298.0)):
         canvas.fill(Finger(x, y, 60.0, 4.0, 4.0, 30.0, side).outline(), 45.0)

@@ -29,7 +29,8 @@ def _between(pair: tuple[Finger, Finger], top: float, bottom: float) -> Points:
     left, right = pair
     corner = max(left.inner_corner_px, 1.0)
     # Above the straight flanks the part has the breadth that it has where they begin.
-    heights = (max(top, left.tip() + corner, right.tip() + corner), bottom)
+    straight = max(top, left.tip() + corner, right.tip() + corner)
+    heights = (straight, max(bottom, straight))
     inner = [(left.inner(h) - UNDER_PX, right.inner(h) + UNDER_PX) for h in heights]
     if bottom <= heights[0]:
         inner[1] = inner[0]
