@@ -216,7 +216,9 @@ def _measured(source: FrameSource, task: Task, out: Path, on_progress: Progress 
         stack.callback(hand_over)
         handed_over_at = monotonic()
         try:
-            for item, outcome in _outcomes(marked(source, marks) if marks else source, settings, series.votes):
+            for item, outcome in _outcomes(
+                marked(source, marks) if marks else source, settings, series.votes, asked.is_set
+            ):
                 result = Result(item.index, item.time_s, outcome)
                 pending.append(result)
                 if video is not None and isinstance(item, Frame):
@@ -228,8 +230,6 @@ def _measured(source: FrameSource, task: Task, out: Path, on_progress: Progress 
                     handed_over_at = monotonic()
                     if on_progress is not None:
                         on_progress(series.frames, description.frame_count)
-                if asked.is_set():
-                    break
             stopped = asked.is_set()
         except KeyboardInterrupt:
             stopped = True
@@ -265,11 +265,11 @@ def _held(out: Path) -> Iterator[None]:
 
 
 def _outcomes(
-    source: Iterable[Frame | LostFrame], settings: Settings, votes: Counter[str]
+    source: Iterable[Frame | LostFrame], settings: Settings, votes: Counter[str], is_stopped: Callable[[], bool]
 ) -> Iterator[tuple[Frame | LostFrame, GapMeasurement | NoGap | LostFrame]]:
     """Every frame with what it says; the decoder runs ahead and is stopped when this is."""
     with closing(decoded_ahead(source)) as frames:
-        yield from one_polarity(frames, settings, votes)
+        yield from one_polarity(frames, settings, votes, is_stopped)
 
 
 def _check(task: Task, description: Description) -> None:

@@ -5,7 +5,7 @@ sky left and right of something dark looks like two light fingers is no measurem
 """
 
 from collections import Counter
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
 
 from fingervision.domain.frame import Frame, LostFrame
@@ -19,7 +19,10 @@ VOTERS, MOST_KEPT_PX = 15, 15_000_000
 
 
 def one_polarity(
-    frames: Iterable[Frame | LostFrame], settings: Settings, votes: Counter[str]
+    frames: Iterable[Frame | LostFrame],
+    settings: Settings,
+    votes: Counter[str],
+    is_stopped: Callable[[], bool] = lambda: False,
 ) -> Iterator[tuple[Frame | LostFrame, Outcome]]:
     """Measure frames in order, all of them with the polarity that most of the first ones with a number have.
 
@@ -31,6 +34,8 @@ def one_polarity(
         Where they state the polarity, it stays.
     votes : Counter of str
         Takes in how many of the first frames show `dark` and `light` fingers.
+    is_stopped : callable
+        Asked after every frame; when it says so no more frames are read, and what was measured is still handed over.
 
     Yields
     ------
@@ -48,15 +53,20 @@ def one_polarity(
                 votes["dark" if outcome.light_gap else "light"] += 1
             elif not votes:
                 yield item, outcome
+                if is_stopped():
+                    return
                 continue
             kept.append((item, outcome))
             pixels += item.pixels.size if isinstance(item, Frame) else 0
-            if votes.total() >= VOTERS or pixels > MOST_KEPT_PX:
+            if votes.total() >= VOTERS or pixels > MOST_KEPT_PX or is_stopped():
                 break
         if votes:
             settings = replace(settings, fingers_are_dark=votes["dark"] >= votes["light"])
         for item, outcome in kept:
             is_other = isinstance(outcome, GapMeasurement) and outcome.light_gap != settings.fingers_are_dark
             yield item, measure_frame(item, settings) if is_other and isinstance(item, Frame) else outcome
-    for item in source:
-        yield item, measure_frame(item, settings) if isinstance(item, Frame) else item
+    while not is_stopped():
+        following = next(source, None)
+        if following is None:
+            return
+        yield following, measure_frame(following, settings) if isinstance(following, Frame) else following

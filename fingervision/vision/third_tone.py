@@ -22,9 +22,9 @@ Floats = NDArray[np.float64]
 # The profile of a side reaches so far inwards and outwards (pixels), is the median of so many rows, and ends where
 # fewer than so many of them are in the picture and short of the middle of the gap.
 REACH_PX, MOST_ROWS, FEWEST_ROWS = 40, 24, 6
-# A strip ends in a step of at least this share of the edge's contrast within so many pixels (the median of the rows has
-# a noise of half a grey level); it is not looked for nearer to the edge than so many blurs and pixels.
-LEAST_STEP, STEP_PX, NEAR_BLURS, NEAR_PX = 0.06, 6, 2.5, 2
+# A strip ends in a step of at least this share of the edge's contrast within so many pixels; it is not looked for
+# nearer to the edge than the blur reaches.
+LEAST_STEP, STEP_PX = 0.12, 6
 
 THIRD_TONE = NoGap(
     Status.NO_FINGERS,
@@ -43,7 +43,7 @@ def other_threshold(upright: GreyImage, edges: EdgePoints) -> float | None:
     edges : EdgePoints
         Where the fingers were measured.
     """
-    near = int(np.ceil(NEAR_BLURS * edges.blur_px[:, 0].max())) + NEAR_PX
+    near = edges.reach_px + 1
     halves = np.array([_room(edges, k) for k in range(2)])
     inward, outward = np.zeros((2, 2)), np.zeros((2, 2))
     for k in range(2):
