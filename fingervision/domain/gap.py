@@ -42,6 +42,43 @@ class FingerEdge:
 
 
 @dataclass(frozen=True, slots=True)
+class HeldPart:
+    """A part between the fingers that both hold: where their inner edges are, half-way along it.
+
+    Parameters
+    ----------
+    left_x_px, left_y_px, right_x_px, right_y_px : float
+        The two places, at the same height along the fingers.
+    u_width_px : float
+        Standard uncertainty of the width from frame to frame.
+    light_gap : bool
+        True for dark fingers on a light ground; False for light fingers on a dark one.
+    """
+
+    left_x_px: float
+    left_y_px: float
+    right_x_px: float
+    right_y_px: float
+    u_width_px: float
+    light_gap: bool
+
+    @property
+    def width_px(self) -> float:
+        """How far the inner edges are apart where they hold the part, across the fingers."""
+        return hypot(self.right_x_px - self.left_x_px, self.right_y_px - self.left_y_px)
+
+    def shifted(self, x_px: float, y_px: float) -> "HeldPart":
+        """The same part in a picture whose origin lies so far to the left and above."""
+        return replace(
+            self,
+            left_x_px=self.left_x_px + x_px,
+            left_y_px=self.left_y_px + y_px,
+            right_x_px=self.right_x_px + x_px,
+            right_y_px=self.right_y_px + y_px,
+        )
+
+
+@dataclass(frozen=True, slots=True)
 class GapMeasurement:
     """The two measuring points of one frame and the distance between them.
 
@@ -69,6 +106,8 @@ class GapMeasurement:
     beside : str
         What stands beside the edges or has moved them: wall, shadow, glare, motion, sharpening; empty where nothing is
         seen.
+    held : HeldPart or None
+        The part that is held, where one is seen.
     """
 
     left: FingerEdge
@@ -81,6 +120,7 @@ class GapMeasurement:
     roughness_px: float = 0.0
     fields_apart_px: float = 0.0
     beside: str = ""
+    held: HeldPart | None = None
 
     @property
     def u_picture_px(self) -> float:
@@ -108,7 +148,7 @@ class GapMeasurement:
             replace(edge, x_px=edge.x_px + x_px, y_px=edge.y_px + y_px, tip_px=edge.tip_px + along_px)
             for edge in (self.left, self.right)
         )
-        return replace(self, left=left, right=right)
+        return replace(self, left=left, right=right, held=self.held and self.held.shifted(x_px, y_px))
 
 
 @dataclass(frozen=True, slots=True)
@@ -121,7 +161,14 @@ class NoGap:
         The reason, as it stands in the table.
     words : str
         The reason in a sentence.
+    held : HeldPart or None
+        The part that hides the inner edges, where its width is known all the same.
     """
 
     status: Status
     words: str
+    held: HeldPart | None = None
+
+    def shifted(self, x_px: float, y_px: float) -> "NoGap":
+        """The same in a picture whose origin lies so far to the left and above."""
+        return self if self.held is None else replace(self, held=self.held.shifted(x_px, y_px))

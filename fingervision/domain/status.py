@@ -16,3 +16,4 @@ class Status(StrEnum):
     TIP_OUT_OF_VIEW = "tip_out_of_view"
     BLURRED = "blurred"
     TOUCHING = "touching"
+    GRIPPING = "gripping"

@@ -1,5 +1,6 @@
 """A recording goes in; the gap over time, its summary and its figure come out."""
 
+from collections import Counter
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import ExitStack, closing, contextmanager
 from dataclasses import dataclass, field, replace
@@ -20,6 +21,7 @@ from fingervision.measuring.clock.common_clock import clock_of, join_drive, refu
 from fingervision.measuring.clock.common_clock import in_words as clock_in_words
 from fingervision.measuring.gap_figure import draw_gap
 from fingervision.measuring.marked import marked
+from fingervision.measuring.one_polarity import one_polarity
 from fingervision.measuring.other_camera import other_camera
 from fingervision.measuring.output_folder import OutputFolder, claimed
 from fingervision.measuring.overlay_video import OverlayVideo
@@ -35,7 +37,7 @@ from fingervision.storage.lost_frames import lost_frames
 from fingervision.storage.out_folder import make_out_folder
 from fingervision.storage.recorded_camera import recorded_camera
 from fingervision.storage.summary_json import write_summary
-from fingervision.vision.pipeline import Settings, measure_frame
+from fingervision.vision.pipeline import Settings
 
 # Rows are made for so many frames at once, or for what has come in so many seconds, and then handed to the table.
 FRAMES_AT_ONCE, SECONDS_AT_ONCE = 128, 0.4
@@ -146,7 +148,9 @@ def _measured(source: FrameSource, task: Task, out: Path, on_progress: Progress 
         stack.callback(hand_over)
         handed_over_at = monotonic()
         try:
-            for item, outcome in _outcomes(marked(source, marks) if marks else source, settings, description.coding):
+            for item, outcome in _outcomes(
+                marked(source, marks) if marks else source, settings, description.coding, series.votes, asked.is_set
+            ):
                 result = Result(item.index, item.time_s, outcome)
                 pending.append(result)
                 if video is not None and isinstance(item, Frame):
@@ -158,8 +162,6 @@ def _measured(source: FrameSource, task: Task, out: Path, on_progress: Progress 
                     handed_over_at = monotonic()
                     if on_progress is not None:
                         on_progress(series.frames, description.frame_count)
-                if asked.is_set():
-                    break
             stopped = asked.is_set()
         except KeyboardInterrupt:
             stopped = True
@@ -203,15 +205,26 @@ def _held(out: Path) -> Iterator[None]:
 
 
 def _outcomes(
-    source: Iterable[Frame | LostFrame], settings: Settings, coding: Coding
+    source: Iterable[Frame | LostFrame],
+    settings: Settings,
+    coding: Coding,
+    votes: Counter[str],
+    is_stopped: Callable[[], bool],
 ) -> Iterator[tuple[Frame | LostFrame, GapMeasurement | NoGap | LostFrame]]:
     """Every frame with what it says; the decoder runs ahead and is stopped when this is."""
     pictures = SoundPictures()
     with closing(decoded_ahead(source)) as frames:
-        for item in frames:
-            if isinstance(item, LostFrame):
-                yield item, item
-                continue
-            if item.coding is Coding.LOSSLESS and coding is not Coding.LOSSLESS:
-                item = replace(item, coding=coding)
-            yield item, pictures.judged(item, measure_frame(item, settings))
+        for item, outcome in one_polarity(_coded(frames, coding), settings, votes, is_stopped):
+            if isinstance(item, LostFrame) or isinstance(outcome, LostFrame):
+                yield item, outcome
+            else:
+                yield item, pictures.judged(item, outcome)
+
+
+def _coded(frames: Iterable[Frame | LostFrame], coding: Coding) -> Iterator[Frame | LostFrame]:
+    """Tell frames that are stored without loss what they came from."""
+    for item in frames:
+        if isinstance(item, Frame) and item.coding is Coding.LOSSLESS and coding is not Coding.LOSSLESS:
+            yield replace(item, coding=coding)
+        else:
+            yield item

@@ -107,8 +107,19 @@ class RowMaker:
                 run, input_mm, force_n = state.run, state.input_mm, state.force_n
         outcome = result.outcome
         if not isinstance(outcome, GapMeasurement) or millimetres is None:
-            return GapRow(result.index, result.time_s, outcome.status, run=run, input_mm=input_mm, force_n=force_n)
+            held_px, held_mm = self._held(outcome)
+            return GapRow(
+                result.index,
+                result.time_s,
+                outcome.status,
+                held_px=held_px,
+                held_mm=held_mm,
+                run=run,
+                input_mm=input_mm,
+                force_n=force_n,
+            )
         gap_mm, u_gap_mm, u_random_mm, left_mm, right_mm = millimetres
+        held_px, held_mm = self._held(outcome)
         return GapRow(
             frame=result.index,
             time_s=result.time_s,
@@ -128,7 +139,18 @@ class RowMaker:
             right_mm=right_mm,
             u_shift_px=outcome.u_picture_px,
             fingers="dark" if outcome.light_gap else "light",
+            held_px=held_px,
+            held_mm=held_mm,
             run=run,
             input_mm=input_mm,
             force_n=force_n,
         )
+
+    def _held(self, outcome: GapMeasurement | NoGap | LostFrame) -> tuple[float | None, float | None]:
+        """Width of a held part; what lies between dark fingers is bounded by the same edges as their gap."""
+        held = None if isinstance(outcome, LostFrame) else outcome.held
+        if held is None:
+            return None, None
+        points = np.array([[(held.left_x_px, held.left_y_px), (held.right_x_px, held.right_y_px)]])
+        found = self.scale.distances(points, np.array([held.u_width_px]), np.array([held.light_gap]))
+        return held.width_px, float(found.value_mm[0])

@@ -53,6 +53,8 @@ class GapSeries:
     beside : Counter of str
         Frames in which something stands beside the edges or has moved them, by what it is; rough edges and fields of
         interlaced pictures among them.
+    votes : Counter of str
+        The same among the first frames, before they agreed on one answer.
     has_budget : bool
         Whether the scale said how surely it is known.
     """
@@ -61,6 +63,7 @@ class GapSeries:
     first_without: dict[Status, FirstBad] = field(default_factory=dict)
     fingers: Counter[str] = field(default_factory=Counter)
     beside: Counter[str] = field(default_factory=Counter)
+    votes: Counter[str] = field(default_factory=Counter)
     has_budget: bool = False
     _frame: array[int] = field(default_factory=lambda: array("q"))
     _time_s: array[float] = field(default_factory=lambda: array("d"))

@@ -115,12 +115,13 @@ def summarise(
 
 def _about_fingers(series: GapSeries) -> list[str]:
     """Say so where the frames disagree about what the fingers are."""
-    if len(series.fingers) < 2:
+    if len(series.votes) < 2:
         return []
-    counts = " and ".join(f"{tone} in {count}" for tone, count in series.fingers.most_common())
+    counts = " and ".join(f"{tone} in {count}" for tone, count in series.votes.most_common())
+    taken = "dark" if series.votes["dark"] >= series.votes["light"] else "light"
     return [
-        f"The frames disagree about what the fingers are: {counts} frames. Look at both with --steps, and state "
-        "--fingers dark or --fingers light."
+        f"The first frames disagree about what the fingers are: {counts} of them. All were measured with {taken} "
+        "fingers: look at both with --steps, and state --fingers dark or --fingers light."
     ]
 
 

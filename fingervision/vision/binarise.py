@@ -1,6 +1,6 @@
 """Step 3, black and white: which pixels are dark. The binary image finds; it measures nothing."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
@@ -63,6 +63,12 @@ def binarise_local(denoised: GreyImage) -> Binary:
     light = cv2.blur(denoised.astype(np.float32), (2 * side + 1, 2 * side + 1), borderType=cv2.BORDER_REPLICATE)
     flat = np.clip(128.0 * denoised / np.maximum(light, 1.0), 0, 255).astype(np.uint8)
     return binarise(flat)
+
+
+def split_at(denoised: GreyImage, otsu: Binary, threshold: int) -> Binary:
+    """The same picture split at another threshold, where Otsu's had a third tone on its wrong side."""
+    _, dark = cv2.threshold(denoised, threshold, 255, cv2.THRESH_BINARY_INV)
+    return replace(otsu, dark=dark.astype(np.uint8, copy=False), threshold=threshold)
 
 
 @compiled

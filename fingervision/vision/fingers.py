@@ -7,7 +7,7 @@ tip out of view. Between the two there is nothing but ground, and no third thing
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from itertools import combinations
 
 import numpy as np
@@ -17,6 +17,7 @@ from fingervision.domain.direction import Direction
 from fingervision.domain.gap import NoGap
 from fingervision.domain.status import Status
 from fingervision.vision.flanks import follow_down, has_straight_flanks
+from fingervision.vision.likeness import MOST_TURNED, Build, are_alike, build, common_turn, end_alike
 from fingervision.vision.orientation import Orientation
 from fingervision.vision.outlines import Outline, find_outlines, longest_first
 from fingervision.vision.tops import Top, find_tops
@@ -31,16 +32,23 @@ MOST_TOPS = 8
 ROOTED_BONUS = 2.0
 # Things that lie in view and are shorter than so many times the measuring height are letters or dirt.
 LYING_HEIGHTS = 6.0
+# Of things that lie in view only those that are so many times as long as wide may be fingers: coins are not.
+LYING_SLENDER = 1.5
+# A gripper that lies in view is the only thing of its size: no third outline has this share of its length.
+COMPANY_SHARE = 0.4
 # A lone finger that comes in from the border for so many times the measuring height makes everything else a thing.
 ROOTED_HEIGHTS = 2.0
 # What stands beside the two, has so much of their height and leans by no more than this may be meant as well as they.
 THIRD_SHARE, THIRD_STEEPEST = 0.5, 1.0
-# The tips of one gripper differ in height by no more than so many times the measuring height, seen by a camera that is
-# turned by no more than this (slope; 14 degrees).
-STEP_HEIGHTS, MOST_TURNED = 4.0, 0.25
+
+NOTHING_HIDDEN: NDArray[np.int64] = np.empty(0, dtype=np.int64)
 
 MORE_THAN_TWO = NoGap(
     Status.NO_FINGERS, "More than two things in the picture look like fingers: give the region that holds the two."
+)
+UNLIKE = NoGap(
+    Status.ONE_FINGER,
+    "Of two things that stand side by side one is far wider than the other: give the region that holds two fingers.",
 )
 
 
@@ -56,11 +64,14 @@ class CoarseFinger:
         +1 where the gap lies at larger `across` (the left finger), -1 for the right finger.
     top : Top
         Where it begins.
+    hidden : ndarray of int64, shape (n,)
+        Coordinates along, in order, in which a part between the fingers hides the inner side.
     """
 
     outline: Outline
     inner_sign: int
     top: Top
+    hidden: NDArray[np.int64] = field(default_factory=lambda: NOTHING_HIDDEN)
 
     @property
     def top_along_px(self) -> int:
@@ -82,6 +93,10 @@ class CoarseFingers:
         How much they look like two fingers; larger is better.
     is_rooted : bool
         Whether both go down as far as the picture does.
+    are_cut : bool
+        Whether the picture's border cuts off the outer sides of both.
+    held_along_px : float or None
+        Where along the fingers both hold a part.
     """
 
     left: CoarseFinger
@@ -89,6 +104,13 @@ class CoarseFingers:
     orientation: Orientation
     score: float
     is_rooted: bool
+    are_cut: bool
+    held_along_px: float | None = None
+
+    @property
+    def is_joined(self) -> bool:
+        """Whether a base in view joins them."""
+        return self.left.top.outline is self.right.top.outline
 
 
 def find_fingers(
@@ -116,6 +138,7 @@ def find_fingers(
     best: CoarseFingers | None = None
     alone: NoGap | None = None
     worst_reason = NoGap(Status.NO_FINGERS, "Nothing in the picture looks like a finger.")
+    is_unlike = False
     for direction, longest_px in longest_first(outlines, directions):
         if best is not None and best.is_rooted and ROOTED_BONUS * longest_px <= best.score:
             break  # nothing goes on for so long that it could be a better pair
@@ -126,13 +149,14 @@ def find_fingers(
                 alone = found
             if found is MORE_THAN_TWO:
                 return found
+            is_unlike = is_unlike or found is UNLIKE
             if _SEVERITY.index(found.status) > _SEVERITY.index(worst_reason.status):
                 worst_reason = found
         elif best is None or found.score > best.score:
             best = found
-    if best is not None and not best.is_rooted and alone is not None:
+    if best is not None and not best.is_rooted and not best.is_joined and alone is not None:
         return alone
-    return best or worst_reason
+    return best or (UNLIKE if is_unlike else worst_reason)
 
 
 # Which reason says most, where several directions were tried.
@@ -150,7 +174,7 @@ def _best_pair(
     in_view = [top for top in tops if top.along_px > 0]
     best: CoarseFingers | None = None
     two: tuple[Top, Top] | None = None
-    shallow = False
+    shallow = unlike = False
     for first, second in combinations(in_view, 2):
         left, right = sorted((first, second), key=lambda top: top.across_px)
         prominence = min(left.prominence_px, right.prominence_px)
@@ -158,6 +182,8 @@ def _best_pair(
         if left.is_rooted != right.is_rooted and left.outline is not right.outline:
             continue  # one comes in from the border and one lies in view: a finger and a thing
         if not is_rooted and prominence < LYING_HEIGHTS * below_tip_px:
+            continue
+        if not is_rooted and _has_company(left.outline, outlines):
             continue
         score = prominence * (ROOTED_BONUS if is_rooted else 1.0)
         if best is not None and score <= best.score:
@@ -172,28 +198,56 @@ def _best_pair(
         pair = (_follow(left, 1, below_tip_px, reach_px), _follow(right, -1, below_tip_px, reach_px))
         if pair[0] is None or pair[1] is None or pair[0].outline[0, 0] > pair[1].outline[0, 0]:
             continue  # the inner sides, in this order
-        if is_free(mask, *_measured_at(pair[0], pair[1], orientation, below_tip_px)):
-            best, two = CoarseFingers(pair[0], pair[1], orientation, score, is_rooted), (left, right)
+        builds = (build(left, 1, orientation.across_size), build(right, -1, orientation.across_size))
+        if not are_alike(*builds):
+            unlike = unlike or (is_rooted and all(has_straight_flanks(top, below_tip_px) for top in (left, right)))
+            continue
+        if not _end_alike(left, right, below_tip_px, builds):
+            continue
+        is_lying = not is_rooted and left.outline is not right.outline
+        if is_lying and any(
+            top.prominence_px < LYING_SLENDER * one.width_px for top, one in zip((left, right), builds, strict=True)
+        ):
+            continue
+        if _is_open(mask, pair[0], pair[1], orientation, below_tip_px, builds):
+            are_cut = builds[0].is_cut and builds[1].is_cut
+            best, two = CoarseFingers(pair[0], pair[1], orientation, score, is_rooted, are_cut), (left, right)
     if best is not None and two is not None:
         for top in in_view:
-            if top not in two and _is_third(top, two, below_tip_px):
+            if top not in two and _is_third(top, best, below_tip_px):
                 return MORE_THAN_TWO
-        if best.is_rooted or len(_standing(in_view, below_tip_px)) != 1:
+        if best.is_rooted or best.is_joined or len(_standing(in_view, below_tip_px)) != 1:
             return best
     if shallow:
         return NoGap(Status.TOUCHING, "The fingers touch above the measuring height.")
-    return _why_none(tops, below_tip_px)
+    return UNLIKE if unlike else _why_none(tops, below_tip_px)
 
 
-def _is_third(top: Top, two: tuple[Top, Top], below_tip_px: float) -> bool:
+def _has_company(own: Outline, outlines: list[Outline]) -> bool:
+    """Whether something else of about this size lies in view, as letters and the like do."""
+    longest_px = COMPANY_SHARE * len(own)
+    return sum(len(outline) > longest_px for outline in outlines) > 2
+
+
+def _is_third(top: Top, fingers: CoarseFingers, below_tip_px: float) -> bool:
     """Whether a third thing may be meant as well as either of two fingers."""
-    lower = min(two, key=lambda finger: finger.prominence_px)
-    return (
-        (top.is_rooted == lower.is_rooted or top.outline is lower.outline)
-        and top.prominence_px > THIRD_SHARE * lower.prominence_px
-        and all(_stand_side_by_side(top, finger, below_tip_px) for finger in two)
-        and has_straight_flanks(top, below_tip_px, THIRD_STEEPEST)
-    )
+    two = (fingers.left, fingers.right)
+    lower = min((finger.top for finger in two), key=lambda finger: finger.prominence_px)
+    if (
+        not (top.is_rooted == lower.is_rooted or top.outline is lower.outline)
+        or top.prominence_px <= THIRD_SHARE * lower.prominence_px
+        or not all(_stand_side_by_side(top, finger.top, below_tip_px) for finger in two)
+        or not has_straight_flanks(top, below_tip_px, THIRD_STEEPEST)
+    ):
+        return False
+    size = fingers.orientation.across_size
+    own = build(top, 1 if top.across_px < fingers.left.top.across_px else -1, size)
+    for finger in two:
+        other = build(finger.top, finger.inner_sign, size)
+        builds = (own, other) if top.across_px < finger.top.across_px else (other, own)
+        if are_alike(*builds) and _end_alike(top, finger.top, below_tip_px, builds):
+            return True
+    return False
 
 
 def _standing(tops: list[Top], below_tip_px: float) -> list[Top]:
@@ -220,10 +274,11 @@ def _why_none(tops: list[Top], below_tip_px: float) -> NoGap:
     return NoGap(Status.NO_FINGERS, "Nothing in the picture looks like two fingers.")
 
 
-def _end_alike(left: Top, right: Top, below_tip_px: float) -> bool:
-    """Whether two tips are about equally high, as those of one gripper are, also where the camera is turned."""
-    apart_px = abs(right.across_px - left.across_px)
-    return abs(right.along_px - left.along_px) <= STEP_HEIGHTS * below_tip_px + MOST_TURNED * apart_px
+def _end_alike(first: Top, second: Top, below_tip_px: float, builds: tuple[Build, Build] | None = None) -> bool:
+    """Whether two tips are about equally high."""
+    left, right = sorted((first, second), key=lambda top: top.across_px)
+    step_px, apart_px = right.along_px - left.along_px, right.across_px - left.across_px
+    return end_alike(step_px, apart_px, below_tip_px, builds)
 
 
 def _stand_side_by_side(left: Top, right: Top, below_tip_px: float) -> bool:
@@ -243,12 +298,38 @@ def _follow(top: Top, inner_sign: int, below_tip_px: float, reach_px: float) -> 
     return CoarseFinger(np.ascontiguousarray(piece), inner_sign, top)
 
 
-def _measured_at(
-    left: CoarseFinger, right: CoarseFinger, orientation: Orientation, below_tip_px: float
+def _is_open(
+    mask: NDArray[np.uint8],
+    left: CoarseFinger,
+    right: CoarseFinger,
+    orientation: Orientation,
+    below_tip_px: float,
+    builds: tuple[Build, Build],
+) -> bool:
+    """Whether next to nothing lies on the way from one measuring point to the other.
+
+    Where a turned camera shows one finger's top from the side, its own corner lies on that way: there the way is
+    level, at the lower of the two measuring heights.
+    """
+    heights = [finger.top_along_px + below_tip_px for finger in (left, right)]
+    if is_free(mask, *_inner_places(left, right, orientation, heights)):
+        return True
+    if abs(common_turn((builds[0].lean, builds[1].lean))) <= MOST_TURNED:
+        return False
+    return is_free(mask, *_inner_places(left, right, orientation, [max(heights)] * 2))
+
+
+def _inner_places(
+    left: CoarseFinger, right: CoarseFinger, orientation: Orientation, heights: list[float]
 ) -> tuple[Place, Place]:
-    """Where the two fingers will be measured, to a pixel, in the picture."""
+    """Where the two inner sides cross a height each, to a pixel, in the picture."""
     first, second = (
-        orientation.to_pixels(*inner_crossing(finger.outline, finger.top_along_px + below_tip_px))
-        for finger in (left, right)
+        orientation.to_pixels(*inner_crossing(finger.outline, height))
+        for finger, height in zip((left, right), heights, strict=True)
     )
     return first, second
+
+
+def is_hidden(finger: CoarseFinger, along: float) -> bool:
+    """Whether a part hides a finger's inner edge at a place along the fingers."""
+    return bool(np.isin(round(along), finger.hidden))

@@ -33,7 +33,7 @@ def has_straight_flanks(top: Top, below_tip_px: float, steepest: float = STEEPES
     steepest : float
         Pixels across per pixel along by which a flank may lean.
     """
-    sides = [_across_by_row(top.outline, top.index, step) for step in (-1, 1)]
+    sides = [across_by_row(top.outline, top.index, step) for step in (-1, 1)]
     wanted = int(max(LEAST_HEIGHTS * below_tip_px, LEAST_SHARE * max(side.size for side in sides)))
     long = [side for side in sides if side.size >= wanted]
     return bool(long) and all(_has_straight_stretch(side, wanted, steepest) for side in long)
@@ -51,7 +51,7 @@ def follow_down(outline: Outline, top: int, step: int, limit: float) -> int:
 
 
 @compiled
-def _across_by_row(outline: Outline, top: int, step: int) -> NDArray[np.float64]:
+def across_by_row(outline: Outline, top: int, step: int) -> NDArray[np.float64]:
     """Where the outline, followed down from its top, last crosses every row, from the top's own on."""
     end = follow_down(outline, top, step, np.inf)
     across = np.zeros(outline[end, 1] - outline[top, 1] + 1)

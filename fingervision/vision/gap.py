@@ -1,6 +1,7 @@
 """Step 8, the gap: the distance between the two measuring points, and how surely it is known."""
 
 from dataclasses import replace
+from math import atan, degrees
 
 import numpy as np
 from numpy.typing import NDArray
@@ -8,13 +9,16 @@ from numpy.typing import NDArray
 from fingervision.domain.frame import Coding
 from fingervision.domain.gap import FingerEdge, GapMeasurement, NoGap
 from fingervision.domain.status import Status
+from fingervision.vision.cornered_outline import cornered_measuring_point
 from fingervision.vision.edge_filters import PIXEL_VARIANCE
 from fingervision.vision.edges import EdgePoints
 from fingervision.vision.finger_end import FingerEnd, fit_finger_end
-from fingervision.vision.finger_shape import PARAMETERS
-from fingervision.vision.fingers import CoarseFinger, CoarseFingers
+from fingervision.vision.finger_shape import OUTER_M, PARAMETERS
+from fingervision.vision.fingers import CoarseFinger, CoarseFingers, is_hidden
 from fingervision.vision.first_guess import first_guess
-from fingervision.vision.flanks import has_straight_flanks
+from fingervision.vision.flanks import STEEPEST, has_straight_flanks
+from fingervision.vision.held_part import held_part
+from fingervision.vision.likeness import FARTHEST_TURNED, common_turn
 from fingervision.vision.local_outline import local_measuring_point
 from fingervision.vision.measuring_point import MeasuringPoint, measuring_point, squared
 from fingervision.vision.median import middle
@@ -35,8 +39,12 @@ FEWEST_LINES = 2 * PARAMETERS
 CUT_OFF_LIMIT = 0.08
 # A tip has at least this share of the flanks' contrast.
 TIP_CONTRAST = 0.2
-# A gap that is less sure than this (pixels) is no measurement.
+# A gap that is less sure than this (pixels) is no measurement; beside a part, whose edges may be taken for a finger's.
 LEAST_SURE_PX = 5.0
+LEAST_SURE_BESIDE_PX = 0.5
+# Corners are cut off both fingers alike: their sides at the measuring height lean alike to this (slope).
+CUT_ALIKE = 0.35
+BROKEN = "The outline near the measuring height is neither smooth nor straight: clean the fingers, or change the light."
 # Below this ratio of contrast to noise nothing is measured.
 CONTRAST_TO_NOISE = 3.0
 
@@ -70,8 +78,9 @@ def measure_gap(
     if refusal is not None:
         return refusal
     points = outline_points(fingers, edges)
+    behind = _gripping(fingers, below_tip_px)
     if min(len(p.x) for p in points) < FEWEST_LINES:
-        return NoGap(Status.NO_FINGERS, "Too little of a finger's outline is in view to be measured.")
+        return behind or NoGap(Status.NO_FINGERS, "Too little of a finger's outline is in view to be measured.")
     guesses = [first_guess(p, below_tip_px) for p in points]
     fits = [fit_finger_end(p, *guess) for p, guess in zip(points, guesses, strict=True)]
     noise_shared = max(SHARED_POINTS[coding], edges.shared_lines)
@@ -93,7 +102,13 @@ def measure_gap(
     refusal = _no_fingers(fingers, points, (left, right), holds, below_tip_px)
     if refusal is not None:
         return refusal
+    held = None
+    if all(holds) or behind is not None:
+        held = held_part(fingers, (left, right), (spread(left) * shared, spread(right) * shared), light_gap)
+    if behind is not None:
+        return replace(behind, held=held)
     measured: list[MeasuringPoint] = []
+    cornered = 0
     for p, end, found, does_hold in zip(points, (left, right), fitted, holds, strict=True):
         own = None
         if not all(holds):  # both in the same way: what a method does to a shape, it does to either
@@ -104,12 +119,35 @@ def measure_gap(
             covariance = found.covariance * (spread(end) * shared if rough is None else 1.0)
             own = MeasuringPoint(found.tip, found.apex, found.edge, found.slope, covariance)
         if own is None:
-            return NoGap(Status.NO_FINGERS, "The outline near the measuring height is broken.")
+            own = cornered_measuring_point(p, below_tip_px, shared)
+            cornered += 1
+        if own is None:
+            return NoGap(Status.NO_FINGERS, BROKEN)
         measured.append(own)
+    if cornered and abs(measured[0].slope - measured[1].slope) > CUT_ALIKE:
+        return NoGap(Status.NO_FINGERS, BROKEN)
     outcome = _assemble(fingers, edges, measured, below_tip_px, light_gap)
-    if rough is None or isinstance(outcome, NoGap):
-        return outcome
-    return replace(outcome, roughness_px=rough.deviation_px)
+    has_part = any(finger.hidden.size for finger in (fingers.left, fingers.right))
+    if has_part and isinstance(outcome, GapMeasurement) and outcome.u_gap_px > LEAST_SURE_BESIDE_PX:
+        return NoGap(
+            Status.GRIPPING, "A part between the fingers leaves too little of their inner edges in view.", held
+        )
+    if isinstance(outcome, NoGap):
+        return replace(outcome, held=held) if held is not None else outcome
+    return replace(outcome, held=held, roughness_px=0.0 if rough is None else rough.deviation_px)
+
+
+def _gripping(fingers: CoarseFingers, below_tip_px: float) -> NoGap | None:
+    """Say so where a part hides an inner edge at the measuring height."""
+    sides = [
+        name
+        for name, finger in (("left", fingers.left), ("right", fingers.right))
+        if is_hidden(finger, finger.top_along_px + below_tip_px)
+    ]
+    if not sides:
+        return None
+    edges = "inner edges" if len(sides) == 2 else f"{sides[0]} finger's inner edge"
+    return NoGap(Status.GRIPPING, f"A part between the fingers hides the {edges} at the measuring height.")
 
 
 def _refuse(edges: EdgePoints, full_scale: int, light_gap: bool) -> NoGap | None:
@@ -142,10 +180,19 @@ def _no_fingers(
     below_tip_px: float,
 ) -> NoGap | None:
     """Say so where what was measured is round all over: a finger has straight flanks."""
+    pair = (fingers.left, fingers.right)
+    turn = common_turn([finger.inner_sign * end.parameters[OUTER_M] for finger, end in zip(pair, ends, strict=True)])
     are_fingers = [
-        (does_hold and has_flanks(p, end)) or has_straight_flanks(finger.top, below_tip_px)
-        for finger, p, end, does_hold in zip((fingers.left, fingers.right), points, ends, holds, strict=True)
+        (does_hold and has_flanks(p, end, finger.inner_sign * turn))
+        or has_straight_flanks(finger.top, below_tip_px, STEEPEST + abs(turn))
+        for finger, p, end, does_hold in zip(pair, points, ends, holds, strict=True)
     ]
+    if abs(turn) > FARTHEST_TURNED and any(are_fingers):
+        return NoGap(
+            Status.NO_FINGERS,
+            f"The fingers are turned by {degrees(atan(abs(turn))):.0f} degrees in the picture, and at most 25 are "
+            "measured: turn the camera.",
+        )
     if all(are_fingers):
         return None
     if any(are_fingers):

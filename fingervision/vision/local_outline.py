@@ -26,6 +26,9 @@ SHORTEST_IN_BLURS = 6.0
 # A longer window must not leave more than this times the spread of the shortest one.
 SPREAD_LIMIT = 1.5
 FEWEST_POINTS = 12
+# An outline whose points scatter by more than so many of their own uncertainties about the shortest polynomial has a
+# corner or a step there.
+ROUGHEST = 6.0
 # Spread (in units of the points' uncertainties) below which a residual is never an outlier.
 LEAST_SPREAD = 0.7
 # An outline that is less sure than this (pixels) is not smooth; one that is flatter (across over along) has no edge.
@@ -113,6 +116,8 @@ def outline_near(
         coefficients, variance, spread = fit
         if best is not None and spread > SPREAD_LIMIT * first_spread:
             break
+        if best is None and spread > ROUGHEST:
+            return None
         first_spread = first_spread or max(spread, 0.2)
         curvature = 2.0 * coefficients[2] / (1.0 + coefficients[1] ** 2) ** 1.5
         corrected = coefficients.copy()

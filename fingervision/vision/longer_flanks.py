@@ -5,6 +5,7 @@ says the same, surely enough, as the near part (Hausman, Econometrica 46, 1978, 
 less sure estimate has the difference of their variances).
 """
 
+from dataclasses import replace
 from math import sqrt
 
 import numpy as np
@@ -20,9 +21,12 @@ AGREES = 2.5
 
 
 def with_longer_flanks(fingers: CoarseFingers, below_tip_px: float) -> CoarseFingers:
-    """The same fingers, their outlines as far down as a long flank goes."""
-    left, right = (_longer(finger, below_tip_px + LONG_PX) for finger in (fingers.left, fingers.right))
-    return CoarseFingers(left, right, fingers.orientation, fingers.score, fingers.is_rooted)
+    """The same fingers, their outlines as far down as a long flank goes; one that holds a part stays as it is."""
+    left, right = (
+        finger if finger.hidden.size else _longer(finger, below_tip_px + LONG_PX)
+        for finger in (fingers.left, fingers.right)
+    )
+    return replace(fingers, left=left, right=right)
 
 
 def is_surer(longer: GapMeasurement | NoGap, near: GapMeasurement) -> bool:

@@ -14,11 +14,12 @@ from fingervision.vision.orientation import Orientation
 from fingervision.vision.profile_lines import IS_ROW
 
 # Red, green, blue.
-EDGE, TIP, POINT, DISTANCE, WORDS, FAILURE, BACKING = (
+EDGE, TIP, POINT, DISTANCE, HELD, WORDS, FAILURE, BACKING = (
     (64, 200, 255),
     (255, 176, 32),
     (255, 64, 64),
     (64, 255, 96),
+    (255, 96, 255),
     (255, 255, 255),
     (255, 96, 96),
     (0, 0, 0),
@@ -33,7 +34,7 @@ Canvas = NDArray[np.uint8]
 
 
 def draw_overlay(frame: Frame, outcome: GapMeasurement | NoGap, words: str) -> Canvas:
-    """Draw edges, tips, measuring points, the distance between these, and a line of text.
+    """Draw edges, tips, measuring points, the distance between these, a held part's width, and a line of text.
 
     Parameters
     ----------
@@ -58,6 +59,9 @@ def draw_overlay(frame: Frame, outcome: GapMeasurement | NoGap, words: str) -> C
         _line(canvas, (left.x_px, left.y_px), (right.x_px, right.y_px), DISTANCE, size)
         for edge in (left, right):
             _cross(canvas, edge.x_px, edge.y_px, POINT_PX * size, size)
+    if outcome.held is not None:
+        held = outcome.held
+        _line(canvas, (held.left_x_px, held.left_y_px), (held.right_x_px, held.right_y_px), HELD, size)
     _write(canvas, words, WORDS if isinstance(outcome, GapMeasurement) else FAILURE, size)
     return canvas
 

@@ -1,6 +1,7 @@
 """The order of the steps: grey, denoise, binarise, fingers, edges, tip, gap. Only this file knows it."""
 
 from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import lru_cache
 
@@ -15,34 +16,47 @@ from fingervision.domain.frame import Coding, Frame, Pixels
 from fingervision.domain.gap import GapMeasurement, NoGap
 from fingervision.domain.region import Region
 from fingervision.domain.status import Status
-from fingervision.vision.binarise import Binary, binarise, binarise_local
+from fingervision.vision.binarise import Binary, binarise, binarise_local, split_at
 from fingervision.vision.denoise import denoise
 from fingervision.vision.edges import EdgePoints, fit_edges
-from fingervision.vision.fingers import CoarseFingers, find_fingers
+from fingervision.vision.fingers import MORE_THAN_TWO, UNLIKE, CoarseFingers, find_fingers
 from fingervision.vision.gap import measure_gap
 from fingervision.vision.grey import GreyImage, to_grey, top_level
+from fingervision.vision.held_part import visible_lines
 from fingervision.vision.interlace import at_half_way
 from fingervision.vision.longer_flanks import is_surer, with_longer_flanks
 from fingervision.vision.overlay import draw_boundary, draw_edge_points, draw_overlay, in_eight_bits
+from fingervision.vision.part_removal import is_likelier, looks_parted, without_part
 from fingervision.vision.profile_choice import with_profile
 from fingervision.vision.profile_lines import profile_lines
 from fingervision.vision.residuals import SHARED_POINTS
 from fingervision.vision.response_shift import gap_shift_px
 from fingervision.vision.stripes import with_stripes
+from fingervision.vision.third_tone import THIRD_TONE, other_threshold
 
 # A picture whose two classes differ by less (share of full scale, and in units of the spread within) shows nothing.
 CONTRAST_FLOOR, SEPARATION_FLOOR = 0.03, 3.0
+# Classes that stand so far apart are not two halves of uneven light: another split would find the same things again.
+CLEAR_SEPARATION = 8.0
 SATURATED_SHARE = 0.99
 # An edge at the limit of blur (5 px) makes half of its contrast within so many pixels to either side, shade does not.
 EDGE_REACH_PX, EDGE_SHARE = 3, 0.2
 # Two fingers and the edges between them need so many pixels.
 SMALLEST_SIDE_PX = 16
 # Where fingers were found and this was wrong with them, nothing else in the picture is taken for fingers.
-FINAL = (Status.SATURATED, Status.BLURRED)
+FINAL = (Status.SATURATED, Status.BLURRED, Status.GRIPPING)
+# Beside a shadow or a pad a gap that is less sure than this (pixels) may be that of something else.
+LEAST_SURE_AGAIN_PX = 0.3
 # What is taken of a camera that says nothing, and what it may be as well.
 LINEAR, SRGB = standard_response("linear"), standard_response("srgb")
 # A codec that shares noise over more lines than this leaves nothing to be learnt of it in one picture.
 FARTHEST_SHARED = 7.0
+UNIFORM = NoGap(Status.LOW_CONTRAST, "The picture is uniform: nothing in it differs from anything else.")
+# Light ground left and right of one dark thing looks like two light fingers that the border cuts off.
+MAY_BE_GROUND = NoGap(
+    Status.NO_FINGERS,
+    "Light on both sides of something dark reaches the picture's borders: state --fingers light if these are fingers.",
+)
 # The outline is followed so far below the measuring height (pixels, or in units of that height).
 REACH_BELOW_PX, REACH_BELOW_HEIGHTS = 45.0, 1.5
 
@@ -188,9 +202,8 @@ def _attempt(grey: GreyImage, settings: Settings, coding: Coding) -> _Attempt:
     if binary.full_scale_share > 0.9 and np.count_nonzero(grey == scale) > SATURATED_SHARE * grey.size:
         words = "The picture is white: nearly every pixel is at full scale."
         return _Attempt(NoGap(Status.SATURATED, words), binary)
-    if binary.contrast < CONTRAST_FLOOR * scale or binary.separation < SEPARATION_FLOOR:
-        words = "The picture is uniform: nothing in it differs from anything else."
-        return _Attempt(NoGap(Status.LOW_CONTRAST, words), binary)
+    if binary.contrast < CONTRAST_FLOOR * scale:
+        return _Attempt(UNIFORM, binary)
     first: _Attempt | None = None
     for split, fingers, light_gap in _candidates(denoised, binary, settings):
         if isinstance(fingers, NoGap):
@@ -198,38 +211,82 @@ def _attempt(grey: GreyImage, settings: Settings, coding: Coding) -> _Attempt:
                 fingers = NoGap(Status.NO_FINGERS, "Light passes into shade without an edge.")
             attempt = _Attempt(fingers, split)
         else:
-            upright = fingers.orientation.view(grey)
-            how = (settings, scale, light_gap, coding)
-            edges, outcome = _measured(upright, fingers, *how)
-            if isinstance(outcome, GapMeasurement) and outcome.roughness_px:
-                longer = _measured(upright, with_longer_flanks(fingers, settings.below_tip_px), *how)
-                edges, outcome = longer if is_surer(longer[1], outcome) else (edges, outcome)
-            if settings.other_response is not None and isinstance(outcome, GapMeasurement):
-                shift = gap_shift_px(outcome, edges, settings.response, settings.other_response, scale)
-                outcome = replace(outcome, response_shift_px=shift)
-            attempt = _Attempt(outcome, split, fingers, edges)
+            attempt = _measured(grey, split, fingers, light_gap, settings, coding, scale)
+            attempt = _with_two_tones(attempt, grey, denoised, light_gap, settings, coding, scale)
         if isinstance(attempt.outcome, GapMeasurement) or attempt.outcome.status in FINAL:
             return attempt
         first = first or attempt
-    return first or _Attempt(NoGap(Status.NO_FINGERS, "Nothing in the picture looks like two fingers."), binary)
+    return first or _Attempt(UNIFORM, binary)
 
 
 def _measured(
+    grey: GreyImage,
+    split: Binary,
+    fingers: CoarseFingers,
+    light_gap: bool,
+    settings: Settings,
+    coding: Coding,
+    scale: int,
+) -> _Attempt:
+    """Measure two fingers that were found; rough ones over longer flanks where that is surer."""
+    upright = fingers.orientation.view(grey)
+    how = (settings, scale, light_gap, coding)
+    edges, outcome = _edges_and_gap(upright, fingers, *how)
+    if isinstance(outcome, GapMeasurement) and outcome.roughness_px:
+        longer = _edges_and_gap(upright, with_longer_flanks(fingers, settings.below_tip_px), *how)
+        edges, outcome = longer if is_surer(longer[1], outcome) else (edges, outcome)
+    if settings.other_response is not None and isinstance(outcome, GapMeasurement):
+        shift = gap_shift_px(outcome, edges, settings.response, settings.other_response, scale)
+        outcome = replace(outcome, response_shift_px=shift)
+    return _Attempt(outcome, split, fingers, edges)
+
+
+def _edges_and_gap(
     upright: GreyImage, fingers: CoarseFingers, settings: Settings, scale: int, light_gap: bool, coding: Coding
 ) -> tuple[EdgePoints, GapMeasurement | NoGap]:
     """Edges of fingers that were found, and what they say."""
     light = _light(settings.response, scale, int(np.iinfo(upright.dtype).max) + 1)
-    lines = profile_lines((fingers.left, fingers.right))
+    lines = visible_lines(profile_lines((fingers.left, fingers.right)), fingers)
     is_shared_known = SHARED_POINTS[coding] > FARTHEST_SHARED
     edges, apart_px = fit_edges(upright, lines, light, scale, is_shared_known), 0.0
     if fingers.orientation.direction.is_vertical:
         edges, apart_px = at_half_way(edges)
-    edges = with_profile(upright, edges, light, scale, settings.is_outline)
+    with suppress(np.linalg.LinAlgError):  # what stands beside the edges is none of the models
+        edges = with_profile(upright, edges, light, scale, settings.is_outline)
     edges = with_stripes(upright, edges, light)
     outcome = measure_gap(fingers, edges, settings.below_tip_px, scale, light_gap, coding)
     if (apart_px or edges.beside) and isinstance(outcome, GapMeasurement):
         outcome = replace(outcome, fields_apart_px=apart_px, beside=edges.beside)
     return edges, outcome
+
+
+def _with_two_tones(
+    attempt: _Attempt,
+    grey: GreyImage,
+    denoised: GreyImage,
+    light_gap: bool,
+    settings: Settings,
+    coding: Coding,
+    scale: int,
+) -> _Attempt:
+    """The same attempt, or one with another threshold where a shadow or pad was taken for the wrong class."""
+    if not isinstance(attempt.outcome, GapMeasurement) or attempt.fingers is None or attempt.edges is None:
+        return attempt
+    upright = attempt.fingers.orientation.view(grey)
+    threshold = other_threshold(upright, attempt.edges)
+    if threshold is None or attempt.binary is None:
+        return attempt
+    split = split_at(denoised, attempt.binary, round(threshold))
+    fingers = _found(split, light_gap, (attempt.fingers.orientation.direction,), settings)
+    if isinstance(fingers, CoarseFingers):
+        again = _measured(grey, split, fingers, light_gap, settings, coding, scale)
+        if isinstance(again.outcome, GapMeasurement) and again.edges is not None:
+            is_sure = again.outcome.u_gap_px < LEAST_SURE_AGAIN_PX
+            if is_sure and other_threshold(upright, again.edges) is None:
+                return again
+        elif again.outcome.status in FINAL:
+            return again
+    return _Attempt(THIRD_TONE, attempt.binary, attempt.fingers, attempt.edges)
 
 
 def _scale(grey: GreyImage, settings: Settings) -> int:
@@ -256,23 +313,56 @@ def _candidates(
 ) -> Iterator[tuple[Binary, CoarseFingers | NoGap, bool]]:
     """Where the fingers may be, the likeliest first: darker or lighter than the border, then against uneven light."""
     directions = tuple(Direction) if settings.direction is None else (settings.direction,)
-    below = settings.below_tip_px
-    reach = below + max(REACH_BELOW_PX, REACH_BELOW_HEIGHTS * below)
+    clear = False
     for is_local in (False, True):
         split = binarise_local(denoised) if is_local else binary
+        if split.separation < SEPARATION_FLOOR:
+            continue
         dark_first = _border_is_light(split)
         unsure: list[tuple[Binary, CoarseFingers | NoGap, bool]] = []
         for light_gap in (dark_first, not dark_first):
             if settings.fingers_are_dark not in (None, light_gap):
                 continue
-            fingers = find_fingers(split.dark if light_gap else split.light, directions, below, reach)
-            if isinstance(fingers, CoarseFingers) and not fingers.is_rooted:
+            fingers = _found(split, light_gap, directions, settings, has_parts=not is_local)
+            if (
+                not light_gap
+                and settings.fingers_are_dark is None
+                and isinstance(fingers, CoarseFingers)
+                and fingers.are_cut
+            ):
+                fingers = MAY_BE_GROUND
+            if isinstance(fingers, CoarseFingers) and not (fingers.is_rooted or fingers.is_joined):
                 unsure.append(
                     (split, fingers, light_gap)
                 )  # something may come in from the border in the other polarity
             else:
                 yield split, fingers, light_gap
+                clear = clear or fingers is UNLIKE or (fingers is MORE_THAN_TWO and split.separation > CLEAR_SEPARATION)
         yield from unsure
+        if clear:
+            break
+
+
+def _found(
+    split: Binary, light_gap: bool, directions: tuple[Direction, ...], settings: Settings, *, has_parts: bool = True
+) -> CoarseFingers | NoGap:
+    """The fingers in one class of a binary picture, also with a part between them.
+
+    A picture that is split against its local mean has hollow things in it, whose rooms are no room between fingers.
+    """
+    below = settings.below_tip_px
+    reach = below + max(REACH_BELOW_PX, REACH_BELOW_HEIGHTS * below)
+    mask = split.dark if light_gap else split.light
+    fingers = find_fingers(mask, directions, below, reach)
+    if not has_parts:
+        return fingers
+    if isinstance(fingers, NoGap):
+        return fingers if fingers is UNLIKE else without_part(mask, directions, below, reach) or fingers
+    if looks_parted(fingers, below, reach):
+        parted = without_part(mask, (fingers.orientation.direction,), below, reach)
+        if parted is not None and is_likelier(parted, below):
+            return parted
+    return fingers
 
 
 def _has_edges(denoised: GreyImage, split: Binary, contrast: float) -> bool:
@@ -292,6 +382,6 @@ def _border_is_light(binary: Binary) -> bool:
 
 def _shifted(measured: GapMeasurement | NoGap, region: Region | None) -> GapMeasurement | NoGap:
     """From the region's pixels to the full frame's."""
-    if region is None or isinstance(measured, NoGap):
+    if region is None:
         return measured
     return measured.shifted(region.x_px, region.y_px)

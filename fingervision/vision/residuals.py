@@ -27,6 +27,9 @@ SHAPE_LIMIT, MISFIT_LIMIT = 3.5, 2.5
 FLANKS_SHARE = 0.05
 # Residuals within so many pixels of a point speak of the shape there.
 SHAPE_REACH_PX, FEWEST_NEAR = 8.0, 3.0
+# Dust covers less than this share of the outline near the measuring point: what is more is the finger's own shape. A
+# point counts that has at least this weight.
+MOST_REJECTED, LEAST_COUNTED = 0.5, 0.05
 # A measuring point farther from every point of the outline would be extrapolated (pixels).
 FARTHEST_POINT_PX = 2.5
 
@@ -87,14 +90,26 @@ def shape_holds(
     """
     if np.count_nonzero(end.robust) < PARAMETERS or not is_on_outline(points, found.edge, found.tip + below_tip_px):
         return False
+    if _rejected(points.x, points.y, end.robust, found.edge, found.tip, below_tip_px) > MOST_REJECTED:
+        return False
     limit = max(_roughness(end.residual, end.robust), 1.0) * np.sqrt(stray)
     systematic = _systematic(points.x, points.y, end.residual, end.robust, found.edge, found.tip, below_tip_px)
     return bool(systematic < SHAPE_LIMIT * limit and end.misfit < MISFIT_LIMIT * limit)
 
 
-def has_flanks(points: OutlinePoints, end: FingerEnd) -> bool:
-    """Whether enough of the outline that was fitted belongs to flanks that stand nearly along the axis."""
-    if max(abs(end.parameters[INNER_M]), abs(end.parameters[OUTER_M])) > STEEPEST:
+def has_flanks(points: OutlinePoints, end: FingerEnd, turn: float = 0.0) -> bool:
+    """Whether enough of the outline that was fitted belongs to flanks that stand nearly along the axis.
+
+    Parameters
+    ----------
+    points : OutlinePoints
+        Sub-pixel outline.
+    end : FingerEnd
+        The shape that was fitted to it.
+    turn : float
+        How both fingers of a turned camera lean, in this finger's own axes.
+    """
+    if max(abs(end.parameters[INNER_M] - turn), abs(end.parameters[OUTER_M] - turn)) > STEEPEST:
         return False
     seen = end.robust > 0.0
     share = float(on_flanks(end.parameters, end.origin, points.x, points.y)[seen].mean())
@@ -106,6 +121,17 @@ def _roughness(residual: Floats, robust: Floats) -> float:
     """Spread from point to point: that of the noise, where a wrong shape differs from one end to the other."""
     counted = residual[robust > 0.0]
     return float(SIGMAS_IN_MEDIAN * middle(np.abs(counted[1:] - counted[:-1])) / np.sqrt(2.0))
+
+
+@compiled
+def _rejected(x: Floats, y: Floats, robust: Floats, edge: float, tip: float, below_tip: float) -> float:
+    """Share of the points near the measuring point that the fit takes for dust."""
+    near, rejected = 0, 0
+    for i in range(x.size):
+        if abs(y[i] - tip - below_tip) < SHAPE_REACH_PX and abs(x[i] - edge) < 2.0 * SHAPE_REACH_PX:
+            near += 1
+            rejected += robust[i] < LEAST_COUNTED
+    return rejected / max(near, 1)
 
 
 @compiled

@@ -1,0 +1,122 @@
+"""Whether two things can be the two fingers of one gripper: about equally high, equally wide, and parallel.
+
+A camera that is turned against the gripper shows its tips at different heights, and both fingers lean by as much; a
+finger beside a wire, a housing or the edge of a table is unlike it in width.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fingervision.domain.compiled import compiled
+from fingervision.vision.flanks import across_by_row
+from fingervision.vision.median import middle
+from fingervision.vision.tops import Top
+
+Floats = NDArray[np.float64]
+
+# Fingers of one gripper are at most so many times as wide as each other (printed jaws and their counterparts); one that
+# the picture's border cuts off may be wider than is seen, but what is seen is not much wider than the other.
+MOST_TIMES_WIDER, MOST_TIMES_CUT = 2.5, 1.2
+# The tips of one gripper differ in height by no more than so many times the measuring height, seen by a camera that is
+# turned by no more than this (slope; 14 degrees).
+STEP_HEIGHTS, MOST_TURNED = 4.0, 0.25
+# Where the border cuts off one of the two alone, their heights are all that shows them to belong together.
+STEP_HEIGHTS_CUT = 1.0
+# Where both fingers lean as the line through their tips does, to this slope, the camera may be turned as far as 25
+# degrees and a little more (slope); beyond, rows no longer cross the flanks well.
+LEANS_ALIKE, FARTHEST_TURNED = 0.2, 0.49
+# Fingers that lean by less are not turned in any way that matters (slope).
+LEAST_TURN = 0.05
+# Widths and leans are taken in so many rows, in this part of the finger's height, without the top and the root.
+ROWS, FROM_SHARE, TO_SHARE, FEWEST_ROWS = 24, 0.4, 0.9, 4
+
+
+@dataclass(frozen=True, slots=True)
+class Build:
+    """How wide a thing is and how it leans.
+
+    Parameters
+    ----------
+    width_px : float
+        Median breadth of what is seen, below the tip; 0 where too little is seen.
+    lean : float
+        Change across per pixel towards the root.
+    is_cut : bool
+        Whether the picture's border cuts its outer side off.
+    """
+
+    width_px: float
+    lean: float
+    is_cut: bool
+
+
+def build(top: Top, inner_sign: int, across_size: int) -> Build:
+    """Breadth and lean of what begins at a top, as deep as both its sides go; its inner side lies towards the sign."""
+    first, second = (across_by_row(top.outline, top.index, step) for step in (-1, 1))
+    inner, outer = (second, first) if inner_sign * (second[-1] - first[-1]) > 0 else (first, second)
+    width, lean, cut = _build(inner, outer, across_size)
+    return Build(width, lean, cut)
+
+
+def are_alike(first: Build, second: Build) -> bool:
+    """Whether two things are about equally wide, as far as the picture shows them."""
+    narrow, wide = sorted((first, second), key=lambda one: one.width_px)
+    if narrow.width_px <= 0.0 or (narrow.is_cut and wide.is_cut):
+        return True
+    times = MOST_TIMES_CUT if wide.is_cut else MOST_TIMES_WIDER
+    return narrow.is_cut or wide.width_px <= times * narrow.width_px
+
+
+def end_alike(step_px: float, apart_px: float, below_tip_px: float, builds: tuple[Build, Build] | None = None) -> bool:
+    """Whether two tips are about equally high, as those of one gripper are, also where the camera is turned.
+
+    Parameters
+    ----------
+    step_px : float
+        Height of the right tip minus that of the left one, along the axis towards the roots.
+    apart_px : float
+        Distance across of the two, positive.
+    below_tip_px : float
+        Height of measuring below the tips.
+    builds : (Build, Build), optional
+        Of the left and the right thing; without them every turn is allowed.
+    """
+    heights, turned = STEP_HEIGHTS, MOST_TURNED
+    if builds is None:
+        turned = FARTHEST_TURNED
+    elif builds[0].is_cut != builds[1].is_cut:
+        heights = STEP_HEIGHTS_CUT
+    if abs(step_px) <= heights * below_tip_px + turned * apart_px:
+        return True
+    if builds is None or abs(step_px) > heights * below_tip_px + FARTHEST_TURNED * apart_px:
+        return False
+    turn = -step_px / max(apart_px, 1.0)
+    return all(abs(one.lean - turn) <= LEANS_ALIKE for one in builds)
+
+
+def common_turn(leans: Sequence[float]) -> float:
+    """Slope by which both fingers lean, 0 where they do not lean alike or hardly lean."""
+    turn = 0.5 * sum(leans)
+    return turn if abs(leans[0] - leans[1]) <= LEANS_ALIKE and abs(turn) > LEAST_TURN else 0.0
+
+
+@compiled
+def _build(inner: Floats, outer: Floats, across_size: int) -> tuple[float, float, bool]:
+    high = min(inner.size, outer.size)
+    first, past = int(FROM_SHARE * high), int(TO_SHARE * high)
+    if past - first < FEWEST_ROWS:
+        return 0.0, 0.0, False
+    stride = max((past - first) // ROWS, 1)
+    count, cut = (past - first + stride - 1) // stride, 0
+    width, middles = np.empty(count), np.empty(count)
+    for k in range(count):
+        a, b = inner[first + k * stride], outer[first + k * stride]
+        width[k], middles[k] = abs(a - b) + 1.0, 0.5 * (a + b)
+        if b <= 0 or b >= across_size - 1:
+            cut += 1
+    half = count // 2
+    lean = middle((middles[count - half :] - middles[:half]) / ((count - half) * stride))
+    return middle(width), lean, 2 * cut > count

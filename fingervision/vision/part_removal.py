@@ -1,0 +1,211 @@
+"""A part between the fingers is taken out of the binary picture, and what it hides of the fingers is remembered.
+
+Where the room between the fingers is bounded by two straight lines, whatever else lies between these lines is a part:
+held by both fingers, stuck to one of them, or free. Without it the two fingers are found as ever, and the rows in which
+it touches an inner edge are left out of the measurement.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fingervision.domain.compiled import compiled
+from fingervision.domain.direction import Direction
+from fingervision.domain.gap import NoGap
+from fingervision.vision.channels import Channel, find_channel
+from fingervision.vision.fingers import CoarseFinger, CoarseFingers, find_fingers, is_hidden
+from fingervision.vision.median import middle
+from fingervision.vision.orientation import Orientation
+from fingervision.vision.way_between import inner_crossing
+
+Ints = NDArray[np.int64]
+Mask = NDArray[np.uint8]
+
+# A part within so many pixels of an inner edge spoils its profiles, and in so many rows beyond its own.
+NEAR_PX, BEYOND_PX = 8, 4
+# A part covers no more than so many times the length that it leaves open.
+MOST_TIMES_COVERED = 4.0
+# So many rows of the flanks below a part are wanted.
+SEEN_BELOW_PX = 40
+# The finger that was found has the channel's side within so many pixels, where it is not hidden.
+ON_SIDE_PX = 2.5
+# Less than this many pixels in a row is a speck, and in all (a fifth of the measuring height would not be seen) dust.
+SPECK_PX, SMALLEST_PART_PX = 2, 12
+# A run of pixels at a side that is no longer than this is what clearing left of a part, and no finger.
+SLIVER_PX = 8
+# The inner edge of a finger goes straight on under what steps out of it by so many pixels in so many rows.
+STEP_PX, STEP_ROWS = 3.0, 3
+# A part closes the room between the fingers over so many pixels and this share of its breadth; fingers that touch
+# close it to a point.
+FLOOR_PX, FLOOR_SHARE = 6, 0.3
+
+
+def without_part(
+    mask: Mask, directions: tuple[Direction, ...], below_tip_px: float, reach_px: float
+) -> CoarseFingers | None:
+    """The two fingers of a gripper with something between them, or None where there is no such thing.
+
+    Parameters
+    ----------
+    mask : ndarray of uint8, shape (height, width)
+        Non-zero where the fingers may be.
+    directions : tuple of Direction
+        Where the tips may point.
+    below_tip_px : float
+        Height of measuring below the tips.
+    reach_px : float
+        How far below the tips the outline is wanted.
+    """
+    best: CoarseFingers | None = None
+    for direction in directions:
+        orientation = Orientation(direction, *mask.shape)
+        upright: Mask = np.ascontiguousarray(orientation.view(mask), dtype=np.uint8)
+        channel = find_channel(upright, below_tip_px)
+        if channel is None:
+            continue
+        found = _found_without(mask, upright, channel, orientation, below_tip_px, reach_px)
+        if found is not None and (best is None or found.score > best.score):
+            best = found
+    return best
+
+
+def looks_parted(fingers: CoarseFingers, below_tip_px: float, reach_px: float) -> bool:
+    """Whether the two inner sides show a part: a floor between them, or a step out of one of them.
+
+    Parameters
+    ----------
+    fingers : CoarseFingers
+        As they were found.
+    below_tip_px : float
+        Height of measuring below the tips.
+    reach_px : float
+        How far below the tips the outline was followed.
+    """
+    left, right = fingers.left.outline, fingers.right.outline
+    lowest = min(left[0, 1] - fingers.left.top_along_px, right[0, 1] - fingers.right.top_along_px)
+    if fingers.is_joined and lowest < reach_px - 1.0:
+        floor = right[0, 0] - left[0, 0]
+        room = right[:, 0].min() - left[:, 0].max()
+        if floor > max(FLOOR_PX, FLOOR_SHARE * room):
+            return True
+    return any(
+        _has_step(finger.outline, finger.inner_sign, finger.top_along_px + 0.5 * below_tip_px)
+        for finger in (fingers.left, fingers.right)
+    )
+
+
+@compiled
+def _has_step(outline: NDArray[np.int32], inner_sign: int, from_row: float) -> bool:
+    """Whether something stands out of the inner side of a finger's coarse outline."""
+    crest = outline[:, 1].argmin()
+    count = 0
+    t, v = np.empty(crest + 1), np.empty(crest + 1)
+    for i in range(crest + 1):
+        if outline[i, 1] >= from_row and (count == 0 or outline[i, 1] != t[count - 1]):
+            t[count], v[count] = outline[i, 1], inner_sign * outline[i, 0]
+            count += 1
+    if count < 4 * STEP_ROWS:
+        return False
+    t, v = t[:count], v[:count]
+    half = count // 2
+    m = middle((v[half : 2 * half] - v[:half]) / (t[half : 2 * half] - t[:half] - 0.5))
+    away = v - m * t
+    # The finger's own edge is the innermost thing: a part only ever adds.
+    base = np.sort(away)[count // 4]
+    out = 0
+    for i in range(count):
+        out += away[i] - base > STEP_PX
+    return out >= STEP_ROWS
+
+
+def is_likelier(parted: CoarseFingers, below_tip_px: float) -> bool:
+    """Whether a part was found, and not the shape of both fingers alike, as a nose at either tip is."""
+    hides = [is_hidden(finger, finger.top_along_px + below_tip_px) for finger in (parted.left, parted.right)]
+    return parted.held_along_px is not None or not all(hides)
+
+
+def _found_without(
+    mask: Mask, upright: Mask, channel: Channel, orientation: Orientation, below_tip_px: float, reach_px: float
+) -> CoarseFingers | None:
+    sides = (channel.left_c, channel.left_m, channel.right_c, channel.right_m)
+    left_rows, right_rows, held_rows, filled = _part_rows(upright, *sides, channel.last_row)
+    if filled < SMALLEST_PART_PX:
+        return None
+    cleared = mask.copy()
+    _clear(np.asarray(orientation.view(cleared), dtype=np.uint8), *sides, channel.last_row)
+    fingers = find_fingers(cleared, (orientation.direction,), below_tip_px, reach_px)
+    if isinstance(fingers, NoGap):
+        return None
+    tips = max(fingers.left.top_along_px, fingers.right.top_along_px)
+    held_rows = held_rows[held_rows > tips]
+    if held_rows.size and held_rows[-1] + SEEN_BELOW_PX > tips + reach_px:
+        # The flanks are followed to where they are seen again.
+        deeper_px = float(held_rows[-1] + SEEN_BELOW_PX - tips)
+        deeper = find_fingers(cleared, (orientation.direction,), below_tip_px, deeper_px)
+        if isinstance(deeper, CoarseFingers):
+            fingers, reach_px = deeper, deeper_px
+    covered = channel.first_row - tips
+    if covered > MOST_TIMES_COVERED * channel.rows:
+        return None
+    hidden = (_widened(left_rows), _widened(right_rows))
+    pair = [replace(finger, hidden=rows) for finger, rows in zip((fingers.left, fingers.right), hidden, strict=True)]
+    for finger, side in zip(pair, (channel.left, channel.right), strict=True):
+        if not _is_on_side(finger, side(finger.top_along_px + reach_px), reach_px):
+            return None
+    held_at = float(np.median(held_rows)) if held_rows.size else None
+    return replace(fingers, left=pair[0], right=pair[1], held_along_px=held_at)
+
+
+def _is_on_side(finger: CoarseFinger, across: float, reach_px: float) -> bool:
+    """Whether the finger that was found is the one that bounds the channel."""
+    found, along = inner_crossing(finger.outline, finger.top_along_px + reach_px)
+    return abs(found - across) <= ON_SIDE_PX + abs(along - finger.top_along_px - reach_px)
+
+
+def _widened(rows: Ints) -> Ints:
+    """Rows and their neighbours."""
+    return np.unique((rows[:, None] + np.arange(-BEYOND_PX, BEYOND_PX + 1)).ravel())
+
+
+@compiled
+def _part_rows(
+    upright: Mask, left_c: float, left_m: float, right_c: float, right_m: float, last_row: int
+) -> tuple[Ints, Ints, Ints, int]:
+    """Rows in which something lies at the left side, at the right one, and touches both; its pixels in all."""
+    at_left, at_right, held = np.zeros(last_row + 1), np.zeros(last_row + 1), np.zeros(last_row + 1)
+    columns, pixels = upright.shape[1], 0
+    for row in range(last_row + 1):
+        a, b = int(np.rint(left_c + left_m * row)), int(np.rint(right_c + right_m * row))
+        if a < 0 or b >= columns or b - a < 2 * SPECK_PX + 2:
+            continue
+        # Two pixels beside the line may be the finger's own edge.
+        first, past = a + 2, b - 1
+        filled, left, right = 0, 0, 0
+        for x in range(first, past):
+            if upright[row, x]:
+                filled += 1
+                left += x < first + NEAR_PX
+                right += x >= past - NEAR_PX
+        pixels += filled
+        at_left[row], at_right[row] = left >= SPECK_PX, right >= SPECK_PX
+        held[row] = upright[row, first] > 0 and upright[row, past - 1] > 0 and 2 * filled > past - first
+    return np.flatnonzero(at_left), np.flatnonzero(at_right), np.flatnonzero(held), pixels
+
+
+@compiled
+def _clear(upright: Mask, left_c: float, left_m: float, right_c: float, right_m: float, last_row: int) -> None:
+    """Clear all between the two sides, from the picture's end down to the channel's, and what is left beside them."""
+    columns = upright.shape[1]
+    for row in range(last_row + 1):
+        a, b = int(np.rint(left_c + left_m * row)), int(np.rint(right_c + right_m * row))
+        for x in range(max(a + 1, 0), min(b, columns)):
+            upright[row, x] = 0
+        for at, step in ((a, -1), (b, 1)):
+            x = at
+            while 0 <= x < columns and upright[row, x]:
+                x += step
+            if abs(x - at) <= SLIVER_PX:
+                while x != at:
+                    x -= step
+                    upright[row, x] = 0
