@@ -6,9 +6,10 @@ from itertools import count
 from pathlib import Path
 
 import av
+import numpy as np
 
 from fingervision.domain.errors import FingervisionError, UsageError
-from fingervision.domain.frame import Coding, Frame, LostFrame
+from fingervision.domain.frame import Coding, Frame, LostFrame, Pixels
 from fingervision.domain.status import Status
 from fingervision.frames.damage import DamageTrail
 from fingervision.frames.file_pictures import pictures
@@ -21,6 +22,7 @@ from fingervision.frames.told_times import believable
 # FFmpeg's AV_CODEC_PROP_INTRA_ONLY and AV_CODEC_PROP_LOSSY. A codec that can do both (H.264) counts as lossy, because
 # the stream does not say.
 INTRA_PROPERTY, LOSSY_PROPERTY = 1, 2
+QUARTER_DEG = 90
 
 
 def _coding(properties: int) -> Coding:
@@ -75,11 +77,18 @@ class VideoFile:
             length_s = float(container.duration / av.time_base) if container.duration else None
             expected = stream.frames or (round(length_s * rate) if length_s and rate else None)
             ratio = stream.sample_aspect_ratio
-            notes = (
+            notes: tuple[str, ...] = (
                 ()
                 if ratio in (None, 0, 1)
                 else (f"The file states pixels that are not square ({ratio}): one scale cannot hold along both axes.",)
             )
+            size_px = (codec.width, codec.height)
+            turned = _rotation_deg(container, stream)
+            if turned % QUARTER_DEG:
+                notes += (f"The file states a rotation of {turned} degrees, which is no quarter turn: not applied.",)
+            elif turned:
+                size_px = (size_px[1], size_px[0]) if turned % (2 * QUARTER_DEG) else size_px
+                notes += (f"The pictures are turned by {turned} degrees, as the file asks of every player.",)
             object.__setattr__(
                 self,
                 "description",
@@ -88,8 +97,8 @@ class VideoFile:
                     kind=f"video file ({container.format.long_name})",
                     codec=codec.name,
                     coding=_coding(codec.codec.properties),
-                    width_px=codec.width,
-                    height_px=codec.height,
+                    width_px=size_px[0],
+                    height_px=size_px[1],
                     rate_hz=rate,
                     has_times=True,
                     frame_count=expected or None,
@@ -115,12 +124,15 @@ class VideoFile:
                 time_s = None if tick is None or stream.time_base is None else float(tick * stream.time_base)
                 if isinstance(found, str):
                     yield LostFrame(index, time_s, Status.DAMAGED, found)
-                elif (found.width, found.height) != (self.description.width_px, self.description.height_px):
-                    yield LostFrame(index, time_s, Status.DAMAGED, _of_another_size(found, self.description))
+                    last_tick = tick
+                    continue
+                pixels = _upright(luma(found), found.rotation)
+                if pixels.shape[1::-1] != (self.description.width_px, self.description.height_px):
+                    yield LostFrame(index, time_s, Status.DAMAGED, _of_another_size(pixels, self.description))
                 elif tick is not None and tick == last_tick:
                     yield LostFrame(index, time_s, Status.DUPLICATE, "It has the same time as the frame before.")
                 else:
-                    yield Frame(luma(found), index, time_s, self.description.coding, not found.key_frame)
+                    yield Frame(pixels, index, time_s, self.description.coding, not found.key_frame)
                 last_tick = tick
 
     def _opened(self) -> av.container.InputContainer:
@@ -144,9 +156,26 @@ def _stream(container: av.container.InputContainer, name: str) -> av.VideoStream
     return stream
 
 
-def _of_another_size(picture: av.VideoFrame, description: Description) -> str:
+def _rotation_deg(container: av.container.InputContainer, stream: av.VideoStream) -> int:
+    """Angle by which the file asks to turn its pictures, anticlockwise; 0 where the first cannot be decoded."""
+    try:
+        first = next(iter(container.decode(stream)), None)
+    except (av.FFmpegError, OSError):
+        return 0
+    return 0 if first is None else int(first.rotation)
+
+
+def _upright(pixels: Pixels, rotation_deg: int) -> Pixels:
+    """Turn a picture by quarters as its file asks; other angles are left alone."""
+    if rotation_deg % QUARTER_DEG or not rotation_deg:
+        return pixels
+    turned: Pixels = np.ascontiguousarray(np.rot90(pixels, rotation_deg // QUARTER_DEG))  # type: ignore[assignment]
+    return turned
+
+
+def _of_another_size(pixels: Pixels, description: Description) -> str:
     return (
-        f"It has {picture.width}x{picture.height} pixels, but the recording "
+        f"It has {pixels.shape[1]}x{pixels.shape[0]} pixels, but the recording "
         f"{description.width_px}x{description.height_px}."
     )
 
