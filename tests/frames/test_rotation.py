@@ -1,4 +1,4 @@
-"""A phone stores its pictures as the sensor lies and writes how to turn them: they are measured as every player shows."""
+"""A phone stores its pictures as the sensor lies and writes how to turn them: they are measured as players show them."""
 
 import shutil
 import subprocess
