@@ -1,4 +1,4 @@
-"""A phone stores its pictures as the sensor lies and writes how to turn them: they are measured as players show them."""
+"""A phone writes into its videos how to turn them: they are measured as a player shows them."""
 
 import shutil
 import subprocess
