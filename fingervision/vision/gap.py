@@ -44,8 +44,6 @@ LEAST_SURE_PX = 5.0
 LEAST_SURE_BESIDE_PX = 0.5
 # Corners are cut off both fingers alike: their sides at the measuring height lean alike to this (slope).
 CUT_ALIKE = 0.35
-# Inner sides that lean more unlike than this are no pair of fingers: a corner of one beside the side of a part.
-LEAN_ALIKE = 0.45
 BROKEN = "The outline near the measuring height is neither smooth nor straight: clean the fingers, or change the light."
 # Below this ratio of contrast to noise nothing is measured.
 CONTRAST_TO_NOISE = 3.0
@@ -126,10 +124,7 @@ def measure_gap(
         if own is None:
             return NoGap(Status.NO_FINGERS, BROKEN)
         measured.append(own)
-    turn = _turn((fingers.left, fingers.right), (left, right))
-    # In each finger's own axes a turned camera leans the two in opposite ways.
-    lean = [own.slope - f.inner_sign * turn for own, f in zip(measured, (fingers.left, fingers.right), strict=True)]
-    if abs(lean[0] - lean[1]) > (CUT_ALIKE if cornered else LEAN_ALIKE):
+    if cornered and abs(measured[0].slope - measured[1].slope) > CUT_ALIKE:
         return NoGap(Status.NO_FINGERS, BROKEN)
     outcome = _assemble(fingers, edges, measured, below_tip_px, light_gap)
     has_part = any(finger.hidden.size for finger in (fingers.left, fingers.right))
@@ -177,11 +172,6 @@ def _refuse(edges: EdgePoints, full_scale: int, light_gap: bool) -> NoGap | None
     return None
 
 
-def _turn(pair: tuple[CoarseFinger, CoarseFinger], ends: tuple[FingerEnd, FingerEnd]) -> float:
-    """Slope by which the camera turns both fingers, told from their outer sides."""
-    return common_turn([finger.inner_sign * end.parameters[OUTER_M] for finger, end in zip(pair, ends, strict=True)])
-
-
 def _no_fingers(
     fingers: CoarseFingers,
     points: tuple[OutlinePoints, OutlinePoints],
@@ -191,7 +181,7 @@ def _no_fingers(
 ) -> NoGap | None:
     """Say so where what was measured is round all over: a finger has straight flanks."""
     pair = (fingers.left, fingers.right)
-    turn = _turn(pair, ends)
+    turn = common_turn([finger.inner_sign * end.parameters[OUTER_M] for finger, end in zip(pair, ends, strict=True)])
     are_fingers = [
         (does_hold and has_flanks(p, end, finger.inner_sign * turn))
         or has_straight_flanks(finger.top, below_tip_px, STEEPEST + abs(turn))
