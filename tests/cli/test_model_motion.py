@@ -168,7 +168,7 @@ def test_wrong_motion_is_refused(tmp_path: Path, options: tuple[str, ...], sente
         ("time_s,input_mm\n0,0\n0,1\n", (), "time_s must increase from row to row"),
         ("time_s,input_mm\n0,0\n1,0\n", (), "must hold at least two different inputs"),
         ("time_s,input_mm\n0,0\n1,1500\n", (), "are they micrometres"),
-        ("input_mm\n0\n1\n", (), "must have one column time_s"),
+        ("input_mm\n0\n1\n", (), "must hold rows of two numbers or more"),
         ("time_s,input_mm\n0,0\n1,1\n", ("--rate-hz", "-5"), "--rate-hz must be a positive number"),
         ("time_s,input_mm\n0,0\n1,1\n", ("--rate-hz", "1e9"), "--rate-hz must give at most 2000000 rows"),
         ("time_s,input_mm\n0,0\n1,1\n", ("--rate-hz", "nan"), "--rate-hz must be a positive number"),
