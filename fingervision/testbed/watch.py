@@ -105,7 +105,7 @@ class Watch:
         gap_mm = measured.gap_mm
         if gap_mm is not None and gap_mm < self.bed.limits.gap_mm and not self._closes:
             raise FingervisionError(
-                f"The gap must stay above {self.bed.limits.gap_mm:g} mm, but is {gap_mm:.3g} mm at "
+                f"The gap must stay above {self.bed.limits.gap_mm:g} mm, but is {gap_mm:.4f} mm at "
                 f"{self.sight.position.newest:.3f} mm: the motor was stopped."
             )
         return look, measured

@@ -246,7 +246,9 @@ def fit(
         covariance[np.ix_(free, free)] = scale[:, None] * np.linalg.pinv(unit) * scale
     own = np.array([parameter.run is None for _, parameter in listed], dtype=bool)
     # A start is anywhere between -1 and 1 beforehand, with a variance of 1/3; one at its end was chosen as well.
-    price = float(np.sum(np.log1p(np.diag(normal)[~own] * START_VARIANCE)))
+    # It costs no more than a parameter does, or a play would be the greater surprise than two effects that imitate it.
+    prices = np.log1p(np.diag(normal)[~own] * START_VARIANCE)
+    price = float(np.sum(np.minimum(prices, np.log(max(2, aim.size)))))
     names_of = settings(x)
     return Explanation(order, names_of, cost + penalty, residual, covariance, int((free & own).sum()), spread, price)
 
