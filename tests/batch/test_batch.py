@@ -64,6 +64,7 @@ def made(out: Path) -> dict[str, int]:
     return {path.parent.name: path.stat().st_mtime_ns for path in whole}
 
 
+@pytest.mark.slow
 def test_one_two_and_by_hand_are_the_same_and_a_broken_one_is_listed(run: Run, copy: Path, tmp_path: Path) -> None:
     code, out, err = run("batch", "measure", "rec/**/*.mkv", *SCALE, "--out", "two", "--jobs", 2)
     assert code == 3
@@ -93,6 +94,7 @@ def test_one_two_and_by_hand_are_the_same_and_a_broken_one_is_listed(run: Run, c
     assert not list(Path("two").glob(".*"))
 
 
+@pytest.mark.slow
 def test_what_is_done_stays_and_what_changed_is_done_again(run: Run, copy: Path) -> None:
     arguments = ("batch", "measure", "rec/*/good*.mkv", "--out", "out", *ALONE)
     assert run(*arguments)[0] == 0
@@ -116,6 +118,7 @@ def test_what_is_done_stays_and_what_changed_is_done_again(run: Run, copy: Path)
     assert "4 worked on" in run(*arguments, "--below-tip-mm", 0.4)[1]
 
 
+@pytest.mark.slow
 def test_a_result_whose_table_was_changed_or_deleted_is_done_again(run: Run, copy: Path) -> None:
     arguments = ("batch", "measure", "rec/*/good*.mkv", "--out", "out", *ALONE)
     run(*arguments)
@@ -140,6 +143,7 @@ def made_by_hand() -> list[Path]:
     return list(Path("measured").glob("*/summary.json"))
 
 
+@pytest.mark.slow
 def test_the_content_of_a_calibration_counts_and_not_its_name(run: Run, copy: Path) -> None:
     sample = Path(__file__).parents[2] / "sample_frames" / "opening"
     document = json.loads((sample / "calibration.json").read_text(encoding="utf-8"))
@@ -156,6 +160,7 @@ def test_the_content_of_a_calibration_counts_and_not_its_name(run: Run, copy: Pa
     assert "1 worked on" in run(*arguments, "--calibration", "d.json")[1]
 
 
+@pytest.mark.slow
 def test_a_recording_of_a_taken_name_gets_a_longer_one(run: Run, copy: Path) -> None:
     run("batch", "measure", "rec/a/good.mkv", *ALONE, "--out", "out")
     before = made(Path("out"))
@@ -218,6 +223,7 @@ def test_an_unreadable_file_is_listed(run: Run, copy: Path) -> None:
     assert "rec/gone.mkv" in err
 
 
+@pytest.mark.slow
 def test_tables_are_diagnosed_together(run: Run, tmp_path: Path) -> None:
     sample = Path(__file__).parents[2] / "sample_frames" / "opening"
     Path("good.csv").write_bytes((sample / "expected_gaps.csv").read_bytes())
@@ -276,6 +282,7 @@ def test_a_batch_that_was_stopped_goes_on(
     assert not list((tmp_path / "out").glob(".*.part*"))
 
 
+@pytest.mark.slow
 def test_a_full_disk_stops_it_and_loses_nothing(run: Run, copy: Path, tmp_path: Path) -> None:
     disk = tmp_path / "disk"
     disk.mkdir()

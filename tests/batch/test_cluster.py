@@ -116,6 +116,7 @@ def test_workers_of_another_version_are_refused(
     assert not (tmp_path / "out").exists()
 
 
+@pytest.mark.slow
 def test_a_cluster_gives_the_same_and_survives_a_dead_worker(
     cluster: tuple[str, "list[subprocess.Popen[bytes]]"], recordings: Path, tmp_path: Path
 ) -> None:

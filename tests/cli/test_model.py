@@ -125,6 +125,7 @@ def test_large_rotation_reaches_stress_and_onset(tmp_path: Path) -> None:
     assert large["input_at_yield_mm"] != small["input_at_yield_mm"]
 
 
+@pytest.mark.slow
 def test_the_picture_shows_the_physics_asked_for(tmp_path: Path) -> None:
     given = drive(tmp_path / "drive.csv", [-1.0, 0.0])
     pictures = []

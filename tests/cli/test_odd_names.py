@@ -46,6 +46,7 @@ def run(folder: Path, *arguments: str | bytes, shell: str = "") -> "subprocess.C
     return done
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", [b"12:30:05.mkv", b"a$b^c$.mkv", b"=1+1.mkv", b"caf\xe9.mkv", b"with 'quotes\".mkv"])
 def test_a_recording_of_any_name_is_measured(tmp_path: Path, clip: Path, name: bytes) -> None:
     shutil.copy(clip, tmp_path / os.fsdecode(name))
@@ -55,6 +56,7 @@ def test_a_recording_of_any_name_is_measured(tmp_path: Path, clip: Path, name: b
     assert len(list((tmp_path / "measured").glob("*/gaps.csv"))) == 1
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("closed", ["2>&-", ">&-", "<&- 2>&- >&-"])
 def test_closed_streams_cost_no_result(tmp_path: Path, clip: Path, closed: str) -> None:
     done = run(tmp_path, "measure", str(clip), *SCALE, "--out", "out", shell=closed)
@@ -76,6 +78,7 @@ def said(folder: Path, *arguments: str) -> str:
     return done.stderr.decode()
 
 
+@pytest.mark.slow
 def test_what_is_no_recording_is_a_sentence(tmp_path: Path) -> None:
     os.mkfifo(tmp_path / "pipe.mp4")
     (tmp_path / "loop").symlink_to("loop")
@@ -85,6 +88,7 @@ def test_what_is_no_recording_is_a_sentence(tmp_path: Path) -> None:
     assert "fingervision: " in said(tmp_path, "measure", "loop", *SCALE)
 
 
+@pytest.mark.slow
 def test_what_is_no_table_is_a_sentence(tmp_path: Path, clip: Path) -> None:
     os.mkfifo(tmp_path / "pipe.csv")
     (tmp_path / "loop").symlink_to("loop")

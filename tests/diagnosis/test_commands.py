@@ -54,6 +54,7 @@ def test_diagnose_writes_what_the_design_lays_down(tables: tuple[Path, Path], tm
     assert "nowhere beyond the noise" in again.output
 
 
+@pytest.mark.slow
 def test_an_answer_leaves_no_next_run_of_an_earlier_one(tables: tuple[Path, Path], tmp_path: Path) -> None:
     out = tmp_path / "out"
     for model in (tables[1], out / "model.toml"):

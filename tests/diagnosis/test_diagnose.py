@@ -92,6 +92,7 @@ def test_nothing_hidden_agrees_and_says_what_would_have_shown(tmp_path: Path) ->
     assert float(str(report.smallest_seen["backlash"]["size"])) < 0.01
 
 
+@pytest.mark.slow
 def test_play_is_named_with_its_width_and_the_corrected_model_agrees(tmp_path: Path) -> None:
     report = bench(tmp_path, with_play)
     assert (report.verdict, [effect.name for effect in report.effects]) == (Verdict.NAMED, ["backlash"])
@@ -115,6 +116,7 @@ def test_two_effects_are_named_together(tmp_path: Path) -> None:
     assert {effect.name for effect in report.effects} == {"backlash", "assembly_asymmetry"}
 
 
+@pytest.mark.slow
 def test_a_step_in_time_is_unknown_and_described(tmp_path: Path) -> None:
     report = bench(tmp_path, lambda u, t: halves(on_grid(u) + 0.02 * (t > 8.0)))
     assert report.verdict is Verdict.UNKNOWN

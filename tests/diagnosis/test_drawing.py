@@ -84,6 +84,7 @@ def test_a_link_without_a_force_is_the_set_that_no_gap_can_tell_apart(diagnosed:
     )
 
 
+@pytest.mark.slow
 def test_the_corrected_drawing_agrees_and_keeps_its_kind(diagnosed: Diagnosed, tmp_path: Path) -> None:
     report, folder = diagnosed("right half", False)
     share = report.effects[0].parameters["share"]
@@ -95,6 +96,7 @@ def test_the_corrected_drawing_agrees_and_keeps_its_kind(diagnosed: Diagnosed, t
     assert compare(read_measured_table(folder / "measured.csv"), model).rms_mm < NOISE_SHARE * EDGE_MM
 
 
+@pytest.mark.slow
 def test_an_uncertain_thickness_is_refitted_and_nothing_is_missing(tmp_path: Path) -> None:
     report = answered(CASES["hinges"], tmp_path, force=True, drawing=uncertain(tmp_path, thickness_mm=0.1))
     assert report.verdict is Verdict.AGREES, report.sentence
@@ -104,6 +106,7 @@ def test_an_uncertain_thickness_is_refitted_and_nothing_is_missing(tmp_path: Pat
     assert report.disagreement.after_rms_mm < NOISE_SHARE * EDGE_MM
 
 
+@pytest.mark.slow
 def test_what_is_surer_than_the_change_is_not_bent_to_it(tmp_path: Path) -> None:
     report = answered(CASES["link"], tmp_path, force=True, drawing=uncertain(tmp_path, l2_mm=0.01))
     assert names(report) == ["lever_ratio_error"]

@@ -74,6 +74,7 @@ def test_an_offset_of_the_runs_is_no_signal_but_their_mean_is() -> None:
     assert remaining_rms_mm(np.ones((2, 30)), run) == pytest.approx(0.0, abs=1e-12)
 
 
+@pytest.mark.slow
 def test_the_judge_recovers_what_is_hidden_from_a_curve_without_noise() -> None:
     checked = 0
     for seed in range(SEED, SEED + 12):

@@ -33,6 +33,7 @@ def screwed(folder: Path, harmonic: float) -> DiagnosisReport:
     return diagnose(read_measured_table(folder / "measured.csv"), read_model(folder / "sim.csv")).report
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("harmonic", [0.0, 0.08, 0.18])
 def test_a_small_harmonic_is_no_second_name(tmp_path: Path, harmonic: float) -> None:
     report = screwed(tmp_path, harmonic)

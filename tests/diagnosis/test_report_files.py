@@ -113,6 +113,7 @@ def test_the_same_model_twice_is_refused(rig: Path) -> None:
     assert done.exit_code == 2
 
 
+@pytest.mark.slow
 def test_turning_points_are_found_and_their_frames_shown(tmp_path: Path) -> None:
     sample = Path(__file__).parents[2] / "sample_frames" / "opening"
     recording = tmp_path / "opening.mp4"

@@ -67,6 +67,7 @@ def test_a_delay_is_told_from_a_resonance_however_the_stage_went_between_two_sam
     assert set(sets) == {("drive_lag",), ("camera_latency",)}
 
 
+@pytest.mark.slow
 def test_a_model_with_the_delay_disagrees_nowhere(tmp_path: Path) -> None:
     answered(tmp_path, late_s=0.03)
     model = read_model(tmp_path / "sim.csv")

@@ -85,10 +85,12 @@ def parameter(report: dict[str, Any], name: str) -> tuple[float, float]:
     return found["value"], found["u"]
 
 
+@pytest.mark.slow
 def test_nothing_hidden_agrees(diagnosed: Diagnosed) -> None:
     assert diagnosed(Film())["verdict"] == "agrees"
 
 
+@pytest.mark.slow
 def test_play_is_named(diagnosed: Diagnosed) -> None:
     report = diagnosed(Film(received=behind_play))
     assert (report["verdict"], report["alternatives"]) == ("named", [["backlash"]])
@@ -96,6 +98,7 @@ def test_play_is_named(diagnosed: Diagnosed) -> None:
     assert abs(play_mm - PLAY_MM) < SIGMAS * u
 
 
+@pytest.mark.slow
 def test_the_play_of_the_sample_clip_is_named(through: Through) -> None:
     """A lossy clip (H.264), one run, edges that lean: sample_frames/opening, whose drive has 0.03 mm of play."""
     report = through(SAMPLE, "opening.mp4", 34.0)

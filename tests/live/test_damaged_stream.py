@@ -111,6 +111,7 @@ def items_of(stream: Path) -> list[Frame | LostFrame]:
     return items
 
 
+@pytest.mark.slow
 def test_what_was_lost_is_said_with_its_reason(tmp_path: Path, film: list[np.ndarray]) -> None:
     stream = tmp_path / "clip.ts"
     begins = coded(stream, film, "h264")

@@ -189,6 +189,7 @@ def under_cursor_s(page: Any, share: float) -> float:
     return float(page.locator("#chart .u-legend .u-value").first.inner_text())
 
 
+@pytest.mark.slow
 def test_the_chart_zooms_and_every_key_and_limit_does_what_it_says(
     live: Callable[..., Any], opened: Callable[..., Any]
 ) -> None:
@@ -259,6 +260,7 @@ def test_the_chart_zooms_and_every_key_and_limit_does_what_it_says(
     assert page.evaluate("getComputedStyle(document.activeElement).outlineStyle") == "solid"
 
 
+@pytest.mark.slow
 def test_a_scale_is_asked_for_and_found_on_a_reference(
     live: Callable[..., Any], opened: Callable[..., Any], tmp_path: Path
 ) -> None:
@@ -289,6 +291,7 @@ def test_a_scale_is_asked_for_and_found_on_a_reference(
     shown(page, "document.querySelector('#scale').textContent.includes('±')")
 
 
+@pytest.mark.slow
 def test_the_page_fits_a_phone_and_comes_back_after_a_restart(
     live: Callable[..., Any], opened: Callable[..., Any], tmp_path: Path
 ) -> None:
@@ -310,6 +313,7 @@ def test_the_page_fits_a_phone_and_comes_back_after_a_restart(
     shown(page, f"Number(document.querySelector('#picture').dataset.shown) > {before + 5}")
 
 
+@pytest.mark.slow
 def test_a_cut_is_said_within_a_second_and_measuring_resumes(
     live: Callable[..., Any], opened: Callable[..., Any], camera: Any
 ) -> None:

@@ -98,6 +98,7 @@ def coarse() -> PlaneMesh:
         return PlaneMesh(stored["nodes_mm"], stored["triangles"].astype(np.int64))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("input_mm", "large"), [(1.0, False), (1.8, True)])
 def test_three_dimensions_agree(
     tmp_path: Path,

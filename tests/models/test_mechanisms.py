@@ -43,6 +43,7 @@ def leaf_stiffness(E: float, b: float, t: float, length: float) -> np.ndarray:
     return np.linalg.inv(np.array([[across, coupled], [coupled, length / EI + 2 * c]]))
 
 
+@pytest.mark.slow
 @both_kinds
 def test_parallel_leaf_stage(kind: Kind) -> None:
     """24 E I / L^3 with the leaves' roots; the first mode by the stage's mass; parasitic motion 3 u^2 / (5 L)."""

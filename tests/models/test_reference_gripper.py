@@ -72,6 +72,7 @@ def test_the_micro_design_in_three_dimensions(gripper: Gripper) -> None:
     assert FiniteElementGripper(micro).half.equilibrium(1.0).force_n == pytest.approx(10.04, rel=FORCE)
 
 
+@pytest.mark.slow
 def test_the_top_corner_touches_first_in_large_rotation_too(finite_element: FiniteElementGripper) -> None:
     half = finite_element.half
     touch = first_touch(half, half.first_touch_mm() or 0.0)

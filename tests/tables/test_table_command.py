@@ -149,6 +149,7 @@ def simulation(folder: Path) -> Path:
     return path
 
 
+@pytest.mark.slow
 def test_results_of_another_table_are_never_replaced(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     first, second = copied("german_logger.csv", tmp_path), copied("spanish.csv", tmp_path)

@@ -61,6 +61,7 @@ def test_a_killed_run_is_gone_on_with_to_the_same_end(tmp_path: Path, whole: byt
         assert json.loads((folder / "run" / "run.json").read_text())["complete"] is True
 
 
+@pytest.mark.slow
 def test_half_a_row_and_half_an_event_are_cut_off(tmp_path: Path, whole: bytes) -> None:
     run(tmp_path)
     folder = tmp_path / "run"

@@ -121,6 +121,7 @@ def test_readings_come_in_order_and_between_question_and_answer(bed: Bed) -> Non
     assert all(reading.asked_s <= reading.got_s for reading in seen)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("beyond_mm", [0.1, -0.1])
 def test_beyond_its_limits_nothing_moves(bed: Bed, beyond_mm: float) -> None:
     limits = bed.actuator.limits

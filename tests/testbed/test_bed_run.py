@@ -70,6 +70,7 @@ def test_the_same_run_gives_the_same_table(short: Path, tmp_path: Path) -> None:
     assert (tmp_path / "run" / "samples.csv").read_bytes() == (short / "samples.csv").read_bytes()
 
 
+@pytest.mark.slow
 def test_every_kind_of_step_is_done(tmp_path: Path) -> None:
     said: list[str] = []
     text = steps(
@@ -98,6 +99,7 @@ def test_every_kind_of_step_is_done(tmp_path: Path) -> None:
     assert rows[-1].input_mm == pytest.approx(-0.24, abs=0.05)
 
 
+@pytest.mark.slow
 def test_what_is_hidden_acts_where_it_belongs(tmp_path: Path) -> None:
     text = steps('kind = "triangle"\nfrom_mm = 0.0\nto_mm = 0.6\nspeed_mm_s = 1.0')
     tables = {}

@@ -276,6 +276,7 @@ def test_ctrl_c_stops_the_motor_before_anything_else(
     assert (down.cycle - began[0]) / HERTZ < 0.2
 
 
+@pytest.mark.slow
 def test_steps_are_run_in_their_sequence_if_the_controller_keeps_these(
     bed_toml: Path, controller: MotorController, tmp_path: Path
 ) -> None:

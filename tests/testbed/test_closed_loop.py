@@ -42,10 +42,12 @@ def test_what_is_hidden_is_named_with_its_size(tmp_path: Path, name: str, parame
     assert effect.parameters[parameter].value == pytest.approx(size, rel=PART_OF_SIZE)
 
 
+@pytest.mark.slow
 def test_where_nothing_is_hidden_it_agrees(tmp_path: Path) -> None:
     assert answer(tmp_path, Hidden()).verdict is Verdict.AGREES
 
 
+@pytest.mark.slow
 def test_the_demonstration_finds_what_it_hid_and_says_each_step(tmp_path: Path) -> None:
     done = CliRunner().invoke(cli, ["demo", "--hide", "backlash:play_mm=0.12", "--out", str(tmp_path / "demo")])
     assert done.exception is None, done.output

@@ -104,6 +104,7 @@ def whole(tmp_path_factory: pytest.TempPathFactory) -> bytes:
     return (folder / "run" / "samples.csv").read_bytes()
 
 
+@pytest.mark.slow
 def test_the_time_of_a_simulation_stands_while_it_is_paused(tmp_path: Path, whole: bytes) -> None:
     pauses = dict.fromkeys((80, 88, 100, 120), "p")
     pressed(tmp_path, SHORT, pauses, replays=True, on_say=Controls.toggle_pause)
@@ -111,6 +112,7 @@ def test_the_time_of_a_simulation_stands_while_it_is_paused(tmp_path: Path, whol
 
 
 # At these frames rows wait for the place of the stage, which later readings tell better.
+@pytest.mark.slow
 @pytest.mark.parametrize("at", [81, 91])
 def test_a_stopped_simulation_goes_on_to_the_same_end(tmp_path: Path, whole: bytes, at: int) -> None:
     with pytest.raises(StoppedError):
@@ -164,6 +166,7 @@ def typed(tmp_path: Path) -> Iterator[tuple[int, "subprocess.Popen[str]"]]:
     os.close(typing)
 
 
+@pytest.mark.slow
 def test_letters_on_a_terminal_pause_go_on_and_stop(tmp_path: Path, typed: tuple[int, "subprocess.Popen[str]"]) -> None:
     typing, process = typed
     video = tmp_path / "run" / "video.mp4"

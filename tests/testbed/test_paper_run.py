@@ -29,6 +29,7 @@ def test_the_recipe_goes_to_the_inputs_of_table_1() -> None:
     assert np.allclose([step.number("to_mm") for step in steps], inputs)
 
 
+@pytest.mark.slow
 def test_the_bed_measures_what_the_table_says_at_the_place_where_the_stage_stood(tmp_path: Path) -> None:
     subprocess.run([sys.executable, str(SAMPLES / "make_paper_run.py"), str(tmp_path)], check=True)
     made = table(tmp_path / "measured.csv")

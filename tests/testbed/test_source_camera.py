@@ -25,6 +25,7 @@ def break_off(done: float, total: float) -> None:
     raise BreaksOffError
 
 
+@pytest.mark.slow
 def test_a_run_that_cannot_be_played_again_goes_on_with_its_leg_as_another_run(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

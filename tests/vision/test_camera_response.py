@@ -27,6 +27,7 @@ def measured(picture: np.ndarray, settings: Settings) -> GapMeasurement:
     return found
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("blur_px", [0.9, 2.0])
 def test_a_known_response_takes_the_bias_away(blur_px: float) -> None:
     rng = np.random.default_rng([15, int(10 * blur_px)])

@@ -33,6 +33,7 @@ def measured(shot: Shot) -> GapMeasurement:
     return found
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", CLASSES)
 def test_what_stands_beside_the_edge(name: str) -> None:
     draw, rms_px = CLASSES[name]
