@@ -39,5 +39,15 @@ def rehearse(say: Callable[[str, str], None]) -> None:
             part = Region(BORDER_PX, BORDER_PX, FRAME_PX[0] - 2 * BORDER_PX, FRAME_PX[1] - 2 * BORDER_PX)
             for pixels, region, known in ((dark, None, None), (255 - dark, part, direction), (dark, whole, direction)):
                 measure_frame(Frame(pixels, 0, 0.0), Settings(BELOW_TIP_PX, known, region))
+            # Where the fingers are sought in the wrong class, or hold something, a part between them is looked for.
+            held = dark.copy()
+            middle = (slice(FRAME_PX[1] // 4, FRAME_PX[1] // 2), slice(FRAME_PX[0] // 4, 3 * FRAME_PX[0] // 4))
+            held[middle] = dark.min()
+            for pixels in (dark, 255 - dark, held):
+                for region in (None, part):
+                    for known in (None, direction):
+                        for is_dark in (True, False):
+                            asked = Settings(BELOW_TIP_PX, known, region, fingers_are_dark=is_dark)
+                            measure_frame(Frame(pixels, 0, 0.0), asked)
     finally:
         late.cancel()
