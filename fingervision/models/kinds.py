@@ -5,6 +5,9 @@ import pkgutil
 from pathlib import Path
 from typing import Protocol
 
+import numpy as np
+from numpy.typing import NDArray
+
 from fingervision.domain.errors import UsageError
 from fingervision.domain.gripper import Gripper
 from fingervision.domain.model import Model
@@ -29,6 +32,10 @@ class GripperModel(Model, Protocol):
     @property
     def rest_gap_mm(self) -> float:
         """The gap at input zero."""
+        ...
+
+    def body_poses(self, input_mm: NDArray[np.float64]) -> dict[str, NDArray[np.float64]]:
+        """Answer the poses of the bodies at each input: x_mm, y_mm, angle_mrad, shape (n, 3) each."""
         ...
 
     def figures(self) -> ModelFigures:

@@ -33,6 +33,8 @@ NAMES = [
     "finger_contact",
     "thermal_drift",
     "hinge_stiffness_error",
+    "link_length_error",
+    "hinge_play",
     "camera_drift",
     "camera_scale_drift",
     "out_of_plane_motion",
@@ -59,6 +61,7 @@ def bench() -> History:
         opening_mm=7.7 * 1.4,
         closing_mm=7.7 * 0.4,
         force=True,
+        bodies=True,
     )
 
 

@@ -8,6 +8,7 @@ from fingervision.diagnosis.report.frame_strip import strip_html
 from fingervision.diagnosis.report.positioning_of_data import positioning_section
 from fingervision.diagnosis.report.report_page import curves_of, report_page
 from fingervision.diagnosis.report.residual_figure import residual_figure
+from fingervision.domain.effect import effect_key
 from fingervision.domain.parameter import Estimate
 from fingervision.effects.position_error_map import curve_values
 from fingervision.models.corrected import CorrectedModel
@@ -39,7 +40,8 @@ def write_answer(out: Path, done: Diagnosis, model: CorrectedModel, made: Proven
     effects: dict[str, dict[str, Estimate]] = {name: dict(values) for name, values in model.effects.items()}
     for effect in report.effects:
         curve = curve_values([at for at, _ in effect.points], [error for _, error in effect.points])
-        effects[effect.name] = {**effect.parameters, **{name: Estimate(value, None) for name, value in curve.items()}}
+        key = effect_key(effect.name, effect.place, effect.end)
+        effects[key] = {**effect.parameters, **{name: Estimate(value, None) for name, value in curve.items()}}
     write_model(out / MODEL, Path(model.base_path), effects, model.kind)
     if report.next_run is None:
         (out / NEXT_RUN).unlink(missing_ok=True)
