@@ -128,6 +128,7 @@ def slipping(number: int) -> tuple[Array, Array, dict[str, Array]]:
     )
     inside = np.abs(across) < 0.6 * h
     faces = [inside & (np.abs(along - side * w) < 1e-6) for side in (-1.0, 1.0)]
+    size = plate.unknowns
     alike = np.ones_like(across)
     ties = [
         _mean(faces[1], dofs, alike, size) - _mean(faces[0], dofs, alike, size) for dofs in (plate.x_dofs, plate.y_dofs)
