@@ -77,6 +77,19 @@ Exit codes: 0 done; 1 could not, or no frame gave a number; 2 wrong usage;
     show_default=True,
     help="Edge of a thick part: of the face towards the camera, or of its outline, side walls included.",
 )
+@click.option(
+    "--mechanism",
+    type=click.Path(path_type=Path),
+    metavar="FILE",
+    help="gripper.toml or mechanism.toml: also follow the bodies that it draws, bodies.csv.",
+)
+@click.option(
+    "--at",
+    "points",
+    multiple=True,
+    metavar="X,Y=XMM,YMM",
+    help="With --mechanism: where a point of the drawing lies in the first picture, in px and in mm; three tell all.",
+)
 @click.option("--overlay", is_flag=True, help="Also write overlay.mp4.")
 @click.option("--steps", "steps_frame", type=int, metavar="FRAME", help="Also write every step of this frame (from 0).")
 @click.option(
@@ -100,6 +113,8 @@ def command(
     bits: int | None,
     fingers: str,
     face: str,
+    mechanism: Path | None,
+    points: tuple[str, ...],
     overlay: bool,
     steps_frame: int | None,
     out: Path | None,
@@ -118,6 +133,8 @@ def command(
     from fingervision.storage.summary_json import refuse_other_recording
     from fingervision.tables.read import read_drive
 
+    if points and mechanism is None:
+        raise UsageError("--at says where a drawing lies, but there is none: add --mechanism FILE, or leave --at out.")
     task = Task(
         scale=_scale(calibration, px_per_mm),
         scale_file=calibration,
@@ -139,6 +156,10 @@ def command(
     with _Bar() as bar:
         measured = measure(source, task, folder, bar)
     _report(measured, as_json)
+    if mechanism is not None:
+        from fingervision.cli._measure_bodies import follow_bodies
+
+        follow_bodies(open_source(recording, Wish(rate_hz=rate_hz)), mechanism, points, task.scale, folder, as_json)
     raise SystemExit(int(measured.exit_code))
 
 
