@@ -143,8 +143,10 @@ class Effect:
         Canonical name.
     stage : Stage
         Drive, mechanism or camera.
-    order : int
-        Place in the chain; effects act in ascending order.
+    order : float
+        Place in the chain within the stage: effects act in ascending order. The catalogue's own have whole tens
+        (`fingervision effects NAME` prints them), so that another may stand between two: one that acts on what the play
+        (60) has left, and before the jumps (70), has 65. By default last of its stage.
     words : str
         What happens, in half a sentence.
     formula : str
@@ -173,7 +175,7 @@ class Effect:
 
     name: str
     stage: Stage
-    order: int
+    order: float = float("inf")
     words: str
     formula: str
     source: str
