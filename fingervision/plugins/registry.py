@@ -43,7 +43,8 @@ class Registry(Generic[T]):
     load : callable
         Imports a built-in part by its name.
     parts_of : callable
-        Gives the parts by name that an imported object or module holds, in order; raises MisfitError where it is not
+        Gives the parts by name that an imported object or module holds, in order (one without a name of its own under
+        the empty name: it has the one under which it is registered); raises MisfitError where it is not
         what the group asks for. It runs within the time limit.
     """
 
@@ -234,6 +235,8 @@ class Registry(Generic[T]):
         if missing is not None:
             raise PluginVersionError(needs(who, missing))
         found = watched(who, origin, lambda: self._parts_of(point.load()))
+        if "" in found:
+            return found[""]
         if point.name not in found:
             named = f"is named {' and '.join(found)}" if found else f"holds no {self.noun}"
             raise PluginShapeError(
