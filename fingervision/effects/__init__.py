@@ -11,12 +11,13 @@ from functools import cache
 from pathlib import Path
 
 from fingervision.domain.effect import Effect, Stage
+from fingervision.domain.further_check import FurtherCheck
 from fingervision.effects.trial import BUILT_IN, effects_in
 from fingervision.plugins.origin import SESSION, Origin
 from fingervision.plugins.registry import Registry
 from fingervision.plugins.watched_import import importing
 
-__all__ = ["REGISTRY", "added_effects", "catalogue", "origin_of", "register"]
+__all__ = ["REGISTRY", "added_effects", "catalogue", "origin_of", "register", "that_show"]
 
 
 @cache
@@ -41,6 +42,11 @@ def catalogue() -> dict[str, Effect]:
 def origin_of(name: str) -> Origin:
     """Say where an effect of the catalogue comes from."""
     return _catalogue()[1][name]
+
+
+def that_show(check: FurtherCheck) -> tuple[str, ...]:
+    """Name the effects that show in a check, in the catalogue's order."""
+    return tuple(name for name, effect in catalogue().items() if effect.checks.get(check) is True)
 
 
 def register(effect: Effect) -> Effect:
