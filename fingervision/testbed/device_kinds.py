@@ -51,9 +51,9 @@ class PluggedKind:
     def __init__(self, part: str, entry: Entry[Kind]) -> None:
         self._part, self._entry = part, entry
         self.KEYS, self.SIMULATED = tuple(entry.value.KEYS), bool(entry.value.SIMULATED)
-        holder = getattr(entry.value, "holder", None)
-        if holder is not None:
-            self.holder = holder
+        for name in ("holder", "without_hardware"):
+            if hasattr(entry.value, name):
+                setattr(self, name, getattr(entry.value, name))
 
     def build(self, section: Section, context: BuildContext) -> Any:
         """Build the device.

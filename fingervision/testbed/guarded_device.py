@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from contextlib import suppress
-from typing import Any, NoReturn
+from typing import Any, Generic, NoReturn, Protocol
 
 from fingervision.domain.errors import FingervisionError
 from fingervision.plugins.faults import PluginShapeError
@@ -51,7 +51,8 @@ def guarded(build: Callable[[], Any], protocol: type, who: str, origin: Origin) 
 
 
 def _look_at(kept: "_Guarded", device: Any, protocol: type, who: str, origin: Origin) -> None:
-    wanted = [name for name in vars(protocol) if not name.startswith("_")]
+    bases = [base for base in protocol.__mro__ if base not in (object, Protocol, Generic)]
+    wanted = [name for base in bases for name in vars(base) if not name.startswith("_")]
     lacks = [name for name in wanted if not (hasattr(type(device), name) or hasattr(device, name))]
     if lacks:
         raise PluginShapeError(

@@ -1,7 +1,5 @@
 """A stage as its maker would plug it in: goes straight at the asked speed, on the bed's own clock."""
 
-from itertools import count
-
 from fingervision.domain.errors import FingervisionError
 from fingervision.storage.toml_section import Section
 from fingervision.testbed.actuator import Alarm, StageLimits
@@ -12,7 +10,6 @@ from fingervision.testbed.reading import Reading
 
 KEYS = ("upper_mm",)
 SIMULATED = True
-STEP_S = 0.002
 
 
 class Stage:
@@ -24,7 +21,6 @@ class Stage:
         self.limits = StageLimits(-1.0, upper_mm, 20.0, 5.0)
         self._clock = clock
         self._from_mm, self._to_mm, self._speed_mm_s, self._began_s = 0.0, 0.0, 1.0, clock.now_s()
-        self._read_s = clock.now_s()
 
     def _end_s(self) -> float:
         return self._began_s + abs(self._to_mm - self._from_mm) / self._speed_mm_s
@@ -68,15 +64,8 @@ class Stage:
         asked_s = self._clock.now_s()
         self._clock.wait_until(asked_s + 0.0005)
         got_s = self._clock.now_s()
-        first_s, self._read_s = self._read_s, got_s
-        times = []
-        for step in count(1):
-            at_s = first_s + step * STEP_S
-            if at_s >= got_s:
-                break
-            times.append(at_s)
-        seen = [Reading(at, at, at, self._at_mm(at), at < self._end_s()) for at in times]
-        return (*seen, Reading(0.5 * (asked_s + got_s), asked_s, got_s, self._at_mm(got_s), got_s < self._end_s()))
+        at_s = 0.5 * (asked_s + got_s)
+        return (Reading(at_s, asked_s, got_s, self._at_mm(at_s), at_s < self._end_s()),)
 
     def close(self) -> None:
         self.stop()

@@ -84,6 +84,7 @@ def bed_at(folder: Path, kind: str) -> Path:
     return path
 
 
+@pytest.mark.slow
 def test_a_stage_in_a_file_beside_the_bed_is_driven_by_a_recipe(tmp_path: Path) -> None:
     (tmp_path / "their_stage.py").write_text(STAGE, encoding="utf-8")
     bed = bed_at(tmp_path, "./their_stage.py")
@@ -115,7 +116,7 @@ def test_an_installed_stage_is_found_by_its_name(tmp_path: Path, monkeypatch: py
         ("KEYS = ()", "build"),
         ("import no_such_driver", "no_such_driver"),
         (STAGE.replace("def stop(self)", "def halt(self)"), "stop"),
-        (STAGE.replace("        return (*seen, ", "        return list(("), "readings"),
+        (STAGE.replace("        return (Reading(", "        return list((Reading("), "readings"),
         (STAGE.replace("StageLimits(-1.0, upper_mm, 20.0, 5.0)", "(-1.0, upper_mm)"), "StageLimits"),
         (STAGE.replace('KEYS = ("upper_mm",)', 'KEYS = ["upper_mm"]'), "KEYS"),
         (STAGE.replace("    return Stage(", "    raise OSError('no port')\n    return Stage("), "no port"),
@@ -123,7 +124,7 @@ def test_an_installed_stage_is_found_by_its_name(tmp_path: Path, monkeypatch: py
     ],
 )
 def test_a_bad_stage_is_refused_by_its_name(tmp_path: Path, source: str, fact: str) -> None:
-    source = source.replace("got_s < self._end_s()))\n", "got_s < self._end_s())))\n") if "list((" in source else source
+    source = source.replace("at_s < self._end_s()),)", "at_s < self._end_s()),))") if "list((" in source else source
     (tmp_path / "bad_stage.py").write_text(source, encoding="utf-8")
     with pytest.raises(FingervisionError) as caught:
         open_bed(str(bed_at(tmp_path, "./bad_stage.py")))
@@ -149,6 +150,7 @@ def test_a_kind_that_is_neither_installed_nor_a_file_is_refused(tmp_path: Path) 
             open_bed(str(bed_at(tmp_path, kind)))
 
 
+@pytest.mark.slow
 def test_an_installed_model_answers_for_a_drawing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     from fingervision.models.hinge_correction import HingeTheory
     from fingervision.models.physics import LINEAR, Physics
@@ -192,6 +194,7 @@ def test_an_installed_source_opens_what_it_accepts(tmp_path: Path, monkeypatch: 
         open_source("simulated")
 
 
+@pytest.mark.slow
 def test_a_part_of_the_report_is_added_and_a_bad_one_left_out(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ) -> None:

@@ -96,6 +96,7 @@ BAD = {
 }  # fmt: skip
 
 
+@pytest.mark.slow
 def test_each_bad_plug_in_is_said_by_name_and_takes_nothing_with_it(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -181,6 +182,7 @@ def test_an_unsound_time_limit_is_refused(tmp_path: Path, monkeypatch: pytest.Mo
     assert not isinstance(run("effects").exception, PluginError)
 
 
+@pytest.mark.slow
 def test_help_and_import_touch_no_plug_in(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     mark = tmp_path / "imported"
     source = f"open({str(mark)!r}, 'w').close()\n" + effect_source()
