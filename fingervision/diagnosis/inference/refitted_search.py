@@ -193,7 +193,11 @@ def _beside_map(state: _Searched, look: _Look) -> _Searched:
     plain = _without(beside.found.problem, first)
     parts = imitating_parts(plain, first, beside.found.best)
     if parts and not parts.keys() & look.forced:
-        beside = look.again(_excluding(beside.data, parts))
+        # The map was estimated beside what stands for a part of it.
+        names = tuple(name for name in beside.found.best.names if name not in parts)
+        rest = fit(plain, names, beside.found.best.values, iterations=20) if names else plain.nothing()
+        first, _ = likeliest_map(plain, rest)
+        beside = look.again(_excluding(replace(beside.data, position_map=first), parts))
         plain = _without(beside.found.problem, first)
     second, _ = likeliest_map(plain, _left(plain, beside.found.best))
     if first.is_like(second):
