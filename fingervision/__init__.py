@@ -18,9 +18,18 @@ from importlib import import_module
 __version__ = "0.1.0"
 
 _HOMES = {
+    "Comparison": "interface.comparison",
+    "Diagnosis": "interface.diagnosis",
     "Measurement": "interface.measurement",
     "Parameter": "domain.parameter",
+    "Simulation": "interface.simulation",
+    "compare": "interface.comparison",
+    "diagnose": "interface.diagnosis",
+    "effect": "interface.own_effect",
     "measure": "interface.measure",
+    "read_model": "interface.tables",
+    "read_table": "interface.tables",
+    "simulate": "interface.simulation",
     "FingervisionError": "domain.errors",
     "UsageError": "domain.errors",
     "ArgumentError": "domain.errors",

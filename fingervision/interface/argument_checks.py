@@ -9,21 +9,16 @@ from fingervision.domain.errors import ArgumentError, ArgumentTypeError, Unknown
 
 
 def number(argument: str, value: object) -> float:
-    """Take a finite number.
+    """Take a number; whether it is one that can be meant is for its user to say.
 
     Raises
     ------
     ArgumentTypeError
         It is none.
-    ArgumentError
-        It is not finite.
     """
     if isinstance(value, bool) or not isinstance(value, Real):
         raise ArgumentTypeError(argument, "be a number", f"is {value!r}")
-    taken = float(value)
-    if not abs(taken) < float("inf"):
-        raise ArgumentError(argument, "be a finite number", f"is {taken:g}")
-    return taken
+    return float(value)
 
 
 def whole_number(argument: str, value: object, least: int) -> int:

@@ -12,7 +12,8 @@ from fingervision.domain.drive import DriveHistory
 from fingervision.domain.errors import ArgumentError, ArgumentTypeError
 from fingervision.domain.measured_table import MeasuredTable
 from fingervision.frames.array_levels import what_it_is
-from fingervision.storage import drive_csv, measured_table
+from fingervision.models.table import TableModel
+from fingervision.storage import drive_csv, measured_table, simulation_table
 from fingervision.storage.number_columns import Numbers
 
 DRIVE_COLUMNS = ("time_s", "input_mm")
@@ -68,6 +69,24 @@ def measured_from_columns(table: Any) -> MeasuredTable:
     return replace(table_in_memory, slots=(), u_clock_s=0.0)
 
 
+def simulation_from_columns(columns: Mapping[str, list[Any]]) -> TableModel:
+    """Take columns `input_mm,gap_mm[,left_mm,right_mm,force_n]` as a simulation table.
+
+    Raises
+    ------
+    ArgumentError
+        A column is missing, or holds what is no number.
+    FingervisionError
+        Fewer than two rows, an input that stands twice, a gap that does not depend on the input.
+    """
+    for name in ("input_mm", "gap_mm"):
+        if name not in columns:
+            raise ArgumentError("model", f"have a column {name}", f"has {', '.join(columns) or 'none'}")
+    names = ("input_mm", "gap_mm", "left_mm", "right_mm", "force_n")
+    values = {name: _numbers("model", name, columns[name]) for name in names if name in columns}
+    return simulation_table.simulation_rows(Path("simulation"), values)
+
+
 def columns_of(argument: str, table: Any, must: str) -> dict[str, list[Any]]:
     """Give the columns of a DataFrame or mapping as lists of one length.
 
@@ -112,4 +131,4 @@ def _is_missing(cell: Any) -> bool:
     return cell is None or type(cell).__name__ in ("NAType", "NaTType") or (isinstance(cell, float) and cell != cell)
 
 
-__all__ = ["columns_of", "drive_from_columns", "measured_from_columns"]
+__all__ = ["columns_of", "drive_from_columns", "measured_from_columns", "simulation_from_columns"]

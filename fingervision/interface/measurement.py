@@ -1,7 +1,7 @@
 """What `fingervision.measure` gives back: the rows of gaps.csv as an object that prints, draws and saves itself."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, overload
@@ -12,15 +12,17 @@ from numpy.typing import NDArray
 from fingervision.domain.drive import DriveHistory
 from fingervision.domain.errors import MissingLibraryError, UsageError
 from fingervision.domain.frame import Frame
+from fingervision.domain.measured_table import MeasuredTable
 from fingervision.domain.status import Status
 from fingervision.interface.argument_checks import path_of, whole_number
 from fingervision.interface.argument_names import speaks_python
 from fingervision.interface.frame_sources import Opener
 from fingervision.interface.notebook import image_html, png_of, png_of_figure
+from fingervision.measuring.clock.alignment import ClockOffset
 from fingervision.measuring.in_memory import MeasuredInMemory
 from fingervision.measuring.outcome import clock_drawn
 from fingervision.measuring.words import in_one_line, result_sentences
-from fingervision.storage.gaps_csv import COLUMNS, GapRow
+from fingervision.storage.gaps_csv import COLUMNS, FORCE_PLACES, MM_PLACES, TIME_PLACES, GapRow
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -130,6 +132,35 @@ class Measurement:
     def drive(self) -> DriveHistory | None:
         """The recorded input that the frames were joined with."""
         return self._found.task.drive
+
+    def measured_table(self) -> MeasuredTable:
+        """Give the frames that have a gap and an input as a measured table, with the digits that gaps.csv has.
+
+        Raises
+        ------
+        UsageError
+            The measurement has no drive.
+        FingervisionError
+            There are too few such frames, or they do not move.
+        """
+        from fingervision.interface.column_tables import measured_from_columns
+        from fingervision.storage.line_file import cell
+        from fingervision.storage.measured_table import NUMBERS
+
+        task, clock = self._found.task, self._found.clock
+        if task.drive is None:
+            raise UsageError("measured must have a drive, but was measured without: give fingervision.measure one.")
+        columns: dict[str, list[Any]] = {
+            name: [
+                float(cell(value, _places(name))) if value is not None else None
+                for value in (_cell(row, name) for row in self)
+            ]
+            for name in NUMBERS
+            if name in self.columns
+        }
+        columns["run"] = [row.run for row in self]
+        table = measured_from_columns(columns)
+        return replace(table, u_clock_s=clock.u_time_s) if isinstance(clock, ClockOffset) else table
 
     def report(self) -> str:
         """Say what was found as the command prints it."""
@@ -290,6 +321,11 @@ class Measurement:
         out = path_of("folder", folder, "a folder")
         steps_frame = None if steps is None else whole_number("steps", steps, 0)
         return save_measured(self._found, self._again(), out, overlay=overlay, steps_frame=steps_frame).path
+
+
+def _places(name: str) -> int:
+    """Decimal places of a column of gaps.csv."""
+    return {"time_s": TIME_PLACES, "force_n": FORCE_PLACES}.get(name, MM_PLACES)
 
 
 def _cell(row: GapRow, name: str) -> Any:
