@@ -17,7 +17,7 @@ class EffectList(ModuleType):
     >>> fv.effects["backlash"].words
     'motion reverses only after the play is taken up'
     >>> [effect.name for effect in fv.effects if effect.stage == "drive"][:2]
-    ['input_scale', 'input_offset']
+    ['drive_lag', 'input_offset']
     >>> "backlash" in fv.effects
     True
     """
