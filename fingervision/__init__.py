@@ -18,11 +18,13 @@ from importlib import import_module
 __version__ = "0.1.0"
 
 _HOMES = {
+    "Calibration": "interface.calibration",
     "Comparison": "interface.comparison",
     "Diagnosis": "interface.diagnosis",
     "Measurement": "interface.measurement",
     "Parameter": "domain.parameter",
     "Simulation": "interface.simulation",
+    "calibrate": "interface.calibrate",
     "compare": "interface.comparison",
     "diagnose": "interface.diagnosis",
     "effect": "interface.own_effect",

@@ -7,6 +7,8 @@ from fingervision.domain.errors import OutputError as OutputError
 from fingervision.domain.errors import UsageError as UsageError
 from fingervision.domain.parameter import Parameter as Parameter
 from fingervision.effects.effect_list import EffectList
+from fingervision.interface.calibrate import calibrate as calibrate
+from fingervision.interface.calibration import Calibration as Calibration
 from fingervision.interface.comparison import Comparison as Comparison
 from fingervision.interface.comparison import compare as compare
 from fingervision.interface.diagnosis import Diagnosis as Diagnosis

@@ -14,7 +14,7 @@ Examples:
   fingervision compare samples.csv --model comsol.csv --out results
   fingervision compare samples.csv --model gripper.toml
   fingervision compare samples.csv --model comsol.csv --model gripper.toml --out both
-  fingervision compare samples.csv --model results/model.toml --json
+  fingervision compare samples.csv --model corrected/model.toml --json
 
 \b
 Files written to --out:

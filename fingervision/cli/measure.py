@@ -21,9 +21,9 @@ Examples:
   fingervision measure opening.mp4 --px-per-mm 34 --overlay --out results/opening
   fingervision measure frames/ --rate-hz 25 --px-per-mm 34
   fingervision measure 'frames/*.png' --px-per-mm 34 --tips down --roi 100,80,400,300
-  fingervision measure run.mkv --calibration calibration.json --drive drive.csv
-  fingervision measure run.mkv --calibration calibration.json --drive drive.csv --drive-offset-s 0.12
-  fingervision measure run.mkv --px-per-mm 34 --steps 10
+  fingervision measure opening.mp4 --calibration calibration.json --drive drive.csv
+  fingervision measure opening.mp4 --calibration calibration.json --drive drive.csv --drive-offset-s 0.12
+  fingervision measure opening.mp4 --px-per-mm 34 --steps 10
 
 \b
 Files written to --out:

@@ -26,8 +26,8 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from calib.camera_response import CameraResponse
-    from calib.measured_scale import Calibration
     from fingervision.domain.drive import DriveHistory
+    from fingervision.interface.calibration import Calibration
 
 FLOAT_BITS = 16
 """Levels that are given as floats become levels of 16 bits."""

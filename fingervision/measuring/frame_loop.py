@@ -29,7 +29,7 @@ FRAMES_AT_ONCE, SECONDS_AT_ONCE = 128, 0.4
 
 Progress = Callable[[int, int | None], None]
 TakeRows = Callable[[Sequence[Result], Sequence[GapRow]], None]
-SeeFrame = Callable[[Frame, Result], None]
+SeeItem = Callable[[Frame | LostFrame, Result], None]
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,7 +73,7 @@ def measure_frames(
     how: Prepared,
     series: GapSeries,
     take_rows: TakeRows,
-    see_frame: SeeFrame | None = None,
+    see_item: SeeItem | None = None,
     on_progress: Progress | None = None,
 ) -> bool:
     """Measure a recording from its first frame to its last.
@@ -88,8 +88,8 @@ def measure_frames(
         Takes in every row.
     take_rows : callable
         Given results with their rows, many frames at once, in order; also what came before an error.
-    see_frame : callable or None
-        Given every frame that could be read, with its result.
+    see_item : callable or None
+        Given every frame, also a lost one, with its result.
     on_progress : callable or None
         Called now and then with the frames done and the frames that the source announces.
 
@@ -121,8 +121,8 @@ def measure_frames(
             ):
                 result = Result(item.index, item.time_s, outcome)
                 pending.append(result)
-                if see_frame is not None and isinstance(item, Frame):
-                    see_frame(item, result)
+                if see_item is not None:
+                    see_item(item, result)
                 if len(pending) >= FRAMES_AT_ONCE or monotonic() - handed_over_at >= SECONDS_AT_ONCE:
                     hand_over()
                     handed_over_at = monotonic()

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-from fingervision.domain.frame import Frame
+from fingervision.domain.frame import Frame, LostFrame
 from fingervision.frames.source import FrameSource
 from fingervision.measuring.clock.alignment import ClockOffset
 from fingervision.measuring.drive_at import drive_at
@@ -86,12 +86,12 @@ def measure_in_memory(source: FrameSource, task: Task, on_progress: Progress | N
         results.extend(these)
         rows.extend(of_these)
 
-    def see_frame(frame: Frame, _: Result) -> None:
-        if not first:
+    def see_item(item: Frame | LostFrame, _: Result) -> None:
+        if not first and isinstance(item, Frame):
             # The decoder's memory may be used again for the next picture.
-            first.append(replace(frame, pixels=frame.pixels.copy()))
+            first.append(replace(item, pixels=item.pixels.copy()))
 
-    stopped = measure_frames(source, how, series, take_rows, see_frame, on_progress)
+    stopped = measure_frames(source, how, series, take_rows, see_item, on_progress)
     clock = clock_for(series, task)
     if isinstance(clock, ClockOffset):
         rows = [_with_drive(row, task, clock) for row in rows]

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from fingervision.domain.errors import ExitCode, UsageError
-from fingervision.domain.frame import Frame
+from fingervision.domain.frame import Frame, LostFrame
 from fingervision.domain.status import Status
 from fingervision.frames.source import FrameSource
 from fingervision.measuring.clock.alignment import ClockOffset
@@ -99,14 +99,14 @@ def _measured(source: FrameSource, task: Task, out: Path, on_progress: Progress 
             driven.update(row.input_mm is not None for row in rows)
             table.add(rows)
 
-        def see_frame(frame: Frame, result: Result) -> None:
-            if video is not None:
-                video.add(frame, result.outcome, how.row_maker.rows([result])[0])
-            if frame.index == task.steps_frame:
-                write_steps(frame, how.settings, folder.steps)
+        def see_item(item: Frame | LostFrame, result: Result) -> None:
+            if video is not None and isinstance(item, Frame):
+                video.add(item, result.outcome, how.row_maker.rows([result])[0])
+            if isinstance(item, Frame) and item.index == task.steps_frame:
+                write_steps(item, how.settings, folder.steps)
 
         is_seen = video is not None or task.steps_frame is not None
-        stopped = measure_frames(source, how, series, take_rows, see_frame if is_seen else None, on_progress)
+        stopped = measure_frames(source, how, series, take_rows, see_item if is_seen else None, on_progress)
     clock = clock_for(series, task)
     if isinstance(clock, ClockOffset) and task.drive is not None:
         join_drive(folder.gaps, task.drive, clock)
