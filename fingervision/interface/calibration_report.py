@@ -151,3 +151,6 @@ def line_lines(fit: "LineScaleFit", lines: "ScaleLines") -> list[str]:
     if lines.is_clipped:
         text.append("Part of the picture stands at an end of the grey scale: the lines' widths may be off by that.")
     return text
+
+
+__all__ = ["as_json", "board_lines", "budget_lines", "line_details", "line_lines", "scale_lines", "sizes_lines"]
