@@ -11,9 +11,9 @@ EXAMPLES = """
 \b
 Examples:
   fingervision bed run recipe.toml --out run
-  fingervision bed run recipe.toml --hide backlash:play_mm=0.2 --hide camera_tilt --out run
-  fingervision bed run recipe.toml --hide sealed.toml --out run
-  fingervision bed run diagnosis/next_run.toml --after run --out second
+  fingervision bed run recipe.toml --hide backlash:play_mm=0.2 --hide camera_tilt --out hidden
+  fingervision bed run recipe.toml --hide sealed.toml --out sealed
+  fingervision bed run next_run.toml --after run --out second
   fingervision diagnose run/samples.csv --model run/simulation.csv --out diagnosis
 
 \b
