@@ -6,8 +6,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from fingervision.domain.compiled import compiled
 from fingervision.domain.direction import Direction
+from fingervision.domain.loops import loop
 from fingervision.vision.orientation import Orientation
 
 # Points in order, shape (n, 2).
@@ -15,6 +15,8 @@ Outline = NDArray[np.int32]
 
 # What has a shorter outline is a speck (pixels).
 SHORTEST_OUTLINE_PX = 20
+
+_from_lowest = loop("outlines_from_lowest")
 
 
 def find_outlines(mask: NDArray[np.uint8]) -> list[Outline]:
@@ -33,20 +35,8 @@ def longest_first(outlines: list[Outline], directions: Sequence[Direction]) -> l
 
 def in_axes(pixels: Outline, orientation: Orientation) -> Outline:
     """A closed outline (x, y) in the fingers' axes, from its lowest point on: it rises and falls back to it."""
-    return _from_lowest(pixels, orientation.direction.is_vertical, orientation.is_flipped, orientation.along_size)
-
-
-@compiled
-def _from_lowest(pixels: Outline, is_vertical: bool, is_flipped: bool, along_size: int) -> Outline:
-    n, axis = pixels.shape[0], 1 if is_vertical else 0
-    lowest = 0
-    for i in range(1, n):
-        down = pixels[i, axis] - pixels[lowest, axis]
-        if (down < 0) if is_flipped else (down > 0):
-            lowest = i
-    outline = np.empty((n, 2), dtype=np.int32)
-    for place in range(n):
-        i = (lowest + place) % n
-        outline[place, 0] = pixels[i, 1 - axis]
-        outline[place, 1] = along_size - 1 - pixels[i, axis] if is_flipped else pixels[i, axis]
+    pixels = np.ascontiguousarray(pixels, dtype=np.int32)
+    outline = np.empty_like(pixels)
+    is_vertical, size = orientation.direction.is_vertical, orientation.along_size
+    _from_lowest(pixels, is_vertical, orientation.is_flipped, size, outline)
     return outline
