@@ -1,4 +1,4 @@
-"""Hatch's build hook: the loops in C become a library in the wheel, or beside the sources of an editable installation."""
+"""Hatch's build hook: the loops in C become a library in the wheel, or beside the sources that stay in place."""
 
 import importlib.util
 import sysconfig

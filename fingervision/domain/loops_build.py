@@ -17,6 +17,7 @@ import sysconfig
 import tempfile
 from importlib.util import find_spec
 from pathlib import Path
+from typing import TypeGuard
 
 PACKAGE = Path(__file__).resolve().parents[1]
 HEADER, DOOR = "domain/loops.h", "domain/loops.c"
@@ -155,7 +156,7 @@ def constants(path: Path) -> dict[str, Constant]:
     return {name: value for name, value in found.items() if name.isupper() and _is_constant(value)}
 
 
-def _is_constant(value: object) -> bool:
+def _is_constant(value: object) -> TypeGuard[Constant]:
     if isinstance(value, tuple):
         return bool(value) and all(_is_constant(one) for one in value)
     return isinstance(value, int | float) and not isinstance(value, bool)

@@ -67,5 +67,6 @@ def measuring_point(end: FingerEnd, below_tip_px: float, blur_px: float) -> Meas
     high on average: a top that is level within twice its uncertainty counts as level.
     """
     covariance = np.empty((2, 2))
-    read = _read_off(end.parameters, end.covariance, end.misfit, end.origin, below_tip_px, blur_px, covariance)
-    return MeasuringPoint(*read, covariance)
+    shape = (end.parameters, end.covariance, end.misfit, end.origin)
+    tip, apex, edge, slope = _read_off(*shape, below_tip_px, blur_px, covariance)
+    return MeasuringPoint(tip, apex, edge, slope, covariance)

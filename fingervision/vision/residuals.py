@@ -52,7 +52,7 @@ def shared_points(
 
     What a codec does to a whole block the fit takes for shape: the residuals do not show it, the block's side does.
     """
-    seen = [_shared(end.residual, end.robust, p.side) for p, end in zip(points, ends, strict=True)]
+    seen: list[float] = [_shared(end.residual, end.robust, p.side) for p, end in zip(points, ends, strict=True)]
     return max(0.5 * sum(seen), SHARED_POINTS[coding])
 
 
@@ -100,4 +100,4 @@ def has_flanks(points: OutlinePoints, end: FingerEnd, turn: float = 0.0) -> bool
 
 def is_on_outline(points: OutlinePoints, edge: float, height: float) -> bool:
     """Whether a measuring point has points of the outline beside it: nothing is ever extrapolated."""
-    return _distance_in_spacings(points.x, points.y, edge, height) < FARTHEST_POINT_PX
+    return float(_distance_in_spacings(points.x, points.y, edge, height)) < FARTHEST_POINT_PX

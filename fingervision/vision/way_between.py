@@ -20,7 +20,7 @@ _covered = loop("way_between_covered")
 
 def is_free(mask: NDArray[np.uint8], start: Place, end: Place) -> bool:
     """Whether next to nothing is set in a mask on the straight way from one place to another."""
-    return _covered(mask, *start, *end) <= DUST_SHARE
+    return float(_covered(mask, *start, *end)) <= DUST_SHARE
 
 
 def inner_crossing(outline: Outline, height: float) -> tuple[float, float]:

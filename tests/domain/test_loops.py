@@ -12,7 +12,11 @@ from fingervision.domain import loops_build
 from fingervision.domain.loops import loop
 
 TOP = Path(__file__).resolve().parents[2]
-USE = "from fingervision.domain.loops import loop; print(loop('median_middle')(__import__('numpy').array([3.0, 1.0, 2.0])))"
+USE = """
+import numpy as np
+from fingervision.domain.loops import loop
+print(loop("median_middle")(np.array([3.0, 1.0, 2.0])))
+"""
 
 
 @pytest.fixture
