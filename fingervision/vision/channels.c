@@ -15,12 +15,30 @@ LOOP(channels_line, "FF", "ddd") {
     free(order);
 }
 
-/* Length of what is set in a row of a picture from a pixel on; a pixel to either side is forgiven. */
-LOOP(channels_run, "piii", "i") {
-    int64_t i = in[2].i, size = in[0].shape[1], length = 0;
-    if (i >= 0 && i < size && !pixel(&in[0], in[1].i, i)) i += in[3].i;
-    for (; i >= 0 && i < size && pixel(&in[0], in[1].i, i); i += in[3].i) length++;
-    out[0].i = length;
+/* Length of what is set in a row from a pixel on; a pixel to either side is forgiven. */
+static int64_t run_length(const uint8_t *line, int64_t size, int64_t i, int64_t step) {
+    int64_t length = 0;
+    if (i >= 0 && i < size && !line[i]) i += step;
+    for (; i >= 0 && i < size && line[i]; i += step) length++;
+    return length;
+}
+
+/* Median breadth of what bounds a channel on its left and on its right, in seven rows: picture, the two lines, first and
+   last row; 0 where no row has any. */
+LOOP(channels_beside, "Bddddii", "dd") {
+    enum { ROWS_SEEN = 9 };
+    int64_t columns = in[0].shape[1];
+    double left[ROWS_SEEN], right[ROWS_SEEN], step = (double)(in[6].i - in[5].i) / (ROWS_SEEN - 1.0);
+    int64_t count = 0;
+    for (int k = 1; k < ROWS_SEEN - 1; k++) {
+        int64_t row = (int64_t)((double)k * step + (double)in[5].i);
+        int64_t a = (int64_t)rint(in[1].d + in[2].d * (double)row), b = (int64_t)rint(in[3].d + in[4].d * (double)row);
+        if (a < 0 || a >= b || b > columns - 1) continue;
+        left[count] = (double)run_length(FLAGS(0) + row * columns, columns, a, -1);
+        right[count++] = (double)run_length(FLAGS(0) + row * columns, columns, b, 1);
+    }
+    out[0].d = median_in_place(left, count);
+    out[1].d = median_in_place(right, count);
 }
 
 /* The runs of a chain from its end on: runs, the run that each goes on from, the end; chain. */
@@ -32,6 +50,17 @@ LOOP(channels_chain, "IIij", "") {
     }
 }
 
+/* Where ground ends, from a pixel of it on: eight pixels at a time. */
+static int64_t past_ground(const uint8_t *line, int64_t x, int64_t columns) {
+    uint64_t eight;
+    for (; x + 8 <= columns; x += 8) {
+        memcpy(&eight, line + x, 8);
+        if (eight) break;
+    }
+    while (x < columns && !line[x]) x++;
+    return x;
+}
+
 /* All bounded runs of ground (row, last pixel before, first pixel after), the run below that each goes on from, its place
    in its chain, and which go on; how many there are. */
 LOOP(channels_runs, "Bjjjb", "i") {
@@ -41,15 +70,14 @@ LOOP(channels_runs, "Bjjjb", "i") {
     uint8_t *has_next = FLAGS(4);
     for (int64_t row = rows - 1; row >= 0; row--) {
         const uint8_t *line = mask + row * columns;
-        int64_t first = count, x = 0;
-        while (x < columns && !line[x]) x++;
+        int64_t first = count, x = past_ground(line, 0, columns);
         int64_t start = x;
         while (x < columns) {
             /* A run of something that is set, from `start`. */
             const uint8_t *off = (const uint8_t *)memchr(line + x, 0, (size_t)(columns - x));
             x = off ? off - line : columns;
             int64_t bounded = x - start, a = x - 1;
-            while (x < columns && !line[x]) x++;
+            x = past_ground(line, x, columns);
             start = x;
             if (x == columns || x - a - 1 < LEAST_GROUND_PX || bounded < LEAST_BESIDE_PX) continue;
             int64_t end = x;

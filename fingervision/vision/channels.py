@@ -33,7 +33,7 @@ MOST_CHANNELS = 6
 MOST_RUNS = 4096
 
 _line = loop("channels_line")
-_run = loop("channels_run")
+_beside_lines = loop("channels_beside")
 _follow_chain = loop("channels_chain")
 _find_runs = loop("channels_runs")
 
@@ -124,15 +124,9 @@ def _straight(chain: Ints) -> Channel | None:
 
 def _beside(upright: Mask, channel: Channel) -> tuple[Build, Build]:
     """Breadth of what bounds a channel on its left and on its right."""
-    rows = np.linspace(channel.first_row, channel.last_row, 9).astype(int)[1:-1]
+    sides = (channel.left_c, channel.left_m, channel.right_c, channel.right_m)
+    widths = _beside_lines(upright, *sides, channel.first_row, channel.last_row)
     last = upright.shape[1] - 1
-    left, right = [], []
-    for row in rows:
-        a, b = round(channel.left(row)), round(channel.right(row))
-        if 0 <= a < b <= last:
-            left.append(_run(upright, row, a, -1))
-            right.append(_run(upright, row, b, 1))
-    widths = [float(np.median(one)) if one else 0.0 for one in (left, right)]
     middle_row = 0.5 * (channel.first_row + channel.last_row)
     cut = (
         channel.left(middle_row) - widths[0] < 0.5,

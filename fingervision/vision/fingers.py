@@ -332,4 +332,4 @@ def _inner_places(
 
 def is_hidden(finger: CoarseFinger, along: float) -> bool:
     """Whether a part hides a finger's inner edge at a place along the fingers."""
-    return bool(np.isin(round(along), finger.hidden))
+    return bool(finger.hidden.size) and bool(np.isin(round(along), finger.hidden))

@@ -29,3 +29,18 @@ static double middle(const double *values, int64_t n) {
 }
 
 LOOP(median_middle, "F", "d") { out[0].d = middle(FLOATS(0), in[0].n); }
+
+/* The mean of the two in the middle, of an even number. */
+static double median_in_place(double *a, int64_t n) {
+    double upper = middle_in_place(a, n), lower = upper;
+    if (n == 0 || n % 2) return upper;
+    for (int64_t i = 0; i < n / 2; i++) lower = i == 0 ? a[0] : larger(lower, a[i]);
+    return 0.5 * (lower + upper);
+}
+
+LOOP(median_median, "F", "d") {
+    double *a = floats(in[0].n);
+    memcpy(a, FLOATS(0), (size_t)in[0].n * sizeof(double));
+    out[0].d = median_in_place(a, in[0].n);
+    free(a);
+}

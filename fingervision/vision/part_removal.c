@@ -32,7 +32,7 @@ LOOP(part_removal_has_step, "Oid", "b") {
 
 /* Rows in which something lies at the left side, at the right one, and touches both: picture, the two lines, last row;
    three flags a row, and the pixels in all. */
-LOOP(part_removal_part_rows, "pddddibbb", "i") {
+LOOP(part_removal_part_rows, "Bddddibbb", "i") {
     int64_t columns = in[0].shape[1], pixels = 0;
     for (int64_t row = 0; row <= in[5].i; row++) {
         int64_t a = (int64_t)rint(in[1].d + in[2].d * (double)row), b = (int64_t)rint(in[3].d + in[4].d * (double)row);
@@ -40,16 +40,16 @@ LOOP(part_removal_part_rows, "pddddibbb", "i") {
         if (a < 0 || b >= columns || b - a < 2 * SPECK_PX + 2) continue;
         /* Two pixels beside the line may be the finger's own edge. */
         int64_t first = a + 2, past = b - 1, filled = 0, left = 0, right = 0;
-        for (int64_t x = first; x < past; x++) {
-            if (!pixel(&in[0], row, x)) continue;
-            filled++;
-            left += x < first + NEAR_PX;
-            right += x >= past - NEAR_PX;
+        const uint8_t *line = FLAGS(0) + row * columns;
+        for (int64_t x = first; x < past; x++) filled += line[x] != 0;
+        for (int64_t x = first; x < past && filled; x++) {
+            left += line[x] && x < first + NEAR_PX;
+            right += line[x] && x >= past - NEAR_PX;
         }
         pixels += filled;
         FLAGS(6)[row] = left >= SPECK_PX;
         FLAGS(7)[row] = right >= SPECK_PX;
-        FLAGS(8)[row] = pixel(&in[0], row, first) > 0 && pixel(&in[0], row, past - 1) > 0 && 2 * filled > past - first;
+        FLAGS(8)[row] = line[first] && line[past - 1] && 2 * filled > past - first;
     }
     out[0].i = pixels;
 }

@@ -14,6 +14,7 @@ from fingervision.domain.loops import loop
 from fingervision.domain.status import Status
 from fingervision.vision.edges import EdgePoints
 from fingervision.vision.grey import GreyImage
+from fingervision.vision.median import median
 from fingervision.vision.profile_lines import INNER, ROWS
 
 Floats = NDArray[np.float64]
@@ -44,28 +45,27 @@ def other_threshold(upright: GreyImage, edges: EdgePoints) -> float | None:
     edges : EdgePoints
         Where the fingers were measured.
     """
-    near = edges.reach_px + 1
-    halves = [_room(edges, k) for k in range(2)]
-    inward, outward = np.zeros((2, 2)), np.zeros((2, 2))
-    for k in range(2):
-        for side, part in enumerate((slice(0, INNER), slice(INNER, ROWS))):
-            lines = (edges.lines.fixed[k, part], edges.position[k, part], edges.lines.weight[k, part])
-            sense, room = edges.lines.outward[k, part], halves[k] if side == 0 else REACH_PX
-            inward[k, side], outward[k, side] = _strips(upright, *lines, sense, near, room)
-    is_in, is_out = inward > 0, outward > 0
-    if is_in[0, 0] != is_in[1, 0]:
-        k = 0 if is_in[0, 0] else 1
+    near, lines = edges.reach_px + 1, edges.lines
+    seen = (upright, lines.fixed, edges.position, lines.weight, lines.outward)
+    room = _room(edges)
+    inner = [_strips(*seen, k, 0, INNER, near, room) for k in range(2)]
+    is_in, is_out = ([strip[way] > 0 for strip in inner] for way in range(2))
+    if is_in[0] == is_in[1] and not all(is_out):
+        return None
+    outer = [_strips(*seen, k, INNER, ROWS, near, REACH_PX) for k in range(2)]
+    if is_in[0] != is_in[1]:
+        k = 0 if is_in[0] else 1
         # The same shadow falls outside the other finger, if that side is in view.
-        if is_in[1 - k, 1] or not (edges.lines.weight[1 - k, INNER:ROWS] > 0).any():
-            return float(inward[k, 0])
-    if is_out[:, 0].all() and not is_out[:, 1].any():
-        return float(outward[:, 0].mean())
+        if outer[1 - k][0] > 0 or not (lines.weight[1 - k, INNER:ROWS] > 0).any():
+            return float(inner[k][0])
+    if all(is_out) and not any(strip[1] > 0 for strip in outer):
+        return 0.5 * float(inner[0][1] + inner[1][1])
     return None
 
 
-def _room(edges: EdgePoints, k: int) -> int:
-    """Half of the way from a finger's inner edge to the other finger (pixels)."""
+def _room(edges: EdgePoints) -> int:
+    """Half of the way from one inner edge to the other (pixels)."""
     inner = [edges.position[j, :INNER][edges.lines.weight[j, :INNER] > 0] for j in range(2)]
     if min(inner[0].size, inner[1].size) == 0:
         return 0
-    return int(min(0.5 * abs(np.median(inner[1]) - np.median(inner[0])), REACH_PX))
+    return int(min(0.5 * abs(median(inner[1]) - median(inner[0])), REACH_PX))
