@@ -27,16 +27,17 @@ LOOP(edge_filters_look, "FFFIFFFFFFffffjj", "") {
         int64_t row = filter_row(sigma, in[6].shape[0]), column = filter_column(start[i]), at = (row * offsets + column) * pixels;
         const double *by_contrast = FLOATS(6) + at, *by_shift = FLOATS(7) + at, *by_blur = FLOATS(8) + at;
         const double *level = FLOATS(0) + i * pixels;
+        int64_t seen = weight[i] > 0.0 ? pixels : 0; /* a place that no line fills stays where it is */
         /* Two sums in turn for each filter do not wait for each other. */
         double height[2] = {0.0, 0.0}, shift[2] = {0.0, 0.0}, widening[2] = {0.0, 0.0};
         int64_t j = 0;
-        for (; j + 1 < pixels; j += 2)
+        for (; j + 1 < seen; j += 2)
             for (int part = 0; part < 2; part++) {
                 height[part] += by_contrast[j + part] * level[j + part];
                 shift[part] += by_shift[j + part] * level[j + part];
                 widening[part] += by_blur[j + part] * level[j + part];
             }
-        for (; j < pixels; j++) {
+        for (; j < seen; j++) {
             height[0] += by_contrast[j] * level[j];
             shift[0] += by_shift[j] * level[j];
             widening[0] += by_blur[j] * level[j];

@@ -94,8 +94,8 @@ def has_flanks(points: OutlinePoints, end: FingerEnd, turn: float = 0.0) -> bool
     if max(abs(end.parameters[INNER_M] - turn), abs(end.parameters[OUTER_M] - turn)) > STEEPEST:
         return False
     seen = end.robust > 0.0
-    share = float(on_flanks(end.parameters, end.origin, points.x, points.y)[seen].mean())
-    return share > FLANKS_SHARE
+    is_on = on_flanks(end.parameters, end.origin, points.x, points.y)
+    return bool(np.count_nonzero(is_on & seen) > FLANKS_SHARE * np.count_nonzero(seen))
 
 
 def is_on_outline(points: OutlinePoints, edge: float, height: float) -> bool:

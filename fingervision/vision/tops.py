@@ -53,18 +53,13 @@ def find_tops(mask: NDArray[np.uint8], outlines: list[Outline], orientation: Ori
     found = []
     for pixels in outlines:
         outline = in_axes(pixels, orientation)
-        bottom = outline[0, 1]
-        for first, peak, prominence in zip(*_peaks(outline), strict=True):
+        bottom = int(outline[0, 1])
+        start, peaks, prominences = np.empty((3, len(outline)), dtype=np.int64)
+        count = _find_peaks(outline, start, peaks, prominences)
+        for first, peak, prominence in zip(*(a[:count].tolist() for a in (start, peaks, prominences)), strict=True):
             r, middle = int(outline[peak, 1]), (int(outline[first, 0]) + int(outline[peak, 0])) // 2
             if not upright[min(r + 2, deepest), middle]:
                 continue  # the top of a hole, not of a thing
-            is_rooted = bool(bottom == deepest and prominence > 0.5 * (bottom - r))
-            found.append(Top(outline, int(peak), float(prominence), is_rooted))
+            is_rooted = bottom == deepest and prominence > 0.5 * (bottom - r)
+            found.append(Top(outline, peak, float(prominence), is_rooted))
     return sorted(found, key=lambda top: -top.prominence_px)
-
-
-def _peaks(outline: Outline) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
-    """First and last places of the tops of an outline that starts, and so ends, at its lowest point; prominences."""
-    start, top, prominence = np.empty((3, len(outline)), dtype=np.int64)
-    tops = _find_peaks(outline, start, top, prominence)
-    return start[:tops], top[:tops], prominence[:tops]
