@@ -7,12 +7,14 @@ from numpy.typing import NDArray
 
 from fingervision.domain.loops import loop
 from fingervision.vision.orientation import Orientation
-from fingervision.vision.outlines import Outline, in_axes
+from fingervision.vision.outlines import Outline, Outlines, in_axes
 
 # A top that is lower than this is noise or dust on an outline, whatever the scale (pixels).
 SMALLEST_PROMINENCE_PX = 5.0
+# Tops beyond this number are texture; the fingers are among the most prominent.
+MOST_TOPS = 8
 
-_find_peaks = loop("tops_peaks")
+_find_tops = loop("tops_find")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -47,19 +49,19 @@ class Top:
         return int(self.outline[self.index, 1])
 
 
-def find_tops(mask: NDArray[np.uint8], outlines: list[Outline], orientation: Orientation) -> list[Top]:
-    """The tops of all outlines, the most prominent first."""
-    upright, deepest = orientation.view(mask), orientation.along_size - 1
+def find_tops(mask: NDArray[np.uint8], outlines: Outlines, orientation: Orientation) -> list[Top]:
+    """The most prominent tops of all outlines, at most `MOST_TOPS`, the most prominent first."""
+    outline, index, prominence = np.empty((3, MOST_TOPS), dtype=np.int64)
+    is_rooted = np.empty(MOST_TOPS, dtype=np.bool_)
+    way = (orientation.direction.is_vertical, orientation.is_flipped, orientation.along_size)
+    count = _find_tops(
+        orientation.view(mask), outlines.points, outlines.starts, *way, outline, index, prominence, is_rooted
+    )
+    seen: dict[int, Outline] = {}
     found = []
-    for pixels in outlines:
-        outline = in_axes(pixels, orientation)
-        bottom = int(outline[0, 1])
-        start, peaks, prominences = np.empty((3, len(outline)), dtype=np.int64)
-        count = _find_peaks(outline, start, peaks, prominences)
-        for first, peak, prominence in zip(*(a[:count].tolist() for a in (start, peaks, prominences)), strict=True):
-            r, middle = int(outline[peak, 1]), (int(outline[first, 0]) + int(outline[peak, 0])) // 2
-            if not upright[min(r + 2, deepest), middle]:
-                continue  # the top of a hole, not of a thing
-            is_rooted = bottom == deepest and prominence > 0.5 * (bottom - r)
-            found.append(Top(outline, peak, float(prominence), is_rooted))
-    return sorted(found, key=lambda top: -top.prominence_px)
+    for k in range(count):
+        number = int(outline[k])
+        if number not in seen:
+            seen[number] = in_axes(outlines[number], orientation)
+        found.append(Top(seen[number], int(index[k]), float(prominence[k]), bool(is_rooted[k])))
+    return found
