@@ -170,6 +170,7 @@ static PyModuleDef MODULE = {1, NULL, NULL, 0, NULL, "_loops", "Loops in C.", -1
 TO_PYTHON PyObject *PyInit__loops(void) {
     PyObject *module = PyModule_Create2(&MODULE, STABLE_ABI);
     if (!module) return NULL;
+    PREPARE_ALL
     for (int k = 0; k < COUNT; k++) {
         METHODS[k].name = LOOPS[k].name;
         METHODS[k].function = call;

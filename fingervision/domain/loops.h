@@ -34,6 +34,8 @@ typedef union {
 } Value;
 
 #define LOOP(name, takes, gives) static void name(const Arg *in, Value *out)
+/* What is made once, when the library is loaded. */
+#define PREPARE(name) static void name(void)
 #define FLOATS(k) ((double *)in[k].data)
 #define INTS(k) ((int64_t *)in[k].data)
 #define FLAGS(k) ((uint8_t *)in[k].data)

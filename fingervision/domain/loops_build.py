@@ -21,6 +21,7 @@ from typing import TypeGuard
 
 PACKAGE = Path(__file__).resolve().parents[1]
 HEADER, DOOR = "domain/loops.h", "domain/loops.c"
+PREPARE = re.compile(r"^PREPARE\((\w+)\)", re.MULTILINE)
 LOOP = re.compile(r'^LOOP\((\w+), "(\w*)", "(\w*)"\)', re.MULTILINE)
 # Sums stay in the order in which they stand, on every processor; only what no digit shows is left to the compiler.
 FLAGS = ("-O3", "-std=c11", "-shared", "-fPIC", "-fvisibility=hidden", "-fno-math-errno", "-ffp-contract=off", "-w")
@@ -107,6 +108,7 @@ def _links() -> list[str]:
 def one_source() -> str:
     """All loops as one C file, each with the constants of its own .py file."""
     pieces, loops, done = [(PACKAGE / HEADER).read_text(encoding="utf-8")], [], set[Path]()
+    prepared: list[str] = []
     waiting = loop_files()
 
     def add(path: Path) -> None:
@@ -122,11 +124,15 @@ def one_source() -> str:
         used = {name: value for name, value in values.items() if re.search(rf"\b{name}(_COUNT)?\b", text)}
         pieces.append(f'#line 1 "{path.relative_to(PACKAGE).as_posix()}"\n{_defined(used)}{text}{_undefined(used)}')
         loops.extend(LOOP.findall(text))
+        prepared.extend(PREPARE.findall(text))
 
     for path in waiting:
         add(path)
     table = " ".join(f'ENTRY({name}, "{takes}", "{gives}")' for name, takes, gives in loops)
-    pieces.append(f"#define ALL_LOOPS {table}\n{(PACKAGE / DOOR).read_text(encoding='utf-8')}")
+    calls = "".join(f"{name}(); " for name in prepared)
+    pieces.append(
+        f"#define ALL_LOOPS {table}\n#define PREPARE_ALL {calls}\n{(PACKAGE / DOOR).read_text(encoding='utf-8')}"
+    )
     return "\n".join(pieces)
 
 

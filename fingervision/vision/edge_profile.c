@@ -1,4 +1,5 @@
 /* after linear_solve */
+/* after normal_distribution */
 /* after median */
 /* Find a mark in one flank: levels (rows, pixels), position, sigma, contrast, mean_square, noise, end of the scale; how far
    the edge may have been moved, and how much lies beyond the end of the scale. */
@@ -26,13 +27,13 @@ LOOP(edge_profile_edge_mark, "FFFFFdd", "dd") {
         height += fabs(contrast[i]);
         for (int64_t j = 0; j < pixels; j++) {
             double away = (double)(j - pixels / 2) - position[i], t = away / width;
-            double step = 0.5 + 0.5 * erf(t * sqrt(0.5)), density = exp(-0.5 * t * t) / sqrt(2.0 * PI), share = level[j] / contrast[i];
+            double density, other, step = normal(t, &density), share = level[j] / contrast[i];
             mark[0] = 1.0;
             mark[1] = step;
             mark[2] = density;
             mark[3] = t * density;
             for (int k = 0; k < RIM_PX_COUNT; k++)
-                mark[FITTED + k] = step - 0.5 - 0.5 * erf((away - RIMS[k]) / width * sqrt(0.5));
+                mark[FITTED + k] = step - normal((away - RIMS[k]) / width, &other);
             for (int k = 0; k < BEYOND_COUNT; k++)
                 mark[FITTED + RIM_PX_COUNT + k] = smaller((1.0 + BEYONDS[k]) * step, 1.0) - step;
             for (int a = 0; a < MARKS; a++) {

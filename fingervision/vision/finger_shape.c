@@ -48,6 +48,9 @@ static double half_level(const Corner *c, const Spot *at, double ux, double uy, 
     for (int side = 0; side < 2; side++) {
         double nx = side ? c->top_x : c->flank_x, ny = side ? c->top_y : c->flank_y;
         double past_end = side ? at->alpha : at->beta, along = fabs(ux * ny - uy * nx);
+        /* Deep inside a fillet all of its curvature is felt: an angle is never below its sine. */
+        double sine = past_end > 0.0 && ux * nx + uy * ny > 0.0 ? along / sqrt(ux * ux + uy * uy) : 0.0;
+        if (c->radius * sine > WHOLLY_FELT_SIGMAS * blur) continue;
         double inside = (past_end > 0.0 ? c->radius * atan2(along, ux * nx + uy * ny) : -along) / (blur * sqrt(0.5));
         if (inside < -FELT_SIGMAS) return 0.0;
         share *= 0.5 * erfc(-inside * sqrt(0.5));

@@ -15,6 +15,8 @@ PARAMETERS = 8
 SHARP_IN_BLURS, SHARP_REACH = 1.5, 2.0
 # Beyond so many sigma of a fillet's end nothing of its curvature is felt.
 FELT_SIGMAS = 6.0
+# From so many sigma inside a fillet on all of it is felt, to the last digit.
+WHOLLY_FELT_SIGMAS = 9.0
 # A line that runs along an edge still sees it at this slant.
 LEAST_SLANT = 0.3
 # A top that is flatter than this crosses no height.

@@ -1,25 +1,33 @@
 /* after linear_solve */
-static double phi(double z) { return exp(-0.5 * z * z) / sqrt(2.0 * PI); }
-static double cumulative(double z) { return 0.5 + 0.5 * erf(z * sqrt(0.5)); }
-
-/* The part beside the step, blurred, at a distance from the edge outwards. */
-static double addition(int64_t kind, double t, double blur, double breadth) {
+/* after normal_distribution */
+/* The part beside the step, blurred, at a distance from the edge outwards; the step there, and its density. */
+static double beside(int64_t kind, double t, double blur, double breadth, double step, double density) {
+    double far_density, far;
     if (kind == WALL) /* what lies between the first step and the second */
-        return cumulative(t / blur) - cumulative((t - breadth) / blur);
+        return step - normal((t - breadth) / blur, &far_density);
     if (kind == SHADOW) { /* falls from one at the edge to nothing at its breadth */
-        double a = t / blur, b = (t - breadth) / blur, ramp = (1.0 - t / breadth) * (cumulative(a) - cumulative(b));
-        return ramp + blur / breadth * (phi(b) - phi(a));
+        far = normal((t - breadth) / blur, &far_density);
+        return (1.0 - t / breadth) * (step - far) + blur / breadth * (far_density - density);
     }
-    return kind == GLARE ? phi((t + breadth) / blur) : 0.0;
+    if (kind == GLARE) {
+        normal((t + breadth) / blur, &far_density);
+        return far_density;
+    }
+    return 0.0;
+}
+
+static double addition(int64_t kind, double t, double blur, double breadth) {
+    double density, step = normal(t / blur, &density);
+    return beside(kind, t, blur, breadth, step, density);
 }
 
 /* Level, step, tail and addition at one place. */
 static void parts_at(int64_t kind, double t, const double *p, double *row) {
-    double away = t - p[POSITION], blur = p[BLUR], step = cumulative(away / blur);
+    double away = t - p[POSITION], blur = p[BLUR], density, other, step = normal(away / blur, &density);
     row[0] = 1.0;
     row[1] = step;
-    row[2] = cumulative(away / (TAIL_BLURS * blur)) - step;
-    row[3] = addition(kind, away, blur, p[BREADTH]);
+    row[2] = normal(away / (TAIL_BLURS * blur), &other) - step;
+    row[3] = beside(kind, away, blur, p[BREADTH], step, density);
 }
 
 typedef struct {
@@ -32,19 +40,22 @@ typedef struct {
    Negative where the linear parameters cannot be told apart. */
 static double squares_of(const Seen *s, double *p, double *model) {
     int count = s->kind != STEP ? LINEAR : LINEAR - 1;
-    double normal[LINEAR * LINEAR] = {0.0}, right[LINEAR] = {0.0}, total = 0.0;
+    double gram[LINEAR * LINEAR] = {0.0}, right[LINEAR] = {0.0}, total = 0.0;
     for (int64_t i = 0; i < s->n; i++) {
         double *row = s->rows + i * LINEAR;
         parts_at(s->kind, s->t[i], p, row);
         for (int a = 0; a < count; a++) {
-            right[a] += s->weight[i] * row[a] * s->value[i];
-            for (int b = 0; b < count; b++) normal[a * count + b] += s->weight[i] * row[a] * row[b];
+            double weighted = s->weight[i] * row[a];
+            right[a] += weighted * s->value[i];
+            for (int b = 0; b <= a; b++) gram[a * count + b] += weighted * row[b];
         }
     }
-    for (int a = 0; a < count; a++) normal[a * count + a] *= 1.0 + 1e-9;
+    for (int a = 0; a < count; a++)
+        for (int b = 0; b < a; b++) gram[b * count + a] = gram[a * count + b];
+    for (int a = 0; a < count; a++) gram[a * count + a] *= 1.0 + 1e-9;
     /* The tail is small: a weak pull to nothing keeps it from standing in for a wall. */
-    normal[2 * count + 2] += 0.05 * normal[1 * count + 1];
-    if (!solve(normal, count, right, 1)) return -1.0;
+    gram[2 * count + 2] += 0.05 * gram[1 * count + 1];
+    if (!solve(gram, count, right, 1)) return -1.0;
     for (int a = 0; a < LINEAR; a++) p[a] = a < count ? right[a] : 0.0;
     for (int64_t i = 0; i < s->n; i++) {
         double found = 0.0;
@@ -60,7 +71,7 @@ static double squares_of(const Seen *s, double *p, double *model) {
 LOOP(profile_models_fit_profile, "iFFFddidd", "bdddddd") {
     int64_t n = in[1].n, kind = in[0].i;
     int free_count = kind != STEP ? 3 : 2, is_blur_known = (int)in[6].i;
-    double p[PARAMETERS] = {0.0}, normal[9] = {0.0}, right[3] = {0.0}, damping = 1e-2;
+    double p[PARAMETERS] = {0.0}, matrix[9] = {0.0}, right[3] = {0.0}, damping = 1e-2;
     double *base = floats(n * (1 + 1 + 3 + LINEAR)), *other = base + n, *jacobian = base + 2 * n;
     Seen s = {kind, n, FLOATS(1), FLOATS(2), FLOATS(3), base + 5 * n};
     p[BLUR] = in[4].d;
@@ -87,20 +98,20 @@ LOOP(profile_models_fit_profile, "iFFFddidd", "bdddddd") {
             for (int b = 0; b < free_count; b++) {
                 double total = 0.0;
                 for (int64_t i = 0; i < n; i++) total += s.weight[i] * jacobian[a * n + i] * jacobian[b * n + i];
-                normal[a * 3 + b] = total;
+                matrix[a * 3 + b] = total;
             }
         }
         if (is_blur_known) {
-            for (int a = 0; a < free_count; a++) normal[3 + a] = normal[a * 3 + 1] = 0.0;
-            normal[4] = 1.0;
+            for (int a = 0; a < free_count; a++) matrix[3 + a] = matrix[a * 3 + 1] = 0.0;
+            matrix[4] = 1.0;
             right[1] = 0.0;
         }
         int has_moved = 0;
         for (int attempt = 0; attempt < 6; attempt++) {
             double damped[9], move[3], new[PARAMETERS];
             for (int a = 0; a < free_count; a++) {
-                for (int b = 0; b < free_count; b++) damped[a * free_count + b] = normal[a * 3 + b];
-                damped[a * free_count + a] = normal[a * 3 + a] * (1.0 + damping) + 1e-12;
+                for (int b = 0; b < free_count; b++) damped[a * free_count + b] = matrix[a * 3 + b];
+                damped[a * free_count + a] = matrix[a * 3 + a] * (1.0 + damping) + 1e-12;
                 move[a] = right[a];
             }
             if (!solve(damped, free_count, move, 1)) goto done;
@@ -125,10 +136,10 @@ LOOP(profile_models_fit_profile, "iFFFddidd", "bdddddd") {
     }
     /* The blur alone hardly shows in one profile: the other edges of the picture tell it to a part. */
     double last[9], unit[3] = {1.0, 0.0, 0.0};
-    normal[4] += 1.0 / square(U_BLUR * p[BLUR]);
+    matrix[4] += 1.0 / square(U_BLUR * p[BLUR]);
     for (int a = 0; a < free_count; a++)
         for (int b = 0; b < free_count; b++)
-            last[a * free_count + b] = a == b ? normal[a * 3 + a] * (1.0 + 1e-9) + 1e-12 : normal[a * 3 + b];
+            last[a * free_count + b] = a == b ? matrix[a * 3 + a] * (1.0 + 1e-9) + 1e-12 : matrix[a * 3 + b];
     if (!solve(last, free_count, unit, 1)) goto done;
     double contrast = fabs(p[1]) > 1e-9 ? p[1] : 1e-9, share = p[3] / contrast;
     if (kind == GLARE) share /= p[BLUR] * sqrt(2.0 * PI);
