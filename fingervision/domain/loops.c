@@ -79,6 +79,7 @@ static int is_kind(const Py_buffer *view, char kind) {
         case 'F': return *f == 'd';
         case 'I': return view->itemsize == 8 && (*f == 'l' || *f == 'q');
         case 'O': return view->itemsize == 4 && (*f == 'i' || *f == 'l');
+        case 'S': return *f == 'f';
         case 'B': return *f == '?' || *f == 'B';
         default: return *f == 'B' || *f == 'H' || *f == '?';
     }

@@ -9,10 +9,13 @@ LOOP(binarise_histogram, "pj", "") {
         memset(count, 0, sizeof count);
         for (int64_t row = 0; row < rows; row++) {
             const uint8_t *at = (const uint8_t *)grey->data + row * grey->stride[0];
-            int64_t step = grey->stride[1], eights = columns - columns % 8, j = 0;
-            for (; j < eights; j += 8)
-                for (int part = 0; part < 8; part++) count[part][at[(j + part) * step]]++;
-            for (; j < columns; j++) count[0][at[j * step]]++;
+            int64_t step = grey->stride[1], j = 0;
+            for (; step == 1 && j + 8 <= columns; j += 8) {
+                uint64_t eight;
+                memcpy(&eight, at + j, 8);
+                for (int part = 0; part < 8; part++) count[part][(eight >> 8 * part) & 255]++;
+            }
+            for (; j < columns; j++) count[j % 8][at[j * step]]++;
         }
         for (int part = 0; part < PARTS; part++)
             for (int level = 0; level < 256; level++) total[level] += count[part][level];
@@ -62,4 +65,16 @@ LOOP(binarise_split, "I", "idd") {
     double contrast = means[1] - means[0];
     out[1].d = contrast;
     out[2].d = contrast / larger(sqrt(0.5 * (variances[0] + variances[1])), 1e-3);
+}
+
+/* The picture over its own light, which becomes half of the scale: picture, light (as large); the flat picture. */
+LOOP(binarise_flatten, "pSb", "") {
+    const float *light = (const float *)in[1].data;
+    int64_t rows = in[0].shape[0], columns = in[0].shape[1];
+    for (int64_t row = 0; row < rows; row++)
+        for (int64_t column = 0; column < columns; column++) {
+            int64_t at = row * columns + column;
+            double flat = 128.0 * (double)pixel(&in[0], row, column) / (double)(light[at] > 1.0f ? light[at] : 1.0f);
+            FLAGS(2)[at] = (uint8_t)smaller(flat, 255.0);
+        }
 }

@@ -11,6 +11,7 @@ from fingervision.vision.grey import GreyImage, full_scale
 
 _count = loop("binarise_histogram")
 _otsu = loop("binarise_split")
+_flatten = loop("binarise_flatten")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -64,7 +65,8 @@ def binarise_local(denoised: GreyImage) -> Binary:
     """
     side = max(denoised.shape) // 8
     light = cv2.blur(denoised.astype(np.float32), (2 * side + 1, 2 * side + 1), borderType=cv2.BORDER_REPLICATE)
-    flat = np.clip(128.0 * denoised / np.maximum(light, 1.0), 0, 255).astype(np.uint8)
+    flat = np.empty(denoised.shape, dtype=np.uint8)
+    _flatten(denoised, light, flat)
     return binarise(flat)
 
 

@@ -59,15 +59,19 @@ LOOP(edge_filters_look, "FFFIFFFFFFffffjj", "") {
     free(change);
 }
 
-/* Sum of the squared residuals of each line about its two levels: levels, contrast, row, column, steps; squares. */
-LOOP(edge_filters_squares, "FFIIFf", "") {
-    int64_t lines = in[0].shape[0], pixels = in[0].shape[1], offsets = in[4].shape[1];
+/* What a look leaves of each line: levels, position, contrast, row, column, steps, offsets, gains by row and column; mean
+   square residual and the position's gain. The last part of an eighth of a pixel is not in the table's edge: its share is
+   taken off to first order. */
+LOOP(edge_filters_mean_square, "FFFIIFFFff", "") {
+    int64_t lines = in[0].shape[0], pixels = in[0].shape[1], offsets = in[5].shape[1];
     for (int64_t i = 0; i < lines; i++) {
-        const double *level = FLOATS(0) + i * pixels, *step = FLOATS(4) + (INTS(2)[i] * offsets + INTS(3)[i]) * pixels;
-        double mean = 0.0, total = 0.0, contrast = FLOATS(1)[i];
+        int64_t at = INTS(3)[i] * offsets + INTS(4)[i];
+        const double *level = FLOATS(0) + i * pixels, *step = FLOATS(5) + at * pixels;
+        double mean = 0.0, total = 0.0, contrast = FLOATS(2)[i], gain = FLOATS(7)[at];
         for (int64_t j = 0; j < pixels; j++) mean += level[j];
         mean /= (double)pixels;
         for (int64_t j = 0; j < pixels; j++) total += square(level[j] - mean - contrast * step[j]);
-        FLOATS(5)[i] = total;
+        FLOATS(8)[i] = (total - square(contrast * (FLOATS(1)[i] - FLOATS(6)[INTS(4)[i]]) * gain)) / ((double)pixels - 3.0);
+        FLOATS(9)[i] = gain;
     }
 }

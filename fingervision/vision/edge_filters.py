@@ -38,7 +38,7 @@ PIXEL_VARIANCE = 1.0 / 12.0
 _row = loop("edge_filters_row")
 _column = loop("edge_filters_column")
 _look = loop("edge_filters_look")
-_squares = loop("edge_filters_squares")
+_mean_square = loop("edge_filters_mean_square")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -97,12 +97,10 @@ class EdgeFilters:
 
     def mean_square(self, levels: Floats, look: "Look") -> tuple[Floats, Floats]:
         """What a look leaves of each line: mean square residual and the position's gain, shape (n,) each."""
-        gain = self.shift_gain[look.row, look.column]
-        # The last part of an eighth of a pixel is not in the table's edge: its share is taken off to first order.
-        remainder = look.position - self.offsets_px[look.column]
-        squares = np.empty(len(levels))
-        _squares(levels, look.contrast, look.row, look.column, self.step, squares)
-        return (squares - (look.contrast * remainder * gain) ** 2) / (levels.shape[-1] - 3.0), gain
+        mean_square, gain = np.empty((2, len(levels)))
+        table = (self.step, self.offsets_px, self.shift_gain)
+        _mean_square(levels, look.position, look.contrast, look.row, look.column, *table, mean_square, gain)
+        return mean_square, gain
 
 
 class Lines(NamedTuple):

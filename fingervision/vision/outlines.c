@@ -15,3 +15,19 @@ LOOP(outlines_from_lowest, "OiiiO", "") {
         if (++i == n) i = 0;
     }
 }
+
+/* Columns and rows that the widest and the tallest outline take: points (n, 2) of all, where each starts. */
+LOOP(outlines_largest_extents, "OI", "ii") {
+    const int32_t *points = POINTS(0);
+    out[0].i = out[1].i = 0;
+    for (int64_t number = 0; number + 1 < in[1].n; number++)
+        for (int axis = 0; axis < 2; axis++) {
+            int32_t least = points[2 * INTS(1)[number] + axis], most = least;
+            for (int64_t i = INTS(1)[number]; i < INTS(1)[number + 1]; i++) {
+                int32_t at = points[2 * i + axis];
+                least = at < least ? at : least;
+                most = at > most ? at : most;
+            }
+            out[axis].i = larger_int(out[axis].i, (int64_t)most - least + 1);
+        }
+}

@@ -17,7 +17,7 @@ Outline = NDArray[np.int32]
 # What has a shorter outline is a speck (pixels).
 SHORTEST_OUTLINE_PX = 20
 
-_from_lowest = loop("outlines_from_lowest")
+_from_lowest, _largest_extents = loop("outlines_from_lowest"), loop("outlines_largest_extents")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -59,11 +59,7 @@ def find_outlines(mask: NDArray[np.uint8]) -> Outlines:
 
 def longest_first(outlines: Outlines, directions: Sequence[Direction]) -> list[tuple[Direction, int]]:
     """Directions with the extent of the longest outline along them (pixels), the greatest first."""
-    widest, tallest = 0, 0
-    if len(outlines):
-        first = outlines.starts[:-1]
-        extents = np.maximum.reduceat(outlines.points, first) - np.minimum.reduceat(outlines.points, first) + 1
-        widest, tallest = extents.max(axis=0).tolist()
+    widest, tallest = _largest_extents(outlines.points, outlines.starts)
     sizes = [(direction, tallest if direction.is_vertical else widest) for direction in directions]
     return sorted(sizes, key=lambda size: -size[1])
 
