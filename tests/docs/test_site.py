@@ -51,7 +51,7 @@ def pages_of(site: Path) -> dict[Path, References]:
 
 
 @pytest.mark.slow
-@pytest.mark.filterwarnings("default")  # Sphinx and its themes warn of themselves; the pages' warnings are held by -W
+@pytest.mark.filterwarnings("ignore")  # Sphinx and its themes warn of themselves; the pages' warnings are held by -W
 def test_site_builds_has_no_dead_link_and_loads_nothing_from_elsewhere(site: Path) -> None:
     pages = pages_of(site)
     assert len(pages) > 20
@@ -75,7 +75,7 @@ def test_site_builds_has_no_dead_link_and_loads_nothing_from_elsewhere(site: Pat
 
 
 @pytest.mark.slow
-@pytest.mark.filterwarnings("default")
+@pytest.mark.filterwarnings("ignore")
 def test_formulas_are_mathml_and_generated_pages_are_whole(site: Path) -> None:
     from fingervision.effects import catalogue
 
@@ -104,7 +104,8 @@ def test_links_between_files_lead_somewhere_where_code_is_hosted(path: Path) -> 
         parts = urlsplit(link)
         if not parts.scheme and parts.path and "_generated" not in parts.path:
             target = (path.parent / unquote(parts.path)).resolve()
-            if not target.exists():
+            # The site holds the pages of docs/ alone; a page names other files and does not link to them.
+            if not target.exists() or (DOCS in path.parents and target.suffix == ".md" and DOCS not in target.parents):
                 dead.append(link)
             elif parts.fragment and target.suffix == ".md":
                 anchors = {
