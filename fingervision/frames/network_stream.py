@@ -109,8 +109,8 @@ class NetworkStream:
         if codec.width < 1 or codec.height < 1:
             self._container.close()
             raise FingervisionError(
-                f"The stream {self.name} must state the size of its pictures, but does not: choose another format in the "
-                "camera's own settings."
+                f"The stream {self.name} must state the size of its pictures, but does not: choose another "
+                "format in the camera's own settings."
             )
         self._jpegs = SoundJpeg(codec.name)
         self.has_own_clock = self._container.format.name not in WITHOUT_TIMES
