@@ -4,6 +4,8 @@ from pathlib import Path
 
 import click
 
+from fingervision.cli._kind_choice import KindChoice
+
 HELP = "Simulation .csv, gripper.toml, model.toml, .fmu, or .py with simulate(time_s, input_mm)"
 
 
@@ -48,7 +50,7 @@ def told_apart(paths: tuple[Path, ...]) -> list[str]:
 
 kind_option = click.option(
     "--kind",
-    type=click.Choice(["stiffness_matrix", "lumped", "finite_element"]),
+    type=KindChoice(),
     default="lumped",
     show_default=True,
     help="Which model answers for a gripper.toml.",
