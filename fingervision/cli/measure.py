@@ -25,12 +25,14 @@ Examples:
   fingervision measure run.mkv --calibration calibration.json --drive drive.csv
   fingervision measure run.mkv --calibration calibration.json --drive drive.csv --drive-offset-s 0.12
   fingervision measure run.mkv --px-per-mm 34 --steps 10
+  fingervision measure run.mkv --px-per-mm 34 --gauges gauges.toml --overlay
 
 \b
 Files written to --out:
   gaps.csv      one row a frame: gap with its uncertainty, points, tips, or why there is no number
   summary.json  counts, statistics, settings, scale, what the uncertainty covers and what it does not
   gap.png       the gap over time
+  gauges.csv    with --gauges: one row a number, time_s,gauge,quantity,value,u,unit,status
   overlay.mp4   with --overlay: edges, tips, points and value drawn in
   steps/        with --steps: a picture of every step
 
@@ -77,6 +79,11 @@ Exit codes: 0 done; 1 could not, or no frame gave a number; 2 wrong usage;
     show_default=True,
     help="Edge of a thick part: of the face towards the camera, or of its outline, side walls included.",
 )
+@click.option(
+    "--gauges",
+    type=click.Path(path_type=Path),
+    help="Gauges of your own (gauges.toml): edges, lines, circles, marks, patches.",
+)
 @click.option("--overlay", is_flag=True, help="Also write overlay.mp4.")
 @click.option("--steps", "steps_frame", type=int, metavar="FRAME", help="Also write every step of this frame (from 0).")
 @click.option(
@@ -100,6 +107,7 @@ def command(
     bits: int | None,
     fingers: str,
     face: str,
+    gauges: Path | None,
     overlay: bool,
     steps_frame: int | None,
     out: Path | None,
@@ -112,6 +120,7 @@ def command(
     """
     from fingervision.domain.direction import Direction
     from fingervision.frames.source import Wish, open_source
+    from fingervision.gauges.gauge_file import read_gauges
     from fingervision.measuring.measure import measure
     from fingervision.measuring.task import Task
     from fingervision.storage.response_csv import response_named
@@ -132,6 +141,7 @@ def command(
         bits=bits,
         fingers_are_dark={"auto": None, "dark": True, "light": False}[fingers],
         is_outline=face == "outline",
+        gauges=() if gauges is None else read_gauges(gauges),
     )
     source = open_source(recording, Wish(rate_hz=rate_hz))
     folder = out or _default_out(recording)
@@ -238,7 +248,7 @@ def _report(measured: "Measured", as_json: bool) -> None:
         )
     elif not series.frames:
         _complain(f"{summary['recording']['name']} must have at least one picture, but has none: record it again.")
-    elif not series.counts[Status.OK]:
+    elif not series.counts[Status.OK] and not measured.has_gauge_numbers:
         first = min(series.first_without.values(), key=lambda bad: bad.frame)
         _complain(
             f"None of the {series.frames} frames gave a number ({counts}). Frame {first.frame}: {first.words} "
@@ -254,6 +264,8 @@ def _report(measured: "Measured", as_json: bool) -> None:
 
 def _print_result(measured: "Measured") -> None:
     summary, series, folder = measured.summary, measured.series, measured.folder
+    from fingervision.gauges.recording import gauge_sentence
+
     gap = summary["gap"]
     click.echo(f"{gap['count']} of {series.frames} frames measured.")
     for status, why in summary["why"].items():
@@ -270,9 +282,11 @@ def _print_result(measured: "Measured") -> None:
                 f"U = {2e3 * gap['median_u_random_mm']:.2f} µm (k = 2, median) from frame to frame; the scale was "
                 "stated without an uncertainty, which is not in it."
             )
+    for name, gauge in summary.get("gauges", {}).items():
+        click.echo(gauge_sentence(name, gauge))
     for advice in summary["advice"]:
         click.echo(advice)
-    files = [folder.gaps, folder.summary, folder.figure, folder.overlay, folder.steps]
+    files = [folder.gaps, folder.gauges, folder.summary, folder.figure, folder.overlay, folder.steps]
     click.echo("Written: " + ", ".join(str(file) for file in files if file.exists()))
 
 

@@ -15,6 +15,7 @@ from fingervision.domain.status import Status
 from fingervision.frames.ahead import decoded_ahead
 from fingervision.frames.camera_settings import coding_of
 from fingervision.frames.source import FrameSource
+from fingervision.gauges.recording import GaugeRecording
 from fingervision.measuring.asked_to_stop import asked_to_stop
 from fingervision.measuring.clock.alignment import ClockOffset, NoClockOffset
 from fingervision.measuring.clock.common_clock import clock_of, join_drive, refusal, sentence
@@ -57,17 +58,20 @@ class Measured:
         As in summary.json.
     stopped : bool
         Whether the user stopped it before the recording's end.
+    has_gauge_numbers : bool
+        Whether any gauge gave a number.
     """
 
     folder: OutputFolder
     series: GapSeries
     summary: dict[str, Any] = field(repr=False)
     stopped: bool
+    has_gauge_numbers: bool = False
 
     @property
     def exit_code(self) -> ExitCode:
         """How the measurement ended."""
-        if self.stopped or not self.series.counts[Status.OK]:
+        if self.stopped or not (self.series.counts[Status.OK] or self.has_gauge_numbers):
             return ExitCode.COULD_NOT
         return ExitCode.DAMAGED_INPUT if self.series.counts[Status.DAMAGED] else ExitCode.DONE
 
@@ -133,6 +137,11 @@ def _measured(source: FrameSource, task: Task, out: Path, on_progress: Progress 
         asked = stack.enter_context(asked_to_stop())
         table = stack.enter_context(GapsCsv(folder.gaps, task.drive_columns))
         video = stack.enter_context(OverlayVideo(folder.overlay, description)) if task.overlay else None
+        gauges = (
+            stack.enter_context(GaugeRecording(task.gauges, task.scale, frame_size_px, settings, folder.gauges))
+            if task.gauges
+            else None
+        )
         pending: list[Result] = []
         driven: set[bool] = set()
 
@@ -153,10 +162,12 @@ def _measured(source: FrameSource, task: Task, out: Path, on_progress: Progress 
             ):
                 result = Result(item.index, item.time_s, outcome)
                 pending.append(result)
+                if gauges is not None:
+                    gauges.add(item, outcome)
                 if video is not None and isinstance(item, Frame):
-                    video.add(item, outcome, row_maker.rows([result])[0])
+                    video.add(item, outcome, row_maker.rows([result])[0], None if gauges is None else gauges.draw)
                 if isinstance(item, Frame) and item.index == task.steps_frame:
-                    write_steps(item, settings, folder.steps)
+                    write_steps(item, settings, folder.steps, () if gauges is None else gauges.steps(item))
                 if len(pending) >= FRAMES_AT_ONCE or monotonic() - handed_over_at >= SECONDS_AT_ONCE:
                     hand_over()
                     handed_over_at = monotonic()
@@ -176,6 +187,8 @@ def _measured(source: FrameSource, task: Task, out: Path, on_progress: Progress 
     draw_gap(folder.figure, series, task.drive, clock if isinstance(clock, ClockOffset) else given_s)
     words_of_task = {**in_words(task, settings), **clock_in_words(clock, given_s if task.drive is not None else None)}
     summary = summarise(description, words_of_task, task.scale, task.scale_file, series, complete=not stopped)
+    if gauges is not None:
+        summary["gauges"] = gauges.in_words()
     write_summary(folder.summary, summary)
     if isinstance(clock, NoClockOffset) and not stopped and series.counts[Status.OK]:
         raise refusal(clock, folder.gaps)
@@ -190,7 +203,7 @@ def _measured(source: FrameSource, task: Task, out: Path, on_progress: Progress 
             f"--steps must be the number of a frame that can be read, 0 to {series.frames - 1}, "
             f"but is {task.steps_frame}; the gaps are in {folder.gaps}."
         )
-    return Measured(folder, series, summary, stopped)
+    return Measured(folder, series, summary, stopped, gauges is not None and gauges.has_numbers)
 
 
 @contextmanager

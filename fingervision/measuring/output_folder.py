@@ -9,6 +9,7 @@ from fingervision.storage.gaps_csv import COLUMNS
 from fingervision.storage.out_folder import out_folder
 
 GAPS, SUMMARY, FIGURE, OVERLAY, STEPS = "gaps.csv", "summary.json", "gap.png", "overlay.mp4", "steps"
+GAUGES = "gauges.csv"
 
 
 @dataclass(frozen=True, slots=True)
@@ -21,6 +22,11 @@ class OutputFolder:
     def gaps(self) -> Path:
         """The table."""
         return self.path / GAPS
+
+    @property
+    def gauges(self) -> Path:
+        """The table of the gauges."""
+        return self.path / GAUGES
 
     @property
     def summary(self) -> Path:
@@ -60,7 +66,7 @@ def claimed(path: Path, recording_files: tuple[Path, ...]) -> OutputFolder:
     UsageError
         The folder is where the recording's images are, or the recording would be replaced.
     """
-    names = (GAPS, SUMMARY, FIGURE, OVERLAY, STEPS)
+    names = (GAPS, GAUGES, SUMMARY, FIGURE, OVERLAY, STEPS)
     for file in recording_files:
         same = file.resolve().parent == path.resolve()
         if same and (len(recording_files) > 1 or file.name in names):
