@@ -1,6 +1,7 @@
 """A motor controller on the parallel lines of a board: it runs the step data that it keeps."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 from fingervision.domain.errors import FingervisionError
@@ -8,21 +9,21 @@ from fingervision.domain.step_data import Coordinates, StepData
 from fingervision.storage.board_toml import read_board
 from fingervision.storage.steps_toml import read_steps
 from fingervision.storage.toml_section import Section
-from fingervision.testbed import published_stage
 from fingervision.testbed.actuator import Alarm, StageLimits
-from fingervision.testbed.asked_move import check_move, check_speed
 from fingervision.testbed.board import controller_settings, wire
 from fingervision.testbed.board.board import Board
 from fingervision.testbed.board.controller_settings import Codes, Waits, codes_of, waits_of
 from fingervision.testbed.board.motions import Motions, Run
 from fingervision.testbed.board.port import fingervision_at
 from fingervision.testbed.board.shared import KEY, board_of
-from fingervision.testbed.clock import Clock
-from fingervision.testbed.published_stage import stage_limits
+from fingervision.testbed.build_context import BuildContext
+from fingervision.testbed.clocks.clock import Clock
+from fingervision.testbed.motion import published_stage
+from fingervision.testbed.motion.move_limits import check_move, check_speed
+from fingervision.testbed.motion.published_stage import stage_limits
+from fingervision.testbed.motion.step_checks import planned
+from fingervision.testbed.motion.step_route import jog_step, route
 from fingervision.testbed.reading import Reading
-from fingervision.testbed.step_checks import planned
-from fingervision.testbed.step_route import jog_step, route
-from fingervision.testbed.workshop import Workshop
 
 SIMULATED = False
 KEYS = (KEY, "steps", *published_stage.KEYS, *controller_settings.KEYS)
@@ -30,6 +31,28 @@ KEYS = (KEY, "steps", *published_stage.KEYS, *controller_settings.KEYS)
 PATIENCE, PATIENCE_S = 1.5, 1.0
 READ_EVERY_S = 0.005
 CLOSES_WITHIN_S = 1.0
+
+
+@dataclass(frozen=True, slots=True)
+class Routes:
+    """Which moves the step data allow, without the board.
+
+    Parameters
+    ----------
+    data : StepData
+        What the controller keeps.
+    limits : StageLimits
+        What the stage can do.
+    """
+
+    data: StepData
+    limits: StageLimits
+    has_steps: bool = True
+
+    def check(self, from_mm: float, to_mm: float, speed_mm_s: float) -> None:
+        """Refuse what is beyond the limits, and where no steps lead."""
+        check_move(self.limits, to_mm, speed_mm_s)
+        route(self.data.steps, from_mm, to_mm, speed_mm_s, self.limits.speed_mm_s)
 
 
 class BoardActuator:
@@ -108,8 +131,7 @@ class BoardActuator:
 
     def check(self, from_mm: float, to_mm: float, speed_mm_s: float) -> None:
         """Refuse what is beyond the limits, and where no steps lead."""
-        check_move(self.limits, to_mm, speed_mm_s)
-        route(self._data.steps, from_mm, to_mm, speed_mm_s, self.limits.speed_mm_s)
+        Routes(self._data, self.limits).check(from_mm, to_mm, speed_mm_s)
 
     def move(self, to_mm: float, speed_mm_s: float) -> None:
         """Begin to move, by the steps that lead there."""
@@ -210,12 +232,17 @@ def holder(section: Section, folder: Path) -> int | None:
     return fingervision_at(read_board(folder / section.word(KEY)).port)
 
 
-def build(section: Section, workshop: Workshop) -> BoardActuator:
+def without_hardware(section: Section, folder: Path) -> Routes:
+    """What the stage can do, for a plan that is checked away from the bed."""
+    return Routes(read_steps(folder / section.word("steps")), stage_limits(section))
+
+
+def build(section: Section, context: BuildContext) -> BoardActuator:
     """Build it from its section of the configuration."""
-    data = read_steps(workshop.folder / section.word("steps"))
+    data = read_steps(context.folder / section.word("steps"))
     codes, waits = codes_of(section, data), waits_of(section)
-    board = board_of(section, workshop)
+    board = board_of(section, context)
     if not board.settings.moves:
         board.close()
         section.refuse(KEY, "must have a motor controller on its lines, but has a force sensor only: add its lines.")
-    return BoardActuator(board, data, stage_limits(section), codes, waits, workshop.clock)
+    return BoardActuator(board, data, stage_limits(section), codes, waits, context.clock)
