@@ -40,10 +40,16 @@ class History:
             self._cells[self.count % len(self._cells)] = [np.nan if cell is None else cell for cell in cells]
             self.count += 1
 
-    def rows(self, after: int = 0) -> Iterator[GapRow]:
-        """Rows from the number `after` on, counted from the first ever, as far as they are kept."""
+    @property
+    def oldest(self) -> int:
+        """Number of the oldest row that is kept, counted from the first ever."""
+        return max(0, self.count - len(self._cells))
+
+    def rows(self, after: int = 0, before: int | None = None) -> Iterator[GapRow]:
+        """Rows from the number `after` on and below `before`, counted from the first ever, as far as they are kept."""
         with self._lock:
-            asked = np.arange(max(after, self.count - len(self._cells)), self.count)
+            last = self.count if before is None else min(before, self.count)
+            asked = np.arange(max(after, self.count - len(self._cells)), last)
             kept = self._cells[asked % len(self._cells)].tolist()
         for frame, time_s, status, *numbers in kept:
             cells: list[Any] = [None if cell != cell else cell for cell in (time_s, *numbers)]

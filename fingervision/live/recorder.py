@@ -2,6 +2,7 @@
 
 from queue import Empty, Full, Queue
 from threading import Thread
+from time import monotonic
 
 from fingervision.domain.errors import FingervisionError
 from fingervision.live.promptness import be_prompt
@@ -26,6 +27,7 @@ class Recorder:
 
     def __init__(self, run: RunFolder) -> None:
         self.run = run
+        self.began_s = monotonic()
         self.failure = ""
         self._waiting: Queue[RecordedFrame | tuple[str, str] | None] = Queue(FRAMES_WAITING)
         self._why = "Recording was stopped."

@@ -16,24 +16,25 @@ from typing import Any
 import uvicorn
 from starlette.applications import Starlette
 from starlette.requests import Request
-from starlette.responses import FileResponse, PlainTextResponse, Response
+from starlette.responses import FileResponse, HTMLResponse, PlainTextResponse, Response
 from starlette.routing import Route, WebSocketRoute
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from fingervision.domain.errors import FingervisionError, UsageError
-from fingervision.live.commands import Answer, obey, save_gaps
+from fingervision.live.commands import Answer, obey
 from fingervision.live.frame_measurement import Seen
 from fingervision.live.guard import EVERYWHERE, POLICY_VIOLATION, Guard
 from fingervision.live.half_open import PatientProtocol
+from fingervision.live.page_files import PAGE, files, index
 from fingervision.live.page_token import kept_token
-from fingervision.live.preview import message
+from fingervision.live.preview import Known, message
 from fingervision.live.promptness import be_prompt
-from fingervision.live.session import Session
+from fingervision.live.save_gaps import save_gaps
+from fingervision.live.view import View
 from fingervision.storage.out_folder import out_folder
 
-PAGE = Path(__file__).parent / "page"
-FILES = frozenset({"icon.svg", "live.js", "live.css", "uPlot.iife.min.js", "uPlot.min.css", "uPlot.LICENSE"})
 MESSAGE_BYTES, MESSAGES_A_SECOND, PAGES_AT_ONCE = 4096, 120, 4
+MOST_DIGITS = 12
 DOOR = ".live_page.html"
 TRY_AGAIN_LATER = 1013
 # The preview is as fast as a screen needs it; without a new picture the page hears of the state so often.
@@ -77,7 +78,7 @@ class Page:
 
     Parameters
     ----------
-    session : Session
+    session : View
         What is shown.
     listening : socket.socket
         See `bound`.
@@ -85,7 +86,7 @@ class Page:
         The address as the user named it.
     """
 
-    def __init__(self, session: Session, listening: socket.socket, host: str) -> None:
+    def __init__(self, session: View, listening: socket.socket, host: str) -> None:
         self._session, self._listening = session, listening
         self._pages = 0
         self._steps: tuple[tuple[str, bytes], ...] = ()
@@ -146,11 +147,11 @@ class Page:
         asyncio.run(self._server.serve(sockets=[self._listening]))
 
     async def _index(self, request: Request) -> Response:
-        return FileResponse(PAGE / "index.html", media_type="text/html")
+        return HTMLResponse(index())
 
     async def _file(self, request: Request) -> Response:
         name = request.path_params["name"]
-        if name not in FILES:
+        if name not in files():
             return PlainTextResponse("There is no such file.", 404)
         return FileResponse(PAGE / name)
 
@@ -199,7 +200,7 @@ class Page:
     async def _send(self, page: WebSocket, acknowledged: asyncio.Event) -> None:
         """Send the newest, then wait until the page has it: nothing ever queues up."""
         session = self._session
-        rows = messages = 0
+        known = _known(page)
         shown: Seen | None = None
         pictured_s = float("-inf")
         while not self._ending:
@@ -211,8 +212,8 @@ class Page:
             picture = seen if seen is not shown and monotonic() - pictured_s >= every_s else None
             if picture is not None:
                 pictured_s = monotonic()
-            following = await asyncio.to_thread(message, session, rows, messages, picture)
-            rows, messages = following.rows, following.messages
+            following = await asyncio.to_thread(message, session, known, picture)
+            known = following.known
             shown = seen
             acknowledged.clear()
             await page.send_bytes(following.content)
@@ -242,7 +243,17 @@ class Page:
             return {"refused": str(error), "do": str(request.get("do"))[:40]}
         if answer.pictures:
             self._steps = answer.pictures
-        return {"words": answer.words, "steps": [name for name, _ in answer.pictures], "do": request.get("do")}
+        steps = [name for name, _ in answer.pictures]
+        return {**answer.more, "words": answer.words, "steps": steps, "do": request.get("do")}
+
+
+def _known(page: WebSocket) -> Known:
+    """What a page that comes back has; numbers that are none count as nothing."""
+    asked = page.query_params
+    numbers = [asked.get(name, "") for name in ("rows", "messages")]
+    if not all(number.isascii() and number.isdigit() and len(number) <= MOST_DIGITS for number in numbers):
+        return Known()
+    return Known(asked.get("view", ""), *(int(number) for number in numbers))
 
 
 def _request(text: str) -> dict[str, Any]:

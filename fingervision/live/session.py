@@ -1,7 +1,8 @@
 """The live measurement: every frame measured as it comes, what is known of it kept for whoever looks."""
 
+import secrets
 from collections import Counter, deque
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
 from threading import Event, Lock, Thread
@@ -22,6 +23,7 @@ from fingervision.live.overflow_report import OverflowReport
 from fingervision.live.promptness import be_prompt
 from fingervision.live.recorder import Recorder
 from fingervision.live.run_folder import RecordedFrame, RunFolder
+from fingervision.live.session_state import state_of_session
 from fingervision.measuring.other_camera import other_camera
 from fingervision.measuring.rehearsal import rehearse
 from fingervision.storage.gaps_csv import GapRow
@@ -31,6 +33,9 @@ SILENT_S, SILENT_PERIODS = 0.5, 5.0
 # With more frames than this waiting for the measurement, it is late by one, and the preview gives way.
 FRAMES_UNTIL_HURRY = 1
 
+
+ROWS_SHOWN = 3000
+"""Rows that a page which comes new is sent: two minutes at 25 frames a second."""
 
 MOVES_ZERO = {"scale", "below_tip_mm", "direction", "region"}
 """After a change of these a gap is another one."""
@@ -56,6 +61,8 @@ class Session:
         self.description = capture.source.description
         choices.check(self.description)
         self.choices = choices
+        self.identity = secrets.token_hex(4)
+        self.features: dict[str, Any] = {}
         self.history = History()
         self.cadence, self.exposure = Cadence(), Exposure()
         self.counts: Counter[Status] = Counter()
@@ -100,6 +107,29 @@ class Session:
         if recorder is not None:
             recorder.add((name, words))
         self._messages.say(name, words)
+
+    @property
+    def row_count(self) -> int:
+        """Rows that there have been."""
+        return self.history.count
+
+    @property
+    def oldest_row(self) -> int:
+        """Number of the first row that is still kept."""
+        return self.history.oldest
+
+    @property
+    def shown_from(self) -> int:
+        """A page that comes new gets the last two minutes."""
+        return max(self.oldest_row, self.history.count - ROWS_SHOWN)
+
+    def rows(self, first: int, last: int) -> Iterator[GapRow]:
+        """Rows from one number on, before another."""
+        return self.history.rows(first, last)
+
+    def state(self) -> dict[str, Any]:
+        """What is known of source and measurement, for the page."""
+        return state_of_session(self)
 
     @property
     def messages(self) -> deque[Message]:

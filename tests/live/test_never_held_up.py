@@ -26,7 +26,7 @@ from fingervision.live.choices import Choices
 from fingervision.live.frame_measurement import Seen
 from fingervision.live.opening import opened
 from fingervision.live.outlet import PATIENCE_S, Outlet
-from fingervision.live.preview import message
+from fingervision.live.preview import Known, message
 from fingervision.live.session import Session
 from fingervision.live.terminal import JsonLines
 from fingervision.storage.gaps_csv import GapRow
@@ -40,7 +40,7 @@ def session(tmp_path: Path) -> Session:
 
 
 def head_of(session: Session) -> dict[str, Any]:
-    content = message(session, 0, 0, None).content
+    content = message(session, Known(), None).content
     (length,) = struct.unpack(">I", content[:4])
     head: dict[str, Any] = json.loads(content[4 : 4 + length])
     return head

@@ -1,0 +1,24 @@
+"""The gaps that the page shows, as a table."""
+
+from pathlib import Path
+
+from fingervision.live.view import View
+from fingervision.storage.gaps_csv import GapsCsv
+from fingervision.storage.out_folder import make_out_folder
+
+SAVED_GAPS = "live_gaps.csv"
+
+
+def save_gaps(view: View) -> Path:
+    """Write the gaps that are kept as gaps.csv has them.
+
+    Raises
+    ------
+    FingervisionError
+        The file cannot be written.
+    """
+    make_out_folder(view.out)
+    path = view.out / SAVED_GAPS
+    with GapsCsv(path) as table:
+        table.add(list(view.rows(view.oldest_row, view.row_count)))
+    return path
