@@ -15,8 +15,8 @@ import numpy as np
 from fingervision.storage.recipe_toml import read_recipe, write_recipe
 from fingervision.storage.samples_csv import read_samples
 from fingervision.storage.simulation_table import read_simulation_table
-from fingervision.testbed.put_together import open_bed
-from fingervision.testbed.run import run_recipe
+from fingervision.testbed.bed_factory import open_bed
+from fingervision.testbed.run.recipe_run import run_recipe
 
 HERE = Path(__file__).parent
 SPEED_MM_S, FRAMES = 2.0, 5

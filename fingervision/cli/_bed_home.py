@@ -18,11 +18,11 @@ def command(bed_name: str) -> None:
 
     This also clears what stopped the motor before.
     """
-    from fingervision.testbed import by_hand
-    from fingervision.testbed.put_together import open_bed
+    from fingervision.testbed.bed_factory import open_bed
+    from fingervision.testbed.manual import manual_control
 
     bed = open_bed(bed_name)
     try:
-        click.echo(f"homed: {by_hand.home(bed):.3f} mm")
+        click.echo(f"homed: {manual_control.home(bed):.3f} mm")
     finally:
         bed.close()

@@ -24,13 +24,13 @@ def command(speed_mm_s: float, for_s: float | None, home_first: bool, bed_name: 
     """
     from math import inf
 
-    from fingervision.testbed import by_hand
-    from fingervision.testbed.put_together import open_bed
+    from fingervision.testbed.bed_factory import open_bed
+    from fingervision.testbed.manual import manual_control
 
     bed = open_bed(bed_name, pace=1.0)
     try:
         if home_first:
-            by_hand.home(bed)
-        click.echo(f"jogged: {by_hand.jog(bed, speed_mm_s, inf if for_s is None else for_s):.3f} mm")
+            manual_control.home(bed)
+        click.echo(f"jogged: {manual_control.jog(bed, speed_mm_s, inf if for_s is None else for_s):.3f} mm")
     finally:
         bed.close()

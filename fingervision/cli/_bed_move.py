@@ -27,13 +27,13 @@ def command(to_mm: float, speed_mm_s: float, home_first: bool, bed_name: str) ->
 
     Nothing moves if the target is beyond the bed's limits.
     """
-    from fingervision.testbed import by_hand
-    from fingervision.testbed.put_together import open_bed
+    from fingervision.testbed.bed_factory import open_bed
+    from fingervision.testbed.manual import manual_control
 
     bed = open_bed(bed_name)
     try:
         if home_first:
-            by_hand.home(bed)
-        click.echo(f"moved: {by_hand.move(bed, to_mm, speed_mm_s):.3f} mm")
+            manual_control.home(bed)
+        click.echo(f"moved: {manual_control.move(bed, to_mm, speed_mm_s):.3f} mm")
     finally:
         bed.close()

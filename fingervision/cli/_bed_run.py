@@ -58,10 +58,10 @@ def command(
 
     from fingervision.measuring.rehearsal import rehearse
     from fingervision.storage.recipe_toml import read_recipe
-    from fingervision.testbed.hidden_words import hidden_from
-    from fingervision.testbed.put_together import open_bed
-    from fingervision.testbed.run import run_recipe
-    from fingervision.testbed.run_folder import rows_before, times_of
+    from fingervision.testbed.bed_factory import open_bed
+    from fingervision.testbed.run.recipe_run import run_recipe
+    from fingervision.testbed.run.run_folder import rows_before, times_of
+    from fingervision.testbed.simulation.parse_injected_effects import hidden_from
 
     recipe, hidden = read_recipe(recipe_toml), hidden_from(hide)
     before = [] if after is None else rows_before(after)

@@ -33,15 +33,15 @@ def command(steps_toml: Path, plot: Path | None, run_them: bool, bed_name: str) 
     Checked against the published stage (10 mm, 400 mm/s, 5.5 N) or that of the bed's configuration.
     """
     from fingervision.storage.steps_toml import read_steps
-    from fingervision.testbed.step_checks import planned_sequence
-    from fingervision.testbed.step_running import run_sequence, step_limits
-    from fingervision.testbed.steps_table import steps_table
+    from fingervision.testbed.manual.step_running import run_sequence, step_limits
+    from fingervision.testbed.manual.steps_table import steps_table
+    from fingervision.testbed.motion.step_checks import planned_sequence
 
     data, limits = read_steps(steps_toml), step_limits(bed_name)
     motions = planned_sequence(data, limits)
     click.echo(steps_table(motions))
     if plot is not None:
-        from fingervision.testbed.steps_figure import draw_steps
+        from fingervision.testbed.manual.steps_figure import draw_steps
 
         draw_steps(plot, data.name, motions, limits)
         click.echo(f"plot: {plot}")

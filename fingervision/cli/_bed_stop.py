@@ -19,6 +19,6 @@ circuit of its own which takes the motor's supply away, see fingervision/testbed
 @bed_option
 def command(bed_name: str) -> None:
     """Stop the motor, whoever drives it."""
-    from fingervision.testbed.stopping import stop_bed
+    from fingervision.testbed.manual.stopping import stop_bed
 
     click.echo(stop_bed(bed_name))

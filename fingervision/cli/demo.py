@@ -27,8 +27,8 @@ def command(hide: tuple[str, ...], seed: int, out: Path) -> None:
 
     Where the first run leaves the answer open, the proposed next one is run as well.
     """
-    from fingervision.testbed.demonstration import demonstrate, drawn
-    from fingervision.testbed.hidden_words import hidden_from
+    from fingervision.demonstration.demonstrate import demonstrate, drawn
+    from fingervision.testbed.simulation.parse_injected_effects import hidden_from
 
     hidden = hidden_from(hide) if hide else drawn(seed)
     click.echo("An effect is hidden in the simulated bed; nobody looks at which until the end.")

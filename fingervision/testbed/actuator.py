@@ -1,4 +1,4 @@
-"""What every actuator does: the simulated one, that behind the Arduino, a hand screw, any later one."""
+"""Protocol of an actuator: simulated, behind the Arduino board, a hand screw, or a plug-in's."""
 
 from dataclasses import dataclass
 from typing import Protocol

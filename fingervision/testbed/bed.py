@@ -8,10 +8,10 @@ from fingervision.domain.model import Model
 from fingervision.measuring.scale import Scale
 from fingervision.testbed.actuator import Actuator
 from fingervision.testbed.camera import BedCamera
-from fingervision.testbed.clock import Clock
+from fingervision.testbed.clocks.clock import Clock
 from fingervision.testbed.force_sensor import ForceSensor
-from fingervision.testbed.operator import Operator
-from fingervision.testbed.soft_limits import SoftLimits
+from fingervision.testbed.motion.soft_limits import SoftLimits
+from fingervision.testbed.operators.operator import Operator
 
 
 @dataclass(frozen=True, slots=True, eq=False)

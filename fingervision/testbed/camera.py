@@ -1,4 +1,4 @@
-"""What every camera of the bed does: hand over its frames, each with the time at which it saw them."""
+"""Protocol of a bed's camera: frames, each with the time at which it was exposed."""
 
 from dataclasses import dataclass
 from typing import Protocol

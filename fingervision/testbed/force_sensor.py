@@ -1,4 +1,4 @@
-"""What every force sensor does."""
+"""Protocol of a force sensor."""
 
 from typing import Protocol
 

@@ -1,4 +1,4 @@
-"""One value of an instrument, at a time of its own clock, between two times of the host's."""
+"""One reading of an instrument: its value, its own clock's time, and two bounds in the host's time."""
 
 from dataclasses import dataclass
 

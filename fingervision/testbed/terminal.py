@@ -1,4 +1,4 @@
-"""The terminal: one reader for the answers that were asked for, and for the letters that were not."""
+"""Terminal input: answers to questions, and single letters typed at any time."""
 
 import sys
 from collections.abc import Callable, Iterator

@@ -22,11 +22,11 @@ from fingervision.storage.measured_table import read_measured_table
 from fingervision.storage.model_toml import read_model
 from fingervision.storage.recipe_toml import read_recipe, write_recipe
 from fingervision.storage.report_json import report_document
-from fingervision.testbed.hidden import Hidden
-from fingervision.testbed.hidden_words import usual_values
-from fingervision.testbed.put_together import open_bed
-from fingervision.testbed.run import run_recipe
-from fingervision.testbed.run_folder import JOINED, SAMPLES, SIMULATION, rows_before, times_of
+from fingervision.testbed.bed_factory import open_bed
+from fingervision.testbed.run.recipe_run import run_recipe
+from fingervision.testbed.run.run_folder import JOINED, SAMPLES, SIMULATION, rows_before, times_of
+from fingervision.testbed.simulation.injected_effects import Hidden
+from fingervision.testbed.simulation.parse_injected_effects import usual_values
 
 NAMED = (
     "backlash", "friction_hysteresis", "stick_slip", "encoder_cyclic_error", "end_stop", "finger_contact",

@@ -6,10 +6,10 @@ from pathlib import Path
 
 import pytest
 
-from fingervision.testbed import by_hand
 from fingervision.testbed.bed import Bed
+from fingervision.testbed.bed_factory import open_bed
 from fingervision.testbed.board.port import opened_port
-from fingervision.testbed.put_together import open_bed
+from fingervision.testbed.manual import manual_control
 from tests.testbed.board_bed import CONTRACT_STEPS, times_of, written_bed
 from tests.testbed.emulated_board import EmulatedBoard, MotorController, compiled, missing_tools, running
 
@@ -38,11 +38,11 @@ def emulated(sketch: tuple[Path, Path], monkeypatch: pytest.MonkeyPatch) -> Iter
 @pytest.fixture
 def homed_board_bed(emulated: EmulatedBoard, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Bed]:
     """A bed whose motor controller behind the board stands at its reference; who uses it closes it."""
-    monkeypatch.setattr("fingervision.testbed.put_together.HostClock", lambda: emulated.clock)
+    monkeypatch.setattr("fingervision.testbed.bed_factory.HostClock", lambda: emulated.clock)
     bed_toml = written_bed(tmp_path, emulated.port, CONTRACT_STEPS, lower_mm=-1.0)
     controller = MotorController(emulated, times_of(tmp_path / "steps.toml"))
     bed = open_bed(str(bed_toml))
-    by_hand.home(bed)
+    manual_control.home(bed)
     yield bed
     controller.close()
 

@@ -4,9 +4,9 @@ from collections.abc import Callable
 from pathlib import Path
 
 from fingervision.storage.recipe_toml import read_recipe
-from fingervision.testbed.hidden import NOTHING, Hidden
-from fingervision.testbed.put_together import open_bed
-from fingervision.testbed.run import RunDone, run_recipe
+from fingervision.testbed.bed_factory import open_bed
+from fingervision.testbed.run.recipe_run import RunDone, run_recipe
+from fingervision.testbed.simulation.injected_effects import NOTHING, Hidden
 
 # One second of motion, then a few points: the shortest run that has everything to break off in.
 SHORT = """

@@ -11,15 +11,15 @@ from typing import NamedTuple
 
 import pytest
 
+from fingervision.demonstration.demonstrate import demonstrate
 from fingervision.domain.errors import FingervisionError
 from fingervision.storage.folder_lock import FolderLock
 from fingervision.storage.recipe_toml import read_recipe
 from fingervision.testbed.actuator import Actuator, Alarm
 from fingervision.testbed.bed import Bed
-from fingervision.testbed.demonstration import demonstrate
-from fingervision.testbed.hidden import Hidden
-from fingervision.testbed.put_together import open_bed
-from fingervision.testbed.run import run_recipe
+from fingervision.testbed.bed_factory import open_bed
+from fingervision.testbed.run.recipe_run import run_recipe
+from fingervision.testbed.simulation.injected_effects import Hidden
 from tests.testbed.simulated_beds import recipe_at, run, steps
 
 MOVE = 'kind = "move"\nto_mm = 0.3\nspeed_mm_s = 1.0'

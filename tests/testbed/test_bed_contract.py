@@ -8,7 +8,7 @@ import pytest
 
 from fingervision.domain.errors import FingervisionError
 from fingervision.testbed.bed import Bed
-from fingervision.testbed.put_together import open_bed
+from fingervision.testbed.bed_factory import open_bed
 from fingervision.testbed.reading import Reading
 from tests.testbed.simulated_beds import live_camera_at
 

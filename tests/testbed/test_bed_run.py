@@ -12,7 +12,7 @@ from fingervision.frames.source import open_source
 from fingervision.storage.measured_table import read_measured_table
 from fingervision.storage.samples_csv import read_samples
 from fingervision.storage.simulation_table import read_simulation_table
-from fingervision.testbed.hidden import Hidden
+from fingervision.testbed.simulation.injected_effects import Hidden
 from fingervision.vision.pipeline import Settings, measure_frame
 from tests.testbed.simulated_beds import recipe_at, run, steps
 

@@ -13,7 +13,7 @@ from fingervision.domain.board_settings import Role
 from fingervision.domain.errors import FingervisionError
 from fingervision.testbed.actuators.board import BoardActuator
 from fingervision.testbed.bed import Bed
-from fingervision.testbed.put_together import open_bed
+from fingervision.testbed.bed_factory import open_bed
 from tests.testbed.board_bed import written_bed
 from tests.testbed.emulated_board import HERTZ, Edge, EmulatedBoard, MotorController
 
@@ -75,7 +75,7 @@ def bed_toml(
     emulated: EmulatedBoard, controller: MotorController, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> Path:
     """The configuration of a bed with that board; its time is the emulator's."""
-    monkeypatch.setattr("fingervision.testbed.put_together.HostClock", lambda: emulated.clock)
+    monkeypatch.setattr("fingervision.testbed.bed_factory.HostClock", lambda: emulated.clock)
     return written_bed(tmp_path, emulated.port, STEPS)
 
 

@@ -6,12 +6,12 @@ import pytest
 from click.testing import CliRunner
 
 from fingervision.cli import cli
+from fingervision.demonstration.demonstrate import SHOWN, drawn
 from fingervision.diagnosis.diagnose import diagnose
 from fingervision.domain.report import DiagnosisReport, Verdict
 from fingervision.storage.measured_table import read_measured_table
 from fingervision.storage.model_toml import read_model
-from fingervision.testbed.demonstration import SHOWN, drawn
-from fingervision.testbed.hidden import Hidden
+from fingervision.testbed.simulation.injected_effects import Hidden
 from tests.testbed.simulated_beds import run, steps
 
 # One run there and back, one of another speed after a new reference: 400 frames.

@@ -15,11 +15,11 @@ import pytest
 from fingervision.storage.recipe_toml import read_recipe
 from fingervision.storage.recorded_video import frames_in
 from fingervision.storage.samples_csv import SampleRow, read_samples
+from fingervision.testbed.bed_factory import open_bed
 from fingervision.testbed.camera import BedCamera, Shot
-from fingervision.testbed.controls import Controls
-from fingervision.testbed.put_together import open_bed
-from fingervision.testbed.run import run_recipe
-from fingervision.testbed.watch import StoppedError
+from fingervision.testbed.run.controls import Controls
+from fingervision.testbed.run.recipe_run import run_recipe
+from fingervision.testbed.run.safety_monitor import StoppedError
 from tests.testbed.simulated_beds import SHORT, recipe_at, run, steps
 
 # Starting Python with its libraries on a busy machine; nothing is measured by it.

@@ -8,7 +8,7 @@ import pytest
 from fingervision.domain.errors import FingervisionError
 from fingervision.testbed.actuator import StageLimits
 from fingervision.testbed.actuators.hand_screw import HandScrew
-from fingervision.testbed.clock import VirtualClock
+from fingervision.testbed.clocks.clock import VirtualClock
 from fingervision.testbed.terminal import Terminal
 
 LIMITS = StageLimits(lower_mm=-1.0, upper_mm=6.0, speed_mm_s=float("inf"), force_n=float("inf"), accuracy_mm=0.004)

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from fingervision.domain.step_data import CycleTime, SpeedEntry
-from fingervision.testbed.motion_profile import MotionProfile, profile, shortest_s
+from fingervision.testbed.motion.motion_profile import MotionProfile, profile, shortest_s
 
 TOP_MM_S, STRONG_MM_S2 = 400.0, 27500.0  # 5.5 N on 0.2 kg
 # Sums and products of a dozen doubles.

@@ -7,8 +7,8 @@ import pytest
 from fingervision.domain.errors import FingervisionError
 from fingervision.storage.recipe_toml import read_recipe
 from fingervision.storage.samples_csv import read_samples
-from fingervision.testbed.put_together import open_bed
-from fingervision.testbed.run import run_recipe
+from fingervision.testbed.bed_factory import open_bed
+from fingervision.testbed.run.recipe_run import run_recipe
 from tests.testbed.simulated_beds import live_camera_at, recipe_at, run, steps
 
 TWO_MOVES = steps(
@@ -30,7 +30,7 @@ def test_a_run_that_cannot_be_played_again_goes_on_with_its_leg_as_another_run(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     # The live gripper is never still.
-    monkeypatch.setattr("fingervision.testbed.doing.STILL_WITHIN_S", 0.5)
+    monkeypatch.setattr("fingervision.testbed.run.step_executor.STILL_WITHIN_S", 0.5)
     config = live_camera_at(tmp_path)
     bed = open_bed(str(config))
     with pytest.raises(BreaksOffError):

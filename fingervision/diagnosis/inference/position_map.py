@@ -11,6 +11,7 @@ from scipy.interpolate import CubicSpline
 
 from fingervision.diagnosis.inference.hypothesis_fit import Explanation, Problem
 from fingervision.diagnosis.inference.measuring_chain import MeasuringChain
+from fingervision.diagnosis.inference.random_effect import estimated_coefficients, normal_equations
 from fingervision.diagnosis.inference.signatures import signatures
 from fingervision.domain.effect import Array, History, InputPath
 from fingervision.domain.parameter import Estimate
@@ -29,8 +30,6 @@ PASSES = 1.8
 """Travel over range from which on each place was passed twice: an error seen once is not known to repeat."""
 LENGTHS, SIZES = 10, 25
 """Lengths and sizes that are tried."""
-LEAST_GAIN = 10.0
-"""Twice the logarithm of a Bayes factor that is very strong evidence (Kass & Raftery 1995)."""
 EVENLY = 200
 """Places that stand for a whole range: enough that its ends count for no more than their share."""
 LINE_SHARE = 1e-3
@@ -93,15 +92,13 @@ class PositionMap:
 
     def refitted(self, problem: Problem, explanation: Explanation, behind: int) -> "PositionMap":
         """Estimate the curve beside an explanation; `behind` random effects stand behind the map's in the problem."""
-        metric = problem.offsets.metric(explanation.sigma_mm)
-        best = metric @ (problem.offsets.design.T @ explanation.residual)
-        own = slice(best.size - behind - self.coefficients.size, best.size - behind)
-        curve = self.root_mm @ best[own]
+        best, covariance_of_best = estimated_coefficients(problem, explanation, self.coefficients.size, behind)
+        curve = self.root_mm @ best
         rms = float(np.sqrt(np.mean(curve**2)))
         # Derivative of the root mean square by the curve, over the curve's posterior covariance.
         slope = self.root_mm.T @ (curve / (curve.size * max(rms, 1e-300)))
-        u = float(np.sqrt(max(float(slope @ metric[own, own] @ slope), 0.0)))
-        return replace(self, coefficients=best[own], rms_mm=Estimate(rms, u, "mm"))
+        u = float(np.sqrt(max(float(slope @ covariance_of_best @ slope), 0.0)))
+        return replace(self, coefficients=best, rms_mm=Estimate(rms, u, "mm"))
 
 
 def why_no_map(history: History, path: InputPath | None) -> str | None:
@@ -138,10 +135,7 @@ def likeliest_map(problem: Problem, explanation: Explanation) -> tuple[PositionM
     history = problem.chain.history
     nodes_mm = _nodes(history)
     raw = _columns(problem.chain, nodes_mm)
-    offsets, metric = problem.offsets, problem.offsets.metric(explanation.sigma_mm)
-    white = problem.whitener.columns(raw)[0]
-    moved = white - offsets.design @ (metric @ (offsets.design.T @ white))
-    gram, aim = white.T @ moved, moved.T @ explanation.residual
+    gram, aim = normal_equations(problem, explanation, raw)
     spacing = float(np.median(np.diff(nodes_mm)))
     shortest = spacing if nodes_mm.size < NODES else SMOOTH * history.input_span_mm
     lengths = np.geomspace(shortest, max(history.input_span_mm, 2.0 * shortest), LENGTHS)

@@ -9,16 +9,16 @@ from scipy.stats import t as student
 from fingervision.diagnosis.inference.explanation_candidates import Progress
 from fingervision.diagnosis.inference.hypothesis_fit import Explanation, Point, Problem, fit
 from fingervision.diagnosis.inference.position_map import (
-    LEAST_GAIN,
     NAME,
+    PositionMap,
     imitating_effects,
     likeliest_map,
     why_no_map,
 )
 from fingervision.diagnosis.inference.posterior import settled
+from fingervision.diagnosis.inference.random_effect import LEAST_GAIN
 from fingervision.diagnosis.inference.reference_gauge import consistent_with_gauges
-from fingervision.diagnosis.inference.run_gains import FEWEST_RUNS, likeliest_gains
-from fingervision.diagnosis.inference.run_gains import LEAST_GAIN as LEAST_GAIN_OF_RUNS
+from fingervision.diagnosis.inference.run_gains import FEWEST_RUNS, RunGains, likeliest_gains
 from fingervision.diagnosis.inference.search import Findings, search
 from fingervision.diagnosis.inference.verdict import standing_of, without_unneeded_effects
 from fingervision.diagnosis.input.intersample_interpolation import likelier_interpolation
@@ -142,7 +142,7 @@ def _beside_gains(state: _Searched, look: _Look) -> _Searched:
         return state
     tried = [likeliest_gains(found.problem, one) for one in (found.best, *found.singles[:3])]
     gains, gain = max(tried, key=lambda one: one[1])
-    if gain < LEAST_GAIN_OF_RUNS:
+    if gain < LEAST_GAIN:
         return state
     known = found.best if found.best.names else None
     beside = look.again(replace(state.data, run_gains=gains), known)
@@ -154,11 +154,7 @@ def _beside_gains(state: _Searched, look: _Look) -> _Searched:
             beside = apart
     if not _does_more(beside):
         return state
-    plain = replace(beside.found.problem, offsets=_offsets_without(beside.found.problem, gains.coefficients.size))
-    rows = max(2, int(plain.measured.size - plain.whitener.aside.sum()))
-    rival = fit(plain, found.best.names, found.best.values, iterations=20) if found.best.names else plain.nothing()
-    gained = rival.bic(rows) - beside.found.best.bic(rows) - gains.price
-    return beside if gained > LEAST_GAIN_OF_RUNS else state
+    return beside if _gained(state, beside, gains) > LEAST_GAIN else state
 
 
 def _does_more(beside: _Searched) -> bool:
@@ -166,7 +162,7 @@ def _does_more(beside: _Searched) -> bool:
     best, gains = beside.found.best, beside.data.run_gains
     if gains is None or not best.names:
         return False
-    scatter_mm = gains.refitted(beside.found.problem, best, beside.data.behind_gains).scatter_mm
+    scatter_mm = gains.refitted(beside.found.problem, best, beside.data.behind(gains)).scatter_mm
     changed_mm = beside.data.chain.stacked(best.values) - beside.data.chain.stacked({})
     return bool(np.linalg.norm(changed_mm) > np.linalg.norm(scatter_mm))
 
@@ -196,18 +192,22 @@ def _beside_map(state: _Searched, look: _Look) -> _Searched:
     excluded = {**state.data.excluded, **imitating}
     kept = found.best if not set(found.best.names) & set(imitating) else None
     beside = look.again(replace(state.data, position_map=first, effects=effects, excluded=excluded), kept)
-    plain = replace(beside.found.problem, offsets=_offsets_without(beside.found.problem, first.coefficients.size))
+    plain = _without(beside.found.problem, first)
     second, _ = likeliest_map(plain, _left(plain, beside.found.best))
     if first.is_like(second):
         second = first
     else:
         beside = look.again(replace(beside.data, position_map=second), beside.found.best)
-        plain = replace(beside.found.problem, offsets=_offsets_without(beside.found.problem, second.coefficients.size))
-    plain = replace(plain, effects=found.problem.effects)
+    return beside if asked or _gained(state, beside, second) > LEAST_GAIN else state
+
+
+def _gained(state: _Searched, beside: _Searched, effect: RunGains | PositionMap) -> float:
+    """By how much -2 log of the likelihood falls by a random effect and what was found beside it, the price paid."""
+    best = state.found.best
+    plain = replace(_without(beside.found.problem, effect), effects=state.found.problem.effects)
     rows = max(2, int(plain.measured.size - plain.whitener.aside.sum()))
-    rival = fit(plain, found.best.names, found.best.values, iterations=20) if found.best.names else plain.nothing()
-    gained = rival.bic(rows) - beside.found.best.bic(rows) - second.price
-    return beside if asked or gained > LEAST_GAIN else state
+    rival = fit(plain, best.names, best.values, iterations=20) if best.names else plain.nothing()
+    return rival.bic(rows) - beside.found.best.bic(rows) - effect.price
 
 
 def _common_offset(state: _Searched, look: _Look) -> _Searched:
@@ -238,11 +238,11 @@ def _left(problem: Problem, explanation: Explanation) -> Explanation:
     return replace(explanation, residual=residual, sigma_mm=problem.offsets.spread(residual)[0])
 
 
-def _offsets_without(problem: Problem, count: int) -> RunOffsets:
-    """Offsets of the runs without the first `count` of the random effects beside them."""
-    drawing = problem.whitener.drawing
+def _without(problem: Problem, effect: RunGains | PositionMap) -> Problem:
+    """The same problem without a random effect's columns, which are the first ones where it was added last."""
+    count, drawing = effect.coefficients.size, problem.whitener.drawing
     kept = None if drawing is None or drawing.shape[1] == count else drawing[:, count:]
-    return RunOffsets.of(replace(problem.whitener, drawing=kept))
+    return replace(problem, offsets=RunOffsets.of(replace(problem.whitener, drawing=kept)))
 
 
 def _beside_drawing(state: _Searched, look: _Look) -> _Searched:
@@ -267,9 +267,11 @@ def _settled(state: _Searched, rng: np.random.Generator) -> Refitted:
     best, posterior = settled(found.problem, found.best, rng)
     found = _with_best(found, best)
     if data.position_map is not None:
-        data = replace(data, position_map=data.position_map.refitted(found.problem, best, data.behind_map))
+        data = replace(
+            data, position_map=data.position_map.refitted(found.problem, best, data.behind(data.position_map))
+        )
     if data.run_gains is not None:
-        gains = data.run_gains.refitted(found.problem, best, data.behind_gains)
+        gains = data.run_gains.refitted(found.problem, best, data.behind(data.run_gains))
         data = replace(data, run_gains=gains, notes=(*data.notes, gains.words))
     if data.refit.moved:
         data = data.redrawn(found.problem, best if best.names else found.problem.nothing())

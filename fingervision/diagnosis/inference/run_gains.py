@@ -10,14 +10,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from fingervision.diagnosis.inference.hypothesis_fit import Explanation, Problem
+from fingervision.diagnosis.inference.random_effect import estimated_coefficients, normal_equations
 from fingervision.domain.effect import Array
 
 FEWEST_RUNS = 2
 """One run has no scatter of gains."""
 SIZES = np.geomspace(1e-4, 0.2, 34)
 """Standard deviations of the gain that are tried; runs that differ by more than a fifth are not one experiment."""
-LEAST_GAIN = 10.0
-"""Twice the logarithm of a Bayes factor that is very strong evidence (Kass & Raftery 1995)."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -67,9 +66,9 @@ class RunGains:
 
     def refitted(self, problem: Problem, explanation: Explanation, behind: int) -> "RunGains":
         """Estimate the gains beside an explanation; `behind` random effects stand behind them in the problem."""
-        metric = problem.offsets.metric(explanation.sigma_mm)
-        best = metric @ (problem.offsets.design.T @ explanation.residual)
-        return replace(self, coefficients=best[best.size - behind - self.coefficients.size : best.size - behind])
+        return replace(
+            self, coefficients=estimated_coefficients(problem, explanation, self.coefficients.size, behind)[0]
+        )
 
 
 def likeliest_gains(problem: Problem, explanation: Explanation) -> tuple[RunGains, float]:
@@ -96,10 +95,7 @@ def likeliest_gains(problem: Problem, explanation: Explanation) -> tuple[RunGain
     for column, run in enumerate(history.runs):
         # About the run's mean: what else a gain does is an offset.
         raw[run, column] = gap_mm[run] - gap_mm[run].mean()
-    offsets, metric = problem.offsets, problem.offsets.metric(explanation.sigma_mm)
-    white = problem.whitener.columns(raw)[0]
-    moved = white - offsets.design @ (metric @ (offsets.design.T @ white))
-    gram, aim = white.T @ moved, moved.T @ explanation.residual
+    gram, aim = normal_equations(problem, explanation, raw)
     value, vector = np.linalg.eigh(gram)
     value, share = np.maximum(value, 0.0), (vector.T @ aim) ** 2
     load = 1.0 + SIZES[:, None] ** 2 * value

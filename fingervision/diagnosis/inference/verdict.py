@@ -142,9 +142,9 @@ def standing_of(data: Observations, found: Findings) -> Standing:
     before = data.stacked_mm - data.chain.stacked({})
     left = before if not found.best.names else data.stacked_mm - data.chain.stacked(found.best.values)
     if data.position_map is not None:
-        left = left - data.position_map.refitted(found.problem, found.best, data.behind_map).fitted_mm
+        left = left - data.position_map.refitted(found.problem, found.best, data.behind(data.position_map)).fitted_mm
     if data.run_gains is not None:
-        data = replace(data, run_gains=data.run_gains.refitted(found.problem, found.best, data.behind_gains))
+        data = replace(data, run_gains=data.run_gains.refitted(found.problem, found.best, data.behind(data.run_gains)))
     return standing(data, found.problem, before, left)
 
 

@@ -97,14 +97,17 @@ class Observations:
         return ("gap", *(["midline"] if history.both_edges else []), *(["force"] if history.force else []))
 
     @property
-    def behind_gains(self) -> int:
-        """Random effects that stand behind the runs' gains in a problem."""
-        return len(self.refit.moved)
+    def random_effects_mm(self) -> tuple[tuple[object, Array], ...]:
+        """Random effects beside every explanation, each with its columns, in the order in which a problem has them."""
+        own = [(one, one.columns_mm) for one in (self.position_map, self.run_gains) if one is not None]
+        clock = [] if self.clock is None or not self.clock.shape[1] else [("clock", self.clock)]
+        drawing = [("drawing", self.refit.columns)] if self.refit.moved else []
+        return (*own, *clock, *drawing)
 
-    @property
-    def behind_map(self) -> int:
-        """Random effects that stand behind a map of position errors in a problem."""
-        return self.behind_gains + (0 if self.run_gains is None else self.run_gains.coefficients.size)
+    def behind(self, effect: object) -> int:
+        """Columns that stand behind those of one of the random effects."""
+        order = [one for one, _ in self.random_effects_mm]
+        return sum(columns.shape[1] for _, columns in self.random_effects_mm[order.index(effect) + 1 :])
 
     @property
     def stalled(self) -> frozenset[str]:
@@ -142,9 +145,7 @@ class Observations:
             error = np.zeros_like(error)
         passing = np.where(self.recorded.stays, 0.0, error)
         noises = (without_input(noises[0], passing), *noises[1:])
-        beside = [one.columns_mm for one in (self.position_map, self.run_gains) if one is not None]
-        beside += [self.clock] if self.clock is not None and self.clock.shape[1] else []
-        beside += [self.refit.columns] if self.refit.moved else []
+        beside = [columns for _, columns in self.random_effects_mm]
         drawing = np.hstack(beside) if beside else None
         whitener = Whitener(
             history,

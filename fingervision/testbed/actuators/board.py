@@ -8,21 +8,21 @@ from fingervision.domain.step_data import Coordinates, StepData
 from fingervision.storage.board_toml import read_board
 from fingervision.storage.steps_toml import read_steps
 from fingervision.storage.toml_section import Section
-from fingervision.testbed import published_stage
 from fingervision.testbed.actuator import Alarm, StageLimits
-from fingervision.testbed.asked_move import check_move, check_speed
 from fingervision.testbed.board import controller_settings, wire
 from fingervision.testbed.board.board import Board
 from fingervision.testbed.board.controller_settings import Codes, Waits, codes_of, waits_of
 from fingervision.testbed.board.motions import Motions, Run
 from fingervision.testbed.board.port import fingervision_at
 from fingervision.testbed.board.shared import KEY, board_of
-from fingervision.testbed.clock import Clock
-from fingervision.testbed.published_stage import stage_limits
+from fingervision.testbed.build_context import BuildContext
+from fingervision.testbed.clocks.clock import Clock
+from fingervision.testbed.motion import published_stage
+from fingervision.testbed.motion.move_limits import check_move, check_speed
+from fingervision.testbed.motion.published_stage import stage_limits
+from fingervision.testbed.motion.step_checks import planned
+from fingervision.testbed.motion.step_route import jog_step, route
 from fingervision.testbed.reading import Reading
-from fingervision.testbed.step_checks import planned
-from fingervision.testbed.step_route import jog_step, route
-from fingervision.testbed.workshop import Workshop
 
 SIMULATED = False
 KEYS = (KEY, "steps", *published_stage.KEYS, *controller_settings.KEYS)
@@ -210,12 +210,12 @@ def holder(section: Section, folder: Path) -> int | None:
     return fingervision_at(read_board(folder / section.word(KEY)).port)
 
 
-def build(section: Section, workshop: Workshop) -> BoardActuator:
+def build(section: Section, context: BuildContext) -> BoardActuator:
     """Build it from its section of the configuration."""
-    data = read_steps(workshop.folder / section.word("steps"))
+    data = read_steps(context.folder / section.word("steps"))
     codes, waits = codes_of(section, data), waits_of(section)
-    board = board_of(section, workshop)
+    board = board_of(section, context)
     if not board.settings.moves:
         board.close()
         section.refuse(KEY, "must have a motor controller on its lines, but has a force sensor only: add its lines.")
-    return BoardActuator(board, data, stage_limits(section), codes, waits, workshop.clock)
+    return BoardActuator(board, data, stage_limits(section), codes, waits, context.clock)

@@ -5,11 +5,11 @@ from math import isfinite
 from fingervision.domain.errors import FingervisionError
 from fingervision.storage.toml_section import Section
 from fingervision.testbed.actuator import Alarm, StageLimits
-from fingervision.testbed.asked_move import check_move
-from fingervision.testbed.clock import Clock
+from fingervision.testbed.build_context import BuildContext
+from fingervision.testbed.clocks.clock import Clock
+from fingervision.testbed.motion.move_limits import check_move
 from fingervision.testbed.reading import Reading
 from fingervision.testbed.terminal import TERMINAL, Terminal
-from fingervision.testbed.workshop import Workshop
 
 KEYS = ("lower_mm", "upper_mm", "speed_mm_s", "accuracy_mm")
 SIMULATED = False
@@ -122,7 +122,7 @@ def _number(words: str, otherwise: float) -> float | None:
     return value if isfinite(value) else None
 
 
-def build(section: Section, workshop: Workshop) -> HandScrew:
+def build(section: Section, context: BuildContext) -> HandScrew:
     """Build it from its section of the configuration; the terminal is asked."""
     lower_mm = section.number("lower_mm")
     limits = StageLimits(
@@ -132,4 +132,4 @@ def build(section: Section, workshop: Workshop) -> HandScrew:
         force_n=float("inf"),
         accuracy_mm=section.number("accuracy_mm", ACCURACY_MM, low=0.0),
     )
-    return HandScrew(limits, workshop.clock, TERMINAL)
+    return HandScrew(limits, context.clock, TERMINAL)

@@ -8,13 +8,13 @@ from numpy.typing import NDArray
 from fingervision.domain.errors import FingervisionError
 from fingervision.storage.toml_section import Section
 from fingervision.testbed.actuator import Alarm, StageLimits
-from fingervision.testbed.asked_move import check_move, check_speed
-from fingervision.testbed.clock import Clock
+from fingervision.testbed.build_context import BuildContext
+from fingervision.testbed.clocks.clock import Clock
+from fingervision.testbed.motion.move_limits import check_move, check_speed
 from fingervision.testbed.reading import Reading
+from fingervision.testbed.simulation.drifting_clock import OwnClock
 from fingervision.testbed.simulation.gripper import Motion
-from fingervision.testbed.simulation.own_clock import OwnClock
 from fingervision.testbed.simulation.stage import SimulatedStage
-from fingervision.testbed.workshop import Workshop
 
 KEYS = ("lower_mm", "upper_mm", "speed_mm_s", "force_n", "encoder_step_mm", "accuracy_mm", "play_mm")
 SIMULATED = True
@@ -176,7 +176,7 @@ class SimulatedActuator:
             raise FingervisionError("The actuator must stand before it moves again, but is busy: stop it first.")
 
 
-def build(section: Section, workshop: Workshop) -> SimulatedActuator:
+def build(section: Section, context: BuildContext) -> SimulatedActuator:
     """Build it from its section of the configuration."""
     lower_mm = section.number("lower_mm", LOWER_MM)
     limits = StageLimits(
@@ -187,16 +187,16 @@ def build(section: Section, workshop: Workshop) -> SimulatedActuator:
         accuracy_mm=section.number("accuracy_mm", ACCURACY_MM, low=0.0),
         encoder_step_mm=section.number("encoder_step_mm", ENCODER_STEP_MM, low=0.0),
     )
-    rng = np.random.default_rng([workshop.seed, 1])
+    rng = np.random.default_rng([context.seed, 1])
     # A controller knows the bed's limits as its own: not even its inaccuracy takes the stage beyond them.
-    ends_mm = max(limits.lower_mm, workshop.limits.lower_mm), min(limits.upper_mm, workshop.limits.upper_mm)
+    ends_mm = max(limits.lower_mm, context.limits.lower_mm), min(limits.upper_mm, context.limits.upper_mm)
     stage = SimulatedStage(*ends_mm, limits.accuracy_mm, rng)
-    workshop.motion = Motion(
+    context.motion = Motion(
         stage.at_mm,
         lambda: stage.planned_until_s,
         lambda: stage.version,
         lambda: list(stage.homed_s),
         lambda: stage.began_s,
     )
-    workshop.play_mm = section.number("play_mm", 0.0, low=0.0)
-    return SimulatedActuator(workshop.clock, stage, limits, rng)
+    context.play_mm = section.number("play_mm", 0.0, low=0.0)
+    return SimulatedActuator(context.clock, stage, limits, rng)

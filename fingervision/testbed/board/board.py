@@ -10,10 +10,10 @@ from typing import NoReturn
 from fingervision.domain.board_settings import BoardSettings, Role
 from fingervision.domain.errors import FingervisionError
 from fingervision.testbed.board import wire
-from fingervision.testbed.board.clock_join import FEWEST, JoinedClock
 from fingervision.testbed.board.link import ASK_EVERY_S, BoardLink, BoardRefusalError
 from fingervision.testbed.board.port import opened_port
-from fingervision.testbed.clock import Clock
+from fingervision.testbed.clocks.board_clock import FEWEST, JoinedClock
+from fingervision.testbed.clocks.clock import Clock
 
 # A board that is reset by the opening of its port starts its sketch within two seconds.
 STARTS_WITHIN_S = 1.0

@@ -10,7 +10,7 @@ from fingervision.domain.board_settings import Role
 from fingervision.domain.errors import FingervisionError
 from fingervision.testbed.board import wire
 from fingervision.testbed.board.board import Board
-from fingervision.testbed.clock import Clock
+from fingervision.testbed.clocks.clock import Clock
 
 LINE_WITHIN_S = 0.3
 WAIT_S = 0.01

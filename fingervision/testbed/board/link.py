@@ -13,9 +13,9 @@ import serial
 
 from fingervision.domain.errors import FingervisionError
 from fingervision.testbed.board import wire
-from fingervision.testbed.board.clock_join import ClockJoin, JoinedClock
 from fingervision.testbed.board.port import BAUD
-from fingervision.testbed.clock import Clock
+from fingervision.testbed.clocks.board_clock import ClockJoin, JoinedClock
+from fingervision.testbed.clocks.clock import Clock
 
 ASK_EVERY_S = 0.02
 # A stop is asked for until it is confirmed, but not faster than the wire carries question and answer (3.5 ms): the

@@ -9,10 +9,10 @@ from fingervision.domain.step_data import Coordinates
 from fingervision.testbed.board.board import Board
 from fingervision.testbed.board.controller_settings import Waits
 from fingervision.testbed.board.handshake import Handshake
-from fingervision.testbed.clock import Clock
-from fingervision.testbed.commanded_path import CommandedPath
-from fingervision.testbed.motion_profile import MotionProfile
-from fingervision.testbed.step_checks import PlannedMotion
+from fingervision.testbed.clocks.clock import Clock
+from fingervision.testbed.motion.commanded_path import CommandedPath
+from fingervision.testbed.motion.motion_profile import MotionProfile
+from fingervision.testbed.motion.step_checks import PlannedMotion
 
 STILL = MotionProfile(0.0, 0.0, 0.0, 0.0, 0.0)
 

@@ -3,12 +3,12 @@
 from fingervision.storage.board_toml import read_board
 from fingervision.storage.toml_section import Section
 from fingervision.testbed.board.board import Board, opened
-from fingervision.testbed.workshop import Workshop
+from fingervision.testbed.build_context import BuildContext
 
 KEY = "board"
 
 
-def board_of(section: Section, workshop: Workshop) -> Board:
+def board_of(section: Section, context: BuildContext) -> Board:
     """Give the board that a part's section names in its key `board`, opened once.
 
     Raises
@@ -16,9 +16,9 @@ def board_of(section: Section, workshop: Workshop) -> Board:
     FingervisionError
         Its file cannot be meant, or it cannot be opened.
     """
-    path = workshop.folder / section.word(KEY)
+    path = context.folder / section.word(KEY)
     name = f"{KEY} {path.resolve()}"
-    if name not in workshop.shared:
-        workshop.shared[name] = opened(read_board(path), workshop.clock)
-    board: Board = workshop.shared[name]
+    if name not in context.shared:
+        context.shared[name] = opened(read_board(path), context.clock)
+    board: Board = context.shared[name]
     return board.hold()

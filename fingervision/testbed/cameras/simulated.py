@@ -13,12 +13,12 @@ from fingervision.frames.source import Description
 from fingervision.rendering import EVEN_LIGHT, Camera, Patch, Scene, render, two_fingers
 from fingervision.rendering.targets import slot
 from fingervision.storage.toml_section import Section
+from fingervision.testbed.build_context import BuildContext
 from fingervision.testbed.camera import Latency
-from fingervision.testbed.clock import Clock
+from fingervision.testbed.clocks.clock import Clock
+from fingervision.testbed.simulation.drifting_clock import OwnClock
 from fingervision.testbed.simulation.gripper import SimulatedGripper
 from fingervision.testbed.simulation.optics import Optics, hidden_in
-from fingervision.testbed.simulation.own_clock import OwnClock
-from fingervision.testbed.workshop import Workshop
 
 KEYS = ("width_px", "height_px", "rate_hz", "px_per_mm", "blur_px", "noise_grey", "latency_s", "jitter_s", "fingers_mm",
         "tip_radius_mm", "off_centre_mm")  # fmt: skip
@@ -170,9 +170,9 @@ class SimulatedCamera:
         )
 
 
-def build(section: Section, workshop: Workshop) -> SimulatedCamera:
+def build(section: Section, context: BuildContext) -> SimulatedCamera:
     """Build it from its section of the configuration."""
-    if workshop.gripper is None:
+    if context.gripper is None:
         raise FingervisionError(
             f"A simulated camera ({section.at('kind')}) must have a simulated gripper, but the bed has none: "
             "add a [gripper]."
@@ -185,9 +185,9 @@ def build(section: Section, workshop: Workshop) -> SimulatedCamera:
     )
     optics = Optics(seen, scale, hypot(width_px, height_px) / 2 / scale)
     return SimulatedCamera(
-        workshop.clock,
-        workshop.gripper,
-        hidden_in(optics, workshop.hidden),
+        context.clock,
+        context.gripper,
+        hidden_in(optics, context.hidden),
         (width_px, height_px),
         section.number("rate_hz", RATE_HZ, low=1.0, high=1000.0),
         (section.number("latency_s", LATENCY_S, low=0.0), section.number("jitter_s", JITTER_S, low=0.0)),
@@ -195,7 +195,7 @@ def build(section: Section, workshop: Workshop) -> SimulatedCamera:
             section.number("fingers_mm", FINGERS_MM, above=0.0),
             section.number("tip_radius_mm", TIP_RADIUS_MM, low=0.0),
             section.number("off_centre_mm", 0.0),
-            workshop.below_tip_mm,
+            context.below_tip_mm,
         ),
-        workshop.seed,
+        context.seed,
     )

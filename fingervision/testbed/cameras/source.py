@@ -10,8 +10,8 @@ from fingervision.domain.frame import Frame, LostFrame
 from fingervision.frames.received import LiveSource, Received
 from fingervision.frames.source import Wish, open_source
 from fingervision.storage.toml_section import Section
+from fingervision.testbed.build_context import BuildContext
 from fingervision.testbed.camera import Latency
-from fingervision.testbed.workshop import Workshop
 
 KEYS = ("source", "rate_hz", "width_px", "height_px", "patience_s", "latency_s", "u_latency_s")
 SIMULATED = False
@@ -94,7 +94,7 @@ class SourceCamera:
             self._changed.notify()
 
 
-def build(section: Section, workshop: Workshop) -> SourceCamera:
+def build(section: Section, context: BuildContext) -> SourceCamera:
     """Open it as its section of the configuration says."""
     name = section.word("source")
     size = None

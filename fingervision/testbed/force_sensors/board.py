@@ -9,9 +9,9 @@ from fingervision.domain.errors import FingervisionError
 from fingervision.storage.toml_section import Section
 from fingervision.testbed.board.board import Board
 from fingervision.testbed.board.shared import KEY, board_of
-from fingervision.testbed.clock import Clock
+from fingervision.testbed.build_context import BuildContext
+from fingervision.testbed.clocks.clock import Clock
 from fingervision.testbed.reading import Reading
-from fingervision.testbed.workshop import Workshop
 
 KEYS = (KEY, "volts", "newtons", "reference_v")
 SIMULATED = False
@@ -88,7 +88,7 @@ class BoardForceSensor:
             self._board.close()
 
 
-def build(section: Section, workshop: Workshop) -> BoardForceSensor:
+def build(section: Section, context: BuildContext) -> BoardForceSensor:
     """Build it from its section of the configuration."""
     volts, newtons = _column(section, "volts"), _column(section, "newtons")
     if len(newtons) != len(volts):
@@ -96,11 +96,11 @@ def build(section: Section, workshop: Workshop) -> BoardForceSensor:
     if any(b <= a for a, b in pairwise(volts)):
         section.refuse("volts", f"must increase, but is {volts!r}.")
     reference_v = section.number("reference_v", REFERENCE_V, above=0.0)
-    board = board_of(section, workshop)
+    board = board_of(section, context)
     if not board.settings.senses_force:
         board.close()
         section.refuse(KEY, "must have a force sensor on its lines, but has none: add its force line.")
-    return BoardForceSensor(board, volts, newtons, reference_v, workshop.clock)
+    return BoardForceSensor(board, volts, newtons, reference_v, context.clock)
 
 
 def _column(section: Section, key: str) -> list[float]:

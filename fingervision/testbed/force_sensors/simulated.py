@@ -4,11 +4,11 @@ import numpy as np
 
 from fingervision.domain.errors import FingervisionError
 from fingervision.storage.toml_section import Section
-from fingervision.testbed.clock import Clock
+from fingervision.testbed.build_context import BuildContext
+from fingervision.testbed.clocks.clock import Clock
 from fingervision.testbed.reading import Reading
+from fingervision.testbed.simulation.drifting_clock import OwnClock
 from fingervision.testbed.simulation.gripper import SimulatedGripper
-from fingervision.testbed.simulation.own_clock import OwnClock
-from fingervision.testbed.workshop import Workshop
 
 KEYS = ("full_scale_n", "noise_n", "rate_hz", "bits")
 SIMULATED = True
@@ -79,9 +79,9 @@ class SimulatedForceSensor:
         return float(np.clip(np.rint(force_n / self._step_n) * self._step_n, -self.full_scale_n, self.full_scale_n))
 
 
-def build(section: Section, workshop: Workshop) -> SimulatedForceSensor:
+def build(section: Section, context: BuildContext) -> SimulatedForceSensor:
     """Build it from its section of the configuration."""
-    if workshop.gripper is None:
+    if context.gripper is None:
         raise FingervisionError(
             f"A simulated force sensor ({section.at('kind')}) must have a simulated gripper, but the bed has none: "
             "add a [gripper]."
@@ -89,11 +89,11 @@ def build(section: Section, workshop: Workshop) -> SimulatedForceSensor:
     full_scale_n = section.number("full_scale_n", FULL_SCALE_N, above=0.0)
     bits = section.whole("bits", BITS, low=6, high=24)
     return SimulatedForceSensor(
-        workshop.clock,
-        workshop.gripper,
+        context.clock,
+        context.gripper,
         full_scale_n,
         section.number("noise_n", NOISE_N, low=0.0),
         section.number("rate_hz", RATE_HZ, low=1.0, high=10000.0),
         2.0 * full_scale_n / 2**bits,
-        np.random.default_rng([workshop.seed, 2]),
+        np.random.default_rng([context.seed, 2]),
     )

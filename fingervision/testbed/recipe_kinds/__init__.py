@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from typing import Protocol
 
 from fingervision.storage.toml_section import Section
-from fingervision.testbed.legs import Act, Frames
+from fingervision.testbed.run.motion_segments import Act, Frames
 
 CONTINUOUS = "continuous"
 MOST_FRAMES = 10000

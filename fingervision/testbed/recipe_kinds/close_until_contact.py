@@ -3,8 +3,8 @@
 from collections.abc import Iterator
 
 from fingervision.storage.toml_section import Section
-from fingervision.testbed.legs import Close
 from fingervision.testbed.recipe_kinds import Asked
+from fingervision.testbed.run.motion_segments import Close
 
 KEYS = ("speed_mm_s", "below_force_n")
 

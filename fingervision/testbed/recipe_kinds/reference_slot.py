@@ -3,8 +3,8 @@
 from collections.abc import Iterator
 
 from fingervision.storage.toml_section import Section
-from fingervision.testbed.legs import Slot
 from fingervision.testbed.recipe_kinds import Asked
+from fingervision.testbed.run.motion_segments import Slot
 
 KEYS = ("size_mm", "u_size_mm")
 

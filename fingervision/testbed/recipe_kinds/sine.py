@@ -3,8 +3,8 @@
 from collections.abc import Iterator
 
 from fingervision.storage.toml_section import Section
-from fingervision.testbed.legs import Go, Swing
 from fingervision.testbed.recipe_kinds import CONTINUOUS, Asked, frames_of
+from fingervision.testbed.run.motion_segments import Go, Swing
 
 KEYS = ("mean_mm", "amplitude_mm", "frequency_hz", "cycles", "frames")
 # The stage goes to the mean as fast as it swings through it, but no slower than this.

@@ -3,8 +3,8 @@
 from collections.abc import Iterator
 
 from fingervision.storage.toml_section import Section
-from fingervision.testbed.legs import Go, Stand
 from fingervision.testbed.recipe_kinds import Asked, frames_of
+from fingervision.testbed.run.motion_segments import Go, Stand
 
 KEYS = ("from_mm", "to_mm", "steps", "dwell_s", "speed_mm_s", "frames")
 

@@ -11,7 +11,7 @@ from fingervision.domain.effect import DriveEffect, History, PointEffect
 from fingervision.domain.model import Model
 from fingervision.domain.response import Response
 from fingervision.effects import catalogue
-from fingervision.testbed.hidden import Hidden
+from fingervision.testbed.simulation.injected_effects import Hidden
 from fingervision.testbed.simulation.optics import IN_THE_PICTURE
 
 Array = NDArray[np.float64]

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 from math import asin, degrees
 
 from fingervision.rendering import Camera, RadialLens, Tilt
-from fingervision.testbed.hidden import Hidden
+from fingervision.testbed.simulation.injected_effects import Hidden
 
 # The keystone alone, as the catalogue has it: so near a plane that the tilt which gives it does not shorten it.
 TILT_SINE = 0.01

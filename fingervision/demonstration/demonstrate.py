@@ -1,0 +1,142 @@
+"""The whole loop on the simulated bed: hide, run, measure, diagnose, run what was proposed, and say how it ended."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from fingervision.diagnosis.diagnose import Diagnosis, diagnose
+from fingervision.diagnosis.report.answer_files import NEXT_RUN, PAGE, write_answer
+from fingervision.domain.report import DiagnosisReport, Verdict
+from fingervision.effects import catalogue
+from fingervision.measuring.rehearsal import rehearse
+from fingervision.storage.measured_table import read_measured_table
+from fingervision.storage.model_toml import read_model
+from fingervision.storage.out_folder import make_out_folder, out_folder
+from fingervision.storage.provenance import provenance
+from fingervision.storage.recipe_toml import read_recipe, write_recipe
+from fingervision.testbed.bed_factory import SIMULATED, open_bed
+from fingervision.testbed.run.recipe_run import run_recipe
+from fingervision.testbed.run.resume_state import contents, refuse_others
+from fingervision.testbed.run.run_folder import rows_before, times_of
+from fingervision.testbed.run.run_metadata import JOINED, SAMPLES, SIMULATION
+from fingervision.testbed.simulation.injected_effects import Hidden
+from fingervision.testbed.simulation.parse_injected_effects import usual_values
+
+# What a few short runs can tell from everything else: one of these is hidden where nobody says which.
+SHOWN = (
+    "backlash", "friction_hysteresis", "encoder_cyclic_error", "end_stop", "finger_contact", "assembly_asymmetry",
+    "viscoelastic_creep", "thermal_drift", "lens_distortion", "camera_tilt", "camera_drift", "stick_slip",
+)  # fmt: skip
+# Sizes are drawn between these multiples of the usual one.
+SIZES = (0.6, 1.4)
+# One way only at first, as at a bench where nobody knows yet what to look for.
+FIRST_RUN: tuple[dict[str, object], ...] = (
+    {"kind": "triangle", "from_mm": -0.4, "to_mm": 1.3, "speed_mm_s": 0.5, "cycles": 1, "frames": "continuous"},
+)
+MOST_RUNS = 3
+Say = Callable[[str], None]
+
+
+@dataclass(frozen=True, slots=True)
+class Shown:
+    """How a demonstration ended.
+
+    Parameters
+    ----------
+    hidden : Hidden
+        The truth.
+    report : DiagnosisReport
+        The last answer.
+    page : Path
+        Its report.
+    runs : int
+        How many runs it took.
+    """
+
+    hidden: Hidden
+    report: DiagnosisReport
+    page: Path
+    runs: int
+
+    @property
+    def among(self) -> bool:
+        """Whether what was hidden is among what the data cannot tell apart."""
+        return any(set(names) == set(self.hidden.effects) for names in self.report.alternatives)
+
+    @property
+    def found(self) -> bool:
+        """Whether the answer is what was hidden."""
+        return {effect.name for effect in self.report.effects} == set(self.hidden.effects) and (
+            self.report.verdict is (Verdict.NAMED if self.hidden.effects else Verdict.AGREES)
+        )
+
+
+def drawn(seed: int) -> Hidden:
+    """Choose an effect and its size by a seed."""
+    rng = np.random.default_rng([seed, 7])
+    name = SHOWN[int(rng.integers(len(SHOWN)))]
+    effect = catalogue()[name]
+    values = usual_values(effect)
+    for p in effect.parameters:
+        if p.neutral == 0.0:
+            values[p.name] = float(np.clip(values[p.name] * rng.uniform(*SIZES), p.lower, p.upper))
+    return Hidden({name: values})
+
+
+def demonstrate(hidden: Hidden, seed: int, out: Path, say: Say) -> Shown:
+    """Run the loop until the answer is one, or nothing more is proposed.
+
+    Parameters
+    ----------
+    hidden : Hidden
+        What acts in the bed; nothing here looks at it before the end.
+    seed : int
+        Of everything random.
+    out : Path
+        Folder; new or empty.
+    say : callable
+        Told each step in a line.
+
+    Raises
+    ------
+    FingervisionError
+        The folder cannot be written, or a run could not be made.
+    """
+    recipe = out / "recipe.toml"
+    make_out_folder(out)
+    if held := contents(out):
+        refuse_others(out, held[0])
+    write_recipe(recipe, "there and back", FIRST_RUN)
+    rehearse(lambda _, words: say(words))
+    before: Path | None = None
+    for number in range(1, MOST_RUNS + 1):
+        folder, asked = out / f"run-{number}", read_recipe(recipe)
+        say(f"Run {number}, {asked.name}: the stage moves, a camera looks on, every picture is measured.")
+        rows = [] if before is None else rows_before(before)
+        bed = open_bed(SIMULATED, hidden, seed=seed, earlier_s=times_of(rows))
+        try:
+            done = run_recipe(asked, bed, folder, hidden, before=rows)
+        finally:
+            bed.close()
+        say(f"{done.counts.with_gap} gaps in {done.counts.recorded} pictures. They are held against the simulation.")
+        table = folder / (SAMPLES if before is None else JOINED)
+        answer, page = _answer(table, folder / SIMULATION, out / f"diagnosis-{number}", seed)
+        say(f"{answer.report.verdict}: {answer.report.sentence}")
+        settled = answer.report.verdict in (Verdict.NAMED, Verdict.AGREES)
+        if settled or answer.report.next_run is None or number == MOST_RUNS:
+            break
+        say(f"Next: {answer.report.next_run.words}")
+        before, recipe = folder, out / f"diagnosis-{number}" / NEXT_RUN
+    return Shown(hidden, answer.report, page, number)
+
+
+def _answer(table: Path, simulation: Path, out: Path, seed: int) -> tuple[Diagnosis, Path]:
+    """Diagnose and write what `fingervision diagnose` writes."""
+    model = read_model(simulation)
+    done = diagnose(read_measured_table(table), model, seed=seed)
+    with out_folder(out):
+        made = provenance({"measured table": table, "model": simulation})
+        write_answer(out, done, model, made, table)
+    return done, out / PAGE

@@ -1,0 +1,64 @@
+"""Random effects beside an explanation: what the gains of runs and a map of position errors are estimated by.
+
+A random effect is a set of columns whose coefficients are independent standard normal numbers (Laird & Ware 1982,
+doi:10.2307/2529876); they are integrated out of the likelihood and estimated afterwards.
+"""
+
+import numpy as np
+
+from fingervision.diagnosis.inference.hypothesis_fit import Explanation, Problem
+from fingervision.domain.effect import Array
+
+LEAST_GAIN = 10.0
+"""Twice the logarithm of a Bayes factor that is very strong evidence (Kass & Raftery 1995,
+doi:10.1080/01621459.1995.10476572): what a random effect must gain beyond its price."""
+
+
+def normal_equations(problem: Problem, explanation: Explanation, raw_mm: Array) -> tuple[Array, Array]:
+    """Normal equations of columns beside an explanation, the runs' offsets integrated out.
+
+    Parameters
+    ----------
+    problem : Problem
+        Without the columns.
+    explanation : Explanation
+        Whose residual they are to explain.
+    raw_mm : ndarray of float, shape (m, k)
+        What a unit of each coefficient does to the prediction.
+
+    Returns
+    -------
+    matrix : ndarray of float, shape (k, k)
+        Of the whitened columns.
+    right : ndarray of float, shape (k,)
+        The whitened columns times the residual.
+    """
+    offsets, metric = problem.offsets, problem.offsets.metric(explanation.sigma_mm)
+    white = problem.whitener.columns(raw_mm)[0]
+    beside = white - offsets.design @ (metric @ (offsets.design.T @ white))
+    return white.T @ beside, beside.T @ explanation.residual
+
+
+def estimated_coefficients(problem: Problem, explanation: Explanation, count: int, behind: int) -> tuple[Array, Array]:
+    """Estimate a random effect's coefficients beside an explanation.
+
+    Parameters
+    ----------
+    problem : Problem
+        With the effect's columns among those that are refitted beside every explanation.
+    explanation : Explanation
+        Whose residual they explain.
+    count, behind : int
+        Columns of the effect, and columns of other random effects that stand behind them.
+
+    Returns
+    -------
+    coefficients : ndarray of float, shape (count,)
+        Posterior mean.
+    covariance : ndarray of float, shape (count, count)
+        Posterior covariance.
+    """
+    metric = problem.offsets.metric(explanation.sigma_mm)
+    every = metric @ (problem.offsets.design.T @ explanation.residual)
+    own = slice(every.size - behind - count, every.size - behind)
+    return np.asarray(every[own], dtype=np.float64), np.asarray(metric[own, own], dtype=np.float64)

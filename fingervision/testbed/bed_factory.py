@@ -1,0 +1,223 @@
+"""Build a bed from its configuration."""
+
+from contextlib import suppress
+from dataclasses import replace
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+from calib.calibration import BareScale
+from fingervision.domain.errors import FingervisionError, UsageError
+from fingervision.domain.model import Model
+from fingervision.measuring.scale import Scale
+from fingervision.models.hinge_correction import HingeTheory
+from fingervision.models.kinds import build_model, kinds
+from fingervision.models.physics import Physics
+from fingervision.storage.calibration_json import read_calibration
+from fingervision.storage.gripper_toml import read_gripper
+from fingervision.storage.toml_section import Section, read_document
+from fingervision.tables.read import read_simulation_table
+from fingervision.testbed.actuator import Actuator
+from fingervision.testbed.bed import Bed
+from fingervision.testbed.build_context import BuildContext
+from fingervision.testbed.camera import BedCamera
+from fingervision.testbed.clocks.clock import Clock, HostClock, VirtualClock
+from fingervision.testbed.device_kinds import Kind, kind_of
+from fingervision.testbed.force_sensor import ForceSensor
+from fingervision.testbed.motion.soft_limits import SoftLimits
+from fingervision.testbed.operators.operator_kinds import AtTheBed, operator_of
+from fingervision.testbed.simulation.gripper import SimulatedGripper
+from fingervision.testbed.simulation.injected_effects import NOTHING, Hidden
+from fingervision.testbed.simulation.recording_actuator import Followed
+from fingervision.testbed.simulation.sample_gripper import sample_gripper
+
+SIMULATED = "simulated"
+SCHEMA = 1
+PARTS = ("actuator", "force_sensor", "camera")
+TOP_KEYS = ("schema", "name", "seed", "below_tip_mm", *PARTS, "gripper", "limits", "scale")
+
+
+def open_bed(
+    name: str,
+    hidden: Hidden = NOTHING,
+    *,
+    pace: float = 0.0,
+    seed: int | None = None,
+    earlier_s: tuple[float, float] | None = None,
+) -> Bed:
+    """Put a bed together.
+
+    Parameters
+    ----------
+    name : str
+        `simulated`, or a configuration file (its format is in README.md).
+    hidden : Hidden
+        Effects that act in the simulated parts.
+    pace : float
+        Seconds of a wholly simulated bed in one second of the host; 0 is as fast as it goes.
+    seed : int, optional
+        Of everything random in the simulated parts; by default that of the configuration.
+    earlier_s : (float, float), optional
+        First and last time of the runs that this one follows on a wholly simulated bed: it has warmed and drifted since
+        the first, and goes on from the last.
+
+    Raises
+    ------
+    FingervisionError
+        The configuration makes no sense, or a part cannot be opened; what was open by then is closed.
+    """
+    top = read_configuration(name)
+    sections = {part: top.table(part) for part in PARTS if part in top.values}
+    if "actuator" not in sections:
+        top.refuse(None, "must have an [actuator], but has none: add it with its kind.")
+    parts = {part: kind_of(part, section) for part, section in sections.items()}
+    all_simulated = all(kind.SIMULATED for kind in parts.values())
+    has_gripper = "gripper" in top.values
+    if hidden.effects and not has_gripper:
+        raise UsageError(f"--hide must have a simulated gripper to act in, but {name} has no [gripper]: add one.")
+    clock: Clock = VirtualClock(pace, earlier_s[1] if earlier_s else 0.0) if all_simulated else HostClock()
+    context = BuildContext(
+        clock=clock,
+        folder=top.path.parent,
+        seed=top.whole("seed", 1, low=0) if seed is None else seed,
+        hidden=hidden,
+        limits=_limits(top.table("limits")),
+        scale=_scale(top.table("scale"), top.path.parent),
+        below_tip_mm=top.number("below_tip_mm", 0.3, above=0.0),
+        since_s=earlier_s[0] if earlier_s else None,
+    )
+    model = _model(top.table("gripper"), top.path.parent) if has_gripper else None
+    return _built(top, sections, parts, context, model, replays=all_simulated)
+
+
+def _built(
+    top: Section,
+    sections: dict[str, Section],
+    parts: dict[str, Kind],
+    context: BuildContext,
+    model: Model | None,
+    *,
+    replays: bool,
+) -> Bed:
+    opened: list[Any] = []
+    try:
+        actuator: Actuator = parts["actuator"].build(sections["actuator"], context)
+        opened.append(actuator)
+        limits = _within(context.limits, actuator, top.table("limits"))
+        if model is not None:
+            if context.motion is None:
+                actuator = followed = Followed(actuator)
+                context.motion = followed.motion
+            context.gripper = SimulatedGripper(model, context.motion, context.hidden, context.play_mm, context.since_s)
+        force: ForceSensor | None = None
+        if "force_sensor" in parts:
+            force = parts["force_sensor"].build(sections["force_sensor"], context)
+            opened.append(force)
+        camera: BedCamera | None = None
+        if "camera" in parts:
+            camera = parts["camera"].build(sections["camera"], context)
+            opened.append(camera)
+    except BaseException:
+        for part in opened:
+            with suppress(FingervisionError):
+                part.close()
+        raise
+    return Bed(
+        clock=context.clock,
+        actuator=actuator,
+        limits=limits,
+        operator=operator_of(camera) if replays else AtTheBed(),
+        force_sensor=force,
+        camera=camera,
+        scale=context.scale,
+        below_tip_mm=context.below_tip_mm,
+        model=model,
+        replays=replays,
+        about={
+            "name": top.word("name", top.path.stem),
+            "configuration": top.text,
+            "seed": context.seed,
+            "actuator": actuator.name,
+            "force_sensor": None if force is None else force.name,
+            "camera": None if camera is None else camera.description.name,
+        },
+    )
+
+
+def read_configuration(name: str) -> Section:
+    """Read what a bed is made of, without opening anything.
+
+    Raises
+    ------
+    FingervisionError
+        There is no such file, or it is no bed's.
+    """
+    if name == SIMULATED:
+        with resources.as_file(resources.files("fingervision.testbed").joinpath("simulated.toml")) as path:
+            document, text = read_document(path, "bed")
+        top = Section(path, text, "", document)
+    else:
+        path = Path(name)
+        if path.suffix.lower() != ".toml":
+            raise UsageError(f"--bed must be the word simulated or a file CONFIG.toml, but is {name}.")
+        document, text = read_document(path, "bed")
+        top = Section(path, text, "", document)
+    top.only(TOP_KEYS)
+    schema = top.whole("schema", low=1)
+    if schema > SCHEMA:
+        top.refuse("schema", f"must be at most {SCHEMA}, but is {schema}: use a newer fingervision.")
+    return top
+
+
+def _limits(section: Section) -> SoftLimits:
+    section.only(("lower_mm", "upper_mm", "speed_mm_s", "force_n", "gap_mm"))
+    big = float("inf")
+    lower_mm = section.number("lower_mm") if "lower_mm" in section.values else -big
+    return SoftLimits(
+        lower_mm=lower_mm,
+        upper_mm=section.number("upper_mm", above=lower_mm) if "upper_mm" in section.values else big,
+        speed_mm_s=section.number("speed_mm_s", above=0.0) if "speed_mm_s" in section.values else big,
+        force_n=section.number("force_n", above=0.0) if "force_n" in section.values else big,
+        gap_mm=section.number("gap_mm", 0.0, low=0.0),
+    )
+
+
+def _within(limits: SoftLimits, actuator: Actuator, section: Section) -> SoftLimits:
+    """Limit the bed further to what its actuator can do."""
+    able = actuator.limits
+    within = replace(
+        limits,
+        lower_mm=max(limits.lower_mm, able.lower_mm),
+        upper_mm=min(limits.upper_mm, able.upper_mm),
+        speed_mm_s=min(limits.speed_mm_s, able.speed_mm_s),
+        force_n=min(limits.force_n, able.force_n),
+    )
+    if not within.lower_mm < within.upper_mm:
+        section.refuse(
+            None,
+            f"must leave the actuator a way to go, but it reaches from {able.lower_mm:g} to {able.upper_mm:g} mm.",
+        )
+    return within
+
+
+def _scale(section: Section, folder: Path) -> Scale | None:
+    section.only(("px_per_mm", "calibration"))
+    if "calibration" in section.values:
+        return read_calibration(folder / section.word("calibration"))
+    if "px_per_mm" in section.values:
+        return BareScale(section.number("px_per_mm", above=0.0))
+    return None
+
+
+def _model(section: Section, folder: Path) -> Model:
+    section.only(("file", "columns", "kind", "large_rotation", "contact"))
+    if "file" in section.values:
+        path = folder / section.word("file")
+        if path.suffix.lower() != ".toml":
+            columns = folder / section.word("columns") if "columns" in section.values else None
+            return read_simulation_table(path, columns)
+        gripper = read_gripper(path)
+    else:
+        gripper = sample_gripper()
+    physics = Physics(large_rotation=section.flag("large_rotation"), contact=section.flag("contact"))
+    return build_model(section.word("kind", "lumped", of=kinds()), gripper, physics, HingeTheory.CORRECTED)

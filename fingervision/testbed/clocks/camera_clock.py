@@ -1,0 +1,81 @@
+"""Map a camera's clock to the bed's from the arrival times of its frames.
+
+A frame arrives no sooner than its exposure and the least latency, and now and then hardly later: the earliest arrivals
+lie on a line, whose slope is the rate and whose height is the offset plus the least latency. Arrivals alone cannot tell
+the two apart, so the least latency must be known (`Latency` of the camera).
+"""
+
+from dataclasses import dataclass
+from math import hypot, sqrt
+
+import numpy as np
+
+from fingervision.testbed.camera import Latency
+
+# The earliest of so many seconds counts.
+BIN_S = 1.0
+# Two quartz clocks part by so much in a second, as a standard deviation (30 parts in a million either, data sheets).
+LIKELY_RATE = 3e-5
+# The offset is that of the earliest frame of so many seconds; the rate is taken from all of them.
+NEWEST_BINS, MOST_BINS = 10, 600
+# Until the arrivals themselves tell how they scatter.
+FIRST_SCATTER_S = 1e-3
+
+
+@dataclass(frozen=True, slots=True)
+class CameraClock:
+    """The bed's time as a straight line over the camera's.
+
+    Parameters
+    ----------
+    camera_s, bed_s : float
+        An instant on both.
+    rate : float
+        Seconds of the bed in one of the camera's.
+    u_s : float
+        Standard uncertainty near that instant: that of the least latency, and the scatter of the earliest arrivals.
+    """
+
+    camera_s: float
+    bed_s: float
+    rate: float
+    u_s: float
+
+    def bed_at(self, camera_s: float) -> float:
+        """Time of the bed at a stamp of the camera."""
+        return self.bed_s + self.rate * (camera_s - self.camera_s)
+
+
+class ArrivalClock:
+    """Collects arrivals and fits the clock to the earliest.
+
+    Parameters
+    ----------
+    latency : Latency
+        Of the camera.
+    """
+
+    def __init__(self, latency: Latency) -> None:
+        self._latency = latency
+        # Of each bin: its beginning; stamp and delay of its earliest arrival.
+        self._bins: list[tuple[float, float, float]] = []
+
+    def add(self, camera_s: float, arrived_s: float) -> None:
+        """Take a frame."""
+        delay_s = arrived_s - self._latency.least_s - camera_s
+        if not self._bins or camera_s - self._bins[-1][0] > BIN_S:
+            self._bins = [*self._bins[-MOST_BINS + 1 :], (camera_s, camera_s, delay_s)]
+        elif delay_s < self._bins[-1][2]:
+            self._bins[-1] = (self._bins[-1][0], camera_s, delay_s)
+
+    def joined(self) -> CameraClock:
+        """Fit the clock to what came until now."""
+        _, at_s, delay_s = np.array(self._bins).T
+        about_s = float(at_s[-1])
+        since_s = at_s - at_s.mean()
+        # Scatter of the earliest arrivals from bin to bin; neighbours differ by next to nothing else.
+        scatter_s = float(np.std(np.diff(delay_s))) / sqrt(2.0) if delay_s.size > 2 else FIRST_SCATTER_S
+        # A ridge: where the arrivals tell less of the rate than the data sheets, it stays small.
+        rate = float(since_s @ delay_s) / float(since_s @ since_s + (scatter_s / LIKELY_RATE) ** 2 + 1e-12)
+        level_s = (delay_s - rate * (at_s - about_s))[-NEWEST_BINS:]
+        return CameraClock(about_s, about_s + float(level_s.min()), 1.0 + rate, hypot(self._latency.u_s, scatter_s))

@@ -1,0 +1,68 @@
+"""The bed's clock: the host's, or a virtual one that advances with the simulation."""
+
+from time import monotonic, sleep
+from typing import Protocol
+
+# A paced clock may be so much late for a moment, and catches up.
+MOST_HURRY_S = 0.05
+
+
+class Clock(Protocol):
+    """The bed's time; every `asked_s`, `got_s` and `arrived_s` is on it."""
+
+    def now_s(self) -> float:
+        """Seconds since some fixed instant."""
+        ...
+
+    def wait_until(self, time_s: float) -> None:
+        """Return at that time, or at once if it is past."""
+        ...
+
+
+class HostClock:
+    """The host's monotonic clock: of any bed with a real part."""
+
+    def now_s(self) -> float:
+        """Seconds on the host's monotonic clock."""
+        return monotonic()
+
+    def wait_until(self, time_s: float) -> None:
+        """Sleep until then."""
+        left_s = time_s - monotonic()
+        if left_s > 0.0:
+            sleep(left_s)
+
+
+class VirtualClock:
+    """Time of a bed without any real part: it passes only while somebody waits.
+
+    With a pace it goes no faster than that; what was missed, by a pause or a busy machine, is not hurried after.
+
+    Parameters
+    ----------
+    pace : float
+        Seconds of the bed in a second of the host: 1 is real time, 0 as fast as it goes.
+    begin_s : float
+        Its first time: that much has passed before.
+    """
+
+    def __init__(self, pace: float = 0.0, begin_s: float = 0.0) -> None:
+        self._now_s = begin_s
+        self._pace = pace
+        self._host_began_s: float | None = None
+
+    def now_s(self) -> float:
+        """Seconds of the bed."""
+        return self._now_s
+
+    def wait_until(self, time_s: float) -> None:
+        """Let time pass until then."""
+        self._now_s = max(self._now_s, time_s)
+        if self._pace > 0.0:
+            if self._host_began_s is None:
+                self._host_began_s = monotonic() - self._now_s / self._pace
+            left_s = self._host_began_s + self._now_s / self._pace - monotonic()
+            if left_s > 0.0:
+                sleep(left_s)
+            elif left_s < -MOST_HURRY_S:
+                self._host_began_s -= left_s

@@ -1,0 +1,80 @@
+"""Run a sequence of step data on a bed."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+from fingervision.domain.errors import FingervisionError
+from fingervision.domain.step_data import StepData
+from fingervision.storage.steps_toml import read_steps
+from fingervision.testbed.actuator import StageLimits
+from fingervision.testbed.bed import Bed
+from fingervision.testbed.bed_factory import SIMULATED, open_bed, read_configuration
+from fingervision.testbed.manual import manual_control
+from fingervision.testbed.motion.published_stage import PUBLISHED, stage_limits
+from fingervision.testbed.motion.step_checks import PlannedMotion, planned_sequence
+
+
+def step_limits(bed_name: str) -> StageLimits:
+    """What the stage of a bed can do, without opening it; the published figures where its file states no others."""
+    if bed_name == SIMULATED:
+        return PUBLISHED
+    return stage_limits(read_configuration(bed_name).table("actuator"))
+
+
+def run_sequence(data: StepData, bed_name: str, say: Callable[[str], Any]) -> None:
+    """Home, then run the sequence; the whole of it is held against the bed's limits before anything moves.
+
+    An actuator that keeps no step data goes to each target at the step's peak speed.
+
+    Raises
+    ------
+    FingervisionError
+        The bed cannot do it, or its motor controller keeps other steps than these.
+    """
+    if bed_name != SIMULATED:
+        _check_kept(data, bed_name)
+    bed = open_bed(bed_name)
+    try:
+        motions = planned_sequence(data, _within(bed), from_mm=0.0)
+        say(f"homed: {manual_control.home(bed):.3f} mm")
+        for motion in motions:
+            at_mm = _run(bed, motion)
+            say(f"step {motion.number}: {motion.from_mm:.3f} to {motion.to_mm:.3f} mm, stands at {at_mm:.3f} mm")
+    finally:
+        bed.close()
+
+
+def _run(bed: Bed, motion: PlannedMotion) -> float:
+    if bed.actuator.has_steps:
+        return manual_control.run_step(bed, motion.number)
+    if motion.motion.speed_mm_s == 0.0:
+        return bed.actuator.readings()[-1].value
+    return manual_control.move(bed, motion.to_mm, motion.motion.speed_mm_s)
+
+
+def _within(bed: Bed) -> StageLimits:
+    limits = bed.limits
+    return replace(
+        bed.actuator.limits,
+        lower_mm=limits.lower_mm,
+        upper_mm=limits.upper_mm,
+        speed_mm_s=limits.speed_mm_s,
+        force_n=limits.force_n,
+    )
+
+
+def _check_kept(data: StepData, bed_name: str) -> None:
+    """Refuse to run steps by their numbers if the motor controller keeps others under these."""
+    top = read_configuration(bed_name)
+    section = top.table("actuator")
+    if "steps" not in section.values:
+        return
+    path = top.path.parent / section.word("steps")
+    kept = read_steps(path)
+    for number, step in data.steps.items():
+        if kept.steps.get(number) != step:
+            raise FingervisionError(
+                f"Step {number} must be the one that the motor controller keeps, but {path} has another: put these "
+                "steps into the controller with its maker's tool, and name them in the bed's configuration."
+            )

@@ -1,0 +1,51 @@
+"""Stopping a bed, also one that another process drives."""
+
+import os
+import signal
+from time import monotonic, sleep
+
+from fingervision.domain.errors import FingervisionError
+from fingervision.testbed.bed_factory import SIMULATED, open_bed, read_configuration
+from fingervision.testbed.device_kinds import kind_of
+
+LETS_GO_WITHIN_S = 5.0
+LOOK_EVERY_S = 0.02
+
+
+def stop_bed(name: str) -> str:
+    """Stop a bed's motor, and say what was done.
+
+    Parameters
+    ----------
+    name : str
+        `simulated`, or a configuration file.
+
+    Raises
+    ------
+    FingervisionError
+        The bed cannot be opened, or the other process does not let go of it.
+    """
+    if name == SIMULATED:
+        return "The simulated bed stands: its motor moves only while a command runs."
+    top = read_configuration(name)
+    section = top.table("actuator")
+    find_holder = getattr(kind_of("actuator", section), "holder", None)
+    process = None if find_holder is None else find_holder(section, top.path.parent)
+    words = ""
+    if process is not None:
+        os.kill(process, signal.SIGTERM)
+        until_s = monotonic() + LETS_GO_WITHIN_S
+        while find_holder is not None and find_holder(section, top.path.parent) is not None:
+            if monotonic() > until_s:
+                raise FingervisionError(
+                    f"Process {process} must let go of the bed within {LETS_GO_WITHIN_S:g} s, but does not: take the "
+                    "motor's supply away."
+                )
+            sleep(LOOK_EVERY_S)
+        words = f"Process {process}, which drove the bed, was ended. "
+    bed = open_bed(name)
+    try:
+        bed.actuator.stop()
+    finally:
+        bed.close()
+    return f"{words}The motor stands, and all its lines are off."

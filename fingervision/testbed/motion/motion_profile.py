@@ -1,0 +1,143 @@
+"""Trapezoidal speed profile of one motion: acceleration, constant speed, deceleration.
+
+The formulas are those of uniformly accelerated motion. With equal accelerations the triangle of distance s and time T
+has its peak at v = 2 s / T with a = 4 s / T^2; the trapezoid of top speed v takes T = s / v + v / a. Which shape a real
+controller gives a block in cycle-time entry is not published: here it is the one with the least acceleration, hence
+the least force, that keeps the top speed.
+"""
+
+from dataclasses import dataclass
+from math import inf, sqrt
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fingervision.domain.step_data import CycleTime, SpeedEntry
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class MotionProfile:
+    """One motion from stand to stand.
+
+    Parameters
+    ----------
+    distance_mm : float
+        Signed.
+    speed_mm_s : float
+        Peak speed, not negative.
+    speeding_s, cruising_s, slowing_s : float
+        Lengths of the three parts, not negative.
+    """
+
+    distance_mm: float
+    speed_mm_s: float
+    speeding_s: float
+    cruising_s: float
+    slowing_s: float
+
+    @property
+    def seconds(self) -> float:
+        """Time from stand to stand."""
+        return self.speeding_s + self.cruising_s + self.slowing_s
+
+    @property
+    def acceleration_mm_s2(self) -> float:
+        """Acceleration while speeding up; 0 without a motion."""
+        return self.speed_mm_s / self.speeding_s if self.speeding_s > 0.0 else 0.0
+
+    @property
+    def deceleration_mm_s2(self) -> float:
+        """Deceleration while slowing down; 0 without a motion."""
+        return self.speed_mm_s / self.slowing_s if self.slowing_s > 0.0 else 0.0
+
+    def speeds_mm_s(self, time_s: Floats) -> Floats:
+        """Signed speed at times from the start; 0 before and after.
+
+        Parameters
+        ----------
+        time_s : ndarray of float, shape (n,)
+            Seconds since the start.
+
+        Returns
+        -------
+        ndarray of float, shape (n,)
+        """
+        knots_s, knots_mm_s = self._knots()
+        return np.interp(time_s, knots_s, knots_mm_s)
+
+    def travelled_mm(self, time_s: Floats) -> Floats:
+        """Signed way gone at times from the start: the integral of the speed.
+
+        Parameters
+        ----------
+        time_s : ndarray of float, shape (n,)
+            Seconds since the start.
+
+        Returns
+        -------
+        ndarray of float, shape (n,)
+        """
+        sign = np.sign(self.distance_mm)
+        up = np.clip(time_s, 0.0, self.speeding_s)
+        level = np.clip(time_s - self.speeding_s, 0.0, self.cruising_s)
+        down = np.clip(time_s - self.speeding_s - self.cruising_s, 0.0, self.slowing_s)
+        way = 0.5 * self.acceleration_mm_s2 * up**2 + self.speed_mm_s * level
+        way += self.speed_mm_s * down - 0.5 * self.deceleration_mm_s2 * down**2
+        return np.asarray(sign * way, dtype=np.float64)
+
+    def _knots(self) -> tuple[Floats, Floats]:
+        peak_mm_s = np.sign(self.distance_mm) * self.speed_mm_s
+        slowing_at_s = self.speeding_s + self.cruising_s
+        return np.array([0.0, self.speeding_s, slowing_at_s, self.seconds]), np.array([0.0, peak_mm_s, peak_mm_s, 0.0])
+
+
+def shortest_s(distance_mm: float, top_speed_mm_s: float, top_acceleration_mm_s2: float) -> float:
+    """Least time from stand to stand within a top speed and a top acceleration.
+
+    Examples
+    --------
+    >>> shortest_s(10.0, 400.0, 16000.0)
+    0.05
+    """
+    way_mm = abs(distance_mm)
+    if way_mm * top_acceleration_mm_s2 <= top_speed_mm_s**2:
+        return 2.0 * sqrt(way_mm / top_acceleration_mm_s2)
+    return way_mm / top_speed_mm_s + (top_speed_mm_s / top_acceleration_mm_s2 if top_acceleration_mm_s2 < inf else 0.0)
+
+
+def profile(distance_mm: float, entry: CycleTime | SpeedEntry, top_speed_mm_s: float) -> MotionProfile:
+    """Profile of a motion as its block asks for it.
+
+    Parameters
+    ----------
+    distance_mm : float
+        Signed.
+    entry : CycleTime or SpeedEntry
+        How it is timed. A positioning time must be longer than the way at top speed.
+    top_speed_mm_s : float
+        What the stage can do; only cycle-time entry needs it, to choose the shape.
+    """
+    if isinstance(entry, CycleTime):
+        return _in_time(distance_mm, entry.positioning_time_s, top_speed_mm_s)
+    return _at_speed(distance_mm, entry)
+
+
+def _in_time(distance_mm: float, seconds: float, top_speed_mm_s: float) -> MotionProfile:
+    way_mm = abs(distance_mm)
+    peak_mm_s = 2.0 * way_mm / seconds
+    if peak_mm_s <= top_speed_mm_s:
+        return MotionProfile(distance_mm, peak_mm_s, 0.5 * seconds, 0.0, 0.5 * seconds)
+    speeding_s = seconds - way_mm / top_speed_mm_s
+    return MotionProfile(distance_mm, top_speed_mm_s, speeding_s, seconds - 2.0 * speeding_s, speeding_s)
+
+
+def _at_speed(distance_mm: float, entry: SpeedEntry) -> MotionProfile:
+    way_mm, up, down = abs(distance_mm), entry.acceleration_mm_s2, entry.deceleration_mm_s2
+    peak_mm_s = min(entry.speed_mm_s, sqrt(2.0 * way_mm * up * down / (up + down)))
+    speeding_s, slowing_s = peak_mm_s / up, peak_mm_s / down
+    cruising_mm = max(0.0, way_mm - 0.5 * peak_mm_s * (speeding_s + slowing_s))
+    return MotionProfile(
+        distance_mm, peak_mm_s, speeding_s, cruising_mm / peak_mm_s if peak_mm_s > 0.0 else 0.0, slowing_s
+    )

@@ -1,0 +1,121 @@
+"""The sequence of step data blocks that leads to a position.
+
+A controller on parallel lines knows no other targets than those of its blocks.
+"""
+
+from collections.abc import Iterator, Mapping
+from math import copysign
+
+from fingervision.domain.errors import FingervisionError
+from fingervision.domain.step_data import Coordinates, CycleTime, Operation, Step
+from fingervision.testbed.motion.motion_profile import profile
+
+# Targets are typed with three decimals, and sums of steps round; the stage itself stands within 0.09 mm.
+SAME_MM = 1e-3
+SAME_SPEED = 0.01
+MOST_BLOCKS = 200
+
+
+def nominal_speed_mm_s(step: Step, way_mm: float, top_speed_mm_s: float) -> float:
+    """Speed that a block states, or that its positioning time asks for."""
+    if isinstance(step.entry, CycleTime):
+        return profile(way_mm, step.entry, top_speed_mm_s).speed_mm_s
+    return step.entry.speed_mm_s
+
+
+def route(
+    steps: Mapping[int, Step], at_mm: float | None, to_mm: float, speed_mm_s: float, top_speed_mm_s: float
+) -> tuple[int, ...]:
+    """Numbers of the moving blocks that lead to a position without being faster than asked.
+
+    An absolute block is taken before a repeated relative one, that before an absolute block with relative ones after
+    it; of several the fastest, with the fewest blocks.
+
+    Parameters
+    ----------
+    steps : mapping of int to Step
+        What the controller keeps.
+    at_mm : float or None
+        Where the stage stands; None if that is not known, so that only absolute blocks lead anywhere.
+    to_mm : float
+        Where to.
+    speed_mm_s : float
+        Highest speed.
+    top_speed_mm_s : float
+        That of the stage.
+
+    Raises
+    ------
+    FingervisionError
+        No blocks lead there, or only faster ones.
+    """
+    if at_mm is not None and abs(to_mm - at_mm) <= SAME_MM:
+        return ()
+    found = list(_routes(steps, at_mm, to_mm, top_speed_mm_s))
+    slow_enough = [each for each in found if each[1] <= speed_mm_s * (1.0 + SAME_SPEED)]
+    if slow_enough:
+        return max(slow_enough, key=lambda each: (-each[2], each[1], -len(each[0])))[0]
+    if found:
+        slowest = min(speed for _, speed, _ in found)
+        raise FingervisionError(
+            f"The move to {to_mm:g} mm must not be faster than {speed_mm_s:g} mm/s, but the slowest step that leads "
+            f"there goes at {slowest:.4g} mm/s: allow that, or give the controller a slower step."
+        )
+    targets = ", ".join(
+        f"{each.target_mm:g}" for each in _moving(steps).values() if each.coordinates is Coordinates.ABSOLUTE
+    )
+    raise FingervisionError(
+        f"A step must lead to {to_mm:g} mm, but none does: the controller goes to {targets or 'no position'} mm, and "
+        f"by its relative steps from there. Give it a step to {to_mm:g} mm, or change the move."
+    )
+
+
+def _moving(steps: Mapping[int, Step]) -> dict[int, Step]:
+    return {number: step for number, step in steps.items() if step.operation is Operation.MOVING}
+
+
+def _routes(
+    steps: Mapping[int, Step], at_mm: float | None, to_mm: float, top_speed_mm_s: float
+) -> Iterator[tuple[tuple[int, ...], float, int]]:
+    """Each way there: blocks, its highest speed, and how roundabout its kind is."""
+    moving = _moving(steps)
+    absolute = {n: step for n, step in moving.items() if step.coordinates is Coordinates.ABSOLUTE}
+    starts: list[tuple[tuple[int, ...], float, float, int]] = []
+    if at_mm is not None:
+        starts.append(((), at_mm, 0.0, 1))
+    for number, step in absolute.items():
+        way_mm = step.target_mm - (at_mm if at_mm is not None else to_mm)
+        speed = nominal_speed_mm_s(step, way_mm, top_speed_mm_s)
+        if abs(step.target_mm - to_mm) <= SAME_MM:
+            yield (number,), speed, 0
+        starts.append(((number,), step.target_mm, speed, 2))
+    for before, from_mm, speed, kind in starts:
+        for number, step in moving.items():
+            if step.coordinates is Coordinates.RELATIVE and step.target_mm != 0.0:
+                count = round((to_mm - from_mm) / step.target_mm)
+                if 1 <= count <= MOST_BLOCKS and abs(from_mm + count * step.target_mm - to_mm) <= SAME_MM:
+                    own = nominal_speed_mm_s(step, step.target_mm, top_speed_mm_s)
+                    yield before + count * (number,), max(speed, own), kind
+
+
+def jog_step(steps: Mapping[int, Step], speed_mm_s: float, top_speed_mm_s: float) -> int:
+    """Number of the relative block to repeat for a jog: the fastest in that direction that is not too fast.
+
+    Raises
+    ------
+    FingervisionError
+        There is none.
+    """
+    speeds = {
+        number: nominal_speed_mm_s(step, step.target_mm, top_speed_mm_s)
+        for number, step in _moving(steps).items()
+        if step.coordinates is Coordinates.RELATIVE and step.target_mm * copysign(1.0, speed_mm_s) > 0.0
+    }
+    fine = [number for number, speed in speeds.items() if speed <= abs(speed_mm_s) * (1.0 + SAME_SPEED)]
+    if not fine:
+        sign = "positive" if speed_mm_s > 0.0 else "negative"
+        raise FingervisionError(
+            f"A jog at {speed_mm_s:g} mm/s must have a relative step with a {sign} target that is no faster, but the "
+            "controller has none: give it one."
+        )
+    return max(fine, key=lambda number: speeds[number])

@@ -1,0 +1,72 @@
+"""The kinds of operators: a person at the terminal, or nobody where the device is simulated."""
+
+from dataclasses import replace
+
+from fingervision.domain.errors import FingervisionError
+from fingervision.testbed.camera import BedCamera
+from fingervision.testbed.cameras.simulated import SHIFT_MM, SimulatedCamera
+from fingervision.testbed.operators.operator import Operator
+from fingervision.testbed.terminal import TERMINAL
+
+
+class AtTheBed:
+    """A person who is asked on the terminal, and says when it is done."""
+
+    def turn_part(self) -> None:
+        """Ask for it."""
+        self._ask("Turn the part by 180 degrees in the picture.")
+
+    def shift_picture(self) -> None:
+        """Ask for it."""
+        self._ask("Shift the camera, so that the fingers stand elsewhere in the picture.")
+
+    def put_in_slot(self, size_mm: float) -> None:
+        """Ask for it."""
+        self._ask(f"Put the reference slot of {size_mm:g} mm in the fingers' plane before the camera.")
+
+    def take_out_slot(self) -> None:
+        """Ask for it."""
+        self._ask("Take the reference slot away, so that the camera sees the fingers again.")
+
+    def _ask(self, words: str) -> None:
+        if TERMINAL.ask(f"{words} Press Enter when it is done: ") is None:
+            raise FingervisionError(
+                f"The recipe asks the operator ({words.rstrip('.').lower()}), but nobody is at the terminal: run it "
+                "from one."
+            )
+
+
+class AtTheSimulation:
+    """Nobody: the simulated part is laid otherwise at once.
+
+    Parameters
+    ----------
+    camera : SimulatedCamera
+        Before which it lies.
+    """
+
+    def __init__(self, camera: SimulatedCamera) -> None:
+        self._camera = camera
+
+    def turn_part(self) -> None:
+        """Turn it."""
+        placed = self._camera.placed
+        self._camera.place(replace(placed, turned=not placed.turned))
+
+    def shift_picture(self) -> None:
+        """Shift it, and the next time back."""
+        placed = self._camera.placed
+        self._camera.place(replace(placed, shift_mm=SHIFT_MM - placed.shift_mm))
+
+    def put_in_slot(self, size_mm: float) -> None:
+        """Draw a slot instead."""
+        self._camera.place(replace(self._camera.placed, slot_mm=size_mm))
+
+    def take_out_slot(self) -> None:
+        """Draw the fingers again."""
+        self._camera.place(replace(self._camera.placed, slot_mm=None))
+
+
+def operator_of(camera: BedCamera | None) -> Operator:
+    """Choose who works at a simulated bed."""
+    return AtTheSimulation(camera) if isinstance(camera, SimulatedCamera) else AtTheBed()

@@ -1,0 +1,1 @@
+"""A recipe on a bed: planned, checked, watched while it moves, recorded."""

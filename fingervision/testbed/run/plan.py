@@ -1,0 +1,149 @@
+"""From a recipe to its motion segments, checked as a whole before anything moves."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from fingervision.domain.model import Model
+from fingervision.domain.recipe import Recipe
+from fingervision.storage.toml_section import Section
+from fingervision.testbed.motion.soft_limits import SoftLimits
+from fingervision.testbed.recipe_kinds import kind_of
+from fingervision.testbed.recipe_kinds.sine import fastest_mm_s
+from fingervision.testbed.run.motion_segments import Close, Go, Leg, Rezero, Slot, Stand, Swing
+
+# Rounding of positions in a recipe and in a limit is no trespass.
+SLACK_MM = 1e-9
+# What one frame at a point costs beside its own time: settling.
+SETTLE_S = 0.3
+REZERO_S = 2.0
+
+
+@dataclass(frozen=True, slots=True)
+class Plan:
+    """What the bed will do.
+
+    Parameters
+    ----------
+    legs : tuple of Leg
+        In order.
+    seconds : tuple of float
+        Expected time of each.
+    """
+
+    legs: tuple[Leg, ...]
+    seconds: tuple[float, ...]
+
+
+def plan(
+    recipe: Recipe[Section], limits: SoftLimits, model: Model | None, start_mm: float, rate_hz: float, view_mm: float
+) -> Plan:
+    """Read all steps and hold them against the limits.
+
+    Parameters
+    ----------
+    recipe : Recipe
+        As it was read.
+    limits : SoftLimits
+        Of the bed.
+    model : Model or None
+        Of the gripper: what gap and force its positions mean.
+    start_mm : float
+        Where the stage is.
+    rate_hz : float
+        Of the camera.
+    view_mm : float
+        Width of what it sees.
+
+    Raises
+    ------
+    FingervisionError
+        A step is beyond a limit, or makes no sense: which line, and by how much.
+    """
+    if recipe.below_force_n > limits.force_n:
+        top = Section(recipe.steps[0].path, recipe.text, "", {})
+        _beyond(top, "below_force_n", recipe.below_force_n, limits.force_n, "N", "force")
+    legs: list[Leg] = []
+    seconds: list[float] = []
+    at_mm = start_mm
+    for number, section in enumerate(recipe.steps, start=1):
+        for act, key in kind_of(section).acts(section, at_mm):
+            leg = Leg(act, number, section, key)
+            if isinstance(act, Slot) and act.size_mm >= view_mm:
+                words = f"must be less than the {view_mm:.3g} mm that the camera sees, but is {act.size_mm:g}."
+                section.refuse(key, words)
+            _check(leg, limits, model, recipe.below_force_n)
+            lasts_s, at_mm = _lasts(leg, at_mm, limits, rate_hz)
+            legs.append(leg)
+            seconds.append(lasts_s)
+    return Plan(tuple(legs), tuple(seconds))
+
+
+def _lasts(leg: Leg, at_mm: float, limits: SoftLimits, rate_hz: float) -> tuple[float, float]:
+    """Time of a leg and where the stage is after it."""
+    match leg.act:
+        case Go(to_mm, speed, frames):
+            return abs(to_mm - at_mm) / speed + _points_s(frames, rate_hz), to_mm
+        case Stand(stands_s, frames):
+            return stands_s + _points_s(frames, rate_hz), at_mm
+        case Swing(mean_mm, _, frequency_hz, cycles):
+            return cycles / frequency_hz, mean_mm
+        case Close(speed, _):
+            # Where it meets something is not known: whatever follows begins with its own way.
+            return abs(at_mm - limits.lower_mm) / speed, limits.lower_mm - SLACK_MM
+        case Rezero():
+            return REZERO_S, 0.0
+    return 1.0, at_mm
+
+
+def _points_s(frames: int | None, rate_hz: float) -> float:
+    return frames / rate_hz + SETTLE_S if frames else 0.0
+
+
+def _check(leg: Leg, limits: SoftLimits, model: Model | None, below_force_n: float) -> None:
+    section, act = leg.section, leg.act
+    if isinstance(act, Go | Close) and act.speed_mm_s > limits.speed_mm_s:
+        _beyond(section, "speed_mm_s", act.speed_mm_s, limits.speed_mm_s, "mm/s", "speed")
+    if isinstance(act, Swing) and fastest_mm_s(act) > limits.speed_mm_s:
+        _beyond(section, "frequency_hz", fastest_mm_s(act), limits.speed_mm_s, "mm/s", "speed of the sine")
+    if isinstance(act, Close) and act.below_force_n > min(limits.force_n, below_force_n):
+        _beyond(section, "below_force_n", act.below_force_n, min(limits.force_n, below_force_n), "N", "force")
+    for at_mm in _reached_mm(leg):
+        if at_mm > limits.upper_mm + SLACK_MM:
+            _beyond(section, leg.key, at_mm, limits.upper_mm, "mm", "position")
+        if at_mm < limits.lower_mm - SLACK_MM:
+            _below(section, leg.key, at_mm, limits.lower_mm, "position")
+        if model is None:
+            continue
+        answer = model.respond(np.array([at_mm]))
+        if answer.force_n is not None and abs(float(answer.force_n[0])) > min(limits.force_n, below_force_n):
+            needed_n = abs(float(answer.force_n[0]))
+            _beyond(section, leg.key, needed_n, min(limits.force_n, below_force_n), "N", f"force at {at_mm:g} mm")
+        if float(answer.gap_mm[0]) < limits.gap_mm - SLACK_MM:
+            _below(section, leg.key, float(answer.gap_mm[0]), limits.gap_mm, f"gap at {at_mm:g} mm")
+
+
+def _reached_mm(leg: Leg) -> Iterator[float]:
+    match leg.act:
+        case Go(to_mm, _, _):
+            yield to_mm
+        case Swing(mean_mm, amplitude_mm, _, _):
+            yield mean_mm - amplitude_mm
+            yield mean_mm + amplitude_mm
+
+
+def _beyond(section: Section, key: str, value: float, limit: float, unit: str, what: str) -> None:
+    section.refuse(
+        key,
+        f"leads beyond the bed's limit of {what}, {limit:g} {unit}: it needs {value:g}, which is "
+        f"{value - limit:.3g} {unit} too much. Nothing was moved.",
+    )
+
+
+def _below(section: Section, key: str, value: float, limit: float, what: str) -> None:
+    section.refuse(
+        key,
+        f"leads below the bed's limit of {what}, {limit:g} mm: it needs {value:g}, which is "
+        f"{limit - value:.3g} mm too little. Nothing was moved.",
+    )

@@ -1,0 +1,43 @@
+"""Whether the actuator can make every move of a plan from where the one before ends."""
+
+from math import tau
+
+from fingervision.domain.errors import FingervisionError
+from fingervision.testbed.bed import Bed
+from fingervision.testbed.run.motion_segments import Close, Go, Rezero, Swing
+from fingervision.testbed.run.plan import Plan
+
+
+def check_moves(plan: Plan, bed: Bed, at_mm: float) -> None:
+    """Refuse a plan that the actuator cannot follow: a motor controller goes only where its step data lead.
+
+    Raises
+    ------
+    FingervisionError
+        With the line of the recipe, and the actuator's reason.
+    """
+    for leg in plan.legs:
+        to_mm, speed_mm_s = at_mm, 0.0
+        match leg.act:
+            case Go(to, speed):
+                to_mm, speed_mm_s = to, speed
+            case Swing(mean, amplitude, frequency_hz):
+                if bed.actuator.has_steps:
+                    raise FingervisionError(
+                        f"kind in {leg.section.at('kind')} cannot be done: A sine must be driven in short moves to "
+                        "anywhere on its way, but this actuator goes only where its step data lead. Use a triangle or "
+                        "a staircase between two of its steps. Nothing was moved."
+                    )
+                to_mm, speed_mm_s = mean + amplitude, tau * frequency_hz * abs(amplitude)
+            case Close(speed):
+                to_mm, speed_mm_s = bed.limits.lower_mm, speed
+            case Rezero():
+                at_mm = 0.0
+                continue
+        if to_mm == at_mm:
+            continue
+        try:
+            bed.actuator.check(at_mm, to_mm, speed_mm_s)
+        except FingervisionError as error:
+            raise FingervisionError(f"{leg.key} in {leg.section.at(leg.key)} cannot be done: {error}") from error
+        at_mm = to_mm

@@ -1,0 +1,158 @@
+"""Run a plan segment by segment; on any failure the motor is stopped first."""
+
+from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import dataclass, field
+from datetime import UTC, datetime
+from typing import Any
+
+from fingervision.domain.errors import FingervisionError
+from fingervision.storage.samples_csv import SampleRow
+from fingervision.testbed.manual import manual_control
+from fingervision.testbed.run import step_executor
+from fingervision.testbed.run.motion_segments import Close, Go, Leg, Rezero, Shift, Slot, Stand, Swing, Turn
+from fingervision.testbed.run.plan import Plan
+from fingervision.testbed.run.run_record import Counts
+from fingervision.testbed.run.safety_monitor import Watch
+
+# The clocks are joined by so many frames before anything moves; in the last of them the fingers are looked for.
+FIRST_FRAMES = 75
+# A recorded run begins at rest.
+REST_FRAMES = 5
+
+Progress = Callable[[float, float], None]
+
+
+@dataclass(slots=True)
+class Runner:
+    """Runs a plan from where the record's rows end.
+
+    A bed that replays is taken through the whole plan again; what is in the folder already is not drawn, measured or
+    written a second time. On any other bed the run goes on with the leg in which it broke off, as a run of its own.
+
+    Parameters
+    ----------
+    plan : Plan
+        What.
+    watch : Watch
+        Where, and what is seen there.
+    on_progress : callable
+        Told the seconds done, and those expected in all.
+    """
+
+    plan: Plan
+    watch: Watch
+    on_progress: Progress
+    _slots: list[dict[str, float]] = field(default_factory=list)
+
+    def follow(self, last: SampleRow) -> None:
+        """Go on from the last row of an earlier run; to be called first."""
+        if self.watch.bed.replays:
+            self.watch.record.follow_replayed(last)
+        else:
+            self.watch.record.follow(last, self.watch.bed.clock.now_s())
+
+    def execute(self) -> Counts:
+        """Run it to its end.
+
+        Raises
+        ------
+        StoppedError
+            The user ended it.
+        FingervisionError
+            A limit was met, an instrument failed, or no fingers are in view; the motor stands then.
+        """
+        watch, actuator, replays = self.watch, self.watch.bed.actuator, self.watch.bed.replays
+        try:
+            # A simulation's motor moves only while this thread lets time pass.
+            with watch.controls.listening((lambda: None) if replays else actuator.stop):
+                self._execute()
+        except BaseException:
+            actuator.stop()
+            if not replays:
+                # Where the stage was last is as well known as it ever will be; a bed that replays sees it again.
+                with suppress(FingervisionError):
+                    watch.record.write(at_once=True)
+            raise
+        return watch.record.counts
+
+    def found(self) -> dict[str, Any]:
+        """What run.json says of the run at its end."""
+        counts = self.watch.record.counts
+        return {
+            "frames": counts.recorded,
+            "frames_with_gap": counts.with_gap,
+            "frames_lost": counts.lost,
+            "clocks": self.watch.sight.clocks(),
+            "reference_slots": self._slots,
+        }
+
+    def _execute(self) -> None:
+        watch, record = self.watch, self.watch.record
+        if not watch.bed.replays:
+            # A real stage is sent to its reference first: where it stands nobody knows. Not without fingers in view.
+            watch.find_fingers()
+            watch.say(f"homed: {manual_control.home(watch.bed):.3f} mm")
+        for _ in range(FIRST_FRAMES - 1):
+            watch.look()
+        watch.find_fingers()
+        first = self._first_leg()
+        total_s, done_s = sum(self.plan.seconds), sum(self.plan.seconds[:first])
+        record.event("began", f"{len(self.plan.legs)} legs.")
+        self._rest(first)
+        for number, (leg, seconds) in enumerate(zip(self.plan.legs, self.plan.seconds, strict=True)):
+            if number < first:
+                continue
+            watch.leg = leg
+            words = f"Step {leg.step}: {leg.words}."
+            record.event("leg", words, leg=number, step=leg.step, frame=record.counts.recorded)
+            self._do(leg, number)
+            done_s += seconds
+            self.on_progress(done_s, total_s)
+        record.write(at_once=True)
+        record.event("clocks", "The instruments' clocks beside the bed's.", **watch.sight.clocks())
+        record.event("ended", f"{record.counts.recorded} frames.")
+
+    def _first_leg(self) -> int:
+        """Leg to begin with: 0, or the one in which a bed that cannot replay broke off."""
+        folder = self.watch.record.folder
+        if self.watch.bed.replays or not folder.resumed:
+            return 0
+        self.watch.record.go_on((datetime.now(UTC) - folder.began_at).total_seconds())
+        legs = [event for event in folder.events_done if event["event"] == "leg"]
+        return int(legs[-1]["leg"]) if legs else 0
+
+    def _do(self, leg: Leg, number: int) -> None:
+        watch = self.watch
+        match leg.act:
+            case Go():
+                step_executor.go(watch, leg.act)
+            case Stand():
+                step_executor.stand(watch, leg.act)
+            case Swing():
+                step_executor.swing(watch, leg.act)
+            case Close():
+                step_executor.close(watch, leg.act)
+            case Slot():
+                self._slots.append(step_executor.slot(watch, leg.act))
+            case Rezero():
+                step_executor.rezero(watch)
+                self._new_run(number, turned=watch.record.turned, rezeroed=True)
+            case Turn():
+                watch.bed.operator.turn_part()
+                self._new_run(number, turned=not watch.record.turned)
+            case Shift():
+                watch.bed.operator.shift_picture()
+                self._new_run(number, turned=watch.record.turned)
+
+    def _new_run(self, leg: int, *, turned: bool, rezeroed: bool = False) -> None:
+        self.watch.record.new_run(turned=turned, rezeroed=rezeroed)
+        self._rest(leg + 1)
+
+    def _rest(self, leg: int) -> None:
+        """Record the rest that a run begins with, if what follows is recorded continuously."""
+        following = self.plan.legs[leg].act if leg < len(self.plan.legs) else None
+        moves_on = isinstance(following, Swing | Close)
+        if moves_on or (isinstance(following, Go | Stand) and following.frames is None):
+            for _ in range(REST_FRAMES):
+                self.watch.see(record=True)

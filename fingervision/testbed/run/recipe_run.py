@@ -1,0 +1,103 @@
+"""Run a recipe on a bed: plan it, check it, run it, record it."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from fingervision.domain.recipe import Recipe
+from fingervision.measuring.rehearsal import rehearse
+from fingervision.storage.samples_csv import SampleRow
+from fingervision.storage.toml_section import Section
+from fingervision.testbed.bed import Bed
+from fingervision.testbed.run.controls import Controls
+from fingervision.testbed.run.plan import Plan, plan
+from fingervision.testbed.run.plan_feasibility import check_moves
+from fingervision.testbed.run.plan_runner import Progress, Runner
+from fingervision.testbed.run.run_folder import BedRunFolder
+from fingervision.testbed.run.run_record import Counts, RunRecord
+from fingervision.testbed.run.safety_monitor import Say, Watch
+from fingervision.testbed.run.synchronised_acquisition import Sight
+from fingervision.testbed.simulation.injected_effects import NOTHING, Hidden
+
+
+@dataclass(frozen=True, slots=True)
+class RunDone:
+    """A run that came to its end.
+
+    Parameters
+    ----------
+    folder : Path
+        Its files.
+    counts : Counts
+        What became of the frames.
+    resumed_after : int
+        Frames that were there before; 0 for a new run.
+    """
+
+    folder: Path
+    counts: Counts
+    resumed_after: int
+
+
+def run_recipe(
+    recipe: Recipe[Section],
+    bed: Bed,
+    out: Path,
+    hidden: Hidden = NOTHING,
+    *,
+    before: Sequence[SampleRow] = (),
+    controls: Controls | None = None,
+    on_progress: Progress = lambda done, total: None,
+    say: Say = lambda words: None,
+    on_plan: Callable[[Plan], None] = lambda planned: None,
+) -> RunDone:
+    """Run a recipe; nothing moves before all of it was held against the limits and the fingers were seen.
+
+    Parameters
+    ----------
+    recipe : Recipe
+        What to do.
+    bed : Bed
+        Where; it is left open.
+    out : Path
+        Folder for the run; one that broke off is gone on with.
+    hidden : Hidden
+        What the bed was put together with.
+    before : sequence of SampleRow
+        Rows of an earlier run on this bed, which this one goes on from: its runs are numbered on, on the same clock.
+    controls : Controls, optional
+        Pause and stop.
+    on_progress, say, on_plan : callable
+        Told of the way: seconds done and expected, sentences, and the plan before it is run.
+
+    Raises
+    ------
+    FingervisionError
+        In a sentence; the motor stands, and the folder is valid.
+    """
+    if not bed.replays:
+        # Compiling holds all threads up for longer than a board lets its motor go on without a word.
+        rehearse(lambda _, words: say(words))
+    sight = Sight(bed)
+    sight.position.read()
+    # A real stage is sent to its reference before the first leg.
+    at_mm = sight.position.newest if bed.replays else 0.0
+    planned = plan(recipe, bed.limits, bed.model, at_mm, sight.rate_hz, sight.width_mm)
+    check_moves(planned, bed, at_mm)
+    on_plan(planned)
+    folder = BedRunFolder(out, recipe, bed, hidden, before)
+    try:
+        size_px = (sight.camera.description.width_px, sight.camera.description.height_px)
+        left = max(sum(planned.seconds) * sight.rate_hz - len(folder.rows), 0.0)
+        folder.needs_room(left, size_px)
+        record = RunRecord(folder, lambda bed_s, at_once: sight.position.at(bed_s, at_once=at_once))
+        watch = Watch(bed, sight, record, controls or Controls(), recipe.below_force_n, say)
+        runner = Runner(planned, watch, on_progress)
+        if before:
+            runner.follow(before[-1])
+        counts = runner.execute()
+        folder.finish(runner.found())
+    except BaseException as error:
+        folder.break_off(str(error) or type(error).__name__)
+        raise
+    return RunDone(out, counts, len(folder.rows))

@@ -1,0 +1,114 @@
+"""State of an earlier run's folder: empty, resumable, or finished and not to be touched."""
+
+import json
+from dataclasses import dataclass
+from datetime import datetime
+from pathlib import Path
+from typing import Any, NoReturn
+
+from fingervision.domain.errors import FingervisionError
+from fingervision.domain.recipe import Recipe
+from fingervision.storage.recorded_video import frames_in
+from fingervision.storage.run_files import EVENTS, RUN, VIDEO
+from fingervision.storage.samples_csv import SampleRow, read_samples, write_rows
+from fingervision.storage.toml_section import Section
+from fingervision.testbed.run.run_metadata import KIND, SAMPLES
+
+
+@dataclass(frozen=True, slots=True)
+class Remains:
+    """A run that broke off.
+
+    Parameters
+    ----------
+    began_at : datetime
+        When it began.
+    rows : list of SampleRow
+        Frames that have a row and a picture.
+    events : list of dict
+        Events of the run itself, in order.
+    """
+
+    began_at: datetime
+    rows: list[SampleRow]
+    events: list[dict[str, Any]]
+
+
+def contents(path: Path) -> list[str]:
+    """Names of what lies in a folder, sorted; hidden files do not count."""
+    return sorted(item.name for item in path.iterdir() if not item.name.startswith("."))
+
+
+def refuse_others(path: Path, held: str) -> NoReturn:
+    """Say that a folder holds something that would be lost among what is to be written."""
+    raise FingervisionError(f"--out must be a new or empty folder, but {path} holds {held}: name another.")
+
+
+def remains(path: Path, recipe: Recipe[Section], digest: str) -> Remains | None:
+    """Find what a run of this recipe on this bed left; None where there is nothing to go on with.
+
+    The table is cut to the rows whose pictures are in the video, the events to whole lines.
+
+    Raises
+    ------
+    FingervisionError
+        The folder holds something else, a finished run, or one of another recipe or bed.
+    """
+    held = contents(path)
+    if not held:
+        return None
+    if RUN not in held:
+        refuse_others(path, held[0])
+    about = _about(path)
+    if about.get("complete"):
+        raise FingervisionError(
+            f"The run in {path} is finished already: name another folder with --out, or remove that one."
+        )
+    if not read_samples(path / SAMPLES):
+        # Nothing was recorded: there is nothing to go on with, and nothing to lose.
+        (path / EVENTS).unlink(missing_ok=True)
+        return None
+    if about.get("recipe") != recipe.text:
+        raise FingervisionError(
+            f"The run in {path} broke off, but was of another recipe ({about.get('name')}): go on with that one, or "
+            "name another folder with --out."
+        )
+    if about.get("bed_digest") != digest:
+        raise FingervisionError(
+            f"The run in {path} broke off, but was on another bed: go on with that one, or name another folder with "
+            "--out."
+        )
+    rows = _rows_with_pictures(path)
+    return Remains(datetime.fromisoformat(str(about["began_at"])), rows, _numbered_events(path))
+
+
+def _about(path: Path) -> dict[str, Any]:
+    try:
+        about: dict[str, Any] = json.loads((path / RUN).read_text(encoding="utf-8"))
+        if about.get("kind") != KIND:
+            refuse_others(path, "another run")
+    except (OSError, ValueError, AttributeError) as error:
+        raise FingervisionError(f"{path / RUN} could not be read ({error}): name another --out.") from error
+    return about
+
+
+def _rows_with_pictures(path: Path) -> list[SampleRow]:
+    rows = read_samples(path / SAMPLES)
+    frames = frames_in(path / VIDEO)
+    if frames < len(rows):
+        rows = rows[:frames]
+        write_rows(path / SAMPLES, rows)
+    return rows
+
+
+def _numbered_events(path: Path) -> list[dict[str, Any]]:
+    try:
+        text = (path / EVENTS).read_bytes()
+    except FileNotFoundError:
+        return []
+    whole = text[: text.rfind(b"\n") + 1]
+    if len(whole) < len(text):
+        with (path / EVENTS).open("rb+") as file:
+            file.truncate(len(whole))
+    events = [json.loads(line) for line in whole.decode("utf-8").splitlines()]
+    return [event for event in events if "n" in event]

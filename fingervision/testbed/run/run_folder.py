@@ -1,0 +1,168 @@
+"""The folder of a run, written so that a run may end at any moment and be resumed."""
+
+import shutil
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
+from dataclasses import replace
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+from calib.measured_scale import Calibration
+from fingervision.domain.errors import FingervisionError
+from fingervision.domain.frame import Frame
+from fingervision.domain.recipe import Recipe
+from fingervision.storage.calibration_json import write_calibration
+from fingervision.storage.folder_lock import FolderLock
+from fingervision.storage.out_folder import make_out_folder
+from fingervision.storage.recorded_video import RecordedVideo
+from fingervision.storage.run_files import CALIBRATION, VIDEO, RunFiles
+from fingervision.storage.samples_csv import SampleRow, SamplesCsv, read_samples, write_rows
+from fingervision.storage.toml_section import Section
+from fingervision.testbed.bed import Bed
+from fingervision.testbed.run.resume_state import remains
+from fingervision.testbed.run.run_metadata import (
+    JOINED,
+    RECIPE,
+    SAMPLES,
+    SIMULATION,
+    about_run,
+    digest_of,
+    write_expected,
+)
+from fingervision.testbed.simulation.injected_effects import Hidden
+
+# FFV1 of a picture with noise takes up to this many bytes a pixel.
+BYTES_PER_PX = 0.8
+
+
+class BedRunFolder:
+    """Writes a run while it happens, and finds out how far an earlier one came.
+
+    Parameters
+    ----------
+    path : Path
+        The folder; made, empty, or holding a run of the same recipe on the same bed that broke off.
+    recipe : Recipe
+        What is run.
+    bed : Bed
+        Where.
+    hidden : Hidden
+        Its digest belongs to the run: a simulation that hides something else is another bed.
+    before : sequence of SampleRow
+        Rows of an earlier run that this one follows; both together are written to joined.csv.
+
+    Raises
+    ------
+    FingervisionError
+        The folder holds something else, a finished run or another recipe's, is in use, or cannot be written.
+    """
+
+    def __init__(
+        self, path: Path, recipe: Recipe[Section], bed: Bed, hidden: Hidden, before: Sequence[SampleRow] = ()
+    ) -> None:
+        self.path, self.before = path, tuple(before)
+        make_out_folder(path)
+        self._lock = FolderLock(path)
+        try:
+            earlier = remains(path, recipe, digest_of(bed, hidden))
+            self.resumed = earlier is not None
+            self.rows: list[SampleRow] = earlier.rows if earlier else []
+            self.events_done = earlier.events if earlier else []
+            self.began_at = earlier.began_at if earlier else datetime.now(UTC)
+            self._about = about_run(recipe, bed, hidden, self.began_at)
+            self._files = RunFiles(path)
+            self._files.write_about(self._about, complete=False)
+            if not earlier:
+                (path / RECIPE).write_text(recipe.text, encoding="utf-8")
+                if isinstance(bed.scale, Calibration):
+                    write_calibration(bed.scale, path / CALIBRATION)
+                if bed.model is not None:
+                    write_expected(path / SIMULATION, bed.model, bed.limits)
+            self._samples = SamplesCsv(path / SAMPLES, go_on=bool(self.rows))
+            self._video = RecordedVideo(path / VIDEO, None, keep=len(self.rows))
+        except OSError as error:
+            self._lock.release()
+            raise FingervisionError(
+                f"The folder {path} cannot be written ({error.strerror}): name another with --out."
+            ) from error
+        except BaseException:
+            self._lock.release()
+            raise
+        self._last_s = self.rows[-1].time_s if self.rows else 0.0
+        if earlier:
+            self._files.event({"time_s": self._last_s, "event": "resumed", "words": f"After {len(self.rows)} frames."})
+
+    def needs_room(self, frames: float, size_px: tuple[int, int]) -> None:
+        """Refuse a run that the disk has no room for."""
+        needed = int(frames * size_px[0] * size_px[1] * BYTES_PER_PX)
+        free = shutil.disk_usage(self.path).free
+        if needed > free:
+            raise FingervisionError(
+                f"The run needs up to {needed / 1e6:.0f} MB, but the disk of {self.path} has {free / 1e6:.0f} MB free: "
+                "make room, or name a folder on another disk. Nothing was moved."
+            )
+
+    def add_picture(self, frame: Frame, time_s: float) -> None:
+        """Write a frame's picture, at its time in the run."""
+        self._video.add(replace(frame, time_s=time_s), ())
+
+    def add_row(self, row: SampleRow) -> None:
+        """Write a frame's row, after its picture."""
+        self._samples.add((row,))
+        self._last_s = row.time_s
+
+    def event(self, number: int, name: str, words: str, **more: object) -> None:
+        """Append an event; those that were written before the run broke off are not written again."""
+        if number >= len(self.events_done):
+            self._files.event({"n": number, "time_s": round(self._last_s, 6), "event": name, "words": words, **more})
+
+    def finish(self, found: Mapping[str, Any]) -> None:
+        """End a run that came to its end."""
+        self._end()
+        if self.before:
+            write_rows(self.path / JOINED, [*self.before, *read_samples(self.path / SAMPLES)])
+        self._about |= {**found, "joined": JOINED if self.before else None}
+        # A recipe that only asks the operator, for a reference slot say, records no frame.
+        names = [name for name in (VIDEO, SAMPLES) if (self.path / name).exists()]
+        self._about["sha256"] = {name: self._files.sha256(name) for name in names}
+        self._files.write_about(self._about, complete=True)
+        self._files.close()
+        self._lock.release()
+
+    def break_off(self, why: str) -> None:
+        """End a run that did not; what is in the folder stays valid, and may be gone on with."""
+        with suppress(FingervisionError):
+            self._files.event({"time_s": round(self._last_s, 6), "event": "stopped", "words": why})
+        with suppress(FingervisionError):
+            self._end()
+        with suppress(FingervisionError):
+            self._files.close()
+        self._lock.release()
+
+    def _end(self) -> None:
+        self._video.close()
+        self._samples.close()
+
+
+def rows_before(path: Path) -> list[SampleRow]:
+    """Rows of a finished run, with those of the runs that it followed.
+
+    Raises
+    ------
+    FingervisionError
+        There is no finished run in the folder.
+    """
+    table = path / (JOINED if (path / JOINED).exists() else SAMPLES)
+    rows = read_samples(table)
+    if not rows:
+        raise FingervisionError(f"--after must be the folder of an earlier run on the bed, but {path} holds none.")
+    return rows
+
+
+def times_of(rows: Sequence[SampleRow]) -> tuple[float, float] | None:
+    """Times of the first row of a step (those before it are at rest) and of the last; None without rows."""
+    if not rows:
+        return None
+    began_s = next((row.arrived_s for row in rows if row.step > 0), rows[0].arrived_s)
+    return began_s, rows[-1].arrived_s

@@ -1,0 +1,162 @@
+"""Record of a run: one row and one picture a frame, in order, written as soon as they are final."""
+
+from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+from fingervision.domain.effect import REZEROED
+from fingervision.domain.frame import Frame
+from fingervision.storage.gaps_csv import GapRow
+from fingervision.storage.samples_csv import MM_PLACES, SampleRow
+from fingervision.testbed.run.run_folder import BedRunFolder
+from fingervision.testbed.run.synchronised_acquisition import Look
+
+# A run that follows another begins at least so much after it; one that goes on, so much after what it goes on with.
+PAUSE_S, GAP_S = 5.0, 1.0
+# Word in the name of a run whose part lies turned by 180 degrees.
+TURNED = "turned"
+
+PlaceAt = Callable[[float, bool], float | None]
+"""Where the stage was at a time of the bed; None where that is not known yet, and need not be known at once."""
+
+
+@dataclass(frozen=True, slots=True)
+class Counts:
+    """What became of a run's frames."""
+
+    recorded: int
+    with_gap: int
+    lost: int
+
+
+class RunRecord:
+    """Numbers runs and frames, and writes them once.
+
+    Parameters
+    ----------
+    folder : BedRunFolder
+        Where it is written.
+    place_at : callable
+        The stage's place.
+    """
+
+    def __init__(self, folder: BedRunFolder, place_at: PlaceAt) -> None:
+        self.folder = folder
+        self._place_at = place_at
+        self._run, self.turned, self._rezeroed = 1, False, False
+        self._rows = self._with_gap = self._lost = self._events = 0
+        # Zero of the run's time on the camera's clock, once there is a frame, and the run's time there.
+        self._zero_s: float | None = None
+        self._base_s = 0.0
+        self._waiting: deque[tuple[SampleRow, float]] = deque()
+
+    @property
+    def counts(self) -> Counts:
+        """What became of the frames until now."""
+        return Counts(self._rows, self._with_gap, self._lost)
+
+    # How it begins.
+
+    def follow_replayed(self, last: SampleRow) -> None:
+        """Go on from the last row of an earlier run on a bed whose camera's clock goes on from there."""
+        self._run = _run_number(last) + 1
+        self._zero_s = last.camera_s - last.time_s
+
+    def follow(self, last: SampleRow, now_s: float) -> None:
+        """Go on from the last row of an earlier run on a bed whose camera's clock began anew.
+
+        What has passed between is known as well as the host's clock, and needs no better.
+        """
+        self._run = _run_number(last) + 1
+        self._base_s = last.time_s + max(PAUSE_S, now_s - last.arrived_s)
+
+    def go_on(self, since_began_s: float) -> None:
+        """Go on after all rows and events that are there, as a run of its own."""
+        self._events = len(self.folder.events_done)
+        self._rows = len(self.folder.rows)
+        self._with_gap = sum(row.gap_mm is not None for row in self.folder.rows)
+        if self.folder.rows:
+            last = self.folder.rows[-1]
+            self._run, how = _run_number(last) + 1, last.run.split()
+            self.turned, self._rezeroed = TURNED in how, REZEROED in how
+            self._base_s = max(last.time_s + GAP_S, since_began_s)
+
+    @property
+    def label(self) -> str:
+        """The run's name: its number, and what a diagnosis must know of how it came about."""
+        words = [str(self._run), *([TURNED] if self.turned else []), *([REZEROED] if self._rezeroed else [])]
+        return " ".join(words)
+
+    def new_run(self, *, turned: bool, rezeroed: bool = False) -> None:
+        """Begin another run of the same folder; what was re-zeroed stays so."""
+        self._run, self.turned, self._rezeroed = self._run + 1, turned, self._rezeroed or rezeroed
+
+    # Frames.
+
+    def there_already(self) -> GapRow | None:
+        """Take the next frame from the folder, if it is there already; None if it is yet to be seen."""
+        if self._rows >= len(self.folder.rows):
+            return None
+        row = self.folder.rows[self._rows]
+        self._zero_s = row.camera_s - row.time_s
+        self._count(row)
+        return GapRow(0, row.time_s, row.status, gap_mm=row.gap_mm, u_random_mm=row.u_random_mm)
+
+    def add(self, look: Look, picture: Frame, measured: GapRow, step: int) -> None:
+        """Take a frame that was seen; its row waits until the stage's place is known."""
+        if self._zero_s is None:
+            self._zero_s = look.shot.device_s - self._base_s
+        row = SampleRow(
+            run=self.label,
+            time_s=round(look.shot.device_s - self._zero_s, 6),
+            input_mm=None,
+            gap_mm=_rounded(measured.gap_mm),
+            left_mm=_rounded(measured.left_mm),
+            right_mm=_rounded(measured.right_mm),
+            u_gap_mm=_rounded(measured.u_gap_mm),
+            u_random_mm=_rounded(measured.u_random_mm),
+            force_n=look.force_n,
+            status=measured.status,
+            frame=self._rows,
+            step=step,
+            encoder_mm=_rounded(look.encoder_mm),
+            camera_s=round(look.shot.device_s, 6),
+            arrived_s=round(look.shot.arrived_s, 6),
+        )
+        self.folder.add_picture(picture, row.time_s)
+        self._waiting.append((row, look.exposed_s))
+        self._count(row)
+
+    def lose(self) -> None:
+        """Count a frame that could not be read."""
+        self._lost += 1
+
+    def write(self, *, at_once: bool = False) -> None:
+        """Write the rows whose place between the encoder's steps is known by now, or all."""
+        while self._waiting:
+            row, exposed_s = self._waiting[0]
+            input_mm = self._place_at(exposed_s, at_once)
+            if input_mm is None:
+                return
+            self.folder.add_row(replace(row, input_mm=round(input_mm, MM_PLACES)))
+            self._waiting.popleft()
+
+    # Events.
+
+    def event(self, name: str, words: str, **more: object) -> None:
+        """Write an event, once."""
+        self.folder.event(self._events, name, words, **more)
+        self._events += 1
+
+    def _count(self, row: SampleRow) -> None:
+        self._rows += 1
+        self._with_gap += row.gap_mm is not None
+
+
+def _run_number(row: SampleRow) -> int:
+    """Number of a row's run: the label's first word."""
+    return int(row.run.split()[0])
+
+
+def _rounded(value: float | None) -> float | None:
+    return None if value is None else round(value, MM_PLACES)

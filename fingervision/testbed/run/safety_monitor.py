@@ -1,0 +1,181 @@
+"""Check every frame of a motion against the limits, and stop the motor where one is exceeded."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from time import sleep
+
+from fingervision.domain.errors import FingervisionError
+from fingervision.domain.frame import Frame
+from fingervision.domain.status import Status
+from fingervision.storage.gaps_csv import GapRow
+from fingervision.testbed.bed import Bed
+from fingervision.testbed.run.controls import Controls
+from fingervision.testbed.run.motion_segments import Close, Leg
+from fingervision.testbed.run.run_record import RunRecord
+from fingervision.testbed.run.synchronised_acquisition import Look, Sight
+
+# The fingers must be seen in one of so many frames.
+FRAMES_TO_FIND_FINGERS = 3
+# While a simulation that goes as fast as it can is paused, it looks so often whether it shall go on.
+LOOK_EVERY_S = 0.05
+
+Say = Callable[[str], None]
+
+
+class StoppedError(FingervisionError):
+    """The user ended the run."""
+
+
+@dataclass(slots=True)
+class Watch:
+    """Looks, measures, records, and stops where it must.
+
+    Parameters
+    ----------
+    bed : Bed
+        What is looked at.
+    sight : Sight
+        The bed's eyes.
+    record : RunRecord
+        What was seen.
+    controls : Controls
+        What the user wants.
+    below_force_n : float
+        The recipe's limit of force.
+    say : callable
+        Told what a person at the bed shall know, in sentences.
+    leg : Leg or None
+        What is under way.
+    paused_s : float
+        How long it was paused, in all.
+    """
+
+    bed: Bed
+    sight: Sight
+    record: RunRecord
+    controls: Controls
+    below_force_n: float
+    say: Say
+    leg: Leg | None = None
+    paused_s: float = 0.0
+
+    # Frames.
+
+    def look(self) -> Look:
+        """Look once.
+
+        Raises
+        ------
+        StoppedError
+            The user ended the run.
+        FingervisionError
+            The actuator has an alarm, or the force is beyond a limit.
+        """
+        self._end_if_stopped()
+        look = self.sight.look()
+        alarm = self.bed.actuator.alarm
+        if alarm is not None:
+            raise FingervisionError(f"The actuator has an alarm ({alarm.code}: {alarm.words}): the motor was stopped.")
+        limit_n = min(self.below_force_n, self.bed.limits.force_n)
+        if look.force_now_n is not None and abs(look.force_now_n) > limit_n and not self._closes:
+            raise FingervisionError(
+                f"The force must stay below {limit_n:g} N, but is {look.force_now_n:.3g} N at "
+                f"{self.sight.position.newest:.3f} mm: the motor was stopped."
+            )
+        return look
+
+    def see(self, *, record: bool) -> tuple[Look, GapRow]:
+        """Look, measure, and record.
+
+        Raises
+        ------
+        FingervisionError
+            As `look`, or the gap is beyond its limit.
+        """
+        look = self.look()
+        if record and (there := self.record.there_already()) is not None:
+            return look, there
+        item = look.shot.item()
+        measured, _ = self.sight.measure(item)
+        if record and isinstance(item, Frame):
+            self.record.add(look, item, measured, 0 if self.leg is None else self.leg.step)
+        elif record:
+            self.record.lose()
+        self.record.write()
+        gap_mm = measured.gap_mm
+        if gap_mm is not None and gap_mm < self.bed.limits.gap_mm and not self._closes:
+            raise FingervisionError(
+                f"The gap must stay above {self.bed.limits.gap_mm:g} mm, but is {gap_mm:.4f} mm at "
+                f"{self.sight.position.newest:.3f} mm: the motor was stopped."
+            )
+        return look, measured
+
+    def find_fingers(self) -> None:
+        """Refuse to go on where the camera does not see both fingers."""
+        words = ""
+        for _ in range(FRAMES_TO_FIND_FINGERS):
+            measured, words = self.sight.measure(self.look().shot.item())
+            if measured.status is Status.OK:
+                return
+        raise FingervisionError(
+            f"The camera must see both fingers before anything moves, but does not: {words} Mend the view, and run the "
+            "recipe again."
+        )
+
+    def _end_if_stopped(self) -> None:
+        if self.controls.stopped:
+            raise StoppedError("The run was stopped; the motor stands. The same command goes on with it.")
+
+    @property
+    def _closes(self) -> bool:
+        """Whether force and touching fingers are what is looked for."""
+        return self.leg is not None and isinstance(self.leg.act, Close)
+
+    # Motions.
+
+    def follow(
+        self, begin: Callable[[], None], *, record: bool, until: Callable[[Look, GapRow], bool] | None = None
+    ) -> None:
+        """Begin a motion and look on until the stage stands; where a pause stopped it, it is begun again.
+
+        Parameters
+        ----------
+        begin : callable
+            Begins the motion, from wherever the stage is.
+        record : bool
+            Whether its frames are recorded.
+        until : callable, optional
+            Ends the motion where it is true of a frame.
+        """
+        while True:
+            self.wait_while_paused(record=record)
+            self.controls.halted = broken_off = False
+            self._end_if_stopped()
+            begin()
+            while self.bed.actuator.busy:
+                seen = self.see(record=record)
+                if until is not None and until(*seen):
+                    self.bed.actuator.stop()
+                    while self.bed.actuator.busy:
+                        self.see(record=record)
+                    return
+                broken_off |= self.wait_while_paused(record=record)
+            # A simulation's time stands while it is paused: nothing was broken off.
+            if self.bed.replays or not (broken_off or self.controls.halted):
+                return
+
+    def wait_while_paused(self, *, record: bool) -> bool:
+        """Wait while the user pauses; whether there was a pause."""
+        if not self.controls.paused:
+            return False
+        self.say("Paused: p and Enter go on, q and Enter end the run.")
+        began_s = self.bed.clock.now_s()
+        if self.bed.replays:
+            while self.controls.waits:
+                sleep(LOOK_EVERY_S)
+        else:
+            self.bed.actuator.stop()
+            while self.controls.waits:
+                self.see(record=record)
+        self.paused_s += self.bed.clock.now_s() - began_s
+        return True

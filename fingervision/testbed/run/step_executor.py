@@ -1,0 +1,147 @@
+"""Execute one segment of a recipe's plan: move, dwell, oscillate, close until contact, measure a slot."""
+
+from functools import partial
+from math import sin, tau
+
+from fingervision.domain.frame import Frame
+from fingervision.domain.status import Status
+from fingervision.storage.gaps_csv import GapRow
+from fingervision.testbed.run.motion_segments import Close, Frames, Go, Slot, Stand, Swing
+from fingervision.testbed.run.reference_slot import measured_slot
+from fingervision.testbed.run.safety_monitor import Watch
+from fingervision.testbed.run.synchronised_acquisition import Look
+
+# The picture is still when so many frames in a row differ by less than so many times their own uncertainty.
+STILL_FRAMES, STILL_SIGMAS = 4, 4.0
+# A picture that is not still by then is measured as it is, and said so.
+STILL_WITHIN_S = 5.0
+# A new reference is only as good as the rest before it.
+REST_AFTER_HOMING_S = 1.0
+# A sine is driven in pieces of so many frames.
+SWING_FRAMES = 3
+SLOT_FRAMES = 10
+
+
+def go(watch: Watch, act: Go) -> None:
+    """Move to a position."""
+    watch.follow(partial(watch.bed.actuator.move, act.to_mm, act.speed_mm_s), record=act.frames is None)
+    if act.frames is None:
+        # A corner is seen: what has a memory remembers it, and no sample beside it tells where it was.
+        watch.see(record=True)
+    _point(watch, act.frames)
+
+
+def stand(watch: Watch, act: Stand) -> None:
+    """Stand for a time."""
+    since = _Since(watch)
+    while since.s < act.seconds:
+        watch.see(record=act.frames is None)
+        watch.wait_while_paused(record=act.frames is None)
+    _point(watch, act.frames)
+
+
+def swing(watch: Watch, act: Swing) -> None:
+    """Move as a sine, in short pieces."""
+    since, piece_s = _Since(watch), SWING_FRAMES / watch.sight.rate_hz
+    lasts_s = act.cycles / act.frequency_hz
+    at_mm = act.mean_mm
+    while (now_s := since.s) < lasts_s:
+        then_s = min(now_s + piece_s, lasts_s)
+        to_mm = act.mean_mm + act.amplitude_mm * sin(tau * act.frequency_hz * then_s)
+        if abs(to_mm - at_mm) > 1e-9 and then_s > now_s:
+            speed_mm_s = max(abs(to_mm - at_mm) / (then_s - now_s), 1e-3)
+            watch.follow(partial(watch.bed.actuator.move, to_mm, speed_mm_s), record=True)
+            at_mm = to_mm
+        if since.s <= now_s:
+            watch.see(record=True)
+
+
+def close(watch: Watch, act: Close) -> None:
+    """Close until the force is reached, the fingers touch, or the bed's limit."""
+    felt: list[str] = []
+
+    def met(look: Look, row: GapRow) -> bool:
+        if look.force_now_n is not None and abs(look.force_now_n) >= act.below_force_n:
+            felt.append(f"the force of {act.below_force_n:g} N was reached")
+        elif row.status is Status.TOUCHING:
+            felt.append("the fingers touch in the picture")
+        return bool(felt)
+
+    bed = watch.bed
+    watch.follow(partial(bed.actuator.move, bed.limits.lower_mm, act.speed_mm_s), record=True, until=met)
+    why = felt[0] if felt else "nothing was met down to the bed's limit of position"
+    watch.record.event("closed", f"Closing ended: {why}.", input_mm=watch.sight.position.newest)
+
+
+def rezero(watch: Watch) -> None:
+    """Reference the stage anew, and rest."""
+    watch.follow(watch.bed.actuator.home, record=False)
+    stand(watch, Stand(REST_AFTER_HOMING_S, frames=0))
+
+
+def slot(watch: Watch, act: Slot) -> dict[str, float]:
+    """Have a reference slot put in, measure it, and have it taken out; what run.json says of it."""
+    operator, scale = watch.bed.operator, watch.bed.scale
+    operator.put_in_slot(act.size_mm)
+    watch.look()
+    items = [watch.look().shot.item() for _ in range(SLOT_FRAMES)]
+    operator.take_out_slot()
+    assert scale is not None  # noqa: S101 - a sight was made of it
+    found = {
+        "size_mm": act.size_mm,
+        "u_size_mm": act.u_size_mm,
+        **measured_slot([item for item in items if isinstance(item, Frame)], act.size_mm, scale),
+    }
+    words = f"The slot of {act.size_mm:g} mm measures {found['measured_mm']:.4f} +- {found['u_random_mm']:.2g} mm."
+    watch.record.event("reference_slot", words, **found)
+    watch.say(words)
+    watch.find_fingers()
+    return found
+
+
+def _point(watch: Watch, frames: Frames) -> None:
+    """Take so many frames of a still picture."""
+    if not frames:
+        return
+    _settle(watch)
+    for _ in range(frames):
+        watch.see(record=True)
+        watch.wait_while_paused(record=False)
+
+
+def _settle(watch: Watch) -> None:
+    """Wait until the picture is still."""
+    since = _Since(watch)
+    last: list[GapRow] = []
+    while since.s < STILL_WITHIN_S:
+        _, row = watch.see(record=False)
+        last = [*last[-STILL_FRAMES + 1 :], row]
+        if len(last) == STILL_FRAMES and _still(last):
+            return
+    words = f"The picture was not still after {STILL_WITHIN_S:g} s, and is measured as it is."
+    watch.record.event("not_still", words)
+
+
+def _still(rows: list[GapRow]) -> bool:
+    """Whether frames in a row show the same gap, or none."""
+    gaps = [row.gap_mm for row in rows if row.gap_mm is not None]
+    if len(gaps) < len(rows):
+        return not gaps
+    u = max(row.u_random_mm or 0.0 for row in rows)
+    return max(gaps) - min(gaps) < STILL_SIGMAS * u
+
+
+class _Since:
+    """Time since it was made, without pauses."""
+
+    def __init__(self, watch: Watch) -> None:
+        self._watch, self._began_s = watch, self._now_s(watch)
+
+    @property
+    def s(self) -> float:
+        """Seconds."""
+        return self._now_s(self._watch) - self._began_s
+
+    @staticmethod
+    def _now_s(watch: Watch) -> float:
+        return watch.bed.clock.now_s() - watch.paused_s

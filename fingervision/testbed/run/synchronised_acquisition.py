@@ -1,0 +1,180 @@
+"""For each camera frame, the stage position and the force at the frame's time."""
+
+from collections import deque
+from dataclasses import dataclass
+
+import numpy as np
+
+from fingervision.domain.errors import FingervisionError
+from fingervision.domain.frame import Frame, LostFrame
+from fingervision.domain.gap import NoGap
+from fingervision.measuring.rows import Result, RowMaker
+from fingervision.storage.gaps_csv import GapRow
+from fingervision.testbed.actuator import Actuator
+from fingervision.testbed.bed import Bed
+from fingervision.testbed.camera import BedCamera, Shot
+from fingervision.testbed.clocks.board_clock import ClockJoin
+from fingervision.testbed.clocks.camera_clock import ArrivalClock
+from fingervision.testbed.force_sensor import ForceSensor
+from fingervision.testbed.motion.encoder_interpolation import StageTrack
+from fingervision.testbed.reading import Reading
+from fingervision.vision.pipeline import Settings, measure_frame
+
+# Readings that are kept: a frame looks back over its own latency, which is far less at 200 readings a second.
+READINGS_KEPT = 2000
+
+
+class JoinedInstrument:
+    """An instrument whose clock is joined to the bed's by every answer.
+
+    Parameters
+    ----------
+    source : Actuator or ForceSensor
+        Where the readings come from.
+    """
+
+    def __init__(self, source: Actuator | ForceSensor) -> None:
+        self._source = source
+        self.clock = ClockJoin()
+        self.newest = 0.0
+
+    def read(self) -> tuple[Reading, ...]:
+        """Take what came since the last time."""
+        readings = self._source.readings()
+        asked = readings[-1]
+        self.clock.add(asked.device_s, asked.asked_s, asked.got_s)
+        self.newest = asked.value
+        return readings
+
+    def device_at(self, bed_s: float) -> float:
+        """Time of the instrument at a time of the bed; the bed's own before the clocks are joined."""
+        joined = self.clock.joined()
+        return bed_s if joined is None else joined.board_s + (bed_s - joined.host_s) / joined.rate
+
+
+class Position(JoinedInstrument):
+    """The stage's place, between the steps of its encoder."""
+
+    def __init__(self, actuator: Actuator) -> None:
+        super().__init__(actuator)
+        self._track = StageTrack(actuator.limits.encoder_step_mm)
+
+    def read(self) -> tuple[Reading, ...]:
+        """Take what came since the last time."""
+        readings = super().read()
+        for reading in readings:
+            self._track.add(reading)
+        return readings
+
+    def at(self, bed_s: float, *, at_once: bool = False) -> float | None:
+        """Place at a time of the bed; None where later readings will tell it better (see `StageTrack`)."""
+        return self._track.at_mm(self.device_at(bed_s), at_once=at_once)
+
+
+class Force(JoinedInstrument):
+    """The force at the drive."""
+
+    def __init__(self, sensor: ForceSensor) -> None:
+        super().__init__(sensor)
+        self._device_s: deque[float] = deque(maxlen=READINGS_KEPT)
+        self._force_n: deque[float] = deque(maxlen=READINGS_KEPT)
+
+    def read(self) -> tuple[Reading, ...]:
+        """Take what came since the last time."""
+        readings = super().read()
+        for reading in readings:
+            if not self._device_s or reading.device_s > self._device_s[-1]:
+                self._device_s.append(reading.device_s)
+                self._force_n.append(reading.value)
+        return readings
+
+    def at(self, bed_s: float) -> float:
+        """Force at a time of the bed, linear between readings."""
+        return float(np.interp(self.device_at(bed_s), self._device_s, self._force_n))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Look:
+    """One frame, and the bed when it was exposed.
+
+    Parameters
+    ----------
+    shot : Shot
+        The frame, perhaps not yet drawn.
+    exposed_s : float
+        When, on the bed's clock, as far as the camera's is joined to it.
+    encoder_mm : float
+        The newest reading of the stage.
+    force_n : float or None
+        Force at the drive at the exposure.
+    force_now_n : float or None
+        The newest force.
+    """
+
+    shot: Shot
+    exposed_s: float
+    encoder_mm: float
+    force_n: float | None
+    force_now_n: float | None
+
+
+class Sight:
+    """Looks and measures.
+
+    Parameters
+    ----------
+    bed : Bed
+        With a camera and a scale.
+
+    Raises
+    ------
+    FingervisionError
+        There is no camera, or no scale for its frames.
+    """
+
+    def __init__(self, bed: Bed) -> None:
+        if bed.camera is None:
+            raise FingervisionError("A run must be seen, but the bed has no camera: add a [camera].")
+        if bed.scale is None:
+            raise FingervisionError(
+                "A run must have a scale, but the bed has none: add a [scale] with px_per_mm or a calibration."
+            )
+        description = bed.camera.description
+        bed.scale.check_frame_size(description.width_px, description.height_px)
+        self.camera: BedCamera = bed.camera
+        self.rate_hz = description.rate_hz or 25.0
+        self.width_mm = description.width_px / bed.scale.px_per_mm
+        self.position = Position(bed.actuator)
+        self.force = None if bed.force_sensor is None else Force(bed.force_sensor)
+        self.camera_clock = ArrivalClock(bed.camera.latency)
+        self._settings = Settings(bed.below_tip_mm * bed.scale.px_per_mm)
+        self._rows = RowMaker(bed.scale, (description.width_px, description.height_px))
+
+    def look(self) -> Look:
+        """Wait for the next frame, and read the instruments after it."""
+        shot = self.camera.next()
+        self.camera_clock.add(shot.device_s, shot.arrived_s)
+        self.position.read()
+        if self.force is not None:
+            self.force.read()
+        exposed_s = self.camera_clock.joined().bed_at(shot.device_s)
+        force_n = None if self.force is None else self.force.at(exposed_s)
+        force_now_n = None if self.force is None else self.force.newest
+        return Look(shot, exposed_s, self.position.newest, force_n, force_now_n)
+
+    def clocks(self) -> dict[str, dict[str, float]]:
+        """How each instrument's clock is joined to the bed's, for run.json."""
+        camera = self.camera_clock.joined()
+        clocks = {"camera": {"offset_s": camera.bed_s - camera.camera_s, "rate": camera.rate, "u_s": camera.u_s}}
+        for name, instrument in (("actuator", self.position), ("force_sensor", self.force)):
+            joined = None if instrument is None else instrument.clock.joined()
+            if joined is not None:
+                u_s = joined.u_at(joined.board_s)
+                clocks[name] = {"offset_s": joined.host_s - joined.board_s, "rate": joined.rate, "u_s": u_s}
+        return clocks
+
+    def measure(self, item: Frame | LostFrame) -> tuple[GapRow, str]:
+        """Measure a picture: its row, and where there is no number the reason in a sentence."""
+        outcome = item if isinstance(item, LostFrame) else measure_frame(item, self._settings)
+        (row,) = self._rows.rows((Result(item.index, item.time_s, outcome),))
+        return row, outcome.words if isinstance(outcome, NoGap | LostFrame) else ""

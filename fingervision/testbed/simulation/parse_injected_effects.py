@@ -1,0 +1,117 @@
+"""Read injected effects from command-line words or from a sealed file."""
+
+import difflib
+from pathlib import Path
+
+import numpy as np
+
+from fingervision.domain.effect import Effect, History
+from fingervision.domain.errors import FingervisionError, UsageError
+from fingervision.effects import catalogue
+from fingervision.storage.toml_section import Section, read_document
+from fingervision.testbed.simulation.injected_effects import Hidden
+
+# An effect that is named without a size gets so much of what its bounds allow, and so many times its typical size.
+SHARE_OF_BOUNDS, TIMES_TYPICAL = 0.2, 3.0
+# Bounds that depend on the data are taken for a run over the paper's inputs: 25 samples a second of 0.05 mm/s.
+USUAL_INPUTS_MM, USUAL_STEP_MM = (-0.45, 1.45), 0.002
+
+
+def hidden_from(words: tuple[str, ...]) -> Hidden:
+    """Read every `EFFECT[:PARAMETER=VALUE,...]` or sealed file.
+
+    A sealed file is like a corrected model's: `[[effect]]` with `name` and `[effect.parameters]` of plain numbers.
+
+    Raises
+    ------
+    UsageError
+        An effect or parameter is not in the catalogue, or a value is no number.
+    FingervisionError
+        A file cannot be read or makes no sense.
+    """
+    effects: dict[str, dict[str, float]] = {}
+    for word in words:
+        more = _sealed(Path(word)) if word.lower().endswith(".toml") else [_spoken(word)]
+        for name, values in more:
+            if name in effects:
+                raise UsageError(f"An effect may be hidden once, but {name} is hidden twice: leave one out.")
+            effects[name] = usual_values(catalogue()[name]) | values
+    return Hidden(effects)
+
+
+def usual_values(effect: Effect) -> dict[str, float]:
+    """Sizes for an effect that is named without any: large enough to show, well inside its bounds."""
+    inputs = np.arange(*USUAL_INPUTS_MM, USUAL_STEP_MM)
+    history = History(
+        input_mm=inputs,
+        time_s=np.arange(inputs.size) / 25.0,
+        runs=(slice(0, inputs.size),),
+        rest_gap_mm=4.0,
+        opening_mm=11.0,
+        closing_mm=3.5,
+        force=True,
+    )
+    searched = effect.search(history)
+    values = {}
+    for p in effect.parameters if isinstance(searched, str) else searched:
+        if p.run is not None:  # where an effect starts is its run's own affair
+            continue
+        if p.typical is not None:
+            values[p.name] = min(TIMES_TYPICAL * p.typical, p.upper)
+        elif p.neutral is not None:
+            values[p.name] = p.neutral + SHARE_OF_BOUNDS * ((p.upper if p.upper > p.neutral else p.lower) - p.neutral)
+        elif p.logarithmic or p.reciprocal:
+            values[p.name] = float(np.sqrt(max(p.lower, 1e-3 * p.upper) * p.upper))
+        else:
+            values[p.name] = p.lower + SHARE_OF_BOUNDS * (p.upper - p.lower)
+    return values
+
+
+def _spoken(word: str) -> tuple[str, dict[str, float]]:
+    name, _, rest = word.partition(":")
+    _known(name)
+    values: dict[str, float] = {}
+    for part in filter(None, rest.split(",")):
+        key, equals, number = part.partition("=")
+        if not equals:
+            raise UsageError(f"--hide must be EFFECT or EFFECT:PARAMETER=VALUE,..., but is {word}.")
+        try:
+            values[key.strip()] = float(number)
+        except ValueError:
+            raise UsageError(f"{key} of {name} must be a number, but is {number}.") from None
+    _inside(name, values)
+    return name, values
+
+
+def _sealed(path: Path) -> list[tuple[str, dict[str, float]]]:
+    document, text = read_document(path, "sealed file")
+    top = Section(path, text, "", document)
+    top.only(("schema", "effect"))
+    read = []
+    for section in top.tables("effect"):
+        section.only(("name", "parameters"))
+        name = section.word("name", of=catalogue())
+        parameters = section.table("parameters")
+        values = {key: parameters.number(key) for key in parameters.values}
+        _inside(name, values)
+        read.append((name, values))
+    if not read:
+        raise FingervisionError(f"{path} must have at least one [[effect]], but has none.")
+    return read
+
+
+def _known(name: str) -> None:
+    if name not in catalogue():
+        near = difflib.get_close_matches(name, catalogue(), n=1)
+        hint = f"did you mean {near[0]}?" if near else "`fingervision effects` lists them."
+        raise UsageError(f"An effect must be one of the catalogue, but is {name or '(nothing)'}: {hint}")
+
+
+def _inside(name: str, values: dict[str, float]) -> None:
+    known = {p.name: p for p in catalogue()[name].parameters}
+    for key, value in values.items():
+        if key not in known:
+            raise UsageError(f"A parameter of {name} must be one of {', '.join(known)}, but is {key}.")
+        p = known[key]
+        if not p.lower <= value <= p.upper:
+            raise UsageError(f"{key} of {name} must be between {p.lower:g} and {p.upper:g}, but is {value:g}.")

@@ -1,0 +1,53 @@
+"""Between the steps of an encoder: a stage that moves evenly is found far inside a step."""
+
+import numpy as np
+import pytest
+
+from fingervision.testbed.motion.encoder_interpolation import WAIT_FOR_BORDER_S, StageTrack
+from fingervision.testbed.reading import Reading
+
+STEP_MM, RATE_HZ = 0.03, 200.0
+# A border is passed somewhere between two readings: half of one reading's way, at 0.5 mm/s.
+BETWEEN_READINGS_MM = 0.5 * 0.5 / RATE_HZ
+
+
+def read(position_mm: float, device_s: float, moving: bool) -> Reading:
+    return Reading(device_s, device_s, device_s, round(position_mm / STEP_MM) * STEP_MM, moving)
+
+
+def followed(speed_mm_s: float = 0.5) -> tuple[StageTrack, np.ndarray]:
+    """There for 2 s, a rest of 1 s, back for 2 s; times and true positions of the readings."""
+    track = StageTrack(STEP_MM)
+    time_s = np.arange(0.0, 6.0, 1.0 / RATE_HZ)
+    true_mm = speed_mm_s * np.interp(time_s, [0.5, 2.5, 3.5, 5.5], [0.0, 2.0, 2.0, 0.0])
+    for at_s, mm in zip(time_s.tolist(), true_mm.tolist(), strict=True):
+        track.add(read(mm, at_s, 0.5 < at_s < 2.5 or 3.5 < at_s < 5.5))
+    return track, np.stack([time_s, true_mm])
+
+
+def test_a_moving_stage_is_found_between_the_borders() -> None:
+    track, (time_s, true_mm) = followed()
+    way = (time_s > 0.6) & (time_s < 5.4)
+    found_mm = np.array([track.at_mm(at_s) for at_s in time_s[way].tolist()])
+    # Where it stood after the way there, the speed is known from the last borders alone.
+    assert np.max(np.abs(found_mm - true_mm[way])) < 3.0 * BETWEEN_READINGS_MM
+    assert np.std(found_mm - true_mm[way]) < 0.15 * STEP_MM / np.sqrt(12.0)
+
+
+def test_on_the_way_to_the_next_border_it_waits_but_not_for_ever() -> None:
+    track = StageTrack(STEP_MM)
+    for k in range(400):
+        at_s = k / RATE_HZ
+        track.add(read(0.001 * at_s, at_s, k > 0))
+    newest_s = 399 / RATE_HZ
+    assert track.at_mm(newest_s) is None
+    assert track.at_mm(newest_s, at_once=True) is not None
+    assert track.at_mm(newest_s - WAIT_FOR_BORDER_S - 0.01) is not None
+
+
+def test_without_a_step_readings_are_taken_as_they_are() -> None:
+    track = StageTrack(0.0)
+    for at_s in (0.0, 1.0):
+        track.add(Reading(at_s, at_s, at_s, 0.3 * at_s, True))
+    assert track.at_mm(0.5) == pytest.approx(0.15)
+    assert track.at_mm(1.0) == pytest.approx(0.3)

@@ -1,0 +1,83 @@
+"""Motions asked for one by one, on the simulated bed: limited, watched, stopped; and the commands that ask for them."""
+
+from collections.abc import Iterator
+
+import pytest
+from click.testing import CliRunner
+
+from fingervision.cli import cli
+from fingervision.domain.errors import FingervisionError
+from fingervision.testbed.actuator import Alarm
+from fingervision.testbed.actuators.simulated import SimulatedActuator
+from fingervision.testbed.bed import Bed
+from fingervision.testbed.bed_factory import open_bed
+from fingervision.testbed.manual import manual_control
+
+
+@pytest.fixture
+def bed() -> Iterator[Bed]:
+    bed = open_bed("simulated")
+    yield bed
+    bed.close()
+
+
+def close_enough_mm(bed: Bed) -> float:
+    return bed.actuator.limits.accuracy_mm + bed.actuator.limits.encoder_step_mm
+
+
+def test_a_move_ends_where_it_shall_and_homing_at_zero(bed: Bed) -> None:
+    assert manual_control.move(bed, 1.2, 5.0) == pytest.approx(1.2, abs=close_enough_mm(bed))
+    assert manual_control.home(bed) == pytest.approx(0.0, abs=1e-6)
+
+
+def test_a_jog_ends_after_its_time_or_at_the_limit_of_the_bed(bed: Bed) -> None:
+    late_mm = 0.5 * manual_control.LOOK_EVERY_S
+    assert manual_control.jog(bed, 0.5, for_s=1.0) == pytest.approx(0.5, abs=late_mm + close_enough_mm(bed))
+    assert manual_control.jog(bed, -0.5) == pytest.approx(bed.limits.lower_mm, abs=close_enough_mm(bed))
+
+
+@pytest.mark.parametrize(
+    ("to_mm", "speed_mm_s", "said"),
+    [
+        (2.0, 1.0, "The target must lie within the bed's limits of -0.46 to 1.45 mm, but 2 mm is 0.55 mm beyond: "
+         "nothing was moved."),
+        (float("nan"), 1.0, "The target must be a finite number of mm, but is nan: nothing was moved."),
+        (1.0, 500.0, "The speed must be positive and at most 400 mm/s, but is 500: nothing was moved."),
+        (1.0, 0.0, "The speed must be positive and at most 400 mm/s, but is 0: nothing was moved."),
+    ],
+)  # fmt: skip
+def test_beyond_a_limit_nothing_moves(bed: Bed, to_mm: float, speed_mm_s: float, said: str) -> None:
+    with pytest.raises(FingervisionError) as raised:
+        manual_control.move(bed, to_mm, speed_mm_s)
+    assert str(raised.value) == said
+    assert not bed.actuator.busy
+    assert bed.actuator.readings()[-1].value == 0.0
+
+
+def test_an_alarm_in_the_middle_stops_and_is_said(bed: Bed, monkeypatch: pytest.MonkeyPatch) -> None:
+    actuator = bed.actuator
+    assert isinstance(actuator, SimulatedActuator)
+    wait_until = bed.clock.wait_until
+
+    def fail_later(time_s: float) -> None:
+        wait_until(time_s)
+        if bed.clock.now_s() > 0.3:
+            actuator.raise_alarm(Alarm("E-42", "the motor is hot"))
+
+    monkeypatch.setattr(bed.clock, "wait_until", fail_later)
+    with pytest.raises(FingervisionError) as raised:
+        manual_control.move(bed, 1.0, 1.0)
+    assert str(raised.value) == "The actuator has an alarm (E-42: the motor is hot): the motor was stopped."
+    assert actuator.readings()[-1].value < 0.5
+
+
+def test_the_commands_say_where_it_stands() -> None:
+    for words, begins in (
+        (["home"], "homed: 0.000 mm"),
+        (["move", "-0.3", "--speed-mm-s", "2"], "moved: -0."),
+        (["jog", "1", "--for-s", "0.2"], "jogged: 0."),
+        (["stop"], "The simulated bed stands: "),
+    ):
+        done = CliRunner().invoke(cli, ["bed", *words])
+        assert done.exit_code == 0, done
+        assert done.output.startswith(begins)
