@@ -20,6 +20,8 @@ Examples:
   fingervision live /dev/video2 --size 1280x720 --rate-hz 30 --exposure-ms 8 --gain 0 --focus 30
   fingervision live http://192.168.1.20/video.mjpg --px-per-mm 34 --tips down
   fingervision live rtsp://camera/stream --calibration calibration.json --out runs
+  fingervision live opening.mp4 --px-per-mm 34         look through a recording: scrub, step, play, measure a range
+  fingervision live runs/2026-05-04T10-11-12Z          look through a run, measured as it was
   fingervision live 0 --px-per-mm 34 --no-page         gap, status and rate in the terminal
   fingervision live 0 --px-per-mm 34 --no-page --json  one line of JSON a frame
   fingervision live 0 --px-per-mm 34 --no-page --out runs   also records, from the first frame
@@ -40,6 +42,7 @@ USUAL_OUT, USUAL_PORT = Path("live"), 8025
 @click.argument("source", required=False)
 @click.option("--list", "list_cameras", is_flag=True, help="List the cameras of this machine.")
 @click.option("--out", type=click.Path(path_type=Path), help="Folder for runs and snapshots.  [default: live]")
+@click.option("--as-camera", is_flag=True, help="Play a recording once at its own pace, as if it came from a camera.")
 @click.option("--no-page", is_flag=True, help="No page: gap, status and rate in the terminal.")
 @click.option("--json", "as_json", is_flag=True, help="Print one line of JSON a frame, with the columns of gaps.csv.")
 @click.option("--host", default="127.0.0.1", show_default=True, help="Address that the page is served at.")
@@ -56,6 +59,7 @@ def command(
     source: str | None,
     list_cameras: bool,
     out: Path | None,
+    as_camera: bool,
     no_page: bool,
     as_json: bool,
     host: str,
@@ -73,10 +77,11 @@ def command(
     tips: str,
     roi: str | None,
 ) -> None:
-    """Show SOURCE live: a camera's number, a /dev path, an rtsp:// or http:// stream, a file, or the word simulated.
+    """Show SOURCE: a camera's number, a /dev path, a stream, a recording, the folder of a run, or the word simulated.
 
     Every frame is measured. The page shows the picture with the measured points, the gap with its uncertainty, and its
-    history; it records, calibrates and saves.
+    history; it records, calibrates and saves. A recording is opened to scrub, step and play in, and measured as
+    `fingervision measure` does.
     """
     if list_cameras:
         _list()
@@ -85,7 +90,8 @@ def command(
         raise UsageError("The source must be given, but is not: name a camera, stream or file, or use `simulated`.")
     from fingervision.frames.source import CameraWish, Wish
     from fingervision.live.opening import opened
-    from fingervision.live.running import Showing, run
+    from fingervision.live.playback.recorded import is_recording, recorded
+    from fingervision.live.running import Showing, look_through, run
 
     choices = _choices(source, calibration, px_per_mm, below_tip_mm, tips, roi)
     if no_page and choices.scale is None:
@@ -93,9 +99,14 @@ def command(
             "Without a page the scale must be given, but is not: add --calibration FILE (made by `fingervision "
             "calibrate`) or --px-per-mm S."
         )
+    showing = Showing(page=not no_page, json_lines=as_json, host=host, port=port, record=no_page and out is not None)
+    if not no_page and not as_camera and is_recording(source):
+        if size is not None:
+            raise UsageError(f"--size is for cameras, but {source} is a recording: leave it out.")
+        look_through(recorded(source, rate_hz, choices, ()), out or USUAL_OUT, showing)
+        return
     camera = CameraWish(pixel_format, exposure_ms, gain, focus, white_balance_k)
     capture = opened(source, Wish(rate_hz, None if size is None else _size(size), camera))
-    showing = Showing(page=not no_page, json_lines=as_json, host=host, port=port, record=no_page and out is not None)
     run(capture, choices, out or USUAL_OUT, showing)
 
 

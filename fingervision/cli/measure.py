@@ -25,6 +25,7 @@ Examples:
   fingervision measure run.mkv --calibration calibration.json --drive drive.csv
   fingervision measure run.mkv --calibration calibration.json --drive drive.csv --drive-offset-s 0.12
   fingervision measure run.mkv --px-per-mm 34 --steps 10
+  fingervision measure run.mkv --px-per-mm 34 --frames 100:250
 
 \b
 Files written to --out:
@@ -44,6 +45,7 @@ Exit codes: 0 done; 1 could not, or no frame gave a number; 2 wrong usage;
 @click.argument("recording")
 @where_to_measure
 @click.option("--rate-hz", type=float, help="Images in a second, where they have no times of their own.")
+@click.option("--frames", metavar="FIRST:LAST", help="Measure these frames alone; counted from 0, both included.")
 @click.option(
     "--drive",
     type=click.Path(path_type=Path),
@@ -93,6 +95,7 @@ def command(
     tips: str,
     roi: str | None,
     rate_hz: float | None,
+    frames: str | None,
     drive: Path | None,
     columns: Path | None,
     drive_offset_s: float | None,
@@ -132,6 +135,7 @@ def command(
         bits=bits,
         fingers_are_dark={"auto": None, "dark": True, "light": False}[fingers],
         is_outline=face == "outline",
+        frames=_frames(frames),
     )
     source = open_source(recording, Wish(rate_hz=rate_hz))
     folder = out or _default_out(recording)
@@ -140,6 +144,15 @@ def command(
         measured = measure(source, task, folder, bar)
     _report(measured, as_json)
     raise SystemExit(int(measured.exit_code))
+
+
+def _frames(words: str | None) -> tuple[int, int] | None:
+    if words is None:
+        return None
+    first, _, last = words.partition(":")
+    if not (first.isascii() and first.isdigit() and last.isascii() and last.isdigit()):
+        raise UsageError(f"--frames must be FIRST:LAST, two whole numbers such as 100:250, but is '{words}'.")
+    return int(first), int(last)
 
 
 def _scale(calibration: Path | None, px_per_mm: float | None) -> "Scale":

@@ -1,7 +1,8 @@
 """What the user chose for a live view, and may change while it runs."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 from fingervision.domain.direction import Direction
 from fingervision.domain.errors import FingervisionError, UsageError
@@ -9,6 +10,10 @@ from fingervision.domain.region import Region
 from fingervision.frames.source import Description
 from fingervision.measuring.scale import Scale
 from fingervision.measuring.task import Task
+
+MOVES_ZERO = frozenset({"scale", "below_tip_mm", "direction", "region"})
+"""After a change of these a gap is another one."""
+ZERO_IS_OFF = "The zero is off: it was taken with another scale, height, region or direction."
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,6 +46,18 @@ class Choices:
     zero_mm: float = 0.0
     least_mm: float | None = None
     greatest_mm: float | None = None
+
+    def changed(self, **changes: Any) -> tuple["Choices", bool]:
+        """Choose otherwise; also whether that took a zero off.
+
+        A zero is a gap as it was measured with its scale, height, direction and region; after a change of these it
+        would be the gap of something else.
+        """
+        moves_zero = bool(MOVES_ZERO & set(changes))
+        if self.zero_mm and moves_zero:
+            changes.setdefault("zero_mm", 0.0)
+        chosen = replace(self, **changes)
+        return chosen, bool(self.zero_mm) and chosen.zero_mm == 0.0 and moves_zero
 
     @property
     def task(self) -> Task | None:

@@ -16,6 +16,8 @@ from fingervision.live.capture import Capture
 from fingervision.live.choices import Choices
 from fingervision.live.guard import LOOPBACK_NAMES
 from fingervision.live.outlet import Outlet
+from fingervision.live.playback.playback import Playback
+from fingervision.live.playback.recorded import Recorded
 from fingervision.live.server import Page, bound
 from fingervision.live.session import Session
 from fingervision.live.terminal import JsonLines, StatusLine, told
@@ -46,6 +48,41 @@ class Showing:
     record: bool
 
 
+BEYOND = (
+    "The page is served beyond this machine, over plain HTTP: who can listen to the network "
+    "can read it and its token. Use it on a bench's own network alone, or through an SSH tunnel."
+)
+
+
+def look_through(recording: Recorded, out: Path, showing: Showing) -> None:
+    """Show a recording in the page until the user ends it.
+
+    Raises
+    ------
+    FingervisionError
+        The scale is for other frames, or the port is in use.
+    """
+    playback = Playback(recording, out)
+    page = Page(playback, bound(showing.host, showing.port), showing.host)
+    if showing.host not in LOOPBACK_NAMES:
+        playback.say("network", BEYOND)
+    out_there, said = Outlet(sys.stdout), Outlet(sys.stderr)
+    playback.on_message.append(lambda message: told(message, said, in_place=is_terminal(sys.stderr)))
+    for message in tuple(playback.messages):
+        told(message, said, in_place=is_terminal(sys.stderr))
+    try:
+        with _until_signalled() as signalled:
+            playback.start()
+            try:
+                _announce(page, out_there)
+                page.serve(signalled)
+            finally:
+                playback.stop()
+    finally:
+        out_there.close()
+        said.close()
+
+
 def run(capture: Capture, choices: Choices, out: Path, showing: Showing) -> None:
     """Run a live view until the user or the source ends it.
 
@@ -62,11 +99,7 @@ def run(capture: Capture, choices: Choices, out: Path, showing: Showing) -> None
         capture.source.close()
         raise
     if page is not None and showing.host not in LOOPBACK_NAMES:
-        session.say(
-            "network",
-            "The page is served beyond this machine, over plain HTTP: who can listen to the network "
-            "can read it and its token. Use it on a bench's own network alone, or through an SSH tunnel.",
-        )
+        session.say("network", BEYOND)
     out_there, said = Outlet(sys.stdout), Outlet(sys.stderr)
     on_terminal = is_terminal(sys.stderr)
     session.on_message.append(lambda message: told(message, said, in_place=on_terminal))

@@ -10,13 +10,15 @@ SAVED_GAPS = "live_gaps.csv"
 
 
 def save_gaps(view: View) -> Path:
-    """Write the gaps that are kept as gaps.csv has them.
+    """Write the gaps that are kept as gaps.csv has them; of a recording, the table as `measure` wrote it.
 
     Raises
     ------
     FingervisionError
         The file cannot be written.
     """
+    if view.table is not None:
+        return view.table
     make_out_folder(view.out)
     path = view.out / SAVED_GAPS
     with GapsCsv(path) as table:

@@ -3,7 +3,6 @@
 import secrets
 from collections import Counter, deque
 from collections.abc import Callable, Iterator
-from dataclasses import replace
 from pathlib import Path
 from threading import Event, Lock, Thread
 from time import monotonic
@@ -14,7 +13,7 @@ from fingervision.domain.frame import Frame
 from fingervision.domain.status import Status
 from fingervision.live.cadence import Cadence
 from fingervision.live.capture import Arrival, Capture, Ended, Happening
-from fingervision.live.choices import Choices
+from fingervision.live.choices import MOVES_ZERO, ZERO_IS_OFF, Choices
 from fingervision.live.exposure import Exposure
 from fingervision.live.frame_measurement import FrameMeasurement, Seen
 from fingervision.live.history import History
@@ -36,9 +35,6 @@ FRAMES_UNTIL_HURRY = 1
 
 ROWS_SHOWN = 3000
 """Rows that a page which comes new is sent: two minutes at 25 frames a second."""
-
-MOVES_ZERO = {"scale", "below_tip_mm", "direction", "region"}
-"""After a change of these a gap is another one."""
 
 RowListener = Callable[[GapRow, float], None]
 
@@ -108,6 +104,8 @@ class Session:
             recorder.add((name, words))
         self._messages.say(name, words)
 
+    table: Path | None = None
+
     @property
     def row_count(self) -> int:
         """Rows that there have been."""
@@ -150,18 +148,13 @@ class Session:
             It cannot be meant for these frames, or would change a recording under way.
         """
         with self._lock:
-            measured = {"scale", "below_tip_mm", "direction", "region"} & set(changes)
-            if measured and (self._recorder is not None or self._beginning):
+            if MOVES_ZERO & set(changes) and (self._recorder is not None or self._beginning):
                 raise FingervisionError("While a run is recorded the measurement stays as it is: stop recording first.")
-            if self.choices.zero_mm and MOVES_ZERO & set(changes):
-                # A zero is a gap as it was measured then; after this it would be the gap of something else.
-                changes.setdefault("zero_mm", 0.0)
-            unzeroed = bool(self.choices.zero_mm) and changes.get("zero_mm") == 0.0 and bool(measured)
-            chosen = replace(self.choices, **changes)
+            chosen, unzeroed = self.choices.changed(**changes)
             chosen.check(self.description)
             self.choices = chosen
         if unzeroed:
-            self.say("zero", "The zero is off: it was taken with another scale, height, region or direction.")
+            self.say("zero", ZERO_IS_OFF)
 
     def record(self) -> Path:
         """Begin a recording.

@@ -55,6 +55,11 @@ class View(Protocol):
         ...
 
     @property
+    def table(self) -> Path | None:
+        """The whole table as a file, where there is one."""
+        ...
+
+    @property
     def row_count(self) -> int:
         """Rows that there have been."""
         ...

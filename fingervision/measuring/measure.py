@@ -14,6 +14,7 @@ from fingervision.domain.gap import GapMeasurement, NoGap
 from fingervision.domain.status import Status
 from fingervision.frames.ahead import decoded_ahead
 from fingervision.frames.camera_settings import coding_of
+from fingervision.frames.frame_range import frame_range
 from fingervision.frames.source import FrameSource
 from fingervision.measuring.asked_to_stop import asked_to_stop
 from fingervision.measuring.clock.alignment import ClockOffset, NoClockOffset
@@ -149,7 +150,11 @@ def _measured(source: FrameSource, task: Task, out: Path, on_progress: Progress 
         handed_over_at = monotonic()
         try:
             for item, outcome in _outcomes(
-                marked(source, marks) if marks else source, settings, description.coding, series.votes, asked.is_set
+                _asked_for(marked(source, marks) if marks else source, task),
+                settings,
+                description.coding,
+                series.votes,
+                asked.is_set,
             ):
                 result = Result(item.index, item.time_s, outcome)
                 pending.append(result)
@@ -191,6 +196,10 @@ def _measured(source: FrameSource, task: Task, out: Path, on_progress: Progress 
             f"but is {task.steps_frame}; the gaps are in {folder.gaps}."
         )
     return Measured(folder, series, summary, stopped)
+
+
+def _asked_for(frames: Iterable[Frame | LostFrame], task: Task) -> Iterable[Frame | LostFrame]:
+    return frames if task.frames is None else frame_range(frames, *task.frames)
 
 
 @contextmanager

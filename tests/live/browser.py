@@ -50,7 +50,9 @@ def opened(browser: Any, tmp_path: Path, request: pytest.FixtureRequest) -> Iter
         page.on("request", lambda each: requests.append(each.url))
         page.on("websocket", lambda each: requests.append(each.url))
         page.on("pageerror", lambda each: errors.append(str(each)))
-        page.on("console", lambda each: None if UNREACHABLE in each.text else errors.append(f"{each.type}: {each.text}"))
+        page.on(
+            "console", lambda each: None if UNREACHABLE in each.text else errors.append(f"{each.type}: {each.text}")
+        )
         page.goto(address)
         return page
 

@@ -196,7 +196,7 @@ def test_a_scale_is_asked_for_and_found_on_a_reference(
     for index in range(200):
         noisy = np.clip(blurred + rng.normal(0.0, 2.0, picture.shape), 0, 255).astype(np.uint8)
         cv2.imwrite(str(folder / f"{index:03d}.png"), noisy)
-    view = live(folder, "--rate-hz", "10", "--port", "0")
+    view = live(folder, "--as-camera", "--rate-hz", "10", "--port", "0")
     page = opened(view.address)
     page.locator("#alarm", has_text="The scale is not known").wait_for()
     page.locator("body").press("r")

@@ -106,8 +106,7 @@ def test_failures_are_marked_on_the_chart_with_their_reason(
 ) -> None:
     view = live(covered, "--rate-hz", "20", "--px-per-mm", "34", "--port", "0")
     page = opened(view.address)
-    page.locator("#alarm", has_text="The source has ended").wait_for()
-    page.locator("body").press("a")
+    shown(page, f"document.querySelector('#place').textContent === 'frame 0 of {CYCLE}'")
     marked = page.evaluate(
         "import('/page/chart_failures.js').then(m => m.failures(-1, 1e9).map(f => [f.status, f.count]))"
     )

@@ -14,6 +14,7 @@ from fingervision.live.commands.asking import Answer, Request, box, number, numb
 from fingervision.live.picture_calibration import calibrated
 from fingervision.live.view import View
 from fingervision.storage.calibration_json import write_calibration
+from fingervision.storage.out_folder import make_out_folder
 from fingervision.vision.overlay import in_eight_bits
 from fingervision.vision.pipeline import steps
 
@@ -72,10 +73,15 @@ def _calibrate(view: View, request: Request) -> Answer:
     made_at = datetime.now(UTC).isoformat(timespec="seconds")
     camera = dict(view.description.camera)
     found = replace(found, camera=camera, made_at=made_at, software=f"fingervision {__version__}")
+    make_out_folder(view.out)
     # A name of its own: a calibration that lies there is somebody's.
     path = view.out / f"calibration_{made_at.replace(':', '-').removesuffix('+00-00')}Z.json"
-    view.choose(scale=found, scale_file=path)
     write_calibration(found, path)
+    try:
+        view.choose(scale=found, scale_file=path)
+    except FingervisionError:
+        path.unlink(missing_ok=True)
+        raise
     u = found.covariance[0, 0] ** 0.5
     return Answer(f"Calibrated: {found.px_per_mm:.4f} px/mm, u {u:.4f} px/mm; written to {path}.")
 
