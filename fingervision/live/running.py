@@ -12,8 +12,10 @@ from types import FrameType
 from typing import TextIO
 
 from fingervision.domain.errors import ExitCode, FingervisionError
+from fingervision.live.beside import Beside, stand_beside
 from fingervision.live.capture import Capture
 from fingervision.live.choices import Choices
+from fingervision.live.comparison.comparison import Comparison
 from fingervision.live.guard import LOOPBACK_NAMES
 from fingervision.live.outlet import Outlet
 from fingervision.live.playback.playback import Playback
@@ -54,7 +56,7 @@ BEYOND = (
 )
 
 
-def look_through(recording: Recorded, out: Path, showing: Showing) -> None:
+def look_through(recording: Recorded, out: Path, showing: Showing, beside: Beside) -> None:
     """Show a recording in the page until the user ends it.
 
     Raises
@@ -63,6 +65,10 @@ def look_through(recording: Recorded, out: Path, showing: Showing) -> None:
         The scale is for other frames, or the port is in use.
     """
     playback = Playback(recording, out)
+    comparison = None if beside.model is None else Comparison(playback, beside.model, beside.kind)
+    if comparison is not None:
+        playback.features["model"] = comparison
+        playback.on_table = comparison.add_all
     page = Page(playback, bound(showing.host, showing.port), showing.host)
     if showing.host not in LOOPBACK_NAMES:
         playback.say("network", BEYOND)
@@ -78,12 +84,14 @@ def look_through(recording: Recorded, out: Path, showing: Showing) -> None:
                 page.serve(signalled)
             finally:
                 playback.stop()
+                if comparison is not None:
+                    comparison.stop()
     finally:
         out_there.close()
         said.close()
 
 
-def run(capture: Capture, choices: Choices, out: Path, showing: Showing) -> None:
+def run(capture: Capture, choices: Choices, out: Path, showing: Showing, beside: Beside | None = None) -> None:
     """Run a live view until the user or the source ends it.
 
     Raises
@@ -93,6 +101,7 @@ def run(capture: Capture, choices: Choices, out: Path, showing: Showing) -> None
     """
     try:
         session = Session(capture, choices, out)
+        stand_beside(session, beside or Beside())
         # Before the camera runs: a port in use is said at once.
         page = Page(session, bound(showing.host, showing.port), showing.host) if showing.page else None
     except FingervisionError:
@@ -126,6 +135,9 @@ def run(capture: Capture, choices: Choices, out: Path, showing: Showing) -> None
                     page.serve(signalled)
             finally:
                 session.stop()
+                comparison = session.features.get("model")
+                if isinstance(comparison, Comparison):
+                    comparison.stop()
                 if status is not None:
                     status.end()
     finally:

@@ -6,6 +6,7 @@ from fingervision.live.view import View
 from fingervision.storage.gaps_csv import GapsCsv
 from fingervision.storage.out_folder import make_out_folder
 
+DRIVE_COLUMNS = ("run", "input_mm", "force_n")
 SAVED_GAPS = "live_gaps.csv"
 
 
@@ -21,6 +22,8 @@ def save_gaps(view: View) -> Path:
         return view.table
     make_out_folder(view.out)
     path = view.out / SAVED_GAPS
-    with GapsCsv(path) as table:
-        table.add(list(view.rows(view.oldest_row, view.row_count)))
+    rows = list(view.rows(view.oldest_row, view.row_count))
+    is_driven = any(row.input_mm is not None for row in rows)
+    with GapsCsv(path, DRIVE_COLUMNS if is_driven else ()) as table:
+        table.add(rows)
     return path

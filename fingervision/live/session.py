@@ -3,6 +3,7 @@
 import secrets
 from collections import Counter, deque
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from pathlib import Path
 from threading import Event, Lock, Thread
 from time import monotonic
@@ -11,6 +12,7 @@ from typing import Any
 from fingervision.domain.errors import FingervisionError
 from fingervision.domain.frame import Frame
 from fingervision.domain.status import Status
+from fingervision.frames.received import Driven
 from fingervision.live.cadence import Cadence
 from fingervision.live.capture import Arrival, Capture, Ended, Happening
 from fingervision.live.choices import MOVES_ZERO, ZERO_IS_OFF, Choices
@@ -36,6 +38,7 @@ FRAMES_UNTIL_HURRY = 1
 ROWS_SHOWN = 3000
 """Rows that a page which comes new is sent: two minutes at 25 frames a second."""
 
+DrivenAt = Callable[[float | None], Driven | None]
 RowListener = Callable[[GapRow, float], None]
 
 
@@ -66,9 +69,11 @@ class Session:
         self._messages = Messages()
         self.ended = Event()
         self.on_row: list[RowListener] = []
+        self.driven_at: DrivenAt = lambda time_s: None
+        """Who knows the gripper's input at a time of this view, where the source does not."""
         self._measurement = FrameMeasurement((self.description.width_px, self.description.height_px))
         self._frame_at_s = monotonic()
-        self._interrupted = False
+        self._interrupted, self._run = False, ""
         self._recorder: Recorder | None = None
         self._beginning = False
         self.trouble = ""
@@ -257,6 +262,13 @@ class Session:
             self._interrupted = False
             came = arrival.item
             item, outcome, row = self._measurement.measured(came, self.choices)
+            driven = arrival.driven or self.driven_at(came.time_s)
+            if driven is not None and driven.run != self._run:
+                # Between two runs of a bed nobody looks: that is no drop.
+                self._run = driven.run
+                self.cadence.restart()
+            if row is not None and driven is not None:
+                row = replace(row, run=driven.run, input_mm=driven.input_mm, force_n=driven.force_n)
             if isinstance(came, Frame):
                 if came.time_s is not None:
                     self.cadence.add(came.time_s)

@@ -2,7 +2,7 @@
 
 import secrets
 from collections import Counter, deque
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from threading import Condition, Thread
 from time import monotonic
@@ -50,6 +50,9 @@ class Playback:
         self.seen: Seen | None = None
         self.range: tuple[int, int] | None = None
         self.trouble = ""
+        self.on_table: Callable[[Sequence[GapRow]], None] = lambda rows: None
+        """Told of the whole table, each time that one is made."""
+        self._told: Track | None = None
         self.is_playing, self.speed, self.frame = False, 1.0, 0
         self._messages = Messages()
         self._track: Track | None = None
@@ -241,8 +244,7 @@ class Playback:
     def _play(self) -> None:
         while not self._stopped:
             with self._changed:
-                if self._track is not None and self._track.refresh():
-                    self._generation += 1
+                self._follow_table()
                 self._advance()
                 frame, row = self.frame, self._row(self.frame)
                 wanted = (frame, row, self._generation, self.choices)
@@ -251,6 +253,16 @@ class Playback:
                     continue
             self._show(frame, row)
             self._shown = wanted
+
+    def _follow_table(self) -> None:
+        track = self._track
+        if track is None:
+            return
+        if track.refresh():
+            self._generation += 1
+        if track.is_whole and self._told is not track:
+            self._told = track
+            self.on_table(track.rows)
 
     def _advance(self) -> None:
         """Go on as far as the time says; frames that cannot be shown in time are passed over."""
