@@ -33,6 +33,7 @@ Examples:
   fingervision bed run recipe.toml --out run
   fingervision bed run recipe.toml --hide backlash:play_mm=0.2 --out run
   fingervision bed run next_run.toml --bed lab.toml --out second
+  fingervision bed check recipe.toml
 """
 
 

@@ -40,7 +40,28 @@ class Alarm:
     words: str
 
 
-class Actuator(Protocol):
+class MoveCheck(Protocol):
+    """What an actuator can do, as far as its configuration tells: enough to check a plan away from the bed.
+
+    A kind of actuator whose `build` opens hardware gives one by `without_hardware(section, folder)`.
+    """
+
+    @property
+    def limits(self) -> StageLimits:
+        """What it can do."""
+        ...
+
+    @property
+    def has_steps(self) -> bool:
+        """Whether it keeps step data, so that `run_step` is possible and it goes only where they lead."""
+        ...
+
+    def check(self, from_mm: float, to_mm: float, speed_mm_s: float) -> None:
+        """Raise the sentence with which it would refuse to go from one position to another."""
+        ...
+
+
+class Actuator(MoveCheck, Protocol):
     """A linear stage. Motions begin at once and end by themselves; `busy` says whether one is under way.
 
     Every method raises `FingervisionError` with a sentence if the connection is lost or the motion was refused (beyond
@@ -53,11 +74,6 @@ class Actuator(Protocol):
         ...
 
     @property
-    def limits(self) -> StageLimits:
-        """What it can do."""
-        ...
-
-    @property
     def busy(self) -> bool:
         """Whether it moves."""
         ...
@@ -67,17 +83,8 @@ class Actuator(Protocol):
         """Why it refuses to move; None if it does not."""
         ...
 
-    @property
-    def has_steps(self) -> bool:
-        """Whether `run_step` is possible."""
-        ...
-
     def home(self) -> None:
         """Go to the reference and make it position 0."""
-        ...
-
-    def check(self, from_mm: float, to_mm: float, speed_mm_s: float) -> None:
-        """Raise the sentence with which `move` would refuse to go from one position to another."""
         ...
 
     def move(self, to_mm: float, speed_mm_s: float) -> None:

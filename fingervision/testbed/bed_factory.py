@@ -1,7 +1,6 @@
 """Build a bed from its configuration."""
 
 from contextlib import suppress
-from dataclasses import replace
 from importlib import resources
 from pathlib import Path
 from typing import Any
@@ -17,7 +16,7 @@ from fingervision.storage.calibration_json import read_calibration
 from fingervision.storage.gripper_toml import read_gripper
 from fingervision.storage.toml_section import Section, read_document
 from fingervision.tables.read import read_simulation_table
-from fingervision.testbed.actuator import Actuator
+from fingervision.testbed.actuator import Actuator, StageLimits
 from fingervision.testbed.bed import Bed
 from fingervision.testbed.build_context import BuildContext
 from fingervision.testbed.camera import BedCamera
@@ -81,12 +80,12 @@ def open_bed(
         folder=top.path.parent,
         seed=top.whole("seed", 1, low=0) if seed is None else seed,
         hidden=hidden,
-        limits=_limits(top.table("limits")),
-        scale=_scale(top.table("scale"), top.path.parent),
+        limits=stated_limits(top.table("limits")),
+        scale=stated_scale(top.table("scale"), top.path.parent),
         below_tip_mm=top.number("below_tip_mm", 0.3, above=0.0),
         since_s=earlier_s[0] if earlier_s else None,
     )
-    model = _model(top.table("gripper"), top.path.parent) if has_gripper else None
+    model = gripper_model(top.table("gripper"), top.path.parent) if has_gripper else None
     return _built(top, sections, parts, context, model, replays=all_simulated)
 
 
@@ -103,7 +102,7 @@ def _built(
     try:
         actuator: Actuator = parts["actuator"].build(sections["actuator"], context)
         opened.append(actuator)
-        limits = _within(context.limits, actuator, top.table("limits"))
+        limits = limits_within(context.limits, actuator.limits, top.table("limits"))
         if model is not None:
             if context.motion is None:
                 actuator = followed = Followed(actuator)
@@ -169,7 +168,8 @@ def read_configuration(name: str) -> Section:
     return top
 
 
-def _limits(section: Section) -> SoftLimits:
+def stated_limits(section: Section) -> SoftLimits:
+    """Read the soft limits that a configuration states."""
     section.only(("lower_mm", "upper_mm", "speed_mm_s", "force_n", "gap_mm"))
     big = float("inf")
     lower_mm = section.number("lower_mm") if "lower_mm" in section.values else -big
@@ -182,16 +182,9 @@ def _limits(section: Section) -> SoftLimits:
     )
 
 
-def _within(limits: SoftLimits, actuator: Actuator, section: Section) -> SoftLimits:
+def limits_within(limits: SoftLimits, able: StageLimits, section: Section) -> SoftLimits:
     """Limit the bed further to what its actuator can do."""
-    able = actuator.limits
-    within = replace(
-        limits,
-        lower_mm=max(limits.lower_mm, able.lower_mm),
-        upper_mm=min(limits.upper_mm, able.upper_mm),
-        speed_mm_s=min(limits.speed_mm_s, able.speed_mm_s),
-        force_n=min(limits.force_n, able.force_n),
-    )
+    within = limits.within(able)
     if not within.lower_mm < within.upper_mm:
         section.refuse(
             None,
@@ -200,7 +193,8 @@ def _within(limits: SoftLimits, actuator: Actuator, section: Section) -> SoftLim
     return within
 
 
-def _scale(section: Section, folder: Path) -> Scale | None:
+def stated_scale(section: Section, folder: Path) -> Scale | None:
+    """Read the camera's scale that a configuration states; None where it states none."""
     section.only(("px_per_mm", "calibration"))
     if "calibration" in section.values:
         return read_calibration(folder / section.word("calibration"))
@@ -209,7 +203,8 @@ def _scale(section: Section, folder: Path) -> Scale | None:
     return None
 
 
-def _model(section: Section, folder: Path) -> Model:
+def gripper_model(section: Section, folder: Path) -> Model:
+    """Read the gripper that simulated parts push and see, and that limits of gap and force are foretold by."""
     section.only(("file", "columns", "kind", "large_rotation", "contact"))
     if "file" in section.values:
         path = folder / section.word("file")

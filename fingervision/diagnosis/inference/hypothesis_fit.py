@@ -82,6 +82,8 @@ class Problem:
         Share of what is explained that the form of an effect may leave over, as a ratio of amplitudes.
     stalled : frozenset of str
         Effects for which readings that stand at an end of the range speak.
+    mapped : float
+        Squared whitened length of what a map of position errors explains beside every explanation; 0 without one.
     """
 
     chain: MeasuringChain
@@ -91,6 +93,7 @@ class Problem:
     effects: Mapping[str, Effect]
     form_share: float = SMALL_SHARE
     stalled: frozenset[str] = frozenset()
+    mapped: float = 0.0
 
     def parameters(self, names: tuple[str, ...]) -> list[tuple[str, Parameter]]:
         """List the parameters of some effects with the bounds that the data leave."""

@@ -162,6 +162,7 @@ def remaining_structure(
     size_mm = abs(float(dot[top])) / float(norm[top]) * shapes.rms[top]
     if below_the_input(problem, size_mm):
         return None, words
-    if best.names and gain[top] < problem.form_share**2 * _explained(problem, best):
+    # A small part of what is explained: the form of an effect, or of a map between its nodes, is no truer than that.
+    if gain[top] < problem.form_share**2 * (_explained(problem, best) + problem.mapped):
         return None, words
     return words, None

@@ -12,7 +12,6 @@ from scipy.interpolate import CubicSpline
 from fingervision.diagnosis.inference.hypothesis_fit import Explanation, Problem
 from fingervision.diagnosis.inference.measuring_chain import MeasuringChain
 from fingervision.diagnosis.inference.random_effect import estimated_coefficients, normal_equations
-from fingervision.diagnosis.inference.signatures import signatures
 from fingervision.domain.effect import Array, History, InputPath
 from fingervision.domain.parameter import Estimate
 from fingervision.effects import catalogue
@@ -32,12 +31,6 @@ LENGTHS, SIZES = 10, 25
 """Lengths and sizes that are tried."""
 EVENLY = 200
 """Places that stand for a whole range: enough that its ends count for no more than their share."""
-LINE_SHARE = 1e-3
-"""Share of its squared length that a straight line may leave of an effect that acts like one: ratios and offsets bend
-that little over a stroke, and a map has no line."""
-CURVE_SHARE = 0.02
-"""Share of the squared length beyond a line that some curve may leave of an effect that acts like a map: 14 % as
-amplitude, less than which the forms of effects are off on real rigs (ISO 230-2 reversals: 19 to 24 %)."""
 SLOPE_STEP = 1e-3
 """Share of the range over which the prediction is differentiated by the input."""
 
@@ -134,7 +127,7 @@ def likeliest_map(problem: Problem, explanation: Explanation) -> tuple[PositionM
     """
     history = problem.chain.history
     nodes_mm = _nodes(history)
-    raw = _columns(problem.chain, nodes_mm)
+    raw = map_columns(problem.chain, nodes_mm)
     gram, aim = normal_equations(problem, explanation, raw)
     spacing = float(np.median(np.diff(nodes_mm)))
     shortest = spacing if nodes_mm.size < NODES else SMOOTH * history.input_span_mm
@@ -173,56 +166,6 @@ def likeliest_map(problem: Problem, explanation: Explanation) -> tuple[PositionM
     return found, float(gains[i, j]) - choice
 
 
-def imitating_effects(problem: Problem, position_map: PositionMap) -> dict[str, str]:
-    """Find effects that only a map's own freedom can hold: functions of the place, beyond a straight line.
-
-    Beside a map nothing tells them from it, whatever their size. Reversal, memory and time do tell.
-
-    Returns
-    -------
-    reasons : dict of str to str
-        Why each cannot show, by name.
-    """
-    history = problem.chain.history
-    still = [
-        name
-        for name, effect in problem.effects.items()
-        if not (effect.memory or effect.needs_times or name == NAME or name in problem.stalled)
-    ]
-    raw = _columns(problem.chain, position_map.nodes_mm)
-    curve = problem.whitener.columns(raw)[0]
-    straight = problem.whitener.columns(raw @ _line(position_map.nodes_mm))[0]
-    atoms = signatures(replace(problem, effects={name: problem.effects[name] for name in still})) if still else None
-    if atoms is None:
-        return {}
-    owner = np.array(atoms.names)
-    offsets, metric = problem.offsets, problem.offsets.metric(problem.nothing().sigma_mm)
-
-    def left(columns: Array, of: Array) -> Array:
-        """Squared lengths once the offsets and `columns` are taken out; shape (k,)."""
-        moved = columns - offsets.design @ (metric @ (offsets.design.T @ columns))
-        rest = of - columns @ (np.linalg.pinv(columns.T @ moved) @ (moved.T @ of))
-        shared = offsets.design.T @ rest
-        return np.asarray(np.einsum("ij,ij->j", rest, rest) - np.einsum("ij,ij->j", shared, metric @ shared))
-
-    whole = np.einsum("ij,ij->j", atoms.columns, atoms.columns)
-    bent = left(straight, atoms.columns)
-    beyond = left(curve, atoms.columns)
-    lines = bent < LINE_SHARE * whole
-    mapped = ~lines & (beyond < CURVE_SHARE * bent)
-    span = f"{history.input_mm.min():g} to {history.input_mm.max():g} mm"
-    return {
-        name: f"beside a map of position errors it is a part of the map: over {span} it depends on the place alone"
-        for name in still
-        if np.any(mapped[owner == name]) and np.all((mapped | lines)[owner == name])
-    }
-
-
-def _line(nodes_mm: Array) -> Array:
-    """Values of a constant and of a straight line at the nodes; shape (k, 2)."""
-    return np.stack([np.ones_like(nodes_mm), nodes_mm - nodes_mm.mean()], axis=1)
-
-
 def _estimate(value: float, logarithms: Array, weight: Array) -> Estimate:
     """A likeliest value with its posterior standard deviation, which is no smaller than the grid is fine."""
     mean = float(weight @ logarithms)
@@ -239,7 +182,7 @@ def _nodes(history: History) -> Array:
     return np.linspace(float(places[0]), float(places[-1]), NODES)
 
 
-def _columns(chain: MeasuringChain, nodes_mm: Array) -> Array:
+def map_columns(chain: MeasuringChain, nodes_mm: Array) -> Array:
     """Change of the stacked prediction by a unit error of the stage at each node; shape (channels * n, k)."""
     history = chain.history
     reach = SLOPE_STEP * history.input_span_mm

@@ -8,10 +8,10 @@ from scipy.stats import t as student
 
 from fingervision.diagnosis.inference.explanation_candidates import Progress
 from fingervision.diagnosis.inference.hypothesis_fit import Explanation, Point, Problem, fit
+from fingervision.diagnosis.inference.map_imitators import imitating_effects, imitating_parts
 from fingervision.diagnosis.inference.position_map import (
     NAME,
     PositionMap,
-    imitating_effects,
     likeliest_map,
     why_no_map,
 )
@@ -188,17 +188,29 @@ def _beside_map(state: _Searched, look: _Look) -> _Searched:
     if gain < LEAST_GAIN and not asked:
         return state
     imitating = imitating_effects(found.problem, first)
-    effects = {name: effect for name, effect in state.data.effects.items() if name not in imitating}
-    excluded = {**state.data.excluded, **imitating}
     kept = found.best if not set(found.best.names) & set(imitating) else None
-    beside = look.again(replace(state.data, position_map=first, effects=effects, excluded=excluded), kept)
+    beside = look.again(_excluding(replace(state.data, position_map=first), imitating), kept)
     plain = _without(beside.found.problem, first)
+    parts = imitating_parts(plain, first, beside.found.best)
+    if parts and not parts.keys() & look.forced:
+        # The map was estimated beside what stands for a part of it.
+        names = tuple(name for name in beside.found.best.names if name not in parts)
+        rest = fit(plain, names, beside.found.best.values, iterations=20) if names else plain.nothing()
+        first, _ = likeliest_map(plain, rest)
+        beside = look.again(_excluding(replace(beside.data, position_map=first), parts))
+        plain = _without(beside.found.problem, first)
     second, _ = likeliest_map(plain, _left(plain, beside.found.best))
     if first.is_like(second):
         second = first
     else:
         beside = look.again(replace(beside.data, position_map=second), beside.found.best)
     return beside if asked or _gained(state, beside, second) > LEAST_GAIN else state
+
+
+def _excluding(data: Observations, reasons: dict[str, str]) -> Observations:
+    """Leave effects out of the search, each for its reason."""
+    kept = {name: effect for name, effect in data.effects.items() if name not in reasons}
+    return replace(data, effects=kept, excluded={**data.excluded, **reasons})
 
 
 def _gained(state: _Searched, beside: _Searched, effect: RunGains | PositionMap) -> float:

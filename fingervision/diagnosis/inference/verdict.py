@@ -23,6 +23,8 @@ TRUSTED = 10.0
 """Times the measurement's own random uncertainty that noise may have: more is structure that looks like noise."""
 NEEDED = 1.1
 """Times that dropping an effect may raise what stands, as RMS; an effect that lowers it by more is seen by eye."""
+MANY_ASIDE = 0.1
+"""Share of the rows that may be gross errors beside a model that agrees: of more, something is the cause."""
 LACK_OF_FIT = 1e-3
 """Significance of the F ratio of lack of fit to pure error, above which nothing is to be explained."""
 
@@ -46,6 +48,8 @@ class Standing:
         Degrees of freedom of a noise that comes from repeats; None where it comes from the residual itself.
     rounding_mm : float
         Largest error that the rounding of a reading makes: half its last digit.
+    aside_share : float
+        Share of the rows that were set aside as gross errors.
     """
 
     before_mm: float
@@ -54,6 +58,7 @@ class Standing:
     rows: int
     noise_degrees: int | None
     rounding_mm: float = 0.0
+    aside_share: float = 0.0
 
     @property
     def explained_share(self) -> float:
@@ -118,7 +123,8 @@ def standing(data: Observations, problem: Problem, before_mm: Array, after_mm: A
     errors = data.measured_pure_errors(np.split(problem.whitener.aside, len(data.channels)))
     degrees = None if errors is None else min(error.degrees for error in errors)
     rounding_mm = 0.5 * resolution(data.table.gap_mm) if data.repeats is not None else 0.0
-    return Standing(rms(before_mm), rms(after_mm), noise, int(np.sum(~aside)), degrees, rounding_mm)
+    kept, gross = int(np.sum(~aside)), float(np.mean(aside & ~data.distrusted))
+    return Standing(rms(before_mm), rms(after_mm), noise, kept, degrees, rounding_mm, gross)
 
 
 def short_scatter(residual_mm: Array, runs: tuple[slice, ...]) -> float:
@@ -181,6 +187,11 @@ def verdict(found: Findings, *, mapped: bool, stands: Standing) -> tuple[Verdict
     )
     if found.unknown is not None:
         return Verdict.UNKNOWN, found.unknown
+    if not named and stands.aside_share > MANY_ASIDE:
+        return (
+            Verdict.UNKNOWN,
+            f"{100.0 * stands.aside_share:.0f} % of the rows lie far off the model, the others on it",
+        )
     if not named:
         return (Verdict.AGREES, None) if stands.is_noise else (Verdict.UNKNOWN, remains)
     if not stands.is_little:

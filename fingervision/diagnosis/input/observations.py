@@ -159,7 +159,13 @@ class Observations:
         )
         share = SMALL_SHARE if repeated is None else FORM_SHARE_OF_RIGS
         offsets = RunOffsets.of(whitener)
-        return Problem(self.chain, whitener.one(self.aim_mm), whitener, offsets, self.effects, share, self.stalled)
+        mapped = 0.0
+        if self.position_map is not None:
+            curve = whitener.one(self.position_map.fitted_mm)
+            mapped = float(curve @ curve)
+        return Problem(
+            self.chain, whitener.one(self.aim_mm), whitener, offsets, self.effects, share, self.stalled, mapped
+        )
 
     def measured_pure_errors(self, aside: list[Flags]) -> list[PureError] | None:
         """Scatter of repeats of each channel, of readings at rest; None where too little repeats."""

@@ -3,12 +3,15 @@
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.stats import hypergeom
 
 from fingervision.domain.effect import Array, Flags
 
 LEAST_SHARE = 0.1
 """Of a residual's variance that is the picture's own at least."""
+AFTER_A_STEP = 5
+"""Samples after a step of the input that are looked at: five in a row off are no outliers in any case."""
 PLACES, ENDS = 20, (2, 3, 5, 8)
 """Parts of the input's range that are looked at, and how many samples at either end of it: stops act there."""
 BY_CHANCE = 2e-3
@@ -57,7 +60,7 @@ def gate(residual: Array, input_mm: Array, runs: tuple[slice, ...], ordered: boo
     if sigma > 0.0:
         out = np.abs(rest) > sigmas * sigma
         if ordered:
-            there = _at_one_place(out, input_mm)
+            there = _recurring(out, [*_places(input_mm), *_after_steps(input_mm, runs)])
             # A real reversal moves neighbours too; an outlier stands alone or in pairs.
             for i in range(2, residual.size - 2):
                 if out[i - 2 : i + 3].sum() >= 4:
@@ -66,16 +69,29 @@ def gate(residual: Array, input_mm: Array, runs: tuple[slice, ...], ordered: boo
     return out
 
 
-def _at_one_place(out: Flags, input_mm: Array) -> Flags:
-    """Where more samples are off than gross errors would be, which come at any input: a contact, a stop."""
-    order = np.argsort(input_mm, kind="stable")
+def _recurring(out: Flags, parts: list[NDArray[np.intp]]) -> Flags:
+    """Where more samples are off than gross errors would be, which come at any input and any time."""
     there = np.zeros(out.size, dtype=bool)
-    ends = [part for count in ENDS for part in (order[:count], order[-count:])]
-    parts = [*np.array_split(order, min(PLACES, out.size)), *ends]
     for part in parts:
         by_chance = hypergeom.sf(out[part].sum() - 1, out.size, int(out.sum()), part.size)
         there[part] |= by_chance < BY_CHANCE / len(parts)
     return there
+
+
+def _places(input_mm: Array) -> list[NDArray[np.intp]]:
+    """Samples near the same input, and at the ends of its range: where a contact or a stop acts."""
+    order = np.argsort(input_mm, kind="stable")
+    ends = [part for count in ENDS for part in (order[:count], order[-count:])]
+    return [*np.array_split(order, min(PLACES, order.size)), *ends]
+
+
+def _after_steps(input_mm: Array, runs: tuple[slice, ...]) -> list[NDArray[np.intp]]:
+    """Samples that come equally long after steps of a held input: there a stage is still on its way."""
+    steps = np.concatenate([run.start + 1 + np.flatnonzero(np.diff(input_mm[run])) for run in runs])
+    if not 0 < steps.size <= input_mm.size // (2 * AFTER_A_STEP):
+        return []
+    last = np.repeat([run.stop for run in runs], [run.stop - run.start for run in runs])
+    return [steps[steps + lag < last[steps]] + lag for lag in range(AFTER_A_STEP)]
 
 
 def white_noise(residual: Array, aside: Flags, floor_mm: float, degrees: int) -> Noise:

@@ -1,6 +1,7 @@
 """A motor controller on the parallel lines of a board: it runs the step data that it keeps."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 from fingervision.domain.errors import FingervisionError
@@ -30,6 +31,28 @@ KEYS = (KEY, "steps", *published_stage.KEYS, *controller_settings.KEYS)
 PATIENCE, PATIENCE_S = 1.5, 1.0
 READ_EVERY_S = 0.005
 CLOSES_WITHIN_S = 1.0
+
+
+@dataclass(frozen=True, slots=True)
+class Routes:
+    """Which moves the step data allow, without the board.
+
+    Parameters
+    ----------
+    data : StepData
+        What the controller keeps.
+    limits : StageLimits
+        What the stage can do.
+    """
+
+    data: StepData
+    limits: StageLimits
+    has_steps: bool = True
+
+    def check(self, from_mm: float, to_mm: float, speed_mm_s: float) -> None:
+        """Refuse what is beyond the limits, and where no steps lead."""
+        check_move(self.limits, to_mm, speed_mm_s)
+        route(self.data.steps, from_mm, to_mm, speed_mm_s, self.limits.speed_mm_s)
 
 
 class BoardActuator:
@@ -108,8 +131,7 @@ class BoardActuator:
 
     def check(self, from_mm: float, to_mm: float, speed_mm_s: float) -> None:
         """Refuse what is beyond the limits, and where no steps lead."""
-        check_move(self.limits, to_mm, speed_mm_s)
-        route(self._data.steps, from_mm, to_mm, speed_mm_s, self.limits.speed_mm_s)
+        Routes(self._data, self.limits).check(from_mm, to_mm, speed_mm_s)
 
     def move(self, to_mm: float, speed_mm_s: float) -> None:
         """Begin to move, by the steps that lead there."""
@@ -208,6 +230,11 @@ class BoardActuator:
 def holder(section: Section, folder: Path) -> int | None:
     """Process of another fingervision that has its board's port open; None if none is seen."""
     return fingervision_at(read_board(folder / section.word(KEY)).port)
+
+
+def without_hardware(section: Section, folder: Path) -> Routes:
+    """What the stage can do, for a plan that is checked away from the bed."""
+    return Routes(read_steps(folder / section.word("steps")), stage_limits(section))
 
 
 def build(section: Section, context: BuildContext) -> BoardActuator:

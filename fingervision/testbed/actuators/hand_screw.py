@@ -1,13 +1,14 @@
 """A micrometer screw that a person turns, typing in what it reads."""
 
 from math import isfinite
+from pathlib import Path
 
 from fingervision.domain.errors import FingervisionError
 from fingervision.storage.toml_section import Section
 from fingervision.testbed.actuator import Alarm, StageLimits
 from fingervision.testbed.build_context import BuildContext
 from fingervision.testbed.clocks.clock import Clock
-from fingervision.testbed.motion.move_limits import check_move
+from fingervision.testbed.motion.move_limits import FreeMoves, check_move
 from fingervision.testbed.reading import Reading
 from fingervision.testbed.terminal import TERMINAL, Terminal
 
@@ -122,14 +123,22 @@ def _number(words: str, otherwise: float) -> float | None:
     return value if isfinite(value) else None
 
 
-def build(section: Section, context: BuildContext) -> HandScrew:
-    """Build it from its section of the configuration; the terminal is asked."""
+def _limits(section: Section) -> StageLimits:
     lower_mm = section.number("lower_mm")
-    limits = StageLimits(
+    return StageLimits(
         lower_mm=lower_mm,
         upper_mm=section.number("upper_mm", above=lower_mm),
         speed_mm_s=section.number("speed_mm_s", SPEED_MM_S, above=0.0),
         force_n=float("inf"),
         accuracy_mm=section.number("accuracy_mm", ACCURACY_MM, low=0.0),
     )
-    return HandScrew(limits, context.clock, TERMINAL)
+
+
+def without_hardware(section: Section, folder: Path) -> FreeMoves:
+    """What the stage can do, for a plan that is checked away from the bed."""
+    return FreeMoves(_limits(section))
+
+
+def build(section: Section, context: BuildContext) -> HandScrew:
+    """Build it from its section of the configuration; the terminal is asked."""
+    return HandScrew(_limits(section), context.clock, TERMINAL)

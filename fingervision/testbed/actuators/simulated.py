@@ -1,6 +1,7 @@
 """A simulated actuator: the paper's, with its encoder, its accuracy and its play."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,7 +11,7 @@ from fingervision.storage.toml_section import Section
 from fingervision.testbed.actuator import Alarm, StageLimits
 from fingervision.testbed.build_context import BuildContext
 from fingervision.testbed.clocks.clock import Clock
-from fingervision.testbed.motion.move_limits import check_move, check_speed
+from fingervision.testbed.motion.move_limits import FreeMoves, check_move, check_speed
 from fingervision.testbed.reading import Reading
 from fingervision.testbed.simulation.drifting_clock import OwnClock
 from fingervision.testbed.simulation.gripper import Motion
@@ -176,10 +177,9 @@ class SimulatedActuator:
             raise FingervisionError("The actuator must stand before it moves again, but is busy: stop it first.")
 
 
-def build(section: Section, context: BuildContext) -> SimulatedActuator:
-    """Build it from its section of the configuration."""
+def _limits(section: Section) -> StageLimits:
     lower_mm = section.number("lower_mm", LOWER_MM)
-    limits = StageLimits(
+    return StageLimits(
         lower_mm=lower_mm,
         upper_mm=section.number("upper_mm", UPPER_MM, above=lower_mm),
         speed_mm_s=section.number("speed_mm_s", SPEED_MM_S, above=0.0),
@@ -187,6 +187,16 @@ def build(section: Section, context: BuildContext) -> SimulatedActuator:
         accuracy_mm=section.number("accuracy_mm", ACCURACY_MM, low=0.0),
         encoder_step_mm=section.number("encoder_step_mm", ENCODER_STEP_MM, low=0.0),
     )
+
+
+def without_hardware(section: Section, folder: Path) -> FreeMoves:
+    """What the stage can do, for a plan that is checked away from the bed."""
+    return FreeMoves(_limits(section))
+
+
+def build(section: Section, context: BuildContext) -> SimulatedActuator:
+    """Build it from its section of the configuration."""
+    limits = _limits(section)
     rng = np.random.default_rng([context.seed, 1])
     # A controller knows the bed's limits as its own: not even its inaccuracy takes the stage beyond them.
     ends_mm = max(limits.lower_mm, context.limits.lower_mm), min(limits.upper_mm, context.limits.upper_mm)

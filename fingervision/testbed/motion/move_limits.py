@@ -1,5 +1,7 @@
 """Check a requested move against the limits of the stage."""
 
+from dataclasses import dataclass
+
 from fingervision.domain.errors import FingervisionError
 from fingervision.testbed.actuator import StageLimits
 
@@ -34,3 +36,21 @@ def check_speed(limits: StageLimits, speed_mm_s: float) -> None:
         raise FingervisionError(
             f"The speed must be at most {limits.speed_mm_s:g} mm/s, but is {speed_mm_s:g} mm/s: nothing was moved."
         )
+
+
+@dataclass(frozen=True, slots=True)
+class FreeMoves:
+    """A stage that goes anywhere within its limits.
+
+    Parameters
+    ----------
+    limits : StageLimits
+        What it can do.
+    """
+
+    limits: StageLimits
+    has_steps: bool = False
+
+    def check(self, from_mm: float, to_mm: float, speed_mm_s: float) -> None:
+        """Refuse what is beyond the limits."""
+        check_move(self.limits, to_mm, speed_mm_s)

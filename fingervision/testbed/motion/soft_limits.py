@@ -1,6 +1,8 @@
 """Soft limits: what a recipe or a jog may ask for, within what the actuator can do."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+
+from fingervision.testbed.actuator import StageLimits
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,3 +26,13 @@ class SoftLimits:
     speed_mm_s: float
     force_n: float
     gap_mm: float = 0.0
+
+    def within(self, able: StageLimits) -> "SoftLimits":
+        """Limit them further to what an actuator can do."""
+        return replace(
+            self,
+            lower_mm=max(self.lower_mm, able.lower_mm),
+            upper_mm=min(self.upper_mm, able.upper_mm),
+            speed_mm_s=min(self.speed_mm_s, able.speed_mm_s),
+            force_n=min(self.force_n, able.force_n),
+        )

@@ -18,6 +18,8 @@ SLACK_MM = 1e-9
 # What one frame at a point costs beside its own time: settling.
 SETTLE_S = 0.3
 REZERO_S = 2.0
+# What takes longer than a month is a slip: no run of a bench does.
+LONGEST_S = 30.0 * 86400.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,6 +36,15 @@ class Plan:
 
     legs: tuple[Leg, ...]
     seconds: tuple[float, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Timed:
+    """One segment with its expected time, and the position of the stage after it."""
+
+    leg: Leg
+    seconds: float
+    end_mm: float
 
 
 def plan(
@@ -64,20 +75,49 @@ def plan(
     if recipe.below_force_n > limits.force_n:
         top = Section(recipe.steps[0].path, recipe.text, "", {})
         _beyond(top, "below_force_n", recipe.below_force_n, limits.force_n, "N", "force")
-    legs: list[Leg] = []
-    seconds: list[float] = []
-    at_mm = start_mm
+    done: list[Timed] = []
     for number, section in enumerate(recipe.steps, start=1):
-        for act, key in kind_of(section).acts(section, at_mm):
-            leg = Leg(act, number, section, key)
-            if isinstance(act, Slot) and act.size_mm >= view_mm:
-                words = f"must be less than the {view_mm:.3g} mm that the camera sees, but is {act.size_mm:g}."
-                section.refuse(key, words)
-            _check(leg, limits, model, recipe.below_force_n)
-            lasts_s, at_mm = _lasts(leg, at_mm, limits, rate_hz)
-            legs.append(leg)
-            seconds.append(lasts_s)
-    return Plan(tuple(legs), tuple(seconds))
+        at_mm = done[-1].end_mm if done else start_mm
+        for timed in timed_segments(number, section, at_mm, limits, rate_hz):
+            if isinstance(timed.leg.act, Slot) and timed.leg.act.size_mm >= view_mm:
+                words = (
+                    f"must be less than the {view_mm:.3g} mm that the camera sees, but is {timed.leg.act.size_mm:g}."
+                )
+                section.refuse(timed.leg.key, words)
+            _check(timed.leg, limits, model, recipe.below_force_n)
+            done.append(timed)
+    return Plan(tuple(one.leg for one in done), tuple(one.seconds for one in done))
+
+
+def timed_segments(
+    number: int, section: Section, at_mm: float, limits: SoftLimits, rate_hz: float
+) -> Iterator["Timed"]:
+    """Read one step: its segments, each with its expected time and where it ends; no limit is checked.
+
+    Parameters
+    ----------
+    number : int
+        Of the step, from 1.
+    section : Section
+        The step.
+    at_mm : float
+        Where the stage is before it.
+    limits : SoftLimits
+        Where closing until contact ends at the latest.
+    rate_hz : float
+        Of the camera.
+
+    Raises
+    ------
+    FingervisionError
+        The step makes no sense by itself.
+    """
+    for act, key in kind_of(section).acts(section, at_mm):
+        leg = Leg(act, number, section, key)
+        lasts_s, at_mm = _lasts(leg, at_mm, limits, rate_hz)
+        if lasts_s > LONGEST_S:
+            section.refuse(key, f"must end within {LONGEST_S / 86400.0:g} days, but takes {lasts_s:.3g} s.")
+        yield Timed(leg, lasts_s, at_mm)
 
 
 def _lasts(leg: Leg, at_mm: float, limits: SoftLimits, rate_hz: float) -> tuple[float, float]:

@@ -3,12 +3,13 @@
 from math import tau
 
 from fingervision.domain.errors import FingervisionError
-from fingervision.testbed.bed import Bed
+from fingervision.testbed.actuator import MoveCheck
+from fingervision.testbed.motion.soft_limits import SoftLimits
 from fingervision.testbed.run.motion_segments import Close, Go, Rezero, Swing
 from fingervision.testbed.run.plan import Plan
 
 
-def check_moves(plan: Plan, bed: Bed, at_mm: float) -> None:
+def check_moves(plan: Plan, actuator: MoveCheck, limits: SoftLimits, at_mm: float) -> None:
     """Refuse a plan that the actuator cannot follow: a motor controller goes only where its step data lead.
 
     Raises
@@ -22,7 +23,7 @@ def check_moves(plan: Plan, bed: Bed, at_mm: float) -> None:
             case Go(to, speed):
                 to_mm, speed_mm_s = to, speed
             case Swing(mean, amplitude, frequency_hz):
-                if bed.actuator.has_steps:
+                if actuator.has_steps:
                     raise FingervisionError(
                         f"kind in {leg.section.at('kind')} cannot be done: A sine must be driven in short moves to "
                         "anywhere on its way, but this actuator goes only where its step data lead. Use a triangle or "
@@ -30,14 +31,14 @@ def check_moves(plan: Plan, bed: Bed, at_mm: float) -> None:
                     )
                 to_mm, speed_mm_s = mean + amplitude, tau * frequency_hz * abs(amplitude)
             case Close(speed):
-                to_mm, speed_mm_s = bed.limits.lower_mm, speed
+                to_mm, speed_mm_s = limits.lower_mm, speed
             case Rezero():
                 at_mm = 0.0
                 continue
         if to_mm == at_mm:
             continue
         try:
-            bed.actuator.check(at_mm, to_mm, speed_mm_s)
+            actuator.check(at_mm, to_mm, speed_mm_s)
         except FingervisionError as error:
             raise FingervisionError(f"{leg.key} in {leg.section.at(leg.key)} cannot be done: {error}") from error
         at_mm = to_mm

@@ -85,7 +85,7 @@ def run_recipe(
     # A real stage is sent to its reference before the first leg.
     at_mm = sight.position.newest if bed.replays else 0.0
     planned = plan(recipe, bed.limits, bed.model, at_mm, sight.rate_hz, sight.width_mm)
-    check_moves(planned, bed, at_mm)
+    check_moves(planned, bed.actuator, bed.limits, at_mm)
     on_plan(planned)
     folder = BedRunFolder(out, recipe, bed, hidden, before)
     try:

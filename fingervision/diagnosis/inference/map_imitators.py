@@ -1,0 +1,111 @@
+"""Effects that a map of position errors can stand for: functions of the place alone, beyond a straight line.
+
+Beside a map nothing tells them from it, whatever their size. Reversal, memory and time do tell.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+
+from fingervision.diagnosis.inference.hypothesis_fit import Explanation, Problem
+from fingervision.diagnosis.inference.position_map import NAME, PositionMap, map_columns
+from fingervision.diagnosis.inference.signatures import signatures
+from fingervision.domain.effect import Array, Flags
+
+LINE_SHARE = 1e-3
+"""Share of its squared length that a straight line may leave of an effect that acts like one: ratios and offsets bend
+that little over a stroke, and a map has no line."""
+CURVE_SHARE = 0.02
+"""Share of the squared length beyond a line that some curve may leave of an effect that acts like a map: 14 % as
+amplitude, less than which the forms of effects are off on real rigs (ISO 230-2 reversals: 19 to 24 %)."""
+
+
+def imitating_effects(problem: Problem, position_map: PositionMap) -> dict[str, str]:
+    """Find effects that act like a map whatever their parameters are.
+
+    Parameters
+    ----------
+    problem : Problem
+        Without the map.
+    position_map : PositionMap
+        The map.
+
+    Returns
+    -------
+    reasons : dict of str to str
+        Why each cannot show, by name.
+    """
+    still = _of_the_place(problem)
+    atoms = signatures(replace(problem, effects={name: problem.effects[name] for name in still})) if still else None
+    if atoms is None:
+        return {}
+    owner = np.array(atoms.names)
+    lines, mapped = _held(problem, position_map, atoms.columns)
+    return {
+        name: _reason(problem)
+        for name in still
+        if np.any(mapped[owner == name]) and np.all((mapped | lines)[owner == name])
+    }
+
+
+def imitating_parts(problem: Problem, position_map: PositionMap, explanation: Explanation) -> dict[str, str]:
+    """Find effects of an explanation that act like a map with the parameters that they have there.
+
+    A cyclic error whose period is half the range is one: its curve is smooth enough to be the map's.
+
+    Parameters
+    ----------
+    problem : Problem
+        Without the map.
+    position_map : PositionMap
+        The map.
+    explanation : Explanation
+        What was found beside it.
+
+    Returns
+    -------
+    reasons : dict of str to str
+        Why each has no place beside the map, by name.
+    """
+    chain, values = problem.chain, explanation.values
+    whole = chain.stacked(values)
+    named = [name for name in _of_the_place(problem) if name in values]
+    if not named:
+        return {}
+    alone = [whole - chain.stacked({key: value for key, value in values.items() if key != name}) for name in named]
+    _, mapped = _held(problem, position_map, problem.whitener.columns(np.stack(alone, axis=1))[0])
+    return {name: _reason(problem) for name, held in zip(named, mapped.tolist(), strict=True) if held}
+
+
+def _of_the_place(problem: Problem) -> list[str]:
+    return [
+        name
+        for name, effect in problem.effects.items()
+        if not (effect.memory or effect.needs_times or name == NAME or name in problem.stalled)
+    ]
+
+
+def _reason(problem: Problem) -> str:
+    history = problem.chain.history
+    span = f"{history.input_mm.min():g} to {history.input_mm.max():g} mm"
+    return f"beside a map of position errors it is a part of the map: over {span} it depends on the place alone"
+
+
+def _held(problem: Problem, position_map: PositionMap, columns: Array) -> tuple[Flags, Flags]:
+    """Whether a straight line holds each whitened column, and whether a map's curve holds what the line leaves."""
+    nodes_mm = position_map.nodes_mm
+    raw = map_columns(problem.chain, nodes_mm)
+    line = np.stack([np.ones_like(nodes_mm), nodes_mm - nodes_mm.mean()], axis=1)
+    curve, straight = problem.whitener.columns(raw)[0], problem.whitener.columns(raw @ line)[0]
+    offsets, metric = problem.offsets, problem.offsets.metric(problem.nothing().sigma_mm)
+
+    def left(beside: Array) -> Array:
+        """Squared lengths once the offsets and the columns beside are taken out; shape (k,)."""
+        moved = beside - offsets.design @ (metric @ (offsets.design.T @ beside))
+        rest = columns - beside @ (np.linalg.pinv(beside.T @ moved) @ (moved.T @ columns))
+        shared = offsets.design.T @ rest
+        return np.asarray(np.einsum("ij,ij->j", rest, rest) - np.einsum("ij,ij->j", shared, metric @ shared))
+
+    bent = left(straight)
+    lines = bent < LINE_SHARE * np.einsum("ij,ij->j", columns, columns)
+    return lines, ~lines & (left(curve) < CURVE_SHARE * bent)

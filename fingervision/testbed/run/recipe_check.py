@@ -1,0 +1,166 @@
+"""Check a recipe against a bed away from it: what would be driven, how long it takes, and what does not fit."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from fingervision.domain.errors import FingervisionError
+from fingervision.domain.recipe import Recipe
+from fingervision.storage.toml_section import Section
+from fingervision.testbed.planned_bed import PlannedBed
+from fingervision.testbed.run.motion_segments import Close, Go, Leg, Swing
+from fingervision.testbed.run.plan import SLACK_MM, Timed, plan, timed_segments
+from fingervision.testbed.run.plan_feasibility import check_moves
+from fingervision.testbed.run.run_folder import BYTES_PER_PX
+
+POSITIONS = 41
+"""Positions of a step's way at which gap and force are predicted: grippers bend little between them."""
+
+
+@dataclass(frozen=True, slots=True)
+class CheckedStep:
+    """One step of a recipe, as the bed would do it.
+
+    Parameters
+    ----------
+    number : int
+        Of the step, from 1.
+    kind : str
+        Of the step.
+    from_mm, to_mm : float
+        Position of the stage before the step, and after it.
+    lower_mm, upper_mm : float
+        Least and greatest position on the way.
+    speed_mm_s : float
+        Highest speed; 0 where nothing moves.
+    seconds : float
+        Expected time.
+    gap_mm : (float, float) or None
+        Least and greatest gap that the bed's gripper predicts; None without a gripper.
+    force_n : float or None
+        Greatest drive force that it predicts; None where it knows none.
+    refusal : str or None
+        The sentence with which the bed refuses the step; None where it can be done.
+    """
+
+    number: int
+    kind: str
+    from_mm: float
+    to_mm: float
+    lower_mm: float
+    upper_mm: float
+    speed_mm_s: float
+    seconds: float
+    gap_mm: tuple[float, float] | None
+    force_n: float | None
+    refusal: str | None
+
+
+@dataclass(frozen=True, slots=True)
+class RecipeCheck:
+    """A recipe on a bed, as planned.
+
+    Parameters
+    ----------
+    bed : PlannedBed
+        The bed.
+    steps : tuple of CheckedStep
+        In order.
+    seconds : float
+        Expected time of all.
+    frames : int
+        Frames that the camera delivers meanwhile.
+    megabytes : float
+        Space that their lossless video may take.
+    """
+
+    bed: PlannedBed
+    steps: tuple[CheckedStep, ...]
+    seconds: float
+    frames: int
+    megabytes: float
+
+    @property
+    def refusals(self) -> tuple[str, ...]:
+        """Why the bed refuses the recipe; empty where it can be run."""
+        return tuple(step.refusal for step in self.steps if step.refusal is not None)
+
+
+def check_recipe(recipe: Recipe[Section], bed: PlannedBed) -> RecipeCheck:
+    """Plan a recipe step by step; what one step is refused for does not hide what the next one is.
+
+    Parameters
+    ----------
+    recipe : Recipe
+        As it was read.
+    bed : PlannedBed
+        What it is checked against.
+    """
+    at_mm = 0.0
+    steps: list[CheckedStep] = []
+    for number, section in enumerate(recipe.steps, start=1):
+        refusal = None
+        try:
+            planned = plan(replace(recipe, steps=(section,)), bed.limits, bed.model, at_mm, bed.rate_hz, bed.view_mm)
+            check_moves(planned, bed.actuator, bed.limits, at_mm)
+        except FingervisionError as error:
+            refusal = str(error)
+        try:
+            segments = tuple(timed_segments(number, section, at_mm, bed.limits, bed.rate_hz))
+        except FingervisionError:
+            # The step makes no sense by itself: there is no motion to describe.
+            segments = ()
+        steps.append(_described(number, section, segments, at_mm, bed, refusal))
+        at_mm = steps[-1].to_mm
+    seconds = sum(step.seconds for step in steps)
+    frames = int(np.ceil(seconds * bed.rate_hz))
+    width, height = bed.size_px
+    return RecipeCheck(bed, tuple(steps), seconds, frames, frames * width * height * BYTES_PER_PX / 1e6)
+
+
+def _described(
+    number: int, section: Section, segments: Sequence[Timed], at_mm: float, bed: PlannedBed, refusal: str | None
+) -> CheckedStep:
+    reached = [at_mm, *(segment.end_mm for segment in segments)]
+    to_mm = reached[-1]
+    for segment in segments:
+        if isinstance(swing := segment.leg.act, Swing):
+            reached += [swing.mean_mm - swing.amplitude_mm, swing.mean_mm + swing.amplitude_mm]
+    # Beyond the limits the gripper's model says nothing that will ever be true.
+    within = bed.limits.lower_mm - SLACK_MM <= min(reached) and max(reached) <= bed.limits.upper_mm + SLACK_MM
+    gap_mm, force_n = _foretold(min(reached), max(reached), bed) if within and refusal is None else (None, None)
+    return CheckedStep(
+        number=number,
+        kind=str(section.values.get("kind", "?")),
+        from_mm=at_mm,
+        to_mm=to_mm,
+        lower_mm=min(reached),
+        upper_mm=max(reached),
+        speed_mm_s=max((_speed_mm_s(segment.leg) for segment in segments), default=0.0),
+        seconds=sum(segment.seconds for segment in segments),
+        gap_mm=gap_mm,
+        force_n=force_n,
+        refusal=refusal,
+    )
+
+
+def _speed_mm_s(leg: Leg) -> float:
+    match leg.act:
+        case Go(_, speed, _) | Close(speed, _):
+            return speed
+        case Swing(_, amplitude_mm, frequency_hz, _):
+            return float(2.0 * np.pi * frequency_hz * abs(amplitude_mm))
+    return 0.0
+
+
+def _foretold(lower_mm: float, upper_mm: float, bed: PlannedBed) -> tuple[tuple[float, float] | None, float | None]:
+    """Gap and force that the bed's gripper predicts over the way; None where it covers none of it."""
+    if bed.model is None:
+        return None, None
+    try:
+        answer = bed.model.respond(np.linspace(lower_mm, upper_mm, POSITIONS))
+    except FingervisionError:
+        return None, None
+    force_n = None if answer.force_n is None else float(np.abs(answer.force_n).max())
+    return (float(answer.gap_mm.min()), float(answer.gap_mm.max())), force_n

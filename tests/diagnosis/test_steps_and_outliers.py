@@ -1,0 +1,49 @@
+"""A stage that is still on its way after each step of a command is no gross error."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from fingervision.diagnosis.diagnose import Diagnosis, diagnose
+from fingervision.domain.report import Verdict
+from fingervision.storage.measured_table import read_measured_table
+from fingervision.storage.model_toml import read_model
+
+LEVELS_MM = (0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 4.0, 3.0, 2.0, 1.0, 0.0, 1.0, 2.0)
+HOLD, RATE_HZ, NOISE_MM = 44, 20.0, 0.002
+
+
+def diagnosed(folder: Path, gap_of: np.ndarray, input_mm: np.ndarray) -> Diagnosis:
+    rows = [f"{k / RATE_HZ:.4f},{x:.6f},{gap:.6f}" for k, (x, gap) in enumerate(zip(input_mm, gap_of, strict=True))]
+    (folder / "measured.csv").write_text("time_s,input_mm,gap_mm\n" + "\n".join(rows) + "\n")
+    (folder / "simulation.csv").write_text("input_mm,gap_mm\n-1,0\n7,8\n")
+    return diagnose(read_measured_table(folder / "measured.csv"), read_model(folder / "simulation.csv"))
+
+
+def test_two_late_samples_after_each_step_are_a_finding(tmp_path: Path) -> None:
+    command = np.repeat(LEVELS_MM, HOLD)
+    rng = np.random.default_rng(5)
+    # The stage leaves 70 ms late and goes at 18 mm/s: two samples of 44 show it.
+    fine_s = np.arange(command.size * 50) / (50 * RATE_HZ)
+    asked = command[np.clip(((fine_s - 0.07) * RATE_HZ).astype(int), 0, None)]
+    place = np.empty_like(fine_s)
+    place[0] = asked[0]
+    for k in range(1, place.size):
+        place[k] = place[k - 1] + np.clip(asked[k] - place[k - 1], -18.0 / (50 * RATE_HZ), 18.0 / (50 * RATE_HZ))
+    found = diagnosed(tmp_path, 1.0 + place[::50] + rng.normal(0.0, NOISE_MM, command.size), command)
+    assert found.report.verdict in (Verdict.NAMED, Verdict.AMBIGUOUS)
+    assert any("slew_limit" in names for names in found.report.alternatives)
+    assert found.report.standing_share < 0.05
+
+
+@pytest.mark.parametrize("share", [0.02, 0.15])
+def test_gross_errors_at_any_time_are_set_aside_only_while_they_are_few(tmp_path: Path, share: float) -> None:
+    rng = np.random.default_rng(6)
+    time = np.arange(600) / RATE_HZ
+    ramp = 2.5 - 2.5 * np.cos(2.0 * np.pi * time / 15.0)
+    gap = 1.0 + ramp + rng.normal(0.0, NOISE_MM, time.size)
+    wrong = rng.random(time.size) < share
+    gap[wrong] += rng.uniform(0.3, 1.0, int(wrong.sum())) * rng.choice([-1.0, 1.0], int(wrong.sum()))
+    verdict = diagnosed(tmp_path, gap, ramp).report.verdict
+    assert verdict is (Verdict.AGREES if share < 0.1 else Verdict.UNKNOWN)

@@ -1,0 +1,97 @@
+"""`bed check`: the plan is what a run does, every refusal is said, and no hardware is touched."""
+
+import json
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner, Result
+
+from fingervision.cli import cli
+from fingervision.domain.errors import FingervisionError
+from fingervision.storage.samples_csv import read_samples
+from tests.testbed.board_bed import CONTRACT_STEPS, written_bed
+
+HEAD = 'schema = 1\nname = "test"\nbelow_force_n = 2.9\n'
+# Over less than half of the stroke, so that the force stays below the recipe's.
+TRIANGLE = '[[step]]\nkind = "triangle"\nfrom_mm = -0.2\nto_mm = {to_mm}\nspeed_mm_s = {speed}\ncycles = 1\n'
+# What a run adds to a plan: settling of the picture, frames that wait for a corner, the encoder's last step.
+BESIDE_THE_PLAN = 0.25
+
+
+def check(folder: Path, steps: str, *options: str) -> Result:
+    (folder / "recipe.toml").write_text(HEAD + steps, encoding="utf-8")
+    return CliRunner().invoke(cli, ["bed", "check", str(folder / "recipe.toml"), *options], catch_exceptions=True)
+
+
+@pytest.mark.slow
+def test_a_run_takes_the_time_and_the_way_of_its_plan(tmp_path: Path) -> None:
+    steps = TRIANGLE.format(to_mm=1.0, speed=0.5) + '[[step]]\nkind = "hold"\nat_mm = 0.4\nseconds = 2.0\n'
+    planned = json.loads(check(tmp_path, steps, "--json").stdout)
+    out = str(tmp_path / "run")
+    done = CliRunner().invoke(cli, ["bed", "run", str(tmp_path / "recipe.toml"), "--out", out])
+    assert done.exit_code == 0, done.output
+    rows = read_samples(tmp_path / "run" / "samples.csv")
+    assert rows[-1].time_s - rows[0].time_s == pytest.approx(planned["seconds"], rel=BESIDE_THE_PLAN)
+    inputs = [row.input_mm for row in rows if row.input_mm is not None]
+    # The simulated stage comes to a stand within 90 um of where it is sent.
+    assert min(inputs) == pytest.approx(min(step["lower_mm"] for step in planned["steps"]), abs=0.1)
+    assert max(inputs) == pytest.approx(max(step["upper_mm"] for step in planned["steps"]), abs=0.1)
+    gaps = [row.gap_mm for row in rows if row.gap_mm is not None]
+    low, high = (end(step["gap_mm"][k] for step in planned["steps"]) for k, end in ((0, min), (1, max)))
+    assert low - 0.8 < min(gaps) < max(gaps) < high + 0.8
+
+
+def test_every_step_that_does_not_fit_is_said_with_its_line(tmp_path: Path) -> None:
+    steps = (
+        TRIANGLE.format(to_mm=1.0, speed=0.5)
+        + TRIANGLE.format(to_mm=9.0, speed=0.5)
+        + TRIANGLE.format(to_mm=1.0, speed=900.0)
+        + '[[step]]\nkind = "close_until_contact"\nspeed_mm_s = 0.1\nbelow_force_n = 1.0\n'
+    )
+    done = check(tmp_path, steps, "--json")
+    assert done.exit_code == 1
+    planned = json.loads(done.stdout)
+    assert planned["fits"] is False
+    refused = {step["number"]: step["refusal"] for step in planned["steps"] if step["refusal"]}
+    assert sorted(refused) == [2, 3]
+    assert "9" in refused[2]
+    assert "line 13" in refused[2]
+    assert "900" in refused[3]
+    for step in planned["steps"]:
+        # What cannot be done has no gap.
+        assert (step["gap_mm"] is None) == (step["refusal"] is not None)
+
+
+def test_a_bed_with_a_board_is_checked_without_its_board(tmp_path: Path) -> None:
+    bed = written_bed(tmp_path, "/dev/there-is-no-such-port", CONTRACT_STEPS, lower_mm=-1.0)
+    move = '[[step]]\nkind = "move"\nto_mm = {}\nspeed_mm_s = 2.0\n'
+    assert check(tmp_path, move.format(0.5), "--bed", str(bed)).exit_code == 0
+    nowhere = check(tmp_path, move.format(0.31), "--bed", str(bed))
+    assert nowhere.exit_code == 1
+    assert "0.31" in str(nowhere.exception)
+
+
+@pytest.mark.parametrize(
+    ("steps", "names"),
+    [
+        ('[[step]]\nkind = "wave"\n', "wave"),
+        ('[[step]]\nkind = "move"\nto_mm = nan\nspeed_mm_s = 1\n', "to_mm"),
+        ('[[step]]\nkind = "move"\nto_mm = 1\nspeed_mm_s = -1\n', "speed_mm_s"),
+        ('[[step]]\nkind = "move"\nto_mm = 1\nspeed_mm_s = 1\nframe = 3\n', "frame"),
+        ('[[step]]\nkind = "hold"\nat_mm = 0.2\nseconds = 1e300\n', "seconds"),
+        ('[[step]]\nkind = "triangle"\nfrom_mm = 1\nto_mm = 1\nspeed_mm_s = 1\n', "to_mm"),
+        ("", "step"),
+        ("[[step]", "TOML"),
+    ],
+)
+def test_a_recipe_that_makes_no_sense_is_one_sentence(tmp_path: Path, steps: str, names: str) -> None:
+    done = check(tmp_path, steps)
+    assert done.exit_code == 1, done.output
+    assert names in str(done.exception)
+    assert isinstance(done.exception, FingervisionError)
+
+
+def test_a_bed_without_a_file_is_one_sentence(tmp_path: Path) -> None:
+    done = check(tmp_path, TRIANGLE.format(to_mm=1.0, speed=0.5), "--bed", str(tmp_path / "no.toml"))
+    assert done.exit_code == 1
+    assert "no.toml" in str(done.exception)
