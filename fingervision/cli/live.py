@@ -46,6 +46,13 @@ USUAL_OUT, USUAL_PORT = Path("live"), 8025
 @click.option("--json", "as_json", is_flag=True, help="Print one line of JSON a frame, with the columns of gaps.csv.")
 @click.option("--host", default="127.0.0.1", show_default=True, help="Address that the page is served at.")
 @click.option("--port", type=click.IntRange(0, 65535), default=USUAL_PORT, show_default=True, help="0: any free one.")
+@click.option(
+    "--password-file",
+    type=click.Path(path_type=Path),
+    help="Text file with the password that the page asks for; needed beyond this machine.",
+)
+@click.option("--tls-cert", type=click.Path(path_type=Path), help="Certificate (PEM): the page is served over TLS.")
+@click.option("--tls-key", type=click.Path(path_type=Path), help="Its key (PEM).")
 @click.option("--size", metavar="WxH", help="Size that the camera is asked for.")
 @click.option("--rate-hz", type=float, help="Frames in a second that the camera is asked for.")
 @click.option("--format", "pixel_format", metavar="FOUR", help="Format, such as YUYV (raw) or MJPG.  [default: raw]")
@@ -82,6 +89,9 @@ def command(
     as_json: bool,
     host: str,
     port: int,
+    password_file: Path | None,
+    tls_cert: Path | None,
+    tls_key: Path | None,
     size: str | None,
     rate_hz: float | None,
     pixel_format: str | None,
@@ -122,6 +132,7 @@ def command(
     if source is None and bed_name is None:
         raise UsageError("The source must be given, but is not: name a camera, stream or file, or use `simulated`.")
     from fingervision.frames.source import CameraWish, Wish
+    from fingervision.live.access import access
     from fingervision.live.beside import Beside
     from fingervision.live.opening import opened
     from fingervision.live.playback.recorded import is_recording, recorded
@@ -134,7 +145,8 @@ def command(
             "Without a page the scale must be given, but is not: add --calibration FILE (made by `fingervision "
             "calibrate`) or --px-per-mm S."
         )
-    showing = Showing(page=not no_page, json_lines=as_json, host=host, port=port, record=no_page and out is not None)
+    way = access(host, port, password_file, tls_cert, tls_key)
+    showing = Showing(page=not no_page, json_lines=as_json, way=way, record=no_page and out is not None)
     if bed_name is not None:
         from fingervision.live.bed.opening import opened_bed
 

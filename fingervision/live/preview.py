@@ -2,7 +2,9 @@
 
 import json
 import struct
+from collections.abc import Mapping
 from dataclasses import dataclass
+from threading import Lock
 from typing import Any
 
 import cv2
@@ -46,7 +48,7 @@ class Next:
     known: Known
 
 
-def message(view: View, known: Known, seen: Seen | None) -> Next:
+def message(view: View, known: Known, seen: Seen | None, about: Mapping[str, Any] | None = None) -> Next:
     """Put together the next message.
 
     Parameters
@@ -57,6 +59,8 @@ def message(view: View, known: Known, seen: Seen | None) -> Next:
         What the page has.
     seen : Seen or None
         The picture to send; None sends none.
+    about : mapping, optional
+        What this page alone is told.
 
     Returns
     -------
@@ -76,11 +80,11 @@ def message(view: View, known: Known, seen: Seen | None) -> Next:
         "count": count,
         "points": points(view, rows),
         "now": _now(view, seen or view.seen),
-        "state": {**view.state(), **section(view)},
+        "state": {**view.state(), **section(view), **(about or {})},
         "messages": [[each.number, each.name, each.words] for each in said],
     }
     words = json.dumps(head, ensure_ascii=False).encode()
-    picture = b"" if seen is None else _picture(seen, view.choices.zero_mm)
+    picture = b"" if seen is None else _PICTURES.of(seen, view.choices.zero_mm)
     content = struct.pack(">I", len(words)) + words + picture
     newest = max([known.messages if is_same else 0, *(each.number for each in said)])
     return Next(content, Known(identity, last, newest))
@@ -137,3 +141,21 @@ def _picture(seen: Seen, zero_mm: float) -> bytes:
             words += f"  {row.status.value}" if row.gap_mm is None else f"  gap {row.gap_mm - zero_mm:.4f} mm{less}"
         drawn = draw_overlay(seen.frame, seen.outcome, words)
     return cv2.imencode(".jpg", drawn[:, :, ::-1], [cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY])[1].tobytes()
+
+
+class _Pictures:
+    """The newest picture, drawn once however many pages look."""
+
+    def __init__(self) -> None:
+        self._lock = Lock()
+        self._seen: Seen | None = None
+        self._zero_mm, self._coded = 0.0, b""
+
+    def of(self, seen: Seen, zero_mm: float) -> bytes:
+        with self._lock:
+            if self._seen is not seen or self._zero_mm != zero_mm:
+                self._seen, self._zero_mm, self._coded = seen, zero_mm, _picture(seen, zero_mm)
+            return self._coded
+
+
+_PICTURES = _Pictures()

@@ -5,7 +5,6 @@ from typing import TYPE_CHECKING, Any
 from calib.measured_scale import Calibration
 from fingervision.domain.status import Status
 from fingervision.live.choices import Choices
-from fingervision.live.free_space import minutes_left
 
 if TYPE_CHECKING:
     from fingervision.live.session import Session
@@ -50,7 +49,7 @@ def state_of_session(session: "Session") -> dict[str, Any]:
         else {
             "path": str(recorder.run.path),
             "frames": recorder.run.frames,
-            "minutes_left": minutes_left(recorder),
+            "minutes_left": recorder.minutes_left,
         },
         **state_of_choices(session.choices),
     }

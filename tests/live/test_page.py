@@ -17,7 +17,7 @@ import cv2
 import numpy as np
 import pytest
 
-from fingervision.live.server import STATE_EVERY_S
+from fingervision.live.page_socket import STATE_EVERY_S
 from fingervision.live.session import SILENT_S
 from tests.live.browser import PATIENCE_MS, browser, drag, needs_chromium, opened, says, shown
 
