@@ -11,7 +11,7 @@ from fingervision.frames.source import Description
 from fingervision.measuring.scale import Scale
 from fingervision.measuring.task import Task
 
-MOVES_ZERO = frozenset({"scale", "below_tip_mm", "direction", "region"})
+MOVES_ZERO = frozenset({"scale", "below_tip_mm", "direction", "region", "fingers_are_dark"})
 """After a change of these a gap is another one."""
 ZERO_IS_OFF = "The zero is off: it was taken with another scale, height, region or direction."
 
@@ -32,6 +32,8 @@ class Choices:
         Where the tips point; None finds out.
     region : Region or None
         The part of the frame that is looked at.
+    fingers_are_dark : bool or None
+        Whether the fingers are darker than the ground; None finds out.
     zero_mm : float
         What is taken off the gap where it is shown; never in a file.
     least_mm, greatest_mm : float or None
@@ -43,6 +45,7 @@ class Choices:
     below_tip_mm: float = 0.3
     direction: Direction | None = None
     region: Region | None = None
+    fingers_are_dark: bool | None = None
     zero_mm: float = 0.0
     least_mm: float | None = None
     greatest_mm: float | None = None
@@ -64,7 +67,14 @@ class Choices:
         """The task of measuring, once the scale is known."""
         if self.scale is None:
             return None
-        return Task(self.scale, self.scale_file, self.below_tip_mm, self.direction, self.region)
+        return Task(
+            self.scale,
+            self.scale_file,
+            self.below_tip_mm,
+            self.direction,
+            self.region,
+            fingers_are_dark=self.fingers_are_dark,
+        )
 
     def check(self, description: Description) -> None:
         """Refuse what cannot be meant for these frames.

@@ -82,8 +82,8 @@ class Recorder:
         self._looked_s = monotonic()
         if not self.run.is_there:
             raise FingervisionError(
-                f"The folder {self.run.path} is gone (its disk was removed, or it was deleted), so recording ended: put "
-                "the disk back, or name another folder with --out."
+                f"The folder {self.run.path} is gone (its disk was removed, or it was deleted), so recording ended: "
+                "put the disk back, or name another folder with --out."
             )
         self.minutes_left = minutes_left(self.run.path, monotonic() - self.began_s)
 

@@ -19,6 +19,7 @@ def state_of_choices(choices: Choices) -> dict[str, Any]:
         "u_px_per_mm": scale.u_px_per_mm if isinstance(scale, Calibration) else None,
         "region": None if region is None else [region.x_px, region.y_px, region.width_px, region.height_px],
         "tips": "auto" if choices.direction is None else choices.direction.value,
+        "fingers": {None: "auto", True: "dark", False: "light"}[choices.fingers_are_dark],
         "below_tip_mm": choices.below_tip_mm,
         "least_mm": choices.least_mm,
         "greatest_mm": choices.greatest_mm,

@@ -6,6 +6,7 @@ from pathlib import Path
 from threading import Thread
 from typing import Any
 
+import numpy as np
 import pytest
 
 from calib.calibration import BareScale
@@ -191,3 +192,68 @@ def test_a_hidden_backlash_is_named_on_the_page_within_a_minute_of_motion(
     assert page.locator("#bed_stop").is_visible()
     page.locator("body").press("Escape")
     says(page, "Stopped.")
+
+
+class Asked:
+    """Notes which tables are judged."""
+
+    def __init__(self) -> None:
+        self.tables: list[list[GapRow]] = []
+
+    def __call__(self, rows: list[GapRow]) -> None:
+        self.tables.append(rows)
+
+
+def test_a_verdict_is_sought_after_a_motion_there_and_back_and_a_long_rest_does_not_outweigh_it(
+    session: Session, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from fingervision.live.comparison.comparison import Comparison
+
+    table = tmp_path / "model.csv"
+    table.write_text("input_mm,gap_mm\n-1,1\n2,10\n")
+    comparison = Comparison(session, table)
+    asked = Asked()
+    monkeypatch.setattr(comparison.verdicts, "_seek", asked)
+
+    def rows(*inputs: float) -> None:
+        for input_mm in inputs:
+            number = comparison._total
+            comparison.add(GapRow(number, number / 25, Status.OK, gap_mm=4 + 3 * input_mm, input_mm=input_mm))
+
+    rows(*[0.0] * 500)
+    rows(*np.linspace(0.0, 1.0, 200))
+    assert asked.tables == []
+    rows(*np.linspace(1.0, 0.0, 200))
+    rows(*[0.0] * 500)
+    assert asked.tables
+    last = asked.tables[-1]
+    resting = sum(1 for row in last if row.input_mm == 0.0)
+    assert len(last) - resting > 350
+    assert resting < 100
+    count = len(asked.tables)
+    rows(*[0.0] * 1000)
+    assert len(asked.tables) == count
+    residual = comparison.state()
+    assert residual["rms_um"] == pytest.approx(0.0, abs=1e-9)
+
+
+def test_a_prediction_follows_the_inputs_path_where_the_model_has_a_memory(tmp_path: Path) -> None:
+    from fingervision.live.comparison.prediction import Prediction
+    from fingervision.tables.read import read_model
+
+    (tmp_path / "base.csv").write_text("input_mm,gap_mm\n-1,1\n2,10\n")
+    (tmp_path / "model.toml").write_text(
+        'schema = 1\nbase = "base.csv"\n[[effect]]\nname = "backlash"\n[effect.parameters]\n'
+        "play_mm = { value = 0.1, u = 0.001 }\n"
+    )
+    prediction = Prediction(read_model(tmp_path / "model.toml"))
+    way = [*np.linspace(0.0, 1.0, 41), *np.linspace(1.0, 0.0, 41)]
+    rows = [GapRow(i, i / 25, Status.OK, gap_mm=4.0, input_mm=float(at)) for i, at in enumerate(way)]
+    found = [prediction.predicted_mm([row])[0] for row in rows]
+    # Up and down, the same input differs by the play times the slope of 3.
+    assert found[20] is not None
+    assert found[61] is not None
+    assert found[61] - found[20] == pytest.approx(3.0 * 0.1, abs=0.01)
+    assert prediction.predicted_mm(rows) == found
+    beyond = GapRow(500, 30.0, Status.OK, gap_mm=4.0, input_mm=9.0)
+    assert prediction.predicted_mm([beyond]) == [None]

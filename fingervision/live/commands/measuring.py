@@ -10,6 +10,7 @@ from calib.calibration import BareScale
 from fingervision import __version__
 from fingervision.domain.direction import Direction
 from fingervision.domain.errors import FingervisionError, UsageError
+from fingervision.domain.gap import GapMeasurement
 from fingervision.live.commands.asking import Answer, Request, box, number, number_or_none, seen_of, shown
 from fingervision.live.picture_calibration import calibrated
 from fingervision.live.view import View
@@ -18,6 +19,7 @@ from fingervision.storage.out_folder import make_out_folder
 from fingervision.vision.overlay import in_eight_bits
 from fingervision.vision.pipeline import steps
 
+POLARITIES = ("auto", "dark", "light")
 TIPS = ("auto", *(direction.value for direction in Direction))
 
 
@@ -32,6 +34,29 @@ def _tips(view: View, request: Request) -> Answer:
         raise UsageError(f"The tips must be one of {', '.join(TIPS)}, but are {shown(tips)}.")
     view.choose(direction=None if tips == "auto" else Direction(tips))
     return Answer()
+
+
+def _fingers(view: View, request: Request) -> Answer:
+    fingers = request.get("fingers")
+    if fingers not in POLARITIES:
+        raise UsageError(f"The fingers must be one of {', '.join(POLARITIES)}, but are {shown(fingers)}.")
+    view.choose(fingers_are_dark={"auto": None, "dark": True, "light": False}[str(fingers)])
+    return Answer()
+
+
+def _height_at(view: View, request: Request) -> Answer:
+    """Measure at the height of a place in the picture."""
+    outcome, scale = seen_of(view).outcome, view.choices.scale
+    if scale is None or not isinstance(outcome, GapMeasurement):
+        raise FingervisionError("The height is counted from the tips, which this frame does not show: mend the view.")
+    at_px = number(request, "y" if outcome.direction.is_vertical else "x")
+    tips_px = 0.5 * (outcome.left.tip_px + outcome.right.tip_px)
+    roots_are_after = outcome.direction in (Direction.UP, Direction.LEFT)
+    below_px = at_px - tips_px if roots_are_after else tips_px - at_px
+    if below_px <= 0.0:
+        raise UsageError(f"The height must be on the fingers, but is {-below_px:.0f} px beyond their tips.")
+    view.choose(below_tip_mm=round(below_px / scale.px_per_mm, 3))
+    return Answer(f"Measured {view.choices.below_tip_mm:g} mm below the tips.")
 
 
 def _height(view: View, request: Request) -> Answer:
@@ -101,7 +126,9 @@ def _steps(view: View, request: Request) -> Answer:
 COMMANDS = {
     "region": _region,
     "tips": _tips,
+    "fingers": _fingers,
     "height": _height,
+    "height_at": _height_at,
     "zero": _zero,
     "limits": _limits,
     "scale": _scale,

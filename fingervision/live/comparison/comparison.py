@@ -43,7 +43,8 @@ class Comparison:
         self._prediction = Prediction(model)
         self.verdicts = VerdictSeeker(path, kind, model.input_range_mm, view.out / "verdicts", view.say)
         self._rows: deque[GapRow] = deque(maxlen=MOST_ROWS)
-        self._total = 0
+        self._recent: deque[GapRow] = deque(maxlen=ROWS_SHOWN)
+        self._total = self._moved = self._still = 0
 
     def predicted_mm(self, rows: Sequence[GapRow]) -> list[float | None]:
         """The model's gap at rows; None where their input is not known."""
@@ -53,19 +54,30 @@ class Comparison:
         """Take in a row as it is measured."""
         if row.input_mm is None or row.time_s is None:
             return
-        self._rows.append(row)
-        self._total += 1
-        if self._total % ROWS_BETWEEN == 0:
-            self.verdicts.consider(tuple(self._rows), self._total)
+        self._take(row)
+        if self._total % ROWS_BETWEEN == 0 or self._still == ROWS_BETWEEN:
+            self.verdicts.consider(tuple(self._rows), self._moved, at_rest=self._still >= ROWS_BETWEEN)
 
     def add_all(self, rows: Sequence[GapRow]) -> None:
         """Take in a recording that is measured to its end."""
         self._rows.clear()
+        self._recent.clear()
         self._prediction.clear()
-        kept = [row for row in rows if row.input_mm is not None and row.time_s is not None]
-        self._rows.extend(kept)
-        self._total = len(kept)
-        self.verdicts.consider(kept, self._total)
+        self._total = self._moved = self._still = 0
+        for row in rows:
+            if row.input_mm is not None and row.time_s is not None:
+                self._take(row)
+        self.verdicts.consider(tuple(self._rows), self._moved, at_rest=True)
+
+    def _take(self, row: GapRow) -> None:
+        """Keep a row; of a long rest one in so many, since it would outweigh the motion and say nothing new."""
+        stands = bool(self._recent) and self._recent[-1].input_mm == row.input_mm
+        self._still = self._still + 1 if stands else 0
+        self._recent.append(row)
+        self._total += 1
+        self._moved += not stands
+        if self._still < ROWS_BETWEEN or self._still % ROWS_BETWEEN == 0:
+            self._rows.append(row)
 
     def stop(self) -> None:
         """Seek no more verdicts."""
@@ -73,7 +85,7 @@ class Comparison:
 
     def state(self) -> dict[str, Any]:
         """What the page is told."""
-        rows = list(self._rows)[-ROWS_SHOWN:]
+        rows = list(self._recent)
         pairs = [
             (row.gap_mm - gap_mm, row.u_random_mm if row.u_gap_mm is None else row.u_gap_mm)
             for row, gap_mm in zip(rows, self._prediction.predicted_mm(rows), strict=True)
@@ -85,6 +97,7 @@ class Comparison:
         return {
             "path": str(self.path),
             "samples": self._total,
+            "moved": self._moved,
             "input_mm": rows[-1].input_mm if rows else None,
             "mean_um": float(1e3 * residual.mean()) if residual.size else None,
             "rms_um": float(1e3 * np.sqrt(np.mean(residual**2))) if residual.size else None,

@@ -11,14 +11,14 @@ from typing import Any
 from fingervision.live.background import BackgroundCommand
 from fingervision.storage.gaps_csv import GapRow
 
-# Four seconds at 25 frames a second: fewer tell next to nothing of what has a memory or a period.
+# Of motion, four seconds at 25 frames a second: fewer tell next to nothing of what has a memory or a period.
 LEAST_ROWS = 100
 # A motion there and back: what differs between the two directions shows in no other.
 LEAST_TURNS = 1
 # A motion of less than this share of the model's range is noise of the stage.
 LEAST_SHARE = 0.02
 # A further verdict is asked for when there is so much more to judge by.
-MORE_ROWS = 1.5
+MORE_ROWS, MORE_AT_REST = 1.5, 1.1
 # The newest two minutes at 25 frames a second are judged: the time that a diagnosis takes grows with its rows.
 MOST_ROWS = 3000
 LOOK_EVERY_S = 0.1
@@ -84,21 +84,23 @@ class VerdictSeeker:
         """Whether a verdict is being sought."""
         return self._thread is not None and self._thread.is_alive()
 
-    def consider(self, rows: Sequence[GapRow], total: int) -> None:
+    def consider(self, rows: Sequence[GapRow], moved: int, *, at_rest: bool) -> None:
         """Seek a verdict if there is enough to judge by, and more than the last time.
 
         Parameters
         ----------
         rows : sequence of GapRow
             With inputs, in order, the newest.
-        total : int
-            How many there have been.
+        moved : int
+            How many there have been while the input moved.
+        at_rest : bool
+            Whether the motion has come to its end: then less that is new is worth a verdict.
         """
-        if self.is_busy or self._ending.is_set() or total < max(LEAST_ROWS, MORE_ROWS * self._judged):
+        if self.is_busy or self._ending.is_set() or moved < LEAST_ROWS:
             return
-        if turns(rows, self._least_mm) < LEAST_TURNS:
+        if moved < (MORE_AT_REST if at_rest else MORE_ROWS) * self._judged or turns(rows, self._least_mm) < LEAST_TURNS:
             return
-        self._judged = total
+        self._judged = moved
         self._number += 1
         kept = list(rows[-MOST_ROWS:])
         self._thread = Thread(target=self._seek, args=(kept,), name="verdict", daemon=True)

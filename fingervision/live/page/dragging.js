@@ -6,7 +6,7 @@ let start = null, wanted = null;
 export const shown = { box: null };
 const canvas = () => at("picture");
 
-// `button` shows that it waits; `act` gets [column, row, width, height].
+// `button` shows that it waits; `act` gets [column, row, width, height], and where the drag ended.
 export function wantBox(button, words, act) {
   const same = wanted && wanted.button === button;
   cancel();
@@ -48,10 +48,10 @@ listen("start", () => {
   canvas().addEventListener("pointermove", (event) => { if (start) showBox(boxOf(start, inPicture(event))); });
   canvas().addEventListener("pointerup", (event) => {
     if (!start) return;
-    const box = boxOf(start, inPicture(event)), { act } = wanted;
+    const end = inPicture(event), box = boxOf(start, end), { act, button } = wanted;
     cancel();
-    if (box[2] < LEAST_PX || box[3] < LEAST_PX) { tell("message", `Drag over at least ${LEAST_PX} pixels each way.`, "refused"); return; }
-    act(box);
+    if (button !== "drag_height" && (box[2] < LEAST_PX || box[3] < LEAST_PX)) { tell("message", `Drag over at least ${LEAST_PX} pixels each way.`, "refused"); return; }
+    act(box, end);
   });
   canvas().addEventListener("pointercancel", cancel);
 });

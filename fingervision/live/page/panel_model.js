@@ -25,7 +25,7 @@ listen("state", ({ model, bed, whole }) => {
   const input = model.input_mm === null ? "The input is not known yet." : `Input ${model.input_mm.toFixed(4)} mm.`;
   say("model_words", `${input} ${model.samples} samples against ${model.path}${model.band_um === null ? "" : `; U of one ${um(model.band_um)} (k = 2)`}.`);
   const { verdict } = model;
-  const waits = model.busy ? "diagnose is at work…" : "A verdict needs 100 samples and a motion there and back.";
+  const waits = model.busy ? "diagnose is at work…" : `A verdict needs 100 samples in motion, there and back: so far ${model.moved}.`;
   say("verdict_words", verdict ? `${verdict.verdict}: ${verdict.sentence} (${verdict.rows} samples)${model.busy ? " – being judged anew" : ""}` : waits);
   const effects = verdict ? verdict.effects.map(([name, values]) => `${name}: ${values}`) : [];
   if (at("verdict_effects").dataset.shown !== effects.join("\n")) {

@@ -33,6 +33,8 @@ def arguments_of(recording: str, choices: Choices, more: tuple[str, ...]) -> tup
     where: tuple[str, ...] = ("--below-tip-mm", repr(choices.below_tip_mm))
     if choices.direction is not None:
         where += ("--tips", choices.direction.value)
+    if choices.fingers_are_dark is not None:
+        where += ("--fingers", "dark" if choices.fingers_are_dark else "light")
     if region is not None:
         where += ("--roi", f"{region.x_px},{region.y_px},{region.width_px},{region.height_px}")
     return ("measure", recording, *given, *where, *more)
