@@ -85,5 +85,6 @@ EFFECT = DriveEffect(
     needs_times=True,
     memory=True,
     narrow=narrow,
+    drawn_with={"speed_mm_s": 0.15},
     act=act,
 )

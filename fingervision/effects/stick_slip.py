@@ -47,5 +47,7 @@ EFFECT = DriveEffect(
     needs_times=True,
     memory=True,
     narrow=narrow,
+    at_frames=True,
+    demonstrated=True,
     act=act,
 )

@@ -54,5 +54,6 @@ EFFECT = PointEffect(
     needs_times=True,
     memory=True,
     narrow=narrow,
+    delay_s=lambda values: values["damping_ratio"] / (np.pi * values["frequency_hz"]),
     act=act,
 )

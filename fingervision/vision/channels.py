@@ -1,8 +1,8 @@
 """Ground between two straight sides: the room between the fingers, wherever a part between them leaves it open.
 
-Seen with the tips up, every row of a binary picture has runs of ground between runs of fingers or parts. Runs that
-follow each other with hardly any step are a channel. A gripper that holds a part has one above the part, one below it,
-or both, on the same two straight lines.
+Seen with the tips up, every row of a binary picture has runs of ground pixels between runs of finger or part pixels.
+Runs of ground in successive rows, with hardly any step between their ends, form a channel. A gripper that holds a part
+shows a channel above the part, a channel below it, or both, between the same two straight lines.
 """
 
 from dataclasses import dataclass

@@ -15,7 +15,7 @@ from calib.response_from_wedge import response_from_wedge
 from fingervision.cli import cli
 
 Grey = NDArray[np.uint8]
-FINER = 8
+FINER = 4
 DENSITIES = np.arange(0.05, 1.96, 0.1)
 
 
@@ -25,7 +25,7 @@ def coded(light: NDArray[np.float64], exponent: float, noise: float, rng: np.ran
 
 
 def bar(blur_px: float, angle: float, dark: float = 0.05, light: float = 0.7) -> NDArray[np.float64]:
-    """Light of a dark bar, each pixel the mean of 64 points."""
+    """Light of a dark bar, each pixel the mean of 16 points."""
     height, width = 240, 320
     y, x = np.mgrid[0 : height * FINER, 0 : width * FINER].astype(np.float32)
     x, y = (x + 0.5) / FINER - 0.5 - width / 2, (y + 0.5) / FINER - 0.5 - height / 2
