@@ -7,6 +7,7 @@ import click
 
 from fingervision.cli._columns_option import columns_option
 from fingervision.cli._where_to_measure import region_of, where_to_measure
+from fingervision.domain.errors import UsageError
 
 if TYPE_CHECKING:
     from fingervision.measuring.frame_loop import Progress
@@ -22,12 +23,15 @@ Examples:
   fingervision measure opening.mp4 --calibration calibration.json --drive drive.csv
   fingervision measure opening.mp4 --calibration calibration.json --drive drive.csv --drive-offset-s 0.12
   fingervision measure opening.mp4 --px-per-mm 34 --steps 10
+  fingervision measure opening.mp4 --px-per-mm 34 --frames 20:60
+  fingervision measure opening.mp4 --px-per-mm 34 --gauges gauges.toml --overlay
 
 \b
 Files written to --out:
   gaps.csv      one row a frame: gap with its uncertainty, points, tips, or why there is no number
   summary.json  counts, statistics, settings, scale, what the uncertainty covers and what it does not
   gap.png       the gap over time
+  gauges.csv    with --gauges: one row a number, time_s,gauge,quantity,value,u,unit,status
   overlay.mp4   with --overlay: edges, tips, points and value drawn in
   steps/        with --steps: a picture of every step
 
@@ -41,6 +45,7 @@ Exit codes: 0 done; 1 could not, or no frame gave a number; 2 wrong usage;
 @click.argument("recording")
 @where_to_measure
 @click.option("--rate-hz", type=float, help="Images in a second, where they have no times of their own.")
+@click.option("--frames", metavar="FIRST:LAST", help="Measure these frames alone; counted from 0, both included.")
 @click.option(
     "--drive",
     type=click.Path(path_type=Path),
@@ -74,6 +79,11 @@ Exit codes: 0 done; 1 could not, or no frame gave a number; 2 wrong usage;
     show_default=True,
     help="Edge of a thick part: of the face towards the camera, or of its outline, side walls included.",
 )
+@click.option(
+    "--gauges",
+    type=click.Path(path_type=Path),
+    help="Gauges of your own (gauges.toml): edges, lines, circles, marks, patches.",
+)
 @click.option("--overlay", is_flag=True, help="Also write overlay.mp4.")
 @click.option("--steps", "steps_frame", type=int, metavar="FRAME", help="Also write every step of this frame (from 0).")
 @click.option(
@@ -90,6 +100,7 @@ def command(
     tips: str,
     roi: str | None,
     rate_hz: float | None,
+    frames: str | None,
     drive: Path | None,
     columns: Path | None,
     drive_offset_s: float | None,
@@ -97,6 +108,7 @@ def command(
     bits: int | None,
     fingers: str,
     face: str,
+    gauges: Path | None,
     overlay: bool,
     steps_frame: int | None,
     out: Path | None,
@@ -124,11 +136,22 @@ def command(
         face=face,
         overlay=overlay,
         steps_frame=steps_frame,
+        frames=_frames(frames),
+        gauges=gauges,
     )
     with _Bar() as bar:
         measured = measure_into(out, recording, task, rate_hz, bar)
     _report(measured, as_json)
     raise SystemExit(int(measured.exit_code))
+
+
+def _frames(words: str | None) -> tuple[int, int] | None:
+    if words is None:
+        return None
+    first, _, last = words.partition(":")
+    if not (first.isascii() and first.isdigit() and last.isascii() and last.isdigit()):
+        raise UsageError(f"--frames must be FIRST:LAST, two whole numbers such as 100:250, but is '{words}'.")
+    return int(first), int(last)
 
 
 class _Bar:
@@ -177,7 +200,7 @@ def _report(measured: "Measured", as_json: bool) -> None:
         )
     elif not series.frames:
         _complain(f"{summary['recording']['name']} must have at least one picture, but has none: record it again.")
-    elif not series.counts[Status.OK]:
+    elif not series.counts[Status.OK] and not measured.has_gauge_numbers:
         first = min(series.first_without.values(), key=lambda bad: bad.frame)
         _complain(
             f"None of the {series.frames} frames gave a number ({counts}). Frame {first.frame}: {first.words} "
@@ -192,12 +215,15 @@ def _report(measured: "Measured", as_json: bool) -> None:
 
 
 def _print_result(measured: "Measured") -> None:
+    from fingervision.gauges.recording import gauge_sentence
     from fingervision.measuring.words import result_sentences
 
     for sentence in result_sentences(measured.summary, measured.series):
         click.echo(sentence)
+    for name, gauge in measured.summary.get("gauges", {}).items():
+        click.echo(gauge_sentence(name, gauge))
     folder = measured.folder
-    files = [folder.gaps, folder.summary, folder.figure, folder.overlay, folder.steps]
+    files = [folder.gaps, folder.gauges, folder.summary, folder.figure, folder.overlay, folder.steps]
     click.echo("Written: " + ", ".join(str(file) for file in files if file.exists()))
 
 
