@@ -51,7 +51,7 @@ def command(name: str | None, figure: Path | None) -> None:
         f"  needs     {', '.join(needs) or 'input and gap'}{'; starts each run at rest' if effect.memory else ''}"
     )
     for p in effect.parameters:
-        click.echo(f"  {p.name} ({p.unit or 'ratio'}): {p.words}, {p.lower:g} to {p.upper:g}, narrowed by the data")
+        click.echo(f"  {p.words}: {p.name}, {p.unit or 'ratio'}, {p.lower:g} to {p.upper:g}, narrowed by the data")
     if figure is not None:
         from fingervision.diagnosis.report.effect_figure import effect_figure
         from fingervision.diagnosis.report.vector_figure import png_bytes

@@ -1,8 +1,9 @@
 """What a diagnosis found: the noun that report.json and report.html are written from."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import StrEnum
+from types import MappingProxyType
 
 from fingervision.domain.parameter import Estimate
 
@@ -18,12 +19,29 @@ class Verdict(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class NamedEffect:
-    """An effect of the answer with its parameters; `points` is the curve of a map, input and error in mm."""
+    """An effect of the answer with its parameters.
+
+    Parameters
+    ----------
+    name, stage : str
+        As in the catalogue.
+    parameters : mapping of str to Estimate
+        By their keys, which every file uses.
+    points : tuple of (float, float)
+        The curve of a map, input and error in mm.
+    shown : mapping of str to str
+        Display names by key, as the effect's own file declares them; for sentences, pages and figures.
+    """
 
     name: str
     stage: str
     parameters: Mapping[str, Estimate]
     points: tuple[tuple[float, float], ...] = ()
+    shown: Mapping[str, str] = field(default_factory=lambda: MappingProxyType({}))
+
+    def display_name(self, key: str) -> str:
+        """What people read in the place of a parameter's key; the key where nothing is declared."""
+        return self.shown.get(key, key)
 
 
 @dataclass(frozen=True, slots=True)
