@@ -15,7 +15,7 @@ changelog, what replaces it. What is not in `__all__`, of this package or of `ca
 
 from importlib import import_module
 
-__version__ = "0.1.0"
+__version__ = "0.2.0"
 
 _HOMES = {
     "Calibration": "interface.calibration",

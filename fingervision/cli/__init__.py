@@ -74,12 +74,6 @@ def main() -> None:
     except FingervisionError as error:
         click.echo(f"fingervision: {error}", err=True)
         sys.exit(error.exit_code)
-    except SystemError as error:
-        # Code that is being compiled hands Ctrl-C on as a failure of its own.
-        if not _interrupted(error):
-            raise
-        click.echo("Aborted!", err=True)
-        sys.exit(ExitCode.COULD_NOT)
     except RuntimeError as error:
         if "Symlink loop" not in str(error):
             raise
@@ -125,9 +119,3 @@ def _give_up_output(error: OSError) -> NoReturn:
             f"fingervision: Standard output could not be written to its end ({error.strerror}): make room.", err=True
         )
     sys.exit(ExitCode.COULD_NOT)
-
-
-def _interrupted(error: BaseException | None) -> bool:
-    return error is not None and (
-        isinstance(error, KeyboardInterrupt) or _interrupted(error.__cause__ or error.__context__)
-    )

@@ -4,6 +4,7 @@ from pathlib import Path
 
 import click
 
+from fingervision.cli._effects_option import effects_option
 from fingervision.cli._on_bed import bed_option, hide_option
 
 EXAMPLES = """
@@ -30,6 +31,7 @@ pauses and goes on, q and Enter or Ctrl-C ends it; the motor stops first.
 @click.argument("recipe_toml", metavar="RECIPE.toml", type=click.Path(path_type=Path))
 @bed_option
 @hide_option
+@effects_option
 @click.option("--out", type=click.Path(path_type=Path), default=Path("run"), show_default=True, help="Folder to write.")
 @click.option(
     "--after", type=click.Path(path_type=Path), help="Earlier run on this bed; joined.csv then holds the rows of both."
@@ -65,7 +67,7 @@ def command(
 
     recipe, hidden = read_recipe(recipe_toml), hidden_from(hide)
     before = [] if after is None else rows_before(after)
-    rehearse(lambda _, words: click.echo(words, err=True))
+    rehearse()
     bed = open_bed(bed_name, hidden, pace=1.0 if real_time else 0.0, seed=seed, earlier_s=times_of(before))
     try:
         with click.progressbar(length=1000, label="running", file=sys.stderr, hidden=not sys.stderr.isatty()) as bar:

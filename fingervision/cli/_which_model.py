@@ -4,6 +4,8 @@ from pathlib import Path
 
 import click
 
+from fingervision.cli._kind_choice import KindChoice
+
 HELP = "Simulation .csv, gripper.toml, model.toml, .fmu, or .py with simulate(time_s, input_mm)"
 
 
@@ -39,7 +41,7 @@ models_option = click.option(
 
 kind_option = click.option(
     "--kind",
-    type=click.Choice(["stiffness_matrix", "lumped", "finite_element"]),
+    type=KindChoice(),
     default="lumped",
     show_default=True,
     help="Which model answers for a gripper.toml.",

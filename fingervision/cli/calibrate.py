@@ -37,6 +37,8 @@ RESPONSE_EXAMPLES = """
 \b
 Examples:
   fingervision calibrate response e05.png=0.5 e10.png=1 e20.png=2 e40.png=4 -o response.csv
+  fingervision calibrate response --densities 0.05:1.95:0.1 --roi 40,200,560,60 wedge.png
+  fingervision calibrate response --edges bar1.png bar2.png bar3.png
   fingervision measure opening.mp4 --calibration calibration.json --response response.csv
 """
 SCALE_EXAMPLES = """
@@ -191,42 +193,29 @@ def scale(**options: Any) -> None:
 
 
 @command.command("response", epilog=RESPONSE_EXAMPLES)
-@click.argument("items", nargs=-1, required=True, metavar="IMAGE=EXPOSURE...")
+@click.argument("items", nargs=-1, required=True, metavar="IMAGE[=EXPOSURE]...")
+@click.option("--edges", is_flag=True, help="Pictures of straight plain edges instead, sharp and unclipped: IMAGE...")
+@click.option(
+    "--densities",
+    metavar="A:B:STEP|A,B,...",
+    help="One picture of a grey wedge instead, with the optical densities of its fields, lightest first.",
+)
+@click.option("--roi", metavar="X,Y,W,H", help="With --densities: where the wedge's fields lie.")
 @click.option("-o", "--out", default="response.csv", type=click.Path(path_type=Path), show_default=True)
 @click.option("--json", "as_json", is_flag=True, help="Print the result for programs.")
-def response(items: Sequence[str], out: Path, as_json: bool) -> None:
-    """Measure the camera's response from pictures of one still scene at several exposures.
+def response(**options: Any) -> None:
+    """Measure the camera's response, best from pictures of one still scene at several exposures.
 
-    The scene needs flat parts of many shades (paper with grey fields); only the exposure time changes, the aperture,
-    the light and the focus do not. Exposures count by their ratios: seconds or any other unit.
+    An exposure series needs flat parts of many shades (paper with grey fields); only the exposure time changes, the
+    aperture, the light and the focus do not. Exposures count by their ratios: seconds or any other unit.
+
+    A grey wedge needs one picture and its certificate. Where there is neither, the shape of straight edges tells a
+    power law to some 5 %, as long as the camera does not sharpen.
     """
-    with sentences():
-        from calib.response_from_exposures import response_from_exposures
-        from fingervision.interface.reference_pictures import read_pictures
-        from fingervision.storage.response_csv import write_response
-        from fingervision.vision.grey import top_level
+    from fingervision.cli._measuring_response import measure_response
 
-        named = named_references(items, "bar", "EXPOSURE with a positive exposure", "e20.png=2")
-        pictures = [grey for _, grey in read_pictures([path for _, path, _ in named])]
-        top = max(top_level(grey) for grey in pictures)
-        found = response_from_exposures(pictures, [value for *_, value in named], top, out.name)
-        write_response(found.response, out)
-        if as_json:
-            content = {
-                "out": str(out),
-                "exponent": found.exponent,
-                "rms_relative": found.rms_relative,
-                "least_level": found.covered[0] * top,
-                "largest_level": found.covered[1] * top,
-            }
-            click.echo(json.dumps(content))
-            return
-        click.echo(
-            f"The camera's response is nearest to a power law with an exponent of {found.exponent:.3f} (1 is linear); "
-            f"the pictures agree to {100.0 * found.rms_relative:.2f} % of the light (RMS), over levels "
-            f"{found.covered[0] * top:.0f} to {found.covered[1] * top:.0f} of {top}."
-        )
-        click.echo(f"Written: {out}")
+    with sentences():
+        measure_response(**options)
 
 
 @command.command("check", epilog=CHECK_EXAMPLES)

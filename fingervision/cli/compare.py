@@ -5,6 +5,7 @@ from pathlib import Path
 import click
 
 from fingervision.cli._columns_option import columns_option
+from fingervision.cli._effects_option import effects_option
 from fingervision.cli._results_folder import results_folder, running_command
 from fingervision.cli._which_model import kind_option, models_option
 
@@ -29,6 +30,7 @@ Files written to --out:
 @click.option("--out", type=click.Path(path_type=Path, file_okay=False), default=Path("comparison"), show_default=True)
 @click.option("--seed", type=click.IntRange(0), default=1, show_default=True, help="Of the bootstrapped threshold.")
 @kind_option
+@effects_option
 @columns_option
 @click.option("--json", "as_json", is_flag=True, help="Print compare.json.")
 def command(

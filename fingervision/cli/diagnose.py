@@ -5,6 +5,7 @@ from pathlib import Path
 import click
 
 from fingervision.cli._columns_option import columns_option
+from fingervision.cli._effects_option import effects_option
 from fingervision.cli._results_folder import results_folder, running_command
 from fingervision.cli._which_model import kind_option, model_option
 
@@ -38,6 +39,7 @@ Files written to --out:
     help="Of the bootstrap: the same seed gives the same report.",
 )
 @kind_option
+@effects_option
 @columns_option
 @click.option("--json", "as_json", is_flag=True, help="Print report.json.")
 def command(

@@ -12,8 +12,6 @@ if TYPE_CHECKING:
     from fingervision.measuring.frame_loop import Progress
     from fingervision.measuring.measure import Measured
 
-LOADING_S = 3.0
-"""What is compiled is loaded faster; after an installation it is compiled first, and that is said."""
 EXAMPLES = """
 \b
 Examples:
@@ -144,16 +142,6 @@ class _Bar:
         self._done = 0
 
     def __enter__(self) -> "Progress":
-        import sys
-        from threading import Timer
-
-        if sys.stderr.isatty():
-            words = "Preparing to measure: after an installation this takes up to a minute, once."
-            late = Timer(LOADING_S, click.echo, (words,), {"err": True})
-            late.daemon = True
-            late.start()
-            self._late = late
-            self._stack.callback(late.cancel)
         return self._show
 
     def __exit__(self, *_: object) -> None:
@@ -162,10 +150,7 @@ class _Bar:
     def _show(self, done: int, of: int | None) -> None:
         import sys
 
-        if not sys.stderr.isatty():
-            return
-        self._late.cancel()
-        if not of:
+        if not (sys.stderr.isatty() and of):
             return
         if self._bar is None:
             bar = click.progressbar(length=of, label="Measuring", file=sys.stderr, show_pos=True)

@@ -131,10 +131,11 @@ def added(effects: Iterable[Effect]) -> Iterator[None]:
                 register(known[each.name])
 
 
-def _order(stage: Stage, after: str | None) -> int:
+def _order(stage: Stage, after: str | None) -> float:
     known = catalogue()
     if after is None:
-        return max((each.order for each in known.values() if each.stage == stage), default=0) + 1
+        # The last of its stage; what has the same place goes by name.
+        return max((each.order for each in known.values() if each.stage == stage), default=0.0) + 1.0
     own_stage: Mapping[str, Effect] = {key: each for key, each in known.items() if each.stage == stage}
     return own_stage[one_of("after", after, own_stage)].order
 

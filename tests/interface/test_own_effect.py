@@ -9,6 +9,7 @@ import pytest
 import fingervision as fv
 from fingervision.domain.errors import ArgumentError, ArgumentTypeError, UnknownNameError
 from fingervision.effects import catalogue, withdraw
+from fingervision.plugins.faults import PluginNameError
 
 
 @pytest.fixture(autouse=True)
@@ -106,7 +107,7 @@ def test_refuses_functions_that_cannot_be_one() -> None:
         fv.effect("drive", size)(lambda input_mm: input_mm)
     with pytest.raises(ArgumentError):
         fv.effect("drive", size)(lambda input_mm, history, values: input_mm)
-    with pytest.raises(ArgumentError, match="backlash"):
+    with pytest.raises(PluginNameError, match="backlash"):
 
         @fv.effect("drive", size, name="backlash")
         def taken(input_mm, history, values):
