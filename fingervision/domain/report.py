@@ -29,6 +29,10 @@ class NamedEffect:
         By their keys, which every file uses.
     points : tuple of (float, float)
         The curve of a map, input and error in mm.
+    place : str
+        The hinge or link that it is the effect of, as the drawing calls it; empty where the effect has no place.
+    end : str
+        The end of a link that sits off; likewise.
     shown : mapping of str to str
         Display names by key, as the effect's own file declares them; for sentences, pages and figures.
     """
@@ -37,6 +41,8 @@ class NamedEffect:
     stage: str
     parameters: Mapping[str, Estimate]
     points: tuple[tuple[float, float], ...] = ()
+    place: str = ""
+    end: str = ""
     shown: Mapping[str, str] = field(default_factory=lambda: MappingProxyType({}))
 
     def display_name(self, key: str) -> str:

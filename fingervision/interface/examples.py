@@ -44,7 +44,12 @@ class Case:
 CASES = {
     "measure": Case(
         "the gap between two fingers in a video and in single pictures, joined with the stage's log",
-        {**OPENING, "drive.csv": "opening/drive.csv", **FRAMES},
+        {
+            **OPENING,
+            "drive.csv": "opening/drive.csv",
+            "gauges.toml": f"{OWN}examples/measure/gauges.toml",
+            **FRAMES,
+        },
         "fingervision measure opening.mp4 --calibration calibration.json --drive drive.csv",
     ),
     "inspect": Case(

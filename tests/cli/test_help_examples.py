@@ -15,7 +15,7 @@ from fingervision.cli import cli
 from fingervision.interface.examples import CASES, copy_example
 
 # What nobody has at hand here: cameras, streams, a cluster; and what goes on until Ctrl-C. Their options are parsed.
-NOT_HERE = re.compile(r"/dev/|://|\blive (0|simulated|http|rtsp)|bed jog -2|/lab/")
+NOT_HERE = re.compile(r"/dev/|://|\blive (0|simulated|http|rtsp)|\bgauge |bed jog -2|/lab/")
 WORD = re.compile(r"""(?:[^\s'"]|'[^']*'|"[^"]*")+""")
 COMMENT = re.compile(r"\s{2,}.*")
 
