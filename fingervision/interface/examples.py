@@ -47,7 +47,7 @@ CASES = {
         {
             **OPENING,
             "drive.csv": "opening/drive.csv",
-            "gauges.toml": f"{OWN}examples/measure/gauges.toml",
+            "gauges.toml": "opening/gauges.toml",
             **FRAMES,
         },
         "fingervision measure opening.mp4 --calibration calibration.json --drive drive.csv",
