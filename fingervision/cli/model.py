@@ -36,7 +36,7 @@ Examples:
   fingervision model gripper.toml --kind lumped --object-mm 3 --object-n-mm 50
   fingervision model gripper.toml --kind lumped --frequency 1:500 --modes 500Hz --film
   fingervision model mechanism.toml --vary lengths.t=0.2:0.4:5
-  fingervision model mechanism.toml --large-rotation --mesh --out model
+  fingervision model mechanism.toml --large-rotation --mesh --out stage
 """
 
 
@@ -164,7 +164,9 @@ def command(
         rows[name] = {**row, "seconds": round(time.perf_counter() - began, 3)}
         folder = out / name if kind == "all" else out
         folder.mkdir(exist_ok=True)
-        write_simulation(folder / "simulation.csv", inputs, answers[name], model.body_poses(inputs))
+        # A model from outside the package need not know where each body stands.
+        poses = model.body_poses(inputs) if hasattr(model, "body_poses") else {}
+        write_simulation(folder / "simulation.csv", inputs, answers[name], poses)
     if inputs is None or not rows:
         raise next(iter(refusals.values()))
     _draw(gripper_toml.stem, gripper, inputs, models, answers, out, mesh=mesh)
