@@ -11,6 +11,7 @@ from fingervision.domain.drive import DriveHistory
 from fingervision.domain.errors import FingervisionError, UsageError
 from fingervision.domain.region import Region
 from fingervision.frames.source import Description
+from fingervision.gauges.gauge_file import Gauge, check_gauges
 from fingervision.measuring.response_budget import choose_response
 from fingervision.measuring.scale import Scale
 from fingervision.vision.pipeline import Settings
@@ -50,6 +51,8 @@ class Task:
         Whether a thick part is measured at its whole outline, side walls included, and not at its front face.
     frames : (int, int) or None
         First and last frame that are measured, counted from 0, both included; None measures all.
+    gauges : tuple of Gauge
+        What is measured beside the gap; none by default.
     """
 
     scale: Scale
@@ -66,6 +69,7 @@ class Task:
     fingers_are_dark: bool | None = None
     is_outline: bool = False
     frames: tuple[int, int] | None = None
+    gauges: tuple[Gauge, ...] = ()
 
     def __post_init__(self) -> None:
         if not 0.0 < self.below_tip_mm < float("inf"):
@@ -144,6 +148,7 @@ def check_task(task: Task, description: Description) -> None:
             f"--drive needs a recording with times, but {description.name} has none: "
             "give --rate-hz, or a times.csv beside the images."
         )
+    check_gauges(task.gauges, width_px, height_px)
     try:
         task.scale.check_frame_size(width_px, height_px)
     except ValueError as error:
