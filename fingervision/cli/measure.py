@@ -23,7 +23,7 @@ Examples:
   fingervision measure opening.mp4 --calibration calibration.json --drive drive.csv
   fingervision measure opening.mp4 --calibration calibration.json --drive drive.csv --drive-offset-s 0.12
   fingervision measure opening.mp4 --px-per-mm 34 --steps 10
-  fingervision measure opening.mp4 --px-per-mm 34 --frames 100:250
+  fingervision measure opening.mp4 --px-per-mm 34 --frames 20:60
   fingervision measure opening.mp4 --px-per-mm 34 --gauges gauges.toml --overlay
 
 \b
@@ -136,8 +136,8 @@ def command(
         face=face,
         overlay=overlay,
         steps_frame=steps_frame,
-        gauges=gauges,
         frames=_frames(frames),
+        gauges=gauges,
     )
     with _Bar() as bar:
         measured = measure_into(out, recording, task, rate_hz, bar)

@@ -97,8 +97,8 @@ def measuring_task(
     face: str = "front",
     overlay: bool = False,
     steps_frame: int | None = None,
-    gauges: Path | None = None,
     frames: tuple[int, int] | None = None,
+    gauges: Path | None = None,
 ) -> Task:
     """Put options or arguments together; see `fingervision.measure`.
 
@@ -133,8 +133,8 @@ def measuring_task(
         bits=depth,
         fingers_are_dark=FINGERS[one_of("fingers", fingers, FINGERS)],
         is_outline=one_of("face", face, FACES) == "outline",
-        gauges=() if gauges is None else read_gauges(gauges),
         frames=frames,
+        gauges=() if gauges is None else read_gauges(gauges),
     )
 
 

@@ -104,10 +104,10 @@ def measure_frames(
     """
     description = how.description
     marks = lost_frames(description.files)
-    frames: Iterable[Frame | LostFrame] = marked(source, marks) if marks else source
-    if how.frames is not None:
-        frames = frame_range(frames, *how.frames)
     stopped = False
+    items: Iterable[Frame | LostFrame] = marked(source, marks) if marks else source
+    if how.frames is not None:
+        items = frame_range(items, *how.frames)
     with ExitStack() as stack:
         asked = stack.enter_context(asked_to_stop())
         pending: list[Result] = []
@@ -123,7 +123,7 @@ def measure_frames(
         stack.callback(hand_over)
         handed_over_at = monotonic()
         try:
-            for item, outcome in _outcomes(frames, how.settings, description.coding, series.votes, asked.is_set):
+            for item, outcome in _outcomes(items, how.settings, description.coding, series.votes, asked.is_set):
                 result = Result(item.index, item.time_s, outcome)
                 pending.append(result)
                 if see_item is not None:
