@@ -66,7 +66,7 @@ class BareScale:
     def positions_mm(
         self, points_px: Floats, axis: int, light_gap: NDArray[np.bool_], frame_size_px: tuple[int, int]
     ) -> Floats:
-        """Where both points are along an axis of the picture, from its middle.
+        """Coordinates of both points of each distance along an axis of the picture, from the picture's middle, in mm.
 
         Parameters
         ----------

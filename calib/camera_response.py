@@ -98,6 +98,31 @@ class CameraResponse:
         return np.rint(table).astype(np.uint16)[grey]
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class MeasuredResponse:
+    """A response with how well it explains its pictures.
+
+    Parameters
+    ----------
+    response : CameraResponse
+        The curve.
+    exponent : float
+        Of the power law that is nearest; 1 for a linear camera, about 2.2 for consumer cameras.
+    rms_relative : float
+        Root mean square of what is left, as a share of the light.
+    covered : (float, float)
+        Least and largest level that the pictures showed, shares of full scale; beyond them the curve is extended.
+    u_exponent : float or None
+        Standard uncertainty of the exponent, where the pictures tell it.
+    """
+
+    response: CameraResponse
+    exponent: float
+    rms_relative: float
+    covered: tuple[float, float]
+    u_exponent: float | None = None
+
+
 def _srgb(level: Floats) -> Floats:
     """IEC 61966-2-1."""
     return np.where(level <= 0.04045, level / 12.92, ((level + 0.055) / 1.055) ** 2.4)

@@ -141,7 +141,7 @@ def find_lines(grey: Grey, region: tuple[int, int, int, int] | None = None) -> S
 
 
 def _direction(part: Floats) -> tuple[float, bool]:
-    """Columns per row of the lines, by the structure tensor (Bigun & Granlund, ICCV 1987); whether rows are columns."""
+    """Slope of the lines in columns per row (structure tensor: Bigun & Granlund, ICCV 1987); whether they lie level."""
     soft = cv2.GaussianBlur(part, (0, 0), 1.0)
     gx, gy = cv2.Sobel(soft, cv2.CV_64F, 1, 0), cv2.Sobel(soft, cv2.CV_64F, 0, 1)
     angle = 0.5 * np.arctan2(2.0 * float(np.sum(gx * gy)), float(np.sum(gx * gx) - np.sum(gy * gy)))

@@ -4,15 +4,16 @@ from pathlib import Path
 
 import click
 
+from fingervision.cli._effects_option import effects_option
 from fingervision.cli._on_bed import bed_option, hide_option
 
 EXAMPLES = """
 \b
 Examples:
   fingervision bed run recipe.toml --out run
-  fingervision bed run recipe.toml --hide backlash:play_mm=0.2 --hide camera_tilt --out run
-  fingervision bed run recipe.toml --hide sealed.toml --out run
-  fingervision bed run diagnosis/next_run.toml --after run --out second
+  fingervision bed run recipe.toml --hide backlash:play_mm=0.2 --hide camera_tilt --out hidden
+  fingervision bed run recipe.toml --hide sealed.toml --out sealed
+  fingervision bed run next_run.toml --after run --out second
   fingervision diagnose run/samples.csv --model run/simulation.csv --out diagnosis
 
 \b
@@ -30,6 +31,7 @@ pauses and goes on, q and Enter or Ctrl-C ends it; the motor stops first.
 @click.argument("recipe_toml", metavar="RECIPE.toml", type=click.Path(path_type=Path))
 @bed_option
 @hide_option
+@effects_option
 @click.option("--out", type=click.Path(path_type=Path), default=Path("run"), show_default=True, help="Folder to write.")
 @click.option(
     "--after", type=click.Path(path_type=Path), help="Earlier run on this bed; joined.csv then holds the rows of both."
@@ -65,7 +67,7 @@ def command(
 
     recipe, hidden = read_recipe(recipe_toml), hidden_from(hide)
     before = [] if after is None else rows_before(after)
-    rehearse(lambda _, words: click.echo(words, err=True))
+    rehearse()
     bed = open_bed(bed_name, hidden, pace=1.0 if real_time else 0.0, seed=seed, earlier_s=times_of(before))
     try:
         with click.progressbar(length=1000, label="running", file=sys.stderr, hidden=not sys.stderr.isatty()) as bar:

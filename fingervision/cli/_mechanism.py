@@ -59,6 +59,8 @@ def predict(
     mechanism = drawing.mechanism()
     if contact and not mechanism.contacts:
         raise UsageError(f"--contact needs a [[contact]] section that says which faces may touch, but {path} has none.")
+    if kind not in (*_KINDS, "stiffness_matrix", "all"):
+        raise UsageError(f"A mechanism drawn by bodies is answered by {', '.join(_KINDS)}, but --kind is {kind}.")
     wanted = _KINDS if kind == "all" else (kind,)
     models: dict[str, MechanismModel] = {}
     refusals: dict[str, FingervisionError] = {}

@@ -53,6 +53,9 @@ def write_grip(
     rows: dict[str, NDArray[np.float64]] = {}
     said = []
     for kind, model in models.items():
+        if not (hasattr(model, "half") or hasattr(model, "grip_force_n")):
+            click.echo(f"{kind} knows no part between the fingers: it has no rows in grip.csv.", err=True)
+            continue
         touch = first_grip_mm(model.half, part) if isinstance(getattr(model, "half", None), DrivenBody) else None
         limit = _closing_limit_mm(gripper, model, touch)
         at = np.linspace(limit, 0.3 * abs(limit) + (touch or 0.0), _ROWS) if inputs is None else np.sort(inputs)

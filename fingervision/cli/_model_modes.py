@@ -16,9 +16,9 @@ from matplotlib.figure import Figure
 
 from fingervision.domain.errors import FingervisionError
 from fingervision.models.driven_body import DrivenBody
+from fingervision.models.kinds import by_trust
 from fingervision.models.mode_shapes import ModeShape, ModesWanted, gripper_mode_shapes
 
-_BEST = ("finite_element", "lumped")
 _A_ROW = 6
 _PICTURES, _PERIODS, _A_SECOND = 24, 4, 24
 """Pictures in a period, periods in the film, pictures a second: one period takes one second, whatever the frequency."""
@@ -49,7 +49,7 @@ def write_modes(found: Mapping[str, Sequence[ModeShape]], name: str, out: Path, 
             if not as_json:
                 click.echo(f"{kind}, {family}: {values} Hz")
     (out / "modes.csv").write_text("\n".join(lines) + "\n", encoding="utf-8")
-    drawn = next((found[kind] for kind in _BEST if kind in found), ())
+    drawn = next((found[kind] for kind in by_trust(found)), ())
     if not drawn:
         click.echo("No mode lies in what --modes asks for: nothing is drawn.", err=True)
         return

@@ -11,11 +11,10 @@ from numpy.typing import NDArray
 from fingervision.domain.gripper import Gripper
 from fingervision.models.answer_figures import ModelFigures
 from fingervision.models.gripper_figures import life_between, unit_of
+from fingervision.models.kinds import by_trust, small_displacements_alone
 from fingervision.models.notch import notches_of
 from fingervision.models.physics import Physics
 from fingervision.models.yield_limit import input_at_yield_mm
-
-_TRUST = ("finite_element", "lumped")
 
 
 def write_table(rows: Mapping[str, Mapping[str, Any]], path: Path) -> None:
@@ -56,8 +55,8 @@ def say_what_limits(
     as_json: bool,
 ) -> None:
     """Warn of stress beyond the yield, of fingers that pass through each other, and of what a kind does not have."""
-    for kind in _TRUST:
-        if kind in models:
+    for kind in by_trust(models):
+        if hasattr(models[kind], "loaded"):
             _warn_of_stress(gripper, models[kind], inputs)
             if not as_json:
                 _say_endurance(gripper, kind, models[kind], inputs)
@@ -69,10 +68,13 @@ def say_what_limits(
                     err=True,
                 )
             break
-    if "stiffness_matrix" in figures and not as_json:
-        if len(models) > 1 and physics != Physics():
-            click.echo("Note: stiffness_matrix answers by small displacements and without contact all the same.")
-        click.echo(_out_of_plane_limit(gripper, figures["stiffness_matrix"]))
+    if as_json:
+        return
+    for kind in figures:
+        if small_displacements_alone(kind) and len(models) > 1 and physics != Physics():
+            click.echo(f"Note: {kind} answers by small displacements and without contact all the same.")
+        if figures[kind].out_of_plane_modes_hz:
+            click.echo(_out_of_plane_limit(gripper, figures[kind]))
 
 
 def _say_endurance(gripper: Gripper, kind: str, model: Any, inputs: NDArray[np.float64]) -> None:

@@ -8,12 +8,12 @@ import click
 from matplotlib.figure import Figure
 
 from fingervision.models.gripper_figures import unit_of
+from fingervision.models.kinds import by_trust
 from fingervision.models.uncertainty import FigureUncertainty
 
 _LEFT_OUT = ("peak_x_mm", "peak_y_mm", "lowest_input_mm", "highest_input_mm")
 _HEADER = ("kind", "figure", "unit", "value", "u", "method", "low_95", "high_95", "first", "first_share", "second",
            "second_share", "third", "third_share")  # fmt: skip
-_BEST = ("finite_element", "lumped", "stiffness_matrix")
 _DRAWN = (
     "gap_per_input",
     "input_stiffness_n_mm",
@@ -56,7 +56,7 @@ def write_uncertainty(
                 cells += [f"{low:.6g}", f"{high:.6g}"]
                 cells += [part for n, share in own.shares for part in (n, f"{share:.3f}")]
                 writer.writerow(cells + [""] * (len(_HEADER) - len(cells)))
-    best = next(kind for kind in (*_BEST, *rows) if kind in rows)
+    best = by_trust(rows)[0]
     stated = _stated(found, rows[best])
     _draw(stated, rows[best], f"{name}: {best}", out / "uncertainty.png")
     if as_json:

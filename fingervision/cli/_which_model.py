@@ -4,6 +4,8 @@ from pathlib import Path
 
 import click
 
+from fingervision.cli._kind_choice import KindChoice
+
 HELP = "Simulation .csv, gripper.toml, model.toml, .fmu, or .py with simulate(time_s, input_mm)"
 
 
@@ -37,18 +39,9 @@ models_option = click.option(
 )
 
 
-def told_apart(paths: tuple[Path, ...]) -> list[str]:
-    """Name models by their files, with as much of the folder as tells them apart."""
-    for parts in range(1, max(len(path.parts) for path in paths) + 1):
-        names = [Path(*path.parts[-parts:]).as_posix() for path in paths]
-        if len(set(names)) == len(names):
-            return names
-    raise click.UsageError("--model names the same file twice: each model counts once.")
-
-
 kind_option = click.option(
     "--kind",
-    type=click.Choice(["stiffness_matrix", "lumped", "finite_element"]),
+    type=KindChoice(),
     default="lumped",
     show_default=True,
     help="Which model answers for a gripper.toml.",

@@ -4,6 +4,7 @@ from pathlib import Path
 
 import click
 
+from fingervision.cli._effects_option import effects_option
 from fingervision.cli._on_bed import hide_option
 
 EXAMPLES = """
@@ -17,6 +18,7 @@ Examples:
 
 @click.command(epilog=EXAMPLES)
 @hide_option
+@effects_option
 @click.option("--seed", type=click.IntRange(0), default=1, show_default=True,
               help="Of everything random; without --hide also of what is hidden.")  # fmt: skip
 @click.option(

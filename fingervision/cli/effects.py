@@ -4,6 +4,7 @@ from pathlib import Path
 
 import click
 
+from fingervision.cli._effects_option import effects_option
 from fingervision.domain.errors import UsageError
 
 EXAMPLES = """
@@ -12,23 +13,28 @@ Examples:
   fingervision effects
   fingervision effects backlash
   fingervision effects backlash --figure backlash.png
+  fingervision effects --effects ./mine.py
 """
 
 
 @click.command(epilog=EXAMPLES)
 @click.argument("name", required=False)
 @click.option("--figure", type=click.Path(path_type=Path, dir_okay=False), help="Draw how it looks in a residual.")
+@effects_option
 def command(name: str | None, figure: Path | None) -> None:
     """List the physical effects, or explain one."""
     from difflib import get_close_matches
 
-    from fingervision.effects import catalogue
+    from fingervision.effects import catalogue, origin_of
 
     if name is None:
         if figure is not None:
             raise UsageError("--figure must come with the name of an effect, but none is given: add one.")
         for effect in catalogue().values():
-            click.echo(f"{effect.name:22} {effect.stage!s:10} {effect.words}")
+            origin = origin_of(effect.name)
+            click.echo(
+                f"{effect.name:22} {effect.stage!s:10} {effect.words}{'' if origin.built_in else f' [{origin}]'}"
+            )
         return
     if name not in catalogue():
         near = get_close_matches(name, catalogue(), n=1)
@@ -50,6 +56,8 @@ def command(name: str | None, figure: Path | None) -> None:
     click.echo(
         f"  needs     {', '.join(needs) or 'input and gap'}{'; starts each run at rest' if effect.memory else ''}"
     )
+    place = f"{effect.order:g} within its stage" if effect.order < float("inf") else "last of its stage"
+    click.echo(f"  acts      {place}\n  from      {origin_of(name)}")
     for p in effect.parameters:
         click.echo(f"  {p.name} ({p.unit or 'ratio'}): {p.words}, {p.lower:g} to {p.upper:g}, narrowed by the data")
     if figure is not None:

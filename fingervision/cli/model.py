@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from fingervision.cli._columns_option import columns_option
+from fingervision.cli._kind_choice import KindChoice
 from fingervision.cli._results_folder import results_folder
 
 if TYPE_CHECKING:
@@ -17,7 +18,6 @@ if TYPE_CHECKING:
     from fingervision.domain.response import Response
     from fingervision.models.answer_figures import ModelFigures
 
-_KINDS = ("stiffness_matrix", "lumped", "finite_element", "all")
 _METRES_BELOW_OF_HEIGHT = 1e-4
 _MOST_ROWS = 401
 _SWEPT = ("vary.csv", "vary.png")
@@ -42,7 +42,7 @@ Examples:
 
 @click.command(epilog=_EPILOG)
 @click.argument("gripper_toml", metavar="DRAWING.toml", type=click.Path(path_type=Path))
-@click.option("--kind", type=click.Choice(_KINDS), default="all", show_default=True, help="Which model.")
+@click.option("--kind", type=KindChoice("all"), default="all", show_default=True, help="Which model.")
 @click.option("--drive", type=click.Path(path_type=Path), help="drive.csv, or another log, with the inputs to answer.")
 @columns_option
 @click.option(
@@ -100,7 +100,7 @@ def command(
     from fingervision.models.agreement import disagreements
     from fingervision.models.gripper_figures import gripper_figures
     from fingervision.models.hinge_correction import HingeTheory
-    from fingervision.models.kinds import build_model, kinds
+    from fingervision.models.kinds import build_model, kinds, small_displacements_alone
     from fingervision.models.physics import LINEAR, Physics
     from fingervision.storage.gripper_toml import read_gripper
     from fingervision.storage.mechanism_toml import is_mechanism
@@ -144,7 +144,7 @@ def command(
     refusals: dict[str, FingervisionError] = {}
     for name in wanted:
         began = time.perf_counter()
-        own = LINEAR if name == "stiffness_matrix" and kind == "all" else physics
+        own = LINEAR if kind == "all" and small_displacements_alone(name) else physics
         try:
             model = build_model(name, gripper, own, HingeTheory(hinge))
             figures[name] = model.figures()
@@ -247,8 +247,8 @@ def _draw(
     from fingervision.cli._model_figures import draw_comparison, draw_deformed, draw_mesh
     from fingervision.models.reference_mesh import is_reference
 
-    if "finite_element" in models:
-        model = models["finite_element"]
+    model = next((model for model in models.values() if hasattr(model, "mesh")), None)
+    if model is not None:
         draw_deformed(model, float(inputs[abs(inputs).argmax()]), name, out / "deformed.png")
         if mesh:
             draw_mesh(model.mesh, name, out / "mesh.png")

@@ -30,6 +30,7 @@ from fingervision.domain.measured_table import MeasuredTable
 from fingervision.domain.parameter import Estimate
 from fingervision.domain.report import DiagnosisReport, Disagreement, NamedEffect, Place
 from fingervision.effects import catalogue
+from fingervision.effects.trial import EffectAnswerError
 from fingervision.models.corrected import CorrectedModel
 
 MEMBERS_SEPARATED = 5
@@ -107,6 +108,30 @@ def diagnose(
     progress : callable
         Told the share that is done.
     """
+    unfit: dict[str, str] = {}
+    while True:
+        try:
+            done = _diagnosed(table, model, seed, forced, without | unfit.keys(), progress)
+        except EffectAnswerError as error:
+            if error.name in forced or error.name in unfit:
+                raise
+            unfit[error.name] = error.words
+        else:
+            excluded = tuple(
+                {"name": one["name"], "reason": unfit.get(one["name"], one["reason"])} for one in done.report.excluded
+            )
+            return replace(done, report=replace(done.report, excluded=excluded)) if unfit else done
+
+
+def _diagnosed(
+    table: MeasuredTable,
+    model: CorrectedModel,
+    seed: int,
+    forced: frozenset[str],
+    without: frozenset[str],
+    progress: Progress,
+) -> Diagnosis:
+    """Diagnose once; an effect from elsewhere that fails on the way ends it."""
     begin = time.perf_counter()
     rng = np.random.default_rng(seed)
     data = prepare(table, model, without)

@@ -9,6 +9,7 @@ from types import MappingProxyType
 import numpy as np
 from numpy.typing import NDArray
 
+from fingervision.domain.further_check import FurtherCheck, PictureForm
 from fingervision.domain.parameter import Parameter
 from fingervision.domain.response import Response
 
@@ -143,8 +144,10 @@ class Effect:
         Canonical name.
     stage : Stage
         Drive, mechanism or camera.
-    order : int
-        Place in the chain; effects act in ascending order.
+    order : float
+        Place in the chain within the stage: effects act in ascending order. The catalogue's own have whole tens
+        (`fingervision effects NAME` prints them), so that another may stand between two: one that acts on what the play
+        (60) has left, and before the jumps (70), has 65. By default last of its stage.
     words : str
         What happens, in half a sentence.
     formula : str
@@ -169,11 +172,31 @@ class Effect:
         these data cannot show the effect.
     foretold : mapping of str to (float, float)
         Where a drawing foretells the effect: the ranges that its parameters then lie in.
+    checks : mapping of FurtherCheck to bool
+        Checks beside the stage's motion in which it shows (True) or stays out (False); the others do not concern it.
+    stands_at : tuple of str
+        Ends of the range (`closed`, `open`) at which the reading stands while the command moves on.
+    delay_s : callable or None
+        For what is a delay or looks like one at slow motion: `delay_s(values)` gives it. An effect that has
+        `act_curved` is a delay, with the one parameter `delay_s`.
+    wave : (str, str) or None
+        For a sine over the recorded input: the names of its amplitude and of its period, both in mm.
+    drawn_with : mapping of str to float
+        Values for its picture in the catalogue, where a share of the range would not show how it looks.
+    odd : tuple of str
+        Parameters that change their sign when the picture is mirrored.
+    in_picture : callable or None
+        For an effect of the camera that changes the picture itself: `in_picture(values)` says how. Without it a
+        simulated camera sees the two points moved, which for drifts and scales is the same.
+    at_frames : bool
+        Whether it is defined on the samples: a simulation looks at it with the frames, not in between.
+    demonstrated : bool
+        Whether a few short runs can tell it from everything else: `fingervision demo` hides one of these.
     """
 
     name: str
     stage: Stage
-    order: int
+    order: float = float("inf")
     words: str
     formula: str
     source: str
@@ -188,6 +211,15 @@ class Effect:
     curve: bool = False
     narrow: Callable[[History], "tuple[Parameter, ...] | str"] | None = None
     foretold: Mapping[str, tuple[float, float]] = field(default_factory=lambda: MappingProxyType({}))
+    checks: Mapping[FurtherCheck, bool] = field(default_factory=lambda: MappingProxyType({}))
+    stands_at: tuple[str, ...] = ()
+    delay_s: Callable[[Values], float] | None = None
+    wave: tuple[str, str] | None = None
+    drawn_with: Mapping[str, float] = field(default_factory=lambda: MappingProxyType({}))
+    odd: tuple[str, ...] = ()
+    in_picture: Callable[[Values], PictureForm] | None = None
+    at_frames: bool = False
+    demonstrated: bool = False
 
     def search(self, history: History) -> tuple[Parameter, ...] | str:
         """Return the parameters with the bounds that these data leave, or the reason why these cannot show it."""
@@ -218,8 +250,8 @@ def _start(words: str, run: int) -> Parameter:
 class DriveEffect(Effect):
     """An effect on what the mechanism receives: `act(input_mm, history, values)` gives the input after it.
 
-    `act_curved` is the same law where the stage went along curves between two samples instead of straight lines; None
-    where that makes no difference.
+    `act_curved` is the same law where the stage went along curves between two samples instead of straight lines, for a
+    delay; None where that makes no difference.
     """
 
     act: DriveAct

@@ -1,6 +1,7 @@
 """One finger opens more than the other."""
 
 from fingervision.domain.effect import History, PointEffect, Stage, Values
+from fingervision.domain.further_check import FurtherCheck
 from fingervision.domain.parameter import Parameter
 from fingervision.domain.response import Response
 
@@ -20,5 +21,8 @@ EFFECT = PointEffect(
     residual="the midline moves in proportion to the opening",
     parameters=(Parameter("share", "", -0.5, 0.5, "share that moves from left to right", typical=0.05),),
     needs_edges=True,
+    checks={FurtherCheck.TURN: True},
+    odd=("share",),
+    demonstrated=True,
     act=act,
 )

@@ -27,5 +27,6 @@ EFFECT = DriveEffect(
     needs_times=True,
     memory=True,
     start="where the play stands at the start, in half widths",
+    demonstrated=True,
     act=act,
 )

@@ -1,6 +1,7 @@
 """The camera or its clamp moves, both points together."""
 
 from fingervision.domain.effect import History, PointEffect, Stage, Values
+from fingervision.domain.further_check import FurtherCheck
 from fingervision.domain.parameter import Parameter
 from fingervision.domain.response import Response
 
@@ -22,5 +23,8 @@ EFFECT = PointEffect(
     needs_times=True,
     needs_shared_clock=True,
     needs_edges=True,
+    checks={FurtherCheck.TURN: False},
+    odd=("rate_mm_per_s",),
+    demonstrated=True,
     act=act,
 )

@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 from fingervision.domain.effect import History, PointEffect, Stage, Values
+from fingervision.domain.further_check import FurtherCheck, PictureForm
 from fingervision.domain.parameter import Parameter
 from fingervision.domain.response import Response
 from fingervision.effects.late import delay_that_shows, late
@@ -43,6 +44,9 @@ EFFECT = PointEffect(
     parameters=(Parameter("delay_s", "s", 0.0, 1.0, "delay", starts=8, logarithmic=True),),
     needs_times=True,
     narrow=narrow,
+    checks={FurtherCheck.LIGHT: True},
+    delay_s=lambda values: values["delay_s"],
+    in_picture=lambda values: PictureForm(late_s=values["delay_s"]),
     act=act,
     act_curved=act_curved,
 )

@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 from fingervision.domain.effect import History, PointEffect, Stage, Values
+from fingervision.domain.further_check import FurtherCheck, PictureForm
 from fingervision.domain.parameter import Parameter
 from fingervision.domain.response import Response
 
@@ -26,5 +27,9 @@ EFFECT = PointEffect(
     residual="the square of the coordinate: the midline moves with the opening squared",
     parameters=(Parameter("k_per_mm", "1/mm", -0.02, 0.02, "keystone", typical=0.002),),
     needs_edges=True,
+    checks={FurtherCheck.TURN: False},
+    odd=("k_per_mm",),
+    in_picture=lambda values: PictureForm(keystone_per_mm=values["k_per_mm"]),
+    demonstrated=True,
     act=act,
 )

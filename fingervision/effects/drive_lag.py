@@ -1,6 +1,7 @@
 """The mechanism is late behind the recorded input."""
 
 from fingervision.domain.effect import Array, DriveEffect, History, Stage, Values
+from fingervision.domain.further_check import FurtherCheck
 from fingervision.domain.parameter import Parameter
 from fingervision.effects.late import delay_that_shows, late
 
@@ -32,6 +33,8 @@ EFFECT = DriveEffect(
     needs_times=True,
     memory=True,
     narrow=narrow,
+    checks={FurtherCheck.LIGHT: False},
+    delay_s=lambda values: values["delay_s"],
     act=act,
     act_curved=act_curved,
 )

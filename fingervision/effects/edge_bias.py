@@ -1,6 +1,7 @@
 """Threshold or blooming moves both edges."""
 
 from fingervision.domain.effect import History, PointEffect, Stage, Values
+from fingervision.domain.further_check import FurtherCheck
 from fingervision.domain.parameter import Parameter
 from fingervision.domain.response import Response
 
@@ -19,5 +20,6 @@ EFFECT = PointEffect(
     source="definition",
     residual="a constant in the gap",
     parameters=(Parameter("offset_mm", "mm", -0.1, 0.1, "offset of the measured gap", typical=0.03),),
+    checks={FurtherCheck.SLOT: True},
     act=act,
 )

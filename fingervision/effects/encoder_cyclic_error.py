@@ -43,5 +43,7 @@ EFFECT = DriveEffect(
         Parameter("phase_rad", "rad", -3.15, 3.15, "phase", neutral=None, starts=4),
     ),
     narrow=narrow,
+    wave=("amplitude_mm", "period_mm"),
+    demonstrated=True,
     act=act,
 )

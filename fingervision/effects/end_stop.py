@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from fingervision.domain.effect import Array, DriveEffect, History, Stage, Values
+from fingervision.domain.further_check import FurtherCheck
 from fingervision.domain.parameter import Parameter
 
 
@@ -36,5 +37,9 @@ EFFECT = DriveEffect(
         Parameter("lower_mm", "mm", -1e3, 1e3, "lower stop", neutral=-1e3, starts=10),
     ),
     narrow=narrow,
+    checks={FurtherCheck.FORCE: False},
+    stands_at=("closed", "open"),
+    drawn_with={"upper_mm": 1.3, "lower_mm": -0.4},
+    demonstrated=True,
     act=act,
 )

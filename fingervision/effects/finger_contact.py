@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from fingervision.domain.effect import History, PointEffect, Stage, Values
+from fingervision.domain.further_check import FurtherCheck
 from fingervision.domain.parameter import Parameter
 from fingervision.domain.response import Response
 
@@ -39,5 +40,9 @@ EFFECT = PointEffect(
         Parameter("remaining_slope", "", 0.0, 0.5, "share of the closing that goes on", neutral=None, starts=2),
     ),
     narrow=narrow,
+    checks={FurtherCheck.FORCE: True},
+    stands_at=("closed",),
+    drawn_with={"floor_mm": 1.5},
+    demonstrated=True,
     act=act,
 )

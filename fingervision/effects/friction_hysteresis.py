@@ -52,5 +52,6 @@ EFFECT = DriveEffect(
     memory=True,
     start="how far the sliders are drawn at the start, in their reaches",
     narrow=narrow,
+    demonstrated=True,
     act=act,
 )

@@ -1,6 +1,7 @@
 """The input's zero is off."""
 
 from fingervision.domain.effect import Array, DriveEffect, History, Stage, Values
+from fingervision.domain.further_check import FurtherCheck
 from fingervision.domain.parameter import Parameter
 
 
@@ -22,5 +23,6 @@ EFFECT = DriveEffect(
     source="definition",
     residual="nearly a constant; follows the slope of a curved model",
     parameters=(Parameter("offset_mm", "mm", -0.5, 0.5, "offset of the input", typical=0.05),),
+    checks={FurtherCheck.REZERO: True},
     act=act,
 )

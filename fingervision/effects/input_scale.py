@@ -1,6 +1,7 @@
 """The input's unit is off."""
 
 from fingervision.domain.effect import Array, DriveEffect, History, Stage, Values
+from fingervision.domain.further_check import FurtherCheck
 from fingervision.domain.parameter import Parameter
 
 
@@ -18,5 +19,6 @@ EFFECT = DriveEffect(
     source="definition",
     residual="proportional to the input",
     parameters=(Parameter("ratio", "", -0.3, 0.3, "relative error of the unit", typical=0.02),),
+    checks={FurtherCheck.TRAVEL: True},
     act=act,
 )

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from fingervision.domain.effect import History, PointEffect, Stage, Values
+from fingervision.domain.further_check import FurtherCheck
 from fingervision.domain.parameter import Parameter
 from fingervision.domain.response import Response
 
@@ -38,5 +39,6 @@ EFFECT = PointEffect(
         Parameter("cross", "", -2.0, 2.0, "share of the motion along the radius"),
     ),
     narrow=narrow,
+    checks={FurtherCheck.SHIFT: False},
     act=act,
 )

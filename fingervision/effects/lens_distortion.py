@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 from fingervision.domain.effect import History, PointEffect, Stage, Values
+from fingervision.domain.further_check import FurtherCheck, PictureForm
 from fingervision.domain.parameter import Parameter
 from fingervision.domain.response import Response
 
@@ -25,5 +26,8 @@ EFFECT = PointEffect(
     source="Brown 1966, first radial term",
     residual="the cube of the coordinate",
     parameters=(Parameter("k_per_mm2", "1/mm2", -0.005, 0.005, "first radial coefficient", typical=0.0005),),
+    checks={FurtherCheck.SLOT: True, FurtherCheck.SHIFT: True},
+    in_picture=lambda values: PictureForm(radial_per_mm2=values["k_per_mm2"]),
+    demonstrated=True,
     act=act,
 )

@@ -1,6 +1,7 @@
 """The amplification differs (link length, hinge position)."""
 
 from fingervision.domain.effect import History, PointEffect, Stage, Values
+from fingervision.domain.further_check import FurtherCheck
 from fingervision.domain.parameter import Parameter
 from fingervision.domain.response import Response
 
@@ -20,5 +21,6 @@ EFFECT = PointEffect(
     source="definition",
     residual="proportional to the opening",
     parameters=(Parameter("ratio", "", -0.3, 0.3, "relative error of the lever ratio", typical=0.1),),
+    checks={FurtherCheck.SLOT: False, FurtherCheck.TRAVEL: False},
     act=act,
 )

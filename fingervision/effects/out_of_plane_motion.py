@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 from fingervision.domain.effect import History, PointEffect, Stage, Values
+from fingervision.domain.further_check import FurtherCheck
 from fingervision.domain.parameter import Parameter
 from fingervision.domain.response import Response
 
@@ -27,5 +28,6 @@ EFFECT = PointEffect(
     parameters=(
         Parameter("relative_per_mm", "1/mm", -0.02, 0.02, "relative change of the distance per opening", typical=0.002),
     ),
+    checks={FurtherCheck.SHIFT: False},
     act=act,
 )

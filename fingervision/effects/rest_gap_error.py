@@ -1,6 +1,7 @@
 """The fingers rest at another gap."""
 
 from fingervision.domain.effect import History, PointEffect, Stage, Values
+from fingervision.domain.further_check import FurtherCheck
 from fingervision.domain.parameter import Parameter
 from fingervision.domain.response import Response
 
@@ -19,5 +20,6 @@ EFFECT = PointEffect(
     source="definition",
     residual="a constant in the gap, in all runs alike",
     parameters=(Parameter("offset_mm", "mm", -2.0, 2.0, "offset of the gap at rest", typical=0.5),),
+    checks={FurtherCheck.SLOT: False, FurtherCheck.REZERO: False},
     act=act,
 )

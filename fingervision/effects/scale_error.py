@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 from fingervision.domain.effect import History, PointEffect, Stage, Values
+from fingervision.domain.further_check import FurtherCheck
 from fingervision.domain.parameter import Parameter
 from fingervision.domain.response import Response
 
@@ -25,5 +26,6 @@ EFFECT = PointEffect(
     source="definition",
     residual="proportional to the gap",
     parameters=(Parameter("ratio", "", -0.2, 0.2, "relative error of the scale", typical=0.02),),
+    checks={FurtherCheck.SLOT: True},
     act=act,
 )

@@ -28,5 +28,6 @@ EFFECT = PointEffect(
     ),
     needs_times=True,
     needs_shared_clock=True,
+    demonstrated=True,
     act=act,
 )

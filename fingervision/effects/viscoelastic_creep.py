@@ -53,5 +53,6 @@ EFFECT = PointEffect(
     memory=True,
     start="opening to which the body had relaxed before, beside the first one, in largest openings",
     narrow=narrow,
+    demonstrated=True,
     act=act,
 )

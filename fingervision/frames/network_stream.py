@@ -108,7 +108,10 @@ class NetworkStream:
         codec.thread_count = 1  # threads of frames would each keep one back
         if codec.width < 1 or codec.height < 1:
             self._container.close()
-            raise FingervisionError(f"The stream {self.name} must say how large its pictures are, but does not.")
+            raise FingervisionError(
+                f"The stream {self.name} must state the size of its pictures, but does not: choose another "
+                "format in the camera's own settings."
+            )
         self._jpegs = SoundJpeg(codec.name)
         self.has_own_clock = self._container.format.name not in WITHOUT_TIMES
         self._closed = Event()

@@ -1,17 +1,23 @@
 """Where frames come from: what every source says of itself, and how one is found."""
 
 import importlib
+import logging
 import pkgutil
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
+from functools import cache
 from math import isfinite
 from pathlib import Path
-from types import ModuleType
-from typing import Protocol
+from typing import Protocol, cast
 
 import fingervision.frames
 from fingervision.domain.errors import FingervisionError, UsageError
 from fingervision.domain.frame import Coding, Frame, LostFrame
+from fingervision.plugins.entry import Entry
+from fingervision.plugins.faults import MisfitError
+from fingervision.plugins.registry import Registry
+
+LOG = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True, slots=True)
@@ -133,16 +139,31 @@ class Wish:
     camera: CameraWish = CameraWish()
 
 
+class SourceKind(Protocol):
+    """A module, or another object, that opens sources by name."""
+
+    def accepts(self, name: str) -> bool:
+        """Whether a name is one of this kind; called for every recording, so it must be quick and open nothing."""
+        ...
+
+    def open_frames(self, name: str, wish: Wish) -> FrameSource:
+        """Open it; FingervisionError with a sentence where that cannot be."""
+        ...
+
+
 def open_source(name: str, wish: Wish | None = None) -> FrameSource:
     """Open a recording or camera by the name that the user gave.
 
     Every module of this package that has `accepts(name) -> bool` and `open_frames(name, wish) -> FrameSource` is a
-    kind of source; adding one adds one file.
+    kind of source, as is every such module or object of another distribution (entry points of the group
+    `fingervision.frame_sources`). One that states `TAKES_THE_REST = True` is asked where no other accepts the name.
 
     Raises
     ------
     FingervisionError
         No kind of source knows the name, or the one that does cannot read it.
+    UsageError
+        Several kinds accept it.
     """
     if not name:
         raise UsageError("The recording must have a name, but it is empty: give a file, a folder, or a glob in quotes.")
@@ -150,17 +171,68 @@ def open_source(name: str, wish: Wish | None = None) -> FrameSource:
         raise FingervisionError(
             f"{name} must be a file or a folder, but is a pipe or a device: save it as a file first."
         )
-    for module in kinds():
-        if module.accepts(name):
-            source: FrameSource = module.open_frames(name, wish or Wish())
-            return source
+    claims = [entry for entry in REGISTRY.entries() if _accepts(entry, name)]
+    claims = [entry for entry in claims if not getattr(entry.value, "TAKES_THE_REST", False)] or claims
+    if len(claims) > 1:
+        who = " and ".join(f"{entry.name} ({entry.origin})" for entry in claims)
+        raise UsageError(f"One kind of source must open {name}, but {who} would: rename it, or remove one of them.")
+    if claims:
+        return _opened(claims[0], name, wish or Wish())
     raise FingervisionError(
         f"There is no recording {name}: give a video file, a folder of images, or a glob in quotes."
     )
 
 
-def kinds() -> list[ModuleType]:
-    """Modules of this package that open sources by name."""
-    names = sorted(module.name for module in pkgutil.iter_modules(fingervision.frames.__path__))
-    modules = (importlib.import_module(f"{fingervision.frames.__name__}.{name}") for name in names)
-    return [module for module in modules if hasattr(module, "accepts")]
+def _accepts(entry: Entry[SourceKind], name: str) -> bool:
+    if entry.origin.built_in:
+        return entry.value.accepts(name)
+    try:
+        return bool(entry.value.accepts(name))
+    except Exception as error:  # it takes nothing else with it
+        LOG.warning("fingervision: The frame source %s of %s is left out (%r).", entry.name, entry.origin, error)
+        return False
+
+
+def _opened(entry: Entry[SourceKind], name: str, wish: Wish) -> FrameSource:
+    if entry.origin.built_in:
+        return entry.value.open_frames(name, wish)
+    who = f"The frame source {entry.name} of {entry.origin}"
+    try:
+        source = entry.value.open_frames(name, wish)
+        described = isinstance(source.description, Description)
+    except FingervisionError:
+        raise
+    except Exception as error:
+        said = f"{type(error).__name__}: {error}".replace("\n", " ")[:200].rstrip(".")
+        raise FingervisionError(f"{who} could not open {name} ({said}): {entry.origin.remedy}.") from error
+    if not (described and hasattr(source, "__iter__")):
+        raise FingervisionError(
+            f"{who} must give a source with a Description whose frames can be read in turn, but gave a "
+            f"{type(source).__name__} without: {entry.origin.remedy}."
+        )
+    return source
+
+
+def kinds() -> list[SourceKind]:
+    """Kinds of source that open recordings by name."""
+    return [entry.value for entry in REGISTRY.entries()]
+
+
+@cache
+def _built_in() -> tuple[str, ...]:
+    names = (module.name for module in pkgutil.iter_modules(fingervision.frames.__path__))
+    return tuple(name for name in names if hasattr(_load(name), "accepts"))
+
+
+def _load(name: str) -> SourceKind:
+    return cast("SourceKind", importlib.import_module(f"{fingervision.frames.__name__}.{name}"))
+
+
+def _held(held: object) -> dict[str, SourceKind]:
+    lacks = [name for name in ("accepts", "open_frames") if not callable(getattr(held, name, None))]
+    if lacks:
+        raise MisfitError(f"must have accepts(name) and open_frames(name, wish), but has no {' and no '.join(lacks)}")
+    return {"": cast("SourceKind", held)}
+
+
+REGISTRY: Registry[SourceKind] = Registry("fingervision.frame_sources", "frame source", _built_in, _load, _held)

@@ -31,6 +31,10 @@ def _coding(properties: int) -> Coding:
     return Coding.INTRAFRAME if properties & INTRA_PROPERTY else Coding.INTERFRAME
 
 
+TAKES_THE_REST = True
+"""A file that no other kind of source knows is read as a video: FFmpeg tells what it is."""
+
+
 def accepts(name: str) -> bool:
     """Whether this is a file that is not an image."""
     path = Path(name)

@@ -1,7 +1,7 @@
 """How a camera shakes: the ground above the fingers' tips registered against the first frame's.
 
-Two halves of the ground are registered each by itself. The camera moves both alike; where they disagree the ground is
-too plain to be followed, and their disagreement is the uncertainty of their mean.
+The ground is registered in two halves, each by itself. A motion of the camera shifts both halves alike. A difference
+between the two shifts means that the ground has too little texture to be followed; it is the uncertainty of their mean.
 """
 
 from collections.abc import Callable

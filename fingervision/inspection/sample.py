@@ -237,7 +237,7 @@ class Sample:
 
     @property
     def u_shift_px(self) -> float:
-        """What the measuring states for things beside the edges and levels that are cut off."""
+        """Standard uncertainty that `measure` states for what lies beside the edges and for clipped levels."""
         return self.median(look.outcome.u_shift_px for look in self.looks)
 
     @property

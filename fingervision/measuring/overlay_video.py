@@ -85,7 +85,7 @@ class OverlayVideo:
         if tick <= self._last_tick or isinstance(outcome, LostFrame):
             return
         self._last_tick = tick
-        canvas = draw_overlay(frame, outcome, _words(row))
+        canvas = draw_overlay(frame, outcome, words_of_row(row))
         if draw_more is not None:
             draw_more(canvas)
         drawn = np.pad(canvas, self._pad, mode="edge")
@@ -103,7 +103,7 @@ class OverlayVideo:
         )
 
 
-def _words(row: GapRow) -> str:
+def words_of_row(row: GapRow) -> str:
     """Frame, time and value in a line; U = 2 u, of the random part where nothing else is known."""
     place = f"{row.frame}" if row.time_s is None else f"{row.frame}  {row.time_s:.3f} s"
     if row.gap_mm is None or row.u_random_mm is None:

@@ -49,7 +49,7 @@ class Scale(Protocol):
     def positions_mm(
         self, points_px: Floats, axis: int, light_gap: NDArray[np.bool_], frame_size_px: tuple[int, int]
     ) -> Floats:
-        """Where both points are along an axis, from the picture's middle."""
+        """Coordinates of both points of each distance along an axis, from the picture's middle, in mm."""
         ...
 
     def check_frame_size(self, width_px: int, height_px: int) -> None:

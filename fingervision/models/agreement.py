@@ -4,11 +4,10 @@ from collections.abc import Callable, Mapping
 from itertools import combinations
 
 from fingervision.models.answer_figures import ModelFigures
+from fingervision.models.kinds import by_trust, why_trusted
 
 _APART = 0.10
 """Beyond the stated errors of both: what differs by more is no error of the kind but of its picture of the body."""
-_TRUST = ("finite_element", "lumped", "stiffness_matrix")
-"""In order: the outline itself, its bars in the plane, its bars at small displacements."""
 _Figure = Callable[[ModelFigures], float | None]
 _QUANTITIES: tuple[tuple[str, str, _Figure, Callable[[ModelFigures], float]], ...] = (
     ("gap per input", "", lambda f: f.gap_per_input, lambda f: f.slope_error),
@@ -16,10 +15,6 @@ _QUANTITIES: tuple[tuple[str, str, _Figure, Callable[[ModelFigures], float]], ..
     ("first mode, drive free", " Hz", lambda f: next(iter(f.free_modes_hz), None), lambda f: f.mode_error),
     ("first mode, drive held", " Hz", lambda f: next(iter(f.locked_modes_hz), None), lambda f: f.mode_error),
 )
-_WHY = {
-    "finite_element": "it has the outline itself, and the other takes the body for bars and notches joined at points",
-    "lumped": "both take the body for bars, and it has more of them",
-}
 
 
 def disagreements(figures: Mapping[str, ModelFigures]) -> list[str]:
@@ -35,7 +30,7 @@ def disagreements(figures: Mapping[str, ModelFigures]) -> list[str]:
     list of str
         One sentence for each quantity that differs; of several pairs the one that differs most.
     """
-    kinds = sorted(figures, key=lambda kind: _TRUST.index(kind) if kind in _TRUST else len(_TRUST))
+    kinds = by_trust(figures)
     sentences = []
     for name, unit, value, error in _QUANTITIES:
         worst = None
@@ -52,6 +47,6 @@ def disagreements(figures: Mapping[str, ModelFigures]) -> list[str]:
             sentences.append(
                 f"{better} and {other} must agree on the {name} within their model errors of {100.0 * errors:.2g} % "
                 f"together, but have {a:.4g} and {b:.4g}{unit}, {100.0 * apart:.3g} % apart; trust {better}: "
-                f"{_WHY.get(better, 'it stands first')}."
+                f"{why_trusted(better) or 'it stands first'}."
             )
     return sentences

@@ -147,7 +147,7 @@ class _Frames:
                 self.held += [at + "xy".index(component)] + [at + 2] * turns
 
     def contacts(self) -> None:
-        """Faces that may be pressed: what presses on one must be able to bend the body that carries it."""
+        """Keep the nodes of contact faces, so that a contact force can bend the body that the face belongs to."""
         for contact in self.mechanism.contacts:
             for face in (contact.face, contact.other):
                 if face is not None:

@@ -35,6 +35,7 @@ from fingervision.models.triangulate import PlaneMesh
 from fingervision.models.width_effect import force_uncertainty, gripper_zones
 
 KIND = "finite_element"
+TRUST, WHY_TRUSTED = 3, "it has the outline itself, and the other takes the body for bars and notches joined at points"
 
 _MODES = 3
 _ON_NOTCH = 1e-6

@@ -83,7 +83,8 @@ def gripper_figures(
         loads = [(s.input_mm, s.gap_mm, s.force_n, s.grip_n, s.stress_mpa) for s in states]
     else:
         answer = model.respond(np.array(ends))
-        loads = [(ends[i], float(answer.gap_mm[i]), float(answer.force_n[i]), None, None) for i in (0, 1)]
+        forces = (None, None) if answer.force_n is None else answer.force_n.tolist()
+        loads = [(ends[i], float(answer.gap_mm[i]), forces[i], None, None) for i in (0, 1)]
     for end, load in zip(("lowest", "highest"), loads, strict=True):
         names = (f"{end}_input_mm", f"{end}_gap_mm", f"{end}_force_n", f"{end}_grip_n", f"{end}_stress_mpa")
         row |= dict(zip(names, load, strict=True))

@@ -30,9 +30,9 @@ def gripper_uncertainty(
 ) -> dict[str, FigureUncertainty]:
     """Propagate the stated uncertainties of a drawing to every figure of `gripper_figures`.
 
-    Changed drawings are answered by the frame of bars (and by the stiffness matrix out of the plane) in small
-    displacements, with contact where the physics has it: a mesh of each would cost minutes, and an uncertainty needs
-    two digits. The same u stands beside another kind's figures.
+    The answers for changed drawings come from the lumped model (out of the plane from the stiffness matrix), in small
+    displacements, with contact where the physics includes it. Finite elements of every changed drawing would take
+    minutes, and an uncertainty needs two digits only. The same u is stated beside the figures of the other kinds.
 
     Parameters
     ----------

@@ -1,16 +1,23 @@
-"""The parametric models there are, found by listing this package: a module that states its KIND builds one."""
+"""The parametric models there are: modules of this package that state their KIND, and those of other distributions."""
 
 import importlib
-import pkgutil
-from pathlib import Path
-from typing import Protocol
+from collections.abc import Iterable
+from typing import Protocol, cast
 
-from fingervision.domain.errors import UsageError
+import numpy as np
+
+from fingervision.domain.errors import FingervisionError, UsageError
 from fingervision.domain.gripper import Gripper
 from fingervision.domain.model import Model
 from fingervision.models.answer_figures import ModelFigures
 from fingervision.models.hinge_correction import HingeTheory
-from fingervision.models.physics import Physics
+from fingervision.models.kind_names import GROUP, built_in_kinds
+from fingervision.models.physics import LINEAR, Physics
+from fingervision.plugins.faults import MisfitError
+from fingervision.plugins.origin import Origin
+from fingervision.plugins.registry import Registry
+
+DEFAULT = "lumped"
 
 
 class GripperModel(Model, Protocol):
@@ -37,7 +44,12 @@ class GripperModel(Model, Protocol):
 
 
 class Kind(Protocol):
-    """A module that builds a model."""
+    """A module, or another object, that builds a model.
+
+    It may state besides: `SMALL_DISPLACEMENTS_ALONE`, True where it knows no large rotation and no contact; `TRUST`, a
+    number (finite elements of the outline 3, bars in the plane 2, bars at small displacements 1; 0 where not stated):
+    where two kinds differ by more than their own errors, the one with more is trusted, for the reason `WHY_TRUSTED`.
+    """
 
     KIND: str
 
@@ -46,17 +58,48 @@ class Kind(Protocol):
         ...
 
 
-def kinds() -> tuple[str, ...]:
-    """List the kinds of model, sorted."""
-    here = Path(__file__).parent
-    return tuple(
-        sorted(
-            module.name
-            for module in pkgutil.iter_modules([str(here)])
-            if not module.ispkg
-            and f'\nKIND = "{module.name}"\n' in (here / f"{module.name}.py").read_text(encoding="utf-8")
+def _held(held: object) -> dict[str, Kind]:
+    name = getattr(held, "KIND", None)
+    if not isinstance(name, str) or not callable(getattr(held, "build", None)):
+        raise MisfitError(
+            "must state KIND, its name, and have build(gripper, physics, theory), but "
+            f"{'has no build' if isinstance(name, str) else 'states no KIND'}"
         )
-    )
+    return {name: cast("Kind", held)}
+
+
+REGISTRY: Registry[Kind] = Registry(
+    GROUP,
+    "model",
+    built_in_kinds,
+    lambda name: cast("Kind", importlib.import_module(f"fingervision.models.{name}")),
+    _held,
+)
+
+
+def kinds() -> tuple[str, ...]:
+    """List the kinds of model: built in and sorted, then installed."""
+    return REGISTRY.names()
+
+
+def small_displacements_alone(kind: str) -> bool:
+    """Whether a kind knows neither large rotation nor contact."""
+    return bool(getattr(REGISTRY.get(kind).value, "SMALL_DISPLACEMENTS_ALONE", False))
+
+
+def by_trust(names: Iterable[str]) -> list[str]:
+    """Sort kinds, the most trusted first; names that are no kind stand last in their order."""
+    return sorted(names, key=lambda name: -trust(name))
+
+
+def trust(kind: str) -> int:
+    """How much a kind is trusted beside others: how much of the outline it has."""
+    return int(getattr(REGISTRY.get(kind).value, "TRUST", 0)) if kind in kinds() else 0
+
+
+def why_trusted(kind: str) -> str:
+    """Say why a kind is trusted before those with less of the outline; empty where it does not say."""
+    return str(getattr(REGISTRY.get(kind).value, "WHY_TRUSTED", "")) if kind in kinds() else ""
 
 
 def build_model(kind: str, gripper: Gripper, physics: Physics, theory: HingeTheory) -> GripperModel:
@@ -69,7 +112,7 @@ def build_model(kind: str, gripper: Gripper, physics: Physics, theory: HingeTheo
     gripper : Gripper
         The drawing.
     physics : Physics
-        What goes beyond small displacements; `stiffness_matrix` knows small displacements alone.
+        What goes beyond small displacements; some kinds know small displacements alone.
     theory : HingeTheory
         Of the hinges; `finite_element` has no need of one.
 
@@ -77,8 +120,53 @@ def build_model(kind: str, gripper: Gripper, physics: Physics, theory: HingeTheo
     ------
     UsageError
         Where the kind is unknown or does not know the physics asked for.
+    FingervisionError
+        A model from outside the package fails, or answers what is no answer.
     """
-    if kind not in kinds():
-        raise UsageError(f"The kind of model must be one of {', '.join(kinds())}, but is {kind}.")
-    module: Kind = importlib.import_module(f"fingervision.models.{kind}")
-    return module.build(gripper, physics, theory)
+    try:
+        entry = REGISTRY.get(kind)
+    except KeyError:
+        raise UsageError(f"The kind of model must be one of {', '.join(kinds())}, but is {kind}.") from None
+    if entry.origin.built_in:
+        return entry.value.build(gripper, physics, theory)
+    if physics != LINEAR and small_displacements_alone(kind):
+        raise UsageError(f"{kind} knows small displacements alone: leave out --large-rotation and --contact.")
+    return _tried(kind, entry.origin, entry.value, gripper, physics, theory)
+
+
+def _tried(
+    kind: str, origin: Origin, builder: Kind, gripper: Gripper, physics: Physics, theory: HingeTheory
+) -> GripperModel:
+    """Build a model from outside the package, and look at one answer."""
+    who = f"The model {kind} of {origin}"
+    try:
+        model = builder.build(gripper, physics, theory)
+        low, high = model.input_range_mm
+        asked = np.array([low, 0.0, high])
+        answer = model.respond(asked)
+        shapes = {np.shape(answer.left_mm), np.shape(answer.right_mm)}
+        rest_mm = float(model.rest_gap_mm)
+        figures = model.figures()
+        gap_mm = np.asarray(answer.gap_mm)
+    except FingervisionError:
+        raise
+    except Exception as error:
+        said = f"{type(error).__name__}: {error}".replace("\n", " ")[:200].rstrip(".")
+        raise FingervisionError(f"{who} must answer for every drawing, but raised {said}: {origin.remedy}.") from error
+    if shapes != {asked.shape} or not np.all(np.isfinite(gap_mm)):
+        words = f"{gap_mm.tolist()}" if shapes == {asked.shape} else f"shape {sorted(shapes)}"
+        raise FingervisionError(
+            f"{who} must answer three inputs with three finite gaps, but gave {words}: {origin.remedy}."
+        )
+    if not np.isclose(gap_mm[1], rest_mm, rtol=0.0, atol=1e-9 * max(1.0, abs(rest_mm))):
+        raise FingervisionError(
+            f"{who} must have its rest gap of {rest_mm:g} mm at input 0, but has {gap_mm[1]:g} mm: {origin.remedy}."
+        )
+    if not isinstance(figures, ModelFigures):
+        given = type(figures).__name__
+        raise FingervisionError(f"{who} must give ModelFigures as its figures, but gave a {given}: {origin.remedy}.")
+    if figures.peak_stress is not None and not hasattr(model, "loaded"):
+        raise FingervisionError(
+            f"{who} must have loaded(inputs_mm) where it knows a stress, but has none: {origin.remedy}."
+        )
+    return model

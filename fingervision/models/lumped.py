@@ -29,6 +29,7 @@ from fingervision.models.static_answer import (
 )
 
 KIND = "lumped"
+TRUST, WHY_TRUSTED = 2, "both take the body for bars, and it has more of them"
 
 _SEGMENTS = 10
 _MODES = 3

@@ -79,7 +79,7 @@ class PhysicalGripper:
 
     @property
     def uncertain(self) -> Mapping[str, Estimate]:
-        """Numbers of the drawing whose uncertainty is stated, by dotted name: they may be refitted within it."""
+        """Numbers of the drawing with a stated uncertainty, by dotted name; a fit may change each within it."""
         return {
             name: Estimate(attrgetter(name)(self.gripper), u)
             for name, u in self.gripper.uncertainties.items()

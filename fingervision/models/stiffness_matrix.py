@@ -34,6 +34,7 @@ from fingervision.models.steady_loads import STANDARD_GRAVITY_MM_S2
 Array = NDArray[np.float64]
 
 KIND = "stiffness_matrix"
+TRUST, SMALL_DISPLACEMENTS_ALONE = 1, True
 
 _X, _Y, _Z, _ABOUT_X, _ABOUT_Y, _ABOUT_Z = range(6)
 _ALL = (_X, _Y, _Z, _ABOUT_X, _ABOUT_Y, _ABOUT_Z)

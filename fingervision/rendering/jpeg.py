@@ -1,4 +1,4 @@
-"""What JPEG leaves of a frame."""
+"""A frame as it is after JPEG compression."""
 
 import cv2
 import numpy as np

@@ -67,7 +67,7 @@ class Outline:
         return Outline(tuple(piece.backwards() for piece in reversed(self.pieces)))
 
     def moved(self, motion: Motion) -> "Outline":
-        """Place the curve by a rigid motion; a solid stays a solid."""
+        """Move the curve rigidly; where the motion mirrors, the curve is reversed, so that inside stays inside."""
         moved = tuple(piece.moved(motion) for piece in self.pieces)
         return Outline(tuple(piece.backwards() for piece in reversed(moved))) if motion.mirrors else Outline(moved)
 

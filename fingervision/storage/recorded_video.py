@@ -121,8 +121,8 @@ class RecordedVideo:
                 kept += 1
         if kept < frames:
             raise FingervisionError(
-                f"{self._path} must hold {frames} frames to go on after them, but holds {kept}: start the run anew in "
-                "another folder."
+                f"To resume the run, {self._path} must hold at least {frames} frames, but holds {kept}: start the run "
+                "anew in another folder."
             )
         self._first_s = 0.0
 

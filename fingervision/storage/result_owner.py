@@ -79,7 +79,7 @@ def began_in(out: Path) -> int | None:
 
 
 def finish_in(out: Path, source: Path, names: Iterable[str], began_ns: int | None) -> None:
-    """Mark a folder whose results are whole, and remove what an earlier call left of this kind.
+    """Mark the results in a folder as complete, and remove files that an earlier call of the same command left there.
 
     Parameters
     ----------

@@ -1,49 +1,129 @@
-"""The kinds of actuators, force sensors and cameras, found by listing three packages."""
+"""The kinds of devices that there are: modules of three packages, plug-ins of other distributions, and files."""
 
 import importlib
 import pkgutil
-from types import ModuleType
-from typing import Any, Protocol
+from typing import Any, Protocol, cast
 
+from fingervision.plugins.entry import Entry
+from fingervision.plugins.faults import MisfitError
+from fingervision.plugins.origin import of_file
+from fingervision.plugins.registry import Registry
 from fingervision.storage.toml_section import Section
 from fingervision.testbed import actuators, cameras, force_sensors
+from fingervision.testbed.actuator import Actuator
 from fingervision.testbed.build_context import BuildContext
+from fingervision.testbed.camera import BedCamera
+from fingervision.testbed.force_sensor import ForceSensor
+from fingervision.testbed.guarded_device import guarded
 
 PACKAGES = {"actuator": actuators, "force_sensor": force_sensors, "camera": cameras}
+PROTOCOLS: dict[str, type] = {"actuator": Actuator, "force_sensor": ForceSensor, "camera": BedCamera}
+FILE = ".py"
+"""A kind that ends so is a file, relative to the bed's."""
 
 
 class Kind(Protocol):
-    """A module that builds one kind of part.
+    """A module, or another object, that builds one kind of device.
 
     `KEYS` are the keys that its section may have besides `kind`; `SIMULATED` says whether it needs no hardware, so that
-    a bed made of such parts alone runs in virtual time.
+    a bed made of such devices alone runs in virtual time.
     """
 
     KEYS: tuple[str, ...]
     SIMULATED: bool
 
     def build(self, section: Section, context: BuildContext) -> Any:
-        """Build the part from its section of the configuration."""
+        """Build the device from its section of the configuration."""
         ...
 
 
+class PluggedKind:
+    """A kind from outside the package: what it builds is looked at, and its faults become sentences.
+
+    Parameters
+    ----------
+    part : str
+        `actuator`, `force_sensor` or `camera`.
+    entry : Entry
+        The kind, and where it comes from.
+    """
+
+    def __init__(self, part: str, entry: Entry[Kind]) -> None:
+        self._part, self._entry = part, entry
+        self.KEYS, self.SIMULATED = tuple(entry.value.KEYS), bool(entry.value.SIMULATED)
+        for name in ("holder", "without_hardware"):
+            if hasattr(entry.value, name):
+                setattr(self, name, getattr(entry.value, name))
+
+    def build(self, section: Section, context: BuildContext) -> Any:
+        """Build the device.
+
+        Raises
+        ------
+        FingervisionError
+            It could not be built, or lacks what its protocol asks for.
+        """
+        name = "" if str(self._entry.origin) == self._entry.name else f"{self._entry.name} of "
+        who = f"The {NOUNS[self._part]} {name}{self._entry.origin}"
+        return guarded(
+            lambda: self._entry.value.build(section, context), PROTOCOLS[self._part], who, self._entry.origin
+        )
+
+
+NOUNS = {"actuator": "actuator", "force_sensor": "force sensor", "camera": "camera"}
+
+
 def kinds(part: str) -> tuple[str, ...]:
-    """Names of the kinds of a part (`actuator`, `force_sensor`, `camera`), sorted."""
-    listed = pkgutil.iter_modules(PACKAGES[part].__path__)
-    return tuple(sorted(module.name for module in listed if not module.name.startswith("_")))
+    """Names of the kinds of a device (`actuator`, `force_sensor`, `camera`): built in and sorted, then installed."""
+    return REGISTRIES[part].names()
 
 
 def kind_of(part: str, section: Section) -> Kind:
-    """Find the module that builds a part as its section says, and refuse keys that it does not know.
+    """Find what builds a device as its section says, and refuse keys that it does not know.
 
     Raises
     ------
     FingervisionError
-        There is no such kind, or a key is unknown.
+        There is no such kind, or it cannot be imported, or a key is unknown.
     """
-    name = section.word("kind", of=kinds(part))
-    module: Any = importlib.import_module(f"{PACKAGES[part].__name__}.{name}")
-    assert isinstance(module, ModuleType)  # noqa: S101 - what import_module gives
-    section.only(("kind", *module.KEYS))
-    kind: Kind = module
+    registry = REGISTRIES[part]
+    name = section.word("kind")
+    if name.endswith(FILE):
+        path = section.path.parent / name
+        (value,) = registry.in_file(path).values()
+        kind: Kind = PluggedKind(part, Entry(str(path), value, of_file(str(path))))
+    else:
+        section.word("kind", of=kinds(part))
+        entry = registry.get(name)
+        kind = entry.value if entry.origin.built_in else PluggedKind(part, entry)
+    section.only(("kind", *kind.KEYS))
     return kind
+
+
+def _registry(part: str) -> Registry[Kind]:
+    package = PACKAGES[part]
+
+    def names() -> tuple[str, ...]:
+        listed = pkgutil.iter_modules(package.__path__)
+        return tuple(sorted(module.name for module in listed if not module.name.startswith("_")))
+
+    def load(name: str) -> Kind:
+        return cast("Kind", importlib.import_module(f"{package.__name__}.{name}"))
+
+    return Registry(f"fingervision.{part}s", NOUNS[part], names, load, lambda held: _held(part, held))
+
+
+def _held(part: str, held: object) -> dict[str, Kind]:
+    """Give what builds the device: the module or object itself, or what it holds as ACTUATOR, CAMERA, FORCE_SENSOR."""
+    held = getattr(held, part.upper(), held)
+    lacks = [name for name in ("KEYS", "SIMULATED") if not hasattr(held, name)]
+    lacks += [] if callable(getattr(held, "build", None)) else ["build"]
+    if lacks:
+        raise MisfitError(f"must have KEYS, SIMULATED and build(section, context), but has no {' and no '.join(lacks)}")
+    keys = held.KEYS  # type: ignore[attr-defined]  # looked for above
+    if not (isinstance(keys, tuple) and all(isinstance(key, str) for key in keys)):
+        raise MisfitError(f"must have a tuple of names as KEYS, but has {keys!r}")
+    return {"": cast("Kind", held)}
+
+
+REGISTRIES: dict[str, Registry[Kind]] = {part: _registry(part) for part in PACKAGES}

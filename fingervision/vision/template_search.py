@@ -62,7 +62,7 @@ def best_match(part: Floats, template: Floats, beyond_px: int = BEYOND_PX) -> Ma
         x + 0.5 * (template.shape[1] - 1),
         y + 0.5 * (template.shape[0] - 1),
         float(best),
-        best > 0.0 and _is_alone(seen, column, row, float(best), beyond_px),
+        best > 0.0 and _is_alone(np.asarray(seen, dtype=np.float32), column, row, float(best), beyond_px),
     )
 
 

@@ -1,109 +1,43 @@
-"""What holds for every effect there is: nothing at zero, rest at the start, mirror, order, stated needs."""
+"""Every effect keeps the contract; and what holds for some: play, map, limits of speed, creep, resonance."""
 
+from contextlib import suppress
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from fingervision.diagnosis.inference.measuring_chain import MeasuringChain
-from fingervision.domain.effect import Effect, History, start_key
+from fingervision.domain.effect import start_key
 from fingervision.effects import catalogue
 from fingervision.effects.position_error_map import curve_values
-from fingervision.models.table import TableModel
+from fingervision.testing import EffectContract, NotApplicable, checks_of
+from fingervision.testing.effect_contract import MODEL, bench
 
 ROUNDING_MM = 1e-9
 """A few operations on numbers of some millimetres."""
-NAMES = [
-    "drive_lag",
-    "input_offset",
-    "input_scale",
-    "encoder_cyclic_error",
-    "end_stop",
-    "position_error_map",
-    "slew_limit",
-    "backlash",
-    "stick_slip",
-    "friction_hysteresis",
-    "lever_ratio_error",
-    "large_deflection",
-    "viscoelastic_creep",
-    "structural_resonance",
-    "rest_gap_error",
-    "assembly_asymmetry",
-    "finger_contact",
-    "thermal_drift",
-    "hinge_stiffness_error",
-    "camera_drift",
-    "camera_scale_drift",
-    "out_of_plane_motion",
-    "scale_error",
-    "lens_distortion",
-    "camera_tilt",
-    "edge_bias",
-    "camera_latency",
-]
-INPUT = np.array([-0.6, 1.6])
-GAP = 4.0 + 7.7 * INPUT
-MODEL = TableModel("straight", INPUT, -0.5 * GAP, 0.5 * GAP, 2.0 * INPUT)
+# effects.md, in its order: what other programs rely on. What is added stands between them or behind.
+PUBLISHED = [
+    "drive_lag", "input_offset", "input_scale", "encoder_cyclic_error", "end_stop", "position_error_map", "slew_limit",
+    "backlash", "stick_slip", "friction_hysteresis", "lever_ratio_error", "large_deflection", "viscoelastic_creep",
+    "structural_resonance", "rest_gap_error", "assembly_asymmetry", "finger_contact", "thermal_drift",
+    "hinge_stiffness_error", "camera_drift", "camera_scale_drift", "out_of_plane_motion", "scale_error",
+    "lens_distortion", "camera_tilt", "edge_bias", "camera_latency",
+]  # fmt: skip
 
 
-def bench() -> History:
-    up = np.linspace(-0.4, 1.4, 120)
-    run = np.concatenate([up, np.full(40, 1.4), up[::-1]])
-    return History(
-        input_mm=np.concatenate([run, run[::-1]]),
-        # The second run goes at half the speed: what limits the speed of one does not limit the other's.
-        time_s=np.concatenate([0.04 * np.arange(run.size), 0.04 * run.size + 0.08 * np.arange(run.size)]),
-        runs=(slice(0, run.size), slice(run.size, 2 * run.size)),
-        rest_gap_mm=4.0,
-        opening_mm=7.7 * 1.4,
-        closing_mm=7.7 * 0.4,
-        force=True,
-    )
-
-
-def values(effect: Effect, history: History, *, neutral: bool) -> dict[str, float]:
-    searched = effect.search(history)
-    assert not isinstance(searched, str)
-    out = {}
-    for p in searched:
-        if p.run is not None:
-            out[p.name] = 0.0
-        elif p.neutral is None:
-            out[p.name] = float(p.starting_values()[0])
-        else:
-            out[p.name] = p.neutral if neutral else float(0.7 * p.neutral + 0.3 * p.upper)
-            if p.neutral == p.upper and not neutral:
-                out[p.name] = 0.5 * (p.lower + p.upper) if p.name == "speed_mm_s" else 0.9 * p.upper
-    if neutral and effect.name in ("large_deflection", "structural_resonance"):
-        out = dict.fromkeys(out, 0.0)
-    return out
-
-
-def test_the_catalogue_is_complete_and_in_order() -> None:
-    assert list(catalogue()) == NAMES
+def test_the_published_effects_are_there_and_in_their_order() -> None:
+    assert [name for name in catalogue() if name in PUBLISHED] == PUBLISHED
     stages = [effect.stage for effect in catalogue().values()]
     assert sorted(stages, key=["drive", "mechanism", "camera"].index) == stages
 
 
-@pytest.mark.parametrize("name", NAMES)
-def test_zero_parameters_change_nothing(name: str) -> None:
-    chain = MeasuringChain(MODEL, bench(), {}, midline_mm=0.3)
-    bare, zero = chain.respond({}), chain.respond({name: values(catalogue()[name], bench(), neutral=True)})
-    np.testing.assert_allclose(zero.left_mm, bare.left_mm, atol=ROUNDING_MM)
-    np.testing.assert_allclose(zero.right_mm, bare.right_mm, atol=ROUNDING_MM)
-
-
-@pytest.mark.parametrize("name", NAMES)
-def test_an_effect_shows_where_it_should(name: str) -> None:
-    chain = MeasuringChain(MODEL, bench(), {}, midline_mm=0.3)
-    bare, moved = chain.respond({}), chain.respond({name: values(catalogue()[name], bench(), neutral=False)})
-    assert moved.force_n is not None
-    assert bare.force_n is not None
-    changed = max(np.ptp(moved.gap_mm - bare.gap_mm), np.max(np.abs(moved.gap_mm - bare.gap_mm)))
-    changed = max(changed, float(np.max(np.abs(moved.midline_mm - bare.midline_mm))))
-    changed = max(changed, float(np.max(np.abs(moved.force_n - bare.force_n))))
-    assert changed > 1e-3
+@pytest.mark.parametrize("check", checks_of(EffectContract))
+@pytest.mark.parametrize("name", list(catalogue()))
+def test_every_effect_keeps_the_contract(name: str, check: str) -> None:
+    contract = EffectContract()
+    contract.effect = catalogue()[name]
+    with suppress(NotApplicable):
+        getattr(contract, check)()
 
 
 CURVED = [name for name, effect in catalogue().items() if getattr(effect, "act_curved", None) is not None]
@@ -119,34 +53,6 @@ def test_along_curves_an_effect_is_the_same_where_the_record_is_straight_and_kee
     # At a corner Akima's curve leads beyond it by less than a tenth of what lies between two samples.
     assert curved.max() <= straight.max() + 0.1 * float(np.max(np.diff(straight)))
     assert curved[0] == pytest.approx(straight[0], abs=ROUNDING_MM)
-
-
-@pytest.mark.parametrize("name", CURVED)
-def test_along_curves_a_sine_is_late_as_a_whole(name: str) -> None:
-    time = np.arange(0.0, 20.0, 0.2)
-    wave = History(np.sin(time), time, (slice(0, time.size),), rest_gap_mm=4.0, opening_mm=7.7)
-    late = 4.0 + 7.7 * np.sin(time - 0.07)
-    errors = [
-        float(
-            np.max(
-                np.abs(MeasuringChain(MODEL, wave, {}, curved=way).respond({name: {"delay_s": 0.07}}).gap_mm - late)[
-                    5:-5
-                ]
-            )
-        )
-        for way in (False, True)
-    ]
-    # Lines miss it by a step squared over eight, curves by the step's third power.
-    assert errors[0] > 0.01
-    assert errors[1] < 0.2 * errors[0]
-
-
-@pytest.mark.parametrize("name", [name for name in NAMES if catalogue()[name].memory])
-def test_memory_starts_each_run_at_rest(name: str) -> None:
-    chain = MeasuringChain(MODEL, bench(), {})
-    bare, moved = chain.respond({}), chain.respond({name: values(catalogue()[name], bench(), neutral=False)})
-    for run in bench().runs:
-        assert moved.gap_mm[run][0] == pytest.approx(bare.gap_mm[run][0], abs=ROUNDING_MM)
 
 
 @pytest.mark.parametrize("start", [-1.0, -0.3, 1.0])
@@ -180,23 +86,6 @@ def test_a_map_adds_the_same_error_both_ways_and_holds_its_points() -> None:
     there = MeasuringChain(MODEL, history, {})
     moved = there.respond({"position_error_map": setting}).gap_mm - there.respond({}).gap_mm
     np.testing.assert_allclose(moved, 7.7 * errors, atol=ROUNDING_MM)
-
-
-@pytest.mark.parametrize("name", NAMES)
-def test_a_mirrored_picture_mirrors_the_answer(name: str) -> None:
-    setting = values(catalogue()[name], bench(), neutral=False)
-    seen = MeasuringChain(MODEL, bench(), {}, midline_mm=0.3).respond({name: setting})
-    for odd in ("share", "rate_mm_per_s", "k_per_mm"):
-        if odd in setting:
-            setting = {**setting, odd: -setting[odd]}
-    mirrored = MeasuringChain(MODEL, bench(), {}, midline_mm=-0.3).respond({name: setting})
-    np.testing.assert_allclose(mirrored.left_mm, -seen.right_mm, atol=ROUNDING_MM)
-    np.testing.assert_allclose(mirrored.right_mm, -seen.left_mm, atol=ROUNDING_MM)
-
-
-@pytest.mark.parametrize("name", [name for name in NAMES if catalogue()[name].needs_times])
-def test_without_times_it_is_excluded_with_the_reason(name: str) -> None:
-    assert "no time_s" in str(catalogue()[name].search(replace(bench(), time_s=None)))
 
 
 def test_play_is_its_full_width_between_the_branches() -> None:

@@ -10,7 +10,6 @@ import pytest
 from fingervision.domain.frame import Frame, LostFrame
 from fingervision.frames.ahead import FRAMES_AHEAD, decoded_ahead
 from fingervision.frames.rendered import RenderedFrames
-from fingervision.frames.source import kinds
 from fingervision.rendering import Camera, two_fingers
 
 
@@ -60,9 +59,3 @@ def test_rendered_frames_are_a_source() -> None:
     items = list(source)
     assert [item.time_s for item in items] == [0.0, 0.1]
     assert (source.description.width_px, source.description.height_px) == (160, 120)
-
-
-@pytest.mark.parametrize("kind", kinds(), ids=lambda kind: kind.__name__)
-def test_every_kind_of_source_knows_what_it_is_not(kind: object) -> None:
-    assert not kind.accepts("nowhere/nothing.xyz")  # type: ignore[attr-defined]
-    assert callable(kind.open_frames)  # type: ignore[attr-defined]

@@ -6,7 +6,7 @@ import pytest
 from click.testing import CliRunner
 
 from fingervision.cli import cli
-from fingervision.demonstration.demonstrate import SHOWN, drawn
+from fingervision.demonstration.demonstrate import demonstrated, drawn
 from fingervision.diagnosis.diagnose import diagnose
 from fingervision.domain.report import DiagnosisReport, Verdict
 from fingervision.storage.measured_table import read_measured_table
@@ -60,6 +60,6 @@ def test_the_demonstration_finds_what_it_hid_and_says_each_step(tmp_path: Path) 
 
 def test_a_seed_hides_one_effect_of_those_that_can_be_shown() -> None:
     chosen = {name for seed in range(60) for name in drawn(seed).effects}
-    assert chosen <= set(SHOWN)
-    assert len(chosen) > len(SHOWN) // 2
+    assert chosen <= set(demonstrated())
+    assert len(chosen) > len(demonstrated()) // 2
     assert drawn(3) == drawn(3)

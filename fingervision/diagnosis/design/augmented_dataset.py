@@ -23,7 +23,7 @@ Settings = Mapping[str, Mapping[str, float]]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class AugmentedDataset:
-    """Data, and a run behind them that has not been made.
+    """The measured data, followed by a proposed run that has not been driven yet.
 
     Parameters
     ----------

@@ -6,13 +6,13 @@ from fingervision.diagnosis.design.protocols import REZERO, Step, measured_ends,
 from fingervision.diagnosis.inference.hypothesis_fit import Explanation, Problem
 from fingervision.diagnosis.input.observations import Observations
 from fingervision.domain.effect import PointEffect
+from fingervision.domain.further_check import FurtherCheck
 from fingervision.domain.report import NextRun
 from fingervision.domain.response import Response
+from fingervision.effects import that_show
 
 WORTH = 9.0
 """Gain in chi-square above which two explanations count as separated."""
-CAMERA = frozenset({"scale_error", "edge_bias", "lens_distortion"})
-"""What a slot of known width in the picture shows."""
 UNTIMED_S = 0.1
 """Time between samples of a run after a table that has no times."""
 SLOT_FRAMES, SLOT_U_MM = 10, 0.002
@@ -27,20 +27,27 @@ def static_check(data: Observations, problem: Problem, best: Explanation, rivals
     """
     for rival in rivals:
         pair = (best, rival)
-        if data.chain.history.time_s is None and sum("input_offset" in e.names for e in pair) == 1:
+        if data.chain.history.time_s is None and _one_shows(FurtherCheck.REZERO, pair):
             return _rezeroed(data, problem, pair)
-        if sum(bool(CAMERA & set(e.names)) for e in pair) == 1:
+        if _one_shows(FurtherCheck.SLOT, pair):
             return _slot(data, problem, pair)
     return None
 
 
+def _one_shows(check: FurtherCheck, pair: tuple[Explanation, Explanation]) -> bool:
+    return sum(not set(e.names).isdisjoint(that_show(check)) for e in pair) == 1
+
+
 def _rezeroed(data: Observations, problem: Problem, pair: tuple[Explanation, Explanation]) -> NextRun | None:
     """Re-zero the stage: an offset of the input is gone after it, an offset of the gap stays."""
-    offset = next(e for e in pair if "input_offset" in e.names)
+    zeroed = that_show(FurtherCheck.REZERO)
+    offset = next(e for e in pair if not set(e.names).isdisjoint(zeroed))
     history, offsets = data.chain.history, problem.offsets
     ends = measured_ends(data.table.input_mm, data.model.input_range_mm)
     steps = [REZERO, *protocols(*ends, UNTIMED_S)[0][1]]
-    moved = data.chain.stacked({"input_offset": offset.values["input_offset"]}) - data.chain.stacked({})
+    moved = data.chain.stacked(
+        {name: offset.values[name] for name in offset.names if name in zeroed}
+    ) - data.chain.stacked({})
     size = float(np.mean(moved[: history.input_mm.size]))
     known = np.diag(offsets.gram)[: offsets.runs]
     spread = float(
@@ -53,7 +60,7 @@ def _slot(data: Observations, problem: Problem, pair: tuple[Explanation, Explana
     """Measure a slot of known width: what the camera adds to a gap it adds to the slot, the gripper adds nothing."""
     slot = np.full(1, round(data.chain.history.rest_gap_mm, 1))
     response = Response(-0.5 * slot, 0.5 * slot)
-    for name in CAMERA:
+    for name in that_show(FurtherCheck.SLOT):
         acting = next((e.values[name] for e in pair if name in e.names), None)
         effect = problem.effects.get(name)
         if acting is not None and isinstance(effect, PointEffect):

@@ -6,8 +6,8 @@ import numpy as np
 
 from fingervision.diagnosis.inference.hypothesis_fit import Explanation, Problem
 from fingervision.domain.effect import Array
+from fingervision.effects import catalogue
 
-PERIODIC = "encoder_cyclic_error"
 ORDERS = (2, 3)
 """Harmonics that a screw's or a resolver's first one brings along."""
 LARGEST = 0.25
@@ -44,10 +44,12 @@ def harmonics(problem: Problem, best: Explanation) -> Harmonics:
         What was named.
     """
     none = Harmonics(np.zeros((problem.measured.size, 0)))
-    if PERIODIC not in best.names:
+    periodic = [(name, effect.wave) for name, effect in catalogue().items() if name in best.names and effect.wave]
+    if not periodic:
         return none
     chain, history = problem.chain, problem.chain.history
-    amplitude_mm, period_mm = (best.values[PERIODIC][name] for name in ("amplitude_mm", "period_mm"))
+    name, wave_names = periodic[0]
+    amplitude_mm, period_mm = (best.values[name][key] for key in wave_names)
     base = chain.stacked(best.values)
     waves = []
     for order in ORDERS:

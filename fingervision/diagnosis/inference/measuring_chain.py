@@ -74,16 +74,9 @@ class MeasuringChain:
         An effect named in `settings` replaces a fixed one of the same name.
         """
         acting = {**self.fixed, **settings}
-        order = [effect for name, effect in self.effects.items() if name in acting]
         history = self.history if self.path is None else self.path.history
-        input_mm = history.input_mm
-        points: list[PointEffect] = []
-        for effect in order:
-            if isinstance(effect, DriveEffect):
-                input_mm = effect.act(input_mm, history, acting[effect.name])
-            elif isinstance(effect, PointEffect):
-                points.append(effect)
-        response = self.model.respond(input_mm)
+        points = [e for name, e in self.effects.items() if name in acting and isinstance(e, PointEffect)]
+        response = self.model.respond(self._driven_mm(acting))
         if self.dynamics is not None and self.dynamics[0] is history.time_s:
             response = response.plus(self.dynamics[1])
         cameras = [effect for effect in points if effect.stage == "camera"]
@@ -101,6 +94,19 @@ class MeasuringChain:
         if not cameras or self.seen_midline_mm is None:
             return first
         return seen(self.midline_mm + self.seen_midline_mm - float(np.median(first.midline_mm)))
+
+    def driven_mm(self, settings: Settings) -> Array:
+        """Input that the mechanism receives at the measured rows, behind the effects of the drive; shape (n,)."""
+        along = self._driven_mm({**self.fixed, **settings})
+        return along if self.path is None else along[self.path.rows]
+
+    def _driven_mm(self, acting: Settings) -> Array:
+        history = self.history if self.path is None else self.path.history
+        input_mm = history.input_mm
+        for name, effect in self.effects.items():
+            if name in acting and isinstance(effect, DriveEffect):
+                input_mm = effect.act(input_mm, history, acting[name])
+        return input_mm
 
     def stacked(self, settings: Settings) -> Array:
         """Gap, and where they were measured midline and force, one after the other; shape (channels * n,)."""

@@ -7,7 +7,7 @@ import numpy as np
 from fingervision.diagnosis.inference.hypothesis_fit import Problem
 from fingervision.diagnosis.input.observations import Observations
 from fingervision.diagnosis.noise.whitening import RunOffsets
-from fingervision.domain.effect import Array
+from fingervision.domain.effect import Array, DriveEffect
 from fingervision.effects.play_operator import play
 
 LEAST_CORRELATION = 0.5
@@ -121,9 +121,10 @@ def _without(values: Array, columns: Array, offsets: RunOffsets, metric: Array) 
 
 def _later(data: Observations) -> list[Array]:
     """Predicted gap for a stage that follows at once, and by up to a second later."""
-    if "drive_lag" not in data.effects:
+    late = [name for name, effect in data.effects.items() if isinstance(effect, DriveEffect) and effect.act_curved]
+    if not late:
         return [data.chain.respond({}).gap_mm]
-    return [data.chain.respond({"drive_lag": {"delay_s": delay_s}}).gap_mm for delay_s in DELAYS_S]
+    return [data.chain.respond({late[0]: {"delay_s": delay_s}}).gap_mm for delay_s in DELAYS_S]
 
 
 def _order(gap: Array, predicted: Array) -> float:

@@ -14,10 +14,9 @@ from fingervision.diagnosis.inference.measuring_chain import MeasuringChain
 from fingervision.diagnosis.inference.random_effect import estimated_coefficients, normal_equations
 from fingervision.domain.effect import Array, History, InputPath
 from fingervision.domain.parameter import Estimate
-from fingervision.effects import catalogue
-from fingervision.effects.position_error_map import covariance, curve_values, without_line
+from fingervision.effects.position_error_map import EFFECT, covariance, curve_values, without_line
 
-NAME = "position_error_map"
+NAME = EFFECT.name
 SET_POINTS = 60
 """Different inputs up to which each is a node of the curve; above, nodes are spread evenly."""
 NODES = 13
@@ -97,7 +96,7 @@ class PositionMap:
 def why_no_map(history: History, path: InputPath | None) -> str | None:
     """Say why these data can show no map that repeats; None where they can."""
     history = history if path is None else path.history
-    narrowed = catalogue()[NAME].search(history)
+    narrowed = EFFECT.search(history)
     if isinstance(narrowed, str):
         return narrowed
     if history.time_s is None:

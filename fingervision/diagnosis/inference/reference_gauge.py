@@ -13,12 +13,11 @@ from fingervision.diagnosis.inference.hypothesis_fit import Explanation
 from fingervision.diagnosis.inference.search import Findings
 from fingervision.diagnosis.input.observations import Observations
 from fingervision.domain.effect import PointEffect
+from fingervision.domain.further_check import FurtherCheck
 from fingervision.domain.reference_slot import ReferenceSlot
 from fingervision.domain.response import Response
-from fingervision.effects import catalogue
+from fingervision.effects import catalogue, that_show
 
-# What acts on a slot at rest in the middle of the picture as it does on a gap, whatever the time and the opening.
-SHOWN = ("scale_error", "lens_distortion", "edge_bias")
 # Chi-square a slot by which another explanation foretells it better: three standard uncertainties.
 REFUTED = 9.0
 # Step of a parameter, in its standard uncertainties, for what its uncertainty does to a slot.
@@ -62,7 +61,7 @@ def seen_mm(data: Observations, values: Values, size_mm: float) -> float:
     """Width at which a slot is measured if an explanation is true."""
     half = np.full(1, 0.5 * size_mm)
     response, acting = Response(-half, half), {**data.chain.fixed, **values}
-    for name in SHOWN:
+    for name in that_show(FurtherCheck.SLOT):
         effect = catalogue()[name]
         if name in acting and isinstance(effect, PointEffect):
             response = effect.act(response, data.chain.history, acting[name])
@@ -81,9 +80,9 @@ def _u_mm(data: Observations, explanation: Explanation, slot: ReferenceSlot) -> 
     listed = [(name, key) for name in explanation.names for key in values[name]]
     slopes = np.zeros(len(listed))
     spread = np.sqrt(np.maximum(np.diag(explanation.covariance), 0.0))
-    at_mm = seen_mm(data, values, slot.size_mm)
+    at_mm, shown = seen_mm(data, values, slot.size_mm), that_show(FurtherCheck.SLOT)
     for k, (name, key) in enumerate(listed):
-        if name in SHOWN and spread[k] > 0.0:
+        if name in shown and spread[k] > 0.0:
             moved = {**values, name: {**values[name], key: values[name][key] + STEP * spread[k]}}
             slopes[k] = (seen_mm(data, moved, slot.size_mm) - at_mm) / (STEP * spread[k])
     by_parameters = float(slopes @ explanation.covariance @ slopes)

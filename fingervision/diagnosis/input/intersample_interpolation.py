@@ -2,13 +2,11 @@
 
 from dataclasses import replace
 
-import numpy as np
-
 from fingervision.diagnosis.inference.hypothesis_fit import MANY_STEPS, Explanation, Point, Problem, fit
 from fingervision.diagnosis.input.observations import Observations
+from fingervision.domain.effect import DriveEffect, Effect, PointEffect
+from fingervision.effects import catalogue
 
-DELAYS = ("drive_lag", "camera_latency")
-RESONANCE = "structural_resonance"
 CLEARLY = 10.0
 """Chi-square by which curves must explain the data better than straight lines."""
 
@@ -34,8 +32,8 @@ def likelier_interpolation(data: Observations, problem: Problem, best: Explanati
     Observations
         `data` itself where nothing is late or straight lines do as well.
     """
-    fixed = any(name in data.chain.fixed for name in DELAYS)
-    if data.chain.curved or not (fixed or {*DELAYS, RESONANCE} & set(best.names)):
+    fixed = any(name in data.chain.fixed for name in delays())
+    if data.chain.curved or not (fixed or _like_delays() & set(best.names)):
         return data
     curved = replace(data.chain, curved=True)
     straight, along = (_score(replace(problem, chain=chain), best, fixed) for chain in (data.chain, curved))
@@ -43,8 +41,8 @@ def likelier_interpolation(data: Observations, problem: Problem, best: Explanati
 
 
 def _score(problem: Problem, best: Explanation, fixed: bool) -> float:
-    kept = {name: dict(best.values[name]) for name in best.names if name not in (*DELAYS, RESONANCE)}
-    starts: list[Point] = [{**kept, name: {"delay_s": _delay_s(best)}} for name in DELAYS if name in problem.effects]
+    kept = {name: dict(best.values[name]) for name in best.names if name not in _like_delays()}
+    starts: list[Point] = [{**kept, name: {"delay_s": _delay_s(best)}} for name in delays() if name in problem.effects]
     starts += [kept] if fixed else []
     return min(
         (fit(problem, tuple(start), start, iterations=MANY_STEPS).score if start else problem.nothing().score)
@@ -52,12 +50,24 @@ def _score(problem: Problem, best: Explanation, fixed: bool) -> float:
     )
 
 
+def delays() -> tuple[str, ...]:
+    """Name the effects that are a delay, in the catalogue's order."""
+    return tuple(name for name, effect in catalogue().items() if is_delay(effect))
+
+
+def is_delay(effect: Effect) -> bool:
+    """Whether an effect is a delay: only then do curves between the samples make a difference."""
+    return isinstance(effect, DriveEffect | PointEffect) and effect.act_curved is not None
+
+
+def _like_delays() -> frozenset[str]:
+    return frozenset(name for name, effect in catalogue().items() if effect.delay_s is not None)
+
+
 def _delay_s(best: Explanation) -> float:
-    """Delay that an explanation has, or that its resonance imitates."""
-    for name in DELAYS:
-        if name in best.names:
-            return best.values[name]["delay_s"]
-    if RESONANCE in best.names:
-        values = best.values[RESONANCE]
-        return float(values["damping_ratio"] / (np.pi * values["frequency_hz"]))
+    """Delay that an explanation has, or else that another effect of it imitates."""
+    effects = [effect for name, effect in catalogue().items() if name in best.names and effect.delay_s is not None]
+    for effect in sorted(effects, key=lambda effect: not is_delay(effect)):
+        assert effect.delay_s is not None  # noqa: S101 - chosen so above
+        return float(effect.delay_s(best.values[effect.name]))
     return 0.0

@@ -134,6 +134,6 @@ def _with_starts(chain: MeasuringChain, stacked_mm: Array) -> MeasuringChain:
 
 
 def _rezeroed(table: MeasuredTable) -> tuple[bool, ...]:
-    """Which runs came after a re-zeroing, by their names; empty where all did: no run shows the zero before."""
+    """Which runs came after a re-zeroing, told by their names; empty where all did: none shows the earlier zero."""
     flags = tuple(REZEROED in name.split() for name in table.run_names)
     return flags if any(flags) and not all(flags) else ()

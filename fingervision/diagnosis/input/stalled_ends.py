@@ -6,6 +6,7 @@ import numpy as np
 
 from fingervision.diagnosis.noise.replicates import resolution
 from fingervision.domain.effect import Array
+from fingervision.effects import catalogue
 
 FEWEST_EQUAL = 6
 """Equal readings at an end that are no accident of a few."""
@@ -13,8 +14,6 @@ LONGER = 3.0
 """Times the longest stand elsewhere, in rows and in predicted motion: stairs of a dead band stand as well."""
 LEAST_DIGITS = 5.0
 """Digits of the reading by which the model moves on while the reading stands."""
-LOWER, UPPER = frozenset({"end_stop", "finger_contact"}), frozenset({"end_stop"})
-"""What stands at the closed end, and at the open one."""
 
 
 def stalled_ends(input_mm: Array, predicted_mm: Array, gap_mm: Array) -> frozenset[str]:
@@ -36,10 +35,10 @@ def stalled_ends(input_mm: Array, predicted_mm: Array, gap_mm: Array) -> frozens
     rows = np.diff(borders)
     motion = np.array([np.ptp(predicted[a:b]) for a, b in pairwise(borders)])
     found: frozenset[str] = frozenset()
-    for end, effects in ((0, LOWER), (rows.size - 1, UPPER)):
+    for end, word in ((0, "closed"), (rows.size - 1, "open")):
         others = np.arange(rows.size) != end
         least = max(float(FEWEST_EQUAL), LONGER * float(rows[others].max(initial=0)))
         far = max(LEAST_DIGITS * digit, LONGER * float(motion[others].max(initial=0.0)))
         if rows.size > 1 and rows[end] >= least and motion[end] > far:
-            found |= effects
+            found |= {name for name, effect in catalogue().items() if word in effect.stands_at}
     return found

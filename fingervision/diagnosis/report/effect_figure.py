@@ -9,8 +9,6 @@ from fingervision.domain.effect import History
 from fingervision.effects import catalogue
 from fingervision.models.table import TableModel
 
-PLAIN = {"upper_mm": 1.3, "lower_mm": -0.4, "speed_mm_s": 0.15}
-"""Parameters whose range follows from the motion: stops within the stroke, a speed below that of the stroke."""
 SHOWN_SHARE = 0.2
 """Parameters are drawn at this share of their range, so that the shape is plain."""
 
@@ -35,17 +33,15 @@ def effect_figure(name: str) -> Figure:
     searched = effect.search(history)
     values = {}
     for p in effect.parameters if isinstance(searched, str) else searched:
-        if p.name in PLAIN:
-            values[p.name] = PLAIN[p.name]
+        if p.name in effect.drawn_with:
+            values[p.name] = effect.drawn_with[p.name]
         elif p.logarithmic or p.reciprocal:
             values[p.name] = float(np.sqrt(max(p.lower, 1e-2 * p.upper) * p.upper))
         else:
             values[p.name] = p.upper * SHOWN_SHARE if p.neutral is not None else 0.5 * (p.lower + p.upper)
-    if name == "finger_contact":
-        values["floor_mm"] = 1.5
     chain = MeasuringChain(model, history, {})
     bare, with_it = chain.respond({}), chain.respond({name: values})
-    if name == "hinge_stiffness_error":
+    if effect.needs_force:
         return residual_figure({"force": 1.0 * (np.asarray(with_it.force_n) - np.asarray(bare.force_n))}, None, history)
     residual = {
         "gap": with_it.gap_mm - bare.gap_mm,

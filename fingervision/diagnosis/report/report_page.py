@@ -21,6 +21,7 @@ from fingervision.diagnosis.report.html_parts import (
     table,
 )
 from fingervision.diagnosis.report.positioning_of_data import positioning_html
+from fingervision.diagnosis.report.report_parts import added_sections
 from fingervision.diagnosis.report.residual_figure import residual_figure
 from fingervision.diagnosis.report.vector_figure import png_bytes
 from fingervision.domain.report import DiagnosisReport, Verdict
@@ -86,6 +87,7 @@ def report_page(diagnosis: Diagnosis, made: Provenance, frames: str) -> str:
         ("Smallest size that this data would have shown", _detection_limits(report)),
         ("Not shown by this data", bullets([f"{e['name']}: {e['reason']}" for e in report.excluded])),
         ("Notes", bullets(list(report.notes))),
+        *added_sections(diagnosis),
         ("Where this comes from", provenance_html(made)),
     ]
     positioning = positioning_html(diagnosis.positioning)

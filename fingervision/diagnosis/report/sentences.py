@@ -83,9 +83,7 @@ def outliers(data: Observations, problem: Problem, after: Array) -> tuple[str, .
 def rows_beyond_model(data: Observations, best: Explanation) -> tuple[str, ...]:
     """Say for how many rows the model was extended beyond its inputs."""
     low, high = data.model.input_range_mm
-    u = data.chain.history.input_mm
-    moved = u + best.values.get("input_offset", {}).get("offset_mm", 0.0)
-    moved = moved * (1.0 + best.values.get("input_scale", {}).get("ratio", 0.0))
+    moved = data.chain.driven_mm(best.values)
     rows = int(np.sum((moved < low) | (moved > high)))
     return (f"for {rows} rows the model was extended by a straight line beyond its inputs.",) if rows else ()
 

@@ -12,7 +12,7 @@ PNG_DPI = 110
 
 
 def plain_style() -> AbstractContextManager[None]:
-    """Give every figure of a report the same style; text stays text, so that it can be searched and set anew."""
+    """Give every figure of a report the same style; its text is kept as text, so that it can be searched and edited."""
     style: dict[str, object] = {
         "font.size": 9,
         "axes.titlesize": 10,

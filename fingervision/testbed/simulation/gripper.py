@@ -8,11 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fingervision.domain.effect import DriveEffect, History, PointEffect
+from fingervision.domain.further_check import FurtherCheck
 from fingervision.domain.model import Model
 from fingervision.domain.response import Response
 from fingervision.effects import catalogue
+from fingervision.effects.backlash import EFFECT as BACKLASH
 from fingervision.testbed.simulation.injected_effects import Hidden
-from fingervision.testbed.simulation.optics import IN_THE_PICTURE
+from fingervision.testbed.simulation.optics import in_the_picture
 
 Array = NDArray[np.float64]
 
@@ -20,16 +22,10 @@ Array = NDArray[np.float64]
 STEPS_A_FRAME = 10
 # Until a camera says when it looks.
 USUAL_PERIOD_S = 0.04
-# These are looked at with the frames alone. A slip between two frames would land elsewhere than the catalogue's, which
-# is defined on samples, and the places would drift apart along a run: another effect, not another form of this one.
-WITH_THE_FRAMES = ("stick_slip",)
 # So much further than asked is computed at once while the stage stands.
 AHEAD_S = 2.0
 # What the fingers press on while they are kept from closing, felt at the drive.
-PRESSED = ("finger_contact",)
 CONTACT_N_PER_MM = 3.0
-# What a new reference of the zero takes away.
-UNTIL_HOMED = ("input_offset",)
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,8 +79,8 @@ class SimulatedGripper:
         self._model, self._motion = model, motion
         drive = dict(hidden.of_stage("drive"))
         if play_mm > 0.0:
-            drive["backlash"] = {"play_mm": play_mm + drive.get("backlash", {}).get("play_mm", 0.0)}
-        camera = {name: values for name, values in hidden.of_stage("camera").items() if name not in IN_THE_PICTURE}
+            drive[BACKLASH.name] = {"play_mm": play_mm + drive.get(BACKLASH.name, {}).get("play_mm", 0.0)}
+        camera = {name: values for name, values in hidden.of_stage("camera").items() if not in_the_picture(name)}
         self._drive = drive
         self._points: dict[str, Mapping[str, float]] = {**hidden.of_stage("mechanism"), **camera}
         self._rest_gap_mm = float(model.respond(np.zeros(1)).gap_mm[0])
@@ -156,7 +152,7 @@ class SimulatedGripper:
         for name, effect in catalogue().items():
             if name in self._drive and isinstance(effect, DriveEffect):
                 moved = self._act(effect, u, history)
-                if name in UNTIL_HOMED and len(runs) > 1:
+                if effect.checks.get(FurtherCheck.REZERO) is True and len(runs) > 1:
                     moved[runs[1].start :] = u[runs[1].start :]
                 u = moved
         response = self._model.respond(u)
@@ -164,7 +160,7 @@ class SimulatedGripper:
         for name, effect in catalogue().items():
             if name in self._points and isinstance(effect, PointEffect):
                 acted = effect.act(response, history, self._points[name])
-                if name in PRESSED:
+                if effect.checks.get(FurtherCheck.FORCE) is True:
                     pressed_mm = acted.gap_mm - response.gap_mm
                 response = acted
         if response.force_n is None:
@@ -172,7 +168,9 @@ class SimulatedGripper:
         return replace(response, force_n=response.force_n - CONTACT_N_PER_MM * pressed_mm)
 
     def _act(self, effect: DriveEffect, u: Array, history: History) -> Array:
-        if effect.name not in WITH_THE_FRAMES:
+        # A slip between two frames would land elsewhere than the catalogue's, which is defined on samples, and the
+        # places would drift apart along a run: another effect, not another form of this one.
+        if not effect.at_frames:
             return effect.act(u, history, self._drive[effect.name])
         # Runs begin on whole frames for what is looked at with them.
         borders = [-(-run.start // STEPS_A_FRAME) for run in history.runs] + [-(-u.size // STEPS_A_FRAME)]

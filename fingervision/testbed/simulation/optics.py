@@ -1,9 +1,9 @@
 """Camera effects in the picture itself: what lens and tilt do to a scene, and when it is seen."""
 
-from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from math import asin, degrees
 
+from fingervision.effects import catalogue
 from fingervision.rendering import Camera, RadialLens, Tilt
 from fingervision.testbed.simulation.injected_effects import Hidden
 
@@ -33,42 +33,39 @@ class Optics:
     late_s: float = 0.0
 
 
-Act = Callable[[Optics, Mapping[str, float]], Optics]
-
-
-def _lens(optics: Optics, values: Mapping[str, float]) -> Optics:
+def _lens(optics: Optics, k_per_mm2: float) -> Optics:
     """Map x (1 + k x^2) in mm to the renderer's q = r / half the diagonal."""
-    lens = RadialLens(k1=values["k_per_mm2"] * optics.half_diagonal_mm**2)
+    lens = RadialLens(k1=k_per_mm2 * optics.half_diagonal_mm**2)
     return replace(optics, camera=replace(optics.camera, lens=lens))
 
 
-def _tilt(optics: Optics, values: Mapping[str, float]) -> Optics:
+def _tilt(optics: Optics, k_per_mm: float) -> Optics:
     """Map x / (1 + k x) in mm to a plane tilted about the vertical axis: k = sin(tilt) / distance."""
-    k_per_mm = values["k_per_mm"]
-    if k_per_mm == 0.0:
-        return optics
     sine = TILT_SINE if k_per_mm > 0.0 else -TILT_SINE
     tilt = Tilt(about_y_deg=degrees(asin(sine)), distance_px=sine / k_per_mm * optics.px_per_mm)
     return replace(optics, camera=replace(optics.camera, tilt=tilt))
 
 
-def _late(optics: Optics, values: Mapping[str, float]) -> Optics:
-    return replace(optics, late_s=optics.late_s + values["delay_s"])
+def in_the_picture(name: str) -> bool:
+    """Whether an effect changes the picture itself.
 
-
-IN_THE_PICTURE: Mapping[str, Act] = {
-    "lens_distortion": _lens,
-    "camera_tilt": _tilt,
-    "camera_latency": _late,
-}
-"""All other camera effects move the scene before the camera: for drifts and scales that is the same thing. Light that
-blooms over round tips moves the gap by less than both edges (the tip goes down as well), and would be no `edge_bias` as
-the catalogue defines it: that, too, moves the fingers."""
+    All other camera effects move the scene before the camera: for drifts and scales that is the same thing. Light that
+    blooms over round tips moves the gap by less than both edges (the tip goes down as well), and would be no
+    `edge_bias` as the catalogue defines it: that, too, moves the fingers.
+    """
+    return catalogue()[name].in_picture is not None
 
 
 def hidden_in(optics: Optics, hidden: Hidden) -> Optics:
     """Add what is hidden in the camera."""
     for name, values in hidden.of_stage("camera").items():
-        if name in IN_THE_PICTURE:
-            optics = IN_THE_PICTURE[name](optics, values)
+        form_of = catalogue()[name].in_picture
+        if form_of is None:
+            continue
+        form = form_of(values)
+        optics = replace(optics, late_s=optics.late_s + form.late_s)
+        if form.radial_per_mm2 != 0.0:
+            optics = _lens(optics, form.radial_per_mm2)
+        if form.keystone_per_mm != 0.0:
+            optics = _tilt(optics, form.keystone_per_mm)
     return optics

@@ -1,0 +1,83 @@
+"""A smooth response curve through levels whose light is known up to a factor for each place of the scene.
+
+ln f is a power law and a smooth correction to it: cameras are nearly power laws (Grossberg & Nayar, 2004,
+doi:10.1109/TPAMI.2004.88), and the logarithm alone has no end at level 0.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from calib.camera_response import CameraResponse, MeasuredResponse
+
+Floats = NDArray[np.float64]
+
+# Levels that are used, shares of full scale: below is the black level's noise, above the sensor is full.
+LEAST_LEVEL, LARGEST_LEVEL = 0.02, 0.97
+# Knots of the correction to the power law, and the weight of its bends against one reading of 1 %.
+KNOTS, SMOOTHNESS = 17, 3.0
+# Places of the scene that an exposure series needs: one for each knot.
+FEWEST_LEVELS = KNOTS
+# Rows of the result.
+ROWS = 257
+
+
+def fitted_response(
+    level: Floats, usable: NDArray[np.bool_], log_light: Floats, top_level: int, name: str
+) -> MeasuredResponse:
+    """Fit the curve by least squares.
+
+    Parameters
+    ----------
+    level : ndarray of float, shape (n, places)
+        Levels, shares of full scale: rows of one known light each, columns of one place each.
+    usable : ndarray of bool, shape (n, places)
+        Levels that count.
+    log_light : ndarray of float, shape (n,)
+        Natural logarithm of each row's light, up to a constant.
+    top_level : int
+        Full scale of the pictures.
+    name : str
+        What the response is called.
+    """
+    exponent, correction, residual = _fit(level, usable, log_light)
+    seen = level[usable]
+    return MeasuredResponse(
+        curve_of(exponent, correction, top_level, name),
+        exponent,
+        float(np.sqrt(np.mean(residual**2))),
+        (float(seen.min()), float(seen.max())),
+    )
+
+
+def curve_of(exponent: float, correction: Floats, top_level: int, name: str) -> CameraResponse:
+    """Tabulate a power law with a correction of its logarithm at the knots, shape (KNOTS,)."""
+    share = np.linspace(0.0, 1.0, ROWS)
+    light = share**exponent * np.exp(np.interp(share, np.linspace(0.0, 1.0, KNOTS), correction))
+    light = np.maximum.accumulate(light / light[-1]) + 1e-9 * share
+    return CameraResponse(name, share, (light - light[0]) / (light[-1] - light[0]), top_level)
+
+
+def _fit(level: Floats, usable: NDArray[np.bool_], log_time: Floats) -> tuple[float, Floats, Floats]:
+    """Exponent, correction at the knots, and residuals of ln light."""
+    picture, place = np.nonzero(usable)
+    share = level[usable]
+    rows, places = share.size, level.shape[1]
+    design = np.zeros((rows, 1 + KNOTS + places))
+    design[:, 0] = np.log(share)
+    at = share * (KNOTS - 1)
+    left = np.minimum(at.astype(int), KNOTS - 2)
+    design[np.arange(rows), 1 + left] = 1.0 - (at - left)
+    design[np.arange(rows), 2 + left] = at - left
+    design[np.arange(rows), 1 + KNOTS + place] = -1.0
+    wanted = log_time[picture]
+    # A level near black is the less sure in its logarithm the lower it is.
+    weight = share / (share + 0.05)
+    bends = np.zeros((KNOTS, design.shape[1]))
+    for knot in range(1, KNOTS - 1):
+        bends[knot, knot : knot + 3] = SMOOTHNESS * np.sqrt(rows / KNOTS) * np.array([1.0, -2.0, 1.0])
+    # The correction is nothing at full scale, and what it has in common with the power law is left to that.
+    bends[0, KNOTS] = bends[-1, 1] = np.sqrt(rows)
+    solved, *_ = np.linalg.lstsq(
+        np.vstack([design * weight[:, None], bends]), np.concatenate([wanted * weight, np.zeros(KNOTS)]), rcond=None
+    )
+    return float(solved[0]), solved[1 : 1 + KNOTS], np.asarray((design @ solved - wanted) * weight)

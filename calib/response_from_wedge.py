@@ -1,0 +1,92 @@
+"""A camera's response from one picture of a grey wedge whose fields have certified optical densities.
+
+A field of density D reflects (or passes) 10**-D of the light (ISO 5-1), so that ln f(level) = -D ln 10 plus a constant
+over the whole wedge: the same equation as that of an exposure series, with one place in the scene.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from calib.camera_response import MeasuredResponse
+from calib.errors import CalibrationError
+from calib.response_curve import LARGEST_LEVEL, LEAST_LEVEL, fitted_response
+
+Floats = NDArray[np.float64]
+Grey = NDArray[np.uint8] | NDArray[np.uint16]
+
+FEWEST_FIELDS = 6
+"""Fields between black and white that a curve needs: a power law and a bend, twice over."""
+MIDDLE = 0.25
+"""Share of a field that is left out at either of its borders."""
+LARGEST_SPREAD = 0.5
+"""Difference between the thirds of a field over the step to the next one: more is a border or a reflection."""
+
+
+def response_from_wedge(
+    grey: Grey, densities: Sequence[float], top_level: int, name: str, region: tuple[int, int, int, int] | None = None
+) -> MeasuredResponse:
+    """Find a camera's response.
+
+    Parameters
+    ----------
+    grey : ndarray, shape (height, width)
+        Picture of the wedge, evenly lit. Its fields follow each other along the longer side of the region.
+    densities : sequence of float
+        Optical density of each field, from the lightest to the darkest.
+    top_level : int
+        Full scale of the picture.
+    name : str
+        What the response is called.
+    region : (x, y, width, height), optional
+        Where the wedge's fields lie in the picture, pixels; by default the whole picture.
+
+    Raises
+    ------
+    CalibrationError
+        Too few fields, densities that do not rise, or a region that does not show them.
+    """
+    stated = np.asarray(densities, dtype=np.float64)
+    if stated.size < FEWEST_FIELDS or not np.isfinite(stated).all() or not (np.diff(stated) > 0.0).all():
+        raise CalibrationError(
+            f"A grey wedge must have at least {FEWEST_FIELDS} fields whose densities rise, but has "
+            f"{', '.join(f'{value:g}' for value in stated[:8])}: state its certificate's."
+        )
+    level, spread = _field_levels(grey, stated.size, top_level, region)
+    if level[0] < level[-1]:
+        level, spread = level[::-1], spread[::-1]
+    steps = -np.diff(level)
+    usable = (level > LEAST_LEVEL) & (level < LARGEST_LEVEL)
+    seen = usable[:-1] & usable[1:]
+    blurred = spread[:-1][seen] > LARGEST_SPREAD * np.maximum(steps[seen], 1.0 / top_level)
+    if np.count_nonzero(usable) < FEWEST_FIELDS or (steps[seen] <= 0.0).any() or blurred.any():
+        raise CalibrationError(
+            f"The region must show {stated.size} even fields, each darker than the one before, of which at least "
+            f"{FEWEST_FIELDS} are neither black nor white, but does not: set --roi to the wedge's fields alone, light "
+            "it evenly and state one density for each field."
+        )
+    return fitted_response(level[None, :].T, usable[None, :].T, -stated * np.log(10.0), top_level, name)
+
+
+def _field_levels(
+    grey: Grey, fields: int, top_level: int, region: tuple[int, int, int, int] | None
+) -> tuple[Floats, Floats]:
+    """Mean and scatter of each field's middle part, shares of full scale; shape (fields,)."""
+    x, y, width, height = region if region is not None else (0, 0, grey.shape[1], grey.shape[0])
+    part = grey[y : y + height, x : x + width].astype(np.float64) / top_level
+    part = part if part.shape[1] >= part.shape[0] else part.T
+    if part.shape[1] < 4 * fields or part.shape[0] < 4:
+        raise CalibrationError(
+            f"The region must show {fields} fields, four pixels of each at least, but is {part.shape[1]} by "
+            f"{part.shape[0]} pixels: set --roi to the wedge."
+        )
+    rows = part[int(MIDDLE * part.shape[0]) : part.shape[0] - int(MIDDLE * part.shape[0])]
+    ends = np.linspace(0.0, part.shape[1], fields + 1)
+    inner = [
+        rows[:, int(np.ceil(a + MIDDLE * (b - a))) : max(int(b - MIDDLE * (b - a)), int(a) + 1)]
+        for a, b in zip(ends[:-1].tolist(), ends[1:].tolist(), strict=True)
+    ]
+    # Thirds are averaged first: noise is no border between two fields.
+    thirds = [[part.mean() for part in np.array_split(field, 3, axis=1) if part.size] for field in inner]
+    return np.array([field.mean() for field in inner]), np.array([np.ptp(means) for means in thirds])

@@ -1,0 +1,28 @@
+"""The option that adds effects of one's own to the catalogue for one command."""
+
+from collections.abc import Callable
+from functools import wraps
+from pathlib import Path
+from typing import Any
+
+import click
+
+Command = Callable[..., Any]
+
+
+def effects_option(command: Command) -> Command:
+    """Add `--effects`: files whose effects stand in the catalogue while the command runs."""
+
+    @wraps(command)
+    def with_effects(*arguments: Any, effects_files: tuple[Path, ...], **options: Any) -> Any:
+        if not effects_files:
+            return command(*arguments, **options)
+        from fingervision.effects import added_effects
+
+        with added_effects(effects_files):
+            return command(*arguments, **options)
+
+    return click.option(
+        "--effects", "effects_files", multiple=True, metavar="FILE.py", type=click.Path(path_type=Path),
+        help="Add the effects that a Python file holds; may be given more than once.",
+    )(with_effects)  # fmt: skip

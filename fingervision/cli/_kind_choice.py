@@ -1,0 +1,40 @@
+"""A choice among the kinds of model there are, listed when it is asked for."""
+
+from typing import Any
+
+import click
+
+
+class KindChoice(click.ParamType):  # type: ignore[type-arg]  # generic in new versions of click alone
+    """A kind of model, built in or installed; nothing but names is looked at.
+
+    Parameters
+    ----------
+    also : str
+        Words that stand for more than one kind.
+    """
+
+    name = "kind"
+
+    def __init__(self, *also: str) -> None:
+        self._also = also
+
+    def _names(self) -> tuple[str, ...]:
+        from fingervision.models.kind_names import kind_names
+
+        return (*kind_names(), *self._also)
+
+    def get_metavar(self, *_: Any, **__: Any) -> str:
+        """Names in the help."""
+        return f"[{'|'.join(self._names())}]"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> str:
+        """Refuse what is no kind, with the nearest."""
+        from difflib import get_close_matches
+
+        names = self._names()
+        if value not in names:
+            near = get_close_matches(str(value), names, n=1)
+            hint = f" Did you mean {near[0]}?" if near else ""
+            self.fail(f"{value!r} is not one of {', '.join(map(repr, names))}.{hint}", param, ctx)
+        return str(value)

@@ -1,0 +1,58 @@
+"""`fingervision plugins`: every part that can be added by others, and where each comes from."""
+
+from typing import Any
+
+import click
+
+EXAMPLES = """
+\b
+Examples:
+  fingervision plugins
+  fingervision plugins --all
+  fingervision plugins --json
+
+\b
+A distribution adds a part by an entry point of its group:
+  fingervision.effects        fingervision.models    fingervision.frame_sources  fingervision.report_parts
+  fingervision.actuators      fingervision.cameras   fingervision.force_sensors
+A file adds one for a command: --effects FILE.py, or kind = "./FILE.py" in a bed's file. The README.md of
+fingervision/plugins says what each must be; fingervision.testing holds the tests that every part passes.
+"""
+
+
+@click.command(epilog=EXAMPLES)
+@click.option("--all", "every", is_flag=True, help="List what is built in as well.")
+@click.option("--json", "as_json", is_flag=True, help="Print the list for programs, with what is built in.")
+def command(every: bool, as_json: bool) -> None:
+    """List the installed plug-ins, where each comes from, and what is left out and why."""
+    import json
+
+    rows: list[dict[str, Any]] = []
+    refused: list[dict[str, str]] = []
+    for registry in _registries():
+        rows += [
+            {"group": registry.group, "name": entry.name, "from": str(entry.origin), "built_in": entry.origin.built_in}
+            for entry in registry.entries()
+        ]
+        refused += [
+            {"group": registry.group, "name": one.name, "from": str(one.origin), "why": one.sentence}
+            for one in registry.refusals()
+        ]
+    if as_json:
+        click.echo(json.dumps({"schema": 1, "parts": rows, "left_out": refused}, indent=2))
+        return
+    shown = [row for row in rows if every or not row["built_in"]]
+    for row in shown:
+        click.echo(f"{row['group'].removeprefix('fingervision.'):14} {row['name']:24} {row['from']}")
+    if not rows or (not shown and not refused):
+        click.echo("No plug-in is installed: what there is is built in (--all lists it).")
+
+
+def _registries() -> list[Any]:
+    from fingervision.diagnosis.report import report_parts
+    from fingervision.effects import REGISTRY as EFFECTS
+    from fingervision.frames.source import REGISTRY as SOURCES
+    from fingervision.models.kinds import REGISTRY as MODELS
+    from fingervision.testbed.device_kinds import REGISTRIES
+
+    return [EFFECTS, MODELS, SOURCES, *REGISTRIES.values(), report_parts.REGISTRY]

@@ -1,0 +1,52 @@
+"""Sections that other distributions add to the report: entry points of the group `fingervision.report_parts`."""
+
+import logging
+from typing import Protocol, cast
+
+from fingervision.diagnosis.diagnose import Diagnosis
+from fingervision.plugins.faults import MisfitError
+from fingervision.plugins.registry import Registry
+
+LOG = logging.getLogger(__name__)
+
+
+class ReportPart(Protocol):
+    """A module, or another object, that adds a section to report.html."""
+
+    TITLE: str
+
+    def html(self, diagnosis: Diagnosis) -> str | None:
+        """Write the section's content as HTML that fetches nothing; None where there is nothing to say."""
+        ...
+
+
+def _held(held: object) -> dict[str, ReportPart]:
+    if not isinstance(getattr(held, "TITLE", None), str) or not callable(getattr(held, "html", None)):
+        lacks = "html" if isinstance(getattr(held, "TITLE", None), str) else "TITLE"
+        raise MisfitError(f"must have TITLE and html(diagnosis), but has no {lacks}")
+    return {"": cast("ReportPart", held)}
+
+
+def _none(name: str) -> ReportPart:
+    raise KeyError(name)
+
+
+REGISTRY: Registry[ReportPart] = Registry("fingervision.report_parts", "report part", lambda: (), _none, _held)
+
+
+def added_sections(diagnosis: Diagnosis) -> list[tuple[str, str]]:
+    """Give title and content of every section that is added; one that fails is left out and said."""
+    sections = []
+    for entry in REGISTRY.entries():
+        try:
+            content = entry.value.html(diagnosis)
+        except Exception as error:  # it takes nothing else with it
+            said = f"{type(error).__name__}: {error}".replace("\n", " ")[:200].rstrip(".")
+            LOG.warning(
+                "fingervision: The report part %s of %s is left out, as it raised %s: %s.",
+                entry.name, entry.origin, said, entry.origin.remedy,
+            )  # fmt: skip
+            continue
+        if isinstance(content, str):
+            sections.append((entry.value.TITLE, content))
+    return sections

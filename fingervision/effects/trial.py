@@ -1,0 +1,175 @@
+"""What an object must be to stand in the catalogue: an effect that answers on a few samples as an effect does."""
+
+from dataclasses import replace
+from functools import partial
+from types import ModuleType
+
+import numpy as np
+
+from fingervision.domain.effect import Array, DriveEffect, Effect, History, PointEffect, Stage, Values
+from fingervision.domain.errors import FingervisionError
+from fingervision.domain.parameter import Parameter
+from fingervision.domain.response import Response
+from fingervision.plugins.faults import MisfitError
+
+BUILT_IN: list[Effect] = []
+"""The package's own effects; the package fills it."""
+SAMPLES = 12
+"""Of the trial: two runs there and back, so that memory, reversals and starts of runs are all met."""
+
+
+class EffectAnswerError(FingervisionError):
+    """An effect from outside the package failed, or answered what is no answer, at some parameters.
+
+    Parameters
+    ----------
+    name : str
+        The effect.
+    words : str
+        What it did.
+    """
+
+    def __init__(self, name: str, words: str) -> None:
+        super().__init__(f"The effect {name} {words}: mend it, or leave it out with --without {name}.")
+        self.name, self.words = name, words
+
+
+def effects_in(held: object) -> dict[str, Effect]:
+    """Give the effects that a module holds at its top, or that an object is, each checked on a trial.
+
+    Raises
+    ------
+    MisfitError
+        One of them is no effect, or does not answer as one.
+    """
+    found: list[object] = [held]
+    if isinstance(held, ModuleType):
+        # What a module imports from the package is no effect of its own.
+        ours = {id(effect) for effect in BUILT_IN}
+        own = {id(value): value for value in vars(held).values() if isinstance(value, Effect) and id(value) not in ours}
+        found = list(own.values())
+        if not found and hasattr(held, "EFFECT"):
+            found = [held.EFFECT]
+    checked: dict[str, Effect] = {}
+    for thing in found:
+        effect = try_effect(thing)
+        if effect.name in checked:
+            raise MisfitError(f"must name each effect once, but has two effects {effect.name}")
+        checked[effect.name] = guarded(effect)
+    return checked
+
+
+def try_effect(effect: object) -> DriveEffect | PointEffect:
+    """Hold an effect against what every effect must be, and give it back.
+
+    Raises
+    ------
+    MisfitError
+        The rest of a sentence that says what it must be and what it is.
+    """
+    if not isinstance(effect, DriveEffect | PointEffect):
+        raise MisfitError(f"must be a DriveEffect or a PointEffect, but is of type {type(effect).__name__}")
+    name = str(effect.name)
+    if not (name.isidentifier() and name.islower()):
+        raise MisfitError(f"must have a name of small letters and underscores, but is named {name!r}")
+    if effect.stage not in tuple(Stage) or (effect.stage == Stage.DRIVE) != isinstance(effect, DriveEffect):
+        kind = "PointEffect of the mechanism or camera" if isinstance(effect, PointEffect) else "DriveEffect"
+        raise MisfitError(f"must be a {kind} if it acts there, but its stage is {effect.stage!s}")
+    if not effect.parameters or not all(isinstance(p, Parameter) for p in effect.parameters):
+        raise MisfitError("must have a tuple of at least one Parameter, but has none")
+    for p in effect.parameters:
+        if not p.lower < p.upper:
+            raise MisfitError(
+                f"must have lower below upper for each parameter, but {p.name} has {p.lower:g} and {p.upper:g}"
+            )
+    for word in ("words", "formula", "source", "residual"):
+        if not isinstance(getattr(effect, word), str) or not getattr(effect, word):
+            raise MisfitError(f"must state its {word} in half a sentence, but does not")
+    history = trial_history()
+    searched = effect.search(history)
+    if isinstance(searched, str):
+        return effect  # these few samples cannot show it
+    values = {p.name: 0.0 if p.run is not None else float(p.starting_values()[0]) for p in searched}
+    try:
+        _answer(effect, history, values)
+    except EffectAnswerError as error:
+        raise MisfitError(str(error).split(f"{name} ", 1)[1].split(": mend it")[0]) from error
+    return effect
+
+
+def guarded(effect: DriveEffect | PointEffect) -> Effect:
+    """Give the effect with each of its answers looked at: one that is no answer is said by the effect's name."""
+    if isinstance(effect, DriveEffect):
+        return replace(effect, act=partial(_checked_drive, effect))
+    return replace(effect, act=partial(_checked_points, effect))
+
+
+def trial_history() -> History:
+    """Twelve samples of two runs with times, both edges and a force."""
+    way = np.array([0.0, 0.4, 0.8, 1.2, 0.6, 0.1])
+    return History(
+        input_mm=np.concatenate([way, way - 0.2]),
+        time_s=0.1 * np.arange(float(SAMPLES)),
+        runs=(slice(0, 6), slice(6, 12)),
+        rest_gap_mm=4.0,
+        opening_mm=9.0,
+        closing_mm=1.5,
+        force=True,
+    )
+
+
+def _answer(effect: DriveEffect | PointEffect, history: History, values: Values) -> None:
+    if isinstance(effect, DriveEffect):
+        _checked_drive(effect, history.input_mm, history, values)
+        return
+    gap = 4.0 + 7.5 * history.input_mm
+    _checked_points(effect, Response(0.3 - 0.5 * gap, 0.3 + 0.5 * gap, 2.0 * history.input_mm), history, values)
+
+
+def _checked_drive(effect: DriveEffect, input_mm: Array, history: History, values: Values) -> Array:
+    asked = input_mm.copy()
+    try:
+        answer = effect.act(input_mm, history, values)
+    except Exception as error:
+        raise EffectAnswerError(effect.name, _raised(error, values)) from error
+    _same(effect.name, "input", answer, input_mm.shape, values)
+    if not np.array_equal(asked, input_mm, equal_nan=True):
+        raise EffectAnswerError(effect.name, "must leave the input that it is given as it is, but changed it in place")
+    return answer
+
+
+def _checked_points(effect: PointEffect, response: Response, history: History, values: Values) -> Response:
+    try:
+        answer = effect.act(response, history, values)
+    except Exception as error:
+        raise EffectAnswerError(effect.name, _raised(error, values)) from error
+    if not isinstance(answer, Response):
+        raise EffectAnswerError(effect.name, f"must return a Response, but returned a {type(answer).__name__}")
+    for side in ("left_mm", "right_mm"):
+        _same(effect.name, side, getattr(answer, side), response.left_mm.shape, values)
+    if (answer.force_n is None) != (response.force_n is None):
+        raise EffectAnswerError(effect.name, "must return a force where it is given one, and only there, but does not")
+    if answer.force_n is not None:
+        _same(effect.name, "force_n", answer.force_n, response.left_mm.shape, values)
+    return answer
+
+
+def _same(name: str, what: str, answer: object, shape: tuple[int, ...], values: Values) -> None:
+    if not isinstance(answer, np.ndarray) or answer.dtype.kind != "f":
+        kind = f"array of {answer.dtype}" if isinstance(answer, np.ndarray) else type(answer).__name__
+        raise EffectAnswerError(name, f"must return {what} as an array of float, but returned a {kind}")
+    if answer.shape != shape:
+        raise EffectAnswerError(
+            name, f"must return {what} of shape {shape}, as it is given, but returned {answer.shape}"
+        )
+    if not np.all(np.isfinite(answer)):
+        raise EffectAnswerError(name, f"must return finite numbers, but returned others at {_told(values)}")
+
+
+def _raised(error: Exception, values: Values) -> str:
+    words = f"{type(error).__name__}: {error}".replace("\n", " ")[:200].rstrip(".")
+    return f"must answer for every value within its bounds, but raised {words} at {_told(values)}"
+
+
+def _told(values: Values) -> str:
+    return ", ".join(f"{key} = {value:.6g}" for key, value in values.items())

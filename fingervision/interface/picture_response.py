@@ -1,0 +1,95 @@
+"""The camera response of calibration pictures: which one they are read with, and what another would do to them."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from calib.camera_response import CameraResponse
+    from calib.known_widths import KnownSize
+    from calib.measured_scale import Calibration
+    from calib.parallel_edges import ParallelEdges
+    from fingervision.vision.grey import GreyImage
+
+
+@dataclass(frozen=True, slots=True)
+class PictureResponse:
+    """What the pictures' levels are taken for.
+
+    Parameters
+    ----------
+    response, other : CameraResponse
+        The response that is used, and the standard one that it may be as well.
+    is_known : bool
+        Whether the user stated it.
+    """
+
+    response: "CameraResponse"
+    other: "CameraResponse"
+    is_known: bool
+
+    @classmethod
+    def of(cls, words: str, files: Sequence[Path]) -> "PictureResponse":
+        """Read --response; `auto` takes the first picture's own tag, and linear where there is none."""
+        from calib.camera_response import standard_response
+        from fingervision.frames.transfer_tag import transfer_tag
+        from fingervision.storage.response_csv import response_named
+
+        stated = response_named(words)
+        response = stated or standard_response(transfer_tag(tuple(files)) or "linear")
+        other = standard_response("srgb" if response.name == "linear" else "linear")
+        return cls(response, other, stated is not None)
+
+    @classmethod
+    def of_calibration(cls, calibration: "Calibration") -> "PictureResponse":
+        """Read pictures as a calibration's own were."""
+        from calib.camera_response import standard_response
+
+        response = calibration.camera_response or standard_response("linear")
+        return cls(response, response, calibration.response_known)
+
+    def light(self, grey: "GreyImage") -> "GreyImage":
+        """Give a picture's light; the levels themselves where they are taken as linear."""
+        return _light(self.response, grey)
+
+    def shift_px(
+        self,
+        stored: Sequence["KnownSize"],
+        edges: Sequence["ParallelEdges"],
+        region: tuple[int, int, int, int] | None,
+    ) -> float:
+        """How much wider a light gap is read than under the other response, on average over the pictures (pixels)."""
+        from calib.errors import CalibrationError
+        from calib.parallel_edges import measure_parallel_edges
+
+        shifts = []
+        for picture, edge in zip(stored, edges, strict=True):
+            levels = _light(self.other, picture.grey).astype(float)
+            try:
+                ends = (edge.edges_px[0][[0, -1]], edge.edges_px[1][[0, -1]])
+                again = measure_parallel_edges(levels, ends, edge.light)
+            except CalibrationError:
+                continue
+            shifts.append((edge.width_px - again.width_px) * (1.0 if edge.light else -1.0))
+        return sum(shifts) / len(shifts) if shifts else 0.0
+
+    def noted(self, calibration: "Calibration", shift_px: float) -> "Calibration":
+        """Write into a calibration what it was read with."""
+        return replace(
+            calibration,
+            camera_response=self.response,
+            response_known=self.is_known,
+            response_shift_px=shift_px,
+        )
+
+
+def _light(response: "CameraResponse", grey: "GreyImage") -> "GreyImage":
+    from fingervision.vision.grey import top_level
+
+    if response.name == "linear":
+        return grey
+    return response.linearised(grey, response.top_level or top_level(grey))
+
+
+__all__ = ["PictureResponse"]

@@ -1,0 +1,75 @@
+"""A module from a file that the user named."""
+
+import hashlib
+import importlib.util
+import sys
+from pathlib import Path
+from types import ModuleType
+
+from fingervision.plugins.faults import PluginFileError, PluginVersionError
+from fingervision.plugins.origin import Origin, of_file
+from fingervision.plugins.requirements import stated_in, unmet
+
+SUFFIX = ".py"
+
+
+def check_file(path: Path, what: str) -> Origin:
+    """Refuse what cannot be imported, before anything of it runs.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    what : str
+        What it is to hold, for the sentence: `effects`, `an actuator`.
+
+    Raises
+    ------
+    PluginFileError
+        There is no such file, or it is no Python file.
+    PluginVersionError
+        Its inline metadata ask for another version of fingervision.
+    """
+    origin = of_file(str(path))
+    if not path.exists():
+        raise PluginFileError(f"There is no file {path}: {what} must come from a Python file that exists.")
+    if not path.is_file() or path.suffix.lower() != SUFFIX:
+        raise PluginFileError(f"{what.capitalize()} must come from a file NAME.py, but {path} is none: name one.")
+    try:
+        source = path.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        raise PluginFileError(f"{path} must be a Python file in UTF-8, but could not be read ({error}).") from error
+    missing = unmet(stated_in(source))
+    if missing is not None:
+        raise PluginVersionError(needs(str(path), missing))
+    return origin
+
+
+def needs(who: str, specifier: str) -> str:
+    """Say that something needs another version."""
+    from fingervision import __version__
+
+    return f"{who} needs fingervision {specifier}, but this is {__version__}: install the version that it asks for."
+
+
+def load_file(path: Path) -> ModuleType:
+    """Import a file under a name of its own, so that two files of one name do not meet.
+
+    It is imported anew where its content has changed.
+    """
+    whole = path.resolve()
+    digest = hashlib.sha256(f"{whole}\n".encode() + whole.read_bytes()).hexdigest()[:16]
+    name = f"_fingervision_file_{digest}"
+    if name in sys.modules:
+        return sys.modules[name]
+    spec = importlib.util.spec_from_file_location(name, whole)
+    assert spec is not None  # noqa: S101 - a file NAME.py always has one
+    assert spec.loader is not None  # noqa: S101 - as above
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[name] = module  # dataclasses look their module up while it is imported
+    try:
+        spec.loader.exec_module(module)
+    except BaseException:
+        sys.modules.pop(name, None)
+        raise
+    return module

@@ -1,0 +1,257 @@
+"""One registry for every kind of part: built-in files, entry points of other distributions, files, this session.
+
+Built-in parts are the modules of a package. What comes from elsewhere is imported when it is first asked for, watched
+while it is, and checked; one that cannot be used is left out with a sentence and takes nothing else with it.
+"""
+
+import logging
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from importlib.metadata import EntryPoint, entry_points
+from pathlib import Path
+from typing import Generic, TypeVar
+
+from fingervision.plugins.entry import Entry, Refusal
+from fingervision.plugins.faults import (
+    PluginError,
+    PluginFileError,
+    PluginNameError,
+    PluginShapeError,
+    PluginVersionError,
+)
+from fingervision.plugins.file_module import check_file, load_file, needs
+from fingervision.plugins.origin import BUILT_IN, SESSION, Origin, of_distribution
+from fingervision.plugins.requirements import unmet
+from fingervision.plugins.watched_import import importing, watched
+
+T = TypeVar("T")
+LOG = logging.getLogger("fingervision.plugins")
+
+
+class Registry(Generic[T]):
+    """The parts of one kind.
+
+    Parameters
+    ----------
+    group : str
+        Group of entry points: `fingervision.effects`.
+    noun : str
+        What one is called in a sentence: `effect`.
+    built_in : callable
+        Gives the names of the built-in parts, in order, without importing them.
+    load : callable
+        Imports a built-in part by its name.
+    parts_of : callable
+        Gives the parts by name that an imported object or module holds, in order (one without a name of its own under
+        the empty name: it has the one under which it is registered); raises MisfitError where it is not
+        what the group asks for. It runs within the time limit.
+    """
+
+    def __init__(
+        self,
+        group: str,
+        noun: str,
+        built_in: Callable[[], tuple[str, ...]],
+        load: Callable[[str], T],
+        parts_of: Callable[[object], dict[str, T]],
+    ) -> None:
+        self.group, self.noun = group, noun
+        self._built_in, self._load, self._parts_of = built_in, load, parts_of
+        self._added: list[Entry[T]] = []
+        self._lock = threading.RLock()
+        self.forget()
+
+    def forget(self) -> None:
+        """Look for installed plug-ins anew when they are next asked for."""
+        self._loaded: dict[str, Entry[T]] = {}
+        self._refused: dict[tuple[str, str], Refusal] = {}
+        self._points: tuple[EntryPoint, ...] | None = None
+        self._version = getattr(self, "_version", 0) + 1
+
+    @property
+    def version(self) -> int:
+        """A number that changes whenever the parts may have changed."""
+        return self._version
+
+    def names(self) -> tuple[str, ...]:
+        """List the names that can be asked for: built in, installed, added. Nothing is imported."""
+        found = dict.fromkeys(
+            (*self._built_in(), *(p.name for p in self._entry_points()), *(e.name for e in self._added))
+        )
+        return tuple(name for name in found if not any(name == refused for refused, _ in self._refused))
+
+    def get(self, name: str) -> Entry[T]:
+        """Give one part; only this one is imported.
+
+        Raises
+        ------
+        PluginError
+            It is a plug-in that cannot be used.
+        KeyError
+            There is none of that name.
+        """
+        for entry in self._added:
+            if entry.name == name:
+                return entry
+        if name in self._built_in():
+            return self._loaded.setdefault(name, Entry(name, self._load(name), BUILT_IN))
+        points = self._points_of(name)
+        if not points:
+            raise KeyError(name)
+        found = self._of_points(points)
+        if found is None:
+            raise PluginError(next(r.sentence for (asked, _), r in self._refused.items() if asked == name))
+        return found
+
+    def entries(self) -> tuple[Entry[T], ...]:
+        """Import all parts, and give those that can be used: built in, installed, added."""
+        own = [self.get(name) for name in self._built_in()]
+        if importing():
+            return tuple(own)
+        with self._lock:
+            installed = [
+                self._of_points([p for p in self._entry_points() if p.name == name]) for name in self._installed()
+            ]
+        return (*own, *(entry for entry in installed if entry is not None), *self._added)
+
+    def refusals(self) -> tuple[Refusal, ...]:
+        """List the installed plug-ins that are left out, each with its sentence; imports all."""
+        self.entries()
+        return tuple(self._refused.values())
+
+    def add(self, name: str, value: T, origin: Origin = SESSION) -> None:
+        """Add a part for this process; the same object twice counts once, another one of the session replaces it.
+
+        Raises
+        ------
+        PluginNameError
+            The name is that of a built-in or installed part, or of one from a file.
+        """
+        with self._lock:
+            mine = [e for e in self._added if e.name == name]
+            if any(e.value is value for e in mine):
+                return
+            if name in self._built_in() or any(e.origin is not SESSION or origin is not SESSION for e in mine):
+                taken = BUILT_IN if name in self._built_in() else mine[0].origin
+                raise PluginNameError(self._taken(name, origin, taken))
+            if name in self._installed():
+                raise PluginNameError(self._taken(name, origin, self._of_point(name)))
+            self._added = [*(e for e in self._added if e.name != name), Entry(name, value, origin)]
+            self._version += 1
+
+    def checked(self, held: object, who: str, origin: Origin) -> dict[str, T]:
+        """Give the parts that an object holds, by name, once they are checked.
+
+        Parameters
+        ----------
+        held : object
+            A part, or a module that holds some.
+        who : str
+            How a sentence about it begins.
+        origin : Origin
+            Where it comes from.
+
+        Raises
+        ------
+        PluginError
+            It is not what the group asks for.
+        """
+        return watched(who, origin, lambda: self._parts_of(held))
+
+    def remove(self, name: str) -> None:
+        """Take back what was added; nothing happens where nothing was."""
+        self._added = [entry for entry in self._added if entry.name != name]
+        self._version += 1
+
+    def in_file(self, path: Path) -> dict[str, T]:
+        """Import a file and give the parts that it holds, by name.
+
+        Raises
+        ------
+        PluginError, PluginFileError
+            It cannot be read or imported, or holds nothing of this kind.
+        """
+        origin = check_file(path, f"{self.noun}s")
+        found = watched(f"{path}", origin, lambda: self._parts_of(load_file(path)))
+        if not found:
+            raise PluginFileError(
+                f"{path} must hold at least one {self.noun}, but holds none: see `fingervision plugins --help`."
+            )
+        return found
+
+    @contextmanager
+    def with_files(self, paths: tuple[Path, ...]) -> Iterator[None]:
+        """Add what some files hold for as long as the block lasts."""
+        before = list(self._added)
+        try:
+            for path in paths:
+                for name, value in self.in_file(path).items():
+                    self.add(name, value, check_file(path, self.noun))
+            yield
+        finally:
+            self._added = before
+            self._version += 1
+
+    def _entry_points(self) -> tuple[EntryPoint, ...]:
+        if self._points is None:
+            self._points = tuple(entry_points(group=self.group))
+        return self._points
+
+    def _points_of(self, name: str) -> list[EntryPoint]:
+        return [point for point in self._entry_points() if point.name == name]
+
+    def _installed(self) -> tuple[str, ...]:
+        return tuple(dict.fromkeys(point.name for point in self._entry_points()))
+
+    def _of_point(self, name: str) -> Origin:
+        return _origin(self._points_of(name)[0])
+
+    def _of_points(self, points: list[EntryPoint]) -> Entry[T] | None:
+        """Give what entry points of one name stand for; None where it is left out."""
+        name = points[0].name
+        if name in self._loaded and not self._loaded[name].origin.built_in:
+            return self._loaded[name]
+        for point in points:
+            if (name, str(_origin(point))) in self._refused:
+                continue
+            others = [_origin(other) for other in points if other is not point]
+            try:
+                if name in self._built_in():
+                    raise PluginNameError(self._taken(name, _origin(point), BUILT_IN))
+                if others:
+                    raise PluginNameError(self._taken(name, _origin(point), others[0]))
+                self._loaded[name] = Entry(name, self._import(point), _origin(point))
+            except PluginError as error:
+                self._refused[name, str(_origin(point))] = Refusal(name, _origin(point), str(error))
+                LOG.warning("fingervision: %s", error)
+        entry = self._loaded.get(name)
+        return None if entry is None or entry.origin.built_in else entry
+
+    def _import(self, point: EntryPoint) -> T:
+        origin = _origin(point)
+        who = f"The {self.noun} {point.name} of {origin}"
+        missing = unmet(point.dist.requires or ()) if point.dist is not None else None
+        if missing is not None:
+            raise PluginVersionError(needs(who, missing))
+        found = watched(who, origin, lambda: self._parts_of(point.load()))
+        if "" in found:
+            return found[""]
+        if point.name not in found:
+            named = f"is named {' and '.join(found)}" if found else f"holds no {self.noun}"
+            raise PluginShapeError(
+                f"{who} must have the name under which it is registered, but {named}: {origin.remedy}."
+            )
+        return found[point.name]
+
+    def _taken(self, name: str, origin: Origin, by: Origin) -> str:
+        whose = f"a built-in {self.noun}" if by.built_in else f"one of {by}"
+        return (
+            f"The {self.noun} {name} of {origin} must have a name of its own, but {name} is {whose}: {origin.remedy}."
+        )
+
+
+def _origin(point: EntryPoint) -> Origin:
+    if point.dist is None:
+        return Origin("an unknown distribution", "find out which")
+    return of_distribution(point.dist.metadata["Name"], point.dist.version)

@@ -1,0 +1,49 @@
+"""Which fingervision a plug-in needs: as its distribution states it, or a file's inline script metadata (PEP 723)."""
+
+import re
+import tomllib
+from collections.abc import Iterable
+
+from fingervision import __version__
+
+# The block of PEP 723, as given there.
+SCRIPT = re.compile(r"(?m)^# /// script\s*$\s(?P<content>(?:^#(?:| .*)$\s)+?)^# ///\s*$")
+
+
+def unmet(requires: Iterable[str]) -> str | None:
+    """Give the requirement on fingervision that this version does not meet, as in `>=0.9`; None if it meets all.
+
+    Parameters
+    ----------
+    requires : iterable of str
+        Requirements as in PEP 508 (`fingervision>=0.2`); those on other distributions, and what is no requirement, are
+        the installer's affair.
+    """
+    from packaging.requirements import InvalidRequirement, Requirement
+
+    for words in requires:
+        if not words.lower().lstrip().startswith("fingervision"):
+            continue
+        try:
+            asked = Requirement(words)
+        except InvalidRequirement:
+            continue
+        applies = asked.marker is None or asked.marker.evaluate({"extra": ""})
+        if asked.name.lower() != "fingervision" or not applies:
+            continue
+        if not asked.specifier.contains(__version__, prereleases=True):
+            return str(asked.specifier)
+    return None
+
+
+def stated_in(source: str) -> tuple[str, ...]:
+    """Read the requirements that a file's inline script metadata states; none where it has none or they are no TOML."""
+    found = SCRIPT.search(source)
+    if found is None:
+        return ()
+    lines = (line[2:] if line.startswith("# ") else line[1:] for line in found["content"].splitlines())
+    try:
+        stated = tomllib.loads("\n".join(lines)).get("dependencies", [])
+    except tomllib.TOMLDecodeError:
+        return ()
+    return tuple(one for one in stated if isinstance(one, str)) if isinstance(stated, list) else ()

@@ -1,0 +1,87 @@
+"""Run foreign code for at most so many seconds."""
+
+import ctypes
+import os
+import threading
+from collections.abc import Callable
+from math import isfinite
+from typing import TypeVar
+
+from fingervision.domain.errors import UsageError
+
+T = TypeVar("T")
+
+VARIABLE = "FINGERVISION_PLUGIN_SECONDS"
+USUAL_S = 20.0
+"""Importing a large library for the first time takes about ten seconds from a slow disk; twice that is not reached."""
+LET_END_S = 0.5
+"""Time to end in, once it was told to."""
+
+
+class OutOfTimeError(Exception):
+    """The code was still running when its time was up."""
+
+
+class _EndNow(BaseException):
+    """Raised inside the code that is to end; no `except Exception` holds it."""
+
+
+def longest_s() -> float:
+    """Read how many seconds a plug-in may take to be imported.
+
+    Raises
+    ------
+    UsageError
+        The variable of the environment holds no positive number.
+    """
+    given = os.environ.get(VARIABLE, "")
+    if not given:
+        return USUAL_S
+    try:
+        seconds = float(given)
+    except ValueError:
+        seconds = -1.0
+    if not (isfinite(seconds) and seconds > 0.0):
+        raise UsageError(f"{VARIABLE} must be a positive number of seconds, but is '{given}': change or unset it.")
+    return seconds
+
+
+def within(seconds: float, act: Callable[[], T]) -> T:
+    """Run something in a thread of its own and give its result.
+
+    Code that is still running at the end of its time is ended by an exception raised inside it. What waits in compiled
+    code cannot be ended so: it is left to wait in the background and does not keep the program from ending.
+
+    Parameters
+    ----------
+    seconds : float
+        Longest time.
+    act : callable
+        Without arguments.
+
+    Raises
+    ------
+    OutOfTimeError
+        It took longer.
+    BaseException
+        Whatever `act` raises.
+    """
+    results: list[T] = []
+    raised: list[BaseException] = []
+
+    def run() -> None:
+        try:
+            results.append(act())
+        except BaseException as error:
+            raised.append(error)
+
+    thread = threading.Thread(target=run, name="fingervision-plugin", daemon=True)
+    thread.start()
+    thread.join(seconds)
+    if thread.is_alive():
+        ctypes.pythonapi.PyThreadState_SetAsyncExc(ctypes.c_ulong(thread.ident or 0), ctypes.py_object(_EndNow))
+        thread.join(LET_END_S)
+        raise OutOfTimeError
+    if raised:
+        raise raised[0]
+    return results[0]

@@ -1,0 +1,68 @@
+"""Import foreign code within a time limit, and say in a sentence what it did wrong."""
+
+import threading
+from collections.abc import Callable
+from typing import TypeVar
+
+from fingervision.plugins.faults import (
+    MisfitError,
+    PluginError,
+    PluginImportError,
+    PluginShapeError,
+    PluginTimeoutError,
+)
+from fingervision.plugins.origin import Origin
+from fingervision.plugins.time_limit import OutOfTimeError, longest_s, within
+
+T = TypeVar("T")
+HERE = threading.local()
+
+
+def importing() -> bool:
+    """Whether this thread imports a plug-in just now: what asks for parts meanwhile sees the built-in ones alone."""
+    return bool(getattr(HERE, "importing", False))
+
+
+def watched(who: str, origin: Origin, act: Callable[[], T]) -> T:
+    """Run foreign code within its time, and turn whatever it does into a sentence.
+
+    Parameters
+    ----------
+    who : str
+        How the sentence begins: `The effect sticky of fv-demo 1.2`.
+    origin : Origin
+        Where it comes from: what to do about it.
+    act : callable
+        Imports and checks it.
+
+    Raises
+    ------
+    PluginError
+        It raised an exception, did not end, or is not what its group asks for.
+    """
+    seconds = longest_s()
+
+    def run() -> T:
+        HERE.importing = True
+        return act()
+
+    try:
+        return within(seconds, run)
+    except OutOfTimeError:
+        raise PluginTimeoutError(
+            f"{who} must be imported within {seconds:g} s, but was still running after that and was stopped: "
+            f"look for an endless loop; {origin.remedy}."
+        ) from None
+    except PluginError:
+        raise
+    except MisfitError as error:
+        raise PluginShapeError(f"{who} {error}; {origin.remedy}.") from error
+    except ModuleNotFoundError as error:
+        raise PluginImportError(
+            f"{who} could not be imported, as there is no module {error.name}: install it, or {origin.remedy}."
+        ) from error
+    except (KeyboardInterrupt, MemoryError):
+        raise
+    except BaseException as error:
+        said = f"{type(error).__name__}{f': {error}' if str(error) else ''}".replace("\n", " ")[:300].rstrip(".")
+        raise PluginImportError(f"{who} could not be imported ({said}): {origin.remedy}.") from error

@@ -1,0 +1,111 @@
+"""A device from outside the package: looked at once it is built, and whatever it raises is said by its name."""
+
+from collections.abc import Callable
+from contextlib import suppress
+from typing import Any, Generic, NoReturn, Protocol
+
+from fingervision.domain.errors import FingervisionError
+from fingervision.plugins.faults import PluginShapeError
+from fingervision.plugins.origin import Origin
+from fingervision.testbed.actuator import StageLimits
+from fingervision.testbed.reading import Reading
+
+
+def guarded(build: Callable[[], Any], protocol: type, who: str, origin: Origin) -> Any:
+    """Build a device and hold it against its protocol.
+
+    Parameters
+    ----------
+    build : callable
+        Gives the device.
+    protocol : type
+        Whose methods and properties it must have.
+    who : str
+        How a sentence about it begins.
+    origin : Origin
+        Where it comes from.
+
+    Returns
+    -------
+    The device; whatever it raises from now on is a FingervisionError that names it.
+
+    Raises
+    ------
+    FingervisionError
+        It could not be built, or is not what the protocol asks for; it is closed then.
+    """
+    try:
+        device = build()
+    except FingervisionError:
+        raise
+    except Exception as error:
+        _say(who, "be built", error, origin)
+    kept = _Guarded(device, who, origin)
+    try:
+        _look_at(kept, device, protocol, who, origin)
+    except BaseException:
+        with suppress(Exception):
+            device.close()
+        raise
+    return kept
+
+
+def _look_at(kept: "_Guarded", device: Any, protocol: type, who: str, origin: Origin) -> None:
+    bases = [base for base in protocol.__mro__ if base not in (object, Protocol, Generic)]
+    wanted = [name for base in bases for name in vars(base) if not name.startswith("_")]
+    lacks = [name for name in wanted if not (hasattr(type(device), name) or hasattr(device, name))]
+    if lacks:
+        raise PluginShapeError(
+            f"{who} must have {', '.join(wanted)}, but has no {' and no '.join(lacks)}: {origin.remedy}."
+        )
+    if "limits" in wanted and not isinstance(kept.limits, StageLimits):
+        given = type(kept.limits).__name__
+        raise PluginShapeError(f"{who} must state its limits as StageLimits, but states a {given}: {origin.remedy}.")
+    if "readings" in wanted:
+        _check_readings(kept.readings(), who, origin)
+
+
+def _check_readings(readings: Any, who: str, origin: Origin) -> None:
+    if not isinstance(readings, tuple) or not readings or not all(isinstance(one, Reading) for one in readings):
+        given = f"{len(readings)} of them" if isinstance(readings, tuple) else f"a {type(readings).__name__}"
+        raise PluginShapeError(
+            f"{who} must give a tuple of at least one Reading whenever readings is called, but gave {given}: "
+            f"{origin.remedy}."
+        )
+
+
+class _Guarded:
+    """The device itself, but for what it raises."""
+
+    def __init__(self, device: Any, who: str, origin: Origin) -> None:
+        self._device, self._who, self._origin = device, who, origin
+
+    def __getattr__(self, name: str) -> Any:
+        try:
+            found = getattr(self._device, name)
+        except FingervisionError:
+            raise
+        except Exception as error:
+            if not hasattr(type(self._device), name):
+                raise
+            _say(self._who, f"tell its {name}", error, self._origin)
+        if not callable(found) or isinstance(found, type):
+            return found
+
+        def called(*arguments: Any, **named: Any) -> Any:
+            try:
+                answer = found(*arguments, **named)
+            except FingervisionError:
+                raise
+            except Exception as error:
+                _say(self._who, f"answer to {name}", error, self._origin)
+            if name == "readings":
+                _check_readings(answer, self._who, self._origin)
+            return answer
+
+        return called
+
+
+def _say(who: str, what: str, error: Exception, origin: Origin) -> NoReturn:
+    said = f"{type(error).__name__}{f': {error}' if str(error) else ''}".replace("\n", " ")[:200].rstrip(".")
+    raise FingervisionError(f"{who} must {what}, but raised {said}: {origin.remedy}.") from error

@@ -1,0 +1,314 @@
+"""What holds for every actuator, force sensor and camera, looked at through a bed that it belongs to."""
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from functools import partial
+from itertools import pairwise
+from pathlib import Path
+from typing import Self
+
+from fingervision.domain.errors import FingervisionError
+from fingervision.domain.frame import Frame
+from fingervision.testbed import bed_factory
+from fingervision.testbed.bed import Bed
+from fingervision.testbed.reading import Reading
+from fingervision.testing.contract import NotApplicable, hold
+
+WAIT_S, PATIENCE_S = 0.01, 10.0
+SPEED_MM_S, SLOW_MM_S, FAR_MM = 2.0, 0.5, 5.0
+STOPS_WITHIN_S = 0.5
+"""A motor that brakes from 0.5 mm/s stands in a tenth of it; an answer over a slow line takes the rest."""
+ROUNDING_MM = 1e-6
+
+
+def bed_at(path: str | Path) -> Bed:
+    """Open the bed that a file describes; in it, `kind` may be a plug-in's name or a file."""
+    return bed_factory.open_bed(str(path))
+
+
+class _BedContract:
+    """Tests of a part through its bed: give `open_bed`, or an open bed by `of`."""
+
+    _open: Bed | None = None
+
+    def open_bed(self) -> Bed:
+        """Open a bed that has the part; its contract overrides this."""
+        raise NotImplementedError
+
+    @classmethod
+    def of(cls, bed: Bed) -> Self:
+        """Test the parts of a bed that is open, and stays so."""
+        contract = cls()
+        contract._open = bed
+        return contract
+
+    @contextmanager
+    def _bed(self) -> Iterator[Bed]:
+        bed = self._open or self.open_bed()
+        try:
+            yield bed
+        finally:
+            if self._open is None:
+                bed.close()
+
+
+class ActuatorContract(_BedContract):
+    """Tests of an actuator; give `open_bed()`.
+
+    The motor moves by up to a millimetre, and once towards 5 mm until it is stopped: see that nothing is in its way.
+
+    `has_motor` is False for what moves otherwise than at the speed that it is told, such as a screw turned by hand.
+    """
+
+    has_motor = True
+
+    def test_it_goes_where_it_is_sent(self) -> None:
+        """It comes to a stand within its accuracy and its encoder's step."""
+        with self._bed() as bed:
+            for share in (0.5, -0.2, 0.0):
+                to_mm = _place_mm(bed, share)
+                bed.actuator.move(to_mm, _speed_mm_s(bed, SPEED_MM_S))
+                at_mm = _until_rest(bed)[-1].value
+                hold(
+                    abs(at_mm - to_mm) <= _near_mm(bed),
+                    f"{bed.actuator.name} must come to a stand within {_near_mm(bed):.3g} mm of {to_mm:g} mm, but "
+                    f"stands at {at_mm:g} mm.",
+                )
+
+    def test_a_motion_takes_the_time_that_its_speed_says(self) -> None:
+        """Within the accuracy at either end, by its own clock."""
+        self._needs_motor()
+        with self._bed() as bed:
+            before = bed.actuator.readings()[-1:]
+            speed_mm_s, to_mm = _speed_mm_s(bed, SPEED_MM_S), _place_mm(bed, 1.0)
+            expected_s = abs(to_mm - before[0].value) / speed_mm_s
+            bed.actuator.move(to_mm, speed_mm_s)
+            took_s = _moved_s(before + _until_rest(bed))
+            within_s = (2.0 * bed.actuator.limits.accuracy_mm + _known_mm(bed, speed_mm_s)) / speed_mm_s
+            hold(
+                abs(took_s - expected_s) <= within_s,
+                f"{bed.actuator.name} must move for {expected_s:.3g} s +-{within_s:.2g} s, but took {took_s:.3g} s.",
+            )
+
+    def test_homing_ends_at_zero(self) -> None:
+        """The reference becomes position 0."""
+        with self._bed() as bed:
+            bed.actuator.move(_place_mm(bed, 0.7), _speed_mm_s(bed, SPEED_MM_S))
+            _until_rest(bed)
+            bed.actuator.home()
+            at_mm = _until_rest(bed)[-1].value
+            hold(
+                abs(at_mm) <= ROUNDING_MM,
+                f"{bed.actuator.name} must stand at 0 once homed, but stands at {at_mm:g} mm.",
+            )
+
+    def test_a_jog_ends_with_a_stop(self) -> None:
+        """A jog goes on at its speed until stopped, and then the stage stands."""
+        self._needs_motor()
+        with self._bed() as bed:
+            before = bed.actuator.readings()[-1:]
+            speed_mm_s = _speed_mm_s(bed, SLOW_MM_S)
+            bed.actuator.jog(speed_mm_s)
+            before += _watched(bed, 1.0)
+            hold(bed.actuator.busy, f"{bed.actuator.name} must jog until stopped, but stands ({bed.actuator.alarm}).")
+            bed.actuator.stop()
+            asked_s = bed.clock.now_s()
+            readings = before + _until_rest(bed)
+            stopping_s = bed.clock.now_s() - asked_s
+            name = bed.actuator.name
+            hold(
+                stopping_s < STOPS_WITHIN_S,
+                f"{name} must stand {STOPS_WITHIN_S:g} s after a stop, but moved on for {stopping_s:.2g} s.",
+            )
+            went_mm, due_mm = readings[-1].value - before[0].value, speed_mm_s * _moved_s(readings)
+            hold(
+                abs(went_mm - due_mm) <= _known_mm(bed, speed_mm_s),
+                f"{bed.actuator.name} must go {due_mm:.3g} mm at {speed_mm_s:g} mm/s, but went {went_mm:.3g} mm.",
+            )
+            _wait(bed, 0.5)
+            later_mm = bed.actuator.readings()[-1].value
+            hold(
+                later_mm == readings[-1].value,
+                f"{bed.actuator.name} must stand after a stop, but went on by {later_mm - readings[-1].value:.3g} mm.",
+            )
+
+    def test_readings_come_in_order_and_between_question_and_answer(self) -> None:
+        """Each call gives the newest as of now, with bounds in the bed's time."""
+        with self._bed() as bed:
+            bed.actuator.move(_place_mm(bed, 0.5), _speed_mm_s(bed, 1.0))
+            _check_order(bed, bed.actuator.readings, bed.actuator.name)
+
+    def test_beyond_its_limits_nothing_moves(self) -> None:
+        """A place or speed beyond the limits is refused with a sentence, and the stage stands."""
+        with self._bed() as bed:
+            limits, before_mm = bed.actuator.limits, bed.actuator.readings()[-1].value
+            speed_mm_s = _speed_mm_s(bed, 1.0)
+            for to_mm, mm_s in (
+                (limits.upper_mm + 0.1, speed_mm_s),
+                (limits.lower_mm - 0.1, speed_mm_s),
+                (before_mm, limits.speed_mm_s * 1.01),
+            ):
+                move = partial(bed.actuator.move, to_mm, mm_s)
+                _refused(move, f"a move to {to_mm:g} mm at {mm_s:g} mm/s")
+            hold(not bed.actuator.busy, f"{bed.actuator.name} must stand after a refused motion, but moves.")
+            after_mm = bed.actuator.readings()[-1].value
+            hold(
+                after_mm == before_mm,
+                f"{bed.actuator.name} must not move when it refuses, but went to {after_mm:g} mm.",
+            )
+
+    def test_a_busy_actuator_refuses_another_motion(self) -> None:
+        """A motion under way is stopped before another begins."""
+        self._needs_motor()
+        with self._bed() as bed:
+            bed.actuator.move(_place_mm(bed, FAR_MM), _speed_mm_s(bed, SLOW_MM_S))
+            _refused(lambda: bed.actuator.move(_place_mm(bed, 0.0), _speed_mm_s(bed, 1.0)), "a move while it is busy")
+            bed.actuator.stop()
+
+    def test_closing_twice_is_allowed(self) -> None:
+        """The second time does nothing."""
+        with self._bed() as bed:
+            bed.close()
+            bed.close()
+
+    def _needs_motor(self) -> None:
+        if not self.has_motor:
+            raise NotApplicable("a hand has its own speed, and stands when it has answered")
+
+
+class ForceSensorContract(_BedContract):
+    """Tests of a force sensor; give `open_bed()`."""
+
+    def test_forces_come_in_order_and_within_the_full_scale(self) -> None:
+        """Each call gives the newest as of now; no force is beyond the full scale."""
+        with self._bed() as bed:
+            sensor = bed.force_sensor
+            if sensor is None:
+                raise NotApplicable("this bed has no force sensor")
+            seen = _check_order(bed, sensor.readings, sensor.name, asked=False)
+            largest = max(abs(reading.value) for reading in seen)
+            hold(
+                largest <= sensor.full_scale_n,
+                f"{sensor.name} must tell forces up to {sensor.full_scale_n:g} N, but told {largest:g} N.",
+            )
+
+
+class CameraContract(_BedContract):
+    """Tests of a camera; give `open_bed()`."""
+
+    def test_frames_come_in_order_after_their_exposure(self) -> None:
+        """Indices without holes, rising times, and pictures as described."""
+        with self._bed() as bed:
+            camera = bed.camera
+            if camera is None:
+                raise NotApplicable("this bed has no camera")
+            shots = [camera.next() for _ in range(5)]
+            indices = [shot.index for shot in shots]
+            hold(
+                indices == list(range(indices[0], indices[0] + 5)),
+                f"Frames must be counted without holes, but are {indices}.",
+            )
+            for a, b in pairwise(shots):
+                hold(
+                    a.device_s < b.device_s and a.arrived_s < b.arrived_s,
+                    f"Times must rise from frame {a.index} to {b.index}, but are {a.device_s:g} and {b.device_s:g} s "
+                    f"on the camera's clock, {a.arrived_s:g} and {b.arrived_s:g} s on the bed's.",
+                )
+            item = shots[-1].item()
+            hold(item.time_s == shots[-1].device_s, "A frame must bear the time of its shot, but bears another.")
+            described = camera.description
+            if isinstance(item, Frame):
+                size = item.width_px, item.height_px
+                hold(
+                    size == (described.width_px, described.height_px),
+                    f"Frames must be {described.width_px} x {described.height_px} px, as described, but one is {size}.",
+                )
+            least_s, u_s = camera.latency.least_s, camera.latency.u_s
+            hold(least_s >= 0.0 and u_s >= 0.0, f"A latency must not be negative, but is {least_s:g} s +-{u_s:g} s.")
+
+
+def _place_mm(bed: Bed, by_mm: float) -> float:
+    """A place so far from 0, within the limits of the bed."""
+    low, high = bed.limits.lower_mm, bed.limits.upper_mm
+    middle = min(max(0.0, low), high)
+    return min(max(middle + by_mm, low), high)
+
+
+def _speed_mm_s(bed: Bed, wanted_mm_s: float) -> float:
+    return min(wanted_mm_s, bed.actuator.limits.speed_mm_s, bed.limits.speed_mm_s)
+
+
+def _near_mm(bed: Bed) -> float:
+    return bed.actuator.limits.accuracy_mm + 0.5 * bed.actuator.limits.encoder_step_mm + ROUNDING_MM
+
+
+def _known_mm(bed: Bed, speed_mm_s: float) -> float:
+    """How well readings tell the way of a motion: by the encoder's steps, and the time between two readings."""
+    return bed.actuator.limits.encoder_step_mm + 2.0 * WAIT_S * speed_mm_s
+
+
+def _wait(bed: Bed, seconds: float) -> None:
+    bed.clock.wait_until(bed.clock.now_s() + seconds)
+
+
+def _until_rest(bed: Bed) -> tuple[Reading, ...]:
+    """Readings up to the end of the motion, the last of them at rest."""
+    until_s = bed.clock.now_s() + PATIENCE_S
+    seen: list[Reading] = []
+    while bed.actuator.busy:
+        seen += _watched(bed, WAIT_S)
+        hold(
+            bed.clock.now_s() < until_s,
+            f"{bed.actuator.name} must end its motion by itself, but moves for {PATIENCE_S:g} s.",
+        )
+    return (*seen, *bed.actuator.readings())
+
+
+def _watched(bed: Bed, seconds: float) -> tuple[Reading, ...]:
+    """Readings during some time: what does not stream is asked often."""
+    seen: list[Reading] = []
+    until_s = bed.clock.now_s() + seconds
+    while bed.clock.now_s() < until_s:
+        _wait(bed, WAIT_S)
+        seen += bed.actuator.readings()
+    return tuple(seen)
+
+
+def _moved_s(readings: tuple[Reading, ...]) -> float:
+    """How long it moved, by the actuator's own clock: a busy machine looks late, but the readings bear their times."""
+    first, last = readings[0].value, readings[-1].value
+    began_s = max(each.device_s for each in readings if abs(each.value - first) <= 1e-9)
+    ended_s = min(each.device_s for each in readings if abs(each.value - last) <= 1e-9)
+    return ended_s - began_s
+
+
+def _check_order(
+    bed: Bed, readings: Callable[[], tuple[Reading, ...]], name: str, *, asked: bool = True
+) -> list[Reading]:
+    """Look at some readings; `asked`: the newest is taken when it is asked for, not streamed before."""
+    seen: list[Reading] = []
+    for _ in range(5):
+        _wait(bed, 0.04)
+        before_s = bed.clock.now_s()
+        given = readings()
+        hold(bool(given), f"{name} must give at least one reading at each call, but gave none.")
+        newest, now_s = given[-1], bed.clock.now_s()
+        hold(
+            not asked or before_s <= newest.asked_s <= newest.got_s <= now_s,
+            f"{name} must take its newest reading between question and answer ({before_s:.6g} to {now_s:.6g} s), but "
+            f"says {newest.asked_s:.6g} to {newest.got_s:.6g} s.",
+        )
+        seen += given
+    hold(
+        all(a.device_s < b.device_s for a, b in pairwise(seen)) and all(one.asked_s <= one.got_s for one in seen),
+        f"{name} must give its readings in the order of their times, but does not.",
+    )
+    return seen
+
+
+def _refused(act: Callable[[], None], what: str) -> None:
+    try:
+        act()
+    except FingervisionError:
+        return
+    hold(False, f"The actuator must refuse {what} with a FingervisionError, but begins it.")

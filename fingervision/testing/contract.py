@@ -1,0 +1,53 @@
+"""What the contracts share: a failure is a sentence, and a test that does not concern a part says so."""
+
+from typing import Any
+from unittest import SkipTest
+
+
+class ContractError(AssertionError):
+    """A part does not keep its contract: the sentence says what it must do, and what it does."""
+
+
+class NotApplicable(SkipTest):
+    """A test that does not concern this part, with the reason."""
+
+
+def hold(kept: bool, sentence: str) -> None:
+    """Raise the sentence unless the contract is kept."""
+    if not kept:
+        raise ContractError(sentence)
+
+
+def checks_of(contract: type) -> tuple[str, ...]:
+    """Name the tests of a contract, in the order in which they stand in it."""
+    names = [name for base in reversed(contract.__mro__) for name in vars(base) if name.startswith("test_")]
+    return tuple(dict.fromkeys(names))
+
+
+def run(contract: type, **given: Any) -> dict[str, str]:
+    """Run every test of a contract without pytest.
+
+    Parameters
+    ----------
+    contract : type
+        `EffectContract` or another.
+    **given
+        What the contract asks for: `effect=EFFECT`.
+
+    Returns
+    -------
+    dict of str to str
+        The sentence of each test that failed, by the test's name; empty where all passed.
+    """
+    failed = {}
+    for name in checks_of(contract):
+        of = contract()
+        for key, value in given.items():
+            setattr(of, key, value)
+        try:
+            getattr(of, name)()
+        except NotApplicable:
+            continue
+        except Exception as error:
+            failed[name] = str(error) if isinstance(error, ContractError) else f"{type(error).__name__}: {error}"
+    return failed

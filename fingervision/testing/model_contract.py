@@ -1,0 +1,68 @@
+"""What holds for every kind of model of a drawn gripper."""
+
+import numpy as np
+
+from fingervision.models.hinge_correction import HingeTheory
+from fingervision.models.kinds import GripperModel, Kind
+from fingervision.models.physics import LINEAR
+from fingervision.testbed.simulation.sample_gripper import sample_gripper
+from fingervision.testing.contract import hold
+
+RELATIVE = 1e-6
+"""Of the figures beside the answer: both are of the same small displacements."""
+
+
+class ModelContract:
+    """Tests of one kind of model, on the drawing of the paper's sample; give it as `kind`."""
+
+    kind: Kind
+
+    def model(self) -> GripperModel:
+        """Build the model."""
+        return self.kind.build(sample_gripper(), LINEAR, HingeTheory.CORRECTED)
+
+    def test_it_has_the_name_of_its_kind(self) -> None:
+        """`name` is `KIND`."""
+        name = self.model().name
+        hold(name == self.kind.KIND, f"The model must be named {self.kind.KIND}, as its KIND, but is named {name}.")
+
+    def test_its_gap_at_input_zero_is_the_rest_gap(self) -> None:
+        """The answer at 0 is `rest_gap_mm`, and 0 lies in the range of inputs."""
+        model = self.model()
+        low, high = model.input_range_mm
+        hold(low < 0.0 < high, f"The inputs of {self.kind.KIND} must reach from below 0 to above, but are {low, high}.")
+        at_rest = float(model.respond(np.zeros(1)).gap_mm[0])
+        hold(
+            abs(at_rest - model.rest_gap_mm) < RELATIVE * model.rest_gap_mm,
+            f"{self.kind.KIND} must have its rest gap of {model.rest_gap_mm:g} mm at input 0, but has {at_rest:g} mm.",
+        )
+
+    def test_the_gap_opens_with_the_input_and_both_fingers_alike(self) -> None:
+        """A symmetric drawing opens symmetrically, the more the farther it is driven."""
+        model = self.model()
+        low, high = model.input_range_mm
+        answer = model.respond(np.linspace(low, high, 7))
+        hold(bool(np.all(np.diff(answer.gap_mm) > 0.0)), f"{self.kind.KIND} must open with the input, but does not.")
+        apart = float(np.max(np.abs(answer.left_mm + answer.right_mm)))
+        hold(
+            apart < RELATIVE * float(np.max(np.abs(answer.gap_mm))),
+            f"{self.kind.KIND} must move both fingers alike, but their middle moves by {apart:.3g} mm.",
+        )
+
+    def test_its_figures_are_those_of_its_answer(self) -> None:
+        """Gap per input and stiffness are the slopes of the answer."""
+        model, figures = self.model(), self.model().figures()
+        low, high = model.input_range_mm
+        answer = model.respond(np.array([low, 0.0, 0.5 * high]))
+        slope = float((answer.gap_mm[2] - answer.gap_mm[1]) / (0.5 * high))
+        hold(
+            abs(slope - figures.gap_per_input) < RELATIVE * abs(slope),
+            f"{self.kind.KIND} must open by its gap per input of {figures.gap_per_input:g}, but opens by {slope:g}.",
+        )
+        if answer.force_n is not None:
+            stiffness = float(answer.force_n[2] / (0.5 * high))
+            hold(
+                abs(stiffness - figures.input_stiffness_n_mm) < RELATIVE * abs(stiffness),
+                f"{self.kind.KIND} must press with its stiffness of {figures.input_stiffness_n_mm:g} N/mm, but "
+                f"presses with {stiffness:g} N/mm.",
+            )

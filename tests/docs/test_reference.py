@@ -1,0 +1,77 @@
+"""The reference names every key that the program writes or reads, and figures are those of their scripts."""
+
+import dataclasses
+import importlib
+import re
+import sys
+from pathlib import Path
+
+import matplotlib as mpl
+import pytest
+
+from fingervision.domain import gripper
+from fingervision.domain.status import Status
+from fingervision.storage import gaps_csv, mechanism_toml, response_csv, samples_csv
+from fingervision.testbed import recipe_kinds
+
+ROOT = Path(__file__).parents[2]
+FORMATS = (ROOT / "docs" / "reference" / "file_formats.md").read_text(encoding="utf-8")
+NAMED = set(re.findall(r"[\w.]+", FORMATS))
+
+
+def keys_in(*paths: str) -> set[str]:
+    """Keys of the mappings that a module writes."""
+    found: set[str] = set()
+    for path in paths:
+        found |= set(re.findall(r'"([a-z_0-9]+)": ', (ROOT / path).read_text(encoding="utf-8")))
+    return found
+
+
+@pytest.mark.parametrize(
+    ("what", "keys"),
+    [
+        ("gaps.csv", set(gaps_csv.COLUMNS.split(","))),
+        ("status", {str(status) for status in Status}),
+        ("samples.csv", set(samples_csv.COLUMNS.split(","))),
+        ("response.csv", set(response_csv.COLUMNS)),
+        ("report.json", keys_in("fingervision/storage/report_json.py")),
+        ("calibration.json", keys_in("fingervision/storage/calibration_json.py") - {"tilt", "value", "stated"}),
+        (
+            "gripper.toml",
+            {
+                field.name
+                for record in (gripper.Material, gripper.Body, gripper.Hinge, gripper.Lever, gripper.Links)
+                for field in dataclasses.fields(record)
+            },
+        ),
+        ("mechanism.toml", {*mechanism_toml._TOP, *mechanism_toml._SHAPES, *mechanism_toml._FLEXURES}),
+    ],
+)
+def test_every_key_stands_in_the_reference(what: str, keys: set[str]) -> None:
+    missing = {key for key in keys if key not in NAMED}
+    assert not missing, f"docs/reference/file_formats.md says nothing of these keys of {what}: {sorted(missing)}"
+
+
+def test_every_key_of_a_recipe_stands_in_the_reference() -> None:
+    page = (ROOT / "docs" / "reference" / "recipes.md").read_text(encoding="utf-8")
+    for name in recipe_kinds.step_kinds():
+        for key in importlib.import_module(f"{recipe_kinds.__name__}.{name}").KEYS:
+            assert f"`{key}`" in page, f"{key} of {name}"
+
+
+@pytest.mark.parametrize("path", sorted((ROOT / "docs" / "figures").glob("*.svg")), ids=lambda path: path.stem)
+def test_a_figure_is_what_its_script_draws(path: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    drawn_by = re.search(r"Matplotlib v([\d.]+)", path.read_text(encoding="utf-8"))
+    assert drawn_by is not None
+    if drawn_by[1] != mpl.__version__:
+        pytest.skip(f"drawn by Matplotlib {drawn_by[1]}, here is {mpl.__version__}")
+    monkeypatch.setattr(sys, "path", [str(ROOT / "docs" / "figures"), *sys.path])
+    make = importlib.import_module("make")
+    monkeypatch.setattr(make, "SCRIPTS", [path.stem])
+    (made,) = make.make(tmp_path)
+    # Numbers may differ in their last digits between machines.
+    assert _numbers(made) == pytest.approx(_numbers(path), abs=0.01)
+
+
+def _numbers(path: Path) -> list[float]:
+    return [float(number) for number in re.findall(r"(?<![\w#])-?\d+\.\d+", path.read_text(encoding="utf-8"))]
