@@ -2,12 +2,12 @@
 
     python -m tests.benchmarks.gauges [--each 40] [--only patches photographs lines circles markers cost silence]
 
-patches      rendered textures moved by tenths of a pixel: bias and SD of shift_x, SD over the bound from the gradient of
-             the noiseless picture (both pictures have noise: sigma sqrt(2) (H^-1)^(1/2)), stated u over SD, share of the
-             three numbers within 1.96 u
+patches      rendered textures moved by tenths of a pixel: bias and SD of shift_x, SD over the bound from the gradient
+             of the noiseless picture (both pictures have noise: sigma sqrt(2) (H^-1)^(1/2)), stated u over SD, share of
+             the three numbers within 1.96 u
 photographs  textures that scikit-image ships (gravel, grass), moved by whole pixels and binned by 10, once seen through
              optics of 0.7 px and once without (aliased): bias at shifts of 0.1 to 0.9 px, and the median stated u
-lines        angle: RMS over the Cramer-Rao bound of a step with known levels and blur, over stated u, share within 1.96 u
+lines        angle: RMS over the Cramer-Rao bound of a step with known levels and blur, over stated u; within 1.96 u
 circles      RMS of the centre at radius 20, noise 2, blur 0.9; bias of the diameter; share within 1.96 u
 markers      RMS of the middle, over the stated u (the bound of a mark of known shape), share within 1.96 u
 cost         milliseconds of one core a frame (640x480): 1, 2 and 3 edges, 20 patches of 31 px; least and median frame
