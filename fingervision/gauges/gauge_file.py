@@ -107,6 +107,6 @@ def check_gauges(gauges: tuple[Gauge, ...], width_px: int, height_px: int) -> No
             size = getattr(gauge.spec, key, 0.0)
             if size > largest:
                 raise FingervisionError(
-                    f"The gauge {gauge.name!r} must be smaller than the frame of {width_px}x{height_px} pixels, but its "
-                    f"{key} is {size:g}: lower it."
+                    f"The gauge {gauge.name!r} must be smaller than the frame of {width_px}x{height_px} pixels, but "
+                    f"its {key} is {size:g}: lower it."
                 )
