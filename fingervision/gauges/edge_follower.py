@@ -269,7 +269,7 @@ def fit_near(
         and min(abs(step.position_px - own.position_px) for own in chosen) < reach + 2.0
     ]
     beside = sorted(beside, key=lambda step: -abs(step.contrast))[:2]
-    starts = tuple(EdgeStart(step.position_px, follower.slope) for step in (*chosen, *beside))
+    starts = tuple(EdgeStart(step.position_px, follower.slope, step.contrast) for step in (*chosen, *beside))
     x, y = follower.axes.point(follower.at_px)
     band = Band(x, y, follower.axes.direction_rad, follower.length_px)
     places = [start.position_px for start in starts]

@@ -21,6 +21,8 @@ from fingervision.storage.toml_section import Section, read_document
 SCHEMA = 1
 # A table of a thousand gauges and a name of a hundred characters are slips.
 MOST_GAUGES, LONGEST_NAME = 1000, 100
+# Keys of a gauge's size; what is larger than the frame's diagonal can never be in view.
+SIZES = ("length_px", "distance_px", "diameter_px", "width_px", "height_px", "size_px")
 
 
 @dataclass(frozen=True, slots=True)
@@ -100,3 +102,11 @@ def check_gauges(gauges: tuple[Gauge, ...], width_px: int, height_px: int) -> No
                 f"The gauge {gauge.name!r} must have its middle inside the frame of {width_px}x{height_px} pixels, but "
                 f"x_px = {x:g}, y_px = {y:g}: move it there."
             )
+        largest = (width_px**2 + height_px**2) ** 0.5
+        for key in SIZES:
+            size = getattr(gauge.spec, key, 0.0)
+            if size > largest:
+                raise FingervisionError(
+                    f"The gauge {gauge.name!r} must be smaller than the frame of {width_px}x{height_px} pixels, but "
+                    f"its {key} is {size:g}: lower it."
+                )

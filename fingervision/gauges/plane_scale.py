@@ -80,7 +80,12 @@ class PlaneScale:
         """What all frames share of the uncertainty of one edge: half of the edge bias, phase, camera response."""
         if not isinstance(self.scale, Calibration):
             return 0.0
-        return hypot(0.5 * self.scale.u_edge_bias_px, rectangular(self.scale.limits.estimator_px), u_response_px)
+        return hypot(0.5 * self.scale.u_edge_bias_px, self.u_phase_px, u_response_px)
+
+    @property
+    def u_phase_px(self) -> float:
+        """What the sub-pixel phase leaves open of an edge or a registered patch (`estimator_px` of the calibration)."""
+        return rectangular(self.scale.limits.estimator_px) if isinstance(self.scale, Calibration) else 0.0
 
     @property
     def u_angle_rad(self) -> float:

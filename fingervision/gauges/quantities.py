@@ -163,11 +163,13 @@ class Shift:
         return Cell(x * cos(self.direction_rad) + y * sin(self.direction_rad), self.u_px, "px")
 
     def on_plane(self, flat: tuple[Point, ...], scale: PlaneScale) -> Cell:
-        """Millimetres; whatever bias both pictures share cancels."""
+        """Millimetres; whatever bias both pictures share cancels, a registration's phase bias does not."""
         (x, y), (to_x, to_y) = flat
         moved_px = (to_x - x) * cos(self.direction_rad) + (to_y - y) * sin(self.direction_rad)
         shared_px = scale.relative_u(self.from_px, self.direction_rad) * moved_px
-        return Cell(moved_px / scale.px_per_mm, hypot(self.u_px, shared_px) / scale.px_per_mm, "mm")
+        # In the first frame nothing was registered: the shift is zero by definition.
+        phase_px = scale.u_phase_px if self.u_px > 0.0 else 0.0
+        return Cell(moved_px / scale.px_per_mm, hypot(self.u_px, shared_px, phase_px) / scale.px_per_mm, "mm")
 
 
 @dataclass(frozen=True, slots=True)

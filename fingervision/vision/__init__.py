@@ -3,6 +3,7 @@
 The fits that serve any picture are public here; they need NumPy, SciPy and OpenCV only.
 """
 
+from fingervision.vision.circle_fit import Circle, NoCircleFitError, fit_circle
 from fingervision.vision.patch_registration import PatchReference, Registered, patch_reference, register
 from fingervision.vision.straight_edge_fit import (
     Band,
@@ -11,15 +12,22 @@ from fingervision.vision.straight_edge_fit import (
     StraightEdges,
     fit_straight_edges,
 )
+from fingervision.vision.symmetry_fit import NoSymmetryError, Symmetric, fit_symmetry
 
 __all__ = [
     "Band",
+    "Circle",
     "EdgeStart",
+    "NoCircleFitError",
     "NoEdgeFitError",
+    "NoSymmetryError",
     "PatchReference",
     "Registered",
     "StraightEdges",
+    "Symmetric",
+    "fit_circle",
     "fit_straight_edges",
+    "fit_symmetry",
     "patch_reference",
     "register",
 ]

@@ -44,6 +44,7 @@ class _Bins:
     size: int
     half: int
     count: Floats
+    usual: float
 
 
 @lru_cache(maxsize=512)
@@ -59,7 +60,7 @@ def _bins(direction_rad: float, slope: float, length_px: float, half: int) -> _B
     rows, columns = np.nonzero(kept)
     chosen, share = strip[kept], (t - np.floor(t))[kept]
     count = _summed(chosen, share, np.ones(chosen.size), 2 * half + 1)
-    return _Bins(rows - radius, columns - radius, chosen, share, 2 * half + 1, half, count)
+    return _Bins(rows - radius, columns - radius, chosen, share, 2 * half + 1, half, count, float(np.median(count)))
 
 
 def _summed(strip: NDArray[np.intp], share: Floats, values: Floats, size: int) -> Floats:
@@ -136,8 +137,11 @@ def profile(
     safe = np.maximum(count, 1.0)
     mean = total / safe
     inner = np.maximum(squares - total * mean, 0.0)
-    variance = float(np.median(inner[count > 1.0] / (count[count > 1.0] - 1.0))) if np.any(count > 1.0) else 0.0
-    return Profile(mean, count / np.maximum(bins.count, 1.0), variance, float(np.median(bins.count)), half)
+    full = count > 1.0
+    # Strips that an edge lies in spread more, however the edge leans: the middle strip tells what the others do.
+    ordered = np.sort(inner[full] / (count[full] - 1.0))
+    variance = float(ordered[ordered.size // 2]) if ordered.size else 0.0
+    return Profile(mean, count / np.maximum(bins.count, 1.0), variance, bins.usual, half)
 
 
 def candidates(found: Profile) -> list[StepCandidate]:

@@ -103,7 +103,7 @@ def _prefilter() -> Floats:
 
 
 @cache
-def _derivative_power() -> float:
+def derivative_power() -> float:
     """Variance of the spline's derivative at a pixel for unit noise of the pixels."""
     kernel = np.convolve(_prefilter().astype(np.float64), [0.5, 0.0, -0.5])
     return float(kernel @ kernel)
@@ -116,6 +116,12 @@ def _phase_power(steps: int = 64) -> Doubles:
     weights = np.stack(_weights(fraction), axis=1)
     kernel = _prefilter().astype(np.float64)
     return np.array([np.sum(np.convolve(kernel, w) ** 2) for w in weights])
+
+
+def interpolated_power(place_px: float) -> float:
+    """Variance of a level interpolated at a place along one axis, for unit noise of the pixels."""
+    table = _phase_power()
+    return float(table[round((place_px % 1.0) * table.size) % table.size])
 
 
 def _weights(fraction: NDArray[np.floating]) -> tuple[NDArray[np.floating], ...]:
@@ -255,7 +261,7 @@ def register(
     rim = max(first.half_width_px, first.half_height_px)
     x, y, turn = (start[:, i] - (origins_px[:, i] if i < 2 else 0.0) for i in range(3))
     settled, inside = np.zeros(count, dtype=bool), np.ones(count, dtype=bool)
-    residual, gain = np.zeros_like(own), np.ones(count)
+    residual, gain = np.zeros_like(own), np.ones(count, dtype=np.float64)
     correlation = np.zeros(count)
     at = np.arange(count)
     for _iteration in range(ITERATIONS):
@@ -294,15 +300,12 @@ def register(
         if not at.size:
             break
     settled &= inside
-    covariance, noise = _covariance(
-        hessian, np.asarray(inverse, dtype=np.float64), residual, gain, x, y, dx, dy, shared_pixels
-    )
+    covariance, noise = _covariance(hessian, residual, gain, x, y, dx, dy, shared_pixels)
     return Registered(x + origins_px[:, 0], y + origins_px[:, 1], turn, covariance, correlation, noise, settled)
 
 
 def _covariance(
     hessian: Doubles,
-    inverse: Doubles,
     residual: Floats,
     gain: Doubles,
     x: Doubles,
@@ -327,21 +330,20 @@ def _covariance(
     spread = one * (1.0 + gain**2) * shared_pixels
     noisy = np.zeros((count, 3, 3))
     turned = float((dx.astype(np.float64) ** 2 + dy.astype(np.float64) ** 2).sum())
-    noisy[:, 0, 0] = noisy[:, 1, 1] = one * n * _derivative_power()
-    noisy[:, 2, 2] = one * turned * _derivative_power()
-    covariance = np.stack(
-        [_propagated(hessian[k], noisy[k], spread[k]) for k in range(count)] if count else [np.zeros((3, 3))]
-    )
-    return covariance, np.sqrt(one)
+    noisy[:, 0, 0] = noisy[:, 1, 1] = one * n * derivative_power()
+    noisy[:, 2, 2] = one * turned * derivative_power()
+    return _propagated(hessian, noisy, spread), np.sqrt(one)
 
 
-def _propagated(hessian: Doubles, noisy: Doubles, spread: float) -> Doubles:
+def _propagated(hessian: Doubles, noisy: Doubles, spread: Doubles) -> Doubles:
+    """Covariances of k patches, shape (k, 3, 3); infinite where gradients are those of noise or of one direction."""
     true = hessian - noisy
-    size = np.sqrt(np.maximum(np.diag(hessian), 1e-30))
-    if not np.linalg.eigvalsh(true / np.outer(size, size))[0] > LEAST_INFORMATION:
-        return np.diag([np.inf] * 3)
-    own = np.linalg.inv(true)
-    return np.asarray(spread * own @ hessian @ own)
+    size = np.sqrt(np.maximum(np.einsum("kii->ki", hessian), 1e-30))
+    least = np.linalg.eigvalsh(true / (size[:, :, None] * size[:, None, :]))[:, 0]
+    is_sound = least > LEAST_INFORMATION
+    own = np.linalg.inv(np.where(is_sound[:, None, None], true, np.eye(3)))
+    covariance = spread[:, None, None] * (own @ hessian @ own)
+    return np.where(is_sound[:, None, None], covariance, np.diag([np.inf] * 3))
 
 
 def reference_covariance(reference: PatchReference, noise: float) -> Doubles:
@@ -359,5 +361,5 @@ def reference_covariance(reference: PatchReference, noise: float) -> Doubles:
     dx, dy, _ = _grid(reference.half_width_px, reference.half_height_px)
     variance = max(noise**2, ROUNDING)
     turned = float((dx.astype(np.float64) ** 2 + dy.astype(np.float64) ** 2).sum())
-    noisy = variance * _derivative_power() * np.diag([dx.size, dx.size, turned])
-    return _propagated(reference.hessian, noisy, 2.0 * variance)
+    noisy = variance * derivative_power() * np.diag([dx.size, dx.size, turned])
+    return np.asarray(_propagated(reference.hessian[None], noisy[None], np.array([2.0 * variance]))[0])

@@ -70,10 +70,13 @@ class EdgeStart:
         t where s is 0.
     slope : float
         Change of t with s.
+    contrast : float or None
+        Level beyond less level before; None where nothing is known of it.
     """
 
     position_px: float
     slope: float = 0.0
+    contrast: float | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -191,6 +194,8 @@ def fit_straight_edges(
     t, s = _axes(levels.shape, origin_px, band)
     along = np.abs(s) <= 0.5 * band.length_px
     state = _State(np.array([each.position_px for each in starts]), np.array([each.slope for each in starts]), blur_px)
+    contrasts = [each.contrast for each in starts if each.contrast is not None]
+    state.contrast = np.array(contrasts) if len(contrasts) == len(starts) else None
     fitted_reach, at = 0.0, state.position.copy()
     for _iteration in range(ITERATIONS):
         reach = reach_px(state.blur_px)

@@ -48,7 +48,7 @@ def best_match(part: Floats, template: Floats, beyond_px: int = BEYOND_PX) -> Ma
     beyond_px : int
         Places so near the border of the search are looked at only to see whether the best one's lobe ends.
     """
-    seen = cv2.matchTemplate(part, template, cv2.TM_CCOEFF_NORMED)
+    seen = np.asarray(cv2.matchTemplate(part, template, cv2.TM_CCOEFF_NORMED), dtype=np.float32)
     # A part without any contrast has no correlation.
     np.clip(seen, -1.0, 1.0, out=seen)
     inner = seen[beyond_px : seen.shape[0] - beyond_px, beyond_px : seen.shape[1] - beyond_px]

@@ -5,13 +5,13 @@ from pathlib import Path
 import pytest
 
 from fingervision.domain.errors import FingervisionError
-from fingervision.gauges.gauge_file import read_gauges
+from fingervision.gauges.gauge_file import Gauge, check_gauges, read_gauges
 from fingervision.gauges.kinds import kind_named, kinds
 
 EDGE = 'name = "a"\nkind = "edge"\nx_px = 10\ny_px = 20.5\ndirection_deg = 90\nlength_px = 30\n'
 
 
-def _read(folder: Path, text: str) -> object:
+def _read(folder: Path, text: str) -> tuple[Gauge, ...]:
     path = folder / "gauges.toml"
     path.write_text(text, encoding="utf-8")
     return read_gauges(path)
@@ -63,6 +63,12 @@ def test_what_cannot_be_meant_is_said_in_a_sentence(tmp_path: Path, text: str, f
 def test_a_file_that_is_not_there(tmp_path: Path) -> None:
     with pytest.raises(FingervisionError, match="no gauge file"):
         read_gauges(tmp_path / "gauges.toml")
+
+
+def test_a_gauge_that_is_larger_than_the_frame_is_refused(tmp_path: Path) -> None:
+    gauges = _read(tmp_path, _with("length_px", "length_px = 5000"))
+    with pytest.raises(FingervisionError, match=r"'a'.*640x480.*length_px is 5000"):
+        check_gauges(gauges, 640, 480)
 
 
 def test_every_kind_says_what_it_reads_and_gives() -> None:

@@ -1,0 +1,209 @@
+"""Centre and diameter of a disc or hole."""
+
+from dataclasses import dataclass
+from math import ceil, hypot, sqrt
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from fingervision.gauges import common_keys
+from fingervision.gauges.edge_follower import (
+    CONTRAST_FLOOR,
+    GUARD,
+    LARGEST_BLUR_PX,
+    LEAST_OF_KNOWN,
+    LEAST_PIECE,
+    LEAST_SURE_PX,
+    MOST_NOISE,
+    MOST_OF_KNOWN,
+    MOST_TIMES,
+)
+from fingervision.gauges.picture import Picture
+from fingervision.gauges.quantities import Distance, Position
+from fingervision.gauges.reading import Mark, Reading
+from fingervision.gauges.status import GaugeStatus
+from fingervision.storage.toml_section import Section
+from fingervision.vision.circle_fit import Circle, NoCircleFitError, fit_circle
+from fingervision.vision.response_shift import edge_shift_px
+from fingervision.vision.straight_edge_fit import reach_px
+from fingervision.vision.template_search import BEYOND_PX, best_match
+
+KEYS = ("x_px", "y_px", "diameter_px", "reach_px", "polarity")
+QUANTITIES = (("x", "length"), ("y", "length"), ("diameter", "length"))
+POLARITIES = {"any": 0, "light": 1, "dark": -1}
+SMALLEST_PX, LARGEST_PX = 5.0, 5000.0
+# A disc is looked for in a picture made smaller until its radius is this; the fit then starts a pixel off.
+SEARCH_RADIUS_PX = 8.0
+# Diameters that are tried in the first frame, as shares of the stated one; and how far it may be off afterwards.
+TRIED = (0.8, 0.9, 1.0, 1.1, 1.25)
+LEAST_STATED, MOST_STATED, MOST_GROWTH = 0.7, 1.4, 0.1
+# Correlation of a disc with a picture of one, its surroundings half as wide as its radius.
+LEAST_CORRELATION, SURROUNDINGS = 0.6, 0.5
+# Sixteenths of the outline that stray from the circle by more than this share of the radius: another shape.
+MOST_UNROUND = 0.05
+
+
+@dataclass(frozen=True, slots=True)
+class CircleSpec:
+    """Keys of a circle: its centre and diameter in the first frame, how far it may move, and its tone."""
+
+    middle_px: tuple[float, float]
+    diameter_px: float
+    reach_px: float
+    polarity: int
+
+    def follower(self) -> "FollowedCircle":
+        """Begin a recording."""
+        return FollowedCircle(self)
+
+
+def read(section: Section) -> CircleSpec:
+    """Read one gauge's keys."""
+    return CircleSpec(
+        common_keys.middle(section),
+        section.number("diameter_px", low=SMALLEST_PX, high=LARGEST_PX),
+        common_keys.reach(section),
+        POLARITIES[section.word("polarity", "any", of=POLARITIES)],
+    )
+
+
+class FollowedCircle:
+    """One disc in the frames of one recording."""
+
+    def __init__(self, spec: CircleSpec) -> None:
+        self._spec = spec
+        self._at = (*spec.middle_px, 0.5 * spec.diameter_px)
+        self._known: Circle | None = None
+        self._times = 1.0
+
+    def _zone(self) -> Mark:
+        x, y, radius = self._at
+        half = radius + self._spec.reach_px
+        return Mark(tuple((x + a * half, y + b * half) for a, b in ((-1, -1), (1, -1), (1, 1), (-1, 1), (-1, -1))))
+
+    def measured(self, picture: Picture) -> Reading:
+        """Measure the next frame."""
+        zone = self._zone()
+        found = self._found(picture)
+        if not isinstance(found, Circle):
+            self._times = min(self._times + 1.0, MOST_TIMES) if self._known is not None else 1.0
+            status, words = found
+            return Reading(status, zone=zone, words=words)
+        self._known, self._times = found, 1.0
+        self._at = (found.x_px, found.y_px, found.radius_px)
+        u_x, u_y, u_radius = (sqrt(float(found.covariance[i, i])) for i in range(3))
+        centre, radius = (found.x_px, found.y_px), found.radius_px
+        ends = ((centre[0] - radius, centre[1]), (centre[0] + radius, centre[1]))
+        quantities = (
+            Position(centre, 0.0, u_x),
+            Position(centre, 0.5 * np.pi, u_y),
+            Distance(*ends, 2.0 * u_radius, 1 if found.contrast > 0.0 else -1, _u_response(picture, found)),
+        )
+        turn = np.linspace(0.0, 2.0 * np.pi, 61)
+        outline = tuple((centre[0] + radius * float(np.cos(a)), centre[1] + radius * float(np.sin(a))) for a in turn)
+        return Reading(GaugeStatus.OK, quantities, (Mark(outline), Mark((centre,))), zone)
+
+    def _found(self, picture: Picture) -> Circle | tuple[GaugeStatus, str]:
+        x, y, _ = self._at
+        start = self._start(picture)
+        if isinstance(start[0], GaugeStatus):
+            return start[0], str(start[1])
+        at_x, at_y, at_radius, slack = start
+        blur = self._known.blur_px if self._known is not None else 1.2
+        wide = hypot(blur, slack)
+        half = ceil(at_radius + reach_px(wide) + 2.0)
+        levels, origin = picture.part(round(at_x) - half, round(at_y) - half, 2 * half + 1, 2 * half + 1)
+        try:
+            found = fit_circle(levels, origin, (at_x, at_y, at_radius), wide, picture.shared_pixels)
+        except (NoCircleFitError, np.linalg.LinAlgError) as why:
+            return GaugeStatus.NOT_FOUND, str(why)
+        refused = self._refused(picture, found)
+        if refused is not None:
+            return refused
+        reach = self._spec.reach_px * self._times
+        if hypot(found.x_px - x, found.y_px - y) > reach + 1.0:
+            return GaugeStatus.NOT_FOUND, "it lies farther away than it may have moved"
+        return found
+
+    def _refused(self, picture: Picture, found: Circle) -> tuple[GaugeStatus, str] | None:
+        radius, stated = found.radius_px, 0.5 * self._spec.diameter_px
+        band = radius + reach_px(found.blur_px) - 2.0
+        if not picture.holds(found.x_px - band, found.y_px - band, 2.0 * band, 2.0 * band):
+            return GaugeStatus.OUT_OF_VIEW, ""
+        if found.blur_px >= LARGEST_BLUR_PX:
+            return GaugeStatus.BLURRED, ""
+        if abs(found.contrast) < CONTRAST_FLOOR * picture.top or found.noise > MOST_NOISE * abs(found.contrast):
+            return GaugeStatus.NOT_FOUND, "too little contrast"
+        if self._spec.polarity * found.contrast < 0.0:
+            return GaugeStatus.NOT_FOUND, "of the other tone"
+        if found.least_piece < LEAST_PIECE or found.unround_px > MOST_UNROUND * radius:
+            return GaugeStatus.NOT_FOUND, "its outline is no whole circle"
+        if not LEAST_STATED * stated <= radius <= MOST_STATED * stated:
+            return GaugeStatus.NOT_FOUND, "of another diameter"
+        known = self._known
+        if known is not None and not (
+            abs(radius / known.radius_px - 1.0) < MOST_GROWTH
+            and LEAST_OF_KNOWN <= found.contrast / known.contrast <= MOST_OF_KNOWN
+        ):
+            return GaugeStatus.NOT_FOUND, "of another diameter or contrast"
+        if not 0.0 < float(np.max(np.diag(found.covariance))) < LEAST_SURE_PX**2:
+            return GaugeStatus.LOW_CONTRAST, ""
+        return None
+
+    def _start(self, picture: Picture) -> tuple[float, float, float, float] | tuple[GaugeStatus, str]:
+        """Coarse centre and radius, and how far off they may be."""
+        x, y, radius = self._at
+        tried = TRIED if self._known is None else (1.0,)
+        by = max(1, int(radius / SEARCH_RADIUS_PX))
+        reach = GUARD * self._spec.reach_px * self._times
+        half = ceil((radius * max(tried) * (1.0 + SURROUNDINGS) + reach) / by) + BEYOND_PX + 2
+        side = (2 * half + 1) * by
+        left, top = round(x) - side // 2, round(y) - side // 2
+        levels, origin = picture.part(left, top, side, side)
+        if levels.shape != (side, side):
+            if min(levels.shape) < 2:
+                return GaugeStatus.OUT_OF_VIEW, ""
+            before = (origin[0] - left, origin[1] - top)
+            after = (side - levels.shape[1] - before[0], side - levels.shape[0] - before[1])
+            levels = np.pad(levels, ((before[1], after[1]), (before[0], after[0])), mode="edge")
+        small = levels.reshape(2 * half + 1, by, 2 * half + 1, by).mean(axis=(1, 3)).astype(np.float32)
+        sign = self._spec.polarity if self._known is None else (1 if self._known.contrast > 0.0 else -1)
+        best = None
+        for share in tried:
+            template = _disc(share * radius / by)
+            places = half - template.shape[0] // 2 - ceil(reach / by)
+            beyond = max(min(places, half - template.shape[0] // 2 - 1), 1)
+            for tone in (1, -1) if sign == 0 else (sign,):
+                match = best_match(small, tone * template, beyond)
+                if best is None or match.correlation > best[0].correlation:
+                    best = (match, share)
+        assert best is not None  # noqa: S101 - there are diameters to try
+        match, share = best
+        if match.correlation < LEAST_CORRELATION:
+            return GaugeStatus.NOT_FOUND, ""
+        if not match.is_alone:
+            return GaugeStatus.AMBIGUOUS, "another disc lies within 1.5 reach_px"
+        at_x, at_y = (corner + (place + 0.5) * by - 0.5 for corner, place in ((left, match.x_px), (top, match.y_px)))
+        slack = 0.3 * by + (0.05 * radius if self._known is None else 0.0)
+        return at_x, at_y, share * radius, min(slack, 2.5)
+
+
+def _disc(radius: float) -> NDArray[np.float32]:
+    """A soft disc with its surroundings."""
+    half = ceil(radius * (1.0 + SURROUNDINGS)) + 1
+    y, x = np.mgrid[-half : half + 1, -half : half + 1]
+    disc = np.clip(radius + 0.5 - np.hypot(x, y), 0.0, 1.0).astype(np.float32)
+    return np.asarray(cv2.GaussianBlur(disc, (0, 0), 0.7), dtype=np.float32)
+
+
+def _u_response(picture: Picture, found: Circle) -> float:
+    """What an unknown camera response leaves open of the outline."""
+    other = picture.settings.other_response
+    if other is None:
+        return 0.0
+    # The fit's levels are not kept; an outline of this contrast in the middle of the scale stands for it.
+    share = min(abs(found.contrast) / picture.top, 1.0)
+    levels = (0.5 - 0.5 * share, 0.5 + 0.5 * share)
+    shift: float = edge_shift_px(picture.settings.response, other, *levels, found.blur_px)
+    return abs(shift) / float(np.sqrt(3.0))

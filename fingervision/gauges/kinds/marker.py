@@ -1,0 +1,187 @@
+"""Where a printed mark is: a dot, a cross, or a corner of a chessboard."""
+
+from dataclasses import dataclass
+from math import ceil, hypot, sqrt
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fingervision.gauges import common_keys
+from fingervision.gauges.edge_follower import CONTRAST_FLOOR, GUARD, MOST_TIMES
+from fingervision.gauges.picture import Picture
+from fingervision.gauges.quantities import Position
+from fingervision.gauges.reading import Mark, Reading
+from fingervision.gauges.status import GaugeStatus
+from fingervision.storage.toml_section import Section
+from fingervision.vision.symmetry_fit import BEYOND_PX as WINDOW_BEYOND_PX
+from fingervision.vision.symmetry_fit import NoSymmetryError, Symmetric, fit_symmetry
+from fingervision.vision.template_search import BEYOND_PX, best_match
+
+KEYS = ("x_px", "y_px", "size_px", "shape", "reach_px")
+QUANTITIES = (("x", "length"), ("y", "length"))
+SHAPES = ("dot", "cross", "corner")
+SMALLEST_PX, LARGEST_PX = 7.0, 301.0
+# A mark is the same after half a turn, but for noise of a third of its own spread.
+LEAST_SYMMETRY = 0.9
+# Rings of a dot are of one level; a cross is the same after a quarter turn and no dot; a chessboard's corner is its own
+# negative then.
+LEAST_ROUND, LEAST_QUARTER = 0.9, 0.75
+# In the first frame the middle is looked for within this share of the mark's size of where it was stated.
+NEAR = 0.35
+# From frame to frame it looks like itself (zero-normalised correlation, as for patches).
+LEAST_CORRELATION = 0.7
+# A middle that is less sure than this (pixels) is none.
+LEAST_SURE_PX = 0.5
+
+
+@dataclass(frozen=True, slots=True)
+class MarkerSpec:
+    """Keys of a mark: its middle in the first frame, a window that holds it, its shape, how far it may move."""
+
+    middle_px: tuple[float, float]
+    size_px: float
+    shape: str
+    reach_px: float
+
+    def follower(self) -> "FollowedMarker":
+        """Begin a recording."""
+        return FollowedMarker(self)
+
+
+def read(section: Section) -> MarkerSpec:
+    """Read one gauge's keys."""
+    return MarkerSpec(
+        common_keys.middle(section),
+        section.number("size_px", low=SMALLEST_PX, high=LARGEST_PX),
+        section.word("shape", of=SHAPES),
+        common_keys.reach(section),
+    )
+
+
+class FollowedMarker:
+    """One mark in the frames of one recording."""
+
+    def __init__(self, spec: MarkerSpec) -> None:
+        self._spec = spec
+        self._half = max(int(spec.size_px) // 2, 3)
+        self._at = spec.middle_px
+        self._template: NDArray[np.float32] | None = None
+        self._times = 1.0
+
+    def _zone(self) -> Mark:
+        (x, y), half = self._at, self._half
+        return Mark(tuple((x + a * half, y + b * half) for a, b in ((-1, -1), (1, -1), (1, 1), (-1, 1), (-1, -1))))
+
+    def measured(self, picture: Picture) -> Reading:
+        """Measure the next frame."""
+        zone = self._zone()
+        found = self._found(picture)
+        if isinstance(found[0], GaugeStatus):
+            self._times = min(self._times + 1.0, MOST_TIMES) if self._template is not None else 1.0
+            status, words = found
+            return Reading(status, zone=zone, words=words)
+        (x, y), covariance = found
+        self._at, self._times = (x, y), 1.0
+        quantities = (
+            Position((x, y), 0.0, sqrt(float(covariance[0, 0]))),
+            Position((x, y), 0.5 * np.pi, sqrt(float(covariance[1, 1]))),
+        )
+        return Reading(GaugeStatus.OK, quantities, (Mark(((x, y),)),), zone)
+
+    def _found(self, picture: Picture) -> tuple[tuple[float, float], NDArray[np.float64]] | tuple[GaugeStatus, str]:
+        near = self._near(picture)
+        if isinstance(near[0], GaugeStatus):
+            return near[0], str(near[1])
+        best: tuple[Symmetric, tuple[float, float]] | None = None
+        status, words = GaugeStatus.NOT_FOUND, ""
+        for start in near:
+            fitted = self._fitted(picture, start)
+            if isinstance(fitted[0], GaugeStatus):
+                status, words = fitted[0], str(fitted[1])
+            elif best is None or fitted[0].half_turn > best[0].half_turn:
+                best = fitted
+        if best is None:
+            return status, words
+        found, place = best
+        away = hypot(place[0] - self._at[0], place[1] - self._at[1])
+        first_reach = min(self._spec.reach_px, NEAR * self._spec.size_px)
+        if away > (first_reach if self._template is None else self._spec.reach_px * self._times) + 1.0:
+            return GaugeStatus.NOT_FOUND, "it lies farther away than it may have moved"
+        if self._template is None:
+            refused = self._taken(picture, place)
+            if refused is not None:
+                return refused
+        return place, found.covariance
+
+    def _near(self, picture: Picture) -> list[tuple[float, float]] | tuple[GaugeStatus, str]:
+        """First guesses of the middle."""
+        x, y = self._at
+        if self._template is None:
+            step = max(NEAR * self._spec.size_px * 0.7, 1.0)
+            reach = min(self._spec.reach_px, NEAR * self._spec.size_px)
+            offsets = [0.0] if step > reach else [-step, 0.0, step]
+            return [(x + across, y + down) for across in offsets for down in offsets]
+        half = self._half + ceil(GUARD * self._spec.reach_px * self._times) + BEYOND_PX
+        levels, (left, top) = picture.part(round(x) - half, round(y) - half, 2 * half + 1, 2 * half + 1)
+        least = 2 * (self._half + BEYOND_PX) + 3
+        if min(levels.shape) < least:
+            return GaugeStatus.OUT_OF_VIEW, ""
+        match = best_match(levels.astype(np.float32), self._template)
+        is_cut = levels.shape != (2 * half + 1, 2 * half + 1)
+        if match.correlation < LEAST_CORRELATION:
+            return (GaugeStatus.OUT_OF_VIEW if is_cut else GaugeStatus.NOT_FOUND), ""
+        if not match.is_alone:
+            return (GaugeStatus.OUT_OF_VIEW if is_cut else GaugeStatus.AMBIGUOUS), ""
+        return [(left + match.x_px, top + match.y_px)]
+
+    def _fitted(
+        self, picture: Picture, start: tuple[float, float]
+    ) -> tuple[Symmetric, tuple[float, float]] | tuple[GaugeStatus, str]:
+        half = self._half + WINDOW_BEYOND_PX + ceil(NEAR * self._spec.size_px)
+        left, top = round(start[0]) - half, round(start[1]) - half
+        levels, origin = picture.part(left, top, 2 * half + 1, 2 * half + 1)
+        width, height = levels.shape[1], levels.shape[0]
+        if min(width, height) < 2 * (self._half + 4):
+            return GaugeStatus.OUT_OF_VIEW, ""
+        try:
+            found = fit_symmetry(
+                levels.astype(np.float32), (start[0] - origin[0], start[1] - origin[1]), self._half,
+                picture.shared_pixels,
+            )  # fmt: skip
+        except NoSymmetryError as why:
+            is_cut = (width, height) != (2 * half + 1, 2 * half + 1)
+            return (GaugeStatus.OUT_OF_VIEW if is_cut else GaugeStatus.NOT_FOUND), str(why)
+        except np.linalg.LinAlgError:
+            return GaugeStatus.LOW_CONTRAST, ""
+        if found.spread < CONTRAST_FLOOR * picture.top:
+            return GaugeStatus.LOW_CONTRAST, ""
+        if found.half_turn < LEAST_SYMMETRY:
+            return GaugeStatus.NOT_FOUND, "it does not look the same after half a turn"
+        if not self._has_shape(found):
+            return GaugeStatus.NOT_FOUND, f"it is no {self._spec.shape}"
+        if not float(np.max(np.diag(found.covariance))) < LEAST_SURE_PX**2:
+            return GaugeStatus.LOW_CONTRAST, "it slides along itself"
+        return found, (found.x_px + origin[0], found.y_px + origin[1])
+
+    def _has_shape(self, found: Symmetric) -> bool:
+        if self._spec.shape == "dot":
+            return found.any_turn > LEAST_ROUND
+        if self._spec.shape == "cross":
+            return found.quarter_turn > LEAST_QUARTER and found.any_turn <= LEAST_ROUND
+        return found.quarter_turn < -LEAST_QUARTER
+
+    def _taken(self, picture: Picture, place: tuple[float, float]) -> tuple[GaugeStatus, str] | None:
+        """Keep what it looks like, unless another like it is within reach."""
+        half = self._half + ceil(GUARD * self._spec.reach_px) + BEYOND_PX
+        x, y = round(place[0]), round(place[1])
+        own, _ = picture.part(x - self._half, y - self._half, 2 * self._half + 1, 2 * self._half + 1)
+        if own.shape != (2 * self._half + 1, 2 * self._half + 1):
+            return GaugeStatus.OUT_OF_VIEW, ""
+        levels, _ = picture.part(x - half, y - half, 2 * half + 1, 2 * half + 1)
+        template = own.astype(np.float32)
+        if min(levels.shape) >= 2 * (self._half + BEYOND_PX) + 3:
+            match = best_match(levels.astype(np.float32), template)
+            if not match.is_alone:
+                return GaugeStatus.AMBIGUOUS, "another mark like it lies within 1.5 reach_px"
+        self._template = template
+        return None

@@ -1,0 +1,173 @@
+"""The middle of a mark that looks the same when it is turned by half a turn: dots, crosses, corners of a chessboard.
+
+The picture is compared with itself reflected through a point, `I(c + x) - I(c - x)`; the point is the one that makes
+the sum of squares least (Gauss-Newton). Nothing but the symmetry is assumed: not the mark's size, blur or tone. Each
+pixel and its reflection change by twice the gradient, and their difference has twice the variance of the noise: the
+variance is that of a fit with the mark's shape known, `sigma^2 (sum g g')^-1`, the Cramer-Rao bound. A plane of light
+is taken off.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fingervision.vision.patch_registration import (
+    LEAST_INFORMATION,
+    MARGIN_PX,
+    ROUNDING,
+    coefficients,
+    interpolated_power,
+    sampled,
+)
+
+Floats = NDArray[np.float32]
+Doubles = NDArray[np.float64]
+
+ITERATIONS, SETTLED_PX, LARGEST_STEP_PX = 20, 2e-3, 1.0
+# Derivatives by the five-point formula, right to the fourth order: the three-point one takes a tenth off the gradients
+# of an edge that is spread by a pixel, and the uncertainty would be as much too large. Pixels that it needs beyond the
+# window, and its variance for unit noise.
+RIM, DIFFERENCE_POWER = 2, 130.0 / 144.0
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Symmetric:
+    """The middle of a point-symmetric mark.
+
+    Parameters
+    ----------
+    x_px, y_px : float
+        In pixels of the part that was given.
+    covariance : ndarray of float, shape (2, 2)
+        Of both.
+    half_turn, quarter_turn, any_turn : float
+        Correlation of the mark with itself turned by 180 and by 90 degrees, and the correlation of its levels with the
+        mean of each ring.
+    spread : float
+        Standard deviation of its levels, the plane taken off.
+    noise : float
+        Standard deviation of the noise.
+    """
+
+    x_px: float
+    y_px: float
+    covariance: Doubles
+    half_turn: float
+    quarter_turn: float
+    any_turn: float
+    spread: float
+    noise: float
+
+
+class NoSymmetryError(ValueError):
+    """There is no such middle near the first guess."""
+
+
+def fit_symmetry(part: Floats, start: tuple[float, float], half_px: int, shared_pixels: float = 1.0) -> Symmetric:
+    """Find the middle of a point-symmetric mark.
+
+    Parameters
+    ----------
+    part : ndarray of float32, shape (height, width)
+        Light about the mark; at least `MARGIN_PX` beyond its window.
+    start : (float, float)
+        First guess of x and y, to within a few pixels.
+    half_px : int
+        The window reaches so far to every side.
+    shared_pixels : float
+        So many pixels count as one, where a codec is known to share its errors.
+
+    Raises
+    ------
+    NoSymmetryError
+        The search leaves the part or does not settle.
+    """
+    flat = coefficients(part).ravel()
+    height, width = part.shape
+    size = 2 * half_px + 1
+    y, x = np.mgrid[-half_px - RIM : half_px + RIM + 1, -half_px - RIM : half_px + RIM + 1].astype(np.float32)
+    inner = (slice(RIM, -RIM), slice(RIM, -RIM))
+    dx, dy = (v[inner].ravel().astype(np.float64) for v in (x, y))
+    basis = np.stack((dx, dy)) / np.sqrt((dx**2).sum())
+    at_x, at_y = start
+    begin = np.zeros(1, dtype=np.intp)
+
+    def window(turned: bool = False) -> Floats:
+        across, down = (-y, x) if turned else (x, y)
+        px, py = (across + np.float32(at_x)).reshape(1, -1), (down + np.float32(at_y)).reshape(1, -1)
+        if px.min() < 2 or py.min() < 2 or px.max() >= width - 3 or py.max() >= height - 3:
+            raise NoSymmetryError("the mark leaves the part")
+        return sampled(flat, begin, width, px, py).reshape(size + 2 * RIM, size + 2 * RIM)
+
+    for _iteration in range(ITERATIONS):
+        seen = window()
+        difference = (seen[inner] - seen[inner][::-1, ::-1]).ravel().astype(np.float64)
+        difference -= (basis @ difference) @ basis
+        by_x, by_y = _derivative(seen[RIM:-RIM]), _derivative(seen[:, RIM:-RIM].T).T
+        odd = np.stack([(g - g[::-1, ::-1]).ravel() for g in (by_x, by_y)])
+        odd -= (odd @ basis.T) @ basis
+        normal = odd @ odd.T
+        if np.linalg.det(normal) <= 0.0:
+            raise NoSymmetryError("there is no contrast")
+        step = -np.linalg.solve(normal, odd @ difference)
+        length = float(np.hypot(*step))
+        step *= min(1.0, LARGEST_STEP_PX / max(length, 1e-12))
+        at_x, at_y = at_x + float(step[0]), at_y + float(step[1])
+        if length < SETTLED_PX:
+            break
+    else:
+        raise NoSymmetryError("the search does not settle")
+    return _judged(window(), window(turned=True), (at_x, at_y), (normal, difference), half_px, shared_pixels)
+
+
+def _judged(
+    seen: Floats,
+    turned: Floats,
+    at: tuple[float, float],
+    solved: tuple[Doubles, Doubles],
+    half_px: int,
+    shared_pixels: float,
+) -> Symmetric:
+    normal, difference = solved
+    inner = (slice(RIM, -RIM), slice(RIM, -RIM))
+    y, x = np.mgrid[-half_px : half_px + 1, -half_px : half_px + 1]
+    # Square windows show a round thing's corners: only the disc within is compared.
+    disc = np.hypot(x, y) <= half_px
+    basis = np.stack((np.ones(disc.sum()), x[disc], y[disc]))
+    levels = _plane_off(seen[inner][disc].astype(np.float64), basis)
+    reflected = _plane_off(seen[inner][::-1, ::-1][disc].astype(np.float64), basis)
+    quarter = _plane_off(turned[inner][disc].astype(np.float64), basis)
+    ring = np.rint(np.hypot(x, y)[disc]).astype(np.intp)
+    mean = (np.bincount(ring, levels) / np.maximum(np.bincount(ring), 1))[ring]
+    power = max(float(levels @ levels), 1e-12)
+    phases = interpolated_power(at[0]) * interpolated_power(at[1])
+    # The difference and its reflection are one and the same: half of the pixels are free.
+    variance = max(float(np.mean(difference**2)) / 2.0 / phases * difference.size / (difference.size - 8), ROUNDING)
+    noisy = np.eye(2) * 2.0 * variance * phases * DIFFERENCE_POWER * difference.size
+    true = normal - noisy
+    size = np.sqrt(np.maximum(np.diag(normal), 1e-30))
+    covariance = np.diag([np.inf, np.inf])
+    if np.linalg.eigvalsh(true / np.outer(size, size))[0] > LEAST_INFORMATION:
+        own = np.linalg.inv(true)
+        # `normal` sums over all pixels, each pair twice, (2 g)^2 each; the noise of a pair's difference is 2 sigma^2.
+        covariance = 4.0 * variance * shared_pixels * own @ normal @ own
+    return Symmetric(
+        at[0], at[1], covariance, float(levels @ reflected) / power,
+        float(levels @ quarter) / max(float(np.sqrt(power * (quarter @ quarter))), 1e-12),
+        float(np.sqrt((mean @ mean) / power)), float(np.sqrt(power / levels.size)), float(np.sqrt(variance)),
+    )  # fmt: skip
+
+
+def _derivative(seen: Floats) -> Doubles:
+    """Change of each row's levels from column to column, without the two columns at either end."""
+    levels = seen.astype(np.float64)
+    return (8.0 * (levels[:, 3:-1] - levels[:, 1:-3]) - levels[:, 4:] + levels[:, :-4]) / 12.0
+
+
+def _plane_off(levels: Doubles, basis: Doubles) -> Doubles:
+    return np.asarray(levels - np.linalg.lstsq(basis.T, levels, rcond=None)[0] @ basis)
+
+
+# What beyond a mark's window is needed of the picture.
+BEYOND_PX = MARGIN_PX + 2
