@@ -11,8 +11,10 @@ length_px = 40.0
 reach_px = 12.0                      # it may move so far from frame to frame; nothing alike may be within it
 """
 
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from fingervision.domain.errors import FingervisionError
 from fingervision.gauges.kinds import Kind, Spec, kind_named, kinds
@@ -62,7 +64,26 @@ def read_gauges(path: Path) -> tuple[Gauge, ...]:
     FingervisionError
         The file cannot be read, or a value in it cannot be meant; the sentence names the line.
     """
-    values, text = read_document(path, "gauge file")
+    return gauges_in(path, *read_document(path, "gauge file"))
+
+
+def gauges_in(path: Path, values: Mapping[str, Any], text: str) -> tuple[Gauge, ...]:
+    """Make gauges of what a file holds.
+
+    Parameters
+    ----------
+    path : Path
+        The file, for the sentences.
+    values : mapping
+        Its tables.
+    text : str
+        Its text.
+
+    Raises
+    ------
+    FingervisionError
+        A value in it cannot be meant; the sentence names the line.
+    """
     top = Section(path, text, "", values)
     top.only(("schema", "gauge"))
     schema = top.whole("schema", low=1)
@@ -75,16 +96,35 @@ def read_gauges(path: Path) -> tuple[Gauge, ...]:
         )
     gauges: dict[str, Gauge] = {}
     for section in sections:
-        name = section.word("name")
-        if not name.strip() or len(name) > LONGEST_NAME or not name.isprintable():
-            section.refuse("name", f"must be 1 to {LONGEST_NAME} printable characters, but is {name[:200]!r}.")
-        if name in gauges:
-            section.refuse("name", f"must be another than those before, but {name!r} comes again: rename one.")
-        kind_name = section.word("kind", of=kinds())
-        kind = kind_named(kind_name)
-        section.only(("name", "kind", *kind.KEYS))
-        gauges[name] = Gauge(name, kind_name, kind.read(section))
+        gauge = gauge_of(section, gauges)
+        gauges[gauge.name] = gauge
     return tuple(gauges.values())
+
+
+def gauge_of(section: Section, others: Collection[str]) -> Gauge:
+    """Make one gauge of its table.
+
+    Parameters
+    ----------
+    section : Section
+        Its table.
+    others : collection of str
+        Names that are taken.
+
+    Raises
+    ------
+    FingervisionError
+        A value in it cannot be meant.
+    """
+    name = section.word("name")
+    if not name.strip() or len(name) > LONGEST_NAME or not name.isprintable():
+        section.refuse("name", f"must be 1 to {LONGEST_NAME} printable characters, but is {name[:200]!r}.")
+    if name in others:
+        section.refuse("name", f"must be another than those before, but {name!r} comes again: rename one.")
+    kind_name = section.word("kind", of=kinds())
+    kind = kind_named(kind_name)
+    section.only(("name", "kind", *kind.KEYS))
+    return Gauge(name, kind_name, kind.read(section))
 
 
 def check_gauges(gauges: tuple[Gauge, ...], width_px: int, height_px: int) -> None:

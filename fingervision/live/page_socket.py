@@ -129,7 +129,7 @@ class PageSocket:
                 return {"words": "", "do": name}
             answer: Answer = await asyncio.to_thread(obey, self._view, request)
         except FingervisionError as error:
-            return {"refused": str(error), "do": str(name)[:40]}
+            return {"refused": str(error), "do": str(name)[:40], "field": getattr(error, "field", None)}
         if answer.pictures:
             self._steps[:] = answer.pictures
         steps = [title for title, _ in answer.pictures]

@@ -18,6 +18,7 @@ from fingervision.live.capture import Capture
 from fingervision.live.choices import Choices
 from fingervision.live.comparison.comparison import Comparison
 from fingervision.live.outlet import Outlet
+from fingervision.live.playback.gauges_beside import put_gauges_beside
 from fingervision.live.playback.playback import Playback
 from fingervision.live.playback.recorded import Recorded
 from fingervision.live.server import Page, bound
@@ -39,16 +40,19 @@ class Showing:
         How the page is reached.
     record : bool
         Whether a run is recorded from the first frame.
+    browser : bool
+        Whether the page is opened in the browser, where a person sits at the terminal.
     """
 
     page: bool
     json_lines: bool
     way: Access
     record: bool
+    browser: bool = True
 
 
-def look_through(recording: Recorded, out: Path, showing: Showing, beside: Beside) -> None:
-    """Show a recording in the page until the user ends it.
+def look_through(recording: Recorded, out: Path, showing: Showing, beside: Beside, gauges: Path | None = None) -> None:
+    """Show a recording in the page until the user ends it; `gauges` opens the panel that draws them, on this file.
 
     Raises
     ------
@@ -60,7 +64,12 @@ def look_through(recording: Recorded, out: Path, showing: Showing, beside: Besid
     if comparison is not None:
         playback.features["model"] = comparison
         playback.on_table = comparison.add_all
-    page = Page(playback, bound(showing.way.host, showing.way.port), showing.way)
+    listening = bound(showing.way.host, showing.way.port)
+    if gauges is not None:
+        put_gauges_beside(playback, gauges, is_asked_for=True)
+        words = "read, and saved to" if gauges.exists() else "a new file, written when they are saved"
+        playback.say("gauges", f"Gauges: {gauges} ({words}).")
+    page = Page(playback, listening, showing.way)
     if showing.way.warning:
         playback.say("network", showing.way.warning)
     out_there, said = Outlet(sys.stdout), Outlet(sys.stderr)
@@ -71,7 +80,7 @@ def look_through(recording: Recorded, out: Path, showing: Showing, beside: Besid
         with _until_signalled() as signalled:
             playback.start()
             try:
-                _announce(page, out_there)
+                _announce(page, out_there, browser=showing.browser)
                 page.serve(signalled)
             finally:
                 playback.stop()
@@ -122,7 +131,7 @@ def run(capture: Capture, choices: Choices, out: Path, showing: Showing, beside:
                     while not (signalled.wait(0.1) or session.ended.is_set() or out_there.broken):
                         pass
                 else:
-                    _announce(page, out_there if lines is None else said)
+                    _announce(page, out_there if lines is None else said, browser=showing.browser)
                     page.serve(signalled)
             finally:
                 session.stop()
@@ -146,10 +155,10 @@ def run(capture: Capture, choices: Choices, out: Path, showing: Showing, beside:
         raise SystemExit(int(ExitCode.COULD_NOT))
 
 
-def _announce(page: Page, outlet: Outlet) -> None:
+def _announce(page: Page, outlet: Outlet, *, browser: bool) -> None:
     outlet.put(f"The live view is at {page.address}  (Ctrl-C ends it)\n")
     outlet.put(f"For those who only look: {page.viewer_address}\n")
-    if is_terminal(sys.stdout):
+    if browser and is_terminal(sys.stdout):
         # Everybody on this machine sees what stands on a command line: the browser gets a file of this user's alone.
         webbrowser.open(page.door().as_uri())
 

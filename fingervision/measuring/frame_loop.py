@@ -151,14 +151,14 @@ def _outcomes(
     """Every frame with what it says; the decoder runs ahead and is stopped when this is."""
     pictures = SoundPictures()
     with closing(decoded_ahead(source)) as frames:
-        for item, outcome in one_polarity(_coded(frames, coding), settings, votes, is_stopped):
+        for item, outcome in one_polarity(coded(frames, coding), settings, votes, is_stopped):
             if isinstance(item, LostFrame) or isinstance(outcome, LostFrame):
                 yield item, outcome
             else:
                 yield item, pictures.judged(item, outcome)
 
 
-def _coded(frames: Iterable[Frame | LostFrame], coding: Coding) -> Iterator[Frame | LostFrame]:
+def coded(frames: Iterable[Frame | LostFrame], coding: Coding) -> Iterator[Frame | LostFrame]:
     """Tell frames that are stored without loss what they came from."""
     for item in frames:
         if isinstance(item, Frame) and item.coding is Coding.LOSSLESS and coding is not Coding.LOSSLESS:

@@ -7,6 +7,7 @@ from time import sleep
 
 from fingervision.domain.errors import FingervisionError
 from fingervision.live.background import BackgroundCommand
+from fingervision.live.playback.gauges_beside import GAUGES, GaugesBeside
 from fingervision.live.playback.playback import Playback
 from fingervision.live.playback.track import WHOLE, arguments_of
 
@@ -32,6 +33,12 @@ class RangeMeasurement:
     def __init__(self, playback: Playback, frames: tuple[int, int] | None) -> None:
         if playback.choices.scale is None:
             raise FingervisionError("The scale is not known: give it before measuring.")
+        beside = playback.features.get(GAUGES)
+        gauges: tuple[str, ...] = ()
+        if isinstance(beside, GaugesBeside) and beside.board.gauges:
+            if not beside.board.is_saved:
+                raise FingervisionError("The gauges have changes that are not saved: save them before measuring.")
+            gauges = ("--gauges", str(beside.board.path))
         path = Path(playback.recorded.name)
         name = path.parent.resolve().name if path.name == "video.mp4" else path.stem
         part = "" if frames is None else f"_{frames[0]}_{frames[1]}"
@@ -39,7 +46,7 @@ class RangeMeasurement:
         more = () if frames is None else ("--frames", f"{frames[0]}:{frames[1]}")
         arguments = arguments_of(playback.recorded.name, playback.choices, playback.recorded.options)
         self._playback = playback
-        self._command = BackgroundCommand(*arguments, *more, "--out", str(self.folder), "--json")
+        self._command = BackgroundCommand(*arguments, *more, *gauges, "--out", str(self.folder), "--json")
         self._thread = Thread(target=self._wait, name="measuring a range", daemon=True)
         self._thread.start()
 

@@ -52,6 +52,8 @@ class Playback:
         self.trouble = ""
         self.on_table: Callable[[Sequence[GapRow]], None] = lambda rows: None
         """Told of the whole table, each time that one is made."""
+        self.on_stop: list[Callable[[], None]] = []
+        """Called before everything ends."""
         self._told: Track | None = None
         self.is_playing, self.speed, self.frame = False, 1.0, 0
         self._messages = Messages()
@@ -75,6 +77,8 @@ class Playback:
 
     def stop(self) -> None:
         """End everything."""
+        for end in self.on_stop:
+            end()
         with self._changed:
             self._stopped = True
             self._changed.notify_all()

@@ -1,0 +1,134 @@
+"""Gauges of one's own on a recording: opened, added, changed, removed, loaded, saved."""
+
+from collections.abc import Mapping
+from dataclasses import asdict
+from typing import Any
+
+from fingervision.domain.errors import FingervisionError, UsageError
+from fingervision.gauges.fields import fields_of
+from fingervision.gauges.kinds import kinds
+from fingervision.live.commands.asking import GREATEST, MOST_LETTERS, Answer, Request, shown, words
+from fingervision.live.playback.gauge_board import USUAL_FILE, ChangedMeanwhileError, GaugeBoard
+from fingervision.live.playback.gauges_beside import GAUGES, GaugesBeside, put_gauges_beside
+from fingervision.live.playback.playback import Playback
+from fingervision.live.view import View
+
+MOST_KEYS = 50
+
+
+def _beside(view: View) -> GaugesBeside:
+    found = view.features.get(GAUGES)
+    if isinstance(found, GaugesBeside):
+        return found
+    if not isinstance(view, Playback):
+        raise FingervisionError("Gauges are drawn on a recording: record, and open the recording.")
+    return put_gauges_beside(view, USUAL_FILE)
+
+
+def _board(view: View) -> GaugeBoard:
+    return _beside(view).board
+
+
+def _table(request: Request) -> dict[str, Any]:
+    table = request.get("table")
+    if not isinstance(table, dict) or len(table) > MOST_KEYS:
+        raise UsageError("A gauge must be a table of its keys, but is none.")
+    for key, value in table.items():
+        is_number = isinstance(value, int | float) and not isinstance(value, bool) and abs(value) <= GREATEST
+        is_word = isinstance(value, str) and len(value) <= MOST_LETTERS
+        if not (is_number or is_word):
+            raise UsageError(f"{str(key)[:40]} must be a number or a text, but is {shown(value)}.")
+    return table
+
+
+def _said(view: View, sentence: str = "") -> Answer:
+    return Answer(sentence, more={"version": _board(view).version})
+
+
+def _kinds(view: View, request: Request) -> Answer:
+    """What there is to draw, as the kinds themselves say."""
+    return Answer(
+        more={
+            "kinds": {name: [{**asdict(field), "usual": field.usual} for field in fields_of(name)] for name in kinds()}
+        }
+    )
+
+
+def _open(view: View, request: Request) -> Answer:
+    _beside(view)
+    return Answer()
+
+
+def _add(view: View, request: Request) -> Answer:
+    _board(view).add(_table(request))
+    return _said(view)
+
+
+def _change(view: View, request: Request) -> Answer:
+    _board(view).change(words(request, "name"), _table(request))
+    return _said(view)
+
+
+def _remove(view: View, request: Request) -> Answer:
+    name = words(request, "name")
+    _board(view).remove(name)
+    return _said(view, f"The gauge {name} is removed; the file has it until it is saved.")
+
+
+def _load(view: View, request: Request) -> Answer:
+    board = _board(view)
+    board.load()
+    return _said(view, f"{len(board.gauges)} gauges loaded from {board.path}.")
+
+
+def _save(view: View, request: Request) -> Answer:
+    board = _board(view)
+    try:
+        board.save(over=request.get("over") is True)
+    except ChangedMeanwhileError:
+        _beside(view).is_changed_meanwhile = True
+        raise
+    _beside(view).is_changed_meanwhile = False
+    return _said(view, f"{len(board.gauges)} gauges saved to {board.path}.")
+
+
+def section(view: View) -> dict[str, Any]:
+    """The gauges, and what they say of the frame that is shown."""
+    found = view.features.get(GAUGES)
+    if not isinstance(found, GaugesBeside):
+        return {"gauges": {"is_open": False} if isinstance(view, Playback) else None}
+    board, following, seen = found.board, found.following, view.seen
+    version, tables = board.version, board.tables
+    frame = None if seen is None else seen.frame.index
+    return {
+        "gauges": {
+            "is_open": True,
+            "is_asked_for": found.is_asked_for,
+            "file": str(board.path),
+            "is_saved": board.is_saved,
+            "changed_meanwhile": found.is_changed_meanwhile,
+            "version": version,
+            "tables": _plain(tables),
+            "first": following.first or 0,
+            "frames": following.frames,
+            "trouble": following.trouble,
+            "frame": frame,
+            "readings": None if frame is None else following.readings(frame, version),
+        }
+    }
+
+
+def _plain(tables: list[Mapping[str, Any]]) -> list[dict[str, Any]]:
+    return [dict(table) for table in tables]
+
+
+COMMANDS = {
+    "gauge_kinds": _kinds,
+    "gauges_open": _open,
+    "gauge_add": _add,
+    "gauge_change": _change,
+    "gauge_remove": _remove,
+    "gauges_load": _load,
+    "gauges_save": _save,
+}
+HARMLESS = frozenset({"gauge_kinds"})

@@ -1,0 +1,61 @@
+// The gauges as this page has them: the server's, with what is being dragged here before the server has answered.
+import { ask, listen, page } from "/page/bus.js";
+
+export const board = { kinds: null, chosen: null, local: null };
+export const told = () => (page.state && page.state.gauges) || null;
+export const works = () => page.state && !page.state.viewer && page.state.holds_pen !== false;
+export function tables() {
+  const state = told(), { local } = board;
+  if (!state || !state.is_open) return [];
+  return state.tables.map((table) => (local && local.name === table.name ? { ...table, ...local.changes } : table));
+}
+export const chosen = () => tables().find((table) => table.name === board.chosen) || null;
+export const isFirst = () => told() && told().frame === told().first;
+
+// Answers come in the order of the requests.
+let asked = [];
+export function request(what, answered = () => {}) {
+  asked.push(answered);
+  ask(what);
+}
+const OURS = /^gauge/;
+listen("reply", (reply) => {
+  if (!OURS.test(reply.do || "")) return;
+  const answered = asked.shift();
+  if (answered) answered(reply);
+});
+listen("gone", () => { asked = []; board.local = null; });
+
+// Give the chosen gauge other values; what is refused is told to `refused(words, key)`.
+export function change(name, changes, refused) {
+  const table = { ...told().tables.find((each) => each.name === name), ...changes };
+  for (const key of Object.keys(table)) if (table[key] === null) delete table[key];
+  request({ do: "gauge_change", name, table }, (reply) => {
+    if (reply.refused) { refused(reply.refused, reply.field); return; }
+    if (table.name !== name && board.chosen === name) board.chosen = table.name;
+    refused("", null);
+  });
+}
+// What a new gauge of a kind begins with: its required keys, in the picture's middle.
+export function usual(kind) {
+  const fields = board.kinds[kind], table = { name: freeName(kind), kind };
+  for (const field of fields) if (field.default === null) table[field.key] = field.usual;
+  table.x_px = Math.round((page.state.width_px - 1) / 2);
+  table.y_px = Math.round((page.state.height_px - 1) / 2);
+  if ("direction_deg" in table) table.direction_deg = 0;
+  if ("angle_deg" in table) table.angle_deg = 0;
+  return table;
+}
+export function freeName(word) {
+  const taken = new Set(tables().map((table) => table.name));
+  if (!taken.has(word)) return word;
+  let number = 2;
+  while (taken.has(`${word} ${number}`)) number += 1;
+  return `${word} ${number}`;
+}
+listen("state", (state) => {
+  if (state.gauges && !board.kinds && !asked.length) request({ do: "gauge_kinds" }, (reply) => { board.kinds = reply.kinds || null; });
+  const { local } = board;
+  if (local && local.version !== null && state.gauges && state.gauges.version >= local.version) board.local = null;
+  if (state.gauges && state.gauges.is_open && !tables().some((table) => table.name === board.chosen)) board.chosen = tables().length ? tables()[0].name : null;
+});

@@ -1,0 +1,149 @@
+// Gauges over the picture: as they are set in the first frame, what was found in any, and points to drag them by.
+import { ask, at, listen, page } from "/page/bus.js";
+import { board, chosen, isFirst, request, tables, told, usual, works } from "/page/gauge_board.js";
+import { dragged, drawn, handles, outline } from "/page/gauge_shapes.js";
+
+const SVG = "http://www.w3.org/2000/svg", ASK_EVERY_MS = 100, LETTER = 12, POINT = 6, LEAST_PX = 3;
+at("stage").insertAdjacentHTML("beforeend", '<svg id="gauge_drawing" aria-hidden="true" preserveAspectRatio="none"></svg>');
+const svg = at("gauge_drawing");
+let drag = null, askedAt = 0, taken = [];
+export const drawing = { kind: null, name: "", said: () => {} };
+
+const make = (name, attributes, words = "") => {
+  const element = document.createElementNS(SVG, name);
+  for (const [key, value] of Object.entries(attributes)) element.setAttribute(key, String(value));
+  element.textContent = words;
+  return element;
+};
+// Whole coordinates are pixels' middles.
+const path = (points) => points.map(([x, y], i) => `${i ? "L" : "M"}${x.toFixed(2)} ${y.toFixed(2)}`).join("");
+const line = (points, kind) => make("path", { d: path(points), class: kind });
+const isOpen = () => told() && told().is_open && at("gauges").open;
+
+function readingsHere() {
+  const state = told();
+  // The readings of another frame than the picture's would look right, and be wrong.
+  return page.now && state && state.readings && page.now.frame === state.frame ? state.readings : null;
+}
+export function draw() {
+  svg.replaceChildren();
+  taken = [];
+  svg.classList.toggle("drawing", Boolean(drawing.kind));
+  if (!isOpen()) return;
+  const { width, height } = at("picture"), unit = width / (svg.clientWidth || width);
+  svg.setAttribute("viewBox", `-0.5 -0.5 ${width} ${height}`);
+  const readings = readingsHere(), first = isFirst(), now = chosen();
+  tables().forEach((table, i) => {
+    const reading = readings && readings[i], is = table === now || (now && table.name === now.name) ? " chosen" : "";
+    const good = reading ? (reading.status === "ok" ? " found" : " failed") : "";
+    if (reading && reading.zone.length && !(drag && is)) svg.append(line(reading.zone, `zone${good}`));
+    if (first) for (const each of outline(table)) svg.append(line(each, `set${is}`));
+    if (reading && !(drag && is)) for (const mark of reading.marks) {
+      if (mark.length > 1) svg.append(line(mark, `mark${good}`));
+      else for (const [a, b] of [[1, 0], [0, 1]]) svg.append(line([[mark[0][0] - 5 * unit * a, mark[0][1] - 5 * unit * b], [mark[0][0] + 5 * unit * a, mark[0][1] + 5 * unit * b]], `mark${good}`));
+    }
+    const places = first ? outline(table).flat() : reading ? [...reading.zone, ...reading.marks.flat()] : [];
+    if (places.length) name(table, reading, places, unit, width, good + is);
+  });
+  if (drag && drag.kind === "new") svg.append(line([drag.from, drag.to], "set chosen"));
+  if (first && works() && !drawing.kind) for (const table of tables()) points(table, unit, now && table.name === now.name);
+}
+function name(table, reading, places, unit, width, kind) {
+  const words = reading && reading.status !== "ok" ? `${table.name}: ${reading.status}` : table.name;
+  const right = Math.max(...places.map(([x]) => x)), top = Math.min(...places.map(([, y]) => y));
+  const wide = words.length * LETTER * 0.58 * unit;
+  const x = Math.max(2 * unit, Math.min(right + 4 * unit, width - wide - 2 * unit)), high = 1.15 * LETTER * unit;
+  let y = Math.max(top, LETTER * unit);
+  // Names that would lie on each other stand below each other.
+  const meets = ([x0, x1, at_y]) => x < x1 && x0 < x + wide && Math.abs(at_y - y) < high;
+  for (let tries = 0; tries < taken.length && taken.some(meets); tries += 1) y = Math.max(...taken.filter(meets).map(([, , at_y]) => at_y)) + high;
+  taken.push([x, x + wide, y]);
+  svg.append(make("text", { x: x.toFixed(1), y: y.toFixed(1), "font-size": (LETTER * unit).toFixed(2), class: kind.trim() }, words));
+}
+function points(table, unit, is) {
+  for (const [handle, x, y] of handles(table)) {
+    if (handle !== "middle" && !is) continue;
+    const point = make("circle", { cx: x, cy: y, r: POINT * unit, class: `point${is ? " chosen" : ""}` });
+    point.dataset.handle = handle;
+    point.dataset.gauge = table.name;
+    svg.append(point);
+  }
+}
+
+function place(event) {
+  const frame = svg.getBoundingClientRect(), { width, height } = at("picture");
+  const x = ((event.clientX - frame.left) / frame.width) * width - 0.5, y = ((event.clientY - frame.top) / frame.height) * height - 0.5;
+  return [Math.min(width - 1, Math.max(0, x)), Math.min(height - 1, Math.max(0, y))];
+}
+svg.addEventListener("pointerdown", (event) => {
+  const { handle, gauge } = event.target.dataset;
+  if (drawing.kind) drag = { kind: "new", from: place(event), to: place(event) };
+  else if (handle) {
+    board.chosen = gauge;
+    drag = { kind: "old", handle, gauge, before: chosen() };
+    listenChosen();
+  } else return;
+  svg.setPointerCapture(event.pointerId);
+  event.preventDefault();
+  draw();
+});
+svg.addEventListener("pointermove", (event) => {
+  if (!drag) return;
+  drag.to = place(event);
+  if (drag.kind === "old") {
+    board.local = { name: drag.gauge, changes: dragged(drag.before, drag.handle, ...drag.to), version: null };
+    drag.moved = true;
+    if (performance.now() - askedAt > ASK_EVERY_MS) { askedAt = performance.now(); settle(drag.gauge, board.local.changes, false); }
+  }
+  draw();
+});
+function settle(gauge, changes, last) {
+  const table = { ...told().tables.find((each) => each.name === gauge), ...changes };
+  request({ do: "gauge_change", name: gauge, table }, (reply) => {
+    if (!last) return;
+    drawing.said(reply.refused || "");
+    // What was refused goes back to what the server has; what was taken stays until the server's word comes.
+    if (reply.refused) board.local = null;
+    else if (board.local) board.local.version = reply.version;
+    draw();
+  });
+}
+svg.addEventListener("pointerup", () => {
+  const done = drag;
+  drag = null;
+  if (!done) return;
+  if (done.kind === "old") { if (done.moved) settle(done.gauge, board.local.changes, true); return; }
+  const kind = drawing.kind, far = Math.hypot(done.to[0] - done.from[0], done.to[1] - done.from[1]);
+  if (far < LEAST_PX) { drawing.said(`Drag over at least ${LEAST_PX} pixels of the picture.`); draw(); return; }
+  add(drawn(usual(kind), done.from, done.to));
+  stopDrawing();
+});
+svg.addEventListener("pointercancel", () => { drag = null; board.local = null; draw(); });
+
+export function add(table) {
+  request({ do: "gauge_add", table: drawing.name ? { ...table, name: drawing.name } : table }, (reply) => {
+    drawing.said(reply.refused || "");
+    if (reply.refused) return;
+    board.chosen = drawing.name || table.name;
+    drawing.added();
+  });
+}
+export function beginDrawing(kind) {
+  drawing.kind = kind;
+  at("gauge_draw").setAttribute("aria-pressed", "true");
+  if (!isFirst()) ask({ do: "seek", frame: told().first });
+  at("hint").textContent = `Drag over the ${kind} in the first frame; Escape lets it be.`;
+  draw();
+}
+export function stopDrawing() {
+  if (!drawing.kind) return;
+  drawing.kind = null;
+  at("gauge_draw").setAttribute("aria-pressed", "false");
+  at("hint").textContent = "";
+  draw();
+}
+let listenChosen = () => {};
+export function onChosen(act) { listenChosen = act; }
+listen("escape", () => { drag = null; board.local = null; stopDrawing(); });
+listen("now", draw);
+

@@ -1,0 +1,220 @@
+"""The gauges that a page works on: added, changed and removed one by one, read from their file and saved to it."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from threading import Lock
+from typing import Any, NoReturn
+
+from fingervision.domain.errors import FingervisionError
+from fingervision.gauges.gauge_file import MOST_GAUGES, SCHEMA, Gauge, check_gauges, gauge_of, gauges_in
+from fingervision.storage.gauges_toml import gauges_text, text_of, write_gauges_text
+from fingervision.storage.toml_section import Section, read_document
+
+USUAL_FILE = Path("gauges.toml")
+# Keys that every kind has, and a frame's sides limit.
+PLACE = ("x_px", "y_px")
+
+
+class FieldError(FingervisionError):
+    """A value that cannot be meant, with the key that it stands in.
+
+    Parameters
+    ----------
+    field : str or None
+        The key; None where the gauge as a whole is meant.
+    words : str
+        The sentence.
+    """
+
+    def __init__(self, field: str | None, words: str) -> None:
+        super().__init__(words)
+        self.field = field
+
+
+class ChangedMeanwhileError(FingervisionError):
+    """Somebody else has written the file since it was read."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Typed(Section):
+    """A table that was typed or drawn: it stands in no line of a file."""
+
+    def refuse(self, key: str | None, words: str) -> NoReturn:
+        raise FieldError(key, f"{self.header if key is None else key} {words}")
+
+
+@dataclass(frozen=True, slots=True)
+class _Entry:
+    table: Mapping[str, Any]
+    place: int | None
+    gauge: Gauge
+
+
+class GaugeBoard:
+    """Gauges of one recording, and the file that they are kept in.
+
+    Parameters
+    ----------
+    path : Path
+        The file; read where it exists.
+    frame_size_px : (int, int)
+        Width and height of the frames.
+
+    Raises
+    ------
+    FingervisionError
+        The file exists and cannot be read, or holds what cannot be meant for these frames.
+    """
+
+    def __init__(self, path: Path, frame_size_px: tuple[int, int]) -> None:
+        self.path, self.frame_size_px = path, frame_size_px
+        self._lock = Lock()
+        self._entries: tuple[_Entry, ...] = ()
+        self._before: str | None = None
+        self._kept: list[Mapping[str, Any]] = []
+        self.version = 0
+        """Rises with every change."""
+        self.load()
+
+    @property
+    def gauges(self) -> tuple[Gauge, ...]:
+        """The gauges, in the order of the file."""
+        return tuple(entry.gauge for entry in self._entries)
+
+    @property
+    def tables(self) -> list[Mapping[str, Any]]:
+        """Their keys as they stand in the file, or will."""
+        return [entry.table for entry in self._entries]
+
+    @property
+    def is_saved(self) -> bool:
+        """Whether the file was given just these gauges."""
+        return self.tables == self._kept
+
+    def snapshot(self) -> tuple[int, tuple[Gauge, ...]]:
+        """Version and gauges, of one moment."""
+        with self._lock:
+            return self.version, self.gauges
+
+    # ---- the file
+    def load(self) -> None:
+        """Read the file; what was not saved is dropped. Where there is no file there are no gauges.
+
+        Raises
+        ------
+        FingervisionError
+            It cannot be read, or holds what cannot be meant for these frames; the gauges then stay as they are.
+        """
+        before = text_of(self.path)
+        entries: tuple[_Entry, ...] = ()
+        if before is not None:
+            values, before = read_document(self.path, "gauge file")
+            gauges = gauges_in(self.path, values, before)
+            check_gauges(gauges, *self.frame_size_px)
+            entries = tuple(
+                _Entry(table, place, gauge)
+                for place, (table, gauge) in enumerate(zip(values["gauge"], gauges, strict=True))
+            )
+        with self._lock:
+            self._entries, self._before = entries, before
+            self._kept = self.tables
+            self.version += 1
+
+    def save(self, *, over: bool = False) -> None:
+        """Write the file.
+
+        Parameters
+        ----------
+        over : bool
+            Also where somebody else has changed it since it was read.
+
+        Raises
+        ------
+        ChangedMeanwhileError
+            Somebody else has.
+        FingervisionError
+            There is no gauge, or the file cannot be written; what was there stays.
+        """
+        with self._lock:
+            if not self._entries:
+                raise FingervisionError("A gauge file must hold at least one gauge, but there is none: add one.")
+            if not over and self._now() != self._before:
+                raise ChangedMeanwhileError(
+                    f"{self.path} was changed by somebody else since it was read here: load it and lose what is not "
+                    "saved, or save over it."
+                )
+            text = gauges_text([(entry.table, entry.place) for entry in self._entries], self._before, SCHEMA)
+            write_gauges_text(self.path, text)
+            self._before = text
+            self._entries = tuple(_Entry(entry.table, place, entry.gauge) for place, entry in enumerate(self._entries))
+            self._kept = self.tables
+
+    def _now(self) -> str | None:
+        try:
+            return text_of(self.path)
+        except FingervisionError as error:
+            raise ChangedMeanwhileError(f"{error} Save over it, or mend it first.") from error
+
+    # ---- one gauge
+    def add(self, table: Mapping[str, Any]) -> None:
+        """Add a gauge.
+
+        Raises
+        ------
+        FingervisionError
+            A value cannot be meant; a `FieldError` says in which key.
+        """
+        with self._lock:
+            if len(self._entries) >= MOST_GAUGES:
+                raise FingervisionError(f"A file holds {MOST_GAUGES} gauges at most: remove one first.")
+            self._entries += (self._entry(table, None, self._entries),)
+            self.version += 1
+
+    def change(self, name: str, table: Mapping[str, Any]) -> None:
+        """Give a gauge other keys, also another name.
+
+        Raises
+        ------
+        FingervisionError
+            There is no such gauge, or a value cannot be meant; the gauge then stays as it was.
+        """
+        with self._lock:
+            at = self._at(name)
+            others = self._entries[:at] + self._entries[at + 1 :]
+            entry = self._entry(table, self._entries[at].place, others)
+            self._entries = (*self._entries[:at], entry, *self._entries[at + 1 :])
+            self.version += 1
+
+    def remove(self, name: str) -> None:
+        """Remove a gauge.
+
+        Raises
+        ------
+        FingervisionError
+            There is none of that name.
+        """
+        with self._lock:
+            at = self._at(name)
+            self._entries = self._entries[:at] + self._entries[at + 1 :]
+            self.version += 1
+
+    def _at(self, name: str) -> int:
+        for at, entry in enumerate(self._entries):
+            if entry.gauge.name == name:
+                return at
+        raise FingervisionError(f"There is no gauge {name!r} any more: load the page again.")
+
+    def _entry(self, table: Mapping[str, Any], place: int | None, others: tuple[_Entry, ...]) -> _Entry:
+        section = _Typed(self.path, "", "The gauge", table)
+        gauge = gauge_of(section, {other.gauge.name for other in others})
+        try:
+            check_gauges((gauge,), *self.frame_size_px)
+        except FingervisionError as error:
+            outside = [
+                key
+                for key, of, side in zip(PLACE, gauge.spec.middle_px, self.frame_size_px, strict=True)
+                if not -0.5 <= of <= side - 0.5
+            ]
+            raise FieldError(outside[0] if outside else None, str(error)) from error
+        return _Entry(dict(table), place, gauge)

@@ -1,0 +1,158 @@
+"""Gauges followed from the first frame on, as far as the frame that is shown: the numbers of `measure --gauges`."""
+
+import json
+import zlib
+from collections.abc import Sequence
+from threading import Event, Thread
+from typing import Any
+
+from fingervision.domain.errors import FingervisionError
+from fingervision.domain.frame import LostFrame
+from fingervision.domain.status import Status
+from fingervision.gauges.gauge_file import Gauge
+from fingervision.gauges.kinds import measured_together
+from fingervision.gauges.picture import picture_of
+from fingervision.gauges.plane_scale import PlaneScale
+from fingervision.gauges.reading import Mark, Reading
+from fingervision.gauges.recording import cells_of
+from fingervision.gauges.status import MEANING, GaugeStatus
+from fingervision.live.playback.gauge_board import GaugeBoard
+from fingervision.live.playback.playback import Playback
+from fingervision.measuring.frame_loop import Prepared, coded, prepared
+from fingervision.measuring.marked import marked
+from fingervision.measuring.task import Task
+from fingervision.storage.lost_frames import lost_frames
+
+LOOK_EVERY_S = 0.02
+# So many frames beyond the one that is shown are followed already, so that stepping on waits for nothing.
+AHEAD_FRAMES = 25
+NO_SCALE = "The scale is not known: gauges can be drawn, and are read once it is given."
+
+
+class GaugeFollowing:
+    """Reads a board's gauges in a thread of its own.
+
+    A gauge follows its thing from frame to frame, and a patch counts from the first: the reading of a frame is that of
+    a follower which has seen all frames before. What a frame's picture is worth (damaged, repeated) is the table's
+    word, as in `measure`. Any change of gauges, scale or settings begins anew.
+
+    Parameters
+    ----------
+    playback : Playback
+        The recording.
+    board : GaugeBoard
+        Its gauges.
+    """
+
+    def __init__(self, playback: Playback, board: GaugeBoard) -> None:
+        self._playback, self._board = playback, board
+        self._stopped = Event()
+        self._key: tuple[int, str] | None = None
+        self._told: list[bytes] = []
+        self.first: int | None = None
+        """Number of the first frame that has a picture, as far as it is known."""
+        self.trouble = ""
+        self._thread = Thread(target=self._follow, name="gauges", daemon=True)
+
+    def start(self) -> None:
+        """Begin to follow."""
+        self._thread.start()
+
+    def stop(self) -> None:
+        """End."""
+        self._stopped.set()
+        if self._thread.is_alive():
+            self._thread.join()
+
+    @property
+    def frames(self) -> int:
+        """Frames that are read."""
+        return len(self._told)
+
+    def readings(self, frame: int, version: int) -> list[dict[str, Any]] | None:
+        """Give what the gauges of a version of the board say of a frame; None as long as that is not known."""
+        key, told = self._key, self._told
+        if key is None or key[0] != version or not 0 <= frame < len(told):
+            return None
+        found: list[dict[str, Any]] = json.loads(zlib.decompress(told[frame]))
+        return found
+
+    def _follow(self) -> None:
+        while not self._stopped.is_set():
+            version, gauges = self._board.snapshot()
+            key = (version, self._playback.identity)
+            if key == self._key and not self.trouble:
+                self._stopped.wait(LOOK_EVERY_S)
+                continue
+            task = self._playback.choices.task
+            self._told, self._key = [], key
+            self.trouble = NO_SCALE if task is None else ""
+            try:
+                if task is not None:
+                    self._read_all(key, gauges, task)
+            except (FingervisionError, OSError) as error:
+                self.trouble = f"The gauges cannot be read: {error}"
+            except Exception as error:  # a fault of ours must not look like a gauge that waits
+                self.trouble = f"The gauges cannot be read ({type(error).__name__}: {error})."
+            while self.trouble and key == self._now() and not self._stopped.wait(LOOK_EVERY_S):
+                pass
+
+    def _now(self) -> tuple[int, str]:
+        return self._board.version, self._playback.identity
+
+    def _read_all(self, key: tuple[int, str], gauges: Sequence[Gauge], task: Task) -> None:
+        source = self._playback.recorded.source
+        how: Prepared = prepared(source.description, task)
+        plane = PlaneScale(task.scale, (how.description.width_px, how.description.height_px))
+        followers = [gauge.spec.follower() for gauge in gauges]
+        marks = lost_frames(source.description.files)
+        for item in coded(iter(marked(source, marks) if marks else source), how.description.coding):
+            status = self._status(item.index, key)
+            if status is None:
+                return
+            readings: Sequence[Reading]
+            if isinstance(item, LostFrame) or status in (Status.DAMAGED, Status.DUPLICATE):
+                words = item.words if isinstance(item, LostFrame) else ""
+                readings = [Reading(GaugeStatus(status.value), words=words)] * len(gauges)
+            else:
+                if self.first is None:
+                    self.first = item.index
+                readings = measured_together(followers, picture_of(item, how.settings))
+            if key != self._now():
+                return
+            self._told.append(_packed(gauges, readings, plane))
+
+    def _status(self, frame: int, key: tuple[int, str]) -> Status | None:
+        """Wait until a frame is near enough, and the table has it; None where there is nothing to follow any more."""
+        playback = self._playback
+        while not self._stopped.is_set() and key == self._now():
+            if frame <= playback.frame + AHEAD_FRAMES:
+                row = next(playback.rows(frame, frame + 1), None)
+                if row is not None:
+                    return row.status
+                if playback.failure:
+                    raise FingervisionError(playback.failure)
+            self._stopped.wait(LOOK_EVERY_S)
+        return None
+
+
+def _packed(gauges: Sequence[Gauge], readings: Sequence[Reading], plane: PlaneScale) -> bytes:
+    """Readings as the page shows them, in few bytes: a recording has many frames."""
+    told = []
+    for gauge, reading in zip(gauges, readings, strict=True):
+        cells = cells_of(reading.quantities, plane)
+        told.append(
+            {
+                "name": gauge.name,
+                "status": reading.status.value,
+                "words": reading.words or MEANING.get(reading.status, ""),
+                "cells": [[name, *cell] for (name, _), cell in zip(gauge.quantities, cells, strict=False)],
+                "zone": _points(reading.zone),
+                "marks": [_points(mark) for mark in reading.marks],
+            }
+        )
+    return zlib.compress(json.dumps(told).encode())
+
+
+def _points(mark: Mark | None) -> list[tuple[float, float]]:
+    return [] if mark is None else [(round(float(x), 2), round(float(y), 2)) for x, y in mark.points_px]

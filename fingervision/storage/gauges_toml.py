@@ -1,0 +1,112 @@
+"""gauges.toml written: what stood in the file and is still meant stays as it was, with its comments."""
+
+import tomllib
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+import tomlkit
+from tomlkit.exceptions import TOMLKitError
+
+from fingervision.domain.errors import FingervisionError
+from fingervision.storage.plain_file import plain
+
+HEAD = "# For `fingervision measure RECORDING --gauges FILE`; `fingervision gauge RECORDING` draws them.\n"
+
+Tables = Sequence[tuple[Mapping[str, Any], int | None]]
+
+
+def text_of(path: Path) -> str | None:
+    """Read a file's text; None where there is no file.
+
+    Raises
+    ------
+    FingervisionError
+        It cannot be read.
+    """
+    try:
+        return plain(path).read_text(encoding="utf-8-sig")
+    except FileNotFoundError:
+        return None
+    except OSError as error:
+        raise FingervisionError(f"The gauge file {path} could not be read ({error.strerror}).") from error
+    except UnicodeDecodeError as error:
+        raise FingervisionError(f"{path} must be TOML in UTF-8, but is not: {error.reason}.") from error
+
+
+def gauges_text(tables: Tables, before: str | None, schema: int) -> str:
+    """Put gauges into the text of a file.
+
+    Parameters
+    ----------
+    tables : sequence of (mapping, int or None)
+        Keys of every gauge, and which table `[[gauge]]` of the text it was, from 0; None for a new one.
+    before : str or None
+        The file as it was read; None for a new one.
+    schema : int
+        Of the file.
+
+    Returns
+    -------
+    str
+        TOML that holds exactly these gauges. Comments and order of the text before are kept.
+    """
+    meant = {"schema": schema, "gauge": [dict(table) for table, _ in tables]}
+    if before is not None:
+        try:
+            text = _changed(tables, before)
+            if tomllib.loads(text) == meant:
+                return text
+        except (TOMLKitError, ValueError, TypeError, KeyError):
+            pass  # a layout that cannot be changed in place is written anew
+    return HEAD + _anew(meant)
+
+
+def _changed(tables: Tables, before: str) -> str:
+    """Change what is otherwise, table by table, and leave the rest of the text alone."""
+    document = tomlkit.parse(before)
+    old: Any = document["gauge"]
+    kept = {place: table for table, place in tables if place is not None}
+    for place in reversed(range(len(old))):
+        if place not in kept:
+            del old[place]
+            continue
+        into, table = old[place], kept[place]
+        for key in [key for key in into if key not in table]:
+            del into[key]
+        for key, value in table.items():
+            if key not in into or into[key] != value:
+                into[key] = value
+    for table, place in tables:
+        if place is None:
+            new = tomlkit.table()
+            new.update(table)
+            old.append(new)
+    return tomlkit.dumps(document)
+
+
+def _anew(meant: Mapping[str, Any]) -> str:
+    tables = "".join("\n[[gauge]]\n" + tomlkit.dumps(table) for table in meant["gauge"])
+    return f"schema = {meant['schema']}\n{tables}"
+
+
+def write_gauges_text(path: Path, text: str) -> None:
+    """Replace a file of gauges, when the new one is whole.
+
+    Raises
+    ------
+    FingervisionError
+        It cannot be written; what was there stays.
+    """
+    part = path.with_name(f".{path.name}.part")
+    try:
+        plain(path).parent.mkdir(parents=True, exist_ok=True)
+        part.write_text(text, encoding="utf-8")
+        part.replace(path)
+    except OSError as error:
+        with suppress(OSError):
+            part.unlink(missing_ok=True)
+        raise FingervisionError(
+            f"{path} could not be written ({error.strerror}); nothing is lost here: make room there, and save again."
+        ) from error

@@ -1,0 +1,267 @@
+"""Gauges drawn on a recording: kept as they are meant, refused where they cannot be, read as `measure` reads them."""
+
+import csv
+import json
+import subprocess
+import sys
+import time
+import tomllib
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+import pytest
+
+from calib.calibration import BareScale
+from fingervision.domain.errors import FingervisionError
+from fingervision.gauges.fields import fields_of
+from fingervision.gauges.gauge_file import read_gauges
+from fingervision.gauges.kinds import kind_named, kinds
+from fingervision.live.choices import Choices
+from fingervision.live.commands import obey, section
+from fingervision.live.playback.gauge_board import FieldError
+from fingervision.live.playback.gauges_beside import GaugesBeside, put_gauges_beside
+from fingervision.live.playback.playback import Playback
+from fingervision.live.playback.recorded import recorded
+from tests.gauges.drawn import bar, drawn, half_plane, seen
+
+SHAPE, FRAMES = (192, 256), 12
+EDGE = {"name": "the edge", "kind": "edge", "x_px": 80, "y_px": 96.5, "direction_deg": 0, "length_px": 60}
+BAR = {
+    "name": 'a "bar" ü',
+    "kind": "pair",
+    "x_px": 180,
+    "y_px": 96,
+    "direction_deg": 0.0,
+    "distance_px": 30,
+    "length_px": 50,
+    "reach_px": 6,
+    "polarity": "dark",
+}
+
+
+@pytest.fixture(scope="module")
+def frames(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """An edge that moves, and a bar that stands."""
+    folder = tmp_path_factory.mktemp("edge") / "frames"
+    folder.mkdir()
+    rng = np.random.default_rng(5)
+    for number in range(FRAMES):
+        light = drawn(SHAPE, 60, [(half_plane(80 + 2.5 * number, 96, 0.0), 160), (bar(180, 96, 0.0, 30), 60)])
+        cv2.imwrite(str(folder / f"{number:03d}.png"), seen(light, 1.0, rng))
+    return folder
+
+
+@pytest.fixture
+def opened_on(frames: Path, tmp_path: Path) -> Iterator[Callable[..., tuple[Playback, GaugesBeside]]]:
+    """Recordings with a board of gauges; all are ended afterwards."""
+    views: list[Playback] = []
+
+    def open_on(path: Path, px_per_mm: float | None = None) -> tuple[Playback, GaugesBeside]:
+        scale = None if px_per_mm is None else BareScale(px_per_mm)
+        view = Playback(recorded(str(frames), 25.0, Choices(scale=scale), ()), tmp_path / "out")
+        beside = put_gauges_beside(view, path)
+        view.start()
+        views.append(view)
+        return view, beside
+
+    yield open_on
+    for view in views:
+        view.stop()
+
+
+Opened = Callable[..., tuple[Playback, GaugesBeside]]
+
+
+@pytest.mark.parametrize("name", kinds())
+def test_a_kind_says_all_its_keys_and_a_gauge_of_usual_values_can_be_meant(name: str, opened_on: Opened) -> None:
+    fields = fields_of(name)
+    assert tuple(field.key for field in fields) == kind_named(name).KEYS
+    for field in fields:
+        assert field.choices or (field.low is not None and field.high is not None)
+        assert field.default is None or not field.choices or field.default in field.choices
+    view, _ = opened_on(Path("does_not_exist.toml"))
+    table = {field.key: field.usual for field in fields if field.default is None}
+    obey(view, {"do": "gauge_add", "table": {**table, "name": name, "kind": name}})
+    assert [table["name"] for table in section(view)["gauges"]["tables"]] == [name]
+
+
+def test_what_is_added_and_changed_is_saved_and_read_again_the_same(opened_on: Opened, tmp_path: Path) -> None:
+    path = tmp_path / "new" / "gauges.toml"
+    view, beside = opened_on(path)
+    with pytest.raises(FingervisionError, match="at least one"):
+        obey(view, {"do": "gauges_save"})
+    obey(view, {"do": "gauge_add", "table": EDGE})
+    obey(view, {"do": "gauge_add", "table": BAR})
+    obey(view, {"do": "gauge_change", "name": "the edge", "table": {**EDGE, "name": "lever", "x_px": 81.25}})
+    assert not section(view)["gauges"]["is_saved"]
+    assert not path.exists()
+    obey(view, {"do": "gauges_save"})
+    assert section(view)["gauges"]["is_saved"]
+    meant = [{**EDGE, "name": "lever", "x_px": 81.25}, BAR]
+    assert tomllib.loads(path.read_text(encoding="utf-8")) == {"schema": 1, "gauge": meant}
+    assert read_gauges(path) == beside.board.gauges
+    again, other = opened_on(path)
+    assert section(again)["gauges"]["tables"] == meant
+    assert other.board.gauges == beside.board.gauges
+    obey(view, {"do": "gauge_remove", "name": "lever"})
+    obey(view, {"do": "gauges_load"})
+    assert section(view)["gauges"]["tables"] == meant
+    assert [each.name for each in path.parent.iterdir()] == ["gauges.toml"]
+
+
+def test_comments_and_numbers_of_the_file_stay(opened_on: Opened, tmp_path: Path) -> None:
+    path = tmp_path / "gauges.toml"
+    before = (
+        "# of the bench\nschema = 1   # for ever\n\n[[gauge]]   # the first\nname = 'one'\nkind = \"edge\"\n"
+        "x_px = 8e1    # measured by hand\ny_px = 96\ndirection_deg = 0\nlength_px = 40\n\n# below the second\n"
+        "[[gauge]]\nname = 'two'\nkind = \"edge\"\nx_px = 80\ny_px = 90  # here\ndirection_deg = 0\nlength_px = 40\n"
+    )
+    path.write_text(before)
+    view, _ = opened_on(path)
+    obey(view, {"do": "gauges_save"})
+    assert path.read_text() == before
+    tables = section(view)["gauges"]["tables"]
+    obey(view, {"do": "gauge_change", "name": "two", "table": {**tables[1], "name": "zwei", "y_px": 91}})
+    obey(view, {"do": "gauge_add", "table": BAR})
+    obey(view, {"do": "gauges_save"})
+    text = path.read_text(encoding="utf-8")
+    for words in ("# of the bench", "# for ever", "# the first", "8e1    # measured by hand", "# below the second"):
+        assert words in text
+    assert "y_px = 91  # here" in text
+    obey(view, {"do": "gauge_remove", "name": "one"})
+    obey(view, {"do": "gauges_save"})
+    assert [table["name"] for table in tomllib.loads(path.read_text(encoding="utf-8"))["gauge"]] == [
+        "zwei",
+        BAR["name"],
+    ]
+    assert "# here" in path.read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize(
+    ("changes", "key"),
+    [
+        ({"x_px": "eighty"}, "x_px"),
+        ({"x_px": -20}, "x_px"),
+        ({"y_px": 5000}, "y_px"),
+        ({"x_px": float("nan")}, None),
+        ({"length_px": 2}, "length_px"),
+        ({"length_px": 10**30}, None),
+        ({"length_px": 15000}, None),
+        ({"reach_px": 0}, "reach_px"),
+        ({"polarity": "up"}, "polarity"),
+        ({"colour": "red"}, "colour"),
+        ({"kind": "egde"}, "kind"),
+        ({"name": ""}, "name"),
+        ({"name": "two\nlines"}, "name"),
+        ({"name": BAR["name"]}, "name"),
+        ({"direction_deg": True}, None),
+        ({"direction_deg": [1]}, None),
+    ],
+)
+def test_a_wrong_value_is_a_sentence_at_its_key_and_changes_nothing(
+    changes: dict[str, Any], key: str | None, opened_on: Opened, tmp_path: Path
+) -> None:
+    view, _ = opened_on(tmp_path / "gauges.toml")
+    for table in (EDGE, BAR):
+        obey(view, {"do": "gauge_add", "table": table})
+    before = section(view)["gauges"]
+    for request in (
+        {"do": "gauge_change", "name": "the edge", "table": {**EDGE, **changes}},
+        {"do": "gauge_add", "table": {**EDGE, "name": "other", **changes}},
+    ):
+        with pytest.raises(FingervisionError) as refused:
+            obey(view, request)
+        if key is not None:
+            assert isinstance(refused.value, FieldError)
+            assert refused.value.field == key
+        assert "must" in str(refused.value) or "not known" in str(refused.value)
+        assert "\n" not in str(refused.value)
+    now = section(view)["gauges"]
+    assert (now["tables"], now["version"]) == (before["tables"], before["version"])
+
+
+def test_a_key_that_is_missing_is_said(opened_on: Opened, tmp_path: Path) -> None:
+    view, _ = opened_on(tmp_path / "gauges.toml")
+    for bad in ({}, {"name": "a"}, {"name": "a", "kind": "edge"}, None, [], "edge", {str(i): 1 for i in range(99)}):
+        with pytest.raises(FingervisionError):
+            obey(view, {"do": "gauge_add", "table": bad})
+    for request in ("gauge_remove", "gauge_change"):
+        with pytest.raises(FingervisionError, match="no gauge"):
+            obey(view, {"do": request, "name": "nobody", "table": EDGE})
+    assert section(view)["gauges"]["tables"] == []
+
+
+def test_a_file_that_somebody_else_changed_is_not_overwritten(opened_on: Opened, tmp_path: Path) -> None:
+    path = tmp_path / "gauges.toml"
+    view, _ = opened_on(path)
+    obey(view, {"do": "gauge_add", "table": EDGE})
+    path.write_text("# theirs\nschema = 1\n")
+    for _ in range(2):
+        with pytest.raises(FingervisionError, match="somebody else"):
+            obey(view, {"do": "gauges_save"})
+        assert path.read_text() == "# theirs\nschema = 1\n"
+    assert section(view)["gauges"]["changed_meanwhile"]
+    with pytest.raises(FingervisionError):
+        obey(view, {"do": "gauges_load"})
+    assert section(view)["gauges"]["tables"] == [EDGE]
+    obey(view, {"do": "gauges_save", "over": True})
+    assert tomllib.loads(path.read_text())["gauge"] == [EDGE]
+    assert not section(view)["gauges"]["changed_meanwhile"]
+    path.unlink()
+    with pytest.raises(FingervisionError, match="somebody else"):
+        obey(view, {"do": "gauges_save"})
+
+
+def test_a_file_that_cannot_be_written_is_said_and_nothing_lost(opened_on: Opened, tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("")
+    view, _ = opened_on(tmp_path / "folder" / "gauges.toml")
+    obey(view, {"do": "gauge_add", "table": EDGE})
+    (tmp_path / "folder").write_text("a file where the folder should be")
+    with pytest.raises(FingervisionError, match="could not be"):
+        obey(view, {"do": "gauges_save"})
+    assert section(view)["gauges"]["tables"] == [EDGE]
+
+
+@pytest.mark.parametrize("text", ["schema = 1\n", "not toml", 'schema = 1\n[[gauge]]\nname = "a"\nkind = "edge"\n'])
+def test_a_file_that_cannot_be_meant_is_refused_before_anything(text: str, opened_on: Opened, tmp_path: Path) -> None:
+    path = tmp_path / "gauges.toml"
+    path.write_text(text)
+    with pytest.raises(FingervisionError, match=r"gauges\.toml"):
+        opened_on(path)
+    assert path.read_text() == text
+
+
+@pytest.mark.slow
+def test_readings_are_those_of_measure(opened_on: Opened, frames: Path, tmp_path: Path) -> None:
+    path, out = tmp_path / "gauges.toml", tmp_path / "measured"
+    view, beside = opened_on(path, 20.0)
+    obey(view, {"do": "gauge_add", "table": EDGE})
+    obey(view, {"do": "gauge_add", "table": BAR})
+    with pytest.raises(FingervisionError, match="not saved"):
+        obey(view, {"do": "measure"})
+    obey(view, {"do": "gauges_save"})
+    options = ["--px-per-mm", "20", "--rate-hz", "25", "--gauges", str(path), "--out", str(out)]
+    subprocess.run([sys.executable, "-m", "fingervision", "measure", str(frames), *options], check=True)
+    with (out / "gauges.csv").open(encoding="utf-8", newline="") as file:
+        rows = [list(row.values())[1:] for row in csv.DictReader(file)]
+    obey(view, {"do": "seek", "frame": FRAMES - 1})
+    until = time.monotonic() + 60.0
+    while beside.following.frames < FRAMES:
+        assert time.monotonic() < until, beside.following.trouble
+        time.sleep(0.05)
+    found = []
+    for frame in range(FRAMES):
+        readings = beside.following.readings(frame, beside.board.version)
+        assert readings is not None
+        found += [[each["name"], *cell, each["status"]] for each in readings for cell in each["cells"]]
+    assert len(found) == len(rows) == 2 * FRAMES
+    for ours, theirs in zip(found, rows, strict=True):
+        assert [ours[0], ours[1], ours[4], ours[5]] == [theirs[0], theirs[1], theirs[4], theirs[5]]
+        assert ours[2:4] == pytest.approx([float(theirs[2]), float(theirs[3])], abs=1e-6)
+    # After any change nothing of before is shown.
+    obey(view, {"do": "gauge_remove", "name": "the edge"})
+    assert beside.following.readings(0, beside.board.version) is None
+    assert json.dumps(section(view))
