@@ -72,17 +72,16 @@ def _changed(tables: Tables, before: str) -> str:
         if place not in kept:
             del old[place]
             continue
-        into, table = old[place], kept[place]
-        for key in [key for key in into if key not in table]:
+        into, meant = old[place], kept[place]
+        for key in [key for key in into if key not in meant]:
             del into[key]
-        for key, value in table.items():
+        for key, value in meant.items():
             if key not in into or into[key] != value:
                 into[key] = value
-    for table, place in tables:
-        if place is None:
-            new = tomlkit.table()
-            new.update(table)
-            old.append(new)
+    for added in (table for table, place in tables if place is None):
+        new = tomlkit.table()
+        new.update(added)
+        old.append(new)
     return tomlkit.dumps(document)
 
 

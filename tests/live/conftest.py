@@ -106,11 +106,11 @@ def live(tmp_path: Path) -> Iterator[Callable[..., Live]]:
     """Start live views; all are ended afterwards."""
     started: list[Live] = []
 
-    def start(*arguments: str | Path, out: Path | None = None) -> Live:
+    def start(*arguments: str | Path, out: Path | None = None, name: str = "live") -> Live:
         number = len(started)
         folder = out or tmp_path / f"out{number}"
         stdout, stderr = tmp_path / f"stdout{number}", tmp_path / f"stderr{number}"
-        command = [sys.executable, "-m", "fingervision", "live", *map(str, arguments), "--out", str(folder)]
+        command = [sys.executable, "-m", "fingervision", name, *map(str, arguments), "--out", str(folder)]
         environment = {**os.environ, "OMP_NUM_THREADS": "1", "PYTHONPATH": str(Path(__file__).parents[2])}
         with stdout.open("w") as first, stderr.open("w") as second:
             process = subprocess.Popen(command, stdout=first, stderr=second, text=True, env=environment, cwd=tmp_path)

@@ -26,6 +26,10 @@ from fingervision.live.playback.gauges_beside import GaugesBeside, put_gauges_be
 from fingervision.live.playback.playback import Playback
 from fingervision.live.playback.recorded import recorded
 from tests.gauges.drawn import bar, drawn, half_plane, seen
+from tests.live.browser import browser, needs_chromium, opened, says, shown
+from tests.live.test_page_layout import findings
+
+__all__ = ["browser", "opened"]
 
 SHAPE, FRAMES = (192, 256), 12
 EDGE = {"name": "the edge", "kind": "edge", "x_px": 80, "y_px": 96.5, "direction_deg": 0, "length_px": 60}
@@ -95,7 +99,7 @@ def test_what_is_added_and_changed_is_saved_and_read_again_the_same(opened_on: O
         obey(view, {"do": "gauges_save"})
     obey(view, {"do": "gauge_add", "table": EDGE})
     obey(view, {"do": "gauge_add", "table": BAR})
-    obey(view, {"do": "gauge_change", "name": "the edge", "table": {**EDGE, "name": "lever", "x_px": 81.25}})
+    obey(view, {"do": "gauge_change", "name": "the edge", "changes": {"name": "lever", "x_px": 81.25}})
     assert not section(view)["gauges"]["is_saved"]
     assert not path.exists()
     obey(view, {"do": "gauges_save"})
@@ -123,8 +127,7 @@ def test_comments_and_numbers_of_the_file_stay(opened_on: Opened, tmp_path: Path
     view, _ = opened_on(path)
     obey(view, {"do": "gauges_save"})
     assert path.read_text() == before
-    tables = section(view)["gauges"]["tables"]
-    obey(view, {"do": "gauge_change", "name": "two", "table": {**tables[1], "name": "zwei", "y_px": 91}})
+    obey(view, {"do": "gauge_change", "name": "two", "changes": {"name": "zwei", "y_px": 91}})
     obey(view, {"do": "gauge_add", "table": BAR})
     obey(view, {"do": "gauges_save"})
     text = path.read_text(encoding="utf-8")
@@ -158,6 +161,7 @@ def test_comments_and_numbers_of_the_file_stay(opened_on: Opened, tmp_path: Path
         ({"name": "two\nlines"}, "name"),
         ({"name": BAR["name"]}, "name"),
         ({"direction_deg": True}, None),
+        ({"length_px": None}, None),
         ({"direction_deg": [1]}, None),
     ],
 )
@@ -169,7 +173,7 @@ def test_a_wrong_value_is_a_sentence_at_its_key_and_changes_nothing(
         obey(view, {"do": "gauge_add", "table": table})
     before = section(view)["gauges"]
     for request in (
-        {"do": "gauge_change", "name": "the edge", "table": {**EDGE, **changes}},
+        {"do": "gauge_change", "name": "the edge", "changes": changes},
         {"do": "gauge_add", "table": {**EDGE, "name": "other", **changes}},
     ):
         with pytest.raises(FingervisionError) as refused:
@@ -190,7 +194,7 @@ def test_a_key_that_is_missing_is_said(opened_on: Opened, tmp_path: Path) -> Non
             obey(view, {"do": "gauge_add", "table": bad})
     for request in ("gauge_remove", "gauge_change"):
         with pytest.raises(FingervisionError, match="no gauge"):
-            obey(view, {"do": request, "name": "nobody", "table": EDGE})
+            obey(view, {"do": request, "name": "nobody", "changes": {"x_px": 1}})
     assert section(view)["gauges"]["tables"] == []
 
 
@@ -265,3 +269,130 @@ def test_readings_are_those_of_measure(opened_on: Opened, frames: Path, tmp_path
     obey(view, {"do": "gauge_remove", "name": "the edge"})
     assert beside.following.readings(0, beside.board.version) is None
     assert json.dumps(section(view))
+
+
+def mouse(page: Any, way: list[tuple[float, float]]) -> None:
+    """Drag along points of the picture, in its own pixels."""
+    box = page.locator("#picture").bounding_box()
+    places = [
+        (box["x"] + (x + 0.5) / SHAPE[1] * box["width"], box["y"] + (y + 0.5) / SHAPE[0] * box["height"])
+        for x, y in way
+    ]
+    page.mouse.move(*places[0])
+    page.mouse.down()
+    for place in places[1:]:
+        page.mouse.move(*place, steps=4)
+    page.mouse.up()
+
+
+def reads(page: Any, name: str, words: str) -> str:
+    line = page.locator("#gauge_list li", has=page.locator(f"button:text-is('{name}')")).locator("span", has_text=words)
+    line.wait_for()
+    return str(line.inner_text())
+
+
+@pytest.mark.slow
+@needs_chromium
+def test_gauges_are_drawn_dragged_typed_and_saved_in_the_page(
+    live: Callable[..., Any], opened: Callable[..., Any], frames: Path, tmp_path: Path
+) -> None:
+    path = tmp_path / "gauges.toml"
+    view = live(frames, "--rate-hz", "25", "--px-per-mm", "20", "--port", "0", "--no-browser", name="gauge")
+    page = opened(view.address, viewport={"width": 1280, "height": 720})
+    shown(page, "document.querySelector('#gauge_kind').options.length > 5")
+    assert page.locator("#gauges").get_attribute("open") is not None
+
+    # The picture stands still from here on: the table is whole (and has no gap, which gauges do not need).
+    page.locator("#place", has_text="None of the 12 frames").wait_for()
+
+    # Drawn with the mouse: across an edge; then dragged by its middle.
+    page.select_option("#gauge_kind", "edge")
+    page.fill("#gauge_new_name", "lever")
+    page.click("#gauge_draw")
+    mouse(page, [(70, 96), (96, 96)])
+    reads(page, "lever", "ok")
+    assert float(page.input_value("#gauge_key_x_px")) == pytest.approx(83, abs=1)
+    assert float(page.input_value("#gauge_key_direction_deg")) == pytest.approx(0, abs=3)
+    mouse(page, [(float(page.input_value("#gauge_key_x_px")), 96), (80, 100), (79, 120)])
+    shown(page, "document.querySelector('#gauge_key_y_px').value > 118")
+    assert float(page.input_value("#gauge_key_x_px")) == pytest.approx(79, abs=1)
+    # Typed, and moved by arrow keys.
+    page.fill("#gauge_key_direction_deg", "0")
+    page.fill("#gauge_key_y_px", "96")
+    page.keyboard.press("Tab")
+    page.locator("#gauge_list button").focus()
+    page.keyboard.press("ArrowRight")
+    page.keyboard.press("Shift+ArrowUp")
+    shown(page, "document.querySelector('#gauge_key_y_px').value === '86'")
+    words = reads(page, "lever", "ok")
+    assert float(words.split()[1]) == pytest.approx((80 - 127.5) / 20, abs=0.002), words
+
+    # By the keyboard alone: added, refused beside the field with what was typed in it, mended.
+    page.select_option("#gauge_kind", "pair")
+    page.locator("#gauge_new_name").press("Enter")
+    shown(page, "document.querySelector('#gauge_key_name').value === 'pair'")
+    for key, value in (("distance_px", "1"), ("x_px", "180")):
+        page.fill(f"#gauge_key_{key}", value)
+        page.keyboard.press("Tab")
+    page.locator("#gauge_key_distance_px_why", has_text="must be between 3 and").wait_for()
+    assert page.input_value("#gauge_key_distance_px") == "1"
+    page.fill("#gauge_key_distance_px", "30")
+    page.keyboard.press("Tab")
+    shown(page, "document.querySelector('#gauge_key_distance_px_why').textContent === ''")
+    page.fill("#gauge_key_name", "the bar")
+    page.keyboard.press("Tab")
+    words = reads(page, "the bar", "ok")
+    assert float(words.split()[1]) == pytest.approx(1.5, abs=0.005), words
+    assert findings(page) == []
+
+    # Saved; the file measures; what is shown of a later frame is the table's row.
+    page.click("#gauge_save")
+    says(page, "2 gauges saved")
+    command = ["measure", str(frames), "--rate-hz", "25", "--px-per-mm", "20", "--gauges", str(path)]
+    subprocess.run([sys.executable, "-m", "fingervision", *command, "--out", str(tmp_path / "measured")], check=True)
+    with (tmp_path / "measured" / "gauges.csv").open(encoding="utf-8", newline="") as file:
+        rows = [row for row in csv.DictReader(file) if row["gauge"] == "lever"]
+    page.locator("#scrub").fill("7")
+    words = reads(page, "lever", f"position {float(rows[7]['value']):.4f} mm")
+    assert "ok" in words
+    assert page.locator("#gauge_drawing .mark.found").count() > 0
+
+    # Somebody else's file is not written over unless that is asked for.
+    theirs = path.read_text() + "# theirs\n"
+    path.write_text(theirs)
+    page.click("#gauge_remove")
+    shown(page, "document.querySelector('#gauge_saved').textContent === 'not saved'")
+    page.click("#gauge_save")
+    page.locator("#gauge_words", has_text="somebody else").wait_for()
+    assert path.read_text() == theirs
+    page.click("#gauge_over")
+    says(page, "1 gauges saved")
+    assert [each["name"] for each in tomllib.loads(path.read_text())["gauge"]] == ["lever"]
+
+    page.set_viewport_size({"width": 390, "height": 844})
+    assert page.evaluate("document.documentElement.scrollWidth") <= 390
+    assert findings(page) == []
+    # Who only looks sees the gauges, and changes nothing.
+    viewer = opened(view.until(lambda live: [w for w in live.text().split() if "token=" in w][1:])[0])
+    viewer.locator("#gauge_list li .good").first.wait_for()
+    assert viewer.locator("#gauge_save").is_disabled()
+    assert viewer.locator("#gauge_key_x_px").is_disabled()
+    assert view.stop() == 0
+
+
+@pytest.mark.slow
+@needs_chromium
+def test_the_panel_is_in_the_live_page_of_a_recording_and_costs_nothing_until_it_is_opened(
+    live: Callable[..., Any], opened: Callable[..., Any], frames: Path
+) -> None:
+    view = live(frames, "--rate-hz", "25", "--port", "0")
+    page = opened(view.address, viewport={"width": 1280, "height": 720})
+    page.locator("#gauges").wait_for()
+    assert page.locator("#gauges").get_attribute("open") is None
+    page.locator("#gauges summary").click()
+    page.locator("#gauge_hint", has_text="scale is not known").wait_for()
+    page.locator("#gauge_new_name").press("Enter")
+    page.locator("#gauge_list button").wait_for()
+    page.fill("#px_per_mm", "20")
+    page.press("#px_per_mm", "Enter")
+    page.locator("#gauge_list .bad, #gauge_list .good").wait_for()

@@ -29,14 +29,14 @@ def _board(view: View) -> GaugeBoard:
     return _beside(view).board
 
 
-def _table(request: Request) -> dict[str, Any]:
-    table = request.get("table")
+def _table(request: Request, name: str, *, may_lack: bool = False) -> dict[str, Any]:
+    table = request.get(name)
     if not isinstance(table, dict) or len(table) > MOST_KEYS:
         raise UsageError("A gauge must be a table of its keys, but is none.")
     for key, value in table.items():
         is_number = isinstance(value, int | float) and not isinstance(value, bool) and abs(value) <= GREATEST
         is_word = isinstance(value, str) and len(value) <= MOST_LETTERS
-        if not (is_number or is_word):
+        if not (is_number or is_word or (may_lack and value is None)):
             raise UsageError(f"{str(key)[:40]} must be a number or a text, but is {shown(value)}.")
     return table
 
@@ -60,12 +60,12 @@ def _open(view: View, request: Request) -> Answer:
 
 
 def _add(view: View, request: Request) -> Answer:
-    _board(view).add(_table(request))
+    _board(view).add(_table(request, "table"))
     return _said(view)
 
 
 def _change(view: View, request: Request) -> Answer:
-    _board(view).change(words(request, "name"), _table(request))
+    _board(view).change(words(request, "name"), _table(request, "changes", may_lack=True))
     return _said(view)
 
 

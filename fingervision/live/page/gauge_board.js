@@ -7,7 +7,10 @@ export const works = () => page.state && !page.state.viewer && page.state.holds_
 export function tables() {
   const state = told(), { local } = board;
   if (!state || !state.is_open) return [];
-  return state.tables.map((table) => (local && local.name === table.name ? { ...table, ...local.changes } : table));
+  return state.tables.map((table) => {
+    if (!local || local.name !== table.name) return table;
+    return Object.fromEntries(Object.entries({ ...table, ...local.changes }).filter(([, value]) => value !== null));
+  });
 }
 export const chosen = () => tables().find((table) => table.name === board.chosen) || null;
 export const isFirst = () => told() && told().frame === told().first;
@@ -26,14 +29,22 @@ listen("reply", (reply) => {
 });
 listen("gone", () => { asked = []; board.local = null; });
 
-// Give the chosen gauge other values; what is refused is told to `refused(words, key)`.
-export function change(name, changes, refused) {
-  const table = { ...told().tables.find((each) => each.name === name), ...changes };
-  for (const key of Object.keys(table)) if (table[key] === null) delete table[key];
-  request({ do: "gauge_change", name, table }, (reply) => {
-    if (reply.refused) { refused(reply.refused, reply.field); return; }
-    if (table.name !== name && board.chosen === name) board.chosen = table.name;
-    refused("", null);
+// Show other values of a gauge before the server has them.
+export function show(name, changes) {
+  const { local } = board, is = local && local.name === name;
+  board.local = { name, changes: { ...(is ? local.changes : {}), ...changes }, pending: is ? local.pending : 0, version: null };
+}
+// Give a gauge other values (null takes a key away); `answered(words, key)` is told of a refusal, or that there is none.
+export function change(name, changes, answered) {
+  if (!("name" in changes)) { show(name, changes); board.local.pending += 1; }
+  request({ do: "gauge_change", name, changes }, (reply) => {
+    const { local } = board;
+    if (local && local.name === name && !("name" in changes)) local.pending -= 1;
+    if (reply.refused) { board.local = null; answered(reply.refused, reply.field); return; }
+    // The server's word is in the next state; what was asked since then stays until its own answer.
+    if (local && local.pending === 0) local.version = reply.version;
+    if ("name" in changes && board.chosen === name) board.chosen = changes.name;
+    answered("", null);
   });
 }
 // What a new gauge of a kind begins with: its required keys, in the picture's middle.

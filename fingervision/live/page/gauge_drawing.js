@@ -1,6 +1,6 @@
 // Gauges over the picture: as they are set in the first frame, what was found in any, and points to drag them by.
 import { ask, at, listen, page } from "/page/bus.js";
-import { board, chosen, isFirst, request, tables, told, usual, works } from "/page/gauge_board.js";
+import { board, change, chosen, isFirst, request, show, tables, told, usual, works } from "/page/gauge_board.js";
 import { dragged, drawn, handles, outline } from "/page/gauge_shapes.js";
 
 const SVG = "http://www.w3.org/2000/svg", ASK_EVERY_MS = 100, LETTER = 12, POINT = 6, LEAST_PX = 3;
@@ -91,28 +91,17 @@ svg.addEventListener("pointermove", (event) => {
   if (!drag) return;
   drag.to = place(event);
   if (drag.kind === "old") {
-    board.local = { name: drag.gauge, changes: dragged(drag.before, drag.handle, ...drag.to), version: null };
-    drag.moved = true;
-    if (performance.now() - askedAt > ASK_EVERY_MS) { askedAt = performance.now(); settle(drag.gauge, board.local.changes, false); }
+    drag.changes = dragged(drag.before, drag.handle, ...drag.to);
+    show(drag.gauge, drag.changes);
+    if (performance.now() - askedAt > ASK_EVERY_MS) { askedAt = performance.now(); change(drag.gauge, drag.changes, () => {}); }
   }
   draw();
 });
-function settle(gauge, changes, last) {
-  const table = { ...told().tables.find((each) => each.name === gauge), ...changes };
-  request({ do: "gauge_change", name: gauge, table }, (reply) => {
-    if (!last) return;
-    drawing.said(reply.refused || "");
-    // What was refused goes back to what the server has; what was taken stays until the server's word comes.
-    if (reply.refused) board.local = null;
-    else if (board.local) board.local.version = reply.version;
-    draw();
-  });
-}
 svg.addEventListener("pointerup", () => {
   const done = drag;
   drag = null;
   if (!done) return;
-  if (done.kind === "old") { if (done.moved) settle(done.gauge, board.local.changes, true); return; }
+  if (done.kind === "old") { if (done.changes) change(done.gauge, done.changes, (words) => { drawing.said(words); draw(); }); return; }
   const kind = drawing.kind, far = Math.hypot(done.to[0] - done.from[0], done.to[1] - done.from[1]);
   if (far < LEAST_PX) { drawing.said(`Drag over at least ${LEAST_PX} pixels of the picture.`); draw(); return; }
   add(drawn(usual(kind), done.from, done.to));

@@ -7,24 +7,24 @@ const MOVES = { ArrowLeft: ["x_px", -1], ArrowRight: ["x_px", 1], ArrowUp: ["y_p
 panel("gauges", 'Gauges <span id="gauge_file" class="quiet"></span>', `
   <form id="gauge_add" class="row">
     <label>Kind <select id="gauge_kind"></select></label>
-    <label>Name <input id="gauge_new_name" size="9" maxlength="100" autocomplete="off"></label>
+    <label>Name <input id="gauge_new_name" size="6" maxlength="100" autocomplete="off"></label>
     <button id="gauge_draw" type="button" aria-pressed="false">Draw</button>
     <button id="gauge_add_here">Add</button>
   </form>
-  <p id="gauge_words" class="refused" role="status"></p>
-  <p id="gauge_hint" class="quiet"></p>
-  <ul id="gauge_list" aria-label="Gauges"></ul>
-  <form id="gauge_form" hidden><fieldset><legend id="gauge_legend"></legend>
-    <div id="gauge_fields"></div>
-    <button id="gauge_remove" type="button">Remove</button>
-  </fieldset></form>
   <div class="row">
     <button id="gauge_first" type="button">First frame</button>
     <button id="gauge_save" type="button">Save gauges</button>
     <button id="gauge_over" type="button" hidden>Save over it</button>
     <button id="gauge_load" type="button">Load file</button>
     <span id="gauge_saved" class="quiet"></span>
-  </div>`, { order: 5 });
+  </div>
+  <p id="gauge_words" class="refused" role="status"></p>
+  <p id="gauge_hint" class="quiet"></p>
+  <ul id="gauge_list" aria-label="Gauges"></ul>
+  <form id="gauge_form" hidden><fieldset><legend id="gauge_legend"></legend>
+    <div id="gauge_fields"></div>
+    <button id="gauge_remove" type="button">Remove</button>
+  </fieldset></form>`, { order: 5 });
 at("gauges").hidden = true;
 drawing.said = (words) => say("gauge_words", words);
 drawing.added = () => { at("gauge_new_name").value = ""; drawing.name = ""; build(); };
@@ -84,15 +84,9 @@ function nudge(event) {
   event.preventDefault();
   event.stopPropagation();
   board.chosen = name;
-  const table = chosen(), [key, by] = move;
-  const changes = { ...(board.local && board.local.name === name ? board.local.changes : {}), [key]: table[key] + by * (event.shiftKey ? MANY_PX : 1) };
-  board.local = { name, changes, version: null };
+  const [key, by] = move;
+  change(name, { [key]: Number((chosen()[key] + by * (event.shiftKey ? MANY_PX : 1)).toFixed(3)) }, drawing.said);
   draw();
-  request({ do: "gauge_change", name, table: { ...table, ...changes } }, (reply) => {
-    said(reply);
-    if (reply.refused) board.local = null;
-    else if (board.local) board.local.version = reply.version;
-  });
 }
 
 // ---- the fields of the chosen gauge: one a key of its kind
@@ -128,6 +122,7 @@ function one(field) {
     if (field.default !== null) input.placeholder = String(field.default);
   }
   input.addEventListener("change", () => typed(field, input));
+  place.className = field.isText ? "wide" : "";
   place.append(label, words);
   return place;
 }
@@ -140,7 +135,6 @@ function typed(field, input) {
   }
   if (field.choices.length && value === field.default && !(field.key in chosen())) return;
   refusedIn.add(field.key); // until the answer comes, what was typed stays
-  board.local = null;
   change(name, { [field.key]: value }, (words, key) => refused(words, key, field.key));
 }
 // The sentence stands beside the field that it is about; what was typed stays there.

@@ -171,8 +171,15 @@ class GaugeBoard:
             self._entries += (self._entry(table, None, self._entries),)
             self.version += 1
 
-    def change(self, name: str, table: Mapping[str, Any]) -> None:
-        """Give a gauge other keys, also another name.
+    def change(self, name: str, changes: Mapping[str, Any]) -> None:
+        """Give a gauge other values, also another name.
+
+        Parameters
+        ----------
+        name : str
+            The gauge.
+        changes : mapping
+            Values of the keys that change; None takes a key away.
 
         Raises
         ------
@@ -182,6 +189,8 @@ class GaugeBoard:
         with self._lock:
             at = self._at(name)
             others = self._entries[:at] + self._entries[at + 1 :]
+            table = {**self._entries[at].table, **changes}
+            table = {key: value for key, value in table.items() if value is not None}
             entry = self._entry(table, self._entries[at].place, others)
             self._entries = (*self._entries[:at], entry, *self._entries[at + 1 :])
             self.version += 1
