@@ -1,3 +1,58 @@
-"""Measure a compliant gripper's finger gap in video, and explain where simulation and measurement disagree."""
+"""Measure a compliant gripper's finger gap in video, and explain where simulation and measurement disagree.
+
+The public names stand in `__all__`. Each is imported when it is first asked for, so that `import fingervision` takes
+milliseconds::
+
+    import fingervision as fv
+
+    measured = fv.measure("opening.mp4", calibration="calibration.json", drive="drive.csv")
+    found = fv.diagnose(measured, "simulation.csv")
+    print(found.report.sentence)
+
+A public name stays for at least two minor versions after the version that says, by a `DeprecationWarning` and in the
+changelog, what replaces it. What is not in `__all__`, of this package or of `calib`, may change with any version.
+"""
+
+from importlib import import_module
 
 __version__ = "0.2.0"
+
+_HOMES = {
+    "Calibration": "interface.calibration",
+    "Comparison": "interface.comparison",
+    "Diagnosis": "interface.diagnosis",
+    "Measurement": "interface.measurement",
+    "Parameter": "domain.parameter",
+    "Simulation": "interface.simulation",
+    "calibrate": "interface.calibrate",
+    "compare": "interface.comparison",
+    "diagnose": "interface.diagnosis",
+    "effect": "interface.own_effect",
+    "measure": "interface.measure",
+    "read_model": "interface.tables",
+    "read_table": "interface.tables",
+    "simulate": "interface.simulation",
+    "FingervisionError": "domain.errors",
+    "UsageError": "domain.errors",
+    "ArgumentError": "domain.errors",
+    "DataError": "domain.errors",
+    "OutputError": "domain.errors",
+}
+"""Where each public name lives, below this package; `effects` is the sub-package itself."""
+
+__all__ = ["__version__", "effects", *_HOMES]
+
+
+def __getattr__(name: str) -> object:
+    if name == "effects":
+        return import_module(f"{__name__}.effects")
+    if name not in _HOMES:
+        message = f"module {__name__!r} has no attribute {name!r}"
+        raise AttributeError(message, name=name, obj=import_module(__name__))
+    value = getattr(import_module(f"{__name__}.{_HOMES[name]}"), name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})

@@ -9,7 +9,7 @@ from pathlib import Path
 import calib
 import fingervision
 
-LIBRARIES = ("numpy", "scipy", "opencv-python-headless", "scikit-image", "av", "numba", "matplotlib")
+LIBRARIES = ("numpy", "scipy", "opencv-python-headless", "scikit-image", "av", "matplotlib")
 
 
 @cache
@@ -32,11 +32,11 @@ def difference(here: dict[str, str], there: dict[str, str]) -> str:
 
 
 def _source() -> str:
-    """Hash of every module of both packages: two copies of one version may still differ."""
+    """Hash of every module and loop of both packages: two copies of one version may still differ."""
     found = hashlib.sha256()
     for package in (fingervision, calib):
         top = Path(str(package.__file__)).parent
-        for file in sorted(top.rglob("*.py")):
+        for file in sorted(path for kind in ("*.py", "*.c", "*.h") for path in top.rglob(kind)):
             found.update(f"{file.relative_to(top).as_posix()}\0".encode())
             found.update(file.read_bytes())
     return found.hexdigest()[:12]

@@ -8,7 +8,7 @@ import signal
 import sys
 from contextlib import suppress
 from pathlib import Path
-from typing import NoReturn
+from typing import Any, NoReturn
 
 import click
 
@@ -44,6 +44,13 @@ class Commands(click.Group):
         assert isinstance(command, click.Command)  # noqa: S101 - a file without a command is a fault of ours
         return command
 
+    def invoke(self, ctx: click.Context) -> Any:
+        """Run the command; an argument's error names its option."""
+        from fingervision.interface.argument_names import command_words
+
+        with command_words():
+            return super().invoke(ctx)
+
 
 @click.group(cls=Commands, context_settings={"help_option_names": ["-h", "--help"]})
 @click.version_option(__version__, prog_name="fingervision")
@@ -67,12 +74,6 @@ def main() -> None:
     except FingervisionError as error:
         click.echo(f"fingervision: {error}", err=True)
         sys.exit(error.exit_code)
-    except SystemError as error:
-        # Code that is being compiled hands Ctrl-C on as a failure of its own.
-        if not _interrupted(error):
-            raise
-        click.echo("Aborted!", err=True)
-        sys.exit(ExitCode.COULD_NOT)
     except RuntimeError as error:
         if "Symlink loop" not in str(error):
             raise
@@ -118,9 +119,3 @@ def _give_up_output(error: OSError) -> NoReturn:
             f"fingervision: Standard output could not be written to its end ({error.strerror}): make room.", err=True
         )
     sys.exit(ExitCode.COULD_NOT)
-
-
-def _interrupted(error: BaseException | None) -> bool:
-    return error is not None and (
-        isinstance(error, KeyboardInterrupt) or _interrupted(error.__cause__ or error.__context__)
-    )

@@ -10,7 +10,7 @@ EXAMPLES = """
 \b
 Examples:
   fingervision bed check recipe.toml
-  fingervision bed check diagnosis/next_run.toml --bed lab.toml
+  fingervision bed check next_run.toml --bed lab.toml
   fingervision bed check recipe.toml --json
 
 Nothing is opened and nothing moves. Exit code 0: the recipe fits the bed; 1: it does not, a sentence for each step.

@@ -9,7 +9,7 @@ EXAMPLES = """
 Examples:
   fingervision bed move 1.25
   fingervision bed move -0.3 --speed-mm-s 0.5
-  fingervision bed move 5 --speed-mm-s 20 --bed lab.toml
+  fingervision bed move 1.2 --speed-mm-s 20 --bed lab.toml
 
 \b
 A motor controller behind a board goes by its step data: by a step to that position, or by repeated relative steps, none

@@ -11,9 +11,9 @@ EXAMPLES = """
 \b
 Examples:
   fingervision bed run recipe.toml --out run
-  fingervision bed run recipe.toml --hide backlash:play_mm=0.2 --hide camera_tilt --out run
-  fingervision bed run recipe.toml --hide sealed.toml --out run
-  fingervision bed run diagnosis/next_run.toml --after run --out second
+  fingervision bed run recipe.toml --hide backlash:play_mm=0.2 --hide camera_tilt --out hidden
+  fingervision bed run recipe.toml --hide sealed.toml --out sealed
+  fingervision bed run next_run.toml --after run --out second
   fingervision diagnose run/samples.csv --model run/simulation.csv --out diagnosis
 
 \b
@@ -67,7 +67,7 @@ def command(
 
     recipe, hidden = read_recipe(recipe_toml), hidden_from(hide)
     before = [] if after is None else rows_before(after)
-    rehearse(lambda _, words: click.echo(words, err=True))
+    rehearse()
     bed = open_bed(bed_name, hidden, pace=1.0 if real_time else 0.0, seed=seed, earlier_s=times_of(before))
     try:
         with click.progressbar(length=1000, label="running", file=sys.stderr, hidden=not sys.stderr.isatty()) as bar:

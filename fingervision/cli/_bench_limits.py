@@ -1,12 +1,9 @@
 """Options that state the bench: what no picture shows and the uncertainty budget needs."""
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
-
-if TYPE_CHECKING:
-    from calib.limits import Limits
 
 # Option, name in calib.limits.Limits, default there (a test holds the two equal), what it is.
 LIMITS = (
@@ -19,8 +16,6 @@ LIMITS = (
     ("--temperature-k", "temperature_k", 2.0, "Reference warmer or colder than its certificate by up to +- this, K."),
     ("--expansion-per-k", "expansion_per_k", 11.5e-6, "Thermal expansion of the reference (steel), 1/K."),
 )
-# With a calibrated lens this part of the radius at the corner is left to bend (a board's rows and columns show it).
-LENS_LEFT = 0.0002
 
 Command = Callable[..., Any]
 
@@ -31,20 +26,3 @@ def limit_options(command: Command) -> Command:
         text = f"{words}  [default: {default:g}]"
         command = click.option(option, name, type=float, default=None, help=text)(command)
     return command
-
-
-def limits_from(options: dict[str, float | None], lens_calibrated: bool) -> tuple["Limits", frozenset[str]]:
-    """Limits and the names of those that the user stated.
-
-    Parameters
-    ----------
-    options : dict
-        Values of the options above; None where not given.
-    lens_calibrated : bool
-        Whether a lens is taken off: what is then left is less.
-    """
-    from calib.limits import Limits
-
-    given = {name: value for name, value in options.items() if value is not None}
-    defaults = {"lens_relative": LENS_LEFT} if lens_calibrated else {}
-    return Limits(**(defaults | given)), frozenset(given)

@@ -11,8 +11,9 @@ from calib.camera_response import MeasuredResponse
 from calib.response_from_edges import response_from_edges
 from calib.response_from_exposures import response_from_exposures
 from calib.response_from_wedge import response_from_wedge
-from fingervision.cli._references import named_references, read_pictures, region_from
+from fingervision.cli._references import named_references, region_from
 from fingervision.domain.errors import UsageError
+from fingervision.interface.reference_pictures import read_pictures
 from fingervision.storage.response_csv import write_response
 from fingervision.vision.grey import top_level
 
@@ -39,7 +40,7 @@ def measure_response(
         exposed = [item for item in items if "=" in item and not Path(item).exists()]
         if exposed:
             raise UsageError(f"With --edges or --densities an item must be an IMAGE alone, but is {exposed[0]}.")
-        pictures = read_pictures([Path(item) for item in items])
+        pictures = [grey for _, grey in read_pictures([Path(item) for item in items])]
         top = max(top_level(grey) for grey in pictures)
         if densities is None:
             found = response_from_edges(pictures, top, out.name)
@@ -49,7 +50,7 @@ def measure_response(
             found = response_from_wedge(pictures[0], _densities(densities), top, out.name, region_from(roi))
     else:
         named = named_references(items, "bar", "EXPOSURE with a positive exposure", "e20.png=2")
-        pictures = read_pictures([path for _, path, _ in named])
+        pictures = [grey for _, grey in read_pictures([path for _, path, _ in named])]
         top = max(top_level(grey) for grey in pictures)
         found = response_from_exposures(pictures, [value for *_, value in named], top, out.name)
     write_response(found.response, out)

@@ -28,3 +28,11 @@ def results_folder(out: Path, source: Path) -> Path:
     if found != out:
         click.echo(f"{out} holds the results of another input: these go to {found}.", err=True)
     return found
+
+
+def running_command() -> str:
+    """Give the command line that is running, as a result names it."""
+    import shlex
+    import sys
+
+    return shlex.join(["fingervision", *sys.argv[1:]])

@@ -39,15 +39,6 @@ models_option = click.option(
 )
 
 
-def told_apart(paths: tuple[Path, ...]) -> list[str]:
-    """Name models by their files, with as much of the folder as tells them apart."""
-    for parts in range(1, max(len(path.parts) for path in paths) + 1):
-        names = [Path(*path.parts[-parts:]).as_posix() for path in paths]
-        if len(set(names)) == len(names):
-            return names
-    raise click.UsageError("--model names the same file twice: each model counts once.")
-
-
 kind_option = click.option(
     "--kind",
     type=KindChoice(),

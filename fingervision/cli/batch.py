@@ -16,8 +16,8 @@ if TYPE_CHECKING:
 EXAMPLES = """
 \b
 Examples:
-  fingervision batch measure 'recordings/**/*.mp4' --calibration c.json --out results
-  fingervision batch measure day1/*.mkv day2/*.mkv --px-per-mm 34 --jobs 4 --out results
+  fingervision batch measure 'recordings/**/*.mp4' --calibration calibration.json --out results
+  fingervision batch measure recordings/first/*.mp4 recordings/second/*.mp4 --px-per-mm 34 --jobs 2 --out others
   fingervision batch measure '/lab/**/*.mkv' --calibration /lab/c.json --scheduler tcp://head:8786 --out /lab/results
   fingervision batch diagnose 'runs/*/samples.csv' --model comsol.csv --out diagnoses
 

@@ -31,7 +31,7 @@ EPILOG = """
 \b
 Examples:
   fingervision bed run recipe.toml --out run
-  fingervision bed run recipe.toml --hide backlash:play_mm=0.2 --out run
+  fingervision bed run recipe.toml --hide backlash:play_mm=0.2 --out hidden
   fingervision bed run next_run.toml --bed lab.toml --out second
   fingervision bed check recipe.toml
 """

@@ -2,22 +2,20 @@
 
 import json
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import click
 
 from fingervision.cli._bench_limits import limit_options
-from fingervision.cli._calibrating import calibrate_on_board, calibrate_on_sizes, sentences
-from fingervision.cli._picture_response import PictureResponse
-from fingervision.cli._references import read_references, region_from
+from fingervision.cli._calibrating import calibrate_on_board, calibrate_on_lines, calibrate_on_sizes, sentences
+from fingervision.cli._references import named_references, region_from
 from fingervision.domain.errors import FingervisionError, UsageError
 
 BAR_EXAMPLES = """
 \b
 Examples:
-  fingervision calibrate bar ref5.png=5.000 ref10.png=10.000 ref15.png=15.000 -o calibration.json
+  fingervision calibrate bar ref5.png=5.000 ref11.png=11.000 ref17.png=17.000 -o calibration.json
   fingervision calibrate bar ref5.png=5.000 slot:ref3.png=3.000 --u-size-mm 0.0005 --plane-mm 0.2
 """
 SLOT_EXAMPLES = """
@@ -33,7 +31,7 @@ Example:
 CHARUCO_EXAMPLES = """
 \b
 Example:
-  fingervision calibrate charuco plane.png tilted*.png --squares 8x6 --square-mm 3 --marker-mm 2.2
+  fingervision calibrate charuco charuco_plane.png charuco_tilted*.png --squares 8x6 --square-mm 3 --marker-mm 2.2
 """
 RESPONSE_EXAMPLES = """
 \b
@@ -41,18 +39,18 @@ Examples:
   fingervision calibrate response e05.png=0.5 e10.png=1 e20.png=2 e40.png=4 -o response.csv
   fingervision calibrate response --densities 0.05:1.95:0.1 --roi 40,200,560,60 wedge.png
   fingervision calibrate response --edges bar1.png bar2.png bar3.png
-  fingervision measure run.mkv --calibration calibration.json --response response.csv
+  fingervision measure opening.mp4 --calibration calibration.json --response response.csv
 """
 SCALE_EXAMPLES = """
 \b
 Examples:
-  fingervision calibrate scale micrometer.png --pitch-mm 0.01 -o calibration.json
-  fingervision calibrate scale micrometer.png --pitch-mm 0.1 --roi 0,200,1280,300 --u-length-mm 0.0005
+  fingervision calibrate scale micrometer.png --pitch-mm 0.1 -o calibration.json
+  fingervision calibrate scale micrometer.png --pitch-mm 0.1 --roi 0,60,640,180 --u-length-mm 0.0005
 """
 CHECK_EXAMPLES = """
 \b
 Example:
-  fingervision calibrate check calibration.json object.png=7.500 --u-size-mm 0.001
+  fingervision calibrate check calibration.json object.png=8.000 --u-size-mm 0.001
 """
 REPEAT_EXAMPLES = """
 \b
@@ -158,7 +156,7 @@ def chessboard(**options: Any) -> None:
     The first picture defines the plane in which distances are measured: put the board where the gripper moves. In the
     others tilt it differently each time.
     """
-    calibrate_on_board(marker_mm=None, **options)
+    calibrate_on_board("chessboard", **options)
 
 
 @command.command("charuco", epilog=CHARUCO_EXAMPLES)
@@ -167,12 +165,12 @@ def chessboard(**options: Any) -> None:
 @click.option("--marker-mm", type=float, default=None, help="Side of a marker, mm.  [default: 0.75 of a square]")
 @limit_options
 @_output_options
-def charuco(marker_mm: float | None, square_mm: float, **options: Any) -> None:
+def charuco(**options: Any) -> None:
     """Calibrate on a ChArUco board; it may leave the frame. The dictionary of its markers is found by itself.
 
     As `chessboard`, but --squares counts squares.
     """
-    calibrate_on_board(marker_mm=0.75 * square_mm if marker_mm is None else marker_mm, square_mm=square_mm, **options)
+    calibrate_on_board("charuco", **options)
 
 
 @command.command("scale", epilog=SCALE_EXAMPLES)
@@ -191,8 +189,6 @@ def scale(**options: Any) -> None:
     The middles of the lines give the scale: blooming and the camera's response move a line's two edges in opposite
     senses and leave its middle alone. The edge bias of a gap stays in the budget, with its limit.
     """
-    from fingervision.cli._calibrating_lines import calibrate_on_lines
-
     calibrate_on_lines(**options)
 
 
@@ -229,27 +225,13 @@ def response(**options: Any) -> None:
 def check(calibration: Path, items: Sequence[str], u_size_mm: float, roi: str | None, as_json: bool) -> None:
     """Measure a known object with an existing calibration and say whether it agrees (E_n number)."""
     with sentences():
-        import numpy as np
+        from fingervision.interface.calibration import Calibration
+        from fingervision.interface.reference_pictures import Reference, known_sizes
 
-        from calib.agreement import Agreement
-        from calib.known_widths import find_widths
-        from fingervision.storage.calibration_json import read_calibration
-
-        scale = read_calibration(calibration)
-        pictures = read_references(items, "bar", u_size_mm)
-        height, width = pictures[0].grey.shape
-        scale.check_frame_size(width, height)
-        read_with = PictureResponse.of_calibration(scale)
-        light = [replace(picture, grey=read_with.light(picture.grey)) for picture in pictures]
-        edges = find_widths(light, region_from(roi), scale.px_per_mm)
-        points = np.array([edge.points_px for edge in edges])
-        u_random = np.array([edge.u_width_px for edge in edges])
-        distances = scale.distances(points, u_random, np.array([edge.light for edge in edges]))
-        assert distances.u_mm is not None  # noqa: S101 - a calibration always has an uncertainty
-        results = [
-            Agreement(float(value), float(u), picture.size_mm, picture.u_size_mm)
-            for picture, value, u in zip(pictures, distances.value_mm, distances.u_mm, strict=True)
-        ]
+        references = [Reference(which, path, size_mm) for which, path, size_mm in named_references(items, "bar")]
+        scale = Calibration.load(calibration)
+        pictures = known_sizes(references, u_size_mm)
+        results = scale.check_sizes(pictures, region_from(roi))
         if as_json:
             content = [
                 {

@@ -6,8 +6,8 @@ import click
 
 from fingervision.cli._columns_option import columns_option
 from fingervision.cli._effects_option import effects_option
-from fingervision.cli._results_folder import results_folder
-from fingervision.cli._which_model import kind_option, models_option, told_apart
+from fingervision.cli._results_folder import results_folder, running_command
+from fingervision.cli._which_model import kind_option, models_option
 
 EXAMPLES = """
 \b
@@ -15,7 +15,7 @@ Examples:
   fingervision compare samples.csv --model comsol.csv --out results
   fingervision compare samples.csv --model gripper.toml
   fingervision compare samples.csv --model comsol.csv --model gripper.toml --out both
-  fingervision compare samples.csv --model results/model.toml --json
+  fingervision compare samples.csv --model corrected/model.toml --json
 
 \b
 Files written to --out:
@@ -45,34 +45,12 @@ def command(
     """Say where a measured table and one or more models disagree beyond the noise."""
     import json
 
-    from fingervision.diagnosis.compare import compare
-    from fingervision.diagnosis.report.comparison_files import PAGE, write_comparison
-    from fingervision.storage.out_folder import new_out_folder, out_folder
-    from fingervision.storage.provenance import provenance
-    from fingervision.storage.result_owner import mark_owner
-    from fingervision.tables.read import read_measured_table, read_model
+    from fingervision.diagnosis.report.comparison_files import PAGE
+    from fingervision.interface.comparison import compare
+    from fingervision.storage.out_folder import new_out_folder
 
-    table = read_measured_table(measured, columns)
-    models = {
-        name: read_model(path, kind, columns) for name, path in zip(told_apart(model_paths), model_paths, strict=True)
-    }
     out = results_folder(out, measured)
     with new_out_folder(out):
-        compared = {name: compare(table, model, seed=seed) for name, model in models.items()}
-    files = {"measured table": measured, **{f"model {name}": p for name, p in zip(models, model_paths, strict=True)}}
-    with out_folder(out):
-        document = write_comparison(out, compared, provenance(files), measured)
-    mark_owner(out, measured)
-    if as_json:
-        click.echo(json.dumps(document, indent=2))
-        return
-    for name, found in compared.items():
-        which = "" if len(compared) == 1 else f"{name}: "
-        click.echo(f"{which}RMS disagreement {found.rms_mm:.3g} mm, noise {found.noise_mm:.2g} mm")
-        for place in found.places:
-            click.echo(f"  {place.words}")
-        if not found.places:
-            click.echo("  nowhere beyond the noise")
-        for words in (*found.data.notes, *found.data.refitted()):
-            click.echo(f"  note: {words}")
-    click.echo(f"  {out / PAGE}")
+        found = compare(measured, list(model_paths), seed=seed, kind=kind, columns=columns, call=running_command())
+    found.write(out)
+    click.echo(json.dumps(found.document(), indent=2) if as_json else f"{found.report()}\n  {out / PAGE}")

@@ -6,9 +6,8 @@ import click
 
 from fingervision.cli._columns_option import columns_option
 from fingervision.cli._effects_option import effects_option
-from fingervision.cli._results_folder import results_folder
+from fingervision.cli._results_folder import results_folder, running_command
 from fingervision.cli._which_model import kind_option, model_option
-from fingervision.domain.errors import UsageError
 
 EXAMPLES = """
 \b
@@ -57,46 +56,24 @@ def command(
     """Name the effect that a model lacks beside a measured table."""
     import json
     import sys
-    from difflib import get_close_matches
 
-    from fingervision.diagnosis.diagnose import diagnose
-    from fingervision.diagnosis.report.answer_files import PAGE, write_answer
-    from fingervision.effects import catalogue
-    from fingervision.storage.out_folder import new_out_folder, out_folder
-    from fingervision.storage.provenance import provenance
-    from fingervision.storage.result_owner import mark_owner
-    from fingervision.tables.read import read_measured_table, read_model
+    from fingervision.diagnosis.report.answer_files import PAGE
+    from fingervision.interface.diagnosis import diagnose
+    from fingervision.storage.out_folder import new_out_folder
 
-    for name in (*forced, *without):
-        if name not in catalogue():
-            near = get_close_matches(name, catalogue(), n=1)
-            hint = f"did you mean {near[0]}?" if near else "`fingervision effects` lists them."
-            raise UsageError(f"An effect must be one of the catalogue, but is {name}: {hint}")
-    if set(forced) & set(without):
-        raise UsageError(f"An effect must be forced or left out, but {', '.join(set(forced) & set(without))} is both.")
-    table, model = read_measured_table(measured, columns), read_model(model_path, kind, columns)
     out = results_folder(out, measured)
     bar = click.progressbar(length=1000, label="diagnosing", file=sys.stderr, hidden=not sys.stderr.isatty())
     with new_out_folder(out), bar:
         done = diagnose(
-            table,
-            model,
+            measured,
+            model_path,
+            with_effects=forced,
+            without_effects=without,
             seed=seed,
-            forced=frozenset(forced),
-            without=frozenset(without),
+            kind=kind,
+            columns=columns,
             progress=lambda share: bar.update(max(0, int(1000 * share) - bar.pos)),
+            call=running_command(),
         )
-    with out_folder(out):
-        made = provenance({"measured table": measured, "model": model_path})
-        document = write_answer(out, done, model, made, measured)
-    mark_owner(out, measured)
-    report = done.report
-    if as_json:
-        click.echo(json.dumps(document, indent=2))
-        return
-    click.echo(f"{report.verdict}: {report.sentence}")
-    for words in (*report.outliers, *report.notes):
-        click.echo(f"  note: {words}")
-    if report.next_run is not None:
-        click.echo(f"  next: {report.next_run.words}")
-    click.echo(f"  {out / PAGE}")
+    document = done.write(out)
+    click.echo(json.dumps(document, indent=2) if as_json else f"{done.sentences()}\n  {out / PAGE}")

@@ -7,14 +7,11 @@ import click
 
 from fingervision.cli._columns_option import columns_option
 from fingervision.cli._where_to_measure import region_of, where_to_measure
-from fingervision.domain.errors import UsageError
 
 if TYPE_CHECKING:
-    from fingervision.measuring.measure import Measured, Progress
-    from fingervision.measuring.scale import Scale
+    from fingervision.measuring.frame_loop import Progress
+    from fingervision.measuring.measure import Measured
 
-LOADING_S = 3.0
-"""What is compiled is loaded faster; after an installation it is compiled first, and that is said."""
 EXAMPLES = """
 \b
 Examples:
@@ -22,9 +19,9 @@ Examples:
   fingervision measure opening.mp4 --px-per-mm 34 --overlay --out results/opening
   fingervision measure frames/ --rate-hz 25 --px-per-mm 34
   fingervision measure 'frames/*.png' --px-per-mm 34 --tips down --roi 100,80,400,300
-  fingervision measure run.mkv --calibration calibration.json --drive drive.csv
-  fingervision measure run.mkv --calibration calibration.json --drive drive.csv --drive-offset-s 0.12
-  fingervision measure run.mkv --px-per-mm 34 --steps 10
+  fingervision measure opening.mp4 --calibration calibration.json --drive drive.csv
+  fingervision measure opening.mp4 --calibration calibration.json --drive drive.csv --drive-offset-s 0.12
+  fingervision measure opening.mp4 --px-per-mm 34 --steps 10
 
 \b
 Files written to --out:
@@ -110,73 +107,28 @@ def command(
     The gap is the distance between the fingers' inner edges, 0.3 mm below their tips, in every frame, with its standard
     uncertainty. One of --calibration and --px-per-mm is required.
     """
-    from fingervision.domain.direction import Direction
-    from fingervision.frames.source import Wish, open_source
-    from fingervision.measuring.measure import measure
-    from fingervision.measuring.task import Task
-    from fingervision.storage.response_csv import response_named
-    from fingervision.storage.summary_json import refuse_other_recording
-    from fingervision.tables.read import read_drive
+    from fingervision.interface.measure import measure_into
+    from fingervision.interface.measuring_task import measuring_task, scale_of
 
-    task = Task(
-        scale=_scale(calibration, px_per_mm),
-        scale_file=calibration,
+    task = measuring_task(
+        scale=scale_of(calibration, px_per_mm),
         below_tip_mm=below_tip_mm,
-        direction=None if tips == "auto" else Direction(tips),
-        region=region_of(roi),
-        drive=None if drive is None else read_drive(drive, columns),
+        tips=tips,
+        roi=region_of(roi),
+        drive=drive,
         drive_offset_s=drive_offset_s,
+        columns=columns,
+        response=response,
+        bits=bits,
+        fingers=fingers,
+        face=face,
         overlay=overlay,
         steps_frame=steps_frame,
-        response=response_named(response),
-        bits=bits,
-        fingers_are_dark={"auto": None, "dark": True, "light": False}[fingers],
-        is_outline=face == "outline",
     )
-    source = open_source(recording, Wish(rate_hz=rate_hz))
-    folder = out or _default_out(recording)
-    refuse_other_recording(folder, recording)
     with _Bar() as bar:
-        measured = measure(source, task, folder, bar)
+        measured = measure_into(out, recording, task, rate_hz, bar)
     _report(measured, as_json)
     raise SystemExit(int(measured.exit_code))
-
-
-def _scale(calibration: Path | None, px_per_mm: float | None) -> "Scale":
-    from calib.calibration import BareScale
-    from fingervision.measuring.scale import check_px_per_mm
-    from fingervision.storage.calibration_json import read_calibration
-
-    if calibration is not None and px_per_mm is not None:
-        raise UsageError("Either --calibration or --px-per-mm gives the scale, but both are there: leave one out.")
-    if calibration is not None:
-        return read_calibration(calibration)
-    if px_per_mm is None:
-        raise UsageError(
-            "The scale must be given, but is not: add --calibration FILE (made by `fingervision calibrate`) "
-            "or --px-per-mm S."
-        )
-    try:
-        scale = BareScale(px_per_mm)
-    except ValueError as error:
-        raise UsageError(f"--px-per-mm must be positive, but is {px_per_mm:g}.") from error
-    check_px_per_mm(px_per_mm)
-    return scale
-
-
-def _default_out(recording: str) -> Path:
-    """measured/<file or folder>; for a glob the folder that it looks in; with more of the path where that is taken."""
-    from fingervision.storage.summary_json import recording_of
-
-    path = Path(recording)
-    named = path.resolve() if path.exists() else path.parent.resolve()
-    parts = [part for part in named.parts if part != named.anchor] or ["images"]
-    for depth in range(1, len(parts) + 1):
-        out = Path("measured") / "__".join(parts[-depth:])
-        of = recording_of(out)
-        if of is None or Path(of).resolve() == path.resolve():
-            return out
-    return out
 
 
 class _Bar:
@@ -190,16 +142,6 @@ class _Bar:
         self._done = 0
 
     def __enter__(self) -> "Progress":
-        import sys
-        from threading import Timer
-
-        if sys.stderr.isatty():
-            words = "Preparing to measure: after an installation this takes up to a minute, once."
-            late = Timer(LOADING_S, click.echo, (words,), {"err": True})
-            late.daemon = True
-            late.start()
-            self._late = late
-            self._stack.callback(late.cancel)
         return self._show
 
     def __exit__(self, *_: object) -> None:
@@ -208,10 +150,7 @@ class _Bar:
     def _show(self, done: int, of: int | None) -> None:
         import sys
 
-        if not sys.stderr.isatty():
-            return
-        self._late.cancel()
-        if not of:
+        if not (sys.stderr.isatty() and of):
             return
         if self._bar is None:
             bar = click.progressbar(length=of, label="Measuring", file=sys.stderr, show_pos=True)
@@ -253,25 +192,11 @@ def _report(measured: "Measured", as_json: bool) -> None:
 
 
 def _print_result(measured: "Measured") -> None:
-    summary, series, folder = measured.summary, measured.series, measured.folder
-    gap = summary["gap"]
-    click.echo(f"{gap['count']} of {series.frames} frames measured.")
-    for status, why in summary["why"].items():
-        click.echo(f"  {summary['counts'][status]} {status}, first frame {why['first_frame']}: {why['words']}")
-    if gap["count"]:
-        click.echo(f"Gap {gap['least_mm']:.4f} to {gap['greatest_mm']:.4f} mm, mean {gap['mean_mm']:.4f} mm.")
-        if gap["median_u_gap_mm"] is not None:
-            click.echo(
-                f"U = {2e3 * gap['median_u_gap_mm']:.2f} µm (k = 2, median), of which from frame to frame "
-                f"{2e3 * gap['median_u_random_mm']:.2f} µm."
-            )
-        else:
-            click.echo(
-                f"U = {2e3 * gap['median_u_random_mm']:.2f} µm (k = 2, median) from frame to frame; the scale was "
-                "stated without an uncertainty, which is not in it."
-            )
-    for advice in summary["advice"]:
-        click.echo(advice)
+    from fingervision.measuring.words import result_sentences
+
+    for sentence in result_sentences(measured.summary, measured.series):
+        click.echo(sentence)
+    folder = measured.folder
     files = [folder.gaps, folder.summary, folder.figure, folder.overlay, folder.steps]
     click.echo("Written: " + ", ".join(str(file) for file in files if file.exists()))
 

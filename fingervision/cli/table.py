@@ -17,7 +17,7 @@ Examples:
   fingervision table comsol.txt --as simulation
   fingervision table table1.csv --as simulation --set columns.gap=comsol_mm
   fingervision table log.csv --set units.time=ms --set units.input='0.1 um'
-  fingervision table run.xlsx --set part=Sheet2 --png run.png
+  fingervision table stage.lvm --png stage.png
 
 \b
 Read are text of every habit (CSV, COMSOL, LabVIEW .lvm), .xlsx, .mat, .parquet and .tdms.

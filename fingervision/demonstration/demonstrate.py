@@ -114,7 +114,7 @@ def demonstrate(hidden: Hidden, seed: int, out: Path, say: Say) -> Shown:
     if held := contents(out):
         refuse_others(out, held[0])
     write_recipe(recipe, "there and back", FIRST_RUN)
-    rehearse(lambda _, words: say(words))
+    rehearse()
     before: Path | None = None
     for number in range(1, MOST_RUNS + 1):
         folder, asked = out / f"run-{number}", read_recipe(recipe)

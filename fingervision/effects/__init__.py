@@ -6,18 +6,20 @@ in the catalogue beside them.
 
 import importlib
 import pkgutil
+import sys
 from contextlib import AbstractContextManager
 from functools import cache
 from pathlib import Path
 
 from fingervision.domain.effect import Effect, Stage
 from fingervision.domain.further_check import FurtherCheck
+from fingervision.effects.effect_list import EffectList
 from fingervision.effects.trial import BUILT_IN, effects_in
 from fingervision.plugins.origin import SESSION, Origin
 from fingervision.plugins.registry import Registry
 from fingervision.plugins.watched_import import importing
 
-__all__ = ["REGISTRY", "added_effects", "catalogue", "origin_of", "register", "that_show"]
+__all__ = ["REGISTRY", "added_effects", "catalogue", "origin_of", "register", "that_show", "withdraw"]
 
 
 @cache
@@ -31,7 +33,7 @@ def _built_in() -> dict[str, Effect]:
 REGISTRY: Registry[Effect] = Registry(
     "fingervision.effects", "effect", lambda: tuple(_built_in()), lambda name: _built_in()[name], effects_in
 )
-_known: dict[int, tuple[dict[str, Effect], dict[str, Origin]]] = {}
+_by_version: dict[int, tuple[dict[str, Effect], dict[str, Origin]]] = {}
 
 
 def catalogue() -> dict[str, Effect]:
@@ -66,6 +68,11 @@ def register(effect: Effect) -> Effect:
     return effect
 
 
+def withdraw(name: str) -> None:
+    """Take back what was registered; nothing happens where nothing was."""
+    REGISTRY.remove(name)
+
+
 def added_effects(paths: tuple[Path, ...]) -> AbstractContextManager[None]:
     """Add the effects that files hold for as long as a `with` block lasts."""
     return REGISTRY.with_files(paths)
@@ -73,16 +80,20 @@ def added_effects(paths: tuple[Path, ...]) -> AbstractContextManager[None]:
 
 def _catalogue() -> tuple[dict[str, Effect], dict[str, Origin]]:
     version = REGISTRY.version
-    if version in _known:
-        return _known[version]
+    if version in _by_version:
+        return _by_version[version]
     entries = sorted(REGISTRY.entries(), key=lambda entry: _place(entry.value, built_in=entry.origin.built_in))
     found = {entry.name: entry.value for entry in entries}, {entry.name: entry.origin for entry in entries}
     if not importing():
-        _known.clear()
-        _known[version] = found
+        _by_version.clear()
+        _by_version[version] = found
     return found
 
 
 def _place(effect: Effect, *, built_in: bool) -> tuple[int, float, bool, str]:
     """Place in the chain: by stage, then by `order`; what has the same goes behind what is built in, then by name."""
     return list(Stage).index(effect.stage), effect.order, not built_in, effect.name
+
+
+# `fingervision.effects` itself can be iterated and asked by name.
+sys.modules[__name__].__class__ = EffectList

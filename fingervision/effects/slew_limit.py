@@ -4,8 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from fingervision.domain.compiled import compiled_as_written
 from fingervision.domain.effect import Array, DriveEffect, History, Stage, Values
+from fingervision.domain.loops import filled, loop
 from fingervision.domain.parameter import Parameter
 
 SLOWEST_SHARE, FASTEST_SHARE = 0.05, 0.98
@@ -18,18 +18,12 @@ JUMP_RANGE = 0.01
 APART = 1.5
 """Fastest over slowest motion above which a limit between them is told from a record of one speed and its errors."""
 
+_follow = loop("slew_limit_follow")
 
-@compiled_as_written
+
 def follow(input_mm: Array, time_s: Array, speed_mm_s: float) -> Array:
     """Follow one run's input at no more than `speed_mm_s`, from its first sample on; exact; shape (n,)."""
-    out = np.empty_like(input_mm)
-    state = input_mm[0]
-    out[0] = state
-    for i in range(1, input_mm.size):
-        reach = speed_mm_s * (time_s[i] - time_s[i - 1])
-        state += min(max(input_mm[i] - state, -reach), reach)
-        out[i] = state
-    return out
+    return filled(_follow, input_mm, np.ascontiguousarray(time_s), speed_mm_s)
 
 
 def act(input_mm: Array, history: History, values: Values) -> Array:

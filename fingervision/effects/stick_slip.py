@@ -4,21 +4,16 @@ from dataclasses import replace
 
 import numpy as np
 
-from fingervision.domain.compiled import compiled_as_written
 from fingervision.domain.effect import Array, DriveEffect, History, Stage, Values
+from fingervision.domain.loops import filled, loop
 from fingervision.domain.parameter import Parameter
 
+_stick = loop("stick_slip_stick")
 
-@compiled_as_written
+
 def stick(input_mm: Array, jump_mm: float) -> Array:
     """Hold one run's input until it has moved on by more than `jump_mm`; shape (n,)."""
-    out = np.empty_like(input_mm)
-    state = input_mm[0]
-    for i in range(input_mm.size):
-        if abs(input_mm[i] - state) > jump_mm:
-            state = input_mm[i]
-        out[i] = state
-    return out
+    return filled(_stick, input_mm, jump_mm)
 
 
 def act(input_mm: Array, history: History, values: Values) -> Array:

@@ -4,33 +4,17 @@ from dataclasses import replace
 
 import numpy as np
 
-from fingervision.domain.compiled import compiled_as_written
 from fingervision.domain.effect import Array, History, PointEffect, Stage, Values
+from fingervision.domain.loops import filled, loop
 from fingervision.domain.parameter import Parameter
 from fingervision.domain.response import Response
 
+_ring = loop("structural_resonance_ring")
 
-@compiled_as_written
+
 def ring(signal: Array, time_s: Array, frequency_hz: float, damping_ratio: float) -> Array:
     """Drive a second-order system with one run's signal, at rest at the first sample; exact; shape (n,)."""
-    out = np.empty_like(signal)
-    damping = min(damping_ratio, 0.9999)
-    omega = 2.0 * np.pi * frequency_hz
-    damped = omega * np.sqrt(1.0 - damping * damping)
-    decay = damping * omega
-    x, v = signal[0], 0.0
-    out[0] = x
-    for i in range(1, signal.size):
-        step_s = time_s[i] - time_s[i - 1]
-        slope = (signal[i] - signal[i - 1]) / step_s
-        lag = 2.0 * damping * slope / omega
-        a = x - signal[i - 1] + lag
-        b = (v - slope + decay * a) / damped
-        e, c, s = np.exp(-decay * step_s), np.cos(damped * step_s), np.sin(damped * step_s)
-        x = signal[i] - lag + e * (a * c + b * s)
-        v = slope + e * ((damped * b - decay * a) * c - (damped * a + decay * b) * s)
-        out[i] = x
-    return out
+    return filled(_ring, signal, np.ascontiguousarray(time_s), frequency_hz, min(damping_ratio, 0.9999))
 
 
 def act(response: Response, history: History, values: Values) -> Response:

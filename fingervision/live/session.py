@@ -81,7 +81,7 @@ class Session:
     def start(self) -> None:
         """Begin to measure, once the measurement is ready."""
         self.capture.start()
-        rehearse(self.say)
+        rehearse()
         self.capture.begin()
         self._frame_at_s = monotonic()
         self._thread.start()

@@ -27,18 +27,47 @@ Floats = NDArray[np.float64]
 def draw_gap(
     path: Path, series: GapSeries, drive: DriveHistory | None = None, clock: ClockOffset | float | None = None
 ) -> None:
-    """Draw the gap with the band of its expanded uncertainty, and below it that uncertainty alone.
-
-    Frames without a number are marked at the lower edge. With a drive and its clock offset the input is drawn over the
-    gap, on the recording's clock, and the offset is written above.
+    """Draw the gap into a file; see `gap_figure`.
 
     Raises
     ------
     FingervisionError
         The picture cannot be written.
     """
+    figure = gap_figure(series, drive, clock)
+    part = path.with_name(f".{path.name}.part")
+    try:
+        figure.savefig(part, dpi=DOTS_PER_INCH, format="png")
+        part.replace(path)
+    except OSError as error:
+        part.unlink(missing_ok=True)
+        raise FingervisionError(
+            f"{path} could not be written ({error.strerror}): make room or name another --out, and measure again."
+        ) from error
+
+
+def gap_figure(
+    series: GapSeries, drive: DriveHistory | None = None, clock: ClockOffset | float | None = None
+) -> Figure:
+    """Draw the gap with the band of its expanded uncertainty, and below it that uncertainty alone.
+
+    Frames without a number are marked at the lower edge. With a drive and its clock offset the input is drawn over the
+    gap, on the recording's clock, and the offset is written above.
+    """
     figure = Figure(figsize=SIZE_INCHES, layout="constrained")
     upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=(3, 1))
+    draw_gap_axes(upper, lower, series, drive, clock)
+    return figure
+
+
+def draw_gap_axes(
+    upper: Axes,
+    lower: Axes,
+    series: GapSeries,
+    drive: DriveHistory | None = None,
+    clock: ClockOffset | float | None = None,
+) -> None:
+    """Draw the gap into the upper axes, its expanded uncertainty into the lower ones; see `gap_figure`."""
     where, where_not, label = _axis(series)
     pieces = _pieces(series)
     gap_mm, expanded_um = series.gap_mm, COVERAGE_FACTOR * 1e3 * series.u_mm
@@ -71,15 +100,6 @@ def draw_gap(
     for axes in (upper, lower):
         axes.grid(visible=True, alpha=0.3)
         axes.ticklabel_format(useOffset=False)
-    part = path.with_name(f".{path.name}.part")
-    try:
-        figure.savefig(part, dpi=DOTS_PER_INCH, format="png")
-        part.replace(path)
-    except OSError as error:
-        part.unlink(missing_ok=True)
-        raise FingervisionError(
-            f"{path} could not be written ({error.strerror}): make room or name another --out, and measure again."
-        ) from error
 
 
 def _draw_input(axes: Axes, drive: DriveHistory, clock: ClockOffset | float) -> None:

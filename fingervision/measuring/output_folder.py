@@ -1,12 +1,16 @@
 """The folder that results are written to: made, and never at the cost of somebody else's files."""
 
 import shutil
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
 from fingervision.domain.errors import FingervisionError, UsageError
+from fingervision.storage.folder_lock import FolderLock
 from fingervision.storage.gaps_csv import COLUMNS
-from fingervision.storage.out_folder import out_folder
+from fingervision.storage.out_folder import make_out_folder, out_folder
+from fingervision.storage.summary_json import recording_of
 
 GAPS, SUMMARY, FIGURE, OVERLAY, STEPS = "gaps.csv", "summary.json", "gap.png", "overlay.mp4", "steps"
 
@@ -89,3 +93,27 @@ def _is_ours(table: Path) -> bool:
         return False
     with table.open("rb") as file:
         return file.read(len(COLUMNS)) == COLUMNS.encode()
+
+
+@contextmanager
+def held(out: Path) -> Iterator[None]:
+    """Keep other measurements out of the folder meanwhile: each would replace what the other wrote."""
+    make_out_folder(out)
+    lock = FolderLock(out)
+    try:
+        yield
+    finally:
+        lock.remove()
+
+
+def usual_folder(recording: str) -> Path:
+    """Give measured/<file or folder>; for a glob the folder that it looks in; with more of the path where taken."""
+    path = Path(recording)
+    named = path.resolve() if path.exists() else path.parent.resolve()
+    parts = [part for part in named.parts if part != named.anchor] or ["images"]
+    for depth in range(1, len(parts) + 1):
+        out = Path("measured") / "__".join(parts[-depth:])
+        of = recording_of(out)
+        if of is None or Path(of).resolve() == path.resolve():
+            return out
+    return out

@@ -77,7 +77,7 @@ class OverlayVideo:
         if tick <= self._last_tick or isinstance(outcome, LostFrame):
             return
         self._last_tick = tick
-        drawn = np.pad(draw_overlay(frame, outcome, _words(row)), self._pad, mode="edge")
+        drawn = np.pad(draw_overlay(frame, outcome, words_of_row(row)), self._pad, mode="edge")
         picture = av.VideoFrame.from_ndarray(drawn, format="rgb24")
         picture.pts, picture.time_base = tick, Fraction(1, CLOCK_HZ)
         try:
@@ -92,7 +92,7 @@ class OverlayVideo:
         )
 
 
-def _words(row: GapRow) -> str:
+def words_of_row(row: GapRow) -> str:
     """Frame, time and value in a line; U = 2 u, of the random part where nothing else is known."""
     place = f"{row.frame}" if row.time_s is None else f"{row.frame}  {row.time_s:.3f} s"
     if row.gap_mm is None or row.u_random_mm is None:

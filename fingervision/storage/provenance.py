@@ -49,14 +49,22 @@ class Provenance:
         return asdict(self)
 
 
-def provenance(files: Mapping[str, Path]) -> Provenance:
-    """Tell where the result of the running command comes from; `files` by what they are used as."""
+def provenance(files: Mapping[str, Path], command: str | None = None) -> Provenance:
+    """Tell where a result comes from.
+
+    Parameters
+    ----------
+    files : mapping of str to Path
+        By what they are used as; those that are no files are left out.
+    command : str or None
+        As it was called; None for the command that is running.
+    """
     read = tuple(
         SourceFile(role, path.name, path.stat().st_size, _sha256(path))
         for role, path in files.items()
         if path.is_file()
     )
-    command = shlex.join(["fingervision", *sys.argv[1:]])
+    command = shlex.join(["fingervision", *sys.argv[1:]]) if command is None else command
     versions = {"Python": platform.python_version()}
     for name in ("fingervision", *LIBRARIES):
         try:

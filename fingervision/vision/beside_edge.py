@@ -10,7 +10,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from fingervision.domain.compiled import compiled
+from fingervision.domain.loops import loop
 from fingervision.vision.edge_filters import PIXEL_VARIANCE, Lines, edge_filters, reach_for
 from fingervision.vision.edges import BLUR_OF_LINE, ROUNDING, EdgePoints
 from fingervision.vision.grey import GreyImage
@@ -18,7 +18,7 @@ from fingervision.vision.line_levels import line_levels
 from fingervision.vision.median import middle
 from fingervision.vision.outline_blur import curvature_gain
 from fingervision.vision.profile_lines import ProfileLines
-from fingervision.vision.profile_models import GLARE, ProfileFit, addition
+from fingervision.vision.profile_models import GLARE, ProfileFit
 
 Floats = NDArray[np.float64]
 
@@ -26,6 +26,8 @@ Floats = NDArray[np.float64]
 LOOKS = 5
 # The blur that a look finds is near the profile's own: never below this share of it.
 LEAST_BLUR_SHARE = 0.5
+
+_take_off = loop("beside_edge_without")
 
 
 def without_additions(
@@ -60,7 +62,8 @@ def without_additions(
     breadths, blurs = np.array([fit.breadth for fit in fits]), np.array([fit.blur for fit in fits])
     found = np.repeat(blur, 2)
     for number in range(LOOKS):
-        seen = _without(levels, lines.slope, position, contrast, kind, sizes, breadths, blurs)
+        seen = levels.copy()
+        _take_off(lines.slope, position, contrast, kind, sizes, breadths, blurs, seen)
         look = filters.look(seen.reshape(-1, pixels), shared, found, position.ravel())
         position, contrast = look.position.reshape(shape), look.contrast.reshape(shape)
         if number < LOOKS - 1:
@@ -83,26 +86,3 @@ def without_additions(
 
 def _contrast(edges: EdgePoints, k: int) -> float:
     return middle(edges.contrast[k][edges.lines.weight[k] > 0])
-
-
-@compiled
-def _without(
-    levels: Floats,
-    slope: Floats,
-    position: Floats,
-    contrast: Floats,
-    kind: int,
-    sizes: Floats,
-    breadths: Floats,
-    blurs: Floats,
-) -> Floats:
-    """Light along every line without the addition, which lies as the edge does and has its share of the contrast."""
-    fingers, lines, pixels = levels.shape
-    seen = levels.copy()
-    for k in range(fingers):
-        for i in range(lines):
-            stretch = np.sqrt(1.0 + slope[k, i] ** 2)
-            for j in range(pixels):
-                away = (j - pixels // 2 - position[k, i]) / stretch
-                seen[k, i, j] -= contrast[k, i] * sizes[k] * addition(kind, away, blurs[k], breadths[k])
-    return seen

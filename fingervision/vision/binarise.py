@@ -6,8 +6,12 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from fingervision.domain.compiled import compiled
+from fingervision.domain.loops import loop
 from fingervision.vision.grey import GreyImage, full_scale
+
+_count = loop("binarise_histogram")
+_otsu = loop("binarise_split")
+_flatten = loop("binarise_flatten")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -47,7 +51,7 @@ def binarise(denoised: GreyImage, top_level: int | None = None) -> Binary:
     histogram gives the threshold and how far the classes stand apart. No level lies above `top_level`, full scale.
     """
     histogram = _histogram(denoised, (full_scale(denoised) if top_level is None else top_level) + 1)
-    threshold, contrast, separation = _split(histogram)
+    threshold, contrast, separation = _otsu(histogram)
     _, dark = cv2.threshold(denoised, threshold, 255, cv2.THRESH_BINARY_INV)
     return Binary(
         dark.astype(np.uint8, copy=False), threshold, contrast, separation, float(histogram[-1]) / denoised.size
@@ -61,7 +65,8 @@ def binarise_local(denoised: GreyImage) -> Binary:
     """
     side = max(denoised.shape) // 8
     light = cv2.blur(denoised.astype(np.float32), (2 * side + 1, 2 * side + 1), borderType=cv2.BORDER_REPLICATE)
-    flat = np.clip(128.0 * denoised / np.maximum(light, 1.0), 0, 255).astype(np.uint8)
+    flat = np.empty(denoised.shape, dtype=np.uint8)
+    _flatten(denoised, light, flat)
     return binarise(flat)
 
 
@@ -71,60 +76,8 @@ def split_at(denoised: GreyImage, otsu: Binary, threshold: int) -> Binary:
     return replace(otsu, dark=dark.astype(np.uint8, copy=False), threshold=threshold)
 
 
-@compiled
 def _histogram(grey: GreyImage, levels: int) -> NDArray[np.int64]:
-    """Pixels with each grey level; eight counts in turn, since neighbours are alike and would wait for each other."""
-    count = np.zeros((8, levels), dtype=np.uint32)
-    for row in grey:
-        eights = row.size - row.size % 8
-        for j in range(0, eights, 8):
-            count[0, row[j]] += 1
-            count[1, row[j + 1]] += 1
-            count[2, row[j + 2]] += 1
-            count[3, row[j + 3]] += 1
-            count[4, row[j + 4]] += 1
-            count[5, row[j + 5]] += 1
-            count[6, row[j + 6]] += 1
-            count[7, row[j + 7]] += 1
-        for j in range(eights, row.size):
-            count[0, row[j]] += 1
-    total = np.zeros(levels, dtype=np.int64)
-    for part in range(8):
-        for level in range(levels):
-            total[level] += count[part, level]
-    return total
-
-
-@compiled
-def _split(histogram: NDArray[np.int64]) -> tuple[int, float, float]:
-    """Otsu's threshold, the difference of the two classes' means, and that in units of their spread."""
-    pixels, total = 0.0, 0.0
-    for level in range(histogram.size):
-        pixels += histogram[level]
-        total += histogram[level] * float(level)
-    threshold, largest = 0, 0.0
-    below, sum_below = 0.0, 0.0
-    for level in range(histogram.size - 1):
-        below += histogram[level]
-        sum_below += histogram[level] * float(level)
-        above = pixels - below
-        if histogram[level] == 0 or above == 0:
-            continue
-        between = below * above * (sum_below / below - (total - sum_below) / above) ** 2
-        if between > largest:
-            threshold, largest = level, between
-    if largest == 0.0:
-        return threshold, 0.0, 0.0
-    means, variances = np.zeros(2), np.zeros(2)
-    for side in range(2):
-        first, past = (0, threshold + 1) if side == 0 else (threshold + 1, histogram.size)
-        inside = 0.0
-        for level in range(first, past):
-            inside += histogram[level]
-            means[side] += histogram[level] * float(level)
-        means[side] /= inside
-        for level in range(first, past):
-            variances[side] += histogram[level] * (level - means[side]) ** 2
-        variances[side] /= inside
-    contrast = means[1] - means[0]
-    return threshold, contrast, contrast / max(np.sqrt(0.5 * (variances[0] + variances[1])), 1e-3)
+    """Pixels with each grey level."""
+    count = np.empty(levels, dtype=np.int64)
+    _count(grey, count)
+    return count

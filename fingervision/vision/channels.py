@@ -10,9 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from fingervision.domain.compiled import compiled
+from fingervision.domain.loops import loop
 from fingervision.vision.likeness import Build, are_alike
-from fingervision.vision.median import middle
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -30,6 +29,13 @@ ON_LINE_SHARE, ON_LINE_PX = 0.75, 1.2
 SAME_LINE_PX, STEEPEST = 2.5, 0.55
 # The longest of so many channels are looked at.
 MOST_CHANNELS = 6
+# A picture with more runs of ground than this is texture: what lies above them is not looked at.
+MOST_RUNS = 4096
+
+_line = loop("channels_line")
+_beside_lines = loop("channels_beside")
+_follow_chain = loop("channels_chain")
+_find_runs = loop("channels_runs")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -116,49 +122,17 @@ def _straight(chain: Ints) -> Channel | None:
     return Channel(left_c, left_m, right_c, right_m, int(chain[:, 0].min()), int(chain[:, 0].max()), len(chain))
 
 
-@compiled
-def _line(t: Floats, v: Floats) -> tuple[float, float, float]:
-    """Line v = c + m t by slopes from one half of the rows to the other (Theil, Sen), and the share of rows on it."""
-    half = t.size // 2
-    m = middle((v[t.size - half :] - v[:half]) / np.maximum(t[t.size - half :] - t[:half], 1.0))
-    c = middle(v - m * t)
-    on = 0
-    for i in range(t.size):
-        if abs(v[i] - c - m * t[i]) <= ON_LINE_PX:
-            on += 1
-    return c, m, on / t.size
-
-
 def _beside(upright: Mask, channel: Channel) -> tuple[Build, Build]:
     """Breadth of what bounds a channel on its left and on its right."""
-    rows = np.linspace(channel.first_row, channel.last_row, 9).astype(int)[1:-1]
+    sides = (channel.left_c, channel.left_m, channel.right_c, channel.right_m)
+    widths = _beside_lines(upright, *sides, channel.first_row, channel.last_row)
     last = upright.shape[1] - 1
-    left, right = [], []
-    for row in rows:
-        a, b = round(channel.left(row)), round(channel.right(row))
-        if 0 <= a < b <= last:
-            left.append(_run(upright[row], a, -1))
-            right.append(_run(upright[row], b, 1))
-    widths = [float(np.median(one)) if one else 0.0 for one in (left, right)]
     middle_row = 0.5 * (channel.first_row + channel.last_row)
     cut = (
         channel.left(middle_row) - widths[0] < 0.5,
         channel.right(middle_row) + widths[1] > last - 0.5,
     )
     return Build(widths[0], channel.left_m, cut[0]), Build(widths[1], channel.right_m, cut[1])
-
-
-@compiled
-def _run(line: Mask, start: int, step: int) -> int:
-    """Length of what is set from a pixel on; a pixel to either side is forgiven."""
-    i = start
-    if 0 <= i < line.size and not line[i]:
-        i += step
-    length = 0
-    while 0 <= i < line.size and line[i]:
-        length += 1
-        i += step
-    return length
 
 
 def _chains(upright: Mask, shortest: int) -> list[Ints]:
@@ -169,57 +143,15 @@ def _chains(upright: Mask, shortest: int) -> list[Ints]:
     return [_chain(runs, previous, int(end), int(length[end])) for end in ends]
 
 
-@compiled
 def _chain(runs: Ints, previous: Ints, end: int, length: int) -> Ints:
     chain = np.empty((length, 3), dtype=np.int64)
-    i = end
-    for k in range(length):
-        chain[k] = runs[i]
-        i = previous[i]
+    _follow_chain(runs, previous, end, chain)
     return chain
 
 
-@compiled
 def _runs(upright: Mask) -> tuple[Ints, Ints, Ints, NDArray[np.bool_]]:
     """All bounded runs of ground; the run below that each goes on from, its place in its chain, and which go on."""
-    rows, columns = upright.shape
-    most = 4096
-    runs, previous, length = (
-        np.empty((most, 3), dtype=np.int64),
-        np.empty(most, dtype=np.int64),
-        np.ones(most, dtype=np.int64),
-    )
-    has_next = np.zeros(most, dtype=np.bool_)
-    count, below_first, below_past = 0, 0, 0
-    for row in range(rows - 1, -1, -1):
-        first = count
-        line = upright[row]
-        x = 0
-        while x < columns and not line[x]:
-            x += 1
-        start = x
-        while x < columns:
-            # A run of something that is set, from `start`.
-            while x < columns and line[x]:
-                x += 1
-            bounded, a = x - start, x - 1
-            while x < columns and not line[x]:
-                x += 1
-            start = x
-            if x == columns or x - a - 1 < LEAST_GROUND_PX or bounded < LEAST_BESIDE_PX:
-                continue
-            end = x
-            while end < columns and end - x < LEAST_BESIDE_PX and line[end]:
-                end += 1
-            if end - x < LEAST_BESIDE_PX:
-                continue
-            if count == most:
-                return runs[:count], previous[:count], length[:count], has_next[:count]
-            runs[count, 0], runs[count, 1], runs[count, 2] = row, a, x
-            previous[count] = -1
-            for k in range(below_first, below_past):
-                if abs(runs[k, 1] - a) <= MOST_STEP_PX and abs(runs[k, 2] - x) <= MOST_STEP_PX:
-                    previous[count], length[count], has_next[k] = k, length[k] + 1, True
-            count += 1
-        below_first, below_past = first, count
+    runs, has_next = np.empty((MOST_RUNS, 3), dtype=np.int64), np.empty(MOST_RUNS, dtype=np.bool_)
+    previous, length = np.empty((2, MOST_RUNS), dtype=np.int64)
+    count = _find_runs(upright, runs, previous, length, has_next)
     return runs[:count], previous[:count], length[:count], has_next[:count]

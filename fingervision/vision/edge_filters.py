@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import ndtr
 
-from fingervision.domain.compiled import compiled
+from fingervision.domain.loops import loop
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int_]
@@ -34,6 +34,11 @@ LARGEST_MOVE_PX, LARGEST_WIDENING_PX, LEAST_CONTRAST = 1.0, 0.3, 1e-3
 SMALLEST_BLUR_PX, LARGEST_BLUR_PX = 0.2, 8.0
 # Variance of a pixel's own width, which a slanted edge feels along the line.
 PIXEL_VARIANCE = 1.0 / 12.0
+
+_row = loop("edge_filters_row")
+_column = loop("edge_filters_column")
+_look = loop("edge_filters_look")
+_mean_square = loop("edge_filters_mean_square")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -79,7 +84,12 @@ class EdgeFilters:
         position_px : ndarray of float, shape (n,)
             Where each edge is thought to lie, from the window's middle outwards.
         """
-        return Look(*_look(levels, *lines, blur_px, position_px, self.contrast, self.shift, self.blur, self.offsets_px))
+        n = len(levels)
+        position, contrast, sigma, blur = np.empty(n), np.empty(n), np.empty(n), np.empty(blur_px.size)
+        row, column = np.empty((2, n), dtype=np.int64)
+        table = (self.contrast, self.shift, self.blur, self.offsets_px)
+        _look(levels, *lines, blur_px, position_px, *table, position, contrast, blur, sigma, row, column)
+        return Look(position, contrast, blur, sigma, row, column)
 
     def middle(self, sigma_px: float) -> tuple[int, int]:
         """Row and column of the filters for an edge of this blur in the middle of the window."""
@@ -87,11 +97,10 @@ class EdgeFilters:
 
     def mean_square(self, levels: Floats, look: "Look") -> tuple[Floats, Floats]:
         """What a look leaves of each line: mean square residual and the position's gain, shape (n,) each."""
-        gain = self.shift_gain[look.row, look.column]
-        # The last part of an eighth of a pixel is not in the table's edge: its share is taken off to first order.
-        remainder = look.position - self.offsets_px[look.column]
-        squares = _squares(levels, look.contrast, look.row, look.column, self.step)
-        return (squares - (look.contrast * remainder * gain) ** 2) / (levels.shape[-1] - 3.0), gain
+        mean_square, gain = np.empty((2, len(levels)))
+        table = (self.step, self.offsets_px, self.shift_gain)
+        _mean_square(levels, look.position, look.contrast, look.row, look.column, *table, mean_square, gain)
+        return mean_square, gain
 
 
 class Lines(NamedTuple):
@@ -136,74 +145,6 @@ class Look:
     sigma: Floats
     row: Ints
     column: Ints
-
-
-@compiled
-def _row(sigma: float, blurs: int) -> int:
-    """Index of the nearest blur in the table."""
-    nearest = np.rint(np.log(max(sigma, SMALLEST_SIGMA_PX) / SMALLEST_SIGMA_PX) / np.log(SIGMA_RATIO))
-    return int(min(nearest, blurs - 1.0))
-
-
-@compiled
-def _column(position: float) -> int:
-    """Index of the nearest offset in the table."""
-    nearest = np.rint((position + LARGEST_OFFSET_PX) / OFFSET_STEP_PX)
-    return int(min(max(nearest, 0.0), 2.0 * LARGEST_OFFSET_PX / OFFSET_STEP_PX))
-
-
-@compiled
-def _look(
-    levels: Floats,
-    slope: Floats,
-    weight: Floats,
-    blur_of_line: Ints,
-    blur: Floats,
-    start: Floats,
-    contrasts: Floats,
-    shifts: Floats,
-    blurs: Floats,
-    offsets: Floats,
-) -> tuple[Floats, Floats, Floats, Floats, Ints, Ints]:
-    lines, pixels = levels.shape
-    position, contrast, sigma = np.empty(lines), np.empty(lines), np.empty(lines)
-    row, column = np.empty(lines, dtype=np.int64), np.empty(lines, dtype=np.int64)
-    change, count = np.zeros(blur.size), np.zeros(blur.size)
-    for i in range(lines):
-        own, stretch = blur[blur_of_line[i]], 1.0 + slope[i] ** 2
-        sigma[i] = np.sqrt(own * own * stretch + slope[i] ** 2 * PIXEL_VARIANCE)
-        row[i], column[i] = _row(sigma[i], contrasts.shape[0]), _column(start[i])
-        at = row[i], column[i]
-        by_contrast, by_shift, by_blur = contrasts[at], shifts[at], blurs[at]
-        height, shift, widening = 0.0, 0.0, 0.0
-        for j in range(pixels):
-            height += by_contrast[j] * levels[i, j]
-            shift += by_shift[j] * levels[i, j]
-            widening += by_blur[j] * levels[i, j]
-        contrast[i] = height if abs(height) >= LEAST_CONTRAST else LEAST_CONTRAST
-        move = min(max(shift / contrast[i], -LARGEST_MOVE_PX), LARGEST_MOVE_PX)
-        position[i] = min(max(offsets[column[i]] + move, -LARGEST_OFFSET_PX), LARGEST_OFFSET_PX)
-        widening *= sigma[i] / (contrast[i] * own * stretch)
-        change[blur_of_line[i]] += weight[i] * min(max(widening, -LARGEST_WIDENING_PX), LARGEST_WIDENING_PX)
-        count[blur_of_line[i]] += weight[i]
-    found = np.empty(blur.size)
-    for k in range(blur.size):
-        found[k] = min(max(blur[k] + change[k] / max(count[k], 1.0), SMALLEST_BLUR_PX), LARGEST_BLUR_PX)
-    return position, contrast, found, sigma, row, column
-
-
-@compiled
-def _squares(levels: Floats, contrast: Floats, row: Ints, column: Ints, steps: Floats) -> Floats:
-    """Sum of the squared residuals of each line about its two levels."""
-    lines, pixels = levels.shape
-    squares = np.empty(lines)
-    for i in range(lines):
-        step = steps[row[i], column[i]]
-        mean, total = levels[i].sum() / pixels, 0.0
-        for j in range(pixels):
-            total += (levels[i, j] - mean - contrast[i] * step[j]) ** 2
-        squares[i] = total
-    return squares
 
 
 def reach_for(sigma_px: float) -> int:

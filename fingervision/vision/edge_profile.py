@@ -5,14 +5,12 @@ explain. The mark says how far the edge may have moved, which goes into the unce
 real optics leave marks of their own, and a shift taken from them is not steady from frame to frame.
 """
 
-from math import erf, exp, sqrt
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fingervision.domain.compiled import compiled
-from fingervision.vision.median import middle
+from fingervision.domain.loops import loop
 
 Floats = NDArray[np.float64]
 
@@ -37,6 +35,8 @@ HIDING_BLUR_PX, HIDDEN_SHIFT_PX = 0.65, 0.25
 # A row that fits worse than this (variance, in units of the noise's) has dust on it.
 DUSTY = 6.0
 
+_edge_mark = loop("edge_profile_edge_mark")
+
 
 class EdgeMark(NamedTuple):
     """What one flank shows that a blurred step does not; zero where nothing is significant.
@@ -56,7 +56,6 @@ class EdgeMark(NamedTuple):
 NO_MARK = EdgeMark(0.0, 0.0)
 
 
-@compiled
 def edge_mark(
     levels: Floats,
     position: Floats,
@@ -85,59 +84,4 @@ def edge_mark(
     top_level : float
         End of the scale.
     """
-    rows, pixels = levels.shape
-    gram, seen = np.zeros((MARKS, MARKS)), np.zeros(MARKS)
-    mark = np.empty(MARKS)
-    used, at_end, blur, height = 0, 0, 0.0, 0.0
-    usual = middle(np.abs(contrast))
-    for i in range(rows // 2, rows, THINNING):
-        if mean_square[i] > DUSTY * noise * noise or abs(contrast[i]) < LEAST_CONTRAST * usual:
-            continue
-        used += 1
-        at_end += 1 if levels[i].min() <= 0.0 or levels[i].max() >= top_level else 0
-        width = sqrt(sigma[i] ** 2 + 1.0 / 12.0)
-        blur += width
-        height += abs(contrast[i])
-        for j in range(pixels):
-            away = j - pixels // 2 - position[i]
-            t = away / width
-            step = 0.5 + 0.5 * erf(t * sqrt(0.5))
-            density = exp(-0.5 * t * t) / sqrt(2.0 * np.pi)
-            mark[0], mark[1], mark[2], mark[3] = 1.0, step, density, t * density
-            for k in range(len(RIM_PX)):
-                mark[FITTED + k] = step - 0.5 - 0.5 * erf((away - RIM_PX[k]) / width * sqrt(0.5))
-            for k in range(len(BEYOND)):
-                mark[FITTED + len(RIM_PX) + k] = min((1.0 + BEYOND[k]) * step, 1.0) - step
-            level = levels[i, j] / contrast[i]
-            for a in range(MARKS):
-                seen[a] += mark[a] * level
-                for b in range(a + 1):
-                    gram[a, b] += mark[a] * mark[b]
-    if used < FEWEST_ROWS:
-        return EdgeMark(0.0, 0.0)
-    blur, height = blur / used, height / used
-    for a in range(MARKS):
-        for b in range(a):
-            gram[b, a] = gram[a, b]
-    # What the fit takes up of each mark, as level, contrast, position and blur.
-    taken_up = np.linalg.solve(gram[:FITTED, :FITTED].copy(), gram[:FITTED, FITTED:].copy())
-    # Where the scale ends within the window, that is what is seen; elsewhere nothing can be cut off.
-    is_cut = 2 * at_end > used
-    best, shift, beyond = SIGNIFICANT * (noise / height) ** 2, 0.0, 0.0
-    for k in range(len(RIM_PX), MARKS - FITTED) if is_cut else range(len(RIM_PX)):
-        at = FITTED + k
-        left, own = seen[at], gram[at, at]
-        for a in range(FITTED):
-            left -= taken_up[a, k] * seen[a]
-            own -= taken_up[a, k] * gram[a, at]
-        own = max(own, LEAST_OWN * gram[at, at])
-        size, u_size = left / own, noise / (height * sqrt(own))
-        moves = -taken_up[POSITION, k] * blur
-        if is_cut:  # as large as it may be, and as sure
-            shift = min(shift, moves * max(size + u_size, 0.0))
-            beyond = max(beyond, BEYOND[k - len(RIM_PX)] * (size - SURE_SIGMAS * u_size))
-        elif left * size > best and abs(size) > LEAST_SHARE:
-            best, shift = left * size, moves * size
-    if is_cut and blur < HIDING_BLUR_PX:
-        shift = min(shift, -HIDDEN_SHIFT_PX)
-    return EdgeMark(shift, beyond)
+    return EdgeMark(*_edge_mark(levels, position, sigma, contrast, mean_square, noise, top_level))

@@ -12,7 +12,7 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from fingervision.domain.compiled import compiled
+from fingervision.domain.loops import loop
 from fingervision.vision.edge_filters import (
     EdgeFilters,
     Lines,
@@ -38,6 +38,9 @@ BLUR_PASSES = (True, True, False)
 BLUR_OF_LINE = np.concatenate((np.where(IS_ROW, 0, 1), np.where(IS_ROW, 2, 3)))
 # Variance of rounding to whole grey levels: no noise is smaller.
 ROUNDING = 1.0 / 12.0
+
+_inside = loop("edges_inside")
+_clipped = loop("edges_clipped")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -164,6 +167,8 @@ def _fit(
             for k, filled in enumerate(np.count_nonzero(lines.weight[:, :INNER], axis=1).tolist())
         )
         marks = (left, right)
+    is_clipped = np.empty(len(position), dtype=np.bool_)
+    _clipped(levels.reshape(-1, pixels), position, look.sigma, top_level, is_clipped)
     u_position = np.sqrt(np.maximum(mean_square, noise_variance)) / (np.abs(look.contrast) * gain)
     return EdgePoints(
         lines,
@@ -173,7 +178,7 @@ def _fit(
         blur.reshape(2, 2),
         noise,
         curvature_gain(lines.slope, filters.reach_px / _shaped(look.sigma)),
-        _shaped(_clipped(levels.reshape(-1, pixels), position, look.sigma, top_level)),
+        _shaped(is_clipped),
         filters.reach_px,
         marks,
         (_inside(levels[0], lines.weight[0]), _inside(levels[1], lines.weight[1])),
@@ -181,27 +186,5 @@ def _fit(
     )
 
 
-@compiled
-def _inside(levels: Floats, weight: Floats) -> float:
-    """Usual level at the inner end of an inner flank's lines; 0 where there is none."""
-    return middle(levels[:INNER, 0].copy()[weight[:INNER] > 0])
-
-
 def _shaped(a: NDArray[Number]) -> NDArray[Number]:
     return a.reshape(2, PLACES)
-
-
-@compiled
-def _clipped(levels: Floats, position: Floats, sigma: Floats, top_level: float) -> NDArray[np.bool_]:
-    """Whether the flank itself, within 0.7 sigma and a pixel's breadth of the edge, touches the end of the scale.
-
-    Where the ground is far beyond the scale, what is left of a flank looks steep: sigma alone would look too near.
-    """
-    lines, pixels = levels.shape
-    is_clipped = np.zeros(lines, dtype=np.bool_)
-    for i in range(lines):
-        near = max(0.7 * sigma[i], 0.8)
-        for j in range(pixels):
-            if abs(j - pixels // 2 - position[i]) < near and (levels[i, j] <= 0 or levels[i, j] >= top_level):
-                is_clipped[i] = True
-    return is_clipped

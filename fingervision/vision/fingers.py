@@ -19,15 +19,13 @@ from fingervision.domain.status import Status
 from fingervision.vision.flanks import follow_down, has_straight_flanks
 from fingervision.vision.likeness import MOST_TURNED, Build, are_alike, build, common_turn, end_alike
 from fingervision.vision.orientation import Orientation
-from fingervision.vision.outlines import Outline, find_outlines, longest_first
+from fingervision.vision.outlines import Outline, Outlines, find_outlines, longest_first
 from fingervision.vision.tops import Top, find_tops
 from fingervision.vision.way_between import Place, inner_crossing, is_free
 
 # Two tops with a notch between them are touching fingers where the notch has so much of the measuring height, and the
 # fingers so many times of it.
 SMALLEST_NOTCH_SHARE, LEAST_LENGTH_SHARE = 0.3, 4.0
-# Tops beyond this number are texture; the fingers are among the most prominent.
-MOST_TOPS = 8
 # Fingers come in from the picture's border; things that lie in view are less likely to be fingers.
 ROOTED_BONUS = 2.0
 # Things that lie in view and are shorter than so many times the measuring height are letters or dirt.
@@ -165,12 +163,12 @@ _SEVERITY = (Status.NO_FINGERS, Status.ONE_FINGER, Status.TIP_OUT_OF_VIEW, Statu
 
 def _best_pair(
     mask: NDArray[np.uint8],
-    outlines: list[Outline],
+    outlines: Outlines,
     orientation: Orientation,
     below_tip_px: float,
     reach_px: float,
 ) -> CoarseFingers | NoGap:
-    tops = find_tops(mask, outlines, orientation)[:MOST_TOPS]
+    tops = find_tops(mask, outlines, orientation)
     in_view = [top for top in tops if top.along_px > 0]
     best: CoarseFingers | None = None
     two: tuple[Top, Top] | None = None
@@ -223,10 +221,9 @@ def _best_pair(
     return UNLIKE if unlike else _why_none(tops, below_tip_px)
 
 
-def _has_company(own: Outline, outlines: list[Outline]) -> bool:
+def _has_company(own: Outline, outlines: Outlines) -> bool:
     """Whether something else of about this size lies in view, as letters and the like do."""
-    longest_px = COMPANY_SHARE * len(own)
-    return sum(len(outline) > longest_px for outline in outlines) > 2
+    return bool(np.count_nonzero(outlines.lengths > COMPANY_SHARE * len(own)) > 2)
 
 
 def _is_third(top: Top, fingers: CoarseFingers, below_tip_px: float) -> bool:
@@ -332,4 +329,4 @@ def _inner_places(
 
 def is_hidden(finger: CoarseFinger, along: float) -> bool:
     """Whether a part hides a finger's inner edge at a place along the fingers."""
-    return bool(np.isin(round(along), finger.hidden))
+    return bool(finger.hidden.size) and bool(np.isin(round(along), finger.hidden))

@@ -1,7 +1,7 @@
 """Step 8, the gap: the distance between the two measuring points, and how surely it is known."""
 
 from dataclasses import replace
-from math import atan, degrees
+from math import atan, degrees, hypot, sqrt
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,7 +23,7 @@ from fingervision.vision.local_outline import local_measuring_point
 from fingervision.vision.measuring_point import MeasuringPoint, measuring_point, squared
 from fingervision.vision.median import middle
 from fingervision.vision.outline_points import OutlinePoints, finger_origin, outline_points
-from fingervision.vision.profile_lines import IS_INNER, IS_ROW
+from fingervision.vision.profile_lines import INNER, IS_INNER, IS_ROW
 from fingervision.vision.residuals import SHARED_POINTS, has_flanks, shape_holds, shared_points, spread
 from fingervision.vision.roughness import roughness, shared_along, with_roughness
 
@@ -44,6 +44,7 @@ LEAST_SURE_PX = 5.0
 LEAST_SURE_BESIDE_PX = 0.5
 # Corners are cut off both fingers alike: their sides at the measuring height lean alike to this (slope).
 CUT_ALIKE = 0.35
+IS_TIP = ~IS_ROW
 BROKEN = "The outline near the measuring height is neither smooth nor straight: clean the fingers, or change the light."
 # Below this ratio of contrast to noise nothing is measured.
 CONTRAST_TO_NOISE = 3.0
@@ -154,19 +155,22 @@ def _refuse(edges: EdgePoints, full_scale: int, light_gap: bool) -> NoGap | None
     """Reasons to give no number that the edges themselves show."""
     real = edges.lines.weight > 0
     inner = real & IS_INNER
-    if inner.sum() < FEWEST_ROWS:  # a slanted or touching tip: what faces the gap is seen in columns
-        inner = real & ~IS_ROW
-    if inner.sum() < FEWEST_ROWS:
+    if np.count_nonzero(inner) < FEWEST_ROWS:  # a slanted or touching tip: what faces the gap is seen in columns
+        inner = real & IS_TIP
+    if np.count_nonzero(inner) < FEWEST_ROWS:
         return NoGap(Status.NO_FINGERS, "The inner edges are too short to be measured.")
     contrast = middle(edges.contrast[inner]) * (1.0 if light_gap else -1.0)
     if contrast < CONTRAST_TO_NOISE * edges.noise or contrast < 0.02 * full_scale:
         return NoGap(Status.LOW_CONTRAST, "The fingers hardly differ from their ground.")
-    tips = real & ~IS_ROW
+    tips = real & IS_TIP
     if tips.any() and abs(middle(edges.contrast[tips])) < TIP_CONTRAST * abs(contrast):
         return NoGap(Status.NO_FINGERS, "What is in view fades away where a finger's tip would be.")
-    if edges.is_clipped[inner].mean() > 0.5 or max(mark.beyond for mark in edges.marks) > CUT_OFF_LIMIT:
+    if (
+        2 * np.count_nonzero(edges.is_clipped[inner]) > np.count_nonzero(inner)
+        or max(mark.beyond for mark in edges.marks) > CUT_OFF_LIMIT
+    ):
         return NoGap(Status.SATURATED, "The flank of the edges is cut off at the end of the grey scale.")
-    blur = float(np.sqrt(edges.blur_px[:, 0].max() ** 2 + PIXEL_VARIANCE))
+    blur = sqrt(max(edges.blur_px[:, 0].tolist()) ** 2 + PIXEL_VARIANCE)
     if blur > BLUR_LIMIT_PX:
         return NoGap(Status.BLURRED, f"The edges are spread over {blur:.1f} px (standard deviation).")
     return None
@@ -219,30 +223,31 @@ def _assemble(
     dx, dy = across[1] - across[0], along[1] - along[0]
     if dx <= 0:
         return NoGap(Status.TOUCHING, "The fingers touch at the measuring height.")
-    gap = float(np.hypot(dx, dy))
+    gap = hypot(dx, dy)
     variance = 0.0
     for m, end in zip(measured, (-1.0, 1.0), strict=True):
         # Either edge closes the gap as it grows, each seen from its own finger; the tips move the points' heights.
-        gradient = np.array([end * dy / gap, -dx / gap])
-        variance += float(gradient @ m.covariance @ gradient)
+        by_tip, by_edge = end * dy / gap, -dx / gap
+        (tip_tip, tip_edge), (_, edge_edge) = m.covariance.tolist()
+        variance += by_tip**2 * tip_tip + 2.0 * by_tip * by_edge * tip_edge + by_edge**2 * edge_edge
     if not variance < LEAST_SURE_PX**2:
         return NoGap(Status.NO_FINGERS, "The outlines are too rough to say where a finger's tip and edge are.")
     # A rim or too much light does the same to both edges.
     u_shift = float(abs(sum(mark.shift_px for mark in edges.marks)))
-    return GapMeasurement(found[0], found[1], orientation.direction, float(np.sqrt(variance)), light_gap, u_shift)
+    return GapMeasurement(found[0], found[1], orientation.direction, sqrt(variance), light_gap, u_shift)
 
 
 def _finger_edge(
     finger: CoarseFinger, m: MeasuringPoint, edges: EdgePoints, k: int, point: tuple[float, float], tip: float
 ) -> FingerEdge:
-    mine = (edges.lines.weight[k] > 0) & IS_INNER
+    mine = edges.lines.weight[k, :INNER] > 0
     return FingerEdge(
         x_px=point[0],
         y_px=point[1],
         tip_px=tip,
-        u_across_px=float(np.sqrt(m.covariance[1, 1])),
-        u_tip_px=float(np.sqrt(m.covariance[0, 0])),
+        u_across_px=sqrt(m.covariance[1, 1]),
+        u_tip_px=sqrt(m.covariance[0, 0]),
         slope=finger.inner_sign * m.slope,
-        blur_px=float(np.sqrt(edges.blur_px[k, 0] ** 2 + PIXEL_VARIANCE)),
-        contrast=middle(edges.contrast[k, mine]) if mine.any() else 0.0,
+        blur_px=sqrt(edges.blur_px[k, 0] ** 2 + PIXEL_VARIANCE),
+        contrast=middle(edges.contrast[k, :INNER][mine]),
     )

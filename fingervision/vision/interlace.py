@@ -10,10 +10,9 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from fingervision.domain.compiled import compiled
+from fingervision.domain.loops import loop
 from fingervision.vision.edge_profile import EdgeMark
 from fingervision.vision.edges import EdgePoints
-from fingervision.vision.median import middle
 from fingervision.vision.profile_lines import ROWS
 
 Floats = NDArray[np.float64]
@@ -27,6 +26,8 @@ FEWEST_ROWS, NEAR_PX = 8, 4
 SIGMAS_IN_MEDIAN, DUST, SHARED = 1.4826, 4.0, 1.2
 # Where the tip is round, the two fields' mean lies beside the middle by up to half their variance over the radius.
 TIP_RADIUS_PX = 15.0
+
+_apart = loop("interlace_apart")
 
 
 def at_half_way(edges: EdgePoints) -> tuple[EdgePoints, float]:
@@ -46,32 +47,3 @@ def at_half_way(edges: EdgePoints) -> tuple[EdgePoints, float]:
         for mark, by in zip(edges.marks, apart.tolist(), strict=True)
     )
     return replace(edges, position=position, marks=(left, right)), float(np.abs(apart).max())
-
-
-@compiled
-def _apart(fixed: Ints, position: Floats, weight: Floats) -> float:
-    """How much farther right the even rows see one finger's flanks than the odd rows do; 0 where they agree."""
-    found, count = np.empty(ROWS), 0
-    for b in range(1, ROWS - 1):
-        a, c = b - 1, b + 1
-        if weight[a] == 0.0 or weight[b] == 0.0 or weight[c] == 0.0:
-            continue
-        before, after = fixed[b] - fixed[a], fixed[c] - fixed[b]
-        if before * after <= 0 or before % 2 == 0 or after % 2 == 0 or abs(before) > NEAR_PX or abs(after) > NEAR_PX:
-            continue
-        between = (position[a] * after + position[c] * before) / (before + after)
-        found[count] = (position[b] - between) * (1.0 if fixed[b] % 2 == 0 else -1.0)
-        count += 1
-    if count < FEWEST_ROWS:
-        return 0.0
-    usual = middle(found[:count])
-    spread = SIGMAS_IN_MEDIAN * middle(np.abs(found[:count] - usual)) + 1e-6
-    total, used = 0.0, 0
-    for i in range(count):
-        if abs(found[i] - usual) < DUST * spread:
-            total += found[i]
-            used += 1
-    mean = total / max(used, 1)
-    # One row against the mean of two has 3/2 of its variance; the difference of two halves of n rows 4/n of it.
-    u_mean = SHARED * spread * np.sqrt(4.0 / 1.5 / max(used, 1))
-    return mean if abs(mean) > max(SURE * u_mean, LEAST_PX) else 0.0

@@ -10,9 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from fingervision.domain.compiled import compiled
+from fingervision.domain.loops import loop
 from fingervision.vision.flanks import across_by_row
-from fingervision.vision.median import middle
 from fingervision.vision.tops import Top
 
 Floats = NDArray[np.float64]
@@ -32,6 +31,8 @@ LEANS_ALIKE, FARTHEST_TURNED = 0.2, 0.49
 LEAST_TURN = 0.05
 # Widths and leans are taken in so many rows, in this part of the finger's height, without the top and the root.
 ROWS, FROM_SHARE, TO_SHARE, FEWEST_ROWS = 24, 0.4, 0.9, 4
+
+_build = loop("likeness_build")
 
 
 @dataclass(frozen=True, slots=True)
@@ -101,22 +102,3 @@ def common_turn(leans: Sequence[float]) -> float:
     """Slope by which both fingers lean, 0 where they do not lean alike or hardly lean."""
     turn = 0.5 * sum(leans)
     return turn if abs(leans[0] - leans[1]) <= LEANS_ALIKE and abs(turn) > LEAST_TURN else 0.0
-
-
-@compiled
-def _build(inner: Floats, outer: Floats, across_size: int) -> tuple[float, float, bool]:
-    high = min(inner.size, outer.size)
-    first, past = int(FROM_SHARE * high), int(TO_SHARE * high)
-    if past - first < FEWEST_ROWS:
-        return 0.0, 0.0, False
-    stride = max((past - first) // ROWS, 1)
-    count, cut = (past - first + stride - 1) // stride, 0
-    width, middles = np.empty(count), np.empty(count)
-    for k in range(count):
-        a, b = inner[first + k * stride], outer[first + k * stride]
-        width[k], middles[k] = abs(a - b) + 1.0, 0.5 * (a + b)
-        if b <= 0 or b >= across_size - 1:
-            cut += 1
-    half = count // 2
-    lean = middle((middles[count - half :] - middles[:half]) / ((count - half) * stride))
-    return middle(width), lean, 2 * cut > count

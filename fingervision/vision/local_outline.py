@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from fingervision.vision.finger_end import BIWEIGHT_REACH
+from fingervision.domain.loops import loop
 from fingervision.vision.first_guess import line
 from fingervision.vision.measuring_point import MeasuringPoint
 from fingervision.vision.outline_points import OutlinePoints
@@ -33,6 +33,8 @@ ROUGHEST = 6.0
 LEAST_SPREAD = 0.7
 # An outline that is less sure than this (pixels) is not smooth; one that is flatter (across over along) has no edge.
 LEAST_SURE_PX, FLATTEST = 1.0, 3.0
+
+_fit = loop("local_outline_polynomial")
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,39 +62,10 @@ def _polynomial(
     points: OutlinePoints, centre: tuple[float, float], normal: tuple[float, float], reach: float
 ) -> tuple[Floats, float, float] | None:
     """Coefficients of normal distance over tangent distance, the variance at the centre, and the spread."""
-    nx, ny = normal
-    dx, dy = points.x - centre[0], points.y - centre[1]
-    s, n = dx * -ny + dy * nx, dx * nx + dy * ny
-    taper = np.clip(1.0 - np.abs(s / reach) ** 3, 0.0, None) ** 3 * (np.abs(n) < reach)
-    inside = taper > 0
-    if inside.sum() < FEWEST_POINTS:
-        return None
-    s, n, taper = s[inside] / reach, n[inside], taper[inside]
-    # An outline seen in a row moves along the normal by the normal's component only.
-    share = np.where(points.is_row[inside], abs(nx), abs(ny))
-    u = points.u[inside] * np.maximum(share, 0.3)
-    powers = s[:, None] ** np.arange(DEGREE + 1)
-    weight = taper / u**2
-    for iteration in range(4):
-        scaled = powers * weight[:, None]
-        normal_matrix = scaled.T @ powers
-        coefficients = np.linalg.lstsq(normal_matrix, scaled.T @ n, rcond=1e-12)[0]
-        residual = (n - powers @ coefficients) / u
-        spread = float(1.4826 * np.median(np.abs(residual)))
-        if iteration < 3:
-            robust = np.clip(1.0 - (residual / (BIWEIGHT_REACH * max(spread, LEAST_SPREAD))) ** 2, 0.0, None) ** 2
-            weight = taper * robust / u**2
-    inverse = np.linalg.pinv(normal_matrix)
-    influence = inverse @ scaled.T
-    spread = float(np.sqrt(np.sum(weight * (n - powers @ coefficients) ** 2) / max(weight.sum(), 1e-12)))
-    spread /= float(np.sqrt(np.sum(weight * u**2) / max(weight.sum(), 1e-12)))
-    effective = float(weight.sum() ** 2 / np.sum(weight**2))
-    if effective <= DEGREE + 2:
-        return None
-    # As many points as the polynomial has coefficients tell nothing of the spread.
-    spread *= float(np.sqrt(effective / (effective - DEGREE - 1.0)))
-    variance = float(np.sum((influence[0] * u) ** 2))
-    return coefficients / reach ** np.arange(DEGREE + 1), variance, spread
+    coefficients = np.empty(DEGREE + 1)
+    seen = (points.x, points.y, points.u, points.is_row)
+    is_found, variance, spread = _fit(*seen, *centre, *normal, reach, coefficients)
+    return (coefficients, variance, spread) if is_found else None
 
 
 def outline_near(

@@ -5,18 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from fingervision.domain.compiled import compiled
+from fingervision.domain.loops import loop
 from fingervision.vision.finger_end import FingerEnd
-from fingervision.vision.finger_shape import (
-    INNER_M,
-    INNER_R,
-    OUTER_M,
-    OUTER_R,
-    PARAMETERS,
-    TOP_M,
-    corner_tops,
-    inner_edge,
-)
 
 Floats = NDArray[np.float64]
 
@@ -32,6 +22,9 @@ U_CORNER_IN_BLURS, HIDDEN_IN_BLURS = 0.8, 8.0
 STEP = 1e-3
 # For a radius that is its own uncertainty, up to so many pixels.
 LARGEST_STEP_PX = 2.0
+
+_squared = loop("measuring_point_squared")
+_read_off = loop("measuring_point_read_off")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -62,20 +55,9 @@ def squared(end: FingerEnd) -> FingerEnd:
     short top does. Where the two agree within their uncertainty they are joined (a Kalman update); a slanted tip stays
     slanted.
     """
-    parameters, covariance = _squared(end.parameters, end.covariance, end.misfit)
+    parameters, covariance = np.empty_like(end.parameters), np.empty_like(end.covariance)
+    _squared(end.parameters, end.covariance, end.misfit, parameters, covariance)
     return FingerEnd(parameters, covariance, end.origin, end.misfit, end.residual, end.robust)
-
-
-@compiled
-def _squared(p: Floats, covariance: Floats, misfit: float) -> tuple[Floats, Floats]:
-    # Slope of the top plus the mean slope of the flanks is zero where they are square.
-    off_square = p[TOP_M] + 0.5 * (p[INNER_M] + p[OUTER_M])
-    toward = covariance[:, TOP_M] + 0.5 * (covariance[:, INNER_M] + covariance[:, OUTER_M])
-    variance = (toward[TOP_M] + 0.5 * (toward[INNER_M] + toward[OUTER_M])) * misfit**2
-    if off_square**2 >= SQUARE_IN_SIGMAS**2 * variance:
-        return p, covariance
-    gain = toward * (misfit**2 / (variance + U_SQUARE**2))
-    return p - gain * off_square, covariance - gain.reshape(-1, 1) * toward
 
 
 def measuring_point(end: FingerEnd, below_tip_px: float, blur_px: float) -> MeasuringPoint:
@@ -84,68 +66,7 @@ def measuring_point(end: FingerEnd, below_tip_px: float, blur_px: float) -> Meas
     The tip is the higher of the two corners. Where noise alone decides which that is, the higher of two would be too
     high on average: a top that is level within twice its uncertainty counts as level.
     """
-    wider = _with_corners(end.parameters, end.covariance, blur_px)
-    return MeasuringPoint(*_read_off(end.parameters, end.covariance, wider, end.misfit, end.origin, below_tip_px))
-
-
-@compiled
-def _with_corners(p: Floats, covariance: Floats, blur: float) -> Floats:
-    """The covariance with what blur hides of small corners: their radius, in both fingers alike."""
-    wider = covariance.copy()
-    for a in (INNER_R, OUTER_R):
-        hidden = max(1.0 - p[a] / (HIDDEN_IN_BLURS * blur), 0.0)
-        wider[a, a] += 2.0 * (U_CORNER_IN_BLURS * blur * hidden) ** 2
-    return wider
-
-
-@compiled
-def _read_off(
-    p: Floats, covariance: Floats, wider: Floats, misfit: float, origin: Floats, below_tip: float
-) -> tuple[float, float, float, float, Floats]:
-    by_lean = np.empty(PARAMETERS)
-    inner_x, inner_y, outer_x, outer_y = corner_tops(p, origin)
-    lean = outer_y - inner_y
-    for a in range(PARAMETERS):
-        up, down = corner_tops(_moved(p, a, STEP), origin), corner_tops(_moved(p, a, -STEP), origin)
-        by_lean[a] = (up[3] - up[1] - down[3] + down[1]) / (2.0 * STEP)
-    u_lean = np.sqrt(max(_product(by_lean, covariance, by_lean), 0.0)) * misfit
-    is_level = abs(lean) < min(LEVEL_IN_SIGMAS * u_lean, LEVEL_LIMIT_PX)
-    inner_share = 0.5 if is_level else (1.0 if lean > 0.0 else 0.0)
-    tip, edge, slope = _tip_and_edge(p, origin, inner_share, below_tip)
-    by_tip, by_edge = np.empty(PARAMETERS), np.empty(PARAMETERS)
-    for a in range(PARAMETERS):
-        # A radius is not below zero, and may be so much larger that the measuring point comes to lie on the fillet.
-        is_radius = a in (INNER_R, OUTER_R)
-        more, less = (min(np.sqrt(wider[a, a]), LARGEST_STEP_PX), 0.0) if is_radius else (STEP, STEP)
-        up_tip, up_edge, _ = _tip_and_edge(_moved(p, a, more), origin, inner_share, below_tip)
-        down_tip, down_edge, _ = _tip_and_edge(_moved(p, a, -less), origin, inner_share, below_tip)
-        by_tip[a], by_edge[a] = (up_tip - down_tip) / (more + less), (up_edge - down_edge) / (more + less)
-    found = np.empty((2, 2))
-    found[0, 0], found[1, 1] = _product(by_tip, wider, by_tip), _product(by_edge, wider, by_edge)
-    found[0, 1] = found[1, 0] = _product(by_tip, wider, by_edge)
-    return tip, outer_x if inner_share == 0.0 else inner_x, edge, slope, found
-
-
-@compiled
-def _tip_and_edge(p: Floats, origin: Floats, inner_share: float, below_tip: float) -> tuple[float, float, float]:
-    """Height of the tip, the edge at the measuring height, and its slope."""
-    _, inner, _, outer = corner_tops(p, origin)
-    tip = inner_share * inner + (1.0 - inner_share) * outer
-    edge, slope = inner_edge(p, origin, tip + below_tip)
-    return tip, edge, slope
-
-
-@compiled
-def _moved(p: Floats, parameter: int, by: float) -> Floats:
-    moved = p.copy()
-    moved[parameter] += by
-    return moved
-
-
-@compiled
-def _product(a: Floats, matrix: Floats, b: Floats) -> float:
-    total = 0.0
-    for i in range(a.size):
-        for j in range(b.size):
-            total += a[i] * matrix[i, j] * b[j]
-    return total
+    covariance = np.empty((2, 2))
+    shape = (end.parameters, end.covariance, end.misfit, end.origin)
+    tip, apex, edge, slope = _read_off(*shape, below_tip_px, blur_px, covariance)
+    return MeasuringPoint(tip, apex, edge, slope, covariance)

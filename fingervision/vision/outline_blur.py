@@ -1,10 +1,7 @@
-"""The blur that a curved outline is felt through: along the edge, and by a fit along a slanted line."""
+"""How much more than its half-level a fit along a slanted line feels a curved outline."""
 
 import numpy as np
 from numpy.typing import NDArray
-
-from fingervision.vision.edge_filters import PIXEL_VARIANCE
-from fingervision.vision.profile_lines import IS_ROW
 
 Floats = NDArray[np.float64]
 
@@ -20,25 +17,3 @@ def curvature_gain(slope: Floats, reach_sigmas: Floats) -> Floats:
     level = 0.5 / np.maximum(reach_sigmas, 2.5)
     root = 0.5 / np.sqrt(np.pi)
     return np.asarray(1.0 + slope**2 * (0.5 * root - level) / (root - level))
-
-
-def outline_blur(blur_px: Floats, slope: Floats, gain: Floats) -> Floats:
-    """Blur (sigma_e, the pixel included) that the curvature of the outline is felt through, shape (2, PLACES).
-
-    Blur along the edge moves a curved edge's half-level, blur across it does not. Motion makes the two differ: what is
-    seen on the flanks is the blur across the fingers, what is seen on the tips that along them. What counts is the
-    variance along the edge of what stays on it: det S / n' S n for a covariance S and the edge's normal n. What a fit
-    with free levels adds on a slanted line comes from the blur across the edge, n' S n.
-
-    Parameters
-    ----------
-    blur_px : ndarray of float, shape (2, 2)
-        Gaussian sigma of the optics at each finger's flanks and tip, without the pixel.
-    slope, gain : ndarray of float, shape (2, PLACES)
-        Of every line, and what `curvature_gain` says of it.
-    """
-    across, along = blur_px[:, :1] ** 2 + PIXEL_VARIANCE, blur_px[:, 1:] ** 2 + PIXEL_VARIANCE
-    steep = slope**2
-    normal = np.where(IS_ROW, across + along * steep, along + across * steep) / (1.0 + steep)
-    # A short window takes a little of a slanted line's share away: never all that stays on the edge.
-    return np.asarray(np.sqrt(np.maximum(across * along / normal + (gain - 1.0) * normal, PIXEL_VARIANCE)))

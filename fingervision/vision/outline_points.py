@@ -5,11 +5,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from fingervision.domain.loops import loop
 from fingervision.vision.edges import EdgePoints
 from fingervision.vision.fingers import CoarseFinger, CoarseFingers
 from fingervision.vision.median import middle
-from fingervision.vision.outline_blur import outline_blur
-from fingervision.vision.profile_lines import SIDE, TIP_SIDE
+from fingervision.vision.profile_lines import PLACES, SIDE, TIP_SIDE
 
 Floats = NDArray[np.float64]
 
@@ -17,6 +17,8 @@ Floats = NDArray[np.float64]
 SHARED_SLOPE, SHARED_FACTOR = 0.75, 1.25
 # A line whose contrast is below this share of the typical one meets the border of the picture, not of a finger.
 LEAST_CONTRAST = 0.3
+
+_seen_from = loop("outline_points_seen_from")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -54,38 +56,14 @@ def finger_origin(finger: CoarseFinger) -> tuple[int, int]:
 
 def outline_points(fingers: CoarseFingers, edges: EdgePoints) -> tuple[OutlinePoints, OutlinePoints]:
     """Points of the left and of the right finger, each in its own axes."""
-    lines, height = edges.lines, np.abs(edges.contrast)
-    blur = outline_blur(edges.blur_px, lines.slope, edges.curvature_gain)
-    typical = middle(height[lines.weight > 0])
-    is_point = (lines.weight > 0) & (height > LEAST_CONTRAST * typical)
-    is_shared = np.abs(lines.slope) > SHARED_SLOPE
-    left, right = (
-        _seen_from(
-            finger, np.flatnonzero(is_point[k]), lines.fixed[k], edges.position[k], edges.u_position[k], is_shared[k],
-            blur[k],
-        )
-        for k, finger in enumerate((fingers.left, fingers.right))
-    )  # fmt: skip
-    return left, right
-
-
-def _seen_from(
-    finger: CoarseFinger,
-    chosen: NDArray[np.int_],
-    fixed: NDArray[np.int_],
-    position: Floats,
-    u_position: Floats,
-    is_shared: NDArray[np.bool_],
-    blur: Floats,
-) -> OutlinePoints:
-    """The chosen points in the finger's own axes."""
-    across0, along0 = finger_origin(finger)
-    side, line, found = SIDE[chosen], fixed[chosen], position[chosen]
-    is_row = side != TIP_SIDE
-    return OutlinePoints(
-        x=finger.inner_sign * (np.where(is_row, found, line) - across0),
-        y=np.where(is_row, line, found) - along0,
-        u=u_position[chosen] * np.where(is_shared[chosen], SHARED_FACTOR, 1.0),
-        side=side,
-        blur=blur[chosen],
-    )
+    lines = edges.lines
+    least = LEAST_CONTRAST * middle(np.abs(edges.contrast[lines.weight > 0]))
+    seen = (SIDE, lines.weight, edges.contrast, lines.fixed, edges.position, edges.u_position, lines.slope)
+    found = []
+    for k, finger in enumerate((fingers.left, fingers.right)):
+        x, y, u, blur = np.empty((4, PLACES))
+        side = np.empty(PLACES, dtype=np.int64)
+        axes = (finger.inner_sign, *finger_origin(finger))
+        n = _seen_from(*seen, edges.curvature_gain, edges.blur_px, k, least, *axes, x, y, u, blur, side)
+        found.append(OutlinePoints(x[:n], y[:n], u[:n], side[:n], blur[:n]))
+    return found[0], found[1]

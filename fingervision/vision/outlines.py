@@ -1,13 +1,14 @@
 """The outlines of everything in a binary picture, to a pixel, seen in the fingers' axes."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from fingervision.domain.compiled import compiled
 from fingervision.domain.direction import Direction
+from fingervision.domain.loops import loop
 from fingervision.vision.orientation import Orientation
 
 # Points in order, shape (n, 2).
@@ -16,37 +17,57 @@ Outline = NDArray[np.int32]
 # What has a shorter outline is a speck (pixels).
 SHORTEST_OUTLINE_PX = 20
 
+_from_lowest, _largest_extents = loop("outlines_from_lowest"), loop("outlines_largest_extents")
 
-def find_outlines(mask: NDArray[np.uint8]) -> list[Outline]:
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Outlines:
+    """The outlines of everything in a binary picture, one behind the other.
+
+    Parameters
+    ----------
+    points : ndarray of int32, shape (n, 2)
+        (x, y) of all of them.
+    starts : ndarray of int64, shape (m + 1,)
+        Where each begins in `points`; the last is their number.
+    """
+
+    points: Outline
+    starts: NDArray[np.int64]
+
+    def __len__(self) -> int:
+        return len(self.starts) - 1
+
+    def __getitem__(self, number: int) -> Outline:
+        return self.points[self.starts[number] : self.starts[number + 1]]
+
+    @property
+    def lengths(self) -> NDArray[np.int64]:
+        """Points of each, shape (m,)."""
+        return np.diff(self.starts)
+
+
+def find_outlines(mask: NDArray[np.uint8]) -> Outlines:
     """Outlines (x, y) of everything set in a mask, holes included, but for specks."""
-    outlines, _ = cv2.findContours(mask, cv2.RETR_LIST, cv2.CHAIN_APPROX_NONE)
-    return [np.asarray(outline[:, 0, :], dtype=np.int32) for outline in outlines if len(outline) > SHORTEST_OUTLINE_PX]
+    found, _ = cv2.findContours(mask, cv2.RETR_LIST, cv2.CHAIN_APPROX_NONE)
+    long = [outline for outline in found if len(outline) > SHORTEST_OUTLINE_PX]
+    points = np.concatenate(long)[:, 0] if long else np.empty((0, 2))
+    starts = np.zeros(len(long) + 1, dtype=np.int64)
+    np.cumsum([len(outline) for outline in long], out=starts[1:])
+    return Outlines(np.ascontiguousarray(points, dtype=np.int32), starts)
 
 
-def longest_first(outlines: list[Outline], directions: Sequence[Direction]) -> list[tuple[Direction, int]]:
+def longest_first(outlines: Outlines, directions: Sequence[Direction]) -> list[tuple[Direction, int]]:
     """Directions with the extent of the longest outline along them (pixels), the greatest first."""
-    sizes = [cv2.boundingRect(outline)[2:] for outline in outlines] or [(0, 0)]
-    widest, tallest = (max(size[axis] for size in sizes) for axis in (0, 1))
-    extents = [(direction, tallest if direction.is_vertical else widest) for direction in directions]
-    return sorted(extents, key=lambda extent: -extent[1])
+    widest, tallest = _largest_extents(outlines.points, outlines.starts)
+    sizes = [(direction, tallest if direction.is_vertical else widest) for direction in directions]
+    return sorted(sizes, key=lambda size: -size[1])
 
 
 def in_axes(pixels: Outline, orientation: Orientation) -> Outline:
     """A closed outline (x, y) in the fingers' axes, from its lowest point on: it rises and falls back to it."""
-    return _from_lowest(pixels, orientation.direction.is_vertical, orientation.is_flipped, orientation.along_size)
-
-
-@compiled
-def _from_lowest(pixels: Outline, is_vertical: bool, is_flipped: bool, along_size: int) -> Outline:
-    n, axis = pixels.shape[0], 1 if is_vertical else 0
-    lowest = 0
-    for i in range(1, n):
-        down = pixels[i, axis] - pixels[lowest, axis]
-        if (down < 0) if is_flipped else (down > 0):
-            lowest = i
-    outline = np.empty((n, 2), dtype=np.int32)
-    for place in range(n):
-        i = (lowest + place) % n
-        outline[place, 0] = pixels[i, 1 - axis]
-        outline[place, 1] = along_size - 1 - pixels[i, axis] if is_flipped else pixels[i, axis]
+    pixels = np.ascontiguousarray(pixels, dtype=np.int32)
+    outline = np.empty_like(pixels)
+    is_vertical, size = orientation.direction.is_vertical, orientation.along_size
+    _from_lowest(pixels, is_vertical, orientation.is_flipped, size, outline)
     return outline

@@ -10,12 +10,11 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from fingervision.domain.compiled import compiled
 from fingervision.domain.direction import Direction
 from fingervision.domain.gap import NoGap
+from fingervision.domain.loops import loop
 from fingervision.vision.channels import Channel, find_channel
 from fingervision.vision.fingers import CoarseFinger, CoarseFingers, find_fingers, is_hidden
-from fingervision.vision.median import middle
 from fingervision.vision.orientation import Orientation
 from fingervision.vision.way_between import inner_crossing
 
@@ -39,6 +38,10 @@ STEP_PX, STEP_ROWS = 3.0, 3
 # A part closes the room between the fingers over so many pixels and this share of its breadth; fingers that touch
 # close it to a point.
 FLOOR_PX, FLOOR_SHARE = 6, 0.3
+
+_has_step = loop("part_removal_has_step")
+_part_rows = loop("part_removal_part_rows")
+_clear = loop("part_removal_clear")
 
 
 def without_part(
@@ -95,30 +98,6 @@ def looks_parted(fingers: CoarseFingers, below_tip_px: float, reach_px: float) -
     )
 
 
-@compiled
-def _has_step(outline: NDArray[np.int32], inner_sign: int, from_row: float) -> bool:
-    """Whether something stands out of the inner side of a finger's coarse outline."""
-    crest = outline[:, 1].argmin()
-    count = 0
-    t, v = np.empty(crest + 1), np.empty(crest + 1)
-    for i in range(crest + 1):
-        if outline[i, 1] >= from_row and (count == 0 or outline[i, 1] != t[count - 1]):
-            t[count], v[count] = outline[i, 1], inner_sign * outline[i, 0]
-            count += 1
-    if count < 4 * STEP_ROWS:
-        return False
-    t, v = t[:count], v[:count]
-    half = count // 2
-    m = middle((v[half : 2 * half] - v[:half]) / (t[half : 2 * half] - t[:half] - 0.5))
-    away = v - m * t
-    # The finger's own edge is the innermost thing: a part only ever adds.
-    base = np.sort(away)[count // 4]
-    out = 0
-    for i in range(count):
-        out += away[i] - base > STEP_PX
-    return out >= STEP_ROWS
-
-
 def is_likelier(parted: CoarseFingers, below_tip_px: float) -> bool:
     """Whether a part was found, and not the shape of both fingers alike, as a nose at either tip is."""
     hides = [is_hidden(finger, finger.top_along_px + below_tip_px) for finger in (parted.left, parted.right)]
@@ -129,9 +108,10 @@ def _found_without(
     mask: Mask, upright: Mask, channel: Channel, orientation: Orientation, below_tip_px: float, reach_px: float
 ) -> CoarseFingers | None:
     sides = (channel.left_c, channel.left_m, channel.right_c, channel.right_m)
-    left_rows, right_rows, held_rows, filled = _part_rows(upright, *sides, channel.last_row)
-    if filled < SMALLEST_PART_PX:
+    flags = np.empty((3, channel.last_row + 1), dtype=np.bool_)
+    if _part_rows(upright, *sides, channel.last_row, *flags) < SMALLEST_PART_PX:
         return None
+    left_rows, right_rows, held_rows = map(np.flatnonzero, flags)
     cleared = mask.copy()
     _clear(np.asarray(orientation.view(cleared), dtype=np.uint8), *sides, channel.last_row)
     fingers = find_fingers(cleared, (orientation.direction,), below_tip_px, reach_px)
@@ -166,46 +146,3 @@ def _is_on_side(finger: CoarseFinger, across: float, reach_px: float) -> bool:
 def _widened(rows: Ints) -> Ints:
     """Rows and their neighbours."""
     return np.unique((rows[:, None] + np.arange(-BEYOND_PX, BEYOND_PX + 1)).ravel())
-
-
-@compiled
-def _part_rows(
-    upright: Mask, left_c: float, left_m: float, right_c: float, right_m: float, last_row: int
-) -> tuple[Ints, Ints, Ints, int]:
-    """Rows in which something lies at the left side, at the right one, and touches both; its pixels in all."""
-    at_left, at_right, held = np.zeros(last_row + 1), np.zeros(last_row + 1), np.zeros(last_row + 1)
-    columns, pixels = upright.shape[1], 0
-    for row in range(last_row + 1):
-        a, b = int(np.rint(left_c + left_m * row)), int(np.rint(right_c + right_m * row))
-        if a < 0 or b >= columns or b - a < 2 * SPECK_PX + 2:
-            continue
-        # Two pixels beside the line may be the finger's own edge.
-        first, past = a + 2, b - 1
-        filled, left, right = 0, 0, 0
-        for x in range(first, past):
-            if upright[row, x]:
-                filled += 1
-                left += x < first + NEAR_PX
-                right += x >= past - NEAR_PX
-        pixels += filled
-        at_left[row], at_right[row] = left >= SPECK_PX, right >= SPECK_PX
-        held[row] = upright[row, first] > 0 and upright[row, past - 1] > 0 and 2 * filled > past - first
-    return np.flatnonzero(at_left), np.flatnonzero(at_right), np.flatnonzero(held), pixels
-
-
-@compiled
-def _clear(upright: Mask, left_c: float, left_m: float, right_c: float, right_m: float, last_row: int) -> None:
-    """Clear all between the two sides, from the picture's end down to the channel's, and what is left beside them."""
-    columns = upright.shape[1]
-    for row in range(last_row + 1):
-        a, b = int(np.rint(left_c + left_m * row)), int(np.rint(right_c + right_m * row))
-        for x in range(max(a + 1, 0), min(b, columns)):
-            upright[row, x] = 0
-        for at, step in ((a, -1), (b, 1)):
-            x = at
-            while 0 <= x < columns and upright[row, x]:
-                x += step
-            if abs(x - at) <= SLIVER_PX:
-                while x != at:
-                    x -= step
-                    upright[row, x] = 0

@@ -94,13 +94,20 @@ def with_profile(
         return sharp
     weight = 1.0 / edges.noise_flat**2
     blur = [float(np.hypot(edges.blur_px[k, 0], np.sqrt(PIXEL_VARIANCE))) for k in range(2)]
-    fits = [[_best(kind, profile, weight, blur[k]) for kind in range(4)] for k, profile in enumerate(inner) if profile]
+    fits = [[_best(STEP, profile, weight, blur[k])] for k, profile in enumerate(inner) if profile]
+    bins = sum(profile.t.size for profile in inner if profile)
+    if sum(each[STEP].squares for each in fits) < 0.5 * MODEL_LEAVES * bins:
+        # A step explains both, whatever the others would: only how wide it is is still to be asked.
+        fits = [[each[STEP]] * 4 for each in fits]
+    else:
+        for k, profile in enumerate(inner):
+            if profile:
+                fits[k] += [_best(kind, profile, weight, blur[k]) for kind in (WALL, SHADOW, GLARE)]
     left = np.array([[fit.squares for fit in each] for each in fits]).sum(axis=0)
-    enough = max(MODEL_LEAVES * sum(profile.t.size for profile in inner if profile), left[STEP] / MODEL_TIMES)
+    enough = max(MODEL_LEAVES * bins, left[STEP] / MODEL_TIMES)
     is_step = left[STEP] < max(0.5 * enough, STEP_TIMES * left.min())
     shadow, wall, glare = ([each[kind] for each in fits] for kind in (SHADOW, WALL, GLARE))
     all_around = np.hypot(1.0, edges.lines.slope)
-    bins = sum(profile.t.size for profile in inner if profile)
     margin = CLEARLY * np.maximum(left / bins, 1.0)
     is_shadow = left[SHADOW] < enough and left[SHADOW] + margin[SHADOW] < min(left[WALL], left[GLARE])
     if not is_step and is_shadow and _are_of_size(shadow, -1.0):
@@ -114,14 +121,14 @@ def with_profile(
         is_wall = not is_step and left[WALL] < enough and _are_of_size(wall, -1.0)
         chosen = [_beyond_wall(fit) for fit in wall] if is_outline else wall
         return _unsure(edges, [abs(fit.position) for fit in chosen], "wall") if is_wall else edges
-    # A shadow that the inner flanks alone cannot tell from a wall falls on the outer side as well.
-    beyond = np.array(
-        [[_best(kind, p, weight, blur[k]).squares for kind in range(3)] for k, p in enumerate(outer) if p]
-    )
-    both = left[:3] + beyond.sum(axis=0)
-    if not is_step and left[SHADOW] < enough and both[SHADOW] + margin[SHADOW] < both[WALL]:
-        is_shadow = both[SHADOW] < both[STEP] / MODEL_TIMES and _are_of_size(shadow, -1.0)
-        if is_shadow:
+    if not is_step and left[SHADOW] < enough:
+        # A shadow that the inner flanks alone cannot tell from a wall falls on the outer side as well.
+        beyond = np.array(
+            [[_best(kind, p, weight, blur[k]).squares for kind in range(3)] for k, p in enumerate(outer) if p]
+        )
+        both = left[:3] + beyond.sum(axis=0)
+        is_likelier = both[SHADOW] + margin[SHADOW] < both[WALL] and both[SHADOW] < both[STEP] / MODEL_TIMES
+        if is_likelier and _are_of_size(shadow, -1.0):
             moved = _moved(edges, shadow, U_SHADOW, all_around, "shadow")
             return without_additions(upright, moved, light, SHADOW, shadow)
     widths = [_best(STEP, profile, weight, blur[k]).blur for k, profile in enumerate(outer) if profile]

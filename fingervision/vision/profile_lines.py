@@ -10,9 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from fingervision.domain.compiled import compiled
+from fingervision.domain.loops import loop
 from fingervision.vision.fingers import CoarseFinger
-from fingervision.vision.outlines import Outline
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int_]
@@ -32,6 +31,8 @@ SLOPE_REACH_PX = 4
 SLOPE_OF_A_TIP = 0.999
 # Beyond every picture (pixels).
 FAR = 10**9
+
+_fill = loop("profile_lines_fill")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -71,41 +72,3 @@ def profile_lines(fingers: Sequence[CoarseFinger]) -> ProfileLines:
         outward[k, :INNER], outward[k, INNER:ROWS] = finger.inner_sign, -finger.inner_sign
         _fill(finger.outline, finger.inner_sign, fixed[k], coarse[k], slope[k], weight[k])
     return ProfileLines(fixed, coarse, slope, weight, outward)
-
-
-@compiled
-def _fill(outline: Outline, inner_sign: int, fixed: Ints, coarse: Ints, slope: Floats, weight: Floats) -> None:
-    """Put the lines of one finger into their places."""
-    across, along = outline[:, 0], outline[:, 1]
-    crest = along.argmin()
-    for side in range(3):
-        if side == 0:
-            first, past, sense, steepest = 0, INNER, inner_sign, 1.0
-            lines, values = along[: crest + 1], across[: crest + 1]
-        elif side == 1:
-            first, past, sense, steepest = INNER, ROWS, -inner_sign, 1.0
-            lines, values = along[crest:], across[crest:]
-        else:
-            first, past, sense, steepest = ROWS, PLACES, -1, SLOPE_OF_A_TIP
-            lines, values = across, along
-        lowest = lines.min()
-        reach = np.full(lines.max() - lowest + 1, -FAR)
-        for i in range(lines.size):
-            reach[lines[i] - lowest] = max(reach[lines[i] - lowest], sense * values[i])
-        change = np.empty(reach.size)
-        keep, kept = np.empty(reach.size, dtype=np.int64), 0
-        for i in range(reach.size):
-            low, high = max(i - SLOPE_REACH_PX, 0), min(i + SLOPE_REACH_PX, reach.size - 1)
-            change[i] = sense * (reach[high] - reach[low]) / max(high - low, 1)
-            if abs(change[i]) <= steepest:
-                keep[kept] = i
-                kept += 1
-        thinning = -(-kept // (past - first))
-        place = first
-        for n in range(0, kept, max(thinning, 1)):
-            # A tip is thinned out from its inner side, so that a mirrored finger has the mirrored lines.
-            # Flanks that are thinned out have even and odd rows all the same: an interlaced picture's two fields.
-            other = 1 if side < 2 and thinning % 2 == 0 and (place - first) % 2 == 1 and n + 1 < kept else 0
-            i = keep[kept - 1 - n] if side == 2 and inner_sign > 0 else keep[n + other]
-            fixed[place], coarse[place], slope[place], weight[place] = i + lowest, sense * reach[i], change[i], 1.0
-            place += 1

@@ -3,13 +3,12 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from fingervision.domain.compiled import compiled
 from fingervision.domain.frame import Coding
-from fingervision.vision.finger_end import SIGMAS_IN_MEDIAN, FingerEnd
+from fingervision.domain.loops import loop
+from fingervision.vision.finger_end import FingerEnd
 from fingervision.vision.finger_shape import INNER_M, OUTER_M, PARAMETERS, on_flanks
 from fingervision.vision.flanks import STEEPEST
 from fingervision.vision.measuring_point import MeasuringPoint
-from fingervision.vision.median import middle
 from fingervision.vision.outline_points import OutlinePoints
 
 Floats = NDArray[np.float64]
@@ -33,34 +32,17 @@ MOST_REJECTED, LEAST_COUNTED = 0.5, 0.05
 # A measuring point farther from every point of the outline would be extrapolated (pixels).
 FARTHEST_POINT_PX = 2.5
 
+_shared = loop("residuals_shared")
+_roughness = loop("residuals_roughness")
+_rejected = loop("residuals_rejected")
+_systematic = loop("residuals_systematic")
+_distance_in_spacings = loop("residuals_distance_in_spacings")
+
 
 def spread(end: FingerEnd) -> float:
     """Variance of the residuals in units of what the points' own uncertainties explain."""
     free = max(float(end.robust.sum()) - PARAMETERS, 1.0)
     return max(float(end.robust @ end.residual**2) / free / BIWEIGHT_SPREAD, 0.5)
-
-
-@compiled
-def _shared(residual: Floats, robust: Floats, side: NDArray[np.int_]) -> float:
-    """How many neighbours share one residual: the sum of the correlations under Bartlett's weights (Newey-West).
-
-    With these weights the sum over lags is the mean square of the moving sums over that many neighbours. The sides of a
-    finger do not see each other.
-    """
-    power, moving = 1e-12, 0.0
-    first = 0
-    while first < side.size:
-        past = first
-        while past < side.size and side[past] == side[first]:
-            power += robust[past] * residual[past] ** 2
-            past += 1
-        for start in range(first - LAGS, past):
-            total = 0.0
-            for i in range(max(start, first), min(start + LAGS + 1, past)):
-                total += np.sqrt(robust[i]) * residual[i]
-            moving += total * total
-        first = past
-    return float(moving / ((LAGS + 1.0) * power))
 
 
 def shared_points(
@@ -70,7 +52,7 @@ def shared_points(
 
     What a codec does to a whole block the fit takes for shape: the residuals do not show it, the block's side does.
     """
-    seen = [_shared(end.residual, end.robust, p.side) for p, end in zip(points, ends, strict=True)]
+    seen: list[float] = [_shared(end.residual, end.robust, p.side) for p, end in zip(points, ends, strict=True)]
     return max(0.5 * sum(seen), SHARED_POINTS[coding])
 
 
@@ -112,57 +94,10 @@ def has_flanks(points: OutlinePoints, end: FingerEnd, turn: float = 0.0) -> bool
     if max(abs(end.parameters[INNER_M] - turn), abs(end.parameters[OUTER_M] - turn)) > STEEPEST:
         return False
     seen = end.robust > 0.0
-    share = float(on_flanks(end.parameters, end.origin, points.x, points.y)[seen].mean())
-    return share > FLANKS_SHARE
-
-
-@compiled
-def _roughness(residual: Floats, robust: Floats) -> float:
-    """Spread from point to point: that of the noise, where a wrong shape differs from one end to the other."""
-    counted = residual[robust > 0.0]
-    return float(SIGMAS_IN_MEDIAN * middle(np.abs(counted[1:] - counted[:-1])) / np.sqrt(2.0))
-
-
-@compiled
-def _rejected(x: Floats, y: Floats, robust: Floats, edge: float, tip: float, below_tip: float) -> float:
-    """Share of the points near the measuring point that the fit takes for dust."""
-    near, rejected = 0, 0
-    for i in range(x.size):
-        if abs(y[i] - tip - below_tip) < SHAPE_REACH_PX and abs(x[i] - edge) < 2.0 * SHAPE_REACH_PX:
-            near += 1
-            rejected += robust[i] < LEAST_COUNTED
-    return rejected / max(near, 1)
-
-
-@compiled
-def _systematic(
-    x: Floats, y: Floats, residual: Floats, robust: Floats, edge: float, tip: float, below_tip: float
-) -> float:
-    """Mean residual near the measuring point or near the tip, the larger, in units of its own uncertainty."""
-    sums, weights = np.zeros(2), np.zeros(2)
-    for i in range(x.size):
-        if abs(y[i] - tip - below_tip) < SHAPE_REACH_PX and abs(x[i] - edge) < 2.0 * SHAPE_REACH_PX:
-            sums[0] += robust[i] * residual[i]
-            weights[0] += robust[i]
-        if y[i] - tip < 0.5 * SHAPE_REACH_PX:
-            sums[1] += robust[i] * residual[i]
-            weights[1] += robust[i]
-    largest = 0.0
-    for near in range(2):
-        if weights[near] >= FEWEST_NEAR:
-            largest = max(largest, abs(sums[near]) / np.sqrt(weights[near]))
-    return largest
+    is_on = on_flanks(end.parameters, end.origin, points.x, points.y)
+    return bool(np.count_nonzero(is_on & seen) > FLANKS_SHARE * np.count_nonzero(seen))
 
 
 def is_on_outline(points: OutlinePoints, edge: float, height: float) -> bool:
     """Whether a measuring point has points of the outline beside it: nothing is ever extrapolated."""
-    return _distance_in_spacings(points.x, points.y, edge, height) < FARTHEST_POINT_PX
-
-
-@compiled
-def _distance_in_spacings(x: Floats, y: Floats, edge: float, height: float) -> float:
-    """Distance to the nearest point; a large finger's outline is thinned out: its points stand farther apart."""
-    nearest = np.inf
-    for i in range(x.size):
-        nearest = min(nearest, (x[i] - edge) ** 2 + (y[i] - height) ** 2)
-    return float(np.sqrt(nearest) / max(1.0, (x.max() - x.min() + y.max() - y.min()) / x.size))
+    return float(_distance_in_spacings(points.x, points.y, edge, height)) < FARTHEST_POINT_PX

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from fingervision.domain.compiled import compiled
+from fingervision.domain.loops import loop
 from fingervision.vision.finger_end import FingerEnd
 from fingervision.vision.finger_shape import compared, on_flanks
 from fingervision.vision.outline_points import OutlinePoints
@@ -33,6 +33,9 @@ OWN, FEWEST_POINTS, MOST_POINTS = 3, 12, 40
 SUSPECT, SIGNIFICANT = 1.5, 8.0
 # The covariance is tabulated for whole pixels of distance up to so many.
 FARTHEST_PX = 64
+
+_likelihood = loop("roughness_likelihood")
+_errors = loop("roughness_errors")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -81,8 +84,13 @@ def roughness(points: tuple[OutlinePoints, OutlinePoints], ends: tuple[FingerEnd
                 continue
             seen += 1
             along, across, variance = p.y[chosen], p.x[chosen], p.u[chosen] ** 2
-            nothing += _none(along, across, variance)
-            likelihood += _likelihood(along, across, variance, DEVIATIONS_PX, LENGTHS_PX)
+            own = np.empty_like(likelihood)
+            is_sound, none = _likelihood(along, across, variance, DEVIATIONS_PX, LENGTHS_PX, own)
+            if not is_sound:
+                msg = "the covariance of a flank's points must be positive"
+                raise np.linalg.LinAlgError(msg)
+            nothing += none
+            likelihood += own
     if not seen or likelihood.max() < nothing + SIGNIFICANT:
         return None
     weight = np.exp(likelihood - likelihood.max())
@@ -120,73 +128,13 @@ def shared_along(
         end.parameters, end.origin, points.x, points.y, points.u, points.is_row, points.side == OUTER_SIDE, points.blur
     )
     influence = np.ascontiguousarray(end.covariance @ (jacobian * end.robust[:, None]).T)
-    covariance = _propagated(influence, points.x, points.y, points.u, bare.u, found.covariance)
+    errors = np.empty((points.x.size, points.x.size))
+    _errors(points.x, points.y, points.u, bare.u, found.covariance, errors)
+    covariance = influence @ errors @ influence.T
     silent = (end.covariance / u_prior**2) @ end.covariance
     return FingerEnd(end.parameters, covariance + silent, end.origin, 1.0, end.residual, end.robust)
 
 
-@compiled
 def _correlation(distance: Floats, length: float) -> Floats:
     scaled = np.sqrt(5.0) * np.abs(distance) / length
     return np.asarray((1.0 + scaled + scaled * scaled / 3.0) * np.exp(-scaled))
-
-
-@compiled
-def _basis(along: Floats) -> Floats:
-    t = along - along.mean()
-    t = t / max(np.abs(t).max(), 1.0)
-    basis = np.ones((along.size, OWN))
-    for k in range(1, OWN):
-        basis[:, k] = basis[:, k - 1] * t
-    return basis
-
-
-@compiled
-def _restricted(basis: Floats, across: Floats, covariance: Floats) -> float:
-    """Logarithm of the restricted likelihood, but for a constant."""
-    lower = np.linalg.cholesky(covariance)
-    whitened = np.linalg.solve(lower, np.column_stack((basis, across)))
-    x, y = np.ascontiguousarray(whitened[:, :OWN]), np.ascontiguousarray(whitened[:, OWN])
-    normal = x.T @ x
-    left = y - x @ np.linalg.solve(normal, x.T @ y)
-    log_determinant = 2.0 * np.log(np.diag(lower)).sum() + np.log(np.linalg.det(normal))
-    return float(-0.5 * (log_determinant + left @ left))
-
-
-@compiled
-def _none(along: Floats, across: Floats, variance: Floats) -> float:
-    return _restricted(_basis(along), across, np.diag(variance))
-
-
-@compiled
-def _likelihood(along: Floats, across: Floats, variance: Floats, deviations: Floats, lengths: Floats) -> Floats:
-    """Logarithm of the restricted likelihood of every deviation and length."""
-    basis = _basis(along)
-    found = np.empty((deviations.size, lengths.size))
-    noise = np.diag(variance)
-    for j in range(lengths.size):
-        correlation = np.empty((along.size, along.size))
-        for i in range(along.size):
-            correlation[i] = _correlation(along - along[i], lengths[j])
-        for i in range(deviations.size):
-            found[i, j] = _restricted(basis, across, noise + deviations[i] ** 2 * correlation)
-    return found
-
-
-@compiled
-def _propagated(influence: Floats, x: Floats, y: Floats, u: Floats, u_own: Floats, covariance: Floats) -> Floats:
-    """Covariance of the parameters for points that share what they stray by."""
-    n = x.size
-    errors = np.empty((n, n))
-    last = covariance.size - 1
-    for i in range(n):
-        for j in range(n):
-            distance = np.sqrt((x[i] - x[j]) ** 2 + (y[i] - y[j]) ** 2)
-            whole = int(distance)
-            if whole >= last:
-                errors[i, j] = 0.0
-                continue
-            part = distance - whole
-            errors[i, j] = ((1.0 - part) * covariance[whole] + part * covariance[whole + 1]) / (u[i] * u[j])
-        errors[i, i] += (u_own[i] / u[i]) ** 2
-    return influence @ errors @ influence.T

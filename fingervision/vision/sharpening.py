@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import ndtr
 
-from fingervision.domain.compiled import compiled
+from fingervision.domain.loops import loop
 
 Floats = NDArray[np.float64]
 
@@ -33,6 +33,8 @@ ITERATIONS, STEP, SETTLED = 12, 1e-3, 1e-4
 SIGNIFICANT, LEAST_AMOUNT = 12.0, 0.1
 # Cameras' masks are not quite Gaussian: this share of the shift is its standard uncertainty.
 U_SHIFT = 0.4
+
+_soften = loop("sharpening_softened")
 
 
 @dataclass(frozen=True, slots=True)
@@ -149,17 +151,8 @@ def _adjusted(model: Floats, level: Floats, root: Floats) -> Floats:
     return np.asarray(basis @ np.linalg.solve(basis.T @ basis, basis.T @ seen) - seen)
 
 
-@compiled
 def _softened(levels: Floats, sigma: float) -> Floats:
     """Gaussian blur of a row, its ends repeated."""
-    reach = int(np.ceil(3.5 * sigma))
-    kernel = np.exp(-0.5 * (np.arange(-reach, reach + 1) / sigma) ** 2)
-    kernel /= kernel.sum()
-    n = levels.size
-    soft = np.empty(n)
-    for i in range(n):
-        total = 0.0
-        for j in range(-reach, reach + 1):
-            total += kernel[j + reach] * levels[min(max(i + j, 0), n - 1)]
-        soft[i] = total
+    soft = np.empty(levels.size)
+    _soften(levels, sigma, soft)
     return soft

@@ -9,12 +9,12 @@ ground's class on both inner sides, and on no outer one, is a pair of pads: the 
 import numpy as np
 from numpy.typing import NDArray
 
-from fingervision.domain.compiled import compiled
 from fingervision.domain.gap import NoGap
+from fingervision.domain.loops import loop
 from fingervision.domain.status import Status
 from fingervision.vision.edges import EdgePoints
 from fingervision.vision.grey import GreyImage
-from fingervision.vision.median import middle
+from fingervision.vision.median import median
 from fingervision.vision.profile_lines import INNER, ROWS
 
 Floats = NDArray[np.float64]
@@ -32,6 +32,8 @@ THIRD_TONE = NoGap(
     "that fingers and ground are each of one tone.",
 )
 
+_strips = loop("third_tone_strips")
+
 
 def other_threshold(upright: GreyImage, edges: EdgePoints) -> float | None:
     """The threshold that has a strip of a third tone on its right side; None where the fingers have none on the wrong.
@@ -43,78 +45,27 @@ def other_threshold(upright: GreyImage, edges: EdgePoints) -> float | None:
     edges : EdgePoints
         Where the fingers were measured.
     """
-    near = edges.reach_px + 1
-    halves = np.array([_room(edges, k) for k in range(2)])
-    inward, outward = np.zeros((2, 2)), np.zeros((2, 2))
-    for k in range(2):
-        for side, part in enumerate((slice(0, INNER), slice(INNER, ROWS))):
-            chosen = edges.lines.weight[k, part] > 0
-            inward[k, side], outward[k, side] = _strips(
-                upright,
-                edges.lines.fixed[k, part][chosen],
-                edges.position[k, part][chosen],
-                edges.lines.outward[k, part][chosen],
-                near,
-                halves[k] if side == 0 else REACH_PX,
-            )
-    is_in, is_out = inward > 0, outward > 0
-    if is_in[0, 0] != is_in[1, 0]:
-        k = 0 if is_in[0, 0] else 1
+    near, lines = edges.reach_px + 1, edges.lines
+    seen = (upright, lines.fixed, edges.position, lines.weight, lines.outward)
+    room = _room(edges)
+    inner = [_strips(*seen, k, 0, INNER, near, room) for k in range(2)]
+    is_in, is_out = ([strip[way] > 0 for strip in inner] for way in range(2))
+    if is_in[0] == is_in[1] and not all(is_out):
+        return None
+    outer = [_strips(*seen, k, INNER, ROWS, near, REACH_PX) for k in range(2)]
+    if is_in[0] != is_in[1]:
+        k = 0 if is_in[0] else 1
         # The same shadow falls outside the other finger, if that side is in view.
-        if is_in[1 - k, 1] or not (edges.lines.weight[1 - k, INNER:ROWS] > 0).any():
-            return float(inward[k, 0])
-    if is_out[:, 0].all() and not is_out[:, 1].any():
-        return float(outward[:, 0].mean())
+        if outer[1 - k][0] > 0 or not (lines.weight[1 - k, INNER:ROWS] > 0).any():
+            return float(inner[k][0])
+    if all(is_out) and not any(strip[1] > 0 for strip in outer):
+        return 0.5 * float(inner[0][1] + inner[1][1])
     return None
 
 
-def _room(edges: EdgePoints, k: int) -> int:
-    """Half of the way from a finger's inner edge to the other finger (pixels)."""
+def _room(edges: EdgePoints) -> int:
+    """Half of the way from one inner edge to the other (pixels)."""
     inner = [edges.position[j, :INNER][edges.lines.weight[j, :INNER] > 0] for j in range(2)]
     if min(inner[0].size, inner[1].size) == 0:
         return 0
-    return int(min(0.5 * abs(np.median(inner[1]) - np.median(inner[0])), REACH_PX))
-
-
-@compiled
-def _strips(
-    upright: GreyImage,
-    fixed: NDArray[np.int_],
-    position: Floats,
-    outward: NDArray[np.int_],
-    near: int,
-    room: int,
-) -> tuple[float, float]:
-    """Levels half-way up the steps in which strips inside and outside of one side end; 0 where there is none.
-
-    Only a step of the same sense as the edge itself ends a strip between finger and ground.
-    """
-    count = fixed.size
-    if count < FEWEST_ROWS or near + STEP_PX > REACH_PX:
-        return 0.0, 0.0
-    stride = max(count // MOST_ROWS, 1)
-    profile, seen = np.zeros(2 * REACH_PX + 1), np.zeros(2 * REACH_PX + 1, dtype=np.bool_)
-    for d in range(-REACH_PX, min(REACH_PX, room) + 1):
-        levels, n = np.empty(count // stride + 1), 0
-        for i in range(0, count, stride):
-            x = int(np.rint(position[i])) + outward[i] * d
-            if 0 <= x < upright.shape[1]:
-                levels[n] = upright[fixed[i], x]
-                n += 1
-        if n >= FEWEST_ROWS:
-            profile[d + REACH_PX], seen[d + REACH_PX] = middle(levels[:n]), True
-    if not (seen[REACH_PX - near] and seen[REACH_PX + near]):
-        return 0.0, 0.0
-    contrast = profile[REACH_PX + near] - profile[REACH_PX - near]
-    found = np.zeros(2)
-    for side in range(2):
-        largest = LEAST_STEP * abs(contrast)
-        sense = 1 if side else -1
-        for d in range(near, REACH_PX - STEP_PX + 1):
-            a, b = REACH_PX + sense * d, REACH_PX + sense * (d + STEP_PX)
-            if not seen[a] or not seen[b]:
-                break
-            step = sense * (profile[b] - profile[a]) * np.sign(contrast)
-            if step > largest:
-                largest, found[side] = step, 0.5 * (profile[a] + profile[b])
-    return found[0], found[1]
+    return int(min(0.5 * abs(median(inner[1]) - median(inner[0])), REACH_PX))

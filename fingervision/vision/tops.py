@@ -5,12 +5,16 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from fingervision.domain.compiled import compiled
+from fingervision.domain.loops import loop
 from fingervision.vision.orientation import Orientation
-from fingervision.vision.outlines import Outline, in_axes
+from fingervision.vision.outlines import Outline, Outlines, in_axes
 
 # A top that is lower than this is noise or dust on an outline, whatever the scale (pixels).
 SMALLEST_PROMINENCE_PX = 5.0
+# Tops beyond this number are texture; the fingers are among the most prominent.
+MOST_TOPS = 8
+
+_find_tops = loop("tops_find")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -45,58 +49,19 @@ class Top:
         return int(self.outline[self.index, 1])
 
 
-def find_tops(mask: NDArray[np.uint8], outlines: list[Outline], orientation: Orientation) -> list[Top]:
-    """The tops of all outlines, the most prominent first."""
-    upright, deepest = orientation.view(mask), orientation.along_size - 1
+def find_tops(mask: NDArray[np.uint8], outlines: Outlines, orientation: Orientation) -> list[Top]:
+    """The most prominent tops of all outlines, at most `MOST_TOPS`, the most prominent first."""
+    outline, index, prominence = np.empty((3, MOST_TOPS), dtype=np.int64)
+    is_rooted = np.empty(MOST_TOPS, dtype=np.bool_)
+    way = (orientation.direction.is_vertical, orientation.is_flipped, orientation.along_size)
+    count = _find_tops(
+        orientation.view(mask), outlines.points, outlines.starts, *way, outline, index, prominence, is_rooted
+    )
+    seen: dict[int, Outline] = {}
     found = []
-    for pixels in outlines:
-        outline = in_axes(pixels, orientation)
-        bottom = outline[0, 1]
-        for first, peak, prominence in zip(*_peaks(outline), strict=True):
-            r, middle = int(outline[peak, 1]), (int(outline[first, 0]) + int(outline[peak, 0])) // 2
-            if not upright[min(r + 2, deepest), middle]:
-                continue  # the top of a hole, not of a thing
-            is_rooted = bool(bottom == deepest and prominence > 0.5 * (bottom - r))
-            found.append(Top(outline, int(peak), float(prominence), is_rooted))
-    return sorted(found, key=lambda top: -top.prominence_px)
-
-
-@compiled
-def _peaks(outline: Outline) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
-    """First and last places of the tops of an outline that starts, and so ends, at its lowest point; prominences.
-
-    A top counts once the outline has gone down from it by `SMALLEST_PROMINENCE_PX`, a valley once it has come up by as
-    much.
-    """
-    n = outline.shape[0]
-    start, top, valley = np.empty(n, dtype=np.int64), np.empty(n, dtype=np.int64), np.empty(n, dtype=np.int64)
-    tops, first = 0, 0
-    # The outermost place since the last valley, or the lowest since the last top.
-    extreme, lowest, is_rising = 0, outline[0, 1], True
-    for place in range(1, n + 1):
-        i = place % n
-        down = outline[i, 1] - outline[extreme, 1]
-        if is_rising:
-            if down <= 0:
-                first, extreme = first if down == 0 else i, i
-            elif down >= SMALLEST_PROMINENCE_PX:
-                start[tops], top[tops], valley[tops] = first, extreme, lowest
-                tops, extreme, is_rising = tops + 1, i, False
-        elif down > 0:
-            extreme = i
-        elif -down >= SMALLEST_PROMINENCE_PX:
-            lowest, first, extreme, is_rising = outline[extreme, 1], i, i, True
-    prominence = np.empty(tops, dtype=np.int64)
-    for k in range(tops):
-        height = outline[top[k], 1]
-        before, after = height, height
-        for j in range(k, -1, -1):
-            before = max(before, valley[j])
-            if j > 0 and outline[top[j - 1], 1] < height:
-                break
-        for j in range(k + 1, tops + 1):
-            after = max(after, valley[j] if j < tops else outline[0, 1])
-            if j < tops and outline[top[j], 1] <= height:
-                break
-        prominence[k] = min(before, after) - height
-    return start[:tops], top[:tops], prominence
+    for k in range(count):
+        number = int(outline[k])
+        if number not in seen:
+            seen[number] = in_axes(outlines[number], orientation)
+        found.append(Top(seen[number], int(index[k]), float(prominence[k]), bool(is_rooted[k])))
+    return found

@@ -5,50 +5,25 @@ from dataclasses import dataclass
 import numpy as np
 
 from fingervision.diagnosis.noise.noise_model import Noise
-from fingervision.domain.compiled import compiled_as_written
 from fingervision.domain.effect import Array, Flags, History
+from fingervision.domain.loops import loop
 
 SPREADS = np.concatenate([[0.0], np.geomspace(0.01, 1e4, 121)])
 """Spreads of the runs that are tried, over the noise."""
 MIDLINE_FREE_MM = 1e3
 """Prior spread of the midline's constant: large enough to be free."""
 
+_filter = loop("whitening_innovations")
 
-@compiled_as_written
+
 def _innovations(
     columns: Array, time: Array, white: Array, p1: float, lag1: float, h: Array, p2: float, lag2: float
 ) -> tuple[Array, float]:
-    # States: the edge's correlated noise and the smoothed input's error, both Ornstein-Uhlenbeck.
-    n, k = columns.shape
-    out = np.zeros((n, k))
-    a = np.zeros((2, k))
-    c11, c12, c22 = p1, 0.0, p2
-    logdet = 0.0
-    for i in range(n):
-        if i > 0:
-            f1 = np.exp(-(time[i] - time[i - 1]) * lag1)
-            f2 = np.exp(-(time[i] - time[i - 1]) * lag2)
-            c11 = f1 * f1 * c11 + p1 * (1.0 - f1 * f1)
-            c12 = f1 * f2 * c12
-            c22 = f2 * f2 * c22 + p2 * (1.0 - f2 * f2)
-            for j in range(k):
-                a[0, j] *= f1
-                a[1, j] *= f2
-        if white[i] < 0.0:
-            continue
-        g1, g2 = c11 + c12 * h[i], c12 + c22 * h[i]
-        s = g1 + h[i] * g2 + white[i]
-        root = np.sqrt(s)
-        logdet += np.log(s)
-        for j in range(k):
-            e = columns[i, j] - a[0, j] - h[i] * a[1, j]
-            out[i, j] = e / root
-            a[0, j] += g1 / s * e
-            a[1, j] += g2 / s * e
-        c11 -= g1 * g1 / s
-        c12 -= g1 * g2 / s
-        c22 -= g2 * g2 / s
-    return out, logdet
+    """Innovations of columns, shape (n, k), and the logarithm of their covariance's determinant."""
+    whole = np.ascontiguousarray(columns, dtype=np.float64)
+    time, white, h = (np.ascontiguousarray(a, dtype=np.float64) for a in (time, white, h))
+    out = np.empty_like(whole)
+    return out, _filter(whole, time, white, p1, lag1, h, p2, lag2, out)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

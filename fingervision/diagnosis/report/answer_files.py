@@ -1,5 +1,7 @@
 """The files of an answer: the page, the report, its figures, the corrected model, the next run."""
 
+from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 
 from fingervision.diagnosis.diagnose import Diagnosis, by_channel
@@ -36,11 +38,7 @@ def write_answer(out: Path, done: Diagnosis, model: CorrectedModel, made: Proven
         The measured table, beside which its recording is looked for.
     """
     report = done.report
-    effects: dict[str, dict[str, Estimate]] = {name: dict(values) for name, values in model.effects.items()}
-    for effect in report.effects:
-        curve = curve_values([at for at, _ in effect.points], [error for _, error in effect.points])
-        effects[effect.name] = {**effect.parameters, **{name: Estimate(value, None) for name, value in curve.items()}}
-    write_model(out / MODEL, Path(model.base_path), effects, model.kind)
+    write_model(out / MODEL, Path(model.base_path), corrected(done, model).effects, model.kind)
     if report.next_run is None:
         (out / NEXT_RUN).unlink(missing_ok=True)
     else:
@@ -54,3 +52,12 @@ def write_answer(out: Path, done: Diagnosis, model: CorrectedModel, made: Proven
     write_figures(out, curves_of(done), residuals, f"{Path(model.base_path).name}: {report.verdict}")
     (out / PAGE).write_text(report_page(done, made, strip_html(table)), encoding="utf-8")
     return document
+
+
+def corrected(done: Diagnosis, model: CorrectedModel) -> CorrectedModel:
+    """Add the effects of an answer to the model that was diagnosed."""
+    effects: dict[str, Mapping[str, Estimate]] = dict(model.effects)
+    for effect in done.report.effects:
+        curve = curve_values([at for at, _ in effect.points], [error for _, error in effect.points])
+        effects[effect.name] = {**effect.parameters, **{name: Estimate(value, None) for name, value in curve.items()}}
+    return replace(model, effects=effects)

@@ -42,7 +42,7 @@ def write_comparison(out: Path, found: Mapping[str, Comparison], made: Provenanc
     """
     document = comparison_document(found, made)
     (out / COMPARISON).write_text(json.dumps(document, indent=2, allow_nan=False) + "\n", encoding="utf-8")
-    curves, residuals = _curves(found), _residuals(found)
+    curves, residuals = _curves(found), residuals_of(found)
     (out / PICTURE).write_bytes(png_bytes(residuals))
     write_figures(out, curves, residuals, " and ".join(found))
     (out / PAGE).write_text(_page(found, curves, made, strip_html(measured)), encoding="utf-8")
@@ -55,7 +55,7 @@ def _curves(found: Mapping[str, Comparison]) -> GapCurves:
     return gap_curves(first.data, first.noise_mm, predictions)
 
 
-def _residuals(found: Mapping[str, Comparison]) -> Figure:
+def residuals_of(found: Mapping[str, Comparison]) -> Figure:
     """Residuals of one model by channel; of several, the gap of each."""
     first = next(iter(found.values()))
     if len(found) == 1:

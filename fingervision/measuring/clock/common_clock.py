@@ -76,9 +76,9 @@ def sentence(clock: ClockOffset) -> str:
     )
 
 
-def refusal(found: NoClockOffset, table: Path) -> FingervisionError:
-    """Why the table has no input."""
+def refusal(found: NoClockOffset, where: str) -> FingervisionError:
+    """Say why the rows have no input; `where` says where the gaps are (`in measured/run/gaps.csv`)."""
     return FingervisionError(
-        f"The offset between the recording's clock and the drive's was not found: {found.words} The gaps are in "
-        f"{table}, without an input; --drive-offset-s S states the offset (0 where both share a clock)."
+        f"The offset between the recording's clock and the drive's was not found: {found.words} The gaps are "
+        f"{where}, without an input; --drive-offset-s S states the offset (0 where both share a clock)."
     )

@@ -76,8 +76,8 @@ def run_recipe(
         In a sentence; the motor stands, and the folder is valid.
     """
     if not bed.replays:
-        # Compiling holds all threads up for longer than a board lets its motor go on without a word.
-        rehearse(lambda _, words: say(words))
+        # The first frame may hold all threads up for longer than a board lets its motor go on without a word.
+        rehearse()
     sight = Sight(bed)
     sight.position.read()
     # A real stage is sent to its reference before the first leg.

@@ -90,3 +90,6 @@ def _light(response: "CameraResponse", grey: "GreyImage") -> "GreyImage":
     if response.name == "linear":
         return grey
     return response.linearised(grey, response.top_level or top_level(grey))
+
+
+__all__ = ["PictureResponse"]

@@ -6,9 +6,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 if TYPE_CHECKING:
+    from calib.line_scale import ScaleLines
     from calib.measured_scale import Calibration
     from calib.parallel_edges import ParallelEdges
     from calib.scale_from_board import BoardFit
+    from calib.scale_from_lines import LineScaleFit
     from calib.scale_from_sizes import ScaleFit
 
 # The budget is printed for a gap of this size in the middle of the picture, found as surely as 20 rows allow.
@@ -105,3 +107,50 @@ def as_json(calibration: "Calibration", more: dict[str, Any]) -> dict[str, Any]:
         "edge_bias_px": calibration.edge_bias_px,
         "u_edge_bias_px": calibration.u_edge_bias_px,
     } | more
+
+
+def line_details(fit: "LineScaleFit", lines: "ScaleLines") -> dict[str, object]:
+    """Figures of a line scale, for programs."""
+    return {
+        "bias_known": False,
+        "lines": len(lines.at_px),
+        "lines_used": int(fit.used.sum()),
+        "dark": lines.is_dark,
+        "line_width_mm": fit.width_mm,
+        "u_line_width_mm": fit.u_width_mm,
+        "px_per_mm_by_rising_edges": fit.by_edge[0],
+        "px_per_mm_by_falling_edges": fit.by_edge[1],
+        "largest_residual_um": float(abs(fit.residual_um[fit.used]).max()),
+        "chi_square": fit.chi_square,
+        "freedom": fit.freedom,
+    }
+
+
+def line_lines(fit: "LineScaleFit", lines: "ScaleLines") -> list[str]:
+    """Lines, edges and residuals of a line scale."""
+    rising, falling = fit.by_edge
+    scale = fit.calibration.px_per_mm
+    tone = "dark" if lines.is_dark else "light"
+    text = [
+        "",
+        f"lines      {int(fit.used.sum())} of {len(lines.at_px)} {tone} lines used, over "
+        f"{fit.calibration.references[0].size_mm:g} mm; edges spread over {lines.blur_px:.2f} px (sigma)",
+        f"edges      by rising edges alone {100 * (rising / scale - 1):+.4f} %, by falling ones "
+        f"{100 * (falling / scale - 1):+.4f} % against the lines' middles",
+        f"residuals  {float(abs(fit.residual_um[fit.used]).max()):.3f} um at most; chi square {fit.chi_square:.1f} "
+        f"with {fit.freedom} degrees of freedom (chance {100 * fit.probability:.1f} %)",
+    ]
+    if fit.width_mm is not None:
+        text.insert(3, f"width      {1e3 * fit.width_mm:.2f} um as the lines look (edge bias not taken off)")
+    else:
+        text.insert(3, "width      not told: the lines are narrower than twice their blur")
+    if fit.probability < 0.01:
+        text.append(
+            "The lines do not stand at equal distances within their uncertainties, which were enlarged to match."
+        )
+    if lines.is_clipped:
+        text.append("Part of the picture stands at an end of the grey scale: the lines' widths may be off by that.")
+    return text
+
+
+__all__ = ["as_json", "board_lines", "budget_lines", "line_details", "line_lines", "scale_lines", "sizes_lines"]

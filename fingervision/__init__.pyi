@@ -1,0 +1,25 @@
+"""Types of the public names, which `__init__.py` imports when they are first asked for."""
+
+from fingervision.domain.errors import ArgumentError as ArgumentError
+from fingervision.domain.errors import DataError as DataError
+from fingervision.domain.errors import FingervisionError as FingervisionError
+from fingervision.domain.errors import OutputError as OutputError
+from fingervision.domain.errors import UsageError as UsageError
+from fingervision.domain.parameter import Parameter as Parameter
+from fingervision.effects.effect_list import EffectList
+from fingervision.interface.calibrate import calibrate as calibrate
+from fingervision.interface.calibration import Calibration as Calibration
+from fingervision.interface.comparison import Comparison as Comparison
+from fingervision.interface.comparison import compare as compare
+from fingervision.interface.diagnosis import Diagnosis as Diagnosis
+from fingervision.interface.diagnosis import diagnose as diagnose
+from fingervision.interface.measure import measure as measure
+from fingervision.interface.measurement import Measurement as Measurement
+from fingervision.interface.own_effect import effect as effect
+from fingervision.interface.simulation import Simulation as Simulation
+from fingervision.interface.simulation import simulate as simulate
+from fingervision.interface.tables import read_model as read_model
+from fingervision.interface.tables import read_table as read_table
+
+__version__: str
+effects: EffectList

@@ -1,0 +1,35 @@
+"""`fingervision example`: a runnable case, copied into a folder of one's own."""
+
+from pathlib import Path
+
+import click
+
+EXAMPLES = """
+\b
+Examples:
+  fingervision example
+  fingervision example measure
+  fingervision example diagnose --out trial
+
+\b
+The examples in the --help of a command work in the folder of its name.
+"""
+
+
+@click.command(epilog=EXAMPLES)
+@click.argument("name", required=False)
+@click.option("--out", type=click.Path(path_type=Path), help="The new folder; example-NAME if not given.")
+def command(name: str | None, out: Path | None) -> None:
+    """Copy a runnable case, or list what there is."""
+    from fingervision.domain.errors import UsageError
+    from fingervision.interface.examples import CASES, copy_example
+
+    if name is None:
+        if out is not None:
+            raise UsageError("--out must come with the name of an example, but none is given: add one.")
+        for each, case in CASES.items():
+            click.echo(f"{each:10} {case.words}")
+        return
+    folder = out or Path(f"example-{name}")
+    case = copy_example(name, folder)
+    click.echo(f"{len(list(folder.rglob('*.*')))} files copied to {folder}. Next:\n  cd {folder}\n  {case.run}")

@@ -1,0 +1,104 @@
+"""Loops in C, called like functions of Python: found where they were built, or built once where they were not."""
+
+import os
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import suppress
+from functools import cache
+from importlib.machinery import ExtensionFileLoader
+from importlib.util import module_from_spec, spec_from_file_location
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fingervision.domain import loops_build
+from fingervision.domain.errors import FingervisionError
+
+NAME = "_loops"
+
+
+def loop(name: str) -> Callable[..., Any]:
+    """One of the loops of the package's .c files.
+
+    Other threads run meanwhile. The same numbers give the same digits on every machine but for the C library's own exp,
+    log and erf: no sum is taken in another order for speed.
+
+    Parameters
+    ----------
+    name : str
+        Its name: that of the file, and what it does.
+
+    Returns
+    -------
+    callable
+        Takes contiguous arrays of the very type that the loop asks for (`domain/loops.h`), and writes into those that
+        are its results.
+
+    Raises
+    ------
+    FingervisionError
+        If the loops are not built and cannot be built here.
+    """
+    found: Callable[..., Any] = getattr(_library(), name)
+    return found
+
+
+def filled(run: Callable[..., Any], signal: NDArray[np.float64], *values: object) -> NDArray[np.float64]:
+    """What a loop that goes through one signal, sample by sample, makes of it; shape (n,)."""
+    out = np.empty(signal.shape)
+    run(np.ascontiguousarray(signal, dtype=np.float64), *values, out)
+    return out
+
+
+@cache
+def _library() -> ModuleType:
+    name = loops_build.library_name()
+    places = list(_places())
+    for place in places:
+        if (place / name).exists():
+            return _loaded(place / name)
+    for place in places[1:]:
+        try:
+            place.mkdir(parents=True, exist_ok=True)
+            loops_build.build(place / name)
+        except loops_build.CannotBuildError as error:
+            raise FingervisionError(str(error)) from error
+        except OSError:
+            continue  # cannot be written to
+        _forget_others(place, name)
+        return _loaded(place / name)
+    msg = (
+        f"The loops in C must be built once, and kept in one of {', '.join(map(str, places[1:]))}, but none of these "
+        "can be written to: set XDG_CACHE_HOME to a folder that can."
+    )
+    raise FingervisionError(msg)
+
+
+def _places() -> Iterator[Path]:
+    """Where the library may lie: where an installation puts it, beside the sources, in the user's own cache."""
+    yield loops_build.PACKAGE / "domain"
+    yield loops_build.PACKAGE / "domain" / "__pycache__"
+    own = os.environ.get("LOCALAPPDATA") if sys.platform == "win32" else os.environ.get("XDG_CACHE_HOME")
+    with suppress(RuntimeError):  # no home
+        yield Path(own or Path.home() / ".cache") / "fingervision"
+
+
+def _forget_others(place: Path, name: str) -> None:
+    """Throw away what was built from older sources."""
+    for path in place.glob(f"{NAME}-*"):
+        if path.name != name:
+            with suppress(OSError):  # another process uses it, or has thrown it away
+                path.unlink()
+
+
+def _loaded(path: Path) -> ModuleType:
+    spec = spec_from_file_location(NAME, path, loader=ExtensionFileLoader(NAME, str(path)))
+    if spec is None or spec.loader is None:
+        msg = f"{path} must be a library of this Python, but is not: delete it, and it is built anew."
+        raise FingervisionError(msg)
+    module = module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module

@@ -1,0 +1,187 @@
+"""How the loops in C are built: one source from all .c files of the package, one library from that.
+
+A .c file takes the constants of the .py file beside it, so that each stands in one place, with its reason; and those of
+the files that it names in a line `/* after NAME */`, whose functions it uses. Nothing but the standard library is used
+here: an installation builds before anything else is there.
+"""
+
+import ast
+import hashlib
+import os
+import re
+import shlex
+import shutil
+import subprocess
+import sys
+import sysconfig
+import tempfile
+from importlib.util import find_spec
+from pathlib import Path
+from typing import TypeGuard
+
+PACKAGE = Path(__file__).resolve().parents[1]
+HEADER, DOOR = "domain/loops.h", "domain/loops.c"
+PREPARE = re.compile(r"^PREPARE\((\w+)\)", re.MULTILINE)
+LOOP = re.compile(r'^LOOP\((\w+), "(\w*)", "(\w*)"\)', re.MULTILINE)
+# Sums stay in the order in which they stand, on every processor; only what no digit shows is left to the compiler.
+FLAGS = ("-O3", "-std=c11", "-shared", "-fPIC", "-fvisibility=hidden", "-fno-math-errno", "-ffp-contract=off", "-w")
+Number = int | float
+Constant = Number | tuple["Constant", ...]
+
+
+class CannotBuildError(RuntimeError):
+    """There is no C compiler, or it failed."""
+
+
+def loop_files() -> list[Path]:
+    """The .c files that hold loops, each beside the .py file that calls them."""
+    return [path for path in sorted(PACKAGE.rglob("*.c")) if path != PACKAGE / DOOR]
+
+
+def library_name() -> str:
+    """File name of the library that belongs to the sources as they are, on this kind of machine."""
+    digest = hashlib.sha256(" ".join(FLAGS).encode())
+    files = [PACKAGE / HEADER, PACKAGE / DOOR, Path(__file__)]
+    for path in loop_files():
+        files += [path, path.with_suffix(".py")] if path.with_suffix(".py").exists() else [path]
+    for path in files:
+        digest.update(path.read_bytes().replace(b"\r\n", b"\n"))
+    kind = re.sub(r"\W", "_", sysconfig.get_platform())
+    return f"_loops-{digest.hexdigest()[:16]}-{kind}{'.pyd' if os.name == 'nt' else '.so'}"
+
+
+def build(target: Path) -> None:
+    """Compile all loops into one library.
+
+    Parameters
+    ----------
+    target : Path
+        The library; its folder must exist.
+
+    Raises
+    ------
+    CannotBuildError
+        If there is no C compiler, or it failed.
+    """
+    command = compiler()
+    if command is None:
+        msg = (
+            "The loops in C are not built yet, and no C compiler is there (cc, gcc, clang, or the one of CC): install "
+            "one, or `pip install ziglang`, which brings one, or install fingervision with pip, which builds them."
+        )
+        raise CannotBuildError(msg)
+    with tempfile.TemporaryDirectory() as name:
+        source = Path(name) / "loops.c"
+        source.write_text(one_source(), encoding="utf-8")
+        # Beside the target, so that it appears there at once and whole: another process may build it as well.
+        made = Path(tempfile.mkdtemp(dir=target.parent)) / "made"
+        try:
+            done = subprocess.run(
+                [*command, *FLAGS, str(source), "-o", str(made), *_links()], capture_output=True, text=True, check=False
+            )
+            if done.returncode != 0:
+                msg = f"The C compiler ({shlex.join(command)}) failed on the loops in C:\n{done.stderr[-2000:]}"
+                raise CannotBuildError(msg)
+            made.replace(target)
+        finally:
+            shutil.rmtree(made.parent, ignore_errors=True)
+
+
+def compiler() -> list[str] | None:
+    """Command of a C compiler; None where there is none."""
+    chosen = os.environ.get("CC")
+    if chosen:
+        return shlex.split(chosen)
+    for name in ("cc", "gcc", "clang"):
+        if found := shutil.which(name):
+            return [found]
+    return [sys.executable, "-m", "ziglang", "cc"] if find_spec("ziglang") else None
+
+
+def _links() -> list[str]:
+    """What Python's functions are found in: the running program, but for Windows."""
+    if sys.platform == "win32":
+        return [f"-L{Path(sys.base_prefix) / 'libs'}", "-lpython3"]
+    return ["-undefined", "dynamic_lookup"] if sys.platform == "darwin" else ["-lm"]
+
+
+def one_source() -> str:
+    """All loops as one C file, each with the constants of its own .py file."""
+    pieces, loops, done = [(PACKAGE / HEADER).read_text(encoding="utf-8")], [], set[Path]()
+    prepared: list[str] = []
+    waiting = loop_files()
+
+    def add(path: Path) -> None:
+        if path in done:
+            return
+        done.add(path)
+        text = path.read_text(encoding="utf-8")
+        values: dict[str, Constant] = {}
+        for needed in re.findall(r"^/\* after (\w+) \*/", text, re.MULTILINE):
+            add(path.with_name(f"{needed}.c"))
+            values.update(_constants_beside(path.with_name(f"{needed}.c")))
+        values.update(_constants_beside(path))
+        used = {name: value for name, value in values.items() if re.search(rf"\b{name}(_COUNT)?\b", text)}
+        pieces.append(f'#line 1 "{path.relative_to(PACKAGE).as_posix()}"\n{_defined(used)}{text}{_undefined(used)}')
+        loops.extend(LOOP.findall(text))
+        prepared.extend(PREPARE.findall(text))
+
+    for path in waiting:
+        add(path)
+    table = " ".join(f'ENTRY({name}, "{takes}", "{gives}")' for name, takes, gives in loops)
+    calls = "".join(f"{name}(); " for name in prepared)
+    pieces.append(
+        f"#define ALL_LOOPS {table}\n#define PREPARE_ALL {calls}\n{(PACKAGE / DOOR).read_text(encoding='utf-8')}"
+    )
+    return "\n".join(pieces)
+
+
+def _constants_beside(path: Path) -> dict[str, Constant]:
+    beside = path.with_suffix(".py")
+    return constants(beside) if beside.exists() else {}
+
+
+def constants(path: Path) -> dict[str, Constant]:
+    """The numbers, and tuples of numbers, that a .py file gives NAMES IN CAPITALS, and those that it imports."""
+    found: dict[str, object] = {"range": range, "len": len}
+    for node in ast.parse(path.read_text(encoding="utf-8")).body:
+        if isinstance(node, ast.ImportFrom) and node.module and node.module.startswith("fingervision."):
+            names = [alias.name for alias in node.names if alias.name.isupper()]
+            other = PACKAGE.parent.joinpath(*node.module.split(".")).with_suffix(".py")
+            if names and other.exists():
+                theirs = constants(other)
+                found.update({name: theirs[name] for name in names if name in theirs})
+        elif isinstance(node, ast.Assign):
+            try:
+                value = eval(compile(ast.Expression(node.value), str(path), "eval"), {"__builtins__": {}}, found)
+            except (NameError, TypeError, AttributeError):
+                continue  # no plain number
+            for target in node.targets:
+                names = [t.id for t in ast.walk(target) if isinstance(t, ast.Name)]
+                found.update(zip(names, value, strict=True) if isinstance(target, ast.Tuple) else {names[0]: value})
+    return {name: value for name, value in found.items() if name.isupper() and _is_constant(value)}
+
+
+def _is_constant(value: object) -> TypeGuard[Constant]:
+    if isinstance(value, tuple):
+        return bool(value) and all(_is_constant(one) for one in value)
+    return isinstance(value, int | float) and not isinstance(value, bool)
+
+
+def _in_c(value: Constant) -> str:
+    if isinstance(value, tuple):
+        return f"{{{', '.join(_in_c(one) for one in value)}}}"
+    return f"({value!r})" if value < 0 else repr(value)
+
+
+def _defined(values: dict[str, Constant]) -> str:
+    lines = []
+    for name, value in values.items():
+        if isinstance(value, tuple):
+            lines.append(f"#define {name}_COUNT {len(value)}")
+        lines.append(f"#define {name} {_in_c(value)}")
+    return "".join(f"{line}\n" for line in lines) + "#line 1\n"
+
+
+def _undefined(values: dict[str, Constant]) -> str:
+    return "".join(f"#undef {name}\n#undef {name}_COUNT\n" for name in values)

@@ -1,0 +1,75 @@
+"""The catalogue as `fingervision.effects` shows it: iterated, counted, and asked for an effect by its name."""
+
+from collections.abc import Iterator
+from html import escape
+from types import ModuleType
+
+from fingervision.domain.effect import Effect
+from fingervision.domain.errors import UnknownNameError
+
+
+class EffectList(ModuleType):
+    """The package of the effects, which is a list of them as well, in the order in which they act.
+
+    Examples
+    --------
+    >>> import fingervision as fv
+    >>> fv.effects["backlash"].words
+    'motion reverses only after the play is taken up'
+    >>> [effect.name for effect in fv.effects if effect.stage == "drive"][:2]
+    ['drive_lag', 'input_offset']
+    >>> "backlash" in fv.effects
+    True
+    """
+
+    def _known(self) -> dict[str, Effect]:
+        known: dict[str, Effect] = self.catalogue()
+        return known
+
+    def __iter__(self) -> Iterator[Effect]:
+        return iter(self._known().values())
+
+    def __len__(self) -> int:
+        return len(self._known())
+
+    def __bool__(self) -> bool:
+        return True
+
+    def __contains__(self, name: object) -> bool:
+        return name in self._known()
+
+    def __getitem__(self, name: str) -> Effect:
+        """Look up an effect by its name.
+
+        Raises
+        ------
+        UnknownNameError
+            There is none; with the nearest. It is a KeyError too.
+        """
+        known = self._known()
+        if name not in known:
+            raise NoSuchEffectError(
+                "name", str(name), known, "an effect of the catalogue", "fingervision.effects lists them"
+            )
+        return known[name]
+
+    def __repr__(self) -> str:
+        width = max(len(name) for name in self._known())
+        return "\n".join(f"{name:{width}} {effect.stage!s:10} {effect.words}" for name, effect in self._known().items())
+
+    def _repr_html_(self) -> str:
+        rows = "".join(
+            f"<tr><td>{escape(name)}</td><td>{effect.stage!s}</td><td>{escape(effect.words)}</td></tr>"
+            for name, effect in self._known().items()
+        )
+        return f"<table><tr><th>effect</th><th>stage</th><th>what happens</th></tr>{rows}</table>"
+
+
+class NoSuchEffectError(UnknownNameError, KeyError):
+    """The catalogue has no effect of that name."""
+
+    def __str__(self) -> str:
+        return str(self.args[0])
+
+
+__all__ = ["EffectList", "NoSuchEffectError"]

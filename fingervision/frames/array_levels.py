@@ -1,0 +1,164 @@
+"""Grey levels or colours of a numpy array as a camera would have stored them; what cannot be a picture is refused."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fingervision.domain.errors import ArgumentError, ArgumentTypeError
+from fingervision.domain.frame import Pixels
+
+FULL_SCALE = 65535
+"""Levels from 0 to 1 become 16 bits: rounding then adds 4e-6 of the full scale (1 / (65535 sqrt 12)), a hundredth of
+the noise of the best cameras."""
+OF_EIGHT_BITS = 1e-3
+"""Levels of 8 bits: closer than that to whole ones in every pixel is no chance, and single precision rounds by 2e-5.
+Their rounding, of 1/sqrt(12) levels of 8 bits, then stays in the uncertainty."""
+COLOURS = (3, 4)
+MUST = (
+    "be a numpy array of shape (height, width), (height, width, 3), (frames, height, width) or "
+    "(frames, height, width, 3), in uint8, uint16, or float from 0 to 1"
+)
+
+
+def stated_shape(pictures: object, argument: str = "source") -> NDArray[np.generic]:
+    """Give an array as a stack of pictures, whose levels are not looked at yet.
+
+    Parameters
+    ----------
+    pictures : ndarray
+        As `fingervision.frames.arrays.ArrayFrames` takes it.
+    argument : str
+        Name of the argument, for sentences.
+
+    Returns
+    -------
+    ndarray, shape (frames, height, width) or (frames, height, width, colours)
+        A view.
+
+    Raises
+    ------
+    ArgumentTypeError
+        It is no array, or one of numbers that are no levels.
+    ArgumentError
+        Its shape is that of no picture.
+    """
+    if not isinstance(pictures, np.ndarray):
+        advice = "numpy.asarray(...) makes an array of it" if hasattr(pictures, "__array__") else ""
+        raise ArgumentTypeError(argument, MUST, f"is {what_it_is(pictures)}", advice)
+    if np.ma.isMaskedArray(pictures):
+        raise ArgumentTypeError(
+            argument, MUST, "is a masked array, and a pixel that is masked has no level", "use roi, or .filled(...)"
+        )
+    if pictures.dtype.kind == "c":
+        raise ArgumentTypeError(
+            argument, MUST, f"holds complex numbers ({pictures.dtype})", "numpy.abs(...) gives levels"
+        )
+    if pictures.dtype.kind == "b":
+        raise ArgumentTypeError(
+            argument, MUST, "holds true and false", "a binary picture has lost where its edges are; give the grey one"
+        )
+    if not (pictures.dtype.kind == "f" or (pictures.dtype.kind == "u" and pictures.dtype.itemsize <= 2)):
+        advice = (
+            "where the levels end at 255, .astype(numpy.uint8) makes them so" if pictures.dtype.kind in "iu" else ""
+        )
+        raise ArgumentTypeError(argument, MUST, f"is of type {pictures.dtype}", advice)
+    if pictures.size == 0:
+        raise ArgumentError(argument, MUST, f"is empty (shape {pictures.shape})")
+    shape = pictures.shape
+    if pictures.ndim == 2:
+        return pictures[None]
+    if pictures.ndim == 3:
+        return pictures[None] if shape[2] in COLOURS or shape[2] == 1 else pictures
+    if pictures.ndim == 4 and shape[3] in (1, *COLOURS):
+        return pictures
+    raise ArgumentError(argument, MUST, f"has shape {shape}")
+
+
+def levels_of(picture: NDArray[np.generic], words: str = "", argument: str = "source") -> Pixels:
+    """Levels of one picture of 8 or 16 bits.
+
+    An alpha channel that is opaque is left out. Floats are taken as 0 for black and 1 for the end of the scale;
+    they become levels of 16 bits, or of 8 where they were made from these.
+
+    Parameters
+    ----------
+    picture : ndarray, shape (height, width) or (height, width, colours)
+        One picture of a stack that `stated_shape` has let pass.
+    words : str
+        Which picture it is, for sentences; with a leading blank.
+    argument : str
+        Name of the argument, for sentences.
+
+    Returns
+    -------
+    ndarray of uint8 or uint16, shape (height, width) or (height, width, 3)
+        Contiguous.
+
+    Raises
+    ------
+    ArgumentError
+        A level is no number, lies outside 0 to 1, or is seen through an alpha that is not opaque.
+    """
+    subject = f"{argument}{words and ' '}{words.strip()}" if words else argument
+    if picture.dtype.kind == "f":
+        bad = int(np.count_nonzero(~np.isfinite(picture)))
+        if bad:
+            row, column = (int(at[0]) for at in np.nonzero(~np.isfinite(picture))[:2])
+            raise ArgumentError(
+                subject,
+                "hold a finite level in every pixel",
+                f"{bad} of {picture.size} are NaN or infinite, the first in row {row}, column {column}",
+                "fill them from their neighbours",
+            )
+        least, largest = float(picture.min()), float(picture.max())
+        if least < 0.0 or largest > 1.0:
+            raise ArgumentError(
+                subject,
+                "be from 0 to 1 where its levels are floats (0 black, 1 the end of the scale)",
+                f"runs from {least:.6g} to {largest:.6g}",
+                "divide by the level at which the camera's scale ends",
+            )
+        picture = _stored(picture)
+    native = picture.astype(picture.dtype.newbyteorder("="), copy=False)
+    if native.ndim == 2:
+        return np.ascontiguousarray(native)
+    if native.shape[2] == 1:
+        return np.ascontiguousarray(native[:, :, 0])
+    if native.shape[2] == 4:
+        opaque = FULL_SCALE if native.dtype == np.uint16 else 255
+        see_through = int(np.count_nonzero(native[:, :, 3] != opaque))
+        if see_through:
+            raise ArgumentError(
+                subject,
+                "be opaque where it has an alpha channel",
+                f"{see_through} of {native[:, :, 3].size} pixels are not",
+                "give the colours alone, source[..., :3], where what lies below is what the camera saw",
+            )
+    return np.ascontiguousarray(native[:, :, :3])
+
+
+def _stored(picture: NDArray[np.generic]) -> NDArray[np.generic]:
+    """Levels of floats from 0 to 1: the 8 bits that they were made from, where all are multiples of 1/255, else 16."""
+    light = np.asarray(picture, dtype=np.float64)
+    levels = np.rint(255.0 * light)
+    if np.abs(255.0 * light - levels).max() < OF_EIGHT_BITS:
+        return levels.astype(np.uint8)
+    return np.rint(FULL_SCALE * light).astype(np.uint16)
+
+
+def what_it_is(value: object) -> str:
+    """Say of what kind a value is, with its size where it has one: 'a list of 3'."""
+    kind = type(value)
+    library = kind.__module__.partition(".")[0]
+    name = kind.__name__ if library in ("builtins", "__main__") else f"{library} {kind.__name__}"
+    article = "an" if name[0] in "aeiou" else "a"
+    if value is None:
+        return "None"
+    shape = getattr(value, "shape", None)
+    if isinstance(shape, tuple):
+        return f"{article} {name} of shape {shape}"
+    if isinstance(value, list | tuple | dict | set):
+        return f"{article} {name} of {len(value)}"
+    return f"{article} {name}"
+
+
+__all__ = ["levels_of", "stated_shape", "what_it_is"]

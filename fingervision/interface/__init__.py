@@ -1,0 +1,5 @@
+"""What `import fingervision as fv` offers: each function of the Python interface, and what the commands share with it.
+
+`fingervision.__init__` lists the public names and imports a module of this package when its name is first asked for.
+The commands of `fingervision.cli` call the same functions, so that a number is the same from either side.
+"""

@@ -1,0 +1,80 @@
+"""Checks of single arguments: a number, a whole number, one of several words, a file's name."""
+
+import os
+from collections.abc import Iterable
+from numbers import Integral, Real
+from pathlib import Path
+
+from fingervision.domain.errors import ArgumentError, ArgumentTypeError, UnknownNameError
+
+
+def number(argument: str, value: object) -> float:
+    """Take a number; whether it is one that can be meant is for its user to say.
+
+    Raises
+    ------
+    ArgumentTypeError
+        It is none.
+    """
+    if isinstance(value, bool) or not isinstance(value, Real):
+        raise ArgumentTypeError(argument, "be a number", f"is {value!r}")
+    return float(value)
+
+
+def whole_number(argument: str, value: object, least: int) -> int:
+    """Take a whole number that is not below `least`.
+
+    Raises
+    ------
+    ArgumentTypeError
+        It is none.
+    ArgumentError
+        It is too small.
+    """
+    if isinstance(value, bool) or not isinstance(value, Integral):
+        raise ArgumentTypeError(argument, f"be a whole number from {least}", f"is {value!r}")
+    if value < least:
+        raise ArgumentError(argument, f"be a whole number from {least}", f"is {value}")
+    return int(value)
+
+
+def one_of(argument: str, value: object, words: Iterable[str]) -> str:
+    """Take one of several words.
+
+    Raises
+    ------
+    UnknownNameError
+        It is none of them; with the nearest.
+    """
+    known = tuple(words)
+    if isinstance(value, str) and value in known:
+        return value
+    listed = f"{', '.join(known[:-1])} or {known[-1]}" if len(known) > 1 else known[0]
+    if not isinstance(value, str):
+        raise ArgumentTypeError(argument, f"be {listed}", f"is {value!r}")
+    raise UnknownNameError(argument, value, known, listed)
+
+
+def path_of(argument: str, value: object, what: str) -> Path:
+    """Take the name of a file or folder; `what` says of what kind, with its article.
+
+    Raises
+    ------
+    ArgumentTypeError
+        It is no name.
+    ArgumentError
+        It is empty.
+    """
+    from fingervision.frames.array_levels import what_it_is
+
+    if not isinstance(value, str | os.PathLike):
+        raise ArgumentTypeError(argument, f"be the name of {what}", f"is {what_it_is(value)}")
+    name = os.fspath(value)
+    if isinstance(name, bytes):
+        name = os.fsdecode(name)
+    if not name:
+        raise ArgumentError(argument, f"be the name of {what}", "is empty")
+    return Path(name)
+
+
+__all__ = ["number", "one_of", "path_of", "whole_number"]

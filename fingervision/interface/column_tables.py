@@ -1,0 +1,134 @@
+"""Tables that are in memory: a pandas DataFrame, a mapping of columns, or the rows of a measurement."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fingervision.domain.drive import DriveHistory
+from fingervision.domain.errors import ArgumentError, ArgumentTypeError
+from fingervision.domain.measured_table import MeasuredTable
+from fingervision.frames.array_levels import what_it_is
+from fingervision.models.table import TableModel
+from fingervision.storage import drive_csv, measured_table, simulation_table
+from fingervision.storage.number_columns import Numbers
+
+DRIVE_COLUMNS = ("time_s", "input_mm")
+
+
+def drive_from_columns(table: Any) -> DriveHistory:
+    """Take columns `time_s,input_mm[,run][,force_n]` as a drive.
+
+    Raises
+    ------
+    ArgumentTypeError
+        It holds no columns.
+    ArgumentError
+        A column is missing, or holds what is no number.
+    FingervisionError
+        Times do not increase, or a run comes back after another.
+    """
+    columns = columns_of("drive", table, "a drive table's file name, DriveHistory, DataFrame or mapping of columns")
+    for name in DRIVE_COLUMNS:
+        if name not in columns:
+            raise ArgumentError("drive", f"have a column {name}", f"has {', '.join(columns) or 'none'}")
+    values = {name: _numbers("drive", name, columns[name]) for name in drive_csv.COLUMNS if name in columns}
+    for name, numbers in values.items():
+        if not numbers.present.all():
+            raise ArgumentError("drive", f"have a number in every row of {name}", "has none in some")
+    runs = tuple(str(run) for run in columns["run"]) if "run" in columns else None
+    rows = range(values["time_s"].value.size)
+    return drive_csv.drive_rows(Path("drive"), {name: each.value for name, each in values.items()}, runs, rows)
+
+
+def measured_from_columns(table: Any) -> MeasuredTable:
+    """Take columns `input_mm,gap_mm[,run,time_s,left_mm,right_mm,...]` as a measured table.
+
+    Raises
+    ------
+    ArgumentTypeError
+        It holds no columns.
+    ArgumentError
+        A column is missing, or holds what is no number.
+    FingervisionError
+        As `fingervision.read_table`.
+    """
+    columns = columns_of(
+        "measured", table, "a table's file name, Measurement, MeasuredTable, DataFrame or mapping of columns"
+    )
+    for name in ("input_mm", "gap_mm"):
+        if name not in columns:
+            raise ArgumentError("measured", f"have a column {name}", f"has {', '.join(columns) or 'none'}")
+    values = {name: _numbers("measured", name, columns[name]) for name in measured_table.NUMBERS if name in columns}
+    runs = ["" if _is_missing(run) else str(run) for run in columns["run"]] if "run" in columns else None
+    table_in_memory = measured_table.measured_rows(Path("measured"), values, runs)
+    # What lies in the current folder has nothing to do with these columns.
+    return replace(table_in_memory, slots=(), u_clock_s=0.0)
+
+
+def simulation_from_columns(columns: Mapping[str, list[Any]]) -> TableModel:
+    """Take columns `input_mm,gap_mm[,left_mm,right_mm,force_n]` as a simulation table.
+
+    Raises
+    ------
+    ArgumentError
+        A column is missing, or holds what is no number.
+    FingervisionError
+        Fewer than two rows, an input that stands twice, a gap that does not depend on the input.
+    """
+    for name in ("input_mm", "gap_mm"):
+        if name not in columns:
+            raise ArgumentError("model", f"have a column {name}", f"has {', '.join(columns) or 'none'}")
+    names = ("input_mm", "gap_mm", "left_mm", "right_mm", "force_n")
+    values = {name: _numbers("model", name, columns[name]) for name in names if name in columns}
+    return simulation_table.simulation_rows(Path("simulation"), values)
+
+
+def columns_of(argument: str, table: Any, must: str) -> dict[str, list[Any]]:
+    """Give the columns of a DataFrame or mapping as lists of one length.
+
+    Raises
+    ------
+    ArgumentTypeError
+        It is neither.
+    ArgumentError
+        Columns are of different lengths.
+    """
+    if not isinstance(table, Mapping) and not (hasattr(table, "columns") and hasattr(table, "__getitem__")):
+        raise ArgumentTypeError(argument, f"be {must}", f"is {what_it_is(table)}")
+    names = list(table) if isinstance(table, Mapping) else [str(name) for name in table.columns]
+    columns = {str(name): list(table[name]) for name in names}
+    lengths = {len(column) for column in columns.values()}
+    if len(lengths) > 1:
+        raise ArgumentError(argument, "have columns of one length", f"has lengths {sorted(lengths)}")
+    return columns
+
+
+def _numbers(argument: str, name: str, cells: list[Any]) -> Numbers:
+    present = np.array([not _is_missing(cell) for cell in cells], dtype=bool)
+    value = np.zeros(len(cells))
+    for row in np.flatnonzero(present).tolist():
+        try:
+            value[row] = float(cells[row])
+        except (TypeError, ValueError):
+            raise ArgumentError(
+                argument, f"have numbers in column {name}", f"has {cells[row]!r} in row {row}"
+            ) from None
+    if not np.all(np.isfinite(value)):
+        raise ArgumentError(argument, f"have finite numbers in column {name}", "has an infinite one")
+    return Numbers(_array(value), present)
+
+
+def _array(value: NDArray[np.float64]) -> NDArray[np.float64]:
+    return np.asarray(value, dtype=np.float64)
+
+
+def _is_missing(cell: Any) -> bool:
+    """Whether a cell is empty: None, pandas' NA, or NaN, which is how a DataFrame says so."""
+    return cell is None or type(cell).__name__ in ("NAType", "NaTType") or (isinstance(cell, float) and cell != cell)
+
+
+__all__ = ["columns_of", "drive_from_columns", "measured_from_columns", "simulation_from_columns"]

@@ -1,0 +1,211 @@
+"""`fingervision.compare`: where a measured table and one or more models disagree beyond the noise."""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from html import escape
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fingervision.diagnosis.compare import Comparison as OneComparison
+from fingervision.diagnosis.compare import compare as compare_one
+from fingervision.diagnosis.report.comparison_files import comparison_document, residuals_of, write_comparison
+from fingervision.domain.report import Place
+from fingervision.interface.argument_checks import path_of, whole_number
+from fingervision.interface.argument_names import speaks_python
+from fingervision.interface.notebook import image_html, png_of_figure
+from fingervision.interface.tables import measured_given, models_given
+from fingervision.storage.out_folder import out_folder
+from fingervision.storage.provenance import Provenance, provenance
+from fingervision.storage.result_owner import mark_owner, own_folder
+
+if TYPE_CHECKING:
+    import os
+
+    from matplotlib.figure import Figure
+
+CALL = "fingervision.compare(...) in Python"
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Comparison:
+    """Where a measurement and models disagree; made by `fingervision.compare`.
+
+    Iterating gives the models' names; indexing by one gives what was found for it. The plain properties are those of
+    the first model.
+
+    Parameters
+    ----------
+    models : mapping of str to fingervision.diagnosis.compare.Comparison
+        What was found, by the model's name.
+    measured : Path
+        The table's file, or a name for what was in memory.
+    made : Provenance
+        Files with their hashes, versions and time.
+    """
+
+    models: Mapping[str, OneComparison]
+    measured: Path
+    made: Provenance = field(repr=False)
+
+    def __len__(self) -> int:
+        return len(self.models)
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.models)
+
+    def __getitem__(self, model: str) -> OneComparison:
+        return self.models[model]
+
+    @property
+    def first(self) -> OneComparison:
+        """What was found for the first model."""
+        return next(iter(self.models.values()))
+
+    @property
+    def rms_mm(self) -> float:
+        """Disagreement, RMS."""
+        return self.first.rms_mm
+
+    @property
+    def noise_mm(self) -> float:
+        """Random noise of one gap reading, standard deviation."""
+        return self.first.noise_mm
+
+    @property
+    def places(self) -> tuple[Place, ...]:
+        """Regions that cannot be noise, largest first."""
+        return self.first.places
+
+    @property
+    def residual_mm(self) -> Mapping[str, NDArray[np.float64]]:
+        """Measured minus predicted, by channel (gap, left, right, midline), each of shape (n,)."""
+        return self.first.residual_mm
+
+    @property
+    def input_mm(self) -> NDArray[np.float64]:
+        """Recorded input of each residual, shape (n,)."""
+        return self.first.data.chain.history.input_mm
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What to know of table and model, in sentences."""
+        return (*self.first.data.notes, *self.first.data.refitted())
+
+    def document(self) -> dict[str, object]:
+        """Give what compare.json holds."""
+        return comparison_document(self.models, self.made)
+
+    def report(self) -> str:
+        """Say what was found as the command prints it."""
+        lines = []
+        for name, found in self.models.items():
+            which = "" if len(self.models) == 1 else f"{name}: "
+            lines.append(f"{which}RMS disagreement {found.rms_mm:.3g} mm, noise {found.noise_mm:.2g} mm")
+            lines += [f"  {place.words}" for place in found.places] or ["  nowhere beyond the noise"]
+            lines += [f"  note: {words}" for words in (*found.data.notes, *found.data.refitted())]
+        return "\n".join(lines)
+
+    def figure(self) -> "Figure":
+        """Draw the residuals, as compare.png has them."""
+        return residuals_of(self.models)
+
+    @speaks_python
+    def save(self, folder: "str | os.PathLike[str]") -> Path:
+        """Write what `fingervision compare --out FOLDER` writes: compare.html, compare.json and the figures.
+
+        Returns
+        -------
+        Path
+            The folder.
+
+        Raises
+        ------
+        UsageError
+            The folder holds the results of another table.
+        FingervisionError
+            It cannot be written.
+        """
+        out = own_folder(path_of("folder", folder, "a folder"), self.measured, named=True)
+        self.write(out)
+        return out
+
+    def write(self, out: Path) -> None:
+        """Write the files into a folder that may be used."""
+        with out_folder(out):
+            write_comparison(out, self.models, self.made, self.measured)
+        mark_owner(out, self.measured)
+
+    def __repr__(self) -> str:
+        words = (
+            f"{name}: {found.rms_mm:.3g} mm RMS, noise {found.noise_mm:.2g} mm, {len(found.places)} places beyond it"
+            for name, found in self.models.items()
+        )
+        return f"Comparison({'; '.join(words)})"
+
+    def _repr_html_(self) -> str:
+        return f"<pre>{escape(self.report())}</pre>{image_html(png_of_figure(self.figure()))}"
+
+
+@speaks_python
+def compare(
+    measured: Any,
+    model: Any,
+    *,
+    seed: int = 1,
+    kind: str = "lumped",
+    columns: "str | os.PathLike[str] | None" = None,
+    call: str = CALL,
+) -> Comparison:
+    """Say where a measured table and one or more models disagree beyond the noise; write nothing.
+
+    Parameters
+    ----------
+    measured : path, Measurement, MeasuredTable, DataFrame or mapping of columns
+        `input_mm,gap_mm[,run,time_s,left_mm,right_mm,u_random_mm,force_n]`; a measurement needs a drive.
+    model : path, CorrectedModel, Diagnosis, or a simulation as DataFrame or mapping of columns
+        Also a list of these, or a mapping of them by name.
+    seed : int
+        Of the bootstrapped threshold.
+    kind : str
+        Kind of model that a gripper.toml becomes: stiffness_matrix, lumped or finite_element.
+    columns : path or None
+        A columns.toml for foreign tables.
+    call : str
+        How the call is named among what the results come from.
+
+    Returns
+    -------
+    Comparison
+        Places, residuals and figures.
+
+    Raises
+    ------
+    ArgumentError
+        An argument that cannot be meant.
+    FingervisionError
+        Table or model cannot be read, or do not fit together.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import fingervision as fv
+    >>> inputs = np.linspace(0.0, 1.0, 60)
+    >>> gaps = 1.0 + 2.0 * inputs + np.random.default_rng(1).normal(0.0, 0.001, 60)
+    >>> simulation = {"input_mm": [0.0, 1.0], "gap_mm": [1.0, 3.0]}
+    >>> found = fv.compare({"input_mm": inputs, "gap_mm": gaps}, simulation)
+    >>> found.places
+    ()
+    """
+    seed = whole_number("seed", seed, 0)
+    table = measured_given(measured, columns)
+    models = models_given(model, kind, columns)
+    files = {"measured table": table.path, **{f"model {name}": given.path for name, given in models.items()}}
+    made = provenance(files, call)
+    found = {name: compare_one(table.value, given.value, seed=seed) for name, given in models.items()}
+    return Comparison(found, table.path, made)
+
+
+__all__ = ["Comparison", "compare"]

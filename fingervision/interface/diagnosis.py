@@ -1,0 +1,225 @@
+"""`fingervision.diagnose`: which effect a model lacks beside a measured table."""
+
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field
+from html import escape
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fingervision.diagnosis.diagnose import Diagnosis as Found
+from fingervision.diagnosis.diagnose import by_channel
+from fingervision.diagnosis.diagnose import diagnose as diagnose_table
+from fingervision.diagnosis.report.answer_files import corrected, write_answer
+from fingervision.diagnosis.report.residual_figure import residual_figure
+from fingervision.domain.effect import Effect
+from fingervision.domain.errors import ArgumentError
+from fingervision.domain.report import DiagnosisReport, NamedEffect, Verdict
+from fingervision.interface.argument_checks import path_of, whole_number
+from fingervision.interface.argument_names import speaks_python
+from fingervision.interface.notebook import image_html, png_of_figure
+from fingervision.interface.own_effect import added
+from fingervision.interface.tables import effect_names, measured_given, model_given, own_base
+from fingervision.models.corrected import CorrectedModel
+from fingervision.storage.out_folder import out_folder
+from fingervision.storage.provenance import Provenance, provenance
+from fingervision.storage.result_owner import mark_owner, own_folder
+
+if TYPE_CHECKING:
+    import os
+
+    from matplotlib.figure import Figure
+
+CALL = "fingervision.diagnose(...) in Python"
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Diagnosis:
+    """The answer of a diagnosis with its residuals and the corrected model; made by `fingervision.diagnose`.
+
+    Parameters
+    ----------
+    found : fingervision.diagnosis.diagnose.Diagnosis
+        The report with the arrays behind it.
+    model : CorrectedModel
+        What was diagnosed.
+    measured : Path
+        The table's file, or a name for what was in memory.
+    made : Provenance
+        Files with their hashes, versions and time.
+    own_effects : tuple of Effect
+        Effects that were tried beside the catalogue for this call.
+    """
+
+    found: Found = field(repr=False)
+    model: CorrectedModel
+    measured: Path
+    made: Provenance = field(repr=False)
+    own_effects: tuple[Effect, ...] = ()
+
+    @property
+    def report(self) -> DiagnosisReport:
+        """The whole answer; fields as in report.json."""
+        return self.found.report
+
+    @property
+    def verdict(self) -> Verdict:
+        """One of agrees, named, ambiguous, unknown."""
+        return self.report.verdict
+
+    @property
+    def effects(self) -> tuple[NamedEffect, ...]:
+        """The effects of the answer with their parameters; of the best explanation where it is ambiguous."""
+        return self.report.effects
+
+    @property
+    def residual_before_mm(self) -> Mapping[str, NDArray[np.float64]]:
+        """Measured minus predicted without the answer, by channel (gap, left, right, midline), each of shape (n,)."""
+        return by_channel(self.found.data, self.found.before_mm)
+
+    @property
+    def residual_after_mm(self) -> Mapping[str, NDArray[np.float64]]:
+        """Measured minus predicted with the answer, by channel, each of shape (n,)."""
+        return by_channel(self.found.data, self.found.after_mm)
+
+    @property
+    def input_mm(self) -> NDArray[np.float64]:
+        """Recorded input of each residual, shape (n,)."""
+        return self.found.data.chain.history.input_mm
+
+    @property
+    def corrected_model(self) -> CorrectedModel:
+        """The model with the effects of the answer; every function that takes a model takes it."""
+        return corrected(self.found, self.model)
+
+    def figure(self) -> "Figure":
+        """Draw the residuals before and after, as residuals.svg has them."""
+        after = self.residual_after_mm if self.effects else None
+        return residual_figure(
+            dict(self.residual_before_mm), None if after is None else dict(after), self.found.data.chain.history
+        )
+
+    def sentences(self) -> str:
+        """Say the answer as the command prints it."""
+        report = self.report
+        lines = [f"{report.verdict}: {report.sentence}"]
+        lines += [f"  note: {words}" for words in (*report.outliers, *report.notes)]
+        if report.next_run is not None:
+            lines.append(f"  next: {report.next_run.words}")
+        return "\n".join(lines)
+
+    @speaks_python
+    def save(self, folder: "str | os.PathLike[str]") -> Path:
+        """Write what `fingervision diagnose --out FOLDER` writes: report.html, report.json, model.toml, figures.
+
+        Returns
+        -------
+        Path
+            The folder.
+
+        Raises
+        ------
+        UsageError
+            The folder holds the results of another table.
+        FingervisionError
+            It cannot be written.
+        """
+        out = own_folder(path_of("folder", folder, "a folder"), self.measured, named=True)
+        self.write(out)
+        return out
+
+    def write(self, out: Path) -> dict[str, object]:
+        """Write the files into a folder that may be used, and give what report.json holds."""
+        with out_folder(out), added(self.own_effects):
+            document = write_answer(out, self.found, own_base(self.model, out), self.made, self.measured)
+        mark_owner(out, self.measured)
+        return document
+
+    def __repr__(self) -> str:
+        return f"Diagnosis({self.verdict}: {self.report.sentence})"
+
+    def _repr_html_(self) -> str:
+        return f"<pre>{escape(self.sentences())}</pre>{image_html(png_of_figure(self.figure()))}"
+
+
+@speaks_python
+def diagnose(
+    measured: Any,
+    model: Any,
+    *,
+    with_effects: Iterable[str] = (),
+    without_effects: Iterable[str] = (),
+    effects: Iterable[Effect] = (),
+    seed: int = 1,
+    kind: str = "lumped",
+    columns: "str | os.PathLike[str] | None" = None,
+    progress: Callable[[float], None] | None = None,
+    call: str = CALL,
+) -> Diagnosis:
+    """Name the effect that a model lacks beside a measured table; write nothing.
+
+    Parameters
+    ----------
+    measured : path, Measurement, MeasuredTable, DataFrame or mapping of columns
+        `input_mm,gap_mm[,run,time_s,left_mm,right_mm,u_random_mm,force_n]`; a measurement needs a drive.
+    model : path, CorrectedModel, Diagnosis, or a simulation as DataFrame or mapping of columns
+        What is held against it.
+    with_effects, without_effects : iterable of str
+        Effects that are insisted on, or ruled out.
+    effects : iterable of Effect
+        Effects of one's own that are tried beside the catalogue in this call; see `fingervision.effect`.
+    seed : int
+        Of the bootstrap; the same seed gives the same report.
+    kind : str
+        Kind of model that a gripper.toml becomes: stiffness_matrix, lumped or finite_element.
+    columns : path or None
+        A columns.toml for foreign tables.
+    progress : callable or None
+        Told the share that is done, from 0 to 1.
+    call : str
+        How the call is named among what the results come from.
+
+    Returns
+    -------
+    Diagnosis
+        Report, residuals, corrected model, figures.
+
+    Raises
+    ------
+    ArgumentError
+        An argument that cannot be meant; an effect that there is not comes with the nearest one.
+    FingervisionError
+        Table or model cannot be read, or do not fit together.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import fingervision as fv
+    >>> inputs = np.linspace(0.0, 1.0, 60)
+    >>> gaps = 1.02 + 2.0 * inputs + np.random.default_rng(1).normal(0.0, 0.001, 60)
+    >>> simulation = {"input_mm": [0.0, 1.0], "gap_mm": [1.0, 3.0]}
+    >>> found = fv.diagnose({"input_mm": inputs, "gap_mm": gaps}, simulation)
+    >>> print(found.verdict, found.effects[0].name in found.report.alternatives[0])
+    ambiguous True
+    """
+    own = tuple(effects)
+    for each in own:
+        if not isinstance(each, Effect):
+            raise ArgumentError("effects", "be effects, as fingervision.effect makes them", f"holds {each!r}")
+    seed = whole_number("seed", seed, 0)
+    with added(own):
+        forced, without = effect_names("with_effects", with_effects), effect_names("without_effects", without_effects)
+        if forced & without:
+            both = ", ".join(sorted(forced & without))
+            raise ArgumentError("with_effects", "not hold what without_effects rules out", f"{both} is in both")
+        table = measured_given(measured, columns)
+        given = model_given(model, kind, columns)
+        made = provenance({"measured table": table.path, "model": given.path}, call)
+        told: dict[str, Any] = {} if progress is None else {"progress": progress}
+        found = diagnose_table(table.value, given.value, seed=seed, forced=forced, without=without, **told)
+    return Diagnosis(found, given.value, table.path, made, own)
+
+
+__all__ = ["Diagnosis", "diagnose"]

@@ -1,0 +1,98 @@
+"""Whatever holds pictures as a recording: a name, a camera's number, an array, or a frame source."""
+
+import os
+from collections.abc import Callable, Sequence
+from itertools import islice
+from typing import Any
+
+import numpy as np
+
+from fingervision.domain.errors import ArgumentError, ArgumentTypeError, UsageError
+from fingervision.domain.frame import Coding
+from fingervision.frames.array_levels import what_it_is
+from fingervision.frames.arrays import ArrayFrames, KeptFrames
+from fingervision.frames.source import FrameSource, Wish, open_source
+from fingervision.interface.argument_checks import number, one_of, whole_number
+
+MUST = (
+    "be a picture or a stack of pictures (numpy array), the name of a video, folder, image or glob, or a camera's "
+    "number"
+)
+
+Opener = Callable[[], FrameSource]
+
+
+def recording_of(
+    source: Any,
+    *,
+    rate_hz: float | None = None,
+    times_s: Sequence[float] | None = None,
+    frames: int | None = None,
+    coding: str = "lossless",
+) -> Opener:
+    """Give what opens a recording, as often as it is asked; a camera is read now, and its frames are kept.
+
+    Parameters
+    ----------
+    source, rate_hz, times_s, frames, coding
+        As of `fingervision.measure`.
+
+    Raises
+    ------
+    ArgumentTypeError
+        It holds no pictures.
+    UsageError
+        An argument that this source has no use for.
+    FingervisionError
+        It cannot be read.
+    """
+    if rate_hz is not None:
+        rate_hz = number("rate_hz", rate_hz)
+    stored = Coding(one_of("coding", coding, tuple(Coding)))
+    if isinstance(source, np.ndarray) or hasattr(source, "__array__"):
+        _refuse_frames(frames)
+        pictures = ArrayFrames(source, rate_hz, times_s, stored)
+        return lambda: pictures
+    if times_s is not None:
+        raise UsageError("times_s is for arrays alone; a folder of images takes a times.csv: leave it out.")
+    if stored is not Coding.LOSSLESS:
+        raise UsageError("coding is for arrays alone, and a file says it of itself: leave it out.")
+    if isinstance(source, bool) or not isinstance(source, str | os.PathLike | int | np.integer):
+        if hasattr(source, "description") and hasattr(source, "__iter__"):
+            given: FrameSource = source
+            return _camera(given, frames) if hasattr(given, "received") else _recording(lambda: given, frames)
+        advice = "numpy.stack(...) makes one array of equal pictures" if isinstance(source, list | tuple) else ""
+        raise ArgumentTypeError("source", MUST, f"is {what_it_is(source)}", advice)
+    name = str(int(source)) if isinstance(source, int | np.integer) else os.fspath(source)
+    wish = Wish(rate_hz=rate_hz)
+    opened = open_source(str(name), wish)
+    if hasattr(opened, "received"):
+        return _camera(opened, frames)
+    return _recording(lambda: open_source(str(name), wish), frames)
+
+
+def _recording(opener: Opener, frames: int | None) -> Opener:
+    _refuse_frames(frames)
+    return opener
+
+
+def _refuse_frames(frames: int | None) -> None:
+    if frames is not None:
+        raise ArgumentError("frames", "be left out where the source ends by itself", f"is {frames!r}")
+
+
+def _camera(source: Any, frames: int | None) -> Opener:
+    """Read so many frames of a camera and let go of it."""
+    try:
+        if frames is None:
+            raise ArgumentError(
+                "frames", "be given for a camera, which goes on for ever", "is not", "say how many frames to measure"
+            )
+        count = whole_number("frames", frames, 1)
+        kept = KeptFrames(source.description, tuple(islice(iter(source), count)))
+    finally:
+        source.close()
+    return lambda: kept
+
+
+__all__ = ["Opener", "recording_of"]

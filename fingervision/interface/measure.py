@@ -1,0 +1,192 @@
+"""`fingervision.measure`: the finger gap in a picture, a recording or a camera's next frames."""
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from calib.calibration import BareScale
+from fingervision.domain.errors import ArgumentError
+from fingervision.frames.source import FrameSource, Wish, open_source
+from fingervision.interface.argument_names import speaks_python
+from fingervision.interface.frame_sources import recording_of
+from fingervision.interface.measurement import Measurement
+from fingervision.interface.measuring_task import measuring_task, region_of, scale_of
+from fingervision.measuring.frame_loop import Progress
+from fingervision.measuring.in_memory import measure_in_memory
+from fingervision.measuring.measure import Measured
+from fingervision.measuring.measure import measure as measure_to_files
+from fingervision.measuring.output_folder import usual_folder
+from fingervision.measuring.task import Task
+from fingervision.storage.summary_json import refuse_other_recording
+
+if TYPE_CHECKING:
+    import os
+
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from calib.camera_response import CameraResponse
+    from fingervision.domain.drive import DriveHistory
+    from fingervision.interface.calibration import Calibration
+
+FLOAT_BITS = 16
+"""Levels that are given as floats become levels of 16 bits."""
+
+
+@speaks_python
+def measure(
+    source: "NDArray[np.generic] | str | os.PathLike[str] | int | FrameSource",
+    *,
+    calibration: "str | os.PathLike[str] | Calibration | None" = None,
+    px_per_mm: float | None = None,
+    below_tip_mm: float = 0.3,
+    tips: str = "auto",
+    roi: Sequence[int] | None = None,
+    rate_hz: float | None = None,
+    times_s: Sequence[float] | None = None,
+    drive: "str | os.PathLike[str] | DriveHistory | Any" = None,
+    drive_offset_s: float | None = None,
+    columns: "str | os.PathLike[str] | None" = None,
+    response: "str | os.PathLike[str] | CameraResponse" = "auto",
+    bits: int | None = None,
+    fingers: str = "auto",
+    face: str = "front",
+    coding: str = "lossless",
+    frames: int | None = None,
+    progress: Callable[[int, int | None], None] | None = None,
+) -> Measurement:
+    """Measure the gap between two fingers in a picture, a recording or a camera's next frames; write nothing.
+
+    The gap is the distance between the fingers' inner edges at `below_tip_mm` below their tips, with its standard
+    uncertainty. A frame that gives no number says why in its status; it raises nothing.
+
+    Parameters
+    ----------
+    source : ndarray, path, int or FrameSource
+        One picture of shape (height, width) or (height, width, 3), a stack of them with the frames first, in uint8,
+        uint16, or float from 0 (black) to 1 (end of the scale); colours are red, green, blue, with an opaque alpha or
+        without. Or the name of a video file, an image, a folder of images, a glob, a camera or a stream; or a camera's
+        number. A three-dimensional array is one picture in colour where its last dimension is 3 or 4.
+    calibration : path, Calibration or None
+        The scale with its uncertainty; one of `calibration` and `px_per_mm` is required.
+    px_per_mm : float or None
+        The scale alone; the uncertainty then holds the random part alone.
+    below_tip_mm : float
+        How far below each finger's tip the gap is measured.
+    tips : str
+        Where the fingers point in the picture: auto, up, down, left or right.
+    roi : (int, int, int, int) or None
+        Region of interest: first column, first row, width, height in pixels.
+    rate_hz : float or None
+        Pictures in a second, where they have no times of their own.
+    times_s : sequence of float or None
+        Time of every picture of an array.
+    drive : path, DriveHistory, DataFrame or mapping of columns, or None
+        The recorded input, `time_s,input_mm[,run][,force_n]`.
+    drive_offset_s : float or None
+        Added to the drive's times to get the recording's; None finds it from the motion.
+    columns : path or None
+        A columns.toml that says how a foreign drive table is read.
+    response : str, path or CameraResponse
+        Which light a grey level stands for: auto, linear, srgb, bt709 or a file.
+    bits : int or None
+        Depth of levels stored in 16 bits, where it is not 16.
+    fingers : str
+        Whether the fingers are darker or lighter than their ground: auto, dark or light.
+    face : str
+        Edge of a thick part: front, of the face towards the camera, or outline.
+    coding : str
+        What an array's pictures went through before: lossless, intraframe (JPEG) or interframe (H.264); the errors of
+        neighbouring pixels are then correlated, and the uncertainty is larger.
+    frames : int or None
+        How many frames of a camera are measured.
+    progress : callable or None
+        Called now and then with the frames done and the frames that the source announces.
+
+    Returns
+    -------
+    Measurement
+        One row a frame.
+
+    Raises
+    ------
+    UsageError
+        An argument that cannot be meant; as `ArgumentError` it names the argument and says what it must be.
+    FingervisionError
+        The recording, the calibration or the drive cannot be read.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import fingervision as fv
+    >>> from fingervision.rendering import two_fingers, Camera, render
+    >>> picture = render(two_fingers(68.0, below_tip_px=10.2), Camera(), np.random.default_rng(1))
+    >>> measured = fv.measure(picture, px_per_mm=34.0)
+    >>> print(f"{measured[0].gap_mm:.2f} mm, {measured[0].status}")
+    2.00 mm, ok
+    """
+    own = source == "simulated" if isinstance(source, str) else hasattr(source, "px_per_mm")
+    if own and calibration is None and px_per_mm is None:
+        scale: Any = (BareScale(_own_scale(source)), None)
+    else:
+        scale = scale_of(calibration, px_per_mm)
+    again = recording_of(source, rate_hz=rate_hz, times_s=times_s, frames=frames, coding=coding)
+    recording = again()
+    task = measuring_task(
+        scale=scale,
+        below_tip_mm=below_tip_mm,
+        tips=tips,
+        roi=region_of(roi),
+        drive=drive,
+        drive_offset_s=drive_offset_s,
+        columns=None if columns is None else Path(columns),
+        response=response,
+        bits=FLOAT_BITS if bits is None and getattr(recording, "has_float_levels", False) else bits,
+        fingers=fingers,
+        face=face,
+    )
+    if progress is not None and not callable(progress):
+        raise ArgumentError("progress", "be a function of two numbers", f"is {progress!r}")
+    found = measure_in_memory(recording, task, progress)
+    if found.stopped:
+        raise KeyboardInterrupt
+    return Measurement(found, again)
+
+
+def measure_into(
+    folder: Path | None, recording: str, task: Task, rate_hz: float | None, on_progress: Progress | None
+) -> Measured:
+    """Measure a recording and write its rows as they come, so that any length fits into memory.
+
+    Parameters
+    ----------
+    folder : Path or None
+        Where to; None takes measured/<name of the recording>.
+    recording : str
+        A video file, a folder of images, or a glob.
+    task : Task
+        What is measured.
+    rate_hz : float or None
+        Images in a second, where they have no times of their own.
+    on_progress : callable or None
+        As of `measure`.
+
+    Raises
+    ------
+    UsageError, FingervisionError
+        As of `measure`; or the folder is another recording's, or cannot be written.
+    """
+    source = open_source(recording, Wish(rate_hz=rate_hz))
+    out = folder or usual_folder(recording)
+    refuse_other_recording(out, recording)
+    return measure_to_files(source, task, out, on_progress)
+
+
+def _own_scale(source: Any) -> float:
+    """Scale of what is drawn, which nobody needs to state."""
+    from fingervision.frames.simulated import PX_PER_MM
+
+    return PX_PER_MM if isinstance(source, str) else float(source.px_per_mm)
+
+
+__all__ = ["measure", "measure_into"]

@@ -1,0 +1,146 @@
+"""What shall be measured, from the options of the command or the arguments of the function."""
+
+import os
+from pathlib import Path
+from typing import Any
+
+from calib.calibration import BareScale
+from calib.measured_scale import Calibration as MeasuredScale
+from fingervision.domain.direction import Direction
+from fingervision.domain.drive import DriveHistory
+from fingervision.domain.errors import ArgumentTypeError, UsageError
+from fingervision.domain.region import Region
+from fingervision.frames.array_levels import what_it_is
+from fingervision.interface.argument_checks import number, one_of, whole_number
+from fingervision.measuring.scale import Scale, check_px_per_mm
+from fingervision.measuring.task import Task
+from fingervision.storage.calibration_json import read_calibration
+from fingervision.storage.response_csv import response_named
+from fingervision.tables.read import read_drive
+
+TIPS = ("auto", *(direction.value for direction in Direction))
+FINGERS = {"auto": None, "dark": True, "light": False}
+FACES = ("front", "outline")
+BITS = (8, 16)
+
+
+def scale_of(calibration: Any, px_per_mm: Any) -> tuple[Scale, Path | None]:
+    """Give the scale, and the file that it was read from.
+
+    Parameters
+    ----------
+    calibration : path, Calibration or None
+        A calibration.json, or what one holds.
+    px_per_mm : float or None
+        The scale alone.
+
+    Raises
+    ------
+    UsageError
+        Both are given, or neither, or no camera has such a scale.
+    FingervisionError
+        The calibration cannot be read.
+    """
+    if calibration is not None and px_per_mm is not None:
+        raise UsageError("Either --calibration or --px-per-mm gives the scale, but both are there: leave one out.")
+    if calibration is not None:
+        if isinstance(calibration, str | os.PathLike):
+            return read_calibration(Path(calibration)), Path(calibration)
+        scale = getattr(calibration, "scale", calibration)
+        if not isinstance(scale, MeasuredScale):
+            raise ArgumentTypeError(
+                "calibration", "be a fingervision.Calibration or the name of its file", f"is {what_it_is(calibration)}"
+            )
+        return scale, getattr(calibration, "path", None)
+    if px_per_mm is None:
+        raise UsageError(
+            "The scale must be given, but is not: add --calibration FILE (made by `fingervision calibrate`) "
+            "or --px-per-mm S."
+        )
+    stated = number("px_per_mm", px_per_mm)
+    try:
+        bare = BareScale(stated)
+    except ValueError as error:
+        raise UsageError(f"--px-per-mm must be positive, but is {stated:g}.") from error
+    check_px_per_mm(stated)
+    return bare, None
+
+
+def region_of(roi: Any) -> Region | None:
+    """Take a region of interest: first column, first row, width, height in pixels.
+
+    Raises
+    ------
+    UsageError
+        It is not four whole numbers.
+    """
+    if roi is None:
+        return None
+    if isinstance(roi, str) or not hasattr(roi, "__len__") or len(roi) != 4:
+        raise UsageError(f"--roi must be four whole numbers X,Y,W,H in pixels, but is {roi!r}.")
+    return Region(*(whole_number("roi", value, 0) for value in roi))
+
+
+def measuring_task(
+    *,
+    scale: tuple[Scale, Path | None],
+    below_tip_mm: float = 0.3,
+    tips: str = "auto",
+    roi: Region | None = None,
+    drive: Any = None,
+    drive_offset_s: float | None = None,
+    columns: Path | None = None,
+    response: Any = "auto",
+    bits: int | None = None,
+    fingers: str = "auto",
+    face: str = "front",
+    overlay: bool = False,
+    steps_frame: int | None = None,
+) -> Task:
+    """Put options or arguments together; see `fingervision.measure`.
+
+    Raises
+    ------
+    UsageError
+        An argument that cannot be meant.
+    FingervisionError
+        A file cannot be read.
+    """
+    from calib.camera_response import CameraResponse
+
+    tips = one_of("tips", tips, TIPS)
+    depth = None
+    if bits is not None:
+        depth = whole_number("bits", bits, BITS[0])
+        if depth > BITS[1]:
+            raise UsageError(f"--bits must be {BITS[0]} to {BITS[1]}, but is {depth}.")
+    if not isinstance(response, str | os.PathLike | CameraResponse):
+        raise ArgumentTypeError("response", "be a word or the name of a file", f"is {what_it_is(response)}")
+    return Task(
+        scale=scale[0],
+        scale_file=scale[1],
+        below_tip_mm=number("below_tip_mm", below_tip_mm),
+        direction=None if tips == "auto" else Direction(tips),
+        region=roi,
+        drive=None if drive is None else _drive(drive, columns),
+        drive_offset_s=None if drive_offset_s is None else number("drive_offset_s", drive_offset_s),
+        overlay=overlay,
+        steps_frame=steps_frame,
+        response=response if isinstance(response, CameraResponse) else response_named(os.fspath(response)),
+        bits=depth,
+        fingers_are_dark=FINGERS[one_of("fingers", fingers, FINGERS)],
+        is_outline=one_of("face", face, FACES) == "outline",
+    )
+
+
+def _drive(drive: Any, columns: Path | None) -> DriveHistory:
+    if isinstance(drive, DriveHistory):
+        return drive
+    if isinstance(drive, str | os.PathLike):
+        return read_drive(Path(drive), columns)
+    from fingervision.interface.column_tables import drive_from_columns
+
+    return drive_from_columns(drive)
+
+
+__all__ = ["measuring_task", "region_of", "scale_of"]

@@ -1,0 +1,156 @@
+"""`@fingervision.effect`: a function that becomes an effect of the catalogue."""
+
+import inspect
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import contextmanager
+from typing import Any
+
+from fingervision.domain.effect import DriveEffect, Effect, PointEffect, Stage
+from fingervision.domain.errors import ArgumentError, ArgumentTypeError
+from fingervision.domain.parameter import Parameter
+from fingervision.effects import catalogue, register, withdraw
+from fingervision.interface.argument_checks import one_of
+from fingervision.interface.argument_names import speaks_python
+
+ARGUMENTS = 3
+"""Of an effect's function: the signal, the history, the values of its parameters."""
+
+
+@speaks_python
+def effect(
+    stage: str,
+    parameters: Parameter | Iterable[Parameter],
+    *,
+    name: str | None = None,
+    source: str = "this session",
+    residual: str = "not described",
+    after: str | None = None,
+    **needs: Any,
+) -> Callable[[Callable[..., Any]], Effect]:
+    """Make an effect of one's own of a function, and add it to the catalogue of this process.
+
+    The first sentence of the function's docstring says what happens; the rest, where there is one, is its formula.
+
+    Parameters
+    ----------
+    stage : str
+        Where it acts: drive (the function gets and gives the input in mm, shape (n,)), mechanism or camera (it gets and
+        gives a `Response`, the two measuring points).
+    parameters : Parameter or iterable of Parameter
+        With bounds; one of them, the size, has a neutral value at which nothing happens.
+    name : str or None
+        None takes the function's name.
+    source : str
+        Where the law is from.
+    residual : str
+        How it looks in measured minus simulated.
+    after : str or None
+        The effect that it acts after, of the same stage; None puts it behind all of its stage.
+    **needs
+        Further fields of an effect: needs_times, needs_shared_clock, needs_edges, needs_force, memory, start, narrow.
+
+    Returns
+    -------
+    callable
+        A decorator that gives the effect.
+
+    Raises
+    ------
+    ArgumentError
+        An argument that cannot be meant; a name that a built-in effect has.
+
+    Examples
+    --------
+    The picture is stretched on the right of its middle:
+
+    >>> from dataclasses import replace
+    >>> import fingervision as fv
+    >>> @fv.effect("camera", fv.Parameter("stretch", "", -0.05, 0.05, "how much longer the right half looks"))
+    ... def half_stretch(points, history, values):
+    ...     '''The right half of the picture is stretched.'''
+    ...     longer = 1.0 + values["stretch"]
+    ...     return replace(points, right_mm=points.right_mm * longer)
+    >>> fv.effects["half_stretch"].words
+    'the right half of the picture is stretched'
+    >>> from fingervision.effects import withdraw
+    >>> withdraw("half_stretch")
+    """
+    where = Stage(one_of("stage", stage, tuple(Stage)))
+    listed = (parameters,) if isinstance(parameters, Parameter) else tuple(parameters)
+    given: tuple[Any, ...] = listed
+    if not given or not all(isinstance(each, Parameter) for each in given):
+        raise ArgumentTypeError("parameters", "be one fingervision.Parameter or several", f"is {parameters!r}")
+    for each in listed:
+        if not each.lower < each.upper:
+            raise ArgumentError(
+                "parameters", "have lower below upper", f"{each.name} has {each.lower:g} and {each.upper:g}"
+            )
+    allowed = {
+        "needs_times", "needs_shared_clock", "needs_edges", "needs_force", "memory", "start", "narrow", "act_curved",
+    }  # fmt: skip
+    for key in needs:
+        one_of("effect", key, sorted(allowed))
+    order = _order(where, after)
+
+    def made(function: Callable[..., Any]) -> Effect:
+        if len(inspect.signature(function).parameters) != ARGUMENTS:
+            raise ArgumentTypeError("effect", "decorate a function of (signal, history, values)", f"is {function!r}")
+        words, formula = _sentences(function)
+        kind: Any = DriveEffect if where == Stage.DRIVE else PointEffect
+        return register(
+            kind(
+                name=name or function.__name__,
+                stage=where,
+                order=order,
+                words=words,
+                formula=formula,
+                source=source,
+                residual=residual,
+                parameters=listed,
+                act=function,
+                **needs,
+            )
+        )
+
+    return made
+
+
+@contextmanager
+def added(effects: Iterable[Effect]) -> Iterator[None]:
+    """Add effects to the catalogue for as long as a block lasts; those that stand in it stay as they are."""
+    known = catalogue()
+    new = [each for each in effects if known.get(each.name) is not each]
+    try:
+        for each in new:
+            register(each)
+        yield
+    finally:
+        for each in new:
+            withdraw(each.name)
+            if each.name in known:
+                register(known[each.name])
+
+
+def _order(stage: Stage, after: str | None) -> float:
+    known = catalogue()
+    if after is None:
+        # The last of its stage; what has the same place goes by name.
+        return max((each.order for each in known.values() if each.stage == stage), default=0.0) + 1.0
+    own_stage: Mapping[str, Effect] = {key: each for key, each in known.items() if each.stage == stage}
+    return own_stage[one_of("after", after, own_stage)].order
+
+
+def _sentences(function: Callable[..., Any]) -> tuple[str, str]:
+    """Words and formula from a docstring."""
+    text = inspect.getdoc(function) or ""
+    first, _, rest = text.partition("\n\n")
+    words = " ".join(first.split()).rstrip(".")
+    if not words:
+        raise ArgumentError(
+            "effect", "decorate a function with a docstring that says what happens", f"{function.__name__} has none"
+        )
+    formula = " ".join(rest.split()) or f"{function.__name__}(signal, history, values)"
+    return words[0].lower() + words[1:], formula
+
+
+__all__ = ["added", "effect"]

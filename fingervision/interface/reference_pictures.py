@@ -1,0 +1,164 @@
+"""Pictures of references with what is known of them: files or arrays, with a size each."""
+
+import os
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from calib.known_widths import KnownSize
+from fingervision.domain.errors import ArgumentError, ArgumentTypeError, FingervisionError, UsageError
+from fingervision.frames.array_levels import levels_of, stated_shape, what_it_is
+from fingervision.frames.image_file import UnreadableImageError, read_image
+from fingervision.interface.argument_checks import number, one_of, whole_number
+from fingervision.vision.grey import GreyImage, to_grey
+
+KINDS = ("bar", "slot")
+ARGUMENT = "pictures"
+MUST = "be a mapping of pictures to sizes in mm, or a sequence of (picture, size) or (picture, size, 'bar' or 'slot')"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Reference:
+    """A picture with the size of what it shows.
+
+    Parameters
+    ----------
+    kind : str
+        bar or slot.
+    source : Path or ndarray
+        The picture.
+    value : float
+        The size in mm, or what else is known of the picture.
+    """
+
+    kind: str
+    source: Any
+    value: float
+
+
+def references_of(pictures: Any, kind: str) -> list[Reference]:
+    """Take pictures with their sizes.
+
+    Parameters
+    ----------
+    pictures : mapping of path to float, or sequence of (path or ndarray, float[, str])
+        A path may begin with `slot:` or `bar:`, where that is not what `kind` says.
+    kind : str
+        What is shown where nothing else is said.
+
+    Raises
+    ------
+    ArgumentTypeError, ArgumentError
+        It is something else, or a size is not positive.
+    """
+    if isinstance(pictures, Mapping):
+        items: list[Any] = [(source, value) for source, value in pictures.items()]
+    elif isinstance(pictures, list | tuple):
+        items = list(pictures)
+    else:
+        raise ArgumentTypeError(ARGUMENT, MUST, f"is {what_it_is(pictures)}")
+    if not items:
+        raise ArgumentError(ARGUMENT, MUST, "is empty")
+    found = []
+    for item in items:
+        if not isinstance(item, list | tuple) or len(item) not in (2, 3):
+            raise ArgumentTypeError(ARGUMENT, MUST, f"holds {what_it_is(item)}")
+        which = one_of(ARGUMENT, item[2], KINDS) if len(item) == 3 else kind
+        source = item[0]
+        if isinstance(source, str):
+            prefix, colon, rest = source.partition(":")
+            if colon and prefix in KINDS:
+                which, source = prefix, rest
+        size = number(ARGUMENT, item[1])
+        if not 0.0 < size < float("inf"):
+            raise ArgumentError(ARGUMENT, "have positive sizes", f"has {size:g}")
+        found.append(Reference(which, source, size))
+    return found
+
+
+def known_sizes(references: Sequence[Reference], u_size_mm: float) -> list[KnownSize]:
+    """Read the picture of every reference.
+
+    Raises
+    ------
+    FingervisionError
+        One cannot be read, or is of another size.
+    """
+    u_mm = number("u_size_mm", u_size_mm)
+    named = read_pictures([each.source for each in references])
+    return [
+        KnownSize(name, each.kind, each.value, u_mm, grey) for each, (name, grey) in zip(references, named, strict=True)
+    ]
+
+
+def read_pictures(sources: Sequence[Any]) -> list[tuple[str, GreyImage]]:
+    """Read pictures as grey levels, with a name each; all of one size, no file twice.
+
+    Raises
+    ------
+    UsageError
+        A file is named twice, or what is no picture.
+    FingervisionError
+        One cannot be read, or is of another size.
+    """
+    paths = [Path(each) for each in sources if isinstance(each, str | os.PathLike)]
+    seen: dict[Path, Path] = {}
+    for path in paths:
+        twin = seen.setdefault(path.resolve(), path)
+        if twin is not path:
+            raise UsageError(f"Every picture may be named once, but {path} is named twice: leave one out.")
+    pictures: list[tuple[str, GreyImage]] = []
+    for index, source in enumerate(sources):
+        pictures.append(_read(source, index))
+        (name, grey), (first_name, first) = pictures[-1], pictures[0]
+        if grey.shape != first.shape:
+            (height, width), (first_height, first_width) = grey.shape, first.shape
+            raise FingervisionError(
+                f"All pictures must be of one size, but {name} is {width}x{height} and {first_name} is "
+                f"{first_width}x{first_height}: take all of them with the camera set alike."
+            )
+    return pictures
+
+
+def files_of(sources: Sequence[Any]) -> list[Path]:
+    """Give the files among pictures."""
+    return [Path(each) for each in sources if isinstance(each, str | os.PathLike)]
+
+
+def region_tuple(roi: Any) -> tuple[int, int, int, int] | None:
+    """Take a region of interest: first column, first row, width, height in pixels.
+
+    Raises
+    ------
+    UsageError
+        It is not four whole numbers.
+    """
+    if roi is None:
+        return None
+    if isinstance(roi, str) or not hasattr(roi, "__len__") or len(roi) != 4:
+        raise UsageError(f"--roi must be X,Y,W,H in whole pixels, but is {roi!r}.")
+    x, y, width, height = (whole_number("roi", each, 0) for each in roi)
+    return x, y, width, height
+
+
+def _read(source: Any, index: int) -> tuple[str, GreyImage]:
+    if isinstance(source, np.ndarray) or hasattr(source, "__array__"):
+        stack = stated_shape(source, ARGUMENT)
+        if len(stack) != 1:
+            raise ArgumentError(ARGUMENT, "be single pictures", f"holds a stack of {len(stack)}")
+        return f"picture {index}", to_grey(levels_of(stack[0], f" [{index}]", ARGUMENT))
+    if not isinstance(source, str | os.PathLike):
+        raise ArgumentTypeError(ARGUMENT, "hold names of files or numpy arrays", f"holds {what_it_is(source)}")
+    path = Path(source)
+    if not path.exists():
+        raise FingervisionError(f"There is no picture {path}; check the name.")
+    try:
+        return path.name, to_grey(read_image(path))
+    except UnreadableImageError as error:
+        raise FingervisionError(f"The picture {path} cannot be used: {error}") from error
+
+
+__all__ = ["KINDS", "Reference", "files_of", "known_sizes", "read_pictures", "references_of", "region_tuple"]

@@ -1,0 +1,273 @@
+"""Tables and models from a file or from memory, for every function that takes one."""
+
+import hashlib
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, Literal, overload
+
+import numpy as np
+
+from fingervision.domain.drive import DriveHistory
+from fingervision.domain.errors import ArgumentTypeError, FingervisionError, UnknownNameError
+from fingervision.domain.measured_table import MeasuredTable
+from fingervision.frames.array_levels import what_it_is
+from fingervision.interface.argument_checks import one_of, path_of
+from fingervision.interface.argument_names import speaks_python
+from fingervision.interface.column_tables import columns_of, measured_from_columns, simulation_from_columns
+from fingervision.interface.measurement import Measurement
+from fingervision.models.corrected import CorrectedModel
+from fingervision.models.kinds import kinds
+from fingervision.models.table import TableModel
+from fingervision.tables import read as tables
+
+TABLES = ("measured", "drive", "simulation")
+IN_MEMORY = Path("in memory")
+"""Folder of the names of what has no file."""
+
+
+@overload
+def read_table(
+    path: "str | os.PathLike[str]",
+    kind: Literal["measured"] = "measured",
+    columns: "str | os.PathLike[str] | None" = None,
+) -> MeasuredTable: ...
+
+
+@overload
+def read_table(
+    path: "str | os.PathLike[str]", kind: Literal["drive"], columns: "str | os.PathLike[str] | None" = None
+) -> DriveHistory: ...
+
+
+@overload
+def read_table(
+    path: "str | os.PathLike[str]", kind: Literal["simulation"], columns: "str | os.PathLike[str] | None" = None
+) -> TableModel: ...
+
+
+@speaks_python
+def read_table(
+    path: "str | os.PathLike[str]",
+    kind: str = "measured",
+    columns: "str | os.PathLike[str] | None" = None,
+) -> MeasuredTable | DriveHistory | TableModel:
+    """Read any lab's table: its dialect, columns and units are understood, or asked for.
+
+    Parameters
+    ----------
+    path : path
+        The table.
+    kind : str
+        What it holds: measured, drive or simulation.
+    columns : path or None
+        A columns.toml (`fingervision table FILE` writes one); None: the one beside the table, if any.
+
+    Returns
+    -------
+    MeasuredTable, DriveHistory or TableModel
+        As `kind` says.
+
+    Raises
+    ------
+    OpenQuestionError
+        The table can be read in more than one way; the sentence says how to settle it.
+    FingervisionError
+        It cannot be read, or not be worked with.
+
+    Examples
+    --------
+    >>> import fingervision as fv
+    >>> table = fv.read_table("sample_frames/paper_run/measured.csv")
+    >>> table.gap_mm.shape
+    (17,)
+    """
+    file = path_of("path", path, "a table's file")
+    choice = None if columns is None else path_of("columns", columns, "a columns.toml")
+    kind = one_of("kind", kind, TABLES)
+    if kind == "drive":
+        return tables.read_drive(file, choice)
+    if kind == "simulation":
+        return tables.read_simulation_table(file, choice)
+    return tables.read_measured_table(file, choice)
+
+
+@speaks_python
+def read_model(
+    path: "str | os.PathLike[str]", kind: str = "lumped", columns: "str | os.PathLike[str] | None" = None
+) -> CorrectedModel:
+    """Read a model: a simulation table, gripper.toml, model.toml, an FMU, or a Python file.
+
+    Parameters
+    ----------
+    path : path
+        The file.
+    kind : str
+        Kind of model that a gripper.toml becomes: stiffness_matrix, lumped or finite_element.
+    columns : path or None
+        A columns.toml for a simulation table.
+
+    Raises
+    ------
+    FingervisionError
+        It cannot be read.
+
+    Examples
+    --------
+    >>> import fingervision as fv
+    >>> fv.read_model("sample_frames/paper/gripper.toml").name
+    'gripper.toml (lumped)'
+    """
+    choice = None if columns is None else path_of("columns", columns, "a columns.toml")
+    return tables.read_model(path_of("path", path, "a model's file"), one_of("kind", kind, kinds()), choice)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Given:
+    """A measured table or a model that a function was given, with the file behind it.
+
+    Parameters
+    ----------
+    value : MeasuredTable or CorrectedModel
+        What it holds.
+    path : Path
+        Its file; of what was in memory a name that stays the same for the same content.
+    """
+
+    value: Any
+    path: Path
+
+
+def measured_given(measured: Any, columns: Any = None) -> Given:
+    """Take a measured table: its file, a measurement with a drive, a MeasuredTable, or columns.
+
+    Raises
+    ------
+    ArgumentTypeError
+        It holds no table.
+    FingervisionError
+        It cannot be read, or not be worked with.
+    """
+    if isinstance(measured, str | os.PathLike):
+        path = path_of("measured", measured, "a measured table's file")
+        return Given(read_table(path, "measured", columns), path)
+    if isinstance(measured, MeasuredTable):
+        table = measured
+    elif isinstance(measured, Measurement):
+        table = measured.measured_table()
+    else:
+        table = measured_from_columns(measured)
+    return Given(table, _name_of("table", table.input_mm, table.gap_mm))
+
+
+def model_given(model: Any, kind: str, columns: Any = None) -> Given:
+    """Take a model: its file, a CorrectedModel, a diagnosis's corrected model, or columns of a simulation table.
+
+    Raises
+    ------
+    ArgumentTypeError
+        It is no model.
+    FingervisionError
+        It cannot be read.
+    """
+    if isinstance(model, str | os.PathLike):
+        path = path_of("model", model, "a model's file")
+        return Given(read_model(path, kind, columns), path)
+    model = getattr(model, "corrected_model", model)
+    if isinstance(model, TableModel):
+        path = _name_of("simulation", model.input_mm, model.left_mm, model.right_mm)
+        return Given(CorrectedModel(model.name, model, "", model.input_range_mm, {}), path)
+    if isinstance(model, CorrectedModel):
+        return Given(model, Path(model.base_path) if model.base_path else IN_MEMORY / model.name)
+    must = "a model's file name, CorrectedModel, Diagnosis, DataFrame or mapping with input_mm and gap_mm"
+    if isinstance(model, np.ndarray) or not (isinstance(model, Mapping) or hasattr(model, "columns")):
+        raise ArgumentTypeError("model", f"be {must}", f"is {what_it_is(model)}")
+    return model_given(simulation_from_columns(columns_of("model", model, must)), kind)
+
+
+def models_given(model: Any, kind: str, columns: Any = None) -> dict[str, Given]:
+    """Take one model, several in a list, or several by name; each as `model_given`.
+
+    Raises
+    ------
+    UsageError
+        There is none, or the same one twice.
+    """
+    if isinstance(model, Mapping) and "input_mm" not in model:
+        named = {str(name): model_given(each, kind, columns) for name, each in model.items()}
+    else:
+        listed = list(model) if isinstance(model, list | tuple) else [model]
+        given = [model_given(each, kind, columns) for each in listed]
+        named = dict(zip(told_apart([each.path for each in given]), given, strict=True)) if given else {}
+    if not named:
+        raise ArgumentTypeError("model", "be at least one model", "is none")
+    return named
+
+
+def told_apart(paths: list[Path]) -> list[str]:
+    """Name models by their files, with as much of the folder as tells them apart.
+
+    Raises
+    ------
+    UsageError
+        The same file is named twice.
+    """
+    from fingervision.domain.errors import UsageError
+
+    for parts in range(1, max(len(path.parts) for path in paths) + 1):
+        names = [Path(*path.parts[-parts:]).as_posix() for path in paths]
+        if len(set(names)) == len(names):
+            return names
+    raise UsageError("--model names the same file twice: each model counts once.")
+
+
+def effect_names(argument: str, names: Any) -> frozenset[str]:
+    """Take names of effects.
+
+    Raises
+    ------
+    UnknownNameError
+        The catalogue has no such effect.
+    """
+    from fingervision.effects import catalogue
+
+    listed = (names,) if isinstance(names, str) else tuple(names)
+    for name in listed:
+        if name not in catalogue():
+            what = "an effect of the catalogue"
+            raise UnknownNameError(argument, str(name), catalogue(), what, "`fingervision effects` lists them")
+    return frozenset(listed)
+
+
+def own_base(model: CorrectedModel, out: Path) -> CorrectedModel:
+    """Write a simulation that is in memory as a file that a corrected model can rest on; any other stays.
+
+    Raises
+    ------
+    FingervisionError
+        The file cannot be written.
+    """
+    if model.base_path or not isinstance(model.base, TableModel):
+        return model
+    from fingervision.storage.simulation_csv import write_simulation
+
+    path = out / "simulation.csv"
+    try:
+        write_simulation(path, model.base.input_mm, model.base.respond(model.base.input_mm))
+    except OSError as error:
+        raise FingervisionError(f"{path} could not be written ({error.strerror}): name another folder.") from error
+    return replace(model, base_path=str(path))
+
+
+def _name_of(what: str, *columns: Any) -> Path:
+    whole = hashlib.sha256()
+    for column in columns:
+        whole.update(np.ascontiguousarray(column).tobytes())
+    return IN_MEMORY / f"{what}-{whole.hexdigest()[:12]}"
+
+
+__all__ = [
+    "Given", "effect_names", "measured_given", "model_given", "models_given", "own_base", "read_model", "read_table",
+    "told_apart",
+]  # fmt: skip

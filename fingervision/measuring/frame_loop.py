@@ -1,0 +1,162 @@
+"""Every frame of a recording measured in order, and its rows handed over as they come."""
+
+from collections import Counter
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import ExitStack, closing
+from dataclasses import dataclass, replace
+from time import monotonic
+
+from fingervision.domain.frame import Coding, Frame, LostFrame
+from fingervision.domain.gap import GapMeasurement, NoGap
+from fingervision.frames.ahead import decoded_ahead
+from fingervision.frames.camera_settings import coding_of
+from fingervision.frames.source import Description, FrameSource
+from fingervision.measuring.asked_to_stop import asked_to_stop
+from fingervision.measuring.marked import marked
+from fingervision.measuring.one_polarity import one_polarity
+from fingervision.measuring.other_camera import other_camera
+from fingervision.measuring.rows import Result, RowMaker
+from fingervision.measuring.series import GapSeries
+from fingervision.measuring.sound_picture import SoundPictures
+from fingervision.measuring.task import Task
+from fingervision.storage.gaps_csv import GapRow
+from fingervision.storage.lost_frames import lost_frames
+from fingervision.storage.recorded_camera import recorded_camera
+from fingervision.vision.pipeline import Settings
+
+# Rows are made for so many frames at once, or for what has come in so many seconds, and then handed to the table.
+FRAMES_AT_ONCE, SECONDS_AT_ONCE = 128, 0.4
+
+Progress = Callable[[int, int | None], None]
+TakeRows = Callable[[Sequence[Result], Sequence[GapRow]], None]
+SeeItem = Callable[[Frame | LostFrame, Result], None]
+
+
+@dataclass(frozen=True, slots=True)
+class Prepared:
+    """A recording and how it is measured, with what either knows of the other.
+
+    Parameters
+    ----------
+    description : Description
+        The recording, with notes on what its camera and the scale's have in common.
+    settings : Settings
+        What vision needs.
+    row_maker : RowMaker
+        From pixels to rows.
+    """
+
+    description: Description
+    settings: Settings
+    row_maker: RowMaker
+
+
+def prepared(description: Description, task: Task) -> Prepared:
+    """Put together what is known of a recording before its frames are read."""
+    if words := other_camera(task.scale, recorded_camera(description.files)):
+        description = replace(description, notes=(words, *description.notes))
+    # What is stored without loss may have come compressed from the camera.
+    coding = coding_of(recorded_camera(description.files))
+    if coding is not Coding.LOSSLESS and not description.lossy:
+        description = replace(description, coding=coding)
+    settings, words = task.settings_for(description.files)
+    if words:
+        description = replace(description, notes=(words, *description.notes))
+    given_s = task.drive_offset_s
+    frame_size_px = (description.width_px, description.height_px)
+    row_maker = RowMaker(task.scale, frame_size_px, None if given_s is None else task.drive, given_s or 0.0)
+    return Prepared(description, settings, row_maker)
+
+
+def measure_frames(
+    source: FrameSource,
+    how: Prepared,
+    series: GapSeries,
+    take_rows: TakeRows,
+    see_item: SeeItem | None = None,
+    on_progress: Progress | None = None,
+) -> bool:
+    """Measure a recording from its first frame to its last.
+
+    Parameters
+    ----------
+    source : FrameSource
+        Read once, by a thread of its own.
+    how : Prepared
+        As `prepared` gives it.
+    series : GapSeries
+        Takes in every row.
+    take_rows : callable
+        Given results with their rows, many frames at once, in order; also what came before an error.
+    see_item : callable or None
+        Given every frame, also a lost one, with its result.
+    on_progress : callable or None
+        Called now and then with the frames done and the frames that the source announces.
+
+    Returns
+    -------
+    bool
+        Whether the user stopped it before the recording's end; everything until then was handed over.
+    """
+    description = how.description
+    marks = lost_frames(description.files)
+    stopped = False
+    with ExitStack() as stack:
+        asked = stack.enter_context(asked_to_stop())
+        pending: list[Result] = []
+
+        def hand_over() -> None:
+            results = pending.copy()
+            pending.clear()
+            rows = how.row_maker.rows(results)
+            series.add(results, rows)
+            take_rows(results, rows)
+
+        # Whatever ends the loop.
+        stack.callback(hand_over)
+        handed_over_at = monotonic()
+        try:
+            for item, outcome in _outcomes(
+                marked(source, marks) if marks else source, how.settings, description.coding, series.votes, asked.is_set
+            ):
+                result = Result(item.index, item.time_s, outcome)
+                pending.append(result)
+                if see_item is not None:
+                    see_item(item, result)
+                if len(pending) >= FRAMES_AT_ONCE or monotonic() - handed_over_at >= SECONDS_AT_ONCE:
+                    hand_over()
+                    handed_over_at = monotonic()
+                    if on_progress is not None:
+                        on_progress(series.frames, description.frame_count)
+            stopped = asked.is_set()
+        except KeyboardInterrupt:
+            stopped = True
+    if on_progress is not None:
+        on_progress(series.frames, description.frame_count)
+    return stopped
+
+
+def _outcomes(
+    source: Iterable[Frame | LostFrame],
+    settings: Settings,
+    coding: Coding,
+    votes: Counter[str],
+    is_stopped: Callable[[], bool],
+) -> Iterator[tuple[Frame | LostFrame, GapMeasurement | NoGap | LostFrame]]:
+    """Every frame with what it says; the decoder runs ahead and is stopped when this is."""
+    pictures = SoundPictures()
+    with closing(decoded_ahead(source)) as frames:
+        for item, outcome in one_polarity(_coded(frames, coding), settings, votes, is_stopped):
+            if isinstance(item, LostFrame) or isinstance(outcome, LostFrame):
+                yield item, outcome
+            else:
+                yield item, pictures.judged(item, outcome)
+
+
+def _coded(frames: Iterable[Frame | LostFrame], coding: Coding) -> Iterator[Frame | LostFrame]:
+    """Tell frames that are stored without loss what they came from."""
+    for item in frames:
+        if isinstance(item, Frame) and item.coding is Coding.LOSSLESS and coding is not Coding.LOSSLESS:
+            yield replace(item, coding=coding)
+        else:
+            yield item

@@ -1,0 +1,124 @@
+"""A recording measured without a file: every row and result kept in memory."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+from fingervision.domain.frame import Frame, LostFrame
+from fingervision.frames.source import FrameSource
+from fingervision.measuring.clock.alignment import ClockOffset
+from fingervision.measuring.drive_at import drive_at
+from fingervision.measuring.frame_loop import Prepared, Progress, measure_frames, prepared
+from fingervision.measuring.outcome import Clock, clock_for, refuse_undriven, summary_of
+from fingervision.measuring.rows import Result
+from fingervision.measuring.series import GapSeries
+from fingervision.measuring.task import Task, check_task
+from fingervision.storage.gaps_csv import TIME_PLACES, GapRow
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class MeasuredInMemory:
+    """What a measurement found.
+
+    Parameters
+    ----------
+    source : FrameSource
+        The recording.
+    task : Task
+        What was measured.
+    how : Prepared
+        What was known before.
+    rows : tuple of GapRow
+        One a frame.
+    results : tuple of Result
+        One a frame, in pixels.
+    series : GapSeries
+        The gap over time.
+    clock : ClockOffset, NoClockOffset or None
+        The drive's, where its offset was to be found.
+    summary : dict
+        As in summary.json.
+    first_frame : Frame or None
+        The first picture that could be read.
+    stopped : bool
+        Whether the user stopped it before the recording's end.
+    """
+
+    source: FrameSource
+    task: Task
+    how: Prepared
+    rows: tuple[GapRow, ...] = field(repr=False)
+    results: tuple[Result, ...] = field(repr=False)
+    series: GapSeries = field(repr=False)
+    clock: Clock
+    summary: dict[str, Any] = field(repr=False)
+    first_frame: Frame | None = field(repr=False)
+    stopped: bool = False
+
+
+def measure_in_memory(source: FrameSource, task: Task, on_progress: Progress | None = None) -> MeasuredInMemory:
+    """Measure a recording from its first frame to its last, and write nothing.
+
+    Parameters
+    ----------
+    source : FrameSource
+        The recording; it must end.
+    task : Task
+        What shall be measured.
+    on_progress : callable or None
+        Called now and then with the frames done and the frames that the source announces.
+
+    Raises
+    ------
+    UsageError
+        The region lies outside the frame.
+    FingervisionError
+        The scale is for other frames, or the drive gives no frame an input.
+    """
+    check_task(task, source.description)
+    how = prepared(source.description, task)
+    series = GapSeries()
+    rows: list[GapRow] = []
+    results: list[Result] = []
+    first: list[Frame] = []
+
+    def take_rows(these: Sequence[Result], of_these: Sequence[GapRow]) -> None:
+        results.extend(these)
+        rows.extend(of_these)
+
+    def see_item(item: Frame | LostFrame, _: Result) -> None:
+        if not first and isinstance(item, Frame):
+            # The decoder's memory may be used again for the next picture.
+            first.append(replace(item, pixels=item.pixels.copy()))
+
+    stopped = measure_frames(source, how, series, take_rows, see_item, on_progress)
+    clock = clock_for(series, task)
+    if isinstance(clock, ClockOffset):
+        rows = [_with_drive(row, task, clock) for row in rows]
+    if not stopped:
+        refuse_undriven(task, series, clock, {row.input_mm is not None for row in rows}, "measured")
+    return MeasuredInMemory(
+        source,
+        task,
+        how,
+        tuple(rows),
+        tuple(results),
+        series,
+        clock,
+        summary_of(how, task, series, clock, complete=not stopped),
+        first[0] if first else None,
+        stopped,
+    )
+
+
+def _with_drive(row: GapRow, task: Task, clock: ClockOffset) -> GapRow:
+    """Add the drive's state at a frame's time, which is read as gaps.csv holds it."""
+    if row.time_s is None or task.drive is None:
+        return row
+    found = drive_at(task.drive, clock.log_time_s(round(row.time_s, TIME_PLACES)))
+    if found is None:
+        return row
+    return replace(row, run=found.run, input_mm=found.input_mm, force_n=found.force_n)
+
+
+__all__ = ["MeasuredInMemory", "measure_in_memory"]

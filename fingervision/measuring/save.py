@@ -1,0 +1,70 @@
+"""A recording that was measured in memory, written as the command writes it."""
+
+from pathlib import Path
+
+from fingervision.domain.errors import UsageError
+from fingervision.domain.frame import Frame
+from fingervision.frames.source import FrameSource
+from fingervision.measuring.gap_figure import draw_gap
+from fingervision.measuring.in_memory import MeasuredInMemory
+from fingervision.measuring.marked import marked
+from fingervision.measuring.outcome import clock_drawn
+from fingervision.measuring.output_folder import OutputFolder, claimed, held
+from fingervision.measuring.overlay_video import OverlayVideo
+from fingervision.measuring.step_pictures import write_steps
+from fingervision.storage.gaps_csv import GapsCsv
+from fingervision.storage.lost_frames import lost_frames
+from fingervision.storage.summary_json import refuse_other_recording, write_summary
+
+
+def save_measured(
+    found: MeasuredInMemory, again: FrameSource, out: Path, *, overlay: bool = False, steps_frame: int | None = None
+) -> OutputFolder:
+    """Write gaps.csv, summary.json, gap.png and, where asked, overlay.mp4 and steps/.
+
+    Parameters
+    ----------
+    found : MeasuredInMemory
+        What was measured.
+    again : FrameSource
+        The same recording, from which pictures are read once more where they are asked for.
+    out : Path
+        The folder.
+    overlay : bool
+        Whether to write overlay.mp4.
+    steps_frame : int or None
+        The frame of which every step is written.
+
+    Raises
+    ------
+    UsageError
+        The folder holds the results of another recording, or there is no such frame.
+    FingervisionError
+        The folder cannot be written, or holds files that no measurement wrote.
+    """
+    description, task, series = found.source.description, found.task, found.series
+    if steps_frame is not None and not 0 <= steps_frame < len(found.results):
+        raise UsageError(f"--steps must be the number of a frame, 0 to {len(found.results) - 1}, but is {steps_frame}.")
+    refuse_other_recording(out, description.name)
+    with held(out):
+        folder = claimed(out, description.files)
+        with GapsCsv(folder.gaps, task.drive_columns) as table:
+            table.add(found.rows)
+        if overlay:
+            with OverlayVideo(folder.overlay, found.how.description) as video:
+                marks = lost_frames(description.files)
+                frames = marked(again, marks) if marks else again
+                for item, result, row in zip(frames, found.results, found.rows, strict=False):
+                    if isinstance(item, Frame):
+                        video.add(item, result.outcome, row)
+        if steps_frame is not None:
+            wanted = next((item for item in again if item.index == steps_frame), None)
+            if not isinstance(wanted, Frame):
+                raise UsageError(f"--steps must be a frame that can be read, but {steps_frame} cannot.")
+            write_steps(wanted, found.how.settings, folder.steps)
+        draw_gap(folder.figure, series, task.drive, clock_drawn(found.clock, task))
+        write_summary(folder.summary, found.summary)
+    return folder
+
+
+__all__ = ["save_measured"]

@@ -1,0 +1,54 @@
+"""What a measurement found, in sentences: as the command prints them, and in one line."""
+
+from collections.abc import Mapping
+from typing import Any
+
+from fingervision.domain.status import Status
+from fingervision.measuring.series import GapSeries
+
+COVERAGE_FACTOR = 2.0
+
+
+def result_sentences(summary: Mapping[str, Any], series: GapSeries) -> list[str]:
+    """Say how many frames gave a number, why others did not, the gap, its uncertainty, and what to change."""
+    gap = summary["gap"]
+    lines = [f"{gap['count']} of {series.frames} frames measured."]
+    lines += [
+        f"  {summary['counts'][status]} {status}, first frame {why['first_frame']}: {why['words']}"
+        for status, why in summary["why"].items()
+    ]
+    if gap["count"]:
+        lines.append(f"Gap {gap['least_mm']:.4f} to {gap['greatest_mm']:.4f} mm, mean {gap['mean_mm']:.4f} mm.")
+        if gap["median_u_gap_mm"] is not None:
+            lines.append(
+                f"U = {2e3 * gap['median_u_gap_mm']:.2f} µm (k = 2, median), of which from frame to frame "
+                f"{2e3 * gap['median_u_random_mm']:.2f} µm."
+            )
+        else:
+            lines.append(
+                f"U = {2e3 * gap['median_u_random_mm']:.2f} µm (k = 2, median) from frame to frame; the scale was "
+                "stated without an uncertainty, which is not in it."
+            )
+    return [*lines, *summary["advice"]]
+
+
+def in_one_line(summary: Mapping[str, Any], series: GapSeries) -> str:
+    """Say it in a line: `gap 0.4021 mm, U = 1.20 µm (k = 2), 1 frame`."""
+    gap, frames = summary["gap"], series.frames
+    of = f"{frames} frame{'' if frames == 1 else 's'}"
+    if not gap["count"]:
+        counts = ", ".join(f"{count} {status.value}" for status, count in series.counts.most_common())
+        return f"no number in {of}: {counts}" if counts else "no frame"
+    least, greatest = gap["least_mm"], gap["greatest_mm"]
+    values = f"gap {least:.4f} mm" if gap["count"] == 1 else f"gap {least:.4f} to {greatest:.4f} mm"
+    u_mm, only = gap["median_u_gap_mm"], ""
+    if u_mm is None:
+        u_mm, only = gap["median_u_random_mm"], ", from frame to frame alone"
+    median = "" if gap["count"] == 1 else ", median"
+    found = of if gap["count"] == frames else f"{gap['count']} of {of} with a number"
+    bad = series.counts[Status.DAMAGED]
+    damage = f", {bad} damaged" if bad else ""
+    return f"{values}, U = {COVERAGE_FACTOR * 1e3 * u_mm:.2f} µm (k = 2{median}{only}), {found}{damage}"
+
+
+__all__ = ["in_one_line", "result_sentences"]

@@ -1,0 +1,49 @@
+"""A calibration's file and the pictures beside it: an older calibration is replaced, anything else is not."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fingervision.domain.errors import FingervisionError
+
+
+def refuse_foreign(out: Path) -> None:
+    """Let a calibration be overwritten, never anything else.
+
+    Raises
+    ------
+    FingervisionError
+        Something else stands there.
+    """
+    if not out.exists():
+        return
+    try:
+        content = json.loads(out.read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        content = None
+    if not (isinstance(content, dict) and "px_per_mm" in content):
+        raise FingervisionError(f"{out} stands there already and is no calibration; name another file with -o.")
+
+
+def write_picture(out: Path, name: str, picture: NDArray[np.uint8]) -> None:
+    """Write a calibration picture, of red, green and blue, beside the calibration.
+
+    Raises
+    ------
+    FingervisionError
+        It cannot be written.
+    """
+    import cv2
+
+    path = out.with_name(f"{out.stem}_{Path(name).stem}.png")
+    written, content = cv2.imencode(".png", picture[:, :, ::-1])
+    if written:
+        try:
+            path.write_bytes(content.tobytes())
+        except OSError as error:
+            raise FingervisionError(f"The picture {path} could not be written: {error.strerror}.") from error
+
+
+__all__ = ["refuse_foreign", "write_picture"]

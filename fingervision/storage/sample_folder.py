@@ -1,0 +1,28 @@
+"""Where the samples are: inside the installed package, or beside it in the source tree."""
+
+from pathlib import Path
+
+import fingervision
+from fingervision.domain.errors import FingervisionError
+
+NAME = "sample_frames"
+
+
+def sample_folder() -> Path:
+    """Give the folder of the samples.
+
+    Raises
+    ------
+    FingervisionError
+        The installation lacks them.
+    """
+    package = Path(fingervision.__file__).parent
+    for folder in (package / NAME, package.parent / NAME):
+        if folder.is_dir():
+            return folder
+    raise FingervisionError(
+        f"The samples must lie in {package / NAME}, but are not there: install fingervision again from its wheel."
+    )
+
+
+__all__ = ["sample_folder"]

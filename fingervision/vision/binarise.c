@@ -1,0 +1,80 @@
+/* Pixels with each grey level. Neighbours are alike: several counts in turn do not wait for each other. */
+LOOP(binarise_histogram, "pj", "") {
+    const Arg *grey = &in[0];
+    int64_t rows = grey->shape[0], columns = grey->shape[1], levels = in[1].n, *total = INTS(1);
+    memset(total, 0, (size_t)levels * sizeof(int64_t));
+    if (grey->bytes == 1 && levels == 256) {
+        static const int PARTS = 8;
+        uint32_t count[8][256];
+        memset(count, 0, sizeof count);
+        for (int64_t row = 0; row < rows; row++) {
+            const uint8_t *at = (const uint8_t *)grey->data + row * grey->stride[0];
+            int64_t step = grey->stride[1], j = 0;
+            for (; step == 1 && j + 8 <= columns; j += 8) {
+                uint64_t eight;
+                memcpy(&eight, at + j, 8);
+                for (int part = 0; part < 8; part++) count[part][(eight >> 8 * part) & 255]++;
+            }
+            for (; j < columns; j++) count[j % 8][at[j * step]]++;
+        }
+        for (int part = 0; part < PARTS; part++)
+            for (int level = 0; level < 256; level++) total[level] += count[part][level];
+        return;
+    }
+    for (int64_t row = 0; row < rows; row++)
+        for (int64_t column = 0; column < columns; column++)
+            total[smaller_int(pixel(grey, row, column), levels - 1)]++;
+}
+
+/* Otsu's threshold, the difference of the two classes' means, and that in units of their spread. */
+LOOP(binarise_split, "I", "idd") {
+    const int64_t *histogram = INTS(0), size = in[0].n;
+    double pixels = 0.0, total = 0.0, largest = 0.0, below = 0.0, sum_below = 0.0;
+    int64_t threshold = 0;
+    for (int64_t level = 0; level < size; level++) {
+        pixels += (double)histogram[level];
+        total += (double)histogram[level] * (double)level;
+    }
+    for (int64_t level = 0; level < size - 1; level++) {
+        below += (double)histogram[level];
+        sum_below += (double)histogram[level] * (double)level;
+        double above = pixels - below;
+        if (histogram[level] == 0 || above == 0.0) continue;
+        double between = below * above * square(sum_below / below - (total - sum_below) / above);
+        if (between > largest) {
+            threshold = level;
+            largest = between;
+        }
+    }
+    out[0].i = threshold;
+    out[1].d = out[2].d = 0.0;
+    if (largest == 0.0) return;
+    double means[2] = {0.0, 0.0}, variances[2] = {0.0, 0.0};
+    for (int side = 0; side < 2; side++) {
+        int64_t first = side ? threshold + 1 : 0, past = side ? size : threshold + 1;
+        double inside = 0.0;
+        for (int64_t level = first; level < past; level++) {
+            inside += (double)histogram[level];
+            means[side] += (double)histogram[level] * (double)level;
+        }
+        means[side] /= inside;
+        for (int64_t level = first; level < past; level++)
+            variances[side] += (double)histogram[level] * square((double)level - means[side]);
+        variances[side] /= inside;
+    }
+    double contrast = means[1] - means[0];
+    out[1].d = contrast;
+    out[2].d = contrast / larger(sqrt(0.5 * (variances[0] + variances[1])), 1e-3);
+}
+
+/* The picture over its own light, which becomes half of the scale: picture, light (as large); the flat picture. */
+LOOP(binarise_flatten, "pSb", "") {
+    const float *light = (const float *)in[1].data;
+    int64_t rows = in[0].shape[0], columns = in[0].shape[1];
+    for (int64_t row = 0; row < rows; row++)
+        for (int64_t column = 0; column < columns; column++) {
+            int64_t at = row * columns + column;
+            double flat = 128.0 * (double)pixel(&in[0], row, column) / (double)(light[at] > 1.0f ? light[at] : 1.0f);
+            FLAGS(2)[at] = (uint8_t)smaller(flat, 255.0);
+        }
+}

@@ -1,0 +1,108 @@
+/* after median */
+/* Line v = c + m t by slopes from one half of the rows to the other (Theil, Sen), and the share of rows on it. */
+LOOP(channels_line, "FF", "ddd") {
+    const double *t = FLOATS(0), *v = FLOATS(1);
+    int64_t n = in[0].n, half = n / 2, on = 0;
+    double *order = floats(n);
+    for (int64_t i = 0; i < half; i++) order[i] = (v[n - half + i] - v[i]) / larger(t[n - half + i] - t[i], 1.0);
+    double m = middle_in_place(order, half);
+    for (int64_t i = 0; i < n; i++) order[i] = v[i] - m * t[i];
+    double c = middle_in_place(order, n);
+    for (int64_t i = 0; i < n; i++) on += fabs(v[i] - c - m * t[i]) <= ON_LINE_PX;
+    out[0].d = c;
+    out[1].d = m;
+    out[2].d = (double)on / (double)n;
+    free(order);
+}
+
+/* Length of what is set in a row from a pixel on; a pixel to either side is forgiven. */
+static int64_t run_length(const uint8_t *line, int64_t size, int64_t i, int64_t step) {
+    int64_t length = 0;
+    if (i >= 0 && i < size && !line[i]) i += step;
+    for (; i >= 0 && i < size && line[i]; i += step) length++;
+    return length;
+}
+
+/* Median breadth of what bounds a channel on its left and on its right, in seven rows: picture, the two lines, first and
+   last row; 0 where no row has any. */
+LOOP(channels_beside, "Bddddii", "dd") {
+    enum { ROWS_SEEN = 9 };
+    int64_t columns = in[0].shape[1];
+    double left[ROWS_SEEN], right[ROWS_SEEN], step = (double)(in[6].i - in[5].i) / (ROWS_SEEN - 1.0);
+    int64_t count = 0;
+    for (int k = 1; k < ROWS_SEEN - 1; k++) {
+        int64_t row = (int64_t)((double)k * step + (double)in[5].i);
+        int64_t a = (int64_t)rint(in[1].d + in[2].d * (double)row), b = (int64_t)rint(in[3].d + in[4].d * (double)row);
+        if (a < 0 || a >= b || b > columns - 1) continue;
+        left[count] = (double)run_length(FLAGS(0) + row * columns, columns, a, -1);
+        right[count++] = (double)run_length(FLAGS(0) + row * columns, columns, b, 1);
+    }
+    out[0].d = median_in_place(left, count);
+    out[1].d = median_in_place(right, count);
+}
+
+/* The runs of a chain from its end on: runs, the run that each goes on from, the end; chain. */
+LOOP(channels_chain, "IIij", "") {
+    int64_t i = in[2].i;
+    for (int64_t k = 0; k < in[3].shape[0]; k++) {
+        memcpy(INTS(3) + 3 * k, INTS(0) + 3 * i, 3 * sizeof(int64_t));
+        i = INTS(1)[i];
+    }
+}
+
+/* Where ground ends, from a pixel of it on: eight pixels at a time. */
+static int64_t past_ground(const uint8_t *line, int64_t x, int64_t columns) {
+    uint64_t eight;
+    for (; x + 8 <= columns; x += 8) {
+        memcpy(&eight, line + x, 8);
+        if (eight) break;
+    }
+    while (x < columns && !line[x]) x++;
+    return x;
+}
+
+/* All bounded runs of ground (row, last pixel before, first pixel after), the run below that each goes on from, its place
+   in its chain, and which go on; how many there are. */
+LOOP(channels_runs, "Bjjjb", "i") {
+    const uint8_t *mask = FLAGS(0);
+    int64_t rows = in[0].shape[0], columns = in[0].shape[1], most = in[2].n, count = 0, below_first = 0, below_past = 0;
+    int64_t *runs = INTS(1), *previous = INTS(2), *length = INTS(3);
+    uint8_t *has_next = FLAGS(4);
+    for (int64_t row = rows - 1; row >= 0; row--) {
+        const uint8_t *line = mask + row * columns;
+        int64_t first = count, x = past_ground(line, 0, columns);
+        int64_t start = x;
+        while (x < columns) {
+            /* A run of something that is set, from `start`. */
+            const uint8_t *off = (const uint8_t *)memchr(line + x, 0, (size_t)(columns - x));
+            x = off ? off - line : columns;
+            int64_t bounded = x - start, a = x - 1;
+            x = past_ground(line, x, columns);
+            start = x;
+            if (x == columns || x - a - 1 < LEAST_GROUND_PX || bounded < LEAST_BESIDE_PX) continue;
+            int64_t end = x;
+            while (end < columns && end - x < LEAST_BESIDE_PX && line[end]) end++;
+            if (end - x < LEAST_BESIDE_PX) continue;
+            if (count == most) {
+                out[0].i = count;
+                return;
+            }
+            runs[3 * count] = row;
+            runs[3 * count + 1] = a;
+            runs[3 * count + 2] = x;
+            previous[count] = -1;
+            length[count] = 1;
+            has_next[count] = 0;
+            for (int64_t k = below_first; k < below_past; k++)
+                if (llabs(runs[3 * k + 1] - a) <= MOST_STEP_PX && llabs(runs[3 * k + 2] - x) <= MOST_STEP_PX) {
+                    previous[count] = k;
+                    length[count] = length[k] + 1;
+                    has_next[k] = 1;
+                }
+            count++;
+        }
+        below_first = first;
+        below_past = count;
+    }
+    out[0].i = count;
+}

@@ -1,0 +1,62 @@
+/* after median */
+/* The lines of one side of a finger that are looked at, thinned out. */
+typedef struct {
+    int64_t count, row[2 * MOST_ROWS + 2], edge[2 * MOST_ROWS + 2], outward;
+} Side;
+
+static Side side_of(const int64_t *fixed, const double *position, const double *weight, int64_t outward, int64_t lines) {
+    Side side = {0};
+    int64_t count = 0, place = 0;
+    side.outward = outward;
+    for (int64_t i = 0; i < lines; i++) count += weight[i] > 0.0;
+    int64_t stride = larger_int(count / MOST_ROWS, 1);
+    for (int64_t i = 0; i < lines && count >= FEWEST_ROWS; i++)
+        if (weight[i] > 0.0 && place++ % stride == 0) {
+            side.row[side.count] = fixed[i];
+            side.edge[side.count++] = (int64_t)rint(position[i]);
+        }
+    return side;
+}
+
+/* Median level at a distance outwards from the edge; 0 where too few rows are in the picture. */
+static int level_at(const Arg *upright, const Side *side, int64_t d, double *level) {
+    double levels[2 * MOST_ROWS + 2];
+    int64_t n = 0;
+    for (int64_t i = 0; i < side->count; i++) {
+        int64_t x = side->edge[i] + side->outward * d;
+        if (x >= 0 && x < upright->shape[1]) levels[n++] = (double)pixel(upright, side->row[i], x);
+    }
+    if (n < FEWEST_ROWS) return 0;
+    *level = middle_in_place(levels, n);
+    return 1;
+}
+
+/* Level half-way up the step in which a strip outside (sense 1) or inside (-1) of a side ends; 0 where there is none.
+   Only a step of the same sense as the edge itself ends a strip between finger and ground. */
+static double strip_end(const Arg *upright, const Side *side, int64_t near, int64_t room_px, int64_t sense, double contrast) {
+    double profile[REACH_PX + 1], most = LEAST_STEP * fabs(contrast), found = 0.0;
+    double way = contrast > 0.0 ? 1.0 : contrast < 0.0 ? -1.0 : 0.0;
+    int64_t last = near - 1, end = sense > 0 ? smaller_int(REACH_PX, room_px) : REACH_PX;
+    while (last < end && level_at(upright, side, sense * (last + 1), &profile[last + 1])) last++;
+    for (int64_t d = near; d + STEP_PX <= last; d++) {
+        double step = (double)sense * (profile[d + STEP_PX] - profile[d]) * way;
+        if (step > most) {
+            most = step;
+            found = 0.5 * (profile[d] + profile[d + STEP_PX]);
+        }
+    }
+    return found;
+}
+
+/* Both strips of a finger's side: picture, fixed, position, weight and outward sense (2, PLACES), which finger, first and
+   last place of the side, how near to the edge, how far out; levels of the inner and of the outer strip's end. */
+LOOP(third_tone_strips, "pIFFIiiiii", "dd") {
+    int64_t first = in[5].i * in[1].shape[1] + in[6].i, near = in[8].i;
+    double inside, outside;
+    out[0].d = out[1].d = 0.0;
+    if (near + STEP_PX > REACH_PX || near > in[9].i) return;
+    Side side = side_of(INTS(1) + first, FLOATS(2) + first, FLOATS(3) + first, INTS(4)[first], in[7].i - in[6].i);
+    if (!level_at(&in[0], &side, -near, &inside) || !level_at(&in[0], &side, near, &outside)) return;
+    out[0].d = strip_end(&in[0], &side, near, in[9].i, -1, outside - inside);
+    out[1].d = strip_end(&in[0], &side, near, in[9].i, 1, outside - inside);
+}

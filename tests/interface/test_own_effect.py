@@ -1,0 +1,128 @@
+"""An effect of one's own in nine lines: listed, looked up, diagnosed, and gone again."""
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import fingervision as fv
+from fingervision.domain.errors import ArgumentError, ArgumentTypeError, UnknownNameError
+from fingervision.effects import catalogue, withdraw
+from fingervision.plugins.faults import PluginNameError
+
+
+@pytest.fixture(autouse=True)
+def _as_before() -> Iterator[None]:
+    before = set(catalogue())
+    yield
+    for name in set(catalogue()) - before:
+        withdraw(name)
+
+
+def bump() -> fv.effects.__class__:
+    @fv.effect("mechanism", fv.Parameter("height_mm", "mm", -0.2, 0.2, "height of the bump"))
+    def mid_bump(points, history, values):
+        """The gap bulges in the middle of the range.
+
+        height_mm exp(-((u - 0.5) / 0.1)^2 / 2)
+        """
+        bulge = values["height_mm"] * np.exp(-0.5 * ((history.input_mm - 0.5) / 0.1) ** 2)
+        return points.with_gap(points.gap_mm + bulge)
+
+    return mid_bump
+
+
+def test_is_listed_in_its_stages_place() -> None:
+    before = len(fv.effects)
+    made = bump()
+    assert len(fv.effects) == before + 1
+    assert fv.effects["mid_bump"] is made or fv.effects["mid_bump"].name == "mid_bump"
+    assert "mid_bump" in fv.effects
+    assert made.words == "the gap bulges in the middle of the range"
+    assert "exp" in made.formula
+    stages = [str(effect.stage) for effect in fv.effects]
+    assert stages == sorted(stages, key=["drive", "mechanism", "camera"].index)
+    assert "mid_bump" in repr(fv.effects)
+    assert "mid_bump" in fv.effects._repr_html_()
+
+
+def test_a_cell_may_run_twice() -> None:
+    bump()
+    bump()
+    assert list(catalogue()).count("mid_bump") == 1
+
+
+@pytest.mark.slow
+def test_is_named_on_a_table_that_hides_it_and_simulates() -> None:
+    bump()
+    rng = np.random.default_rng(5)
+    inputs = np.tile(np.concatenate([np.linspace(0, 1, 60), np.linspace(1, 0, 60)]), 2)
+    simulation = {"input_mm": [0.0, 1.0], "gap_mm": [1.0, 3.0]}
+    true_mm = 0.05
+    gaps = 1.0 + 2.0 * inputs + true_mm * np.exp(-0.5 * ((inputs - 0.5) / 0.1) ** 2)
+    table = {
+        "input_mm": inputs,
+        "gap_mm": gaps + rng.normal(0, 1e-3, inputs.size),
+        "time_s": 0.1 * np.arange(inputs.size),
+    }
+    found = fv.diagnose(table, simulation)
+    assert [effect.name for effect in found.effects] == ["mid_bump"]
+    height = found.effects[0].parameters["height_mm"]
+    assert height.value == pytest.approx(true_mm, abs=4 * height.u)
+    again = fv.simulate(found.corrected_model, [0.0, 0.5, 1.0]).gap_mm
+    assert again == pytest.approx([1.0, 2.0 + true_mm, 3.0], abs=2e-3)
+
+
+def test_effects_of_a_call_are_gone_after_it() -> None:
+    made = bump()
+    withdraw("mid_bump")
+    rng = np.random.default_rng(5)
+    inputs = np.linspace(0, 1, 80)
+    table = {"input_mm": inputs, "gap_mm": 1 + 2 * inputs + rng.normal(0, 1e-3, 80)}
+    found = fv.diagnose(table, {"input_mm": [0.0, 1.0], "gap_mm": [1.0, 3.0]}, effects=[made])
+    assert "mid_bump" not in catalogue()
+    assert found.verdict == "agrees"
+    assert found.own_effects == (made,)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "error"),
+    [
+        (("wheel", fv.Parameter("x", "mm", 0, 1, "x")), UnknownNameError),
+        (("camra", fv.Parameter("x", "mm", 0, 1, "x")), UnknownNameError),
+        (("drive", "x"), ArgumentTypeError),
+        (("drive", []), ArgumentTypeError),
+        (("drive", fv.Parameter("x", "mm", 1, 1, "x")), ArgumentError),
+    ],
+)
+def test_refuses_what_is_no_effect(arguments: tuple, error: type[Exception]) -> None:
+    with pytest.raises(error):
+        fv.effect(*arguments)
+
+
+def test_refuses_functions_that_cannot_be_one() -> None:
+    size = fv.Parameter("x_mm", "mm", 0, 1, "x")
+    with pytest.raises(ArgumentTypeError):
+        fv.effect("drive", size)(lambda input_mm: input_mm)
+    with pytest.raises(ArgumentError):
+        fv.effect("drive", size)(lambda input_mm, history, values: input_mm)
+    with pytest.raises(PluginNameError, match="backlash"):
+
+        @fv.effect("drive", size, name="backlash")
+        def taken(input_mm, history, values):
+            """Take a name."""
+            return input_mm
+
+    with pytest.raises(UnknownNameError):
+        fv.effect("drive", size, needs_time=True)
+    assert "taken" not in catalogue()
+
+
+def test_looks_up_by_name_with_the_nearest() -> None:
+    with pytest.raises(UnknownNameError) as refused:
+        fv.effects["backlahs"]
+    assert refused.value.nearest == "backlash"
+    with pytest.raises(KeyError):
+        fv.effects["backlahs"]
+    assert replace(fv.effects["backlash"], order=1).order == 1

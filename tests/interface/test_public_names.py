@@ -1,0 +1,72 @@
+"""The public face: every name is there, loads late, and stands in the stub; starting is fast and light."""
+
+import ast
+import importlib
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import calib
+import fingervision
+
+ROOT = Path(__file__).parents[2]
+PACKAGES = [fingervision, calib]
+
+
+@pytest.mark.parametrize("package", PACKAGES, ids=lambda package: package.__name__)
+def test_every_public_name_is_there(package) -> None:
+    for name in package.__all__:
+        assert getattr(package, name) is not None
+        assert name in dir(package)
+    with pytest.raises(AttributeError):
+        _ = package.no_such_name
+    assert len(set(package.__all__)) == len(package.__all__)
+
+
+@pytest.mark.parametrize("package", PACKAGES, ids=lambda package: package.__name__)
+def test_the_stub_names_the_same(package) -> None:
+    tree = ast.parse((ROOT / package.__name__ / "__init__.pyi").read_text())
+    stated = {alias.asname for node in tree.body if isinstance(node, ast.ImportFrom) for alias in node.names}
+    stated |= {node.target.id for node in tree.body if isinstance(node, ast.AnnAssign)}  # type: ignore[union-attr]
+    assert set(package.__all__) == stated - {None}
+
+
+@pytest.mark.parametrize("package", PACKAGES, ids=lambda package: package.__name__)
+def test_what_is_public_is_documented_with_an_example(package) -> None:
+    plain = {"__version__", "effects"}
+    for name in set(package.__all__) - plain:
+        assert (getattr(package, name).__doc__ or "").strip(), name
+    functions = [getattr(package, name) for name in package.__all__ if name[0].islower() and name not in plain]
+    if package is fingervision:
+        missing = [each.__name__ for each in functions if ">>>" not in (each.__doc__ or "")]
+        assert not missing
+
+
+@pytest.mark.parametrize(
+    "module", sorted((ROOT / "fingervision/interface").glob("[a-z]*.py")), ids=lambda path: path.stem
+)
+def test_every_module_states_what_is_public(module: Path) -> None:
+    loaded = importlib.import_module(f"fingervision.interface.{module.stem}")
+    assert all(hasattr(loaded, name) for name in loaded.__all__)
+
+
+@pytest.mark.parametrize("package", ["fingervision", "calib"])
+def test_importing_loads_nothing_heavy(package: str) -> None:
+    program = (
+        f"import sys, {package} as p; dir(p); "
+        "heavy = {'numpy', 'cv2', 'scipy', 'matplotlib', 'av', 'click', 'numba'} & set(sys.modules); "
+        "assert not heavy, heavy"
+    )
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=False, cwd=ROOT)
+    assert done.returncode == 0, done.stderr
+
+
+def test_a_function_stands_before_the_module_of_its_name() -> None:
+    program = (
+        "from calib.scale_from_sizes import ScaleFit; import calib; "
+        "assert callable(calib.scale_from_sizes) and calib.ScaleFit is ScaleFit"
+    )
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=False, cwd=ROOT)
+    assert done.returncode == 0, done.stderr
