@@ -24,6 +24,7 @@ from fingervision.models.mechanism_plate import MechanismPlate
 from fingervision.models.mechanism_state import MechanismState
 from fingervision.models.mechanism_uncertainty import mechanism_uncertainty
 from fingervision.storage.mechanism_toml import read_drawing
+from fingervision.storage.simulation_csv import POSE
 
 _KINDS = ("finite_element", "lumped")
 _APART = 0.1
@@ -200,9 +201,13 @@ def _write(states: list[MechanismState], out: Path) -> None:
     for name in states[0].contact_n:
         columns[f"{name}_contact_n"] = [s.contact_n[name] for s in states]
     columns["stress_mpa"] = [s.stress_mpa for s in states]
+    poses = {
+        f"{name}.{part}": [getattr(s.bodies[name], part) for s in states] for name in states[0].bodies for part in POSE
+    }
+    columns |= poses
     _table(columns, out / "mechanism.csv")
     if "gap" in states[0].pairs_mm:
-        table = {"input_mm": columns["input_mm"], "gap_mm": columns["gap_mm"], "force_n": columns["force_n"]}
+        table = {name: columns[name] for name in ("input_mm", "gap_mm", "force_n")} | poses
         _table(table, out / "simulation.csv")
 
 

@@ -22,12 +22,14 @@ Examples:
   fingervision measure opening.mp4 --calibration calibration.json --drive drive.csv
   fingervision measure opening.mp4 --calibration calibration.json --drive drive.csv --drive-offset-s 0.12
   fingervision measure opening.mp4 --px-per-mm 34 --steps 10
+  fingervision measure opening.mp4 --px-per-mm 34 --gauges gauges.toml --overlay
 
 \b
 Files written to --out:
   gaps.csv      one row a frame: gap with its uncertainty, points, tips, or why there is no number
   summary.json  counts, statistics, settings, scale, what the uncertainty covers and what it does not
   gap.png       the gap over time
+  gauges.csv    with --gauges: one row a number, time_s,gauge,quantity,value,u,unit,status
   overlay.mp4   with --overlay: edges, tips, points and value drawn in
   steps/        with --steps: a picture of every step
 
@@ -74,6 +76,11 @@ Exit codes: 0 done; 1 could not, or no frame gave a number; 2 wrong usage;
     show_default=True,
     help="Edge of a thick part: of the face towards the camera, or of its outline, side walls included.",
 )
+@click.option(
+    "--gauges",
+    type=click.Path(path_type=Path),
+    help="Gauges of your own (gauges.toml): edges, lines, circles, marks, patches.",
+)
 @click.option("--overlay", is_flag=True, help="Also write overlay.mp4.")
 @click.option("--steps", "steps_frame", type=int, metavar="FRAME", help="Also write every step of this frame (from 0).")
 @click.option(
@@ -97,6 +104,7 @@ def command(
     bits: int | None,
     fingers: str,
     face: str,
+    gauges: Path | None,
     overlay: bool,
     steps_frame: int | None,
     out: Path | None,
@@ -124,6 +132,7 @@ def command(
         face=face,
         overlay=overlay,
         steps_frame=steps_frame,
+        gauges=gauges,
     )
     with _Bar() as bar:
         measured = measure_into(out, recording, task, rate_hz, bar)
@@ -177,7 +186,7 @@ def _report(measured: "Measured", as_json: bool) -> None:
         )
     elif not series.frames:
         _complain(f"{summary['recording']['name']} must have at least one picture, but has none: record it again.")
-    elif not series.counts[Status.OK]:
+    elif not series.counts[Status.OK] and not measured.has_gauge_numbers:
         first = min(series.first_without.values(), key=lambda bad: bad.frame)
         _complain(
             f"None of the {series.frames} frames gave a number ({counts}). Frame {first.frame}: {first.words} "
@@ -192,12 +201,15 @@ def _report(measured: "Measured", as_json: bool) -> None:
 
 
 def _print_result(measured: "Measured") -> None:
+    from fingervision.gauges.recording import gauge_sentence
     from fingervision.measuring.words import result_sentences
 
     for sentence in result_sentences(measured.summary, measured.series):
         click.echo(sentence)
+    for name, gauge in measured.summary.get("gauges", {}).items():
+        click.echo(gauge_sentence(name, gauge))
     folder = measured.folder
-    files = [folder.gaps, folder.summary, folder.figure, folder.overlay, folder.steps]
+    files = [folder.gaps, folder.gauges, folder.summary, folder.figure, folder.overlay, folder.steps]
     click.echo("Written: " + ", ".join(str(file) for file in files if file.exists()))
 
 

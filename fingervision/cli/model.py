@@ -164,7 +164,7 @@ def command(
         rows[name] = {**row, "seconds": round(time.perf_counter() - began, 3)}
         folder = out / name if kind == "all" else out
         folder.mkdir(exist_ok=True)
-        write_simulation(folder / "simulation.csv", inputs, answers[name])
+        write_simulation(folder / "simulation.csv", inputs, answers[name], model.body_poses(inputs))
     if inputs is None or not rows:
         raise next(iter(refusals.values()))
     _draw(gripper_toml.stem, gripper, inputs, models, answers, out, mesh=mesh)

@@ -1,10 +1,13 @@
 """Where a measured table and a model disagree, without a word about why."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
 
+from fingervision.diagnosis.bodies.body_evidence import body_evidence, drawing_of
+from fingervision.diagnosis.bodies.place_diagnosis import without_places
+from fingervision.diagnosis.bodies.place_words import body_places
 from fingervision.diagnosis.diagnose import by_channel, places
 from fingervision.diagnosis.inference.cross_validation import rms_mm
 from fingervision.diagnosis.input.intersample_interpolation import likelier_interpolation
@@ -97,6 +100,7 @@ def rough(residual_mm: Array, history: History) -> Array:
 
 def compare(table: MeasuredTable, model: CorrectedModel, *, seed: int = 1) -> Comparison:
     """Find where a measured table and a model disagree beyond the noise."""
+    table, model = without_places(table, model)
     data = prepare(table, model)
     over = data.with_overshoots()
     if np.sum((data.stacked_mm - over.chain.stacked({})) ** 2) < np.sum(
@@ -120,5 +124,10 @@ def compare(table: MeasuredTable, model: CorrectedModel, *, seed: int = 1) -> Co
     # Nothing was explained yet: what the disagreement itself does within seconds is no noise.
     problem = data.problem(rough(residual, history), 0, explained=False)
     found = places(data, problem, residual, np.random.default_rng(seed))
+    answers = drawing_of(model) if table.channels else None
+    if answers is not None:
+        evidence, notes = body_evidence(table, answers, history.input_mm, np.random.default_rng(seed))
+        found = (*found, *(() if evidence is None else body_places(evidence, answers)))
+        data = replace(data, notes=(*data.notes, *notes))
     rms = rms_mm(residual, history.input_mm.size, history.both_edges)
     return Comparison(data, by_channel(data, residual), found, rms, problem.whitener.noises[0].total_mm)

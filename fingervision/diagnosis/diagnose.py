@@ -5,6 +5,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from fingervision.diagnosis.bodies.body_evidence import BodyEvidence
+from fingervision.diagnosis.bodies.place_diagnosis import diagnose_with_bodies, without_places
 from fingervision.diagnosis.design.further_evidence import further_evidence
 from fingervision.diagnosis.design.next_run import next_run
 from fingervision.diagnosis.inference.cross_validation import left_out_rms_mm, rms_mm
@@ -54,6 +56,8 @@ class Diagnosis:
         Measured minus predicted, without and with the answer.
     positioning : PositioningReport or NoRepeatedTargets
         Figures of ISO 230-2 where the table repeats its targets.
+    bodies : BodyEvidence or None
+        What the poses of bodies say, where there are any.
     """
 
     report: DiagnosisReport
@@ -61,6 +65,7 @@ class Diagnosis:
     before_mm: Array
     after_mm: Array
     positioning: PositioningReport | NoRepeatedTargets
+    bodies: BodyEvidence | None = None
 
 
 def by_channel(data: Observations, stacked: Array) -> dict[str, Array]:
@@ -132,6 +137,25 @@ def _diagnosed(
     progress: Progress,
 ) -> Diagnosis:
     """Diagnose once; an effect from elsewhere that fails on the way ends it."""
+    table, bare = without_places(table, model)
+
+    def explain(seen: MeasuredTable, by: CorrectedModel) -> Diagnosis:
+        return _explained(seen, by, seed, forced, without, progress)
+
+    if not table.channels:
+        return explain(table, bare)
+    return diagnose_with_bodies(table, bare, explain, np.random.default_rng(seed))
+
+
+def _explained(
+    table: MeasuredTable,
+    model: CorrectedModel,
+    seed: int,
+    forced: frozenset[str],
+    without: frozenset[str],
+    progress: Progress,
+) -> Diagnosis:
+    """Explain the gap, the fingers and the force by the catalogue."""
     begin = time.perf_counter()
     rng = np.random.default_rng(seed)
     data = prepare(table, model, without)

@@ -64,6 +64,8 @@ class History:
         Shortest time for which the stage stood before it was read; 0 where it was read on its way.
     commanded : bool
         Whether the input is a command that keeps its value until it jumps.
+    bodies : bool
+        Whether effects with a place are tried by their forms with a table; a diagnosis looks for places by itself.
     """
 
     input_mm: Array
@@ -80,6 +82,7 @@ class History:
     rezeroed: tuple[bool, ...] = ()
     dwell_s: float = 0.0
     commanded: bool = False
+    bodies: bool = False
 
     @property
     def times(self) -> Array:
@@ -130,6 +133,28 @@ class InputPath:
         return replace(self, history=replace(self.history, input_mm=self.history.input_mm + shift))
 
 
+def effect_key(name: str, place: str = "", end: str = "") -> str:
+    """Spell an effect with its place: `hinge_stiffness_error@right hinge 2`; the bare name where it has none.
+
+    Parameters
+    ----------
+    name : str
+        In the catalogue.
+    place : str
+        Hinge or link as the drawing calls it.
+    end : str
+        Which end of a link sits off.
+    """
+    return name if not place else f"{name}@{place}" + (f"; {end}" if end else "")
+
+
+def split_key(key: str) -> tuple[str, str, str]:
+    """Take an effect's key apart: name, place, end."""
+    name, _, rest = key.partition("@")
+    place, _, end = rest.partition("; ")
+    return name, place, end
+
+
 DriveAct = Callable[[Array, History, Values], Array]
 PointAct = Callable[[Response, History, Values], Response]
 
@@ -160,6 +185,8 @@ class Effect:
         With bounds that hold for every table.
     needs_times, needs_shared_clock, needs_edges, needs_force : bool
         Data without which the effect is excluded.
+    needs_bodies : bool
+        Whether poses of bodies show it and the gap alone does not.
     memory : bool
         Whether the past counts.
     start : str
@@ -206,6 +233,7 @@ class Effect:
     needs_shared_clock: bool = False
     needs_edges: bool = False
     needs_force: bool = False
+    needs_bodies: bool = False
     memory: bool = False
     start: str = ""
     curve: bool = False
@@ -231,6 +259,8 @@ class Effect:
             return "the table has no left_mm and right_mm, and the gap alone does not show it"
         if self.needs_force and not history.force:
             return "the table has no force_n, and the gap hardly shows it"
+        if self.needs_bodies and not history.bodies:
+            return "it is told by poses of bodies beside a drawing, and not by the gap alone"
         found = self.parameters if self.narrow is None else self.narrow(history)
         if isinstance(found, str) or not self.start:
             return found

@@ -1,12 +1,33 @@
 """What was measured at the bench: gap and fingers against the recorded input."""
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from itertools import pairwise
+from types import MappingProxyType
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fingervision.domain.reference_slot import ReferenceSlot
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Channel:
+    """A column of one's own: where a body or a point of the mechanism was seen, in mm or mrad.
+
+    Parameters
+    ----------
+    value : ndarray of float, shape (n,)
+        Readings; 0 where there is none.
+    present : ndarray of bool, shape (n,)
+        Whether there is one.
+    u : ndarray of float, shape (n,), or None
+        Standard uncertainties, where they are stated.
+    """
+
+    value: NDArray[np.float64]
+    present: NDArray[np.bool_]
+    u: NDArray[np.float64] | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -58,6 +79,8 @@ class MeasuredTable:
     u_clock_s : float
         Standard uncertainty of the offset between the input's clock and the gap's, where that was found from this
         table's own motion; 0 where they share a clock, or nothing is stated.
+    channels : mapping of str to Channel
+        Columns of one's own, such as `right_finger.angle_mrad`.
     """
 
     input_mm: NDArray[np.float64]
@@ -72,6 +95,7 @@ class MeasuredTable:
     slots: tuple[ReferenceSlot, ...] = ()
     path: RecordedPath | None = None
     u_clock_s: float = 0.0
+    channels: Mapping[str, Channel] = field(default_factory=lambda: MappingProxyType({}))
 
     @property
     def shared_clock(self) -> bool:

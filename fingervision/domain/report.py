@@ -18,12 +18,18 @@ class Verdict(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class NamedEffect:
-    """An effect of the answer with its parameters; `points` is the curve of a map, input and error in mm."""
+    """An effect of the answer with its parameters; `points` is the curve of a map, input and error in mm.
+
+    `place` is the hinge or link that it is the effect of, as the drawing calls it, and `end` the end of a link that
+    sits off; empty where the effect has no place.
+    """
 
     name: str
     stage: str
     parameters: Mapping[str, Estimate]
     points: tuple[tuple[float, float], ...] = ()
+    place: str = ""
+    end: str = ""
 
 
 @dataclass(frozen=True, slots=True)

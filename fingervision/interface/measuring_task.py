@@ -11,6 +11,7 @@ from fingervision.domain.drive import DriveHistory
 from fingervision.domain.errors import ArgumentTypeError, UsageError
 from fingervision.domain.region import Region
 from fingervision.frames.array_levels import what_it_is
+from fingervision.gauges.gauge_file import read_gauges
 from fingervision.interface.argument_checks import number, one_of, whole_number
 from fingervision.measuring.scale import Scale, check_px_per_mm
 from fingervision.measuring.task import Task
@@ -96,6 +97,7 @@ def measuring_task(
     face: str = "front",
     overlay: bool = False,
     steps_frame: int | None = None,
+    gauges: Path | None = None,
 ) -> Task:
     """Put options or arguments together; see `fingervision.measure`.
 
@@ -130,6 +132,7 @@ def measuring_task(
         bits=depth,
         fingers_are_dark=FINGERS[one_of("fingers", fingers, FINGERS)],
         is_outline=one_of("face", face, FACES) == "outline",
+        gauges=() if gauges is None else read_gauges(gauges),
     )
 
 

@@ -10,6 +10,7 @@ from fingervision.domain.errors import ExitCode, UsageError
 from fingervision.domain.frame import Frame, LostFrame
 from fingervision.domain.status import Status
 from fingervision.frames.source import FrameSource
+from fingervision.gauges.recording import GaugeRecording
 from fingervision.measuring.clock.alignment import ClockOffset
 from fingervision.measuring.clock.common_clock import join_drive
 from fingervision.measuring.frame_loop import Progress, measure_frames, prepared
@@ -39,17 +40,20 @@ class Measured:
         As in summary.json.
     stopped : bool
         Whether the user stopped it before the recording's end.
+    has_gauge_numbers : bool
+        Whether any gauge gave a number.
     """
 
     folder: OutputFolder
     series: GapSeries
     summary: dict[str, Any] = field(repr=False)
     stopped: bool
+    has_gauge_numbers: bool = False
 
     @property
     def exit_code(self) -> ExitCode:
         """How the measurement ended."""
-        if self.stopped or not self.series.counts[Status.OK]:
+        if self.stopped or not (self.series.counts[Status.OK] or self.has_gauge_numbers):
             return ExitCode.COULD_NOT
         return ExitCode.DAMAGED_INPUT if self.series.counts[Status.DAMAGED] else ExitCode.DONE
 
@@ -94,24 +98,42 @@ def _measured(source: FrameSource, task: Task, out: Path, on_progress: Progress 
     with ExitStack() as stack:
         table = stack.enter_context(GapsCsv(folder.gaps, task.drive_columns))
         video = stack.enter_context(OverlayVideo(folder.overlay, how.description)) if task.overlay else None
+        gauges = (
+            stack.enter_context(
+                GaugeRecording(
+                    task.gauges,
+                    task.scale,
+                    (how.description.width_px, how.description.height_px),
+                    how.settings,
+                    folder.gauges,
+                )
+            )
+            if task.gauges
+            else None
+        )
 
         def take_rows(_: Sequence[Result], rows: Sequence[GapRow]) -> None:
             driven.update(row.input_mm is not None for row in rows)
             table.add(rows)
 
         def see_item(item: Frame | LostFrame, result: Result) -> None:
+            if gauges is not None:
+                gauges.add(item, result.outcome)
             if video is not None and isinstance(item, Frame):
-                video.add(item, result.outcome, how.row_maker.rows([result])[0])
+                row = how.row_maker.rows([result])[0]
+                video.add(item, result.outcome, row, None if gauges is None else gauges.draw)
             if isinstance(item, Frame) and item.index == task.steps_frame:
-                write_steps(item, how.settings, folder.steps)
+                write_steps(item, how.settings, folder.steps, () if gauges is None else gauges.steps(item))
 
-        is_seen = video is not None or task.steps_frame is not None
+        is_seen = video is not None or gauges is not None or task.steps_frame is not None
         stopped = measure_frames(source, how, series, take_rows, see_item if is_seen else None, on_progress)
     clock = clock_for(series, task)
     if isinstance(clock, ClockOffset) and task.drive is not None:
         join_drive(folder.gaps, task.drive, clock)
     draw_gap(folder.figure, series, task.drive, clock_drawn(clock, task))
     summary = summary_of(how, task, series, clock, complete=not stopped)
+    if gauges is not None:
+        summary["gauges"] = gauges.in_words()
     write_summary(folder.summary, summary)
     if not stopped:
         refuse_undriven(task, series, clock, driven, f"in {folder.gaps}")
@@ -120,7 +142,7 @@ def _measured(source: FrameSource, task: Task, out: Path, on_progress: Progress 
             f"--steps must be the number of a frame that can be read, 0 to {series.frames - 1}, "
             f"but is {task.steps_frame}; the gaps are in {folder.gaps}."
         )
-    return Measured(folder, series, summary, stopped)
+    return Measured(folder, series, summary, stopped, gauges is not None and gauges.has_numbers)
 
 
 def refuse_camera(source: FrameSource) -> None:

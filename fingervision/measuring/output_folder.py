@@ -13,6 +13,7 @@ from fingervision.storage.out_folder import make_out_folder, out_folder
 from fingervision.storage.summary_json import recording_of
 
 GAPS, SUMMARY, FIGURE, OVERLAY, STEPS = "gaps.csv", "summary.json", "gap.png", "overlay.mp4", "steps"
+GAUGES = "gauges.csv"
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,6 +26,11 @@ class OutputFolder:
     def gaps(self) -> Path:
         """The table."""
         return self.path / GAPS
+
+    @property
+    def gauges(self) -> Path:
+        """The table of the gauges."""
+        return self.path / GAUGES
 
     @property
     def summary(self) -> Path:
@@ -64,7 +70,7 @@ def claimed(path: Path, recording_files: tuple[Path, ...]) -> OutputFolder:
     UsageError
         The folder is where the recording's images are, or the recording would be replaced.
     """
-    names = (GAPS, SUMMARY, FIGURE, OVERLAY, STEPS)
+    names = (GAPS, GAUGES, SUMMARY, FIGURE, OVERLAY, STEPS)
     for file in recording_files:
         same = file.resolve().parent == path.resolve()
         if same and (len(recording_files) > 1 or file.name in names):

@@ -1,11 +1,13 @@
 """overlay.mp4: the recording with what was measured drawn in, at the recording's own times."""
 
+from collections.abc import Callable
 from fractions import Fraction
 from pathlib import Path
 from types import TracebackType
 
 import av
 import numpy as np
+from numpy.typing import NDArray
 
 from fingervision.domain.errors import FingervisionError
 from fingervision.domain.frame import Frame, LostFrame
@@ -68,8 +70,14 @@ class OverlayVideo:
             if error is None:
                 raise self._failed(failure) from failure
 
-    def add(self, frame: Frame, outcome: GapMeasurement | NoGap | LostFrame, row: GapRow) -> None:
-        """Draw one frame and write it."""
+    def add(
+        self,
+        frame: Frame,
+        outcome: GapMeasurement | NoGap | LostFrame,
+        row: GapRow,
+        draw_more: Callable[[NDArray[np.uint8]], None] | None = None,
+    ) -> None:
+        """Draw one frame and write it; `draw_more` draws into the same picture."""
         time_s = frame.index / SHOWN_AT_HZ if frame.time_s is None else frame.time_s
         if self._first_s is None:
             self._first_s = min(0.0, time_s)  # a video cannot start before 0
@@ -77,7 +85,10 @@ class OverlayVideo:
         if tick <= self._last_tick or isinstance(outcome, LostFrame):
             return
         self._last_tick = tick
-        drawn = np.pad(draw_overlay(frame, outcome, words_of_row(row)), self._pad, mode="edge")
+        canvas = draw_overlay(frame, outcome, words_of_row(row))
+        if draw_more is not None:
+            draw_more(canvas)
+        drawn = np.pad(canvas, self._pad, mode="edge")
         picture = av.VideoFrame.from_ndarray(drawn, format="rgb24")
         picture.pts, picture.time_base = tick, Fraction(1, CLOCK_HZ)
         try:

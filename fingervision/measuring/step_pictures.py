@@ -1,16 +1,19 @@
 """One picture for each step of vision, numbered in their order."""
 
 import re
+from collections.abc import Sequence
 from pathlib import Path
 
 import cv2
 
 from fingervision.domain.errors import FingervisionError
-from fingervision.domain.frame import Frame
+from fingervision.domain.frame import Frame, Pixels
 from fingervision.vision.pipeline import Settings, steps
 
 
-def write_steps(frame: Frame, settings: Settings, folder: Path) -> tuple[Path, ...]:
+def write_steps(
+    frame: Frame, settings: Settings, folder: Path, more: Sequence[tuple[str, Pixels]] = ()
+) -> tuple[Path, ...]:
     """Write every step of one frame as `01_grey.png`, `02_...` and so on.
 
     Parameters
@@ -21,6 +24,8 @@ def write_steps(frame: Frame, settings: Settings, folder: Path) -> tuple[Path, .
         As for its measurement.
     folder : Path
         Made if it is not there.
+    more : sequence of (str, ndarray)
+        Names and pictures of further steps.
 
     Returns
     -------
@@ -35,7 +40,7 @@ def write_steps(frame: Frame, settings: Settings, folder: Path) -> tuple[Path, .
     written = []
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        for number, (name, picture) in enumerate(steps(frame, settings), start=1):
+        for number, (name, picture) in enumerate((*steps(frame, settings), *more), start=1):
             path = folder / f"{number:02d}_{re.sub('[^a-z0-9]+', '_', name.lower()).strip('_')}.png"
             stored = picture if picture.ndim == 2 else cv2.cvtColor(picture, cv2.COLOR_RGB2BGR)
             path.write_bytes(cv2.imencode(".png", stored)[1].tobytes())

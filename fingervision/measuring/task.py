@@ -11,6 +11,7 @@ from fingervision.domain.drive import DriveHistory
 from fingervision.domain.errors import FingervisionError, UsageError
 from fingervision.domain.region import Region
 from fingervision.frames.source import Description
+from fingervision.gauges.gauge_file import Gauge, check_gauges
 from fingervision.measuring.response_budget import choose_response
 from fingervision.measuring.scale import Scale
 from fingervision.vision.pipeline import Settings
@@ -48,6 +49,8 @@ class Task:
         Whether the fingers are darker than the ground; None finds out in every frame.
     is_outline : bool
         Whether a thick part is measured at its whole outline, side walls included, and not at its front face.
+    gauges : tuple of Gauge
+        What is measured beside the gap; none by default.
     """
 
     scale: Scale
@@ -63,6 +66,7 @@ class Task:
     bits: int | None = None
     fingers_are_dark: bool | None = None
     is_outline: bool = False
+    gauges: tuple[Gauge, ...] = ()
 
     def __post_init__(self) -> None:
         if not 0.0 < self.below_tip_mm < float("inf"):
@@ -137,6 +141,7 @@ def check_task(task: Task, description: Description) -> None:
             f"--drive needs a recording with times, but {description.name} has none: "
             "give --rate-hz, or a times.csv beside the images."
         )
+    check_gauges(task.gauges, width_px, height_px)
     try:
         task.scale.check_frame_size(width_px, height_px)
     except ValueError as error:

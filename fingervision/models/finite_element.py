@@ -18,6 +18,7 @@ from fingervision.domain.response import Response
 from fingervision.models.answer_figures import LoadedState, ModelFigures, PeakStress
 from fingervision.models.covered_inputs import covered_inputs_mm
 from fingervision.models.driven_body import Equilibrium
+from fingervision.models.gripper_bodies import gripper_poses, poses_of_plate
 from fingervision.models.gripper_outline import notch_centres_mm
 from fingervision.models.half_plate import half_plate
 from fingervision.models.hinge_correction import HingeTheory
@@ -88,6 +89,11 @@ class FiniteElementGripper:
     def respond(self, input_mm: NDArray[np.float64]) -> Response:
         """Answer statically at each input."""
         return symmetric_response(self.half, self.physics, input_mm)
+
+    def body_poses(self, input_mm: NDArray[np.float64]) -> dict[str, NDArray[np.float64]]:
+        """Answer the poses of the bodies at each input: x_mm, y_mm, angle_mrad, shape (n, 3) each."""
+        poses = poses_of_plate(self.plate, self.gripper, large=self.physics.large_rotation)
+        return gripper_poses(self.half, self.physics, poses, input_mm)
 
     def peak_stress(self) -> PeakStress:
         """Largest von Mises stress on the notches by 1 mm of input; re-entrant corners are singular and left out."""

@@ -25,6 +25,7 @@ def half_mechanism(gripper: Gripper, name: str = "gripper, right half") -> Mecha
         material=gripper.material,
         plate_mm=gripper.body.plate_mm,
         bodies=tuple((True, shape) for shape in _bodies(gripper, 1.0)),
+        body_names=body_names("right"),
         flexures=_flexures(gripper, 1.0, ""),
         fixed=(_foot(gripper, 1.0, "clamp"),),
         slides=((Face("symmetry axis", (0.0, 0.0, low, top)), "x"),),
@@ -63,6 +64,7 @@ def whole_mechanism(left: Gripper, right: Gripper, name: str) -> Mechanism:
         material=right.material,
         plate_mm=right.body.plate_mm,
         bodies=tuple(bodies),
+        body_names=(*body_names("left"), *body_names("right")),
         flexures=tuple(flexures),
         fixed=(_foot(left, -1.0, "left clamp"), _foot(right, 1.0, "right clamp")),
         slides=(),
@@ -71,6 +73,12 @@ def whole_mechanism(left: Gripper, right: Gripper, name: str) -> Mechanism:
         pairs={"gap": ("left tip", "right tip")},
         contacts=(Contact("tips", faces[0], faces[1]),),
     )
+
+
+def body_names(side: str) -> tuple[str, ...]:
+    """Names of the bodies that the shapes of one half belong to, in their order."""
+    finger = f"{side}_finger"
+    return f"{side}_pillar", "drive", "drive", finger, finger, finger
 
 
 def _drive_box(gripper: Gripper) -> tuple[float, float, float, float]:

@@ -5,6 +5,7 @@ from collections.abc import Iterable
 from typing import Protocol, cast
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fingervision.domain.errors import FingervisionError, UsageError
 from fingervision.domain.gripper import Gripper
@@ -36,6 +37,10 @@ class GripperModel(Model, Protocol):
     @property
     def rest_gap_mm(self) -> float:
         """The gap at input zero."""
+        ...
+
+    def body_poses(self, input_mm: NDArray[np.float64]) -> dict[str, NDArray[np.float64]]:
+        """Answer the poses of the bodies at each input: x_mm, y_mm, angle_mrad, shape (n, 3) each."""
         ...
 
     def figures(self) -> ModelFigures:

@@ -15,6 +15,7 @@ from fingervision.domain.response import Response
 from fingervision.models.answer_figures import LoadedState, ModelFigures, PeakStress
 from fingervision.models.covered_inputs import covered_inputs_mm
 from fingervision.models.driven_body import Equilibrium
+from fingervision.models.gripper_bodies import gripper_poses, poses_of_frame
 from fingervision.models.half_frame import frame_of, half_frame
 from fingervision.models.hinge_correction import HingeTheory
 from fingervision.models.hinge_stress import peak_hinge_stress, peak_in_deformed_shape
@@ -81,6 +82,11 @@ class LumpedGripper:
     def respond(self, input_mm: NDArray[np.float64]) -> Response:
         """Answer statically at each input."""
         return symmetric_response(self.half, self.physics, input_mm)
+
+    def body_poses(self, input_mm: NDArray[np.float64]) -> dict[str, NDArray[np.float64]]:
+        """Answer the poses of the bodies at each input: x_mm, y_mm, angle_mrad, shape (n, 3) each."""
+        poses = poses_of_frame(self.gripper, self.skeleton, large=self.physics.large_rotation)
+        return gripper_poses(self.half, self.physics, poses, input_mm)
 
     def peak_stress(self) -> PeakStress:
         """Largest stress in the hinges by 1 mm of input, on the notch or, by beam theory, nominal."""

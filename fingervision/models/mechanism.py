@@ -90,6 +90,8 @@ class Mechanism:
         Pairs of probes whose distance is wanted; a gap is a pair.
     contacts : tuple of Contact
         Faces that may touch.
+    body_names : tuple of str
+        Names of `bodies`, in their order; empty for a shape without one.
     """
 
     name: str
@@ -103,6 +105,7 @@ class Mechanism:
     probes: dict[str, PointMm]
     pairs: dict[str, tuple[str, str]]
     contacts: tuple[Contact, ...] = ()
+    body_names: tuple[str, ...] = ()
 
     @property
     def region(self) -> PlanarRegion:

@@ -15,9 +15,11 @@ from fingervision.models.flexure_span import FlexureSpan, span_of
 from fingervision.models.flexure_stress import nominal_stress_mpa
 from fingervision.models.hinge_correction import HingeTheory
 from fingervision.models.mechanism import Face, Mechanism, check_mechanism
+from fingervision.models.mechanism_bodies import LinkBody, bodies_of
 from fingervision.models.mechanism_faces import driven_components
 from fingervision.models.mechanism_state import MechanismState, pair_distances_mm
 from fingervision.models.planar_region import PlanarRegion
+from fingervision.models.rigid_motion import MRAD, BodyPose
 
 Array = NDArray[np.float64]
 
@@ -54,6 +56,7 @@ class MechanismChain:
         spans = [span_of(flexure, region) for flexure in mechanism.flexures]
         cut = PlanarRegion((*region.steps, *((False, span.slab) for span in spans)), region.marks_mm)
         self._bodies = [loop for loop in cut.loops if loop.area_mm2 > 0.0]
+        self.bodies: tuple[LinkBody, ...] = bodies_of(mechanism, spans)
         # Bodies are rigid: of a leaf all that is free bends.
         self.spans = [span if span.flexure.is_notch else replace(span, cut_mm=span.free_mm) for span in spans]
         self._joins = [self._joined(span) for span in spans]
@@ -212,7 +215,19 @@ class MechanismChain:
             probes[name] = (float(moved[0]), float(moved[1]))
         stress = max(self._stress_mpa(self.spans[place], load) for place in self._path)
         pairs = pair_distances_mm(mechanism, probes, large=False)
-        return MechanismState(input_mm, float(load[:2] @ mechanism.drive.direction), probes, pairs, stress, load, {})
+        return MechanismState(input_mm, float(load[:2] @ mechanism.drive.direction), probes, pairs, stress, load, {},
+                              self._poses(load))  # fmt: skip
+
+    def _poses(self, load: Array) -> dict[str, BodyPose]:
+        """Rigid bodies' motions by a load at the drive."""
+        found = {}
+        for number, body in enumerate(self.bodies):
+            if not body.is_fixed:
+                own = self._reached_by(number)
+                shared = [place for place in self._path if place in own]
+                x, y, angle = self.compliance_at(body.centroid_mm, shared, self._at) @ load
+                found[body.name] = BodyPose(float(x), float(y), MRAD * float(angle))
+        return found
 
     def _reached_by(self, body: int) -> list[int]:
         if body in self._ground:

@@ -25,6 +25,7 @@ from fingervision.models.flexure_span import span_of
 from fingervision.models.flexure_stress import nominal_stress_mpa
 from fingervision.models.hinge_correction import HingeTheory
 from fingervision.models.mechanism import Contact, Mechanism, check_mechanism
+from fingervision.models.mechanism_bodies import LinkBody, bodies_of, plate_poses
 from fingervision.models.mechanism_equilibrium import DrivenMechanism, Gaps
 from fingervision.models.mechanism_state import MechanismState, pair_distances_mm
 from fingervision.models.planar_region import PlanarRegion
@@ -86,13 +87,13 @@ class MechanismFrame:
         places = [frame.at_mm for frame in assembly.frames]
         ends: list[tuple[int, int]] = []
         compliances: list[Array] = []
-        self._segments: list[range] = []
+        self.segments: list[range] = []
         self._masses: list[tuple[tuple[int, int], float, float]] = []
         for span, (first, last) in zip(self.spans, assembly.ends, strict=True):
             stations = span.stations_mm(mechanism.plate_mm)
             nodes = [first, *range(len(places), len(places) + len(stations) - 2), last]
             places += [np.array(span.flexure.point_mm(x, 0.0)) for x in stations[1:-1].tolist()]
-            self._segments.append(range(len(ends), len(ends) + len(stations) - 1))
+            self.segments.append(range(len(ends), len(ends) + len(stations) - 1))
             own = list(pairwise(nodes))
             ends += own
             compliances += list(span.compliances(mechanism.plate_mm, mechanism.material, self.theory,
@@ -103,9 +104,9 @@ class MechanismFrame:
             self._masses += list(zip(own, masses.tolist(), lengths.tolist(), strict=True))
         self.frame = CorotationalFrame(np.array(places), np.array(ends), np.array(compliances))
         prescribed = list(assembly.by_input)
-        self._unit = np.zeros(self.frame.unknowns)
-        self._unit[prescribed] = list(assembly.by_input.values())
-        self._free = np.setdiff1d(np.arange(self.frame.unknowns), [*assembly.held, *prescribed])
+        self.by_input = np.zeros(self.frame.unknowns)
+        self.by_input[prescribed] = list(assembly.by_input.values())
+        self.free = np.setdiff1d(np.arange(self.frame.unknowns), [*assembly.held, *prescribed])
 
     def _tangent(self, moved: Array) -> tuple[csr_matrix, Array]:
         tangent, force = self.frame.internal_force_n(moved)
@@ -125,8 +126,8 @@ class MechanismFrame:
         """Its equilibria."""
         every = identity(self.frame.unknowns, format="csc")
         return DrivenMechanism(
-            self.mechanism.name, self._tangent, lambda moved: self._tangent(moved)[1], csr_matrix(every[:, self._free]),
-            self._unit, tuple(map(self._gaps_of, self.mechanism.contacts)),
+            self.mechanism.name, self._tangent, lambda moved: self._tangent(moved)[1], csr_matrix(every[:, self.free]),
+            self.by_input, tuple(map(self._gaps_of, self.mechanism.contacts)),
         )  # fmt: skip
 
     def _gaps_of(self, contact: Contact) -> Callable[[Array], Gaps]:
@@ -172,14 +173,27 @@ class MechanismFrame:
         share = 1.0 if large_rotation else _TINY * self._size_mm / max(float(np.abs(moved).max()), _TINY)
         loads = self.frame.end_loads(share * moved) / share
         stress = max(nominal_stress_mpa(span, loads[list(own)], mechanism, self.theory)
-                     for span, own in zip(self.spans, self._segments, strict=True))  # fmt: skip
+                     for span, own in zip(self.spans, self.segments, strict=True))  # fmt: skip
+        poses = plate_poses(self.plate, self.bodies, self._field(moved, large=large_rotation), large=large_rotation)
         pairs = pair_distances_mm(mechanism, probes, large=large_rotation)
         pressed = {c.name: float(part.sum()) for c, part in zip(mechanism.contacts, found.pressed_n, strict=False)}
-        return MechanismState(input_mm, found.force_n, probes, pairs, stress, moved, pressed)
+        return MechanismState(input_mm, found.force_n, probes, pairs, stress, moved, pressed, poses)
+
+    @cached_property
+    def bodies(self) -> tuple[LinkBody, ...]:
+        """What the flexures join."""
+        return bodies_of(self.mechanism, self.spans)
+
+    def _field(self, moved: Array, *, large: bool) -> Array:
+        """Displacement of every node of the bodies."""
+        if large:
+            return self.assembly.field(moved)[0]
+        return np.asarray(sum((body.shapes_mm @ moved[body.unknowns] for body in self.assembly.bodies),
+                              np.zeros(self.plate.unknowns)))  # fmt: skip
 
     def _motion(self, moved: Array, point: tuple[float, float], *, large: bool) -> tuple[float, float]:
         """Displacement of a point: of the body that it lies on, or with the nearest section of its flexure."""
-        for span, own in zip(self.spans, self._segments, strict=True):
+        for span, own in zip(self.spans, self.segments, strict=True):
             if span.slab.holds(np.array(point)[:, None])[0]:
                 nodes = np.unique(self.frame.ends[list(own)])
                 node = nodes[np.argmin(np.hypot(*(self.frame.nodes_mm[nodes] - point).T))]
@@ -212,9 +226,9 @@ class MechanismFrame:
             for node in ends:
                 place = np.arange(3 * node, 3 * node + 3)
                 mass[place, place] += 0.5 * weight * np.array([1.0, 1.0, length_mm**2 / 12.0])
-        columns = np.eye(total)[:, np.concatenate([self._free, np.arange(size, total)])]
+        columns = np.eye(total)[:, np.concatenate([self.free, np.arange(size, total)])]
         if not drive_held:
-            columns = np.column_stack([columns, np.append(self._unit, np.zeros(total - size))])
+            columns = np.column_stack([columns, np.append(self.by_input, np.zeros(total - size))])
         K, M = columns.T @ stiffness @ columns, columns.T @ mass @ columns
         # The reciprocal problem: masses may be zero, the stiffness is positive definite.
         last = K.shape[0] - 1

@@ -10,6 +10,7 @@ from scipy.sparse.linalg import eigsh
 from fingervision.domain.errors import FingervisionError
 from fingervision.models.contact_pairs import contact_pair
 from fingervision.models.mechanism import Mechanism, check_mechanism
+from fingervision.models.mechanism_bodies import LinkBody, bodies_of, plate_poses
 from fingervision.models.mechanism_equilibrium import DrivenMechanism
 from fingervision.models.mechanism_faces import driven_components, mean_weights, supports_of, turns_with
 from fingervision.models.mechanism_state import MechanismState, pair_distances_mm
@@ -143,6 +144,11 @@ class MechanismPlate:
         names = [contact.name for contact in self.mechanism.contacts]
         return {n: at for n, at in zip(names, self.driven.touch_inputs_mm(), strict=True) if at is not None}
 
+    @cached_property
+    def bodies(self) -> tuple[LinkBody, ...]:
+        """What the flexures join."""
+        return bodies_of(self.mechanism)
+
     def state(self, input_mm: float, *, large_rotation: bool = False, contact: bool = False) -> MechanismState:
         """Find the equilibrium at one input."""
         mechanism = self.mechanism
@@ -152,7 +158,8 @@ class MechanismPlate:
         pairs = pair_distances_mm(mechanism, probes, large=large_rotation)
         stress = self.plate.von_mises_mpa(moved, large=large_rotation)[:, self._in_flexure]
         pressed = {c.name: float(part.sum()) for c, part in zip(mechanism.contacts, found.pressed_n, strict=False)}
-        return MechanismState(input_mm, found.force_n, probes, pairs, float(stress.max()), moved, pressed)
+        return MechanismState(input_mm, found.force_n, probes, pairs, float(stress.max()), moved, pressed,
+                              plate_poses(self.plate, self.bodies, moved, large=large_rotation))  # fmt: skip
 
     def _motion(self, moved: Array, point: tuple[float, float]) -> tuple[float, float]:
         """Displacement of a point: a quadratic through the nearest nodes, as the elements have it."""

@@ -1,11 +1,14 @@
 """What a mechanism's models answer at one input, whatever their kind."""
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
 
 from fingervision.models.mechanism import Mechanism
+from fingervision.models.rigid_motion import BodyPose
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,6 +30,8 @@ class MechanismState:
         Of every node; of every frame where the model is lumped.
     contact_n : dict of str to float
         Force of every contact pair.
+    bodies : mapping of str to BodyPose
+        Poses of the bodies that move.
     """
 
     input_mm: float
@@ -36,6 +41,7 @@ class MechanismState:
     stress_mpa: float
     displacement_mm: Any
     contact_n: dict[str, float]
+    bodies: Mapping[str, BodyPose] = field(default_factory=lambda: MappingProxyType({}))
 
 
 def pair_distances_mm(

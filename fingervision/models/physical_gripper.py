@@ -18,11 +18,13 @@ from fingervision.domain.parameter import Estimate
 from fingervision.domain.response import Response
 from fingervision.models.drawn_answer import DrawnAnswer
 from fingervision.models.driven_body import DrivenBody
+from fingervision.models.gripper_mechanism import whole_mechanism
 from fingervision.models.half_frame import half_frame
 from fingervision.models.hinge_correction import HingeTheory
 from fingervision.models.kinds import build_model
 from fingervision.models.laws import laws_of
 from fingervision.models.physics import LINEAR
+from fingervision.models.place_answers import PlaceAnswers
 from fingervision.models.redrawn import redrawn
 from fingervision.models.skeleton import skeleton_of
 from fingervision.models.small_answer import SmallAnswer, ratio_curves, small_answer
@@ -76,6 +78,11 @@ class PhysicalGripper:
             *sorted((_SHORTER * length_mm, _LONGER * length_mm)),
         )
         return laws_of(DrawnAnswer(self.gripper, self.theory, body, self.input_range_mm, lever))
+
+    @cached_property
+    def places(self) -> PlaceAnswers:
+        """How both halves answer with one of their places changed, by condensed bodies whatever the kind."""
+        return PlaceAnswers(whole_mechanism(self.gripper, self.gripper, "gripper"))
 
     @property
     def uncertain(self) -> Mapping[str, Estimate]:

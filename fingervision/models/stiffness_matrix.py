@@ -26,6 +26,8 @@ from fingervision.models.answer_figures import ModelFigures
 from fingervision.models.compliance_chain import ComplianceChain
 from fingervision.models.covered_inputs import covered_inputs_mm
 from fingervision.models.grip import Part
+from fingervision.models.gripper_bodies import gripper_poses, poses_of_frame
+from fingervision.models.half_frame import half_frame
 from fingervision.models.hinge_correction import HingeTheory
 from fingervision.models.physics import LINEAR, Physics
 from fingervision.models.skeleton import Member, skeleton_of
@@ -171,6 +173,14 @@ class StiffnessMatrixGripper:
         inputs = np.asarray(input_mm, dtype=float)
         right = 0.5 * (self.rest_gap_mm + self.gap_per_input * inputs)
         return Response(left_mm=-right, right_mm=right, force_n=self.input_stiffness_n_mm * inputs)
+
+    def body_poses(self, input_mm: Array) -> dict[str, Array]:
+        """Answer the poses of the bodies at each input: x_mm, y_mm, angle_mrad, shape (n, 3) each.
+
+        The matrix is condensed from the members; here the same members are kept.
+        """
+        poses = poses_of_frame(self.gripper, self.skeleton, large=False)
+        return gripper_poses(half_frame(self.gripper, self.skeleton), LINEAR, poses, input_mm)
 
     @cached_property
     def _corner_per_input(self) -> float:

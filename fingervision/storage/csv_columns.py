@@ -55,6 +55,18 @@ def read_columns(path: Path, required: tuple[str, ...], known: tuple[str, ...]) 
     return found
 
 
+def header_of(path: Path) -> list[str]:
+    """Names of the columns of a table.
+
+    Raises
+    ------
+    FingervisionError
+        The file cannot be read.
+    """
+    header = next(_reader(path, _text(path)), None)
+    return [] if header is None else [cell.strip() for cell in header[1]]
+
+
 def _without_quotes(text: str, names: list[str], wanted: list[str]) -> dict[str, list[str]] | None:
     """Read the wanted columns of a table without quotes, several times faster; None where a row must be looked at."""
     if '"' in text:

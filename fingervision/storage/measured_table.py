@@ -2,12 +2,14 @@
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from types import MappingProxyType
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fingervision.domain.errors import FingervisionError
 from fingervision.domain.measured_table import MeasuredTable, RecordedPath
+from fingervision.storage.channel_columns import channels_of, read_channels
 from fingervision.storage.csv_columns import read_block, read_columns
 from fingervision.storage.iso230_table import Iso230Rows, read_iso230_table
 from fingervision.storage.number_columns import Numbers, numbers_in
@@ -36,9 +38,12 @@ def read_measured_table(path: Path) -> MeasuredTable:
         return targets_as_rows(path, targets)
     block = read_block(path)
     if block is not None and {"input_mm", "gap_mm"} <= block.keys() and "run" not in block:
-        return measured_rows(path, {name: Numbers.whole(block[name]) for name in NUMBERS if name in block}, None)
-    cells = read_columns(path, ("input_mm", "gap_mm"), (*NUMBERS[2:], "run"))
-    return measured_rows(path, _numbers(path, cells), cells.get("run"))
+        values, runs = {name: Numbers.whole(block[name]) for name in NUMBERS if name in block}, None
+    else:
+        cells = read_columns(path, ("input_mm", "gap_mm"), (*NUMBERS[2:], "run"))
+        values, runs = _numbers(path, cells), cells.get("run")
+    channels, said = read_channels(path, NUMBERS)
+    return measured_rows(path, values, runs, said, channels=channels)
 
 
 def targets_as_rows(path: Path, targets: Iso230Rows, notes: Sequence[str] = ()) -> MeasuredTable:
@@ -58,6 +63,7 @@ def measured_rows(
     said: Sequence[str] = (),
     *,
     count_rows: bool = True,
+    channels: Mapping[str, Numbers] = MappingProxyType({}),
 ) -> MeasuredTable:
     """Put the columns of a measured table into order, and refuse what cannot be worked with.
 
@@ -73,6 +79,8 @@ def measured_rows(
         What the reader has to say of the table, a sentence each.
     count_rows : bool
         Whether to say how many rows have no value.
+    channels : mapping of str to Numbers
+        Columns of one's own and their `u_`.
 
     Raises
     ------
@@ -141,6 +149,7 @@ def measured_rows(
         slots=slots_beside(path),
         path=along,
         u_clock_s=u_clock_beside(path),
+        channels=channels_of(channels, kept[order]),
     )
 
 

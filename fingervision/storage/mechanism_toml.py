@@ -153,6 +153,7 @@ def mechanism_from_tables(tables: Mapping[str, Any], origin: str) -> Mechanism:
         drive=reader.drive(tables),
         probes={name: p for t in reader.sections(tables, "probe", least=0) for name, p in [reader.probe(t)]},
         pairs={},
+        body_names=tuple(str(table.get("name", "")) for table in reader.sections(tables, "body")),
         contacts=tuple(reader.contact(t, i) for i, t in enumerate(reader.sections(tables, "contact", least=0), 1)),
     )
     pairs = {name: ends for t in reader.sections(tables, "pair", least=0) for name, ends in [reader.pair(t, mechanism)]}

@@ -9,16 +9,19 @@ from pathlib import Path
 
 import numpy as np
 
+from fingervision.domain.effect import effect_key, split_key
 from fingervision.domain.errors import FingervisionError
 from fingervision.domain.parameter import Estimate
 from fingervision.effects import catalogue
 from fingervision.effects.position_error_map import curve_points, curve_values
 from fingervision.models.corrected import CorrectedModel
+from fingervision.models.drawn_mechanism import MechanismModelOfGap
 from fingervision.models.function_model import SUFFIXES, FunctionModel
 from fingervision.models.kinds import kinds
 from fingervision.models.physical_gripper import PhysicalGripper
 from fingervision.models.table import TableModel
 from fingervision.storage.gripper_toml import read_gripper
+from fingervision.storage.mechanism_toml import is_mechanism, read_mechanism
 from fingervision.storage.plain_file import plain
 from fingervision.storage.simulation_table import read_simulation_table
 
@@ -90,13 +93,15 @@ def read_model(
                 for name, value in parameters.items()
             }
             curve = curve_values([at for at, _ in points], [error for _, error in points])
-            effects[str(entry["name"])] = stated | {name: Estimate(value, None) for name, value in curve.items()}
+            key = effect_key(str(entry["name"]), str(entry.get("place", "")), str(entry.get("end", "")))
+            effects[key] = stated | {name: Estimate(value, None) for name, value in curve.items()}
         except (KeyError, TypeError, ValueError, AttributeError, OverflowError) as error:
             raise FingervisionError(
                 f"An effect in {path} must have a name and parameters like play_mm = {{ value = 0.01, u = 0.001 }}, "
                 f"but is {entry}: mend it."
             ) from error
-    for name, values in effects.items():
+    for key, values in effects.items():
+        name = split_key(key)[0]
         _check(name, values, path)
         _check_curve(name, values, path)
     return CorrectedModel(base.name, base.base, base.base_path, base.input_range_mm, effects, base.kind)
@@ -159,6 +164,9 @@ def _gripper(path: Path, kind: str) -> CorrectedModel:
         raise FingervisionError(
             f"The kind of model for {path} must be one of {', '.join(kinds())}, but is {kind}: choose one."
         )
+    if is_mechanism(path):
+        drawn = MechanismModelOfGap(read_mechanism(path), kind)
+        return CorrectedModel(f"{path.name} ({kind})", drawn, str(path), drawn.input_range_mm, {}, kind)
     gripper = PhysicalGripper(read_gripper(path), kind)
     return CorrectedModel(f"{path.name} ({kind})", gripper, str(path), gripper.input_range_mm, {}, kind)
 
@@ -170,7 +178,11 @@ def write_model(
     base = Path(os.path.relpath(base_path.resolve(), path.parent.resolve())).as_posix()
     lines = ["schema = 1", f"base = {json.dumps(base, ensure_ascii=False)}", *([f'kind = "{kind}"'] if kind else [])]
     for name, parameters in effects.items():
-        lines += ["", "[[effect]]", f'name = "{name}"', "[effect.parameters]"]
+        effect, place, end = split_key(name)
+        lines += ["", "[[effect]]", f'name = "{effect}"']
+        lines += [f"place = {json.dumps(place, ensure_ascii=False)}"] if place else []
+        lines += [f"end = {json.dumps(end, ensure_ascii=False)}"] if end else []
+        lines.append("[effect.parameters]")
         inputs, errors = curve_points({key: estimate.value for key, estimate in parameters.items()})
         if inputs.size:
             pairs = ", ".join(

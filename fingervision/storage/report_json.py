@@ -54,9 +54,12 @@ def report_document(report: DiagnosisReport, model_path: str | None, recipe_path
 
 
 def _effect(effect: NamedEffect) -> dict[str, object]:
-    """An effect for programs; points stand there where it has a curve."""
+    """An effect for programs; points stand there where it has a curve, and place and end where it has a place."""
     document = asdict(effect)
     points = document.pop("points")
+    for name in ("place", "end"):
+        if not document[name]:
+            del document[name]
     return {**document, "points": [list(point) for point in points]} if points else document
 
 

@@ -1,15 +1,36 @@
-"""Write a simulation table, `input_mm,gap_mm,left_mm,right_mm[,force_n]`, from a model's answer."""
+"""Write a simulation table, `input_mm,gap_mm,left_mm,right_mm[,force_n]` and poses of bodies, from a model's answer."""
 
 import csv
+from collections.abc import Mapping
 from pathlib import Path
+from types import MappingProxyType
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fingervision.domain.response import Response
 
+POSE = ("x_mm", "y_mm", "angle_mrad")
+"""Of every body: displacement of the centroid of its area as drawn, and rotation from x (right) towards y (up)."""
 
-def write_simulation(path: Path, input_mm: NDArray[np.float64], response: Response) -> None:
+
+def pose_columns(bodies: Mapping[str, NDArray[np.float64]]) -> dict[str, NDArray[np.float64]]:
+    """Name the columns of poses, `body.x_mm`, `body.y_mm`, `body.angle_mrad`, body by body.
+
+    Parameters
+    ----------
+    bodies : mapping of str to ndarray of float, shape (n, 3)
+        Poses of every body.
+    """
+    return {f"{name}.{part}": rows[:, place] for name, rows in bodies.items() for place, part in enumerate(POSE)}
+
+
+def write_simulation(
+    path: Path,
+    input_mm: NDArray[np.float64],
+    response: Response,
+    bodies: Mapping[str, NDArray[np.float64]] = MappingProxyType({}),
+) -> None:
     """Write one row an input; `fingervision.storage.simulation_table` reads it.
 
     Parameters
@@ -20,6 +41,8 @@ def write_simulation(path: Path, input_mm: NDArray[np.float64], response: Respon
         Inputs.
     response : Response
         The model's answer to them.
+    bodies : mapping of str to ndarray of float, shape (n, 3)
+        Poses of the bodies, at the end of the table.
     """
     columns = {
         "input_mm": input_mm,
@@ -29,6 +52,7 @@ def write_simulation(path: Path, input_mm: NDArray[np.float64], response: Respon
     }
     if response.force_n is not None:
         columns["force_n"] = response.force_n
+    columns |= pose_columns(bodies)
     with path.open("w", encoding="utf-8", newline="") as file:
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(columns)

@@ -36,6 +36,7 @@ def bench() -> History:
         opening_mm=GAIN * 1.4,
         closing_mm=GAIN * 0.4,
         force=True,
+        bodies=True,
     )
 
 

@@ -10,6 +10,7 @@ from fingervision.diagnosis.report.frame_strip import strip_html
 from fingervision.diagnosis.report.positioning_of_data import positioning_section
 from fingervision.diagnosis.report.report_page import curves_of, report_page
 from fingervision.diagnosis.report.residual_figure import residual_figure
+from fingervision.domain.effect import effect_key
 from fingervision.domain.parameter import Estimate
 from fingervision.effects.position_error_map import curve_values
 from fingervision.models.corrected import CorrectedModel
@@ -59,5 +60,6 @@ def corrected(done: Diagnosis, model: CorrectedModel) -> CorrectedModel:
     effects: dict[str, Mapping[str, Estimate]] = dict(model.effects)
     for effect in done.report.effects:
         curve = curve_values([at for at, _ in effect.points], [error for _, error in effect.points])
-        effects[effect.name] = {**effect.parameters, **{name: Estimate(value, None) for name, value in curve.items()}}
+        key = effect_key(effect.name, effect.place, effect.end)
+        effects[key] = {**effect.parameters, **{name: Estimate(value, None) for name, value in curve.items()}}
     return replace(model, effects=effects)

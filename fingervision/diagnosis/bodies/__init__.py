@@ -1,0 +1,1 @@
+"""Which body and which hinge: poses of a mechanism's bodies beside its drawing."""

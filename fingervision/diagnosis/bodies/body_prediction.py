@@ -1,0 +1,179 @@
+"""What a drawing foretells of every channel of a measured table, with one of its places changed or none."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fingervision.models.mechanism import Mechanism
+from fingervision.models.mechanism_bodies import column_name
+from fingervision.models.place_answers import AS_DRAWN, LinearAnswer, PlaceAnswers, PlaceChanges
+
+Array = NDArray[np.float64]
+
+_BENT_NODES = (-1.0, -0.5, 0.35, 0.7, 1.0)
+"""Shares of the input's range on either side at which equilibria in the deformed shape are found."""
+_SLIP_NODES = np.geomspace(1e-3, 1e3, 121)
+"""Inputs over the play's radius at which the slip of a pivot is worked out; beyond, it stands at its edge."""
+FORCE = "force_n"
+
+
+@dataclass(frozen=True, eq=False)
+class BodyPrediction:
+    """A drawing's answer over the inputs of a table, in the channels that were measured.
+
+    Parameters
+    ----------
+    answers : PlaceAnswers
+        The drawing.
+    channels : tuple of str
+        Channels of the table, as the drawing calls them.
+    input_mm : ndarray of float, shape (n,)
+        What the mechanism received.
+    """
+
+    answers: PlaceAnswers
+    channels: tuple[str, ...]
+    input_mm: Array
+    _cache: dict[object, LinearAnswer] = field(default_factory=dict)
+
+    @cached_property
+    def _places(self) -> list[int]:
+        return [self.answers.channels.index(name) for name in self.channels]
+
+    def linear(self, changes: PlaceChanges = AS_DRAWN) -> LinearAnswer:
+        """Answer of all channels with some places changed; kept, for a search asks for the same ones again."""
+        key = (
+            tuple(sorted(changes.stiffness.items())),
+            tuple(sorted(changes.moved_mm.items())),
+            tuple(sorted(changes.probes_mm.items())),
+        )
+        if key not in self._cache:
+            self._cache[key] = self.answers.answer(changes)
+        return self._cache[key]
+
+    @cached_property
+    def drawn(self) -> Array:
+        """As drawn, by small displacements; shape (n, channels)."""
+        return np.outer(self.input_mm, self.linear().by_input[self._places])
+
+    def changed(self, changes: PlaceChanges) -> Array:
+        """What changed places add to it, shape (n, channels)."""
+        return np.outer(self.input_mm, (self.linear(changes).by_input - self.linear().by_input)[self._places])
+
+    @cached_property
+    def bent(self) -> Array:
+        """What equilibrium in the deformed shape adds, shape (n, channels); a polynomial of order 2 to 4."""
+        model, names = self.answers.model, self.answers.channels
+        reach = float(np.abs(self.input_mm).max())
+        low = float(np.clip(-self.input_mm.min() / reach, 0.0, 1.0))
+        high = float(np.clip(self.input_mm.max() / reach, 0.0, 1.0))
+        inputs = [share * reach * (high if share > 0.0 else low) for share in _BENT_NODES]
+        inputs = [value for value in inputs if abs(value) > 0.05 * reach]
+        rows = []
+        for value in inputs:
+            state = model.state(value, large_rotation=True)
+            found: dict[str, float] = {FORCE: state.force_n}
+            for name, pose in state.bodies.items():
+                for part in ("x_mm", "y_mm", "angle_mrad"):
+                    found[f"{name}.{part}"] = getattr(pose, part)
+            for name, (x, y) in state.probes_mm.items():
+                found |= {f"{name}_x_mm": x, f"{name}_y_mm": y}
+            pairs = self.answers.mechanism.pairs
+            probes = self.answers.mechanism.probes
+            for name, length in state.pairs_mm.items():
+                a, b = (np.array(probes[end]) for end in pairs[name])
+                found[f"{name}_mm"] = length - float(np.hypot(*(b - a)))
+            for place, hinge in enumerate(self.answers.mechanism.flexures):
+                first, last = (self._angle_of(found, body) for body in self.answers.ends(place))
+                found[f"{hinge.name}.angle_mrad"] = last - first
+            small = value * self.linear().by_input
+            rows.append([found[name] - small[place] for place, name in enumerate(names)])
+        u = np.array(inputs) / reach
+        powers = np.stack([u**2, u**3, u**4], axis=1)[:, : min(3, u.size)]
+        shape = np.linalg.lstsq(powers, np.array(rows), rcond=None)[0][:, self._places]
+        w = self.input_mm / reach
+        return np.asarray(np.stack([w**2, w**3, w**4], axis=1)[:, : shape.shape[0]] @ shape)
+
+    def _angle_of(self, found: dict[str, float], body: int) -> float:
+        """Rotation of a body by its number; what is fixed stands."""
+        assembly = self.answers.model.assembly
+        nodes = np.flatnonzero(assembly.piece == body)
+        middle = assembly.plate.nodes_mm[:, nodes].mean(axis=1)
+        bodies = self.answers.model.bodies
+        nearest = min(bodies, key=lambda each: float(np.hypot(*(each.centroid_mm - middle))))
+        return found.get(f"{nearest.name}.angle_mrad", 0.0)
+
+    def slipped(self, flexure: int, play_mm: float) -> Array:
+        """What a pivot's play adds, shape (n, channels): see `slip_mm`."""
+        slip = slip_mm(self.linear(), flexure, self.input_mm, play_mm)
+        return np.asarray(slip @ self.linear().by_slip[flexure][self._places].T)
+
+    def turned(self) -> Array:
+        """What a drawing that is turned in the picture adds by 1 rad, shape (n, channels)."""
+        out = np.zeros_like(self.drawn)
+        for place, name in enumerate(self.channels):
+            for own, other, sign in ((".x_mm", ".y_mm", -1.0), (".y_mm", ".x_mm", 1.0)):
+                if name.endswith(own) and (partner := name.removesuffix(own) + other) in self.answers.channels:
+                    source = self.answers.channels.index(partner)
+                    out[:, place] = sign * self.input_mm * self.linear().by_input[source]
+        return out
+
+
+def slip_mm(answer: LinearAnswer, flexure: int, input_mm: Array, play_mm: float) -> Array:
+    """Work out how far a pivot with play slips, along x and y, without friction; shape (n, 2).
+
+    The pin finds the place in its hole where the elastic energy is least: with the force F on it by the input u and
+    the stiffness S against a slip s, s S s / 2 - u F s in the disc of half the play (a trust-region problem: More and
+    Sorensen (1983), SIAM Journal on Scientific and Statistical Computing 4, 553, DOI 10.1137/0904038). Around zero it
+    follows the load; beyond, it stands at the edge, on the side to which the load points.
+
+    Parameters
+    ----------
+    answer : LinearAnswer
+        Of the mechanism.
+    flexure : int
+        The pivot.
+    input_mm : ndarray of float, shape (n,)
+        Inputs.
+    play_mm : float
+        Full width of the play.
+    """
+    radius = 0.5 * play_mm
+    if radius <= 0.0:
+        return np.zeros((input_mm.size, 2))
+    stiffness, vectors = np.linalg.eigh(answer.slip_stiffness[flexure])
+    load = vectors.T @ answer.load_by_input[flexure]
+    nodes = _SLIP_NODES
+
+    def length(beyond: Array) -> Array:
+        return np.asarray(np.hypot(*(nodes * (load / (stiffness + beyond[:, None])).T)))
+
+    # Newton's iteration on 1 / |s| converges from the left of the root; bisection on a bracket is as quick here.
+    low = np.zeros(nodes.size)
+    high = nodes * float(np.hypot(*load)) + 1e-12
+    outside = length(low) > 1.0
+    for _ in range(80):
+        middle = 0.5 * (low + high)
+        above = length(middle) > 1.0
+        low, high = np.where(above, middle, low), np.where(above, high, middle)
+    beyond = np.where(outside, 0.5 * (low + high), 0.0)
+    unit = (vectors @ (nodes[:, None] * load / (stiffness + beyond[:, None])).T).T
+    away = np.abs(input_mm) / radius
+    grid = np.concatenate([[0.0], nodes])
+    table = np.vstack([np.zeros((1, 2)), unit])
+    rows = np.stack([np.interp(away, grid, table[:, k]) for k in range(2)], axis=1)
+    return np.asarray(radius * np.sign(input_mm)[:, None] * rows)
+
+
+def known_channels(answers: PlaceAnswers, measured: Sequence[str]) -> dict[str, str]:
+    """Find what the drawing calls the channels of a table: letters, digits and `_` of a name count alone."""
+    own = {column_name(name): name for name in answers.channels}
+    return {name: own[column_name(name)] for name in measured if column_name(name) in own}
+
+
+def answers_of(mechanism: Mechanism) -> PlaceAnswers:
+    """Build the answers of a drawing."""
+    return PlaceAnswers(mechanism)

@@ -1,0 +1,140 @@
+"""Noise of many channels at once: what they share (the input's error, a shaken camera) and what follows from before."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import BSpline
+
+Array = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+
+_KNOTS = 8
+"""Pieces of the curve over the input that is taken for no noise, whatever causes it."""
+_FEWEST_A_PIECE = 12
+_OUTLIER = 5.0
+"""Standard deviations from that curve beyond which a row is set aside: 1 in 2 million by chance."""
+_MOST_CORRELATED = 0.97
+_RANK = 1e-9
+"""Of the largest variance of scaled channels: less is a channel that follows from the others exactly."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ChannelNoise:
+    """What makes the noise of all channels white, of unit variance and independent.
+
+    Parameters
+    ----------
+    mixing : ndarray of float, shape (channels, k)
+        Takes rows of channels to k independent components.
+    correlation : ndarray of float, shape (k,)
+        Of neighbouring rows of a run, by component.
+    runs : tuple of slice
+        Rows of each run.
+    kept : ndarray of bool, shape (n,)
+        Rows that are no outliers.
+    sd : ndarray of float, shape (channels,)
+        Standard deviation of one reading.
+    degrees : int
+        Degrees of freedom of the estimate.
+    """
+
+    mixing: Array
+    correlation: Array
+    runs: tuple[slice, ...]
+    kept: Flags
+    sd: Array
+    degrees: int
+
+    def whitened(self, rows: Array) -> Array:
+        """Whiten signals of all channels.
+
+        Parameters
+        ----------
+        rows : ndarray of float, shape (n, channels)
+            A signal.
+
+        Returns
+        -------
+        ndarray of float, shape (n * k,)
+            Rows that are set aside are zero.
+        """
+        mixed = np.where(self.kept[:, None], rows, 0.0) @ self.mixing
+        out = np.empty_like(mixed)
+        root = np.sqrt(1.0 - self.correlation**2)
+        for run in self.runs:
+            out[run] = mixed[run] / root
+            out[run][1:] -= self.correlation * mixed[run][:-1] / root
+            out[run][:1] *= root
+        return np.asarray(np.where(self.kept[:, None], out, 0.0).ravel())
+
+
+def channel_noise(
+    residual: Array, input_mm: Array, runs: tuple[slice, ...], floors: Array, *, timed: bool
+) -> ChannelNoise:
+    """Estimate the noise of all channels from what no smooth curve over the input follows.
+
+    Parameters
+    ----------
+    residual : ndarray of float, shape (n, channels)
+        Measured minus predicted.
+    input_mm : ndarray of float, shape (n,)
+        Inputs.
+    runs : tuple of slice
+        Rows of each run.
+    floors : ndarray of float, shape (channels,)
+        Least noise of each channel: what was stated with the readings, or their last digit.
+    timed : bool
+        Whether the order of rows is that of time, so that neighbours may share their noise.
+    """
+    curves = _curves(input_mm, runs, timed=timed)
+    kept = np.ones(input_mm.size, dtype=bool)
+    for _ in range(3):
+        fitted = curves @ np.linalg.lstsq(curves[kept], residual[kept], rcond=None)[0]
+        rest = residual - fitted
+        spread = np.maximum(1.4826 * np.median(np.abs(rest[kept]), axis=0), 1e-12)
+        aside = np.any(np.abs(rest) > _OUTLIER * np.maximum(spread, floors), axis=1)
+        if np.array_equal(kept, ~aside):
+            break
+        kept = ~aside
+    degrees = max(int(kept.sum()) - curves.shape[1], 1)
+    covariance = rest[kept].T @ rest[kept] / degrees
+    short = np.maximum(floors**2 - np.diag(covariance), 0.0)
+    covariance = covariance + np.diag(short)
+    sd = np.sqrt(np.maximum(np.diag(covariance), 1e-24))
+    values, vectors = np.linalg.eigh(covariance / np.outer(sd, sd))
+    used = values > _RANK * values.max()
+    mixing = (vectors[:, used] / np.sqrt(values[used])) / sd[:, None]
+    correlation = np.zeros(int(used.sum()))
+    if timed:
+        mixed = np.where(kept[:, None], rest @ mixing, 0.0)
+        products, squares, pairs = np.zeros(correlation.size), np.zeros(correlation.size), 0
+        for run in runs:
+            products += np.sum(mixed[run][1:] * mixed[run][:-1], axis=0)
+            squares += np.sum(mixed[run] ** 2, axis=0)
+            pairs += max(run.stop - run.start - 1, 0)
+        found = products / np.maximum(squares, 1e-300)
+        # A fitted curve takes some of the slow part with it: Marriott and Pope's bias, (1 + 3 rho) / n a constant.
+        found += (1.0 + 3.0 * found) * curves.shape[1] / max(2 * pairs, 1)
+        # Less than chance gives is none: a wrong correlation of 2 / sqrt(n) costs nothing that shows.
+        correlation = np.where(found > 2.0 / np.sqrt(max(pairs, 1)), np.clip(found, 0.0, _MOST_CORRELATED), 0.0)
+    return ChannelNoise(mixing, correlation, runs, kept, sd, degrees)
+
+
+def _curves(input_mm: Array, runs: tuple[slice, ...], *, timed: bool) -> Array:
+    """Cubic splines over the input, a constant a run, and the direction of motion."""
+    low, high = float(input_mm.min()), float(input_mm.max())
+    pieces = int(np.clip(input_mm.size // _FEWEST_A_PIECE, 1, _KNOTS))
+    inner = np.linspace(low, high, pieces + 1)
+    knots = np.concatenate([[low] * 3, inner, [high] * 3])
+    columns = [BSpline.design_matrix(np.clip(input_mm, low, high), knots, 3).toarray()]
+    for run in runs[1:]:
+        own = np.zeros((input_mm.size, 1))
+        own[run] = 1.0
+        columns.append(own)
+    if timed:
+        way = np.concatenate([np.sign(np.gradient(input_mm[run])) if run.stop - run.start > 1 else np.zeros(1)
+                              for run in runs])  # fmt: skip
+        if np.ptp(way) > 0.0:
+            columns.append(way[:, None])
+    return np.hstack(columns)

@@ -1,0 +1,133 @@
+"""The next view: which body to film or where to put a marker, so that places that look alike are told apart."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fingervision.diagnosis.bodies.body_evidence import GAP, BodyEvidence
+from fingervision.diagnosis.bodies.body_prediction import FORCE, BodyPrediction
+from fingervision.diagnosis.bodies.place_candidates import candidates_of
+from fingervision.diagnosis.bodies.place_search import ALIKE, Fitted
+from fingervision.models.place_answers import PlaceAnswers
+
+Array = NDArray[np.float64]
+
+ASSUMED = {"_mm": 0.001, "mrad": 0.05, "ce_n": 0.01}
+"""Standard uncertainty of one reading of a view that was not taken yet, where nothing like it was measured: a pose of a
+link of 15 mm at 34 px/mm; a load cell of 0.2 % of 5 N."""
+MOST_MEMBERS = 6
+
+
+@dataclass(frozen=True, slots=True)
+class NextView:
+    """A view that would tell places apart.
+
+    Parameters
+    ----------
+    channels : tuple of str
+        What to measure besides.
+    expected : float
+        Chi-square by which it is expected to separate the best explanation from the nearest other one.
+    separates : tuple of str
+        Explanations that it is expected to tell from the best.
+    words : str
+        A sentence.
+    """
+
+    channels: tuple[str, ...]
+    expected: float
+    separates: tuple[str, ...]
+    words: str
+
+
+def next_view(evidence: BodyEvidence, answers: PlaceAnswers) -> NextView | None:
+    """Choose the view that separates the members of a set best; None where none separates any.
+
+    Each view is judged by the squared whitened distance that it adds between the best explanation at its size and
+    every other one at the size that comes nearest in that view and in what was measured, constants free (T-optimality:
+    Atkinson and Fedorov (1975), Biometrika 62, 57, DOI 10.1093/biomet/62.1.57).
+
+    Parameters
+    ----------
+    evidence : BodyEvidence
+        What the channels said.
+    answers : PlaceAnswers
+        The drawing.
+    """
+    members = _distinct(evidence.findings.members)[:MOST_MEMBERS]
+    if len(members) < 2:
+        return None
+    best, others = members[0], members[1:]
+    full = BodyPrediction(answers, answers.channels, evidence.prediction.input_mm)
+    known = {each.full_key: each for each in candidates_of(full)}
+    added = {m.candidate.full_key: known[m.candidate.full_key].added(m.size) for m in members}
+    found: list[tuple[float, int, NextView]] = []
+    for label, channels in _views(answers, evidence):
+        columns = [answers.channels.index(name) for name in channels]
+        sigma = np.array([_sigma(name, evidence) for name in channels])
+        gains = []
+        for other in others:
+            one = _centred(added[best.candidate.full_key][:, columns]) / sigma
+            two = _centred(added[other.candidate.full_key][:, columns]) / sigma
+            gains.append(_expected(best, other, one.ravel(), two.ravel()))
+        told = tuple(o.candidate.key for o, gain in zip(others, gains, strict=True) if gain > ALIKE)
+        if told:
+            least = min(gain for gain in gains if gain > ALIKE)
+            words = (
+                f"measuring {label} as well (u {_stated(channels, sigma)}) is expected to tell "
+                f"{best.candidate.key} from {' and from '.join(told)} (expected chi-square "
+                f"{least:.0f} and more)."
+            )
+            found.append((min(gains), len(told), NextView(channels, float(min(gains)), told, words)))
+    return max(found, key=lambda entry: (entry[1], entry[0]))[2] if found else None
+
+
+def _distinct(members: Sequence[Fitted]) -> list[Fitted]:
+    first: dict[str, Fitted] = {}
+    for member in members:
+        first.setdefault(member.candidate.key, member)
+    return list(first.values())
+
+
+def _expected(best: Fitted, other: Fitted, one: Array, two: Array) -> float:
+    """Distance in what was measured and in the new view together, the other's size refitted."""
+    norm = float(other.signature @ other.signature + two @ two)
+    shared = float(best.signature @ other.signature + one @ two)
+    total = float(best.signature @ best.signature + one @ one)
+    return total - shared**2 / max(norm, 1e-300)
+
+
+def _views(answers: PlaceAnswers, evidence: BodyEvidence) -> list[tuple[str, tuple[str, ...]]]:
+    """Bodies whose pose, and points whose motion, was not measured; the force."""
+    measured = set(evidence.prediction.channels)
+    views: list[tuple[str, tuple[str, ...]]] = []
+    for body in answers.moving_bodies:
+        names = tuple(f"{body}.{part}" for part in ("x_mm", "y_mm", "angle_mrad"))
+        if missing := tuple(name for name in names if name not in measured):
+            views.append((f"the pose of {body} (film its edges or put markers on it)", missing))
+    for probe in answers.mechanism.probes:
+        names = tuple(f"{probe}_{axis}_mm" for axis in "xy")
+        if not measured & set(names):
+            views.append((f"a marker at {probe}", names))
+    views += [("the force at the drive", (FORCE,))] if FORCE not in measured else []
+    return views
+
+
+def _sigma(channel: str, evidence: BodyEvidence) -> float:
+    """Noise of a view: the median of what was measured in that unit."""
+    sd = [float(own) for own, name in zip(evidence.findings.noise.sd, evidence.prediction.channels, strict=True)
+          if name[-4:] == channel[-4:] and name != GAP]  # fmt: skip
+    return float(np.median(sd)) if sd else next(value for end, value in ASSUMED.items() if channel.endswith(end))
+
+
+def _centred(rows: Array) -> Array:
+    return np.asarray(rows - rows.mean(axis=0))
+
+
+def _stated(channels: Sequence[str], sigma: Array) -> str:
+    units = {"mrad": "mrad", "_mm": "mm", "ce_n": "N"}
+    said = {next(unit for end, unit in units.items() if c.endswith(end)): f"{s:.2g}"
+            for c, s in zip(channels, sigma, strict=True)}  # fmt: skip
+    return ", ".join(f"{value} {unit}" for unit, value in said.items())

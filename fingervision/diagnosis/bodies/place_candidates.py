@@ -1,0 +1,246 @@
+"""Explanations that have a place: this hinge, this link, this pivot; and those that have none but look alike."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from math import hypot
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fingervision.diagnosis.bodies.body_prediction import BodyPrediction
+from fingervision.domain.effect import effect_key
+from fingervision.domain.parameter import Parameter
+from fingervision.models.drawn_mechanism import GAP
+from fingervision.models.place_answers import AS_DRAWN, PlaceChanges, attachments
+
+Array = NDArray[np.float64]
+Added = Callable[[float], Array]
+
+RATIO = Parameter("ratio", "", -0.9, 0.9, "relative error", typical=0.1)
+LENGTH_RATIO = Parameter("ratio", "", -0.1, 0.1, "relative error of the length", typical=0.01)
+PLAY = Parameter("play_mm", "mm", 0.0, 0.5, "full width of the play", typical=0.02)
+LEVER = Parameter("ratio", "", -0.3, 0.3, "relative error of the opening", typical=0.01)
+SHARE = Parameter("share", "", -0.5, 0.5, "of the opening that the right finger has more than half", typical=0.01)
+_LEAST_SCALE = 0.05
+"""Relative change of the opening by a relative change of a link: with less a link is no lever of it."""
+_MIRRORED = 1e-3
+"""Of a drawing's size: how near a place must lie to another's mirror image to be its partner."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Candidate:
+    """One explanation with one parameter.
+
+    Parameters
+    ----------
+    name : str
+        Effect of the catalogue.
+    place : str
+        Hinge or link as the drawing calls it; empty for an effect that has no place.
+    parameter : Parameter
+        Its size.
+    reference : float
+        A size at which a signature is told.
+    added : callable
+        Size to what it adds to every channel, shape (n, channels).
+    part : str
+        What differs there: `hinge`, `link`, `pair` of links, or `pivot`.
+    detail : str
+        Which end of a link was moved, in words.
+    changes : callable
+        Size to what differs from the drawing; nothing for a pivot and for what has no place.
+    """
+
+    name: str
+    place: str
+    parameter: Parameter
+    reference: float
+    added: Added
+    part: str = ""
+    detail: str = ""
+    changes: Callable[[float], PlaceChanges] = lambda size: AS_DRAWN
+
+    @property
+    def key(self) -> str:
+        """Name and place as a report spells them: `hinge_stiffness_error@right hinge 2`."""
+        return effect_key(self.name, self.place)
+
+    @property
+    def full_key(self) -> str:
+        """The same with the end of a link that sits off, as a `model.toml` tells it."""
+        return effect_key(self.name, self.place, self.detail)
+
+
+def candidates_of(prediction: BodyPrediction) -> tuple[Candidate, ...]:
+    """List the explanations that a drawing has a place for, and those without a place that poses can tell."""
+    found = [*_hinges(prediction), *_links(prediction), *_pivots(prediction)]
+    found += [*_pairs(prediction, found), *_without_place(prediction)]
+    return tuple(found)
+
+
+def _hinges(prediction: BodyPrediction) -> list[Candidate]:
+    return [
+        Candidate("hinge_stiffness_error", flexure.name, RATIO, 0.05, _stiffer(prediction, number), "hinge")
+        for number, flexure in enumerate(prediction.answers.mechanism.flexures)
+    ]
+
+
+def _stiffer(prediction: BodyPrediction, flexure: int) -> Added:
+    return lambda ratio: prediction.changed(PlaceChanges({flexure: ratio}, {}, {}))
+
+
+def _links(prediction: BodyPrediction) -> list[Candidate]:
+    """Links between what holds a body: one end sits too far out along the line that joins both.
+
+    Of a body that many flexures hold, each is joined to the nearest others (a minimum spanning tree).
+    """
+    mechanism, found = prediction.answers.mechanism, []
+    numbers = {flexure.name: place for place, flexure in enumerate(mechanism.flexures)}
+    bodies = prediction.answers.numbered_bodies()
+    for number, points in enumerate(attachments(prediction.answers)):
+        body = bodies[number].name
+        for one, other in _tree(points):
+            for start, end in ((one, other), (other, one)):
+                if end in numbers:
+                    way = np.subtract(points[end], points[start])
+                    place = f"{body}, {' to '.join(sorted((one, other)))}"
+                    found.append(_link(prediction, place, f"{end} sits off", _moved(numbers[end], way)))
+        # A probe hangs on the nearest flexure of its body.
+        for probe, at in mechanism.probes.items():
+            own = [name for name in points if name in numbers]
+            if own and prediction.answers.body_of_probe(probe) == number:
+                start = min(own, key=lambda name: hypot(*np.subtract(at, points[name])))
+                way = np.subtract(at, points[start])
+                place = f"{body}, {start} to {probe}"
+                found.append(_link(prediction, place, f"{probe} sits off", _farther(probe, way)))
+    return found
+
+
+def _link(prediction: BodyPrediction, place: str, detail: str, changes: Callable[[float], PlaceChanges]) -> Candidate:
+    return Candidate("link_length_error", place, LENGTH_RATIO, 0.003, _changed(prediction, changes), "link", detail,
+                     changes)  # fmt: skip
+
+
+def _moved(flexure: int, way: Array) -> Callable[[float], PlaceChanges]:
+    return lambda ratio: PlaceChanges({}, {flexure: (float(ratio * way[0]), float(ratio * way[1]))}, {})
+
+
+def _farther(probe: str, way: Array) -> Callable[[float], PlaceChanges]:
+    return lambda ratio: PlaceChanges({}, {}, {probe: (float(ratio * way[0]), float(ratio * way[1]))})
+
+
+def _changed(prediction: BodyPrediction, changes: Callable[[float], PlaceChanges]) -> Added:
+    return lambda size: prediction.changed(changes(size))
+
+
+def _tree(points: object) -> list[tuple[str, str]]:
+    """Join points by the shortest lines (Prim's algorithm)."""
+    places = dict(points)  # type: ignore[call-overload]
+    names = list(places)
+    inside, joins = names[:1], []
+    while len(inside) < len(names):
+        one, other = min(
+            ((a, b) for a in inside for b in names if b not in inside),
+            key=lambda join: hypot(*np.subtract(places[join[0]], places[join[1]])),
+        )
+        joins.append((one, other))
+        inside.append(other)
+    return joins
+
+
+def _pivots(prediction: BodyPrediction) -> list[Candidate]:
+    return [
+        Candidate("hinge_play", flexure.name, PLAY, 0.01, _slipping(prediction, number), "pivot")
+        for number, flexure in enumerate(prediction.answers.mechanism.flexures)
+    ]
+
+
+def _slipping(prediction: BodyPrediction, flexure: int) -> Added:
+    return lambda play_mm: prediction.slipped(flexure, play_mm)
+
+
+def _pairs(prediction: BodyPrediction, singles: Sequence[Candidate]) -> list[Candidate]:
+    """A link and its mirror image together: both alike change the lever ratio, oppositely the symmetry."""
+    found = []
+    mirrored = mirror_of(prediction)
+    by_key = {(each.place, each.detail): each for each in singles if each.name == "link_length_error"}
+    for (place, detail), one in by_key.items():
+        twin = (mirrored(place), mirrored(detail))
+        if twin in by_key and (place, detail) < twin:
+            other = by_key[twin]
+            both = f"{place} and its mirror image"
+            for name, sign, parameter in (("lever_ratio_error", 1.0, LEVER), ("assembly_asymmetry", -1.0, SHARE)):
+                scale = _by_length(prediction, one, other, sign)
+                if abs(scale) > _LEAST_SCALE:
+                    found.append(Candidate(name, both, parameter, scale * one.reference,
+                                           _together(one, other, sign, scale), "pair", detail))  # fmt: skip
+    return found
+
+
+def _by_length(prediction: BodyPrediction, one: Candidate, other: Candidate, sign: float) -> float:
+    """Ratio of the openings, or share of the right finger, by a relative change of both links' lengths."""
+    answers = prediction.answers
+    if GAP not in answers.mechanism.pairs:
+        return 0.0
+    drawn = prediction.linear().by_input
+    changes = [each.changes(size) for each, size in ((one, one.reference), (other, sign * one.reference))]
+    moved = sum(((prediction.linear(each).by_input - drawn) for each in changes), np.zeros_like(drawn))
+    at = answers.channels.index
+    opening = drawn[at(f"{GAP}_mm")]
+    if sign > 0.0:
+        return float(moved[at(f"{GAP}_mm")] / opening / one.reference)
+    middle = 0.5 * sum(float(moved[at(f"{probe}_x_mm")]) for probe in answers.mechanism.pairs[GAP])
+    return middle / float(opening) / one.reference
+
+
+def _together(one: Candidate, other: Candidate, sign: float, scale: float) -> Added:
+    return lambda size: one.added(size / scale) + other.added(sign * size / scale)
+
+
+def mirror_of(prediction: BodyPrediction) -> Callable[[str], str]:
+    """Return what exchanges every hinge, probe and body in a text for its mirror image about x = 0."""
+    answers = prediction.answers
+    size = answers.mechanism.region.size_mm
+    at = {flexure.name: flexure.at_mm for flexure in answers.mechanism.flexures} | answers.mechanism.probes
+    at |= {face.name: (0.5 * (face.box_mm[0] + face.box_mm[1]), 0.5 * (face.box_mm[2] + face.box_mm[3]))
+           for face in answers.mechanism.fixed}  # fmt: skip
+    at |= {body.name: (float(body.centroid_mm[0]), float(body.centroid_mm[1])) for body in answers.model.bodies}
+    twins = {}
+    for name, (x, y) in at.items():
+        for other, (there_x, there_y) in at.items():
+            if other != name and hypot(there_x + x, there_y - y) < _MIRRORED * size:
+                twins[name] = other
+
+    def mirrored(text: str) -> str:
+        parts = [", ".join(sorted_pair.split(", ")) for sorted_pair in [text]]
+        body, _, rest = parts[0].partition(", ")
+        if not rest:
+            name = body.removesuffix(" sits off")
+            return twins.get(name, name) + body.removeprefix(name)
+        ends = [twins.get(end, end) for end in rest.split(" to ")]
+        order = sorted(ends) if all(end not in answers.mechanism.probes for end in ends) else ends
+        return f"{twins.get(body, body)}, {' to '.join(order)}"
+
+    return mirrored
+
+
+def mirrored_channels(prediction: BodyPrediction) -> dict[str, tuple[str, float]]:
+    """Channels whose mirror image was measured too, and the sign with which they are alike."""
+    mirrored, found = mirror_of(prediction), {}
+    for name in prediction.channels:
+        body, dot, part = name.rpartition(".")
+        twin = f"{mirrored(body)}{dot}{part}"
+        if dot and twin != name and twin in prediction.channels:
+            found[name] = twin, 1.0 if part == "y_mm" else -1.0
+    return found
+
+
+def _without_place(prediction: BodyPrediction) -> list[Candidate]:
+    """Errors of the recorded input and of the picture's scale."""
+    is_mm = np.array([name.endswith("_mm") for name in prediction.channels])
+    return [
+        Candidate("input_scale", "", Parameter("ratio", "", -0.3, 0.3, "relative error", typical=0.01), 0.01,
+                  lambda ratio: ratio * prediction.drawn),
+        Candidate("scale_error", "", Parameter("ratio", "", -0.2, 0.2, "relative error", typical=0.01), 0.01,
+                  lambda ratio: ratio * prediction.drawn * is_mm),
+    ]  # fmt: skip

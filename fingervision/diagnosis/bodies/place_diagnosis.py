@@ -1,0 +1,262 @@
+"""The diagnosis of a table with poses of bodies: the place first, then what the gap says beside it."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fingervision.diagnosis.bodies.body_evidence import (
+    GAP,
+    BodyEvidence,
+    added_everywhere,
+    body_evidence,
+    drawing_of,
+)
+from fingervision.diagnosis.bodies.body_prediction import FORCE, known_channels
+from fingervision.diagnosis.bodies.next_view import next_view
+from fingervision.diagnosis.bodies.place_search import Fitted
+from fingervision.diagnosis.bodies.place_words import body_places, set_words
+from fingervision.diagnosis.inference.verdict import STANDING_SHARE
+from fingervision.domain.effect import DriveEffect, split_key
+from fingervision.domain.errors import FingervisionError
+from fingervision.domain.measured_table import MeasuredTable
+from fingervision.domain.parameter import Estimate
+from fingervision.domain.report import DiagnosisReport, Disagreement, NamedEffect, Verdict
+from fingervision.effects import catalogue
+from fingervision.models.corrected import CorrectedModel
+from fingervision.models.drawn_mechanism import GAP as GAP_PAIR
+from fingervision.models.place_answers import PlaceAnswers
+
+if TYPE_CHECKING:
+    from fingervision.diagnosis.diagnose import Diagnosis
+
+Array = NDArray[np.float64]
+Explain = Callable[[MeasuredTable, CorrectedModel], "Diagnosis"]
+
+ONLY_SLOPES = ("input_scale", "input_offset")
+"""Effects of the drive that look like one of the mechanism over any input: poses are to decide on them."""
+
+
+def without_places(table: MeasuredTable, model: CorrectedModel) -> tuple[MeasuredTable, CorrectedModel]:
+    """Take the effects with a place that a corrected model has out of the table; itself where it has none.
+
+    Raises
+    ------
+    FingervisionError
+        A place is not one of the drawing's.
+    """
+    placed = {key: next(iter(values.values())).value for key, values in model.effects.items() if split_key(key)[1]}
+    if not placed:
+        return table, model
+    answers = drawing_of(model)
+    added = None if answers is None else added_everywhere(answers, table.input_mm, placed)
+    if answers is None or added is None:
+        raise FingervisionError(
+            f"The effects of the model must have places that {model.base_path} draws, but {' and '.join(placed)} "
+            "have not: diagnose again, or leave them out."
+        )
+    rest = {key: values for key, values in model.effects.items() if key not in placed}
+    return _less(table, added, answers), replace(model, effects=rest)
+
+
+def diagnose_with_bodies(
+    table: MeasuredTable, model: CorrectedModel, explain: Explain, rng: np.random.Generator
+) -> "Diagnosis":
+    """Explain a table with channels of its own.
+
+    Parameters
+    ----------
+    table : MeasuredTable
+        With channels.
+    model : CorrectedModel
+        The model, without effects that have a place.
+    explain : callable
+        Explains the gap of a table by the catalogue.
+    rng : numpy Generator
+        For thresholds.
+    """
+    answers = drawing_of(model)
+    first = explain(table if answers is None else _beside_condensed(table, model, answers), model)
+    if answers is None:
+        named = ", ".join(table.channels)
+        return _noted(first, (f"{named}: not compared, for the model draws no bodies; give a gripper.toml or "
+                              "mechanism.toml as --model.",))  # fmt: skip
+    driven_mm = _driven_input(first)
+    evidence, notes = body_evidence(table, answers, driven_mm, rng)
+    if evidence is None:
+        return _noted(first, notes)
+    findings = evidence.findings
+    first = replace(first, report=replace(first.report, where=_where(first.report, evidence, answers)))
+    if not findings.members or findings.structure:
+        notes = (*notes, _nothing_named(evidence))
+        return _measured_bodies(_noted(first, notes), evidence)
+    best = findings.members[0]
+    added = added_everywhere(answers, driven_mm, {best.candidate.full_key: best.size})
+    if added is None:
+        raise AssertionError(best.candidate.full_key)
+    seen = _less(table, added, answers)
+    second = explain(_beside_condensed(seen, model, answers), model)
+    left_mm, whole_mm = (each.report.disagreement.before_rms_mm for each in (second, first))
+    if left_mm < STANDING_SHARE * whole_mm:
+        # The form of an explanation is off by that much of it: no second cause is named for the rest.
+        second = _place_alone(second)
+    return _measured_bodies(_composed(first, second, evidence, answers, notes), evidence)
+
+
+def _place_alone(done: "Diagnosis") -> "Diagnosis":
+    """Name nothing beside the place."""
+    d = done.report.disagreement
+    report = replace(
+        done.report,
+        verdict=Verdict.AGREES,
+        effects=(),
+        alternatives=(),
+        unknown=None,
+        next_run=None,
+        disagreement=replace(d, after_rms_mm=d.before_rms_mm, unseen_after_rms_mm=d.unseen_before_rms_mm),
+        remaining=f"The remaining difference is {d.before_rms_mm:.3g} mm RMS: noise, or the form of the explanation.",
+    )
+    return replace(done, report=report, after_mm=done.before_mm)
+
+
+def _beside_condensed(table: MeasuredTable, model: CorrectedModel, answers: PlaceAnswers) -> MeasuredTable:
+    """Hold a gap against the drawing's condensed bodies: bars joined at points differ from them by some 0.1 %."""
+    u = np.array([0.0, 1.0])
+    bare = model.base.respond(u)
+    drawn = answers.answer().by_input
+    at = answers.channels.index
+    apart = float(bare.gap_mm[1] - bare.gap_mm[0]) - float(drawn[at(GAP)])
+    changed = replace(table, gap_mm=table.gap_mm + apart * table.input_mm)
+    if table.force_n is None or bare.force_n is None:
+        return changed
+    by_force = float(bare.force_n[1] - bare.force_n[0]) - float(drawn[at(FORCE)])
+    return replace(changed, force_n=table.force_n + by_force * table.input_mm)
+
+
+def _driven_input(done: "Diagnosis") -> Array:
+    """What the mechanism received: the recorded input behind what the gap says of the drive, but for its scale."""
+    chain = done.data.chain
+    history = chain.history if chain.path is None else chain.path.history
+    input_mm = history.input_mm
+    values = {**chain.fixed, **{e.name: {n: p.value for n, p in e.parameters.items()} for e in done.report.effects}}
+    for name, effect in chain.effects.items():
+        if name in values and isinstance(effect, DriveEffect) and name not in ONLY_SLOPES and not effect.curve:
+            input_mm = effect.act(input_mm, history, values[name])
+    return np.asarray(input_mm if chain.path is None else input_mm[chain.path.rows])
+
+
+def _less(table: MeasuredTable, added: Mapping[str, Array], answers: PlaceAnswers) -> MeasuredTable:
+    """Take what an explanation adds out of a table."""
+    changes: dict[str, object] = {"gap_mm": table.gap_mm - added[GAP]}
+    if table.midline_mm is not None:
+        first, last = answers.mechanism.pairs[GAP_PAIR]
+        apart = np.subtract(answers.mechanism.probes[last], answers.mechanism.probes[first])
+        way = apart / np.hypot(*apart)
+        middle = 0.5 * sum(
+            added[f"{probe}_{axis}_mm"] * way[k] for probe in (first, last) for k, axis in enumerate("xy")
+        )
+        # A picture may show the drawing upside down: the side to which the middle goes tells.
+        rest = table.midline_mm - np.median(table.midline_mm)
+        sign = 1.0 if float(rest @ (middle - middle.mean())) >= 0.0 else -1.0
+        changes["midline_mm"] = table.midline_mm - sign * middle
+    if table.force_n is not None:
+        changes["force_n"] = table.force_n - added[FORCE]
+    known = known_channels(answers, tuple(table.channels))
+    changes["channels"] = {
+        name: replace(channel, value=channel.value - added[known[name]]) if name in known else channel
+        for name, channel in table.channels.items()
+    }
+    return replace(table, **changes)  # type: ignore[arg-type]
+
+
+def _noted(done: "Diagnosis", notes: tuple[str, ...]) -> "Diagnosis":
+    return replace(done, report=replace(done.report, notes=(*done.report.notes, *notes)))
+
+
+def _nothing_named(evidence: BodyEvidence) -> str:
+    compared = ", ".join(evidence.names)
+    if evidence.findings.structure:
+        return (
+            f"poses of bodies ({compared}): they differ from the drawing in a way that no single hinge, link or pivot "
+            "explains; what is said above is the gap's answer alone."
+        )
+    return f"poses of bodies ({compared}) agree with the drawing: no hinge, link or pivot differs that would show."
+
+
+def _where(report: DiagnosisReport, evidence: BodyEvidence, answers: PlaceAnswers) -> tuple:  # type: ignore[type-arg]
+    return (*report.where, *body_places(evidence, answers))
+
+
+def _measured_bodies(done: "Diagnosis", evidence: BodyEvidence) -> "Diagnosis":
+    """Add what the channels say to the tables of a report: disagreement by channel, detection limits by place."""
+    report, findings = done.report, evidence.findings
+    channels: dict[str, Mapping[str, float]] = dict(report.disagreement.by_channel)
+    for place, name in enumerate(evidence.names):
+        unit = "mrad" if name.endswith("_mrad") else "mm"
+        kept = findings.noise.kept
+        channels[name] = {
+            f"before_rms_{unit}": float(np.sqrt(np.mean(findings.before[kept, place] ** 2))),
+            f"after_rms_{unit}": float(np.sqrt(np.mean(findings.after[kept, place] ** 2))),
+        }
+    smallest = dict(report.smallest_seen) | {
+        key: {"parameter": candidate.parameter.name, "size": size, "unit": candidate.parameter.unit}
+        for key, (candidate, size) in findings.smallest.items()
+        if candidate.place and size <= candidate.parameter.upper
+    }
+    disagreement = replace(report.disagreement, by_channel=channels)
+    return replace(done, report=replace(report, disagreement=disagreement, smallest_seen=smallest), bodies=evidence)
+
+
+def _composed(
+    first: "Diagnosis", second: "Diagnosis", evidence: BodyEvidence, answers: PlaceAnswers, notes: tuple[str, ...]
+) -> "Diagnosis":
+    """Put the place and what the gap says beside it together."""
+    members, rest = evidence.findings.members, second.report
+    best = members[0]
+    keys = list(dict.fromkeys(member.candidate.key for member in members))
+    beside = rest.alternatives or ((),)
+    alternatives = tuple((key, *names) for key in keys for names in beside)
+    verdict = Verdict.NAMED
+    if rest.verdict is Verdict.UNKNOWN:
+        verdict = Verdict.UNKNOWN
+    elif len(alternatives) > 1:
+        verdict = Verdict.AMBIGUOUS
+    before, after = first.report.disagreement, rest.disagreement
+    disagreement = Disagreement(
+        before.before_rms_mm, after.after_rms_mm, after.noise_rms_mm, before.unseen_before_rms_mm,
+        after.unseen_after_rms_mm, before.by_channel,
+    )  # fmt: skip
+    share = float(np.clip(1.0 - (after.after_rms_mm / max(before.before_rms_mm, 1e-300)) ** 2, 0.0, 1.0))
+    view = next_view(evidence, answers)
+    said = set_words(members)
+    sentence = f"Poses of the bodies tell the place: {said} (95 %)."
+    if len(keys) > 1:
+        sentence = f"Poses of the bodies tell the place but for this set: {said} (95 % each)."
+    if rest.verdict is not Verdict.AGREES:
+        sentence += f" Beside it: {rest.sentence}"
+    report = replace(
+        rest,
+        verdict=verdict,
+        sentence=sentence,
+        effects=(_named(best), *rest.effects),
+        alternatives=alternatives,
+        where=first.report.where,
+        disagreement=disagreement,
+        explained_share=share,
+        standing_share=float(np.sqrt(1.0 - share)),
+        runners_up=first.report.runners_up,
+        notes=(*rest.notes, *notes, *(() if view is None else (f"next view: {view.words}",))),
+        seconds=first.report.seconds + rest.seconds,
+    )
+    return replace(second, report=report, data=first.data, before_mm=first.before_mm)
+
+
+def _named(best: Fitted) -> NamedEffect:
+    candidate = best.candidate
+    estimates = {candidate.parameter.name: Estimate(best.size, best.u, candidate.parameter.unit)}
+    for parameter in catalogue()[candidate.name].parameters:
+        estimates.setdefault(parameter.name, Estimate(parameter.neutral or 0.0, None, parameter.unit))
+    return NamedEffect(candidate.name, str(catalogue()[candidate.name].stage), estimates, (), candidate.place,
+                       candidate.detail)  # fmt: skip

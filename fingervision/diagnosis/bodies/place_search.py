@@ -1,0 +1,322 @@
+"""Which place explains what poses and gap show, and the set of places that these data cannot tell apart."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import chi2
+
+from fingervision.diagnosis.bodies.body_prediction import FORCE, BodyPrediction
+from fingervision.diagnosis.bodies.channel_noise import ChannelNoise, channel_noise
+from fingervision.diagnosis.bodies.place_candidates import Candidate, candidates_of, mirror_of, mirrored_channels
+
+Array = NDArray[np.float64]
+
+SLOPE_ERROR, OWN_SLOPE_ERROR = 1e-4, 3e-5
+"""Of the largest slope of its unit: how far a drawing's lumped answer may be off in any channel, and by how much of it
+otherwise than in the mirror image of that channel. Beside finite elements poses of the sample are within 5e-5, and its
+halves alike to 2e-6 (`tests/models/test_body_poses.py` holds 3e-4 of every drawing)."""
+FORCE_SLOPE_ERROR = 0.05
+"""Relative: the modulus of a printed or rolled sheet is known no better (mechanics.md, section 5)."""
+HINGE_ERROR, OWN_HINGE_ERROR = 0.01, 0.003
+"""Relative: the tables of hinges beside bricks, and what a body's own root adds (`models/README.md`); and what of it is
+not shared with the hinge's mirror image."""
+SCALE_ERROR = 3e-4
+"""Relative: of the picture's scale, from a reference of 2 mm known to a micrometre and its edges (measuring.md)."""
+ALIKE = 12.0
+"""Squared whitened distance within which two explanations are not told apart, as in `inference/ambiguity_set`."""
+NOT_REFUTED = 6.0
+"""Chi-square behind the best within which data do not speak against an explanation (Cox, 1961)."""
+FALSE_CLAIMS = 0.02
+"""Share of tables of noise alone in which the largest gain of all exceeds the threshold."""
+DRAWS = 4000
+REFINED = 0.25
+"""Of the largest gain: what gains less in its signature alone is not looked at more closely."""
+STRUCTURE = 1e-3
+"""Significance beyond which what an explanation leaves is structure and no noise."""
+STRUCTURE_SHARE = 0.05
+"""Of what was explained: less structure than this is the form of the explanation (`STANDING_SHARE` of the gap)."""
+PLAYS_MM = np.geomspace(0.002, 0.5, 25)
+STEPS = 4
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Fitted:
+    """A candidate with its size.
+
+    Parameters
+    ----------
+    candidate : Candidate
+        What it is.
+    size, u : float
+        Its parameter with its standard uncertainty.
+    gain : float
+        Fall of chi-square.
+    signature : ndarray of float
+        What it explains, whitened, beside what nobody knows.
+    """
+
+    candidate: Candidate
+    size: float
+    u: float
+    gain: float
+    signature: Array
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PlaceFindings:
+    """What poses say.
+
+    Parameters
+    ----------
+    members : tuple of Fitted
+        The best explanation and all that these data cannot tell from it; empty where there is nothing to explain.
+    limit : float
+        Fall of chi-square that a claim needs.
+    structure : float
+        Chi-square of generic shapes in what the best explanation leaves, where it is no noise; 0 where it is.
+    smallest : dict of str to (Candidate, float)
+        Size of every candidate that these data would have shown.
+    noise : ChannelNoise
+        Of all channels.
+    before, after : ndarray of float, shape (n, channels)
+        Measured minus predicted, constants and the drawing's place in the picture taken out.
+    """
+
+    members: tuple[Fitted, ...]
+    limit: float
+    structure: float
+    smallest: dict[str, tuple[Candidate, float]]
+    noise: ChannelNoise
+    before: Array
+    after: Array
+
+
+class PlaceSearch:
+    """Poses, and whatever else the drawing foretells, beside the drawing.
+
+    Parameters
+    ----------
+    prediction : BodyPrediction
+        The drawing over the inputs of the table.
+    measured : ndarray of float, shape (n, channels)
+        What was measured.
+    runs : tuple of slice
+        Rows of each run.
+    floors : ndarray of float, shape (channels,)
+        Least noise of each channel.
+    timed : bool
+        Whether rows are ordered by time.
+    """
+
+    def __init__(
+        self, prediction: BodyPrediction, measured: Array, runs: tuple[slice, ...], floors: Array, *, timed: bool
+    ) -> None:
+        self.prediction, self.measured, self.runs = prediction, measured, runs
+        self.residual = measured - prediction.drawn
+        self.noise = channel_noise(self.residual, prediction.input_mm, runs, floors, timed=timed)
+        self.candidates = candidates_of(prediction)
+        self._nuisances()
+        self._left = self._beside(self.noise.whitened(self.residual))
+
+    def _nuisances(self) -> None:
+        """Columns of what nobody knows, and how far each may go: infinite where nothing is known of it."""
+        prediction, columns, spread = self.prediction, [], []
+        n, count = self.residual.shape
+        slopes = prediction.linear().by_input[[prediction.answers.channels.index(c) for c in prediction.channels]]
+        twins = mirrored_channels(prediction)
+        for channel, name in enumerate(prediction.channels):
+            for run in self.runs:
+                own = np.zeros((n, count))
+                own[run, channel] = 1.0
+                columns.append(own)
+                spread.append(np.inf)
+            largest = [abs(s) for s, c in zip(slopes, prediction.channels, strict=True) if c[-4:] == name[-4:]]
+            size = (FORCE_SLOPE_ERROR if name == FORCE else SLOPE_ERROR) * max(largest)
+            twin, sign = twins.get(name, (name, 1.0))
+            own = np.zeros((n, count))
+            own[:, channel] = prediction.input_mm
+            if twin != name:
+                columns.append(own)
+                spread.append(OWN_SLOPE_ERROR / SLOPE_ERROR * size)
+                own = own.copy()
+                own[:, prediction.channels.index(twin)] = sign * prediction.input_mm
+            if name <= twin:
+                columns.append(own)
+                spread.append(size)
+        is_mm = np.array([name.endswith("_mm") for name in prediction.channels])
+        columns += [prediction.bent, prediction.drawn * is_mm]
+        spread += [np.inf, SCALE_ERROR]
+        turned = prediction.turned()
+        if np.any(turned):
+            columns.append(turned)
+            spread.append(np.inf)
+        mirrored = mirror_of(prediction)
+        hinges = {c.place: c.added(c.reference) / c.reference for c in self.candidates if c.part == "hinge"}
+        for hinge, own in hinges.items():
+            twin = mirrored(hinge)
+            if twin != hinge and twin in hinges:
+                columns.append(own)
+                spread.append(OWN_HINGE_ERROR)
+                own = own + hinges[twin]
+            if hinge <= twin:
+                columns.append(own)
+                spread.append(HINGE_ERROR)
+        whitened = np.array([self.noise.whitened(column) for column in columns]).T
+        size = np.maximum(np.linalg.norm(whitened, axis=0), 1e-300)
+        bounded = np.array([0.0 if not np.isfinite(s) else 1.0 / s for s in spread])
+        self._columns, self._unit = columns, size
+        stacked = np.vstack([whitened / size, np.diag(bounded / size)])
+        self._basis, self._triangle = np.linalg.qr(stacked)
+        self._rows = whitened.shape[0]
+
+    def _beside(self, signal: Array) -> Array:
+        """What is left of a whitened signal beside what nobody knows."""
+        padded = np.concatenate([signal, np.zeros(self._basis.shape[0] - signal.size)])
+        return np.asarray(padded - self._basis @ (self._basis.T @ padded))
+
+    def _constants_out(self, rows: Array) -> Array:
+        """Take the fitted nuisances out of a residual, in its own units; shape (n, channels)."""
+        padded = np.concatenate([self.noise.whitened(rows), np.zeros(self._basis.shape[0] - self._rows)])
+        shares = np.linalg.lstsq(self._triangle, self._basis.T @ padded, rcond=None)[0] / self._unit
+        return np.asarray(rows - sum(s * column for s, column in zip(shares, self._columns, strict=True)))
+
+    def signature(self, candidate: Candidate, size: float) -> Array:
+        """What a candidate of a size adds, whitened, beside what nobody knows."""
+        return self._beside(self.noise.whitened(candidate.added(size)))
+
+    def fit(self, candidate: Candidate) -> Fitted:
+        """Fit a candidate's size to what is left, at first by its signature at the reference size."""
+        left = self._left
+        if candidate.name == "hinge_play":
+            return self._fit_play(candidate)
+        unit = self.signature(candidate, candidate.reference) / candidate.reference
+        return self._fitted(candidate, unit, left)
+
+    def _fitted(self, candidate: Candidate, unit: Array, left: Array) -> Fitted:
+        norm = float(unit @ unit)
+        if norm <= 0.0:
+            return Fitted(candidate, 0.0, np.inf, 0.0, np.zeros_like(left))
+        own = candidate.parameter
+        size = float(np.clip(unit @ left / norm, own.lower, own.upper))
+        signature = size * unit
+        gain = float(left @ left - np.sum((left - signature) ** 2))
+        return Fitted(candidate, size, norm**-0.5, max(gain, 0.0), signature)
+
+    def _fit_play(self, candidate: Candidate) -> Fitted:
+        """Scan the play: where it is taken up depends on its width."""
+        left, found = self._left, []
+        for play_mm in PLAYS_MM:
+            unit = self.signature(candidate, float(play_mm)) / play_mm
+            norm = float(unit @ unit)
+            ratio = float(unit @ left) / max(norm * play_mm, 1e-300)
+            # A width explains itself where what is left asks for about that width.
+            signature = play_mm * unit
+            found.append((float(2.0 * signature @ left - signature @ signature), float(play_mm), norm, ratio))
+        gain, size, norm, ratio = max(found)
+        for _ in range(STEPS):
+            trial = float(np.clip(size * np.clip(ratio, 0.7, 1.4), PLAYS_MM[0], PLAYS_MM[-1]))
+            unit = self.signature(candidate, trial) / trial
+            better = float(2.0 * trial * (unit @ left) - trial**2 * (unit @ unit))
+            if better <= gain:
+                break
+            gain, size, norm = better, trial, float(unit @ unit)
+            ratio = float(unit @ left) / max(norm * trial, 1e-300)
+        signature = self.signature(candidate, size)
+        return Fitted(candidate, size, max(norm, 1e-300) ** -0.5, max(gain, 0.0), signature)
+
+    def refined(self, fitted: Fitted) -> Fitted:
+        """Fit again by the signature at the size that was found, until that changes nothing."""
+        if fitted.candidate.name == "hinge_play":
+            return fitted
+        for _ in range(STEPS):
+            if fitted.size == 0.0:
+                return fitted
+            unit = self.signature(fitted.candidate, fitted.size) / fitted.size
+            again = self._fitted(fitted.candidate, unit, self._left)
+            settled = abs(again.size - fitted.size) < 0.1 * again.u
+            fitted = again
+            if settled:
+                break
+        return fitted
+
+    def limit(self, rng: np.random.Generator, first: Sequence[Fitted]) -> float:
+        """Fall of chi-square that the best of all candidates exceeds seldom in noise alone."""
+        units = np.array([f.signature / np.linalg.norm(f.signature) for f in first if np.any(f.signature)])
+        if not units.size:
+            return float("inf")
+        values, vectors = np.linalg.eigh(units @ units.T)
+        draws = rng.standard_normal((DRAWS, values.size)) * np.sqrt(np.maximum(values, 0.0)) @ vectors.T
+        quantile = float(np.quantile(np.max(draws**2, axis=1), 1.0 - FALSE_CLAIMS))
+        # The noise is estimated too: Hotelling's T-squared instead of chi-square.
+        count, degrees = self.noise.mixing.shape[1], self.noise.degrees
+        return float(quantile * degrees / max(degrees - count - 1, 1))
+
+    def structure(self, left: Array) -> float:
+        """Chi-square of generic shapes (bends, kinks and directions of every channel) in what is left."""
+        u = self.prediction.input_mm
+        reach = max(float(np.abs(u).max()), 1e-12)
+        shapes = [u / reach, (u / reach) ** 2, np.abs(u) / reach, np.tanh(8.0 * u / reach)]
+        probes = []
+        for channel in range(self.residual.shape[1]):
+            for shape in shapes:
+                own = np.zeros_like(self.residual)
+                own[:, channel] = shape
+                probes.append(self._beside(self.noise.whitened(own)))
+        basis, values, _ = np.linalg.svd(np.array(probes).T, full_matrices=False)
+        basis = basis[:, values > 1e-6 * values.max()]
+        total = float(np.sum((basis.T @ left) ** 2))
+        return total if total > float(chi2.isf(STRUCTURE, basis.shape[1])) else 0.0
+
+    def run(self, rng: np.random.Generator) -> PlaceFindings:
+        """Find the place."""
+        first = [self.fit(candidate) for candidate in self.candidates]
+        limit = self.limit(rng, first)
+        top = max(f.gain for f in first)
+        looked = [self.refined(f) if f.gain > max(REFINED * top, limit / 2.0) else f for f in first]
+        best = max(looked, key=lambda f: f.gain)
+        smallest = _smallest(looked, limit)
+        claims = best.gain > limit
+        singles = [f for f in looked if f.candidate.part != "pair"]
+        # Two links that are off together must gain more than chance over every single place.
+        one = max(singles, key=lambda f: f.gain)
+        best = one if best.gain - one.gain < NOT_REFUTED else best
+        among = singles if best is one else looked
+        members = [best, *(f for f in among if f is not best and self._alike(best, f))] if claims else []
+        structure = self.structure(self._left - best.signature if claims else self._left)
+        explained = best.candidate.added(best.size) if claims else np.zeros_like(self.residual)
+        return PlaceFindings(
+            members=tuple(sorted(members, key=lambda f: -f.gain)),
+            limit=limit,
+            structure=structure if not claims or structure > STRUCTURE_SHARE * best.gain else 0.0,
+            smallest=smallest,
+            noise=self.noise,
+            before=self._constants_out(self.residual),
+            after=self._constants_out(self.residual - explained),
+        )
+
+    def _alike(self, best: Fitted, other: Fitted) -> bool:
+        """Whether these data cannot tell two explanations apart."""
+        if best.gain - other.gain < NOT_REFUTED:
+            return True
+        return other.gain > best.gain / 3.0 and min(apart(best, other), apart(other, best)) < ALIKE
+
+
+def apart(truth: Fitted, other: Fitted) -> float:
+    """Squared whitened distance of an explanation from another one of any size."""
+    norm = float(other.signature @ other.signature)
+    if norm <= 0.0:
+        return float(truth.signature @ truth.signature)
+    shared = float(truth.signature @ other.signature) ** 2 / norm
+    return float(truth.signature @ truth.signature) - shared
+
+
+def _smallest(fitted: Sequence[Fitted], limit: float) -> dict[str, tuple[Candidate, float]]:
+    found: dict[str, tuple[Candidate, float]] = {}
+    for each in fitted:
+        size = float(np.sqrt(limit)) * each.u
+        key = each.candidate.key
+        if np.isfinite(size) and (key not in found or size < found[key][1]):
+            found[key] = each.candidate, size
+    return found

@@ -1,0 +1,81 @@
+"""Places in words: what differs where, by how much, and which body and hinge a disagreement shows in."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from fingervision.diagnosis.bodies.body_evidence import BodyEvidence
+from fingervision.diagnosis.bodies.place_search import Fitted
+from fingervision.domain.report import Place
+from fingervision.models.place_answers import PlaceAnswers
+
+COVER = 2.0
+"""Standard uncertainties of a stated interval: 95 %."""
+BINS = 8
+"""Parts of the input's range over which a pose is looked at."""
+SIGNIFICANT = 5.0
+"""Standard deviations of a part's mean: of a hundred parts of noise one in 17 000 tables has such a one."""
+MOST = 6
+
+
+def fitted_words(fitted: Fitted) -> str:
+    """Say what differs where: `right hinge 2: 14 +- 3 % too soft`."""
+    candidate, size, u = fitted.candidate, fitted.size, COVER * fitted.u
+    where = candidate.place or candidate.name
+    if candidate.parameter.name == "play_mm":
+        return f"{where}: {1e3 * size:.3g} +- {1e3 * u:.2g} um of play"
+    share = f"{100.0 * abs(size):.3g} +- {100.0 * u:.2g} %"
+    if candidate.part == "hinge":
+        return f"{where}: {share} too {'stiff' if size > 0.0 else 'soft'}"
+    if candidate.part == "link":
+        return f"{where}: {share} too {'long' if size > 0.0 else 'short'}, {candidate.detail}"
+    if candidate.part == "pair":
+        way = "alike" if candidate.name == "lever_ratio_error" else "oppositely"
+        what = "the opening is" if candidate.name == "lever_ratio_error" else "the right finger's share is"
+        return f"{where}, off {way}: {what} {share} too {'large' if size > 0.0 else 'small'}, {candidate.detail}"
+    return f"{candidate.name}: {100.0 * size:+.3g} +- {100.0 * u:.2g} %"
+
+
+def set_words(members: Sequence[Fitted]) -> str:
+    """Say the answer: one place, or the set of those that these data cannot tell apart."""
+    keys = list(dict.fromkeys(member.candidate.key for member in members))
+    if len(keys) == 1:
+        return fitted_words(members[0])
+    first = [next(m for m in members if m.candidate.key == key) for key in keys]
+    return "; or ".join(fitted_words(member) for member in first)
+
+
+def body_places(evidence: BodyEvidence, answers: PlaceAnswers) -> tuple[Place, ...]:
+    """Find the parts of the input's range where a body's pose cannot be noise, the sharpest of every channel."""
+    prediction, findings = evidence.prediction, evidence.findings
+    u, kept = prediction.input_mm, findings.noise.kept
+    found = []
+    for place, name in enumerate(evidence.names):
+        residual = findings.before[:, place]
+        order = np.flatnonzero(kept)[np.argsort(u[kept], kind="stable")]
+        parts = np.array_split(order, min(BINS, order.size))
+        scores = [residual[p].sum() / (findings.noise.sd[place] * np.sqrt(p.size)) for p in parts if p.size]
+        sharpest = int(np.argmax(np.abs(scores)))
+        sigma = float(abs(scores[sharpest]))
+        if sigma < SIGNIFICANT:
+            continue
+        inside = parts[sharpest]
+        size = float(residual[inside].mean())
+        unit = "mrad" if name.endswith("_mrad") else "mm"
+        low, high = float(u[inside].min()), float(u[inside].max())
+        words = (
+            f"over the input, between {low:.3g} and {high:.3g} mm, {name} is {abs(size):.3g} {unit} "
+            f"{'larger' if size > 0.0 else 'smaller'} than simulated, {sigma:.0f} sigma{_joined(name, answers)}"
+        )
+        found.append(Place(name, "input", low, high, size, unit, sigma, words))
+    return tuple(sorted(found, key=lambda place: -place.sigma)[:MOST])
+
+
+def _joined(channel: str, answers: PlaceAnswers) -> str:
+    """Say which hinges hold the body of a channel."""
+    body = channel.rpartition(".")[0]
+    numbers = {each.name: number for number, each in answers.numbered_bodies().items()}
+    if body not in numbers:
+        return ""
+    hinges = [f.name for n, f in enumerate(answers.mechanism.flexures) if numbers[body] in answers.ends(n)]
+    return f" ({body} hangs on {' and '.join(hinges)})" if hinges else ""

@@ -1,0 +1,28 @@
+"""A pivot with play: its pin stands at the side of its hole to which the load points."""
+
+import numpy as np
+
+from fingervision.domain.effect import History, PointEffect, Stage, Values
+from fingervision.domain.parameter import Parameter
+from fingervision.domain.response import Response
+
+
+def act(response: Response, history: History, values: Values) -> Response:
+    """Lose half the play of the opening on either side of rest: with a table no pivot is known by name."""
+    opening_mm = response.gap_mm - history.rest_gap_mm
+    half_mm = 0.5 * values["play_mm"]
+    return response.with_gap(history.rest_gap_mm + opening_mm - np.clip(opening_mm, -half_mm, half_mm))
+
+
+EFFECT = PointEffect(
+    name="hinge_play",
+    stage=Stage.MECHANISM,
+    order=172,
+    words="a pivot has play, taken up where its load changes sign",
+    formula="o - clip(o, +-play_mm / 2); with a drawing, the pin moves in its hole to least elastic energy",
+    source="frictionless contact of a pin in a hole",
+    residual="a step where the load on the pivot changes sign; poses of the bodies tell which pivot",
+    parameters=(Parameter("play_mm", "mm", 0.0, 0.5, "full width of the play", typical=0.02),),
+    needs_bodies=True,
+    act=act,
+)

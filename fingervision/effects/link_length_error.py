@@ -1,0 +1,25 @@
+"""A link of another length than drawn: a hinge or a measuring point sits farther out or nearer."""
+
+from fingervision.domain.effect import History, PointEffect, Stage, Values
+from fingervision.domain.parameter import Parameter
+from fingervision.domain.response import Response
+
+
+def act(response: Response, history: History, values: Values) -> Response:
+    """Open less by as much as the lever's short arm is longer: with a table no link is known by name."""
+    opening_mm = response.gap_mm - history.rest_gap_mm
+    return response.with_gap(history.rest_gap_mm + opening_mm / (1.0 + values["ratio"]))
+
+
+EFFECT = PointEffect(
+    name="link_length_error",
+    stage=Stage.MECHANISM,
+    order=171,
+    words="a link is longer or shorter than drawn",
+    formula="o / (1 + ratio); with a drawing, one end of this link moved along it",
+    source="kinematics of a lever",
+    residual="in proportion to the opening; poses of the bodies tell which link",
+    parameters=(Parameter("ratio", "", -0.1, 0.1, "relative error of the link's length", typical=0.01),),
+    needs_bodies=True,
+    act=act,
+)

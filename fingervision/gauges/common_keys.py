@@ -1,0 +1,40 @@
+"""Keys that several kinds of gauges have, each with its limits and the reason for them."""
+
+from math import radians
+
+from fingervision.storage.toml_section import Section
+
+# The largest frames that any camera makes are smaller; what lies beyond is a slip.
+FARTHEST_PX = 100_000.0
+# An edge is fitted in pieces along its length, each of a pixel at least; longer than a frame is a slip.
+SHORTEST_EDGE_PX, LONGEST_PX = 8.0, 20_000.0
+# A thing is looked for so far from where it was in the frame before.
+REACH_PX, LARGEST_REACH_PX = 12.0, 200.0
+POLARITIES = ("any", "rising", "falling")
+
+
+def middle(section: Section) -> tuple[float, float]:
+    """`x_px` and `y_px`: the gauge's middle in the first frame, in pixels of the full frame."""
+    x, y = (section.number(key, low=-FARTHEST_PX, high=FARTHEST_PX) for key in ("x_px", "y_px"))
+    return x, y
+
+
+def reach(section: Section) -> float:
+    """`reach_px`: how far the thing may move from one frame to the next; nothing alike may be within it."""
+    return section.number("reach_px", REACH_PX, low=1.0, high=LARGEST_REACH_PX)
+
+
+def length(section: Section, key: str = "length_px") -> float:
+    """`length_px`: how much of an edge is used, half of it to either side of the middle."""
+    return section.number(key, low=SHORTEST_EDGE_PX, high=LONGEST_PX)
+
+
+def angle(section: Section, key: str, default: float | None = None) -> float:
+    """Read an angle in degrees, from the x axis clockwise on the screen, and give it in radians."""
+    return radians(section.number(key, default, low=-360.0, high=360.0))
+
+
+def polarity(section: Section) -> int:
+    """`polarity`: +1 rising (lighter along the direction), -1 falling, 0 any."""
+    word = section.word("polarity", "any", of=POLARITIES)
+    return {"any": 0, "rising": 1, "falling": -1}[word]

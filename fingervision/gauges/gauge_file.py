@@ -1,0 +1,102 @@
+"""gauges.toml: the gauges of one picture.
+
+schema = 1
+[[gauge]]
+name = "lever"                       # unique in the file
+kind = "edge"                        # edge | pair | line | circle | marker | patch | gap
+x_px = 320.0                         # its middle, in pixels of the full frame
+y_px = 200.0
+direction_deg = 0.0                  # the kind's own keys follow
+length_px = 40.0
+reach_px = 12.0                      # it may move so far from frame to frame; nothing alike may be within it
+"""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from fingervision.domain.errors import FingervisionError
+from fingervision.gauges.kinds import Kind, Spec, kind_named, kinds
+from fingervision.storage.toml_section import Section, read_document
+
+SCHEMA = 1
+# A table of a thousand gauges and a name of a hundred characters are slips.
+MOST_GAUGES, LONGEST_NAME = 1000, 100
+
+
+@dataclass(frozen=True, slots=True)
+class Gauge:
+    """One named gauge.
+
+    Parameters
+    ----------
+    name : str
+        As the user called it.
+    kind_name : str
+        Name of its kind.
+    spec : Spec
+        What its keys say.
+    """
+
+    name: str
+    kind_name: str
+    spec: Spec
+
+    @property
+    def kind(self) -> Kind:
+        """Its kind's module."""
+        return kind_named(self.kind_name)
+
+    @property
+    def quantities(self) -> tuple[tuple[str, str], ...]:
+        """Names of its numbers, and whether each is a length or an angle."""
+        return self.kind.QUANTITIES
+
+
+def read_gauges(path: Path) -> tuple[Gauge, ...]:
+    """Read a file of gauges.
+
+    Raises
+    ------
+    FingervisionError
+        The file cannot be read, or a value in it cannot be meant; the sentence names the line.
+    """
+    values, text = read_document(path, "gauge file")
+    top = Section(path, text, "", values)
+    top.only(("schema", "gauge"))
+    schema = top.whole("schema", low=1)
+    if schema != SCHEMA:
+        top.refuse("schema", f"must be {SCHEMA}, but is {schema}: this program is older than the file.")
+    sections = top.tables("gauge")
+    if not 1 <= len(sections) <= MOST_GAUGES:
+        raise FingervisionError(
+            f"{path} must hold 1 to {MOST_GAUGES} tables [[gauge]], but holds {len(sections)}: add one."
+        )
+    gauges: dict[str, Gauge] = {}
+    for section in sections:
+        name = section.word("name")
+        if not name.strip() or len(name) > LONGEST_NAME or not name.isprintable():
+            section.refuse("name", f"must be 1 to {LONGEST_NAME} printable characters, but is {name[:200]!r}.")
+        if name in gauges:
+            section.refuse("name", f"must be another than those before, but {name!r} comes again: rename one.")
+        kind_name = section.word("kind", of=kinds())
+        kind = kind_named(kind_name)
+        section.only(("name", "kind", *kind.KEYS))
+        gauges[name] = Gauge(name, kind_name, kind.read(section))
+    return tuple(gauges.values())
+
+
+def check_gauges(gauges: tuple[Gauge, ...], width_px: int, height_px: int) -> None:
+    """Refuse gauges whose middle lies outside of the frames.
+
+    Raises
+    ------
+    FingervisionError
+        One does; the sentence names it.
+    """
+    for gauge in gauges:
+        x, y = gauge.spec.middle_px
+        if not (-0.5 <= x <= width_px - 0.5 and -0.5 <= y <= height_px - 0.5):
+            raise FingervisionError(
+                f"The gauge {gauge.name!r} must have its middle inside the frame of {width_px}x{height_px} pixels, but "
+                f"x_px = {x:g}, y_px = {y:g}: move it there."
+            )

@@ -1,0 +1,69 @@
+"""Kinds of gauges, one a file: `KEYS`, `QUANTITIES` and `read(section)`, which gives what `Kind` asks for."""
+
+import importlib
+import pkgutil
+from collections.abc import Sequence
+from typing import Any, Protocol
+
+from fingervision.gauges.picture import Picture
+from fingervision.gauges.reading import Reading
+from fingervision.storage.toml_section import Section
+
+
+class Follower(Protocol):
+    """Measures one gauge in the frames of one recording, in order; it remembers where the thing was."""
+
+    def measured(self, picture: Picture) -> Reading:
+        """Measure the next frame."""
+        ...
+
+
+class Spec(Protocol):
+    """What a gauge's keys say; frozen."""
+
+    @property
+    def middle_px(self) -> tuple[float, float]:
+        """Where it is in the first frame."""
+        ...
+
+    def follower(self) -> Follower:
+        """Begin a recording."""
+        ...
+
+
+class Kind(Protocol):
+    """A module of this package."""
+
+    KEYS: tuple[str, ...]
+    QUANTITIES: tuple[tuple[str, str], ...]
+
+    def read(self, section: Section) -> Spec:
+        """Read the keys of one gauge; a sentence says what cannot be meant."""
+        ...
+
+
+def kinds() -> tuple[str, ...]:
+    """Names of the kinds, sorted."""
+    return tuple(sorted(module.name for module in pkgutil.iter_modules(__path__)))
+
+
+def kind_named(name: str) -> Kind:
+    """Find a kind."""
+    found: Any = importlib.import_module(f"{__name__}.{name}")
+    kind: Kind = found
+    return kind
+
+
+def measured_together(followers: Sequence[Follower], picture: Picture) -> list[Reading]:
+    """Measure several gauges in one frame; a kind whose followers have `measured_with` is asked once for all."""
+    readings: dict[int, Reading] = {}
+    for number, follower in enumerate(followers):
+        if number in readings:
+            continue
+        together = getattr(type(follower), "measured_with", None)
+        if together is None:
+            readings[number] = follower.measured(picture)
+            continue
+        alike = [i for i, other in enumerate(followers) if type(other) is type(follower)]
+        readings |= dict(zip(alike, together([followers[i] for i in alike], picture), strict=True))
+    return [readings[number] for number in range(len(followers))]

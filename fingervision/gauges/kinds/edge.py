@@ -1,0 +1,61 @@
+"""Where one straight edge lies along a direction."""
+
+from dataclasses import dataclass
+
+from fingervision.gauges import common_keys
+from fingervision.gauges.edge_follower import Axes, EdgeFollower, NotFound
+from fingervision.gauges.picture import Picture
+from fingervision.gauges.quantities import Position
+from fingervision.gauges.reading import Mark, Reading
+from fingervision.gauges.status import GaugeStatus
+from fingervision.storage.toml_section import Section
+
+KEYS = ("x_px", "y_px", "direction_deg", "length_px", "reach_px", "polarity")
+QUANTITIES = (("position", "length"),)
+
+
+@dataclass(frozen=True, slots=True)
+class EdgeSpec:
+    """Keys of an edge: its middle, the direction that it is measured along, its length, how far it may move."""
+
+    middle_px: tuple[float, float]
+    direction_rad: float
+    length_px: float
+    reach_px: float
+    polarity: int
+
+    def follower(self) -> "FollowedEdge":
+        """Begin a recording."""
+        return FollowedEdge(self)
+
+
+def read(section: Section) -> EdgeSpec:
+    """Read one gauge's keys."""
+    return EdgeSpec(
+        common_keys.middle(section),
+        common_keys.angle(section, "direction_deg"),
+        common_keys.length(section),
+        common_keys.reach(section),
+        common_keys.polarity(section),
+    )
+
+
+class FollowedEdge:
+    """One edge in the frames of one recording."""
+
+    def __init__(self, spec: EdgeSpec) -> None:
+        axes = Axes(*spec.middle_px, spec.direction_rad)
+        self._edge = EdgeFollower(axes, 0.0, spec.length_px, spec.reach_px, spec.polarity)
+
+    def measured(self, picture: Picture) -> Reading:
+        """Measure the next frame."""
+        edge, axes = self._edge, self._edge.axes
+        zone = edge.zone
+        found = edge.measured(picture)
+        if isinstance(found, NotFound):
+            return Reading(found.status, zone=zone, words=found.words)
+        half = 0.5 * edge.length_px
+        ends = tuple(axes.point(found.position_px + found.slope * s, s) for s in (-half, half))
+        place = axes.point(found.position_px)
+        quantity = Position(place, axes.direction_rad, found.u_position_px, found.dark_side, found.u_response_px)
+        return Reading(GaugeStatus.OK, (quantity,), (Mark(ends), Mark((place,))), zone)

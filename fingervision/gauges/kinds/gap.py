@@ -1,0 +1,80 @@
+"""The gap between two fingers in a region, as `measure` measures it in the whole picture."""
+
+from dataclasses import dataclass, replace
+from math import ceil
+
+from fingervision.domain.gap import GapMeasurement
+from fingervision.domain.region import Region
+from fingervision.gauges import common_keys
+from fingervision.gauges.picture import Picture
+from fingervision.gauges.quantities import Distance
+from fingervision.gauges.reading import Mark, Reading
+from fingervision.gauges.status import GaugeStatus
+from fingervision.storage.toml_section import Section
+from fingervision.vision.pipeline import measure_frame
+
+KEYS = ("x_px", "y_px", "width_px", "height_px")
+QUANTITIES = (("gap", "length"),)
+# A region that holds two fingers and the edges between them (`fingervision.vision.pipeline` refuses smaller ones).
+SMALLEST_PX = 16.0
+
+
+@dataclass(frozen=True, slots=True)
+class GapSpec:
+    """Keys of a gap: the middle of its region, and the region's size."""
+
+    middle_px: tuple[float, float]
+    width_px: float
+    height_px: float
+
+    def follower(self) -> "FollowedGap":
+        """Begin a recording."""
+        return FollowedGap(self)
+
+
+def read(section: Section) -> GapSpec:
+    """Read one gauge's keys."""
+    width, height = (section.number(key, low=SMALLEST_PX, high=common_keys.LONGEST_PX) for key in KEYS[2:])
+    return GapSpec(common_keys.middle(section), width, height)
+
+
+class FollowedGap:
+    """One gap in the frames of one recording; the region moves with the middle between the fingers."""
+
+    def __init__(self, spec: GapSpec) -> None:
+        self._spec = spec
+        self._middle: tuple[float, float] | None = None
+        self._moved = (0, 0)
+
+    def measured(self, picture: Picture) -> Reading:
+        """Measure the next frame."""
+        region = self._region(picture)
+        if region is None:
+            return Reading(GaugeStatus.OUT_OF_VIEW)
+        x, y, right, bottom = (
+            region.x_px, region.y_px, region.x_px + region.width_px - 1, region.y_px + region.height_px - 1,
+        )  # fmt: skip
+        zone = Mark(((x, y), (right, y), (right, bottom), (x, bottom), (x, y)))
+        found = measure_frame(picture.frame, replace(picture.settings, region=region))
+        if not isinstance(found, GapMeasurement):
+            return Reading(GaugeStatus(found.status.value), zone=zone, words=found.words)
+        first, second = ((edge.x_px, edge.y_px) for edge in (found.left, found.right))
+        middle = (0.5 * (first[0] + second[0]), 0.5 * (first[1] + second[1]))
+        if self._middle is None:
+            self._middle = middle
+        self._moved = (round(middle[0] - self._middle[0]), round(middle[1] - self._middle[1]))
+        polarity = 1 if found.light_gap else -1
+        # The response's share is of the gap as a whole, half of it an edge's; other shifts are the picture's own.
+        quantity = Distance(first, second, found.u_gap_px, polarity, 0.5 * found.u_picture_px)
+        return Reading(GaugeStatus.OK, (quantity,), (Mark((first, second)),), zone)
+
+    def _region(self, picture: Picture) -> Region | None:
+        """The region where it is now, as far as it lies in the picture."""
+        spec, (width, height) = self._spec, picture.size_px
+        left = round(spec.middle_px[0] - 0.5 * (spec.width_px - 1.0)) + self._moved[0]
+        top = round(spec.middle_px[1] - 0.5 * (spec.height_px - 1.0)) + self._moved[1]
+        right, bottom = left + ceil(spec.width_px), top + ceil(spec.height_px)
+        left, top, right, bottom = max(left, 0), max(top, 0), min(right, width), min(bottom, height)
+        if right - left < SMALLEST_PX or bottom - top < SMALLEST_PX:
+            return None
+        return Region(left, top, right - left, bottom - top)

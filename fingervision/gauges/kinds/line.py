@@ -1,0 +1,115 @@
+"""Where a straight edge lies and how it is turned: position across it, and angle."""
+
+from dataclasses import dataclass
+from math import atan, cos, hypot, pi, sin, sqrt
+
+from fingervision.gauges import common_keys
+from fingervision.gauges.edge_follower import Axes, EdgeFollower, NotFound
+from fingervision.gauges.picture import Picture
+from fingervision.gauges.quantities import Angle, Position
+from fingervision.gauges.reading import Mark, Reading
+from fingervision.gauges.status import GaugeStatus
+from fingervision.storage.toml_section import Section
+
+KEYS = ("x_px", "y_px", "angle_deg", "length_px", "reach_px", "polarity")
+QUANTITIES = (("position", "length"), ("angle", "angle"))
+# The search turns with the line once it leans by this much against it: the profile is then as sharp as at first.
+TURN_AT = 0.2
+
+
+@dataclass(frozen=True, slots=True)
+class LineSpec:
+    """Keys of a line: its middle, its own direction, its length, how far it may move."""
+
+    middle_px: tuple[float, float]
+    angle_rad: float
+    length_px: float
+    reach_px: float
+    polarity: int
+
+    def follower(self) -> "FollowedLine":
+        """Begin a recording."""
+        return FollowedLine(self)
+
+
+def read(section: Section) -> LineSpec:
+    """Read one gauge's keys."""
+    return LineSpec(
+        common_keys.middle(section),
+        common_keys.angle(section, "angle_deg"),
+        common_keys.length(section),
+        common_keys.reach(section),
+        common_keys.polarity(section),
+    )
+
+
+class FollowedLine:
+    """One line in the frames of one recording.
+
+    `position` is counted across the line as it was drawn, through the gauge's middle, so that it is one number of one
+    direction in all frames; `angle` is the line's direction, within 90 degrees of `angle_deg`.
+    """
+
+    def __init__(self, spec: LineSpec) -> None:
+        self._spec = spec
+        # The direction across it is 90 degrees behind, so that s runs along the line as it was drawn.
+        axes = Axes(*spec.middle_px, spec.angle_rad - 0.5 * pi)
+        self._fixed = axes
+        self._edge = EdgeFollower(axes, 0.0, spec.length_px, spec.reach_px, spec.polarity)
+
+    def measured(self, picture: Picture) -> Reading:
+        """Measure the next frame."""
+        edge, axes = self._edge, self._edge.axes
+        zone = edge.zone
+        found = edge.measured(picture)
+        if isinstance(found, NotFound):
+            return Reading(found.status, zone=zone, words=found.words)
+        half = 0.5 * edge.length_px
+        ends = tuple(axes.point(found.position_px + found.slope * s, s) for s in (-half, half))
+        angle = axes.direction_rad + 0.5 * pi - atan(found.slope)
+        u_angle = found.u_slope / (1.0 + found.slope**2)
+        place, u_place = _crossing(self._fixed, axes, found.position_px, found.slope), found.u_position_px
+        turned = angle - self._spec.angle_rad
+        across = (
+            cos(axes.direction_rad - self._fixed.direction_rad)
+            + sin(axes.direction_rad - self._fixed.direction_rad) * found.slope
+        )
+        # Where the fixed normal meets the line: away from the fit's own middle the slope's uncertainty adds.
+        x, y = place
+        along = -sin(axes.direction_rad) * (x - axes.x_px) + cos(axes.direction_rad) * (y - axes.y_px)
+        variance = u_place**2 + 2.0 * along * found.covariance_px + along**2 * found.u_slope**2
+        u_position = sqrt(max(variance, 0.0)) / max(abs(across), 0.1)
+        quantities = (
+            Position(place, self._fixed.direction_rad, u_position, found.dark_side, found.u_response_px),
+            Angle(place, self._spec.angle_rad + _wrapped(turned), u_angle),
+        )
+        if abs(found.slope) > TURN_AT:
+            self._turn(found.position_px, found.slope)
+        return Reading(GaugeStatus.OK, quantities, (Mark(ends), Mark((place,))), zone)
+
+    def _turn(self, position_px: float, slope: float) -> None:
+        """Let the search lie along the line again."""
+        axes = self._edge.axes
+        x, y = axes.point(position_px)
+        self._edge.turned_to(Axes(x, y, axes.direction_rad - atan(slope)), 0.0, 0.0)
+
+
+def _crossing(fixed: Axes, axes: Axes, position_px: float, slope: float) -> tuple[float, float]:
+    """Where the line meets the fixed gauge's own axis t."""
+    x, y = axes.point(position_px)
+    along_x, along_y = (
+        cos(axes.direction_rad) * slope - sin(axes.direction_rad),
+        sin(axes.direction_rad) * slope + cos(axes.direction_rad),
+    )
+    length = hypot(along_x, along_y)
+    along_x, along_y = along_x / length, along_y / length
+    normal_x, normal_y = along_y, -along_x
+    across = cos(fixed.direction_rad) * normal_x + sin(fixed.direction_rad) * normal_y
+    if abs(across) < 1e-6:
+        return x, y
+    t = ((x - fixed.x_px) * normal_x + (y - fixed.y_px) * normal_y) / across
+    return fixed.point(t)
+
+
+def _wrapped(angle: float) -> float:
+    return (angle + pi) % (2.0 * pi) - pi

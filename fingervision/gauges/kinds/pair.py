@@ -1,0 +1,123 @@
+"""How far two parallel edges are apart along a direction: the width of a bar, slot or link."""
+
+from dataclasses import dataclass
+from math import hypot, sqrt
+
+from fingervision.gauges import common_keys
+from fingervision.gauges.edge_follower import Axes, EdgeFollower, EdgeFound, NotFound, fit_near
+from fingervision.gauges.picture import Picture
+from fingervision.gauges.quantities import Distance
+from fingervision.gauges.reading import Mark, Reading
+from fingervision.gauges.status import GaugeStatus
+from fingervision.storage.toml_section import Section
+from fingervision.vision.edge_search import StepCandidate
+from fingervision.vision.straight_edge_fit import reach_px
+
+KEYS = ("x_px", "y_px", "direction_deg", "distance_px", "length_px", "reach_px", "polarity")
+QUANTITIES = (("distance", "length"),)
+POLARITIES = {"any": (0, 0), "light": (1, -1), "dark": (-1, 1), "rising": (1, 1), "falling": (-1, -1)}
+# Nearer than so many sigma two edges' blurs are one, and their contrast and distance cannot be told apart.
+NEAREST_SIGMAS = 2.5
+# In the first frame each edge is looked for nearer to its own place than to the other's (share of the distance).
+NEAR_OWN = 0.4
+# Candidates of both edges' searches that are nearer than this are one and the same step.
+SAME_PX = 1.5
+
+
+@dataclass(frozen=True, slots=True)
+class PairSpec:
+    """Keys of a pair: the middle between its edges, the direction across them, how far they are apart at first."""
+
+    middle_px: tuple[float, float]
+    direction_rad: float
+    distance_px: float
+    length_px: float
+    reach_px: float
+    polarities: tuple[int, int]
+
+    def follower(self) -> "FollowedPair":
+        """Begin a recording."""
+        return FollowedPair(self)
+
+
+def read(section: Section) -> PairSpec:
+    """Read one gauge's keys."""
+    return PairSpec(
+        common_keys.middle(section),
+        common_keys.angle(section, "direction_deg"),
+        section.number("distance_px", low=3.0, high=common_keys.LONGEST_PX),
+        common_keys.length(section),
+        common_keys.reach(section),
+        POLARITIES[section.word("polarity", "any", of=POLARITIES)],
+    )
+
+
+class FollowedPair:
+    """Two edges in the frames of one recording; those that are near each other are fitted together."""
+
+    def __init__(self, spec: PairSpec) -> None:
+        axes = Axes(*spec.middle_px, spec.direction_rad)
+        self._edges = [
+            EdgeFollower(axes, side * 0.5 * spec.distance_px, spec.length_px, spec.reach_px, polarity)
+            for side, polarity in zip((-1.0, 1.0), spec.polarities, strict=True)
+        ]
+        for edge in self._edges:
+            edge.first_reach_px = min(spec.reach_px, NEAR_OWN * spec.distance_px)
+
+    def measured(self, picture: Picture) -> Reading:
+        """Measure the next frame."""
+        first, second = self._edges
+        axes = first.axes
+        zone = axes.box(
+            0.5 * (first.at_px + second.at_px),
+            0.5 * abs(second.at_px - first.at_px) + first.reach_px,
+            0.5 * first.length_px,
+        )
+        found = self._found(picture)
+        if isinstance(found, NotFound):
+            for edge in self._edges:
+                edge.lost()
+            return Reading(found.status, zone=zone, words=found.words)
+        (left, right), covariance = found
+        for edge, one in zip(self._edges, (left, right), strict=True):
+            edge.keep(one)
+        places = tuple(axes.point(one.position_px) for one in (left, right))
+        half = 0.5 * first.length_px
+        marks = [
+            Mark(tuple(axes.point(one.position_px + one.slope * s, s) for s in (-half, half))) for one in (left, right)
+        ]
+        u = sqrt(max(left.u_position_px**2 + right.u_position_px**2 - 2.0 * covariance, 0.0))
+        polarity = 0 if left.contrast * right.contrast > 0.0 else left.dark_side * -1
+        u_response = 0.5 * (left.u_response_px + right.u_response_px)
+        quantity = Distance(places[0], places[1], u, polarity, u_response)
+        return Reading(GaugeStatus.OK, (quantity,), (*marks, Mark(places)), zone)
+
+    def _found(self, picture: Picture) -> tuple[tuple[EdgeFound, EdgeFound], float] | NotFound:
+        first, second = self._edges
+        seen: list[tuple[StepCandidate, list[StepCandidate]]] = []
+        for edge in self._edges:
+            one_seen = edge.candidate(picture)
+            if isinstance(one_seen, NotFound):
+                return one_seen
+            seen.append(one_seen)
+        (left, beside), (right, beside_right) = seen
+        apart = second.at_px + right.position_px - first.at_px - left.position_px
+        blur = max((edge.known.blur_px for edge in self._edges if edge.known is not None), default=1.2)
+        if apart < NEAREST_SIGMAS * hypot(blur, 0.29):
+            same = abs(apart) < SAME_PX
+            return NotFound(GaugeStatus.AMBIGUOUS if same else GaugeStatus.TOUCHING)
+        if apart > 2.0 * reach_px(blur):
+            fits: list[EdgeFound] = []
+            for edge, one, others in ((first, left, beside), (second, right, beside_right)):
+                fitted = fit_near(edge, picture, [one], others)
+                if isinstance(fitted, NotFound):
+                    return fitted
+                fits += fitted[0]
+            return (fits[0], fits[1]), 0.0
+        # Near edges are one model: what one puts into the other's window is part of it.
+        moved = StepCandidate(right.position_px + second.at_px - first.at_px, right.contrast)
+        near = [step for step in beside if abs(step.position_px - moved.position_px) > SAME_PX]
+        both = fit_near(first, picture, [left, moved], near)
+        if isinstance(both, NotFound):
+            return both
+        return (both[0][0], both[0][1]), both[1]

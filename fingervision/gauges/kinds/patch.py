@@ -1,0 +1,236 @@
+"""How far a textured piece of surface has moved and turned since the first frame."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import ceil, cos, hypot, sin, sqrt
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from fingervision.gauges import common_keys
+from fingervision.gauges.picture import Picture
+from fingervision.gauges.quantities import Angle, Shift
+from fingervision.gauges.reading import Mark, Reading
+from fingervision.gauges.status import GaugeStatus
+from fingervision.storage.toml_section import Section
+from fingervision.vision.patch_registration import (
+    MARGIN_PX,
+    PatchReference,
+    patch_reference,
+    reference_covariance,
+    register,
+)
+from fingervision.vision.template_search import BEYOND_PX, best_match, chance_correlation, high_pass_noise
+
+KEYS = ("x_px", "y_px", "width_px", "height_px", "reach_px")
+QUANTITIES = (("shift_x", "length"), ("shift_y", "length"), ("rotation", "angle"))
+SMALLEST_PX, LARGEST_PX = 9.0, 501.0
+# What correlates less is something else: noise of two thirds of the texture's own spread leaves this much.
+# Coarse textures must correlate more, because others do by chance; where that is asked for more than can be had with
+# noise, the patch is too small for its texture.
+LEAST_CORRELATION, MOST_BY_CHANCE = 0.7, 0.9
+# Nothing alike may be within so many times the reach (as for edges).
+GUARD, MOST_TIMES = 1.5, 4.0
+# The template is turned with the patch once it lags by this (radians, at a rim of 15 px a pixel and a half).
+TURN_AT = 0.1
+# A patch that is less sure than this (pixels) shows too little to be measured.
+LEAST_SURE_PX = 0.3
+# Contrast below a grey level a pixel is rounding.
+LEAST_SPREAD = 1.0
+
+Floats = NDArray[np.float32]
+
+
+@dataclass(frozen=True, slots=True)
+class PatchSpec:
+    """Keys of a patch: its middle and size in the first frame, and how far it may move."""
+
+    middle_px: tuple[float, float]
+    width_px: float
+    height_px: float
+    reach_px: float
+
+    def follower(self) -> "FollowedPatch":
+        """Begin a recording."""
+        return FollowedPatch(self)
+
+
+def read(section: Section) -> PatchSpec:
+    """Read one gauge's keys."""
+    width, height = (section.number(key, low=SMALLEST_PX, high=LARGEST_PX) for key in ("width_px", "height_px"))
+    return PatchSpec(common_keys.middle(section), width, height, common_keys.reach(section))
+
+
+class FollowedPatch:
+    """One patch in the frames of one recording."""
+
+    def __init__(self, spec: PatchSpec) -> None:
+        self._spec = spec
+        self.half = (max(int(spec.width_px) // 2, 4), max(int(spec.height_px) // 2, 4))
+        self.reference: PatchReference | None = None
+        self._around: Floats | None = None
+        self._template: Floats | None = None
+        self._template_turn = 0.0
+        self._least_correlation = LEAST_CORRELATION
+        self._refused: Reading | None = None
+        self._at = (*spec.middle_px, 0.0)
+        self._times = 1.0
+
+    def measured(self, picture: Picture) -> Reading:
+        """Measure the next frame."""
+        return FollowedPatch.measured_with([self], picture)[0]
+
+    @staticmethod
+    def measured_with(followers: Sequence["FollowedPatch"], picture: Picture) -> list[Reading]:
+        """Measure several patches in the next frame; those of one size are registered together."""
+        readings: dict[int, Reading] = {}
+        waiting: dict[tuple[int, ...], list[tuple[int, Floats, tuple[int, int], NDArray[np.float64]]]] = {}
+        for number, follower in enumerate(followers):
+            if follower.reference is None:
+                readings[number] = follower.begun(picture)
+                continue
+            sought = follower.sought(picture)
+            if isinstance(sought, Reading):
+                readings[number] = sought
+                continue
+            part, corner, start = sought
+            waiting.setdefault((part.shape[0], part.shape[1], *follower.half), []).append((number, part, corner, start))
+        for group in waiting.values():
+            own = [followers[number] for number, _, _, _ in group]
+            found = register(
+                [follower.reference for follower in own if follower.reference is not None],
+                [part for _, part, _, _ in group],
+                np.array([corner for _, _, corner, _ in group], dtype=np.float64),
+                np.array([start for _, _, _, start in group]),
+                picture.shared_pixels,
+            )
+            for k, (number, _, _, _) in enumerate(group):
+                place = (float(found.x_px[k]), float(found.y_px[k]), float(found.turn_rad[k]))
+                readings[number] = own[k].taken(
+                    place, found.covariance[k], float(found.correlation[k]), bool(found.settled[k])
+                )
+        return [readings[number] for number in range(len(followers))]
+
+    def _zone(self) -> Mark:
+        x, y, turn = self._at
+        a, b = self.half
+        corners = ((-a, -b), (a, -b), (a, b), (-a, b), (-a, -b))
+        return Mark(tuple((x + cos(turn) * u - sin(turn) * v, y + sin(turn) * u + cos(turn) * v) for u, v in corners))
+
+    def _never(self, status: GaugeStatus, words: str) -> Reading:
+        """The first frame shows nothing to register against: there will be no number in this recording."""
+        self._refused = Reading(status, zone=self._zone(), words=words)
+        return self._refused
+
+    def _failed(self, status: GaugeStatus, words: str = "") -> Reading:
+        self._times = min(self._times + 1.0, MOST_TIMES)
+        return Reading(status, zone=self._zone(), words=words)
+
+    def begun(self, picture: Picture) -> Reading:
+        """Take the reference from the first frame that could be read; a later one would be another zero."""
+        if self._refused is not None:
+            return self._refused
+        (a, b), (x, y) = self.half, self._spec.middle_px
+        column, row = round(x), round(y)
+        if not picture.holds(column - a, row - b, 2 * a + 1, 2 * b + 1):
+            return self._never(GaugeStatus.OUT_OF_VIEW, "a part of it lies outside of the first frame")
+        reach = ceil(GUARD * self._spec.reach_px) + BEYOND_PX + MARGIN_PX
+        part = _padded(picture, column - a - reach, row - b - reach, 2 * (a + reach) + 1, 2 * (b + reach) + 1)
+        reference = patch_reference(part, a + reach, b + reach, a, b)
+        covariance = reference_covariance(reference, high_pass_noise(reference.template))
+        spread = float(np.sqrt(np.mean(reference.levels.astype(np.float64) ** 2)))
+        if spread < LEAST_SPREAD or not max(covariance[0, 0], covariance[1, 1]) < LEAST_SURE_PX**2:
+            return self._never(
+                GaugeStatus.LOW_CONTRAST, "the first frame shows no texture there that tells how it moves"
+            )
+        chance = chance_correlation(reference.template)
+        if chance > MOST_BY_CHANCE:
+            return self._never(GaugeStatus.LOW_CONTRAST, "its texture is too coarse for its size: enlarge it")
+        if not best_match(part[MARGIN_PX:-MARGIN_PX, MARGIN_PX:-MARGIN_PX], reference.template).is_alone:
+            return self._never(GaugeStatus.AMBIGUOUS, "its pattern repeats within 1.5 reach_px: lower reach_px")
+        self._least_correlation = max(LEAST_CORRELATION, chance)
+        self.reference = reference
+        self._around, self._template = part, reference.template
+        self._at = (float(column), float(row), 0.0)
+        zero = (Shift((x, y), (x, y), 0.0, 0.0), Shift((x, y), (x, y), 0.5 * np.pi, 0.0), Angle((x, y), 0.0, 0.0, True))
+        return Reading(GaugeStatus.OK, zero, (Mark(((x, y),)),), self._zone())
+
+    def sought(self, picture: Picture) -> tuple[Floats, tuple[int, int], NDArray[np.float64]] | Reading:
+        """Find the patch coarsely; the part of the picture to register it in, and the first guess."""
+        a, b = self.half
+        x, y, turn = self._at
+        reach = ceil(GUARD * self._spec.reach_px * self._times) + BEYOND_PX
+        column, row = round(x), round(y)
+        levels, (left, top) = picture.part(
+            column - a - reach, row - b - reach, 2 * (a + reach) + 1, 2 * (b + reach) + 1
+        )
+        if levels.shape[0] < 2 * (b + BEYOND_PX) + 3 or levels.shape[1] < 2 * (a + BEYOND_PX) + 3:
+            return self._failed(GaugeStatus.OUT_OF_VIEW)
+        match = best_match(levels.astype(np.float32), self._turned(turn))
+        away = hypot(left + match.x_px - x, top + match.y_px - y)
+        is_cut = levels.shape != (2 * (b + reach) + 1, 2 * (a + reach) + 1)
+        if match.correlation < 0.8 * self._least_correlation or away > self._spec.reach_px * self._times + 1.0:
+            return self._failed(GaugeStatus.OUT_OF_VIEW if is_cut else GaugeStatus.NOT_FOUND)
+        if not match.is_alone:
+            return self._failed(GaugeStatus.OUT_OF_VIEW if is_cut else GaugeStatus.AMBIGUOUS)
+        # The turned patch, and what interpolation needs about it.
+        more = MARGIN_PX + 3 + ceil(max(a, b) * min(abs(sin(turn)) + 0.1, 1.0) * 0.5)
+        middle = (left + round(match.x_px), top + round(match.y_px))
+        corner = (middle[0] - a - more, middle[1] - b - more)
+        part = _padded(picture, *corner, 2 * (a + more) + 1, 2 * (b + more) + 1)
+        return part, corner, np.array([left + match.x_px, top + match.y_px, turn])
+
+    def _turned(self, turn: float) -> Floats:
+        """The template, turned as the patch was in the last frame."""
+        assert self._template is not None  # noqa: S101 - there is a reference
+        assert self._around is not None  # noqa: S101 - likewise
+        if abs(turn - self._template_turn) > TURN_AT:
+            (a, b), around = self.half, self._around
+            middle = (0.5 * (around.shape[1] - 1), 0.5 * (around.shape[0] - 1))
+            # The content turns by `turn` clockwise on the screen; OpenCV counts the other way.
+            turned = cv2.warpAffine(
+                around, cv2.getRotationMatrix2D(middle, -np.degrees(turn), 1.0), around.shape[::-1],
+                borderMode=cv2.BORDER_REFLECT_101,
+            )  # fmt: skip
+            row, column = int(middle[1]), int(middle[0])
+            self._template = np.ascontiguousarray(turned[row - b : row + b + 1, column - a : column + a + 1])
+            self._template_turn = turn
+        return self._template
+
+    def taken(
+        self, place: tuple[float, float, float], covariance: NDArray[np.float64], correlation: float, settled: bool
+    ) -> Reading:
+        """Judge what the registration found, and remember it."""
+        x, y, turn = place
+        if not settled or correlation < self._least_correlation:
+            return self._failed(GaugeStatus.NOT_FOUND)
+        if hypot(x - self._at[0], y - self._at[1]) > self._spec.reach_px * self._times + 1.0:
+            return self._failed(GaugeStatus.NOT_FOUND, "it would have moved farther than it may")
+        if not max(covariance[0, 0], covariance[1, 1]) < LEAST_SURE_PX**2:
+            return self._failed(GaugeStatus.LOW_CONTRAST)
+        self._at, self._times = place, 1.0
+        # The point that was drawn need not be the patch's own middle, which is a pixel's.
+        (from_x, from_y) = self._spec.middle_px
+        off_x, off_y = from_x - round(from_x), from_y - round(from_y)
+        to = (x + cos(turn) * off_x - sin(turn) * off_y, y + sin(turn) * off_x + cos(turn) * off_y)
+        u_x, u_y, u_turn = (sqrt(float(covariance[i, i])) for i in range(3))
+        quantities = (
+            Shift((from_x, from_y), to, 0.0, u_x),
+            Shift((from_x, from_y), to, 0.5 * np.pi, u_y),
+            Angle(to, turn, u_turn, is_turn=True),
+        )
+        return Reading(GaugeStatus.OK, quantities, (Mark(((from_x, from_y), to)), Mark((to,)), self._zone()), None)
+
+
+def _padded(picture: Picture, x: int, y: int, width: int, height: int) -> Floats:
+    """Light of a rectangle; beyond the picture's border it is reflected, which only interpolation's tails feel."""
+    levels, (left, top) = picture.part(x, y, width, height)
+    part = levels.astype(np.float32)
+    if part.shape == (height, width):
+        return part
+    before = (left - x, top - y)
+    after = (width - part.shape[1] - before[0], height - part.shape[0] - before[1])
+    return np.asarray(
+        cv2.copyMakeBorder(part, before[1], after[1], before[0], after[0], cv2.BORDER_REFLECT_101), dtype=np.float32
+    )

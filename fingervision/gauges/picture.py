@@ -1,0 +1,76 @@
+"""What gauges see of a frame: its light, where it is asked for."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from calib.camera_response import CameraResponse
+from fingervision.domain.frame import Coding, Frame
+from fingervision.vision.grey import GreyImage, to_grey, top_level
+from fingervision.vision.pipeline import Settings
+from fingervision.vision.residuals import SHARED_POINTS
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Picture:
+    """One frame as gauges see it.
+
+    Parameters
+    ----------
+    frame : Frame
+        The frame itself.
+    grey : ndarray, shape (height, width)
+        Its grey levels.
+    light : ndarray of float, shape (levels,), or None
+        Light of every level; None where it is the level itself.
+    top : float
+        End of the scale.
+    settings : Settings
+        How the recording is measured.
+    """
+
+    frame: Frame
+    grey: GreyImage
+    light: Floats | None
+    top: float
+    settings: Settings
+
+    @property
+    def size_px(self) -> tuple[int, int]:
+        """Width and height."""
+        return self.grey.shape[1], self.grey.shape[0]
+
+    @property
+    def coding(self) -> Coding:
+        """What stood between the sensor and the pixels."""
+        return self.frame.coding
+
+    @property
+    def shared_pixels(self) -> float:
+        """So many pixels count as one, as far as the codec is known to share its errors."""
+        return SHARED_POINTS[self.frame.coding]
+
+    def part(self, x_px: int, y_px: int, width_px: int, height_px: int) -> tuple[Floats, tuple[int, int]]:
+        """Light in a rectangle, cut to the picture, and the rectangle's first column and row as far as it is inside."""
+        width, height = self.size_px
+        left, top = min(max(x_px, 0), width), min(max(y_px, 0), height)
+        right, bottom = min(max(x_px + width_px, left), width), min(max(y_px + height_px, top), height)
+        stored = self.grey[top:bottom, left:right]
+        return (stored.astype(np.float64) if self.light is None else self.light[stored]), (left, top)
+
+    def holds(self, x_px: float, y_px: float, width_px: float, height_px: float) -> bool:
+        """Whether a rectangle lies wholly inside the picture."""
+        width, height = self.size_px
+        return x_px >= -0.5 and y_px >= -0.5 and x_px + width_px <= width + 0.5 and y_px + height_px <= height + 0.5
+
+
+def picture_of(frame: Frame, settings: Settings) -> Picture:
+    """Prepare a frame for its gauges."""
+    grey = to_grey(frame.pixels)
+    response: CameraResponse = settings.response
+    top = top_level(grey, settings.bits if response.top_level is None else response.top_level.bit_length())
+    light = None if response.name == "linear" else response.table(top, int(np.iinfo(grey.dtype).max) + 1)
+    return Picture(frame, grey, light, float(top), settings)

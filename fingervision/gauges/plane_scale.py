@@ -1,0 +1,91 @@
+"""From the picture to the plane for any point and direction, with what all frames share of the uncertainty."""
+
+from dataclasses import dataclass, field
+from math import cos, hypot, pi, sin, sqrt
+
+import numpy as np
+from numpy.typing import NDArray
+
+from calib.limits import rectangular
+from calib.measured_scale import Calibration
+from fingervision.measuring.scale import Scale
+
+Floats = NDArray[np.float64]
+
+# Lengths are uncertain alike near each other: the budget is asked once for points of a square of this side, and for
+# directions of this breadth. Within both, perspective and lens change by far less than they are uncertain.
+SQUARE_PX, SECTOR_RAD, BASELINE_PX = 32.0, pi / 12.0, 64.0
+
+
+@dataclass(frozen=True, slots=True)
+class PlaneScale:
+    """A scale with the size of the frames that it is for.
+
+    Parameters
+    ----------
+    scale : Scale
+        From pixels to millimetres.
+    frame_size_px : (int, int)
+        Width and height.
+    """
+
+    scale: Scale
+    frame_size_px: tuple[int, int]
+    _known: dict[tuple[int, int, int], float] = field(default_factory=dict)
+
+    @property
+    def px_per_mm(self) -> float:
+        """Pixels to the millimetre."""
+        return self.scale.px_per_mm
+
+    @property
+    def edge_bias_px(self) -> float:
+        """What a light gap between dark edges lacks in the picture."""
+        return self.scale.edge_bias_px
+
+    @property
+    def middle_px(self) -> tuple[float, float]:
+        """The picture's middle."""
+        return 0.5 * (self.frame_size_px[0] - 1), 0.5 * (self.frame_size_px[1] - 1)
+
+    def flatten(self, points_px: Floats) -> Floats:
+        """Take lens and perspective off points, shape (n, 2)."""
+        return self.scale.flatten(points_px) if isinstance(self.scale, Calibration) else points_px
+
+    def relative_u(self, point_px: tuple[float, float], direction_rad: float) -> float:
+        """Relative standard uncertainty of a length there, that all frames share; 0 where nothing is known of it.
+
+        Scale, plane, tilt, lens and temperature are in it; bias and phase of edges are not.
+        """
+        if not isinstance(self.scale, Calibration):
+            return 0.0
+        sector = round((direction_rad % pi) / SECTOR_RAD)
+        key = (round(point_px[0] / SQUARE_PX), round(point_px[1] / SQUARE_PX), sector)
+        if key not in self._known:
+            self._known[key] = self._relative(self.scale, key)
+        return self._known[key]
+
+    def _relative(self, scale: Calibration, key: tuple[int, int, int]) -> float:
+        x, y, angle = key[0] * SQUARE_PX, key[1] * SQUARE_PX, key[2] * SECTOR_RAD
+        step_x, step_y = 0.5 * BASELINE_PX * cos(angle), 0.5 * BASELINE_PX * sin(angle)
+        ends = np.array([[[x - step_x, y - step_y], [x + step_x, y + step_y]]])
+        budget = scale.budget(ends, np.zeros(1), np.ones(1, dtype=bool))
+        length_mm = BASELINE_PX / scale.px_per_mm
+        of_edges = {"estimator", "edge noise", *(part.source for part in scale.parts)}
+        variance = sum(float(line.u_mm[0]) ** 2 for line in budget.lines if line.source not in of_edges)
+        of_scale = sum(float(part.covariance[0, 0]) for part in scale.parts) / scale.px_per_mm**2
+        return sqrt(variance / length_mm**2 + of_scale)
+
+    def u_edge_px(self, u_response_px: float) -> float:
+        """What all frames share of the uncertainty of one edge: half of the edge bias, phase, camera response."""
+        if not isinstance(self.scale, Calibration):
+            return 0.0
+        return hypot(0.5 * self.scale.u_edge_bias_px, rectangular(self.scale.limits.estimator_px), u_response_px)
+
+    @property
+    def u_angle_rad(self) -> float:
+        """What tilt and lens leave open of an angle: half of what they may shorten one axis against the other."""
+        if not isinstance(self.scale, Calibration):
+            return 0.0
+        limits = self.scale.limits
+        return 0.5 * hypot(rectangular(1.0 - cos(limits.tilt_rad)), rectangular(limits.lens_relative))

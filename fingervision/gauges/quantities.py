@@ -1,0 +1,245 @@
+"""What a gauge can measure: a number in pixels with its uncertainty, and the points that decide it on the plane.
+
+Lens and plane are taken off the measured points; the picture is never resampled. In millimetres `u` holds the whole
+budget of a calibration; with a bare scale, which has no uncertainty, it is the fit's own part, as in pixels.
+"""
+
+from dataclasses import dataclass
+from math import atan2, cos, hypot, pi, sin
+from typing import NamedTuple, Protocol
+
+from fingervision.gauges.plane_scale import PlaneScale
+
+Point = tuple[float, float]
+# An angle is turned by what lens and plane do to two points so far to either side of its middle (pixels).
+ANGLE_REACH_PX = 10.0
+
+
+class Cell(NamedTuple):
+    """Value, standard uncertainty and unit, as a row of gauges.csv holds them."""
+
+    value: float
+    u: float
+    unit: str
+
+
+class Quantity(Protocol):
+    """One number of a gauge."""
+
+    @property
+    def points_px(self) -> tuple[Point, ...]:
+        """Points of the picture that decide it."""
+        ...
+
+    def in_pixels(self) -> Cell:
+        """The number in the picture."""
+        ...
+
+    def on_plane(self, flat: tuple[Point, ...], scale: PlaneScale) -> Cell:
+        """The number on the plane; `flat` are the points with lens and perspective taken off."""
+        ...
+
+
+@dataclass(frozen=True, slots=True)
+class Position:
+    """Where a point or an edge is along a direction.
+
+    In pixels it is counted from the middle of the picture's first pixel, in millimetres from the picture's middle, as
+    `left_mm` in gaps.csv.
+
+    Parameters
+    ----------
+    point_px : (float, float)
+        The point, or the edge's point on the gauge's line.
+    direction_rad : float
+        0 to the right, pi / 2 downwards.
+    u_px : float
+        Standard uncertainty along the direction, from the fit.
+    dark_side : int
+        For an edge: +1 where it is dark beyond it, -1 where it is light; 0 for what is no edge.
+    u_response_px : float
+        What an unknown camera response leaves open of an edge.
+    """
+
+    point_px: Point
+    direction_rad: float
+    u_px: float
+    dark_side: int = 0
+    u_response_px: float = 0.0
+
+    @property
+    def points_px(self) -> tuple[Point, ...]:
+        """The point."""
+        return (self.point_px,)
+
+    def in_pixels(self) -> Cell:
+        """Along the direction."""
+        x, y = self.point_px
+        return Cell(x * cos(self.direction_rad) + y * sin(self.direction_rad), self.u_px, "px")
+
+    def on_plane(self, flat: tuple[Point, ...], scale: PlaneScale) -> Cell:
+        """Millimetres from the picture's middle; the dark side of a bright edge begins half of the edge bias later."""
+        ((x, y),) = flat
+        x, y = x - scale.middle_px[0], y - scale.middle_px[1]
+        away_px = x * cos(self.direction_rad) + y * sin(self.direction_rad)
+        value_px = away_px + 0.5 * self.dark_side * scale.edge_bias_px
+        shared_px = scale.relative_u(self.point_px, self.direction_rad) * away_px
+        edge_px = scale.u_edge_px(self.u_response_px) if self.dark_side else 0.0
+        return Cell(value_px / scale.px_per_mm, hypot(self.u_px, shared_px, edge_px) / scale.px_per_mm, "mm")
+
+
+@dataclass(frozen=True, slots=True)
+class Distance:
+    """How far two points on two edges are apart.
+
+    Parameters
+    ----------
+    first_px, second_px : (float, float)
+        The points.
+    u_px : float
+        Standard uncertainty of the distance, from the fit.
+    polarity : int
+        +1 where it is light between the edges and dark beyond, -1 where it is dark between; 0 where both edges have
+        the same sense, so that their biases cancel.
+    u_response_px : float
+        What an unknown camera response leaves open of each edge.
+    """
+
+    first_px: Point
+    second_px: Point
+    u_px: float
+    polarity: int
+    u_response_px: float = 0.0
+
+    @property
+    def points_px(self) -> tuple[Point, ...]:
+        """Both points."""
+        return (self.first_px, self.second_px)
+
+    def in_pixels(self) -> Cell:
+        """Between the points."""
+        (x, y), (to_x, to_y) = self.points_px
+        return Cell(hypot(to_x - x, to_y - y), self.u_px, "px")
+
+    def on_plane(self, flat: tuple[Point, ...], scale: PlaneScale) -> Cell:
+        """`(distance_px + p b) / s`, as a gap."""
+        (x, y), (to_x, to_y) = flat
+        apart_px = hypot(to_x - x, to_y - y)
+        direction = atan2(to_y - y, to_x - x)
+        middle = (0.5 * (self.first_px[0] + self.second_px[0]), 0.5 * (self.first_px[1] + self.second_px[1]))
+        shared_px = scale.relative_u(middle, direction) * apart_px
+        edge_px = 2.0 * abs(self.polarity) * scale.u_edge_px(self.u_response_px)
+        value_px = apart_px + self.polarity * scale.edge_bias_px
+        return Cell(value_px / scale.px_per_mm, hypot(self.u_px, shared_px, edge_px) / scale.px_per_mm, "mm")
+
+
+@dataclass(frozen=True, slots=True)
+class Shift:
+    """How far a point has moved along a direction since the first frame.
+
+    Parameters
+    ----------
+    from_px, to_px : (float, float)
+        The point then and now.
+    direction_rad : float
+        0 to the right, pi / 2 downwards.
+    u_px : float
+        Standard uncertainty of the shift, from the registration.
+    """
+
+    from_px: Point
+    to_px: Point
+    direction_rad: float
+    u_px: float
+
+    @property
+    def points_px(self) -> tuple[Point, ...]:
+        """Then and now."""
+        return (self.from_px, self.to_px)
+
+    def in_pixels(self) -> Cell:
+        """Along the direction."""
+        x, y = self.to_px[0] - self.from_px[0], self.to_px[1] - self.from_px[1]
+        return Cell(x * cos(self.direction_rad) + y * sin(self.direction_rad), self.u_px, "px")
+
+    def on_plane(self, flat: tuple[Point, ...], scale: PlaneScale) -> Cell:
+        """Millimetres; whatever bias both pictures share cancels."""
+        (x, y), (to_x, to_y) = flat
+        moved_px = (to_x - x) * cos(self.direction_rad) + (to_y - y) * sin(self.direction_rad)
+        shared_px = scale.relative_u(self.from_px, self.direction_rad) * moved_px
+        return Cell(moved_px / scale.px_per_mm, hypot(self.u_px, shared_px) / scale.px_per_mm, "mm")
+
+
+@dataclass(frozen=True, slots=True)
+class Angle:
+    """Direction of a line, or how far a thing has turned since the first frame.
+
+    Parameters
+    ----------
+    point_px : (float, float)
+        Its middle.
+    angle_rad : float
+        From the x axis towards the y axis, clockwise on the screen.
+    u_rad : float
+        Standard uncertainty from the fit.
+    is_turn : bool
+        Whether it is counted from the first frame: a turn has no direction of its own.
+    """
+
+    point_px: Point
+    angle_rad: float
+    u_rad: float
+    is_turn: bool = False
+
+    @property
+    def points_px(self) -> tuple[Point, ...]:
+        """Two points along the direction, and for a turn two along the x axis."""
+        return (*_ends(self.point_px, self.angle_rad), *(_ends(self.point_px, 0.0) if self.is_turn else ()))
+
+    def in_pixels(self) -> Cell:
+        """In the picture."""
+        return Cell(1e3 * self.angle_rad, 1e3 * self.u_rad, "mrad")
+
+    def on_plane(self, flat: tuple[Point, ...], scale: PlaneScale) -> Cell:
+        """On the plane; the same number of turns as in the picture."""
+        found = _between(*flat[:2]) - (_between(*flat[2:]) if self.is_turn else 0.0)
+        turned = found - self.angle_rad
+        value = self.angle_rad + (turned + pi) % (2.0 * pi) - pi
+        shared = scale.u_angle_rad * (abs(sin(self.angle_rad)) if self.is_turn else 1.0)
+        return Cell(1e3 * value, 1e3 * hypot(self.u_rad, shared), "mrad")
+
+
+def _ends(middle: Point, angle_rad: float) -> tuple[Point, Point]:
+    x, y = ANGLE_REACH_PX * cos(angle_rad), ANGLE_REACH_PX * sin(angle_rad)
+    return (middle[0] - x, middle[1] - y), (middle[0] + x, middle[1] + y)
+
+
+def _between(first: Point, second: Point) -> float:
+    return atan2(second[1] - first[1], second[0] - first[0])
+
+
+@dataclass(frozen=True, slots=True)
+class Ready:
+    """A number that is worked out already, both ways.
+
+    Parameters
+    ----------
+    pixels, millimetres : Cell
+        The number in the picture and on the plane.
+    """
+
+    pixels: Cell
+    millimetres: Cell
+
+    @property
+    def points_px(self) -> tuple[Point, ...]:
+        """None are needed."""
+        return ()
+
+    def in_pixels(self) -> Cell:
+        """In the picture."""
+        return self.pixels
+
+    def on_plane(self, flat: tuple[Point, ...], scale: PlaneScale) -> Cell:
+        """On the plane."""
+        return self.millimetres

@@ -1,0 +1,210 @@
+"""All gauges of one recording: measured frame by frame, turned into rows, counted, drawn."""
+
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from types import TracebackType
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fingervision.domain.frame import Frame, LostFrame, Pixels
+from fingervision.gauges.drawing import draw_gauges
+from fingervision.gauges.gauge_file import Gauge, check_gauges
+from fingervision.gauges.kinds import measured_together
+from fingervision.gauges.picture import picture_of
+from fingervision.gauges.plane_scale import PlaneScale
+from fingervision.gauges.quantities import Cell
+from fingervision.gauges.reading import Reading
+from fingervision.gauges.status import GaugeStatus
+from fingervision.measuring.scale import Scale
+from fingervision.storage.gauges_csv import GaugeRow, GaugesCsv
+from fingervision.vision.overlay import in_eight_bits
+from fingervision.vision.pipeline import Settings
+
+# Rows are made for so many frames at once: lens and plane are taken off all of their points together.
+FRAMES_AT_ONCE = 64
+
+
+@dataclass(slots=True)
+class Tally:
+    """What is kept of one gauge until the end.
+
+    Parameters
+    ----------
+    counts : Counter of str
+        Frames with each status.
+    words : dict of str to str
+        The first frame's sentence of each status, where there is one.
+    least, most : dict of str to float
+        Range of each quantity.
+    """
+
+    counts: Counter[str] = field(default_factory=Counter)
+    first: dict[str, tuple[int, str]] = field(default_factory=dict)
+    least: dict[str, Cell] = field(default_factory=dict)
+    most: dict[str, Cell] = field(default_factory=dict)
+
+
+class GaugeRecording:
+    """Measures a file's gauges in the frames of one recording, in order, and writes gauges.csv.
+
+    Parameters
+    ----------
+    gauges : tuple of Gauge
+        As read from the file.
+    scale : Scale or None
+        From pixels to millimetres; without one everything stays in pixels.
+    frame_size_px : (int, int)
+        Width and height of the frames.
+    settings : Settings
+        How the recording is measured.
+    path : Path
+        gauges.csv.
+
+    Raises
+    ------
+    FingervisionError
+        A gauge lies outside of the frames, or the table cannot be written.
+    """
+
+    def __init__(
+        self, gauges: tuple[Gauge, ...], scale: Scale | None, frame_size_px: tuple[int, int], settings: Settings,
+        path: Path,
+    ) -> None:  # fmt: skip
+        check_gauges(gauges, *frame_size_px)
+        self._gauges, self._settings = gauges, settings
+        self._plane = None if scale is None else PlaneScale(scale, frame_size_px)
+        self._followers = [gauge.spec.follower() for gauge in gauges]
+        self._pending: list[tuple[float | None, int, Sequence[Reading]]] = []
+        self._newest: Sequence[Reading] = ()
+        self._table = GaugesCsv(path)
+        self.tallies = {gauge.name: Tally() for gauge in gauges}
+
+    def __enter__(self) -> "GaugeRecording":
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._hand_over()
+        self._table.close()
+
+    @property
+    def has_numbers(self) -> bool:
+        """Whether any gauge gave a number in any frame so far."""
+        pending = any(reading.quantities for _, _, readings in self._pending for reading in readings)
+        return pending or any(tally.counts[GaugeStatus.OK.value] for tally in self.tallies.values())
+
+    def add(self, frame: Frame | LostFrame, outcome: object = None) -> Sequence[Reading]:
+        """Measure the next frame.
+
+        Parameters
+        ----------
+        frame : Frame or LostFrame
+            As it came.
+        outcome : object
+            What was measured in it; where that is a `LostFrame` its picture is not believed here either.
+
+        Returns
+        -------
+        sequence of Reading
+            In the order of the gauges.
+        """
+        lost = outcome if isinstance(outcome, LostFrame) else frame
+        readings: Sequence[Reading]
+        if isinstance(lost, LostFrame):
+            readings = [Reading(GaugeStatus(lost.status.value), words=lost.words)] * len(self._gauges)
+        else:
+            readings = measured_together(self._followers, picture_of(lost, self._settings))
+        self._newest = readings
+        self._pending.append((frame.time_s, frame.index, readings))
+        if len(self._pending) >= FRAMES_AT_ONCE:
+            self._hand_over()
+        return readings
+
+    def draw(self, canvas: NDArray[np.uint8]) -> None:
+        """Draw the newest frame's gauges into its picture (red, green and blue), in place."""
+        draw_gauges(canvas, self._gauges, self._newest)
+
+    def steps(self, frame: Frame) -> list[tuple[str, Pixels]]:
+        """The picture of this step: the newest frame with its gauges."""
+        grey = in_eight_bits(frame.pixels)
+        canvas = np.array(grey if grey.ndim == 3 else np.dstack([grey] * 3), dtype=np.uint8)
+        self.draw(canvas)
+        return [("gauges", canvas)]
+
+    def _hand_over(self) -> None:
+        pending, self._pending = self._pending, []
+        quantities = [q for _, _, readings in pending for reading in readings for q in reading.quantities]
+        cells = iter(cells_of(quantities, self._plane))
+        rows: list[GaugeRow] = []
+        length = "px" if self._plane is None else "mm"
+        for time_s, index, readings in pending:
+            for gauge, reading in zip(self._gauges, readings, strict=True):
+                tally, status = self.tallies[gauge.name], reading.status.value
+                tally.counts[status] += 1
+                tally.first.setdefault(status, (index, reading.words))
+                for number, (name, sort) in enumerate(gauge.quantities):
+                    if number < len(reading.quantities):
+                        cell = next(cells)
+                        tally.least[name] = min(tally.least.get(name, cell), cell)
+                        tally.most[name] = max(tally.most.get(name, cell), cell)
+                        rows.append(GaugeRow(time_s, gauge.name, name, *cell, status))
+                    else:
+                        unit = length if sort == "length" else "mrad"
+                        rows.append(GaugeRow(time_s, gauge.name, name, None, None, unit, status))
+        self._table.add(rows)
+
+    def in_words(self) -> dict[str, Any]:
+        """What summary.json says of every gauge."""
+        return {
+            gauge.name: {
+                "kind": gauge.kind_name,
+                "counts": dict(self.tallies[gauge.name].counts),
+                "why": {
+                    status: {"first_frame": index, "words": words}
+                    for status, (index, words) in self.tallies[gauge.name].first.items()
+                    if status != GaugeStatus.OK.value
+                },
+                "quantities": {
+                    name: {
+                        "least": self.tallies[gauge.name].least[name].value,
+                        "greatest": self.tallies[gauge.name].most[name].value,
+                        "unit": self.tallies[gauge.name].least[name].unit,
+                    }
+                    for name, _ in gauge.quantities
+                    if name in self.tallies[gauge.name].least
+                },
+            }
+            for gauge in self._gauges
+        }
+
+
+def cells_of(quantities: Sequence[Any], plane: PlaneScale | None) -> list[Cell]:
+    """Numbers in millimetres, or in pixels where there is no scale."""
+    if plane is None:
+        return [quantity.in_pixels() for quantity in quantities]
+    points = [quantity.points_px for quantity in quantities]
+    every = [point for some in points for point in some]
+    flat = plane.flatten(np.array(every, dtype=np.float64).reshape(-1, 2)).tolist() if every else []
+    found, first = [], 0
+    for quantity, some in zip(quantities, points, strict=True):
+        own = tuple((x, y) for x, y in flat[first : first + len(some)])
+        found.append(quantity.on_plane(own, plane))
+        first += len(some)
+    return found
+
+
+def gauge_sentence(name: str, gauge: Mapping[str, Any]) -> str:
+    """What one gauge of summary.json came to, for a person."""
+    frames = sum(gauge["counts"].values())
+    ranges = [
+        f"{quantity} {found['least']:.4f} to {found['greatest']:.4f} {found['unit']}"
+        for quantity, found in gauge["quantities"].items()
+    ]
+    why = [f"{gauge['counts'][status]} {status}" for status in gauge["why"]]
+    words = "; ".join([*ranges, *why])
+    return f"Gauge {name} ({gauge['kind']}): {gauge['counts'].get('ok', 0)} of {frames} frames; {words}."

@@ -1,0 +1,36 @@
+"""Whether a gauge gave a number in a frame, and if not, why."""
+
+from enum import StrEnum
+
+
+class GaugeStatus(StrEnum):
+    """The state of one gauge in one frame; words that gaps.csv has mean the same here."""
+
+    OK = "ok"
+    DAMAGED = "damaged"
+    DUPLICATE = "duplicate"
+    SATURATED = "saturated"
+    LOW_CONTRAST = "low_contrast"
+    NO_FINGERS = "no_fingers"
+    ONE_FINGER = "one_finger"
+    TIP_OUT_OF_VIEW = "tip_out_of_view"
+    BLURRED = "blurred"
+    TOUCHING = "touching"
+    GRIPPING = "gripping"
+    OUT_OF_VIEW = "out_of_view"
+    NO_EDGE = "no_edge"
+    NOT_FOUND = "not_found"
+    AMBIGUOUS = "ambiguous"
+
+
+MEANING = {
+    GaugeStatus.OUT_OF_VIEW: "what it measures, or a part of it that is needed, lies outside of the picture",
+    GaugeStatus.NO_EDGE: "no straight edge of this polarity and contrast lies where it may be",
+    GaugeStatus.NOT_FOUND: "nothing that looks like it lies where it may be",
+    GaugeStatus.AMBIGUOUS: "more than one thing that looks like it lies where it may be: lower reach_px, state the "
+    "polarity, or move the gauge",
+    GaugeStatus.LOW_CONTRAST: "too little is seen there to measure",
+    GaugeStatus.SATURATED: "the flank of its edge is clipped at the end of the scale",
+    GaugeStatus.BLURRED: "its edge is spread by more than 5 px (standard deviation)",
+    GaugeStatus.TOUCHING: "its two edges are too near each other to be told apart",
+}

@@ -1,0 +1,90 @@
+"""A mechanism drawn by bodies as a model of the diagnosis, and the seam to the places of a drawing."""
+
+from functools import cached_property
+from typing import Protocol, runtime_checkable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fingervision.domain.errors import FingervisionError, UsageError
+from fingervision.domain.response import Response
+from fingervision.models.mechanism import Mechanism
+from fingervision.models.mechanism_chain import MechanismChain
+from fingervision.models.mechanism_figures import MechanismModel
+from fingervision.models.mechanism_frame import MechanismFrame
+from fingervision.models.mechanism_plate import MechanismPlate
+from fingervision.models.place_answers import PlaceAnswers
+
+Array = NDArray[np.float64]
+
+GAP = "gap"
+
+
+@runtime_checkable
+class DrawnMechanism(Protocol):
+    """A model whose drawing knows its hinges, links and bodies."""
+
+    @property
+    def places(self) -> PlaceAnswers:
+        """How it answers with one of its places changed."""
+        ...
+
+
+class MechanismModelOfGap:
+    """A mechanism with a pair called gap, by small displacements.
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+        The drawing.
+    kind : str
+        Kind of model that answers for the gap; places are the lumped model's, whatever the kind.
+
+    Raises
+    ------
+    FingervisionError
+        Where no pair is called gap.
+    """
+
+    def __init__(self, mechanism: Mechanism, kind: str) -> None:
+        self.mechanism = mechanism
+        if GAP not in mechanism.pairs:
+            raise FingervisionError(
+                f"{mechanism.name} must have a pair of probes called {GAP} to be held against a measured gap, but has "
+                f'{", ".join(mechanism.pairs) or "none"}: add [[pair]] name = "{GAP}" with of = [two probes].'
+            )
+        model: MechanismModel
+        if kind == "finite_element":
+            model = MechanismPlate(mechanism)
+        elif kind == "stiffness_matrix":
+            model = MechanismChain(mechanism)
+        elif kind == "lumped":
+            model = MechanismFrame(mechanism)
+        else:
+            raise UsageError(f"The kind of model must be finite_element, lumped or stiffness_matrix, but is {kind}.")
+        self._model = model
+        state = model.state(1.0)
+        reach = mechanism.material.yield_mpa / state.stress_mpa
+        touches = [at for at in model.touch_input_mm().values() if abs(at) < reach]
+        self.input_range_mm = (
+            max([-reach, *(at for at in touches if at < 0.0)]),
+            min([reach, *(at for at in touches if at > 0.0)]),
+        )
+        first, last = mechanism.pairs[GAP]
+        apart = np.subtract(mechanism.probes[last], mechanism.probes[first])
+        self._rest_mm = float(np.hypot(*apart))
+        way = apart / self._rest_mm
+        self._left = float(np.dot(state.probes_mm[first], way))
+        self._right = float(np.dot(state.probes_mm[last], way))
+        self._force_n = state.force_n
+
+    def respond(self, input_mm: Array) -> Response:
+        """Answer by small displacements, the gap's middle at zero at rest."""
+        u = np.asarray(input_mm, dtype=float)
+        half = 0.5 * self._rest_mm
+        return Response(-half + self._left * u, half + self._right * u, self._force_n * u)
+
+    @cached_property
+    def places(self) -> PlaceAnswers:
+        """How it answers with one of its places changed."""
+        return PlaceAnswers(self.mechanism, self._model if isinstance(self._model, MechanismFrame) else None)

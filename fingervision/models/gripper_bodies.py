@@ -1,0 +1,139 @@
+"""Poses of the gripper's bodies by every kind of model of a `gripper.toml`: both fingers and the drive."""
+
+from collections.abc import Callable, Mapping
+from functools import partial
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import PchipInterpolator
+
+from fingervision.domain.gripper import Gripper
+from fingervision.models.driven_body import DrivenBody
+from fingervision.models.gripper_mechanism import half_mechanism
+from fingervision.models.mechanism_bodies import LinkBody, bodies_of, plate_poses
+from fingervision.models.physics import LINEAR, Physics
+from fingervision.models.plane_stress import PlaneStressPlate
+from fingervision.models.rigid_motion import BodyPose, rigid_motion
+from fingervision.models.skeleton import Skeleton
+from fingervision.models.static_answer import equilibria
+
+Array = NDArray[np.float64]
+Poses = Callable[[Array], Mapping[str, BodyPose]]
+
+_MOST_EQUILIBRIA = 41
+"""Equilibria in the deformed shape; a curve through 41 is within 0.02 um of its own refinement for the sample."""
+_RIGHT, _LEFT = "right_", "left_"
+_MIRROR = np.array([-1.0, 1.0, -1.0])
+_ON_AXIS = np.array([0.0, 1.0, 0.0])
+"""A body that both halves share moves along the axis alone; its half also bends aside, against the other half."""
+
+
+def gripper_bodies(gripper: Gripper) -> tuple[LinkBody, ...]:
+    """Cut the right half into its bodies."""
+    return bodies_of(half_mechanism(gripper))
+
+
+def poses_of_plate(plate: PlaneStressPlate, gripper: Gripper, *, large: bool) -> Poses:
+    """Tell the right half's poses from the displacements of its mesh."""
+    return partial(plate_poses, plate, gripper_bodies(gripper), large=large)
+
+
+def poses_of_frame(gripper: Gripper, skeleton: Skeleton, *, large: bool) -> Poses:
+    """Tell the right half's poses from the motions of the nodes of its bars.
+
+    A bar is two rows of points at its sixths across its width, whose area and second moment are the bar's.
+    """
+    members = skeleton.members
+    owners = [_owner(member.name) for member in members]
+    centroids = {body.name: body.centroid_mm for body in gripper_bodies(gripper) if not body.is_fixed}
+    places = np.array([members[0].start_mm, *(member.end_mm for member in members)])
+
+    def poses(moved: Array) -> Mapping[str, BodyPose]:
+        motion = moved.reshape(-1, 3)
+        found = {}
+        for name, centroid in centroids.items():
+            rest, there, weights = [], [], []
+            for place, (member, owner) in enumerate(zip(members, owners, strict=True)):
+                if owner != name or member.mass_t == 0.0:
+                    continue
+                a, b = member.parent + 1, place + 1
+                # Simpson's rule along the bar; at its middle the cubic of a beam that bends.
+                chord = places[b] - places[a]
+                bend = (motion[a, 2] - motion[b, 2]) / 8.0 * np.array([-chord[1], chord[0]])
+                middle = 0.5 * (motion[a] + motion[b])
+                middle[:2] += 0.0 if large else bend
+                for share, at, by in ((1.0, places[a], motion[a]), (4.0, 0.5 * (places[a] + places[b]), middle),
+                                      (1.0, places[b], motion[b])):  # fmt: skip
+                    across = np.array([-chord[1], chord[0]]) / np.hypot(*chord) * member.width_mm / np.sqrt(12.0)
+                    for side in (-1.0, 1.0):
+                        arm = side * across
+                        rest.append(at + arm)
+                        there.append(by[:2] + _turned(arm, float(by[2]), large=large))
+                        weights.append(share * member.mass_t)
+            found[name] = rigid_motion(np.array(rest).T, np.array(there).T, np.array(weights), centroid, large=large)
+        return found
+
+    return poses
+
+
+def gripper_poses(half: DrivenBody, physics: Physics, poses: Poses, input_mm: Array) -> dict[str, Array]:
+    """Answer the poses of both fingers and the drive at each input.
+
+    Parameters
+    ----------
+    half : DrivenBody
+        The right half.
+    physics : Physics
+        What goes beyond small displacements.
+    poses : callable
+        Displacements of the half to the poses of its bodies.
+    input_mm : ndarray of float, shape (n,)
+        Inputs.
+
+    Returns
+    -------
+    dict of str to ndarray of float, shape (n, 3)
+        `x_mm`, `y_mm` and `angle_mrad` of every body that moves, the left finger the right one's mirror image.
+    """
+    inputs = np.asarray(input_mm, dtype=float)
+    if physics == LINEAR:
+        right = {name: np.outer(inputs, row) for name, row in _rows(poses(half.unit_displacement_mm)).items()}
+    else:
+        nodes = np.unique(inputs)
+        if nodes.size > _MOST_EQUILIBRIA:
+            nodes = np.linspace(nodes[0], nodes[-1], _MOST_EQUILIBRIA)
+        states = [_rows(poses(state.displacement_mm)) for state in equilibria(half, physics, nodes.tolist())]
+        right = {name: _through(nodes, np.array([state[name] for state in states]), inputs) for name in states[0]}
+    found: dict[str, Array] = {}
+    for name, rows in right.items():
+        if name.startswith(_RIGHT):
+            found[_LEFT + name.removeprefix(_RIGHT)] = rows * _MIRROR
+        found[name] = rows if name.startswith(_RIGHT) else rows * _ON_AXIS
+    return {name: rows + 0.0 for name, rows in sorted(found.items())}  # no -0
+
+
+def _rows(poses: Mapping[str, BodyPose]) -> dict[str, Array]:
+    return {name: np.array([pose.x_mm, pose.y_mm, pose.angle_mrad]) for name, pose in poses.items()}
+
+
+def _through(nodes: Array, rows: Array, inputs: Array) -> Array:
+    if nodes.size == 1:
+        return np.repeat(rows, inputs.size, axis=0)
+    return np.asarray(PchipInterpolator(nodes, rows)(inputs))
+
+
+def _owner(member: str) -> str:
+    """Body that a bar of the half belongs to; none where it is a hinge's."""
+    if member.startswith("hinge"):
+        return ""
+    if member in ("shuttle", "drive block"):
+        return "drive"
+    return "right_pillar" if member == "pillar" else "right_finger"
+
+
+def _turned(arm: Array, angle: float, *, large: bool) -> Array:
+    """Motion of the end of an arm that turns."""
+    if not large:
+        return angle * np.array([-arm[1], arm[0]])
+    c, s = np.cos(angle) - 1.0, np.sin(angle)
+    return np.array([c * arm[0] - s * arm[1], s * arm[0] + c * arm[1]])

@@ -1,0 +1,190 @@
+"""The bodies of a mechanism: what is left of the drawing, in one piece each, where its flexures are cut away."""
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fingervision.models.flexure_span import FlexureSpan, span_of
+from fingervision.models.mechanism import Face, Mechanism
+from fingervision.models.planar_region import Loop, PlanarRegion
+from fingervision.models.plane_shapes import Polygon, Shape
+from fingervision.models.plane_stress import PlaneStressPlate
+from fingervision.models.rigid_motion import BodyPose, rigid_motion
+
+Array = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+
+_CHORDS = 65
+"""Along an arc: a centroid is then within 1e-5 of the arc's radius."""
+_SAMPLES = 24
+"""Points along either side of the box round a shape, by which it is told in which piece most of a shape lies."""
+_ON = 1e-6
+"""Of the drawing's size: how near to a face's box the outline must come to lie on it."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LinkBody:
+    """One body.
+
+    Parameters
+    ----------
+    name : str
+        That of the first named shape of the drawing that mostly lies in it; letters, digits, `_` and `-` alone, so that
+        it can be part of a column's name.
+    is_fixed : bool
+        Whether a fixed face holds it: its pose is no answer.
+    outline, holes : Loop, tuple of Loop
+        Its outline and its holes, without the flexures.
+    centroid_mm : ndarray of float, shape (2,)
+        Of its area: the reference point of its pose.
+    """
+
+    name: str
+    is_fixed: bool
+    outline: Loop
+    holes: tuple[Loop, ...]
+    centroid_mm: Array
+
+    def holds(self, points_mm: Array) -> Flags:
+        """Whether points, shape (2, n), lie in it; arcs are taken as their chords."""
+        inside = _polygon(self.outline).holds(points_mm)
+        for hole in self.holes:
+            inside = inside & ~_polygon(hole).holds(points_mm)
+        return inside
+
+
+def bodies_of(mechanism: Mechanism, spans: Sequence[FlexureSpan] | None = None) -> tuple[LinkBody, ...]:
+    """Cut a mechanism into its bodies.
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+        The drawing, already checked.
+    spans : sequence of FlexureSpan, or None
+        Its flexures between their cuts; found where None.
+    """
+    region = mechanism.region
+    if spans is None:
+        spans = [span_of(flexure, region) for flexure in mechanism.flexures]
+    cut = PlanarRegion((*region.steps, *((False, span.slab) for span in spans)), region.marks_mm)
+    outer = [loop for loop in cut.loops if loop.area_mm2 > 0.0]
+    inner = [loop for loop in cut.loops if loop.area_mm2 < 0.0]
+    # The smallest outline that holds a hole is the one that it is cut from: loops are sorted by size.
+    owners = [max(n for n, loop in enumerate(outer) if loop.holds(_point(hole))) for hole in inner]
+    names = _names(mechanism, outer)
+    found = []
+    for number, loop in enumerate(outer):
+        holes = tuple(hole for hole, owner in zip(inner, owners, strict=True) if owner == number)
+        held = any(_touches(loop, face, _ON * region.size_mm) for face in mechanism.fixed)
+        found.append(LinkBody(names[number], held, loop, holes, _centroid_mm((loop, *holes))))
+    return tuple(found)
+
+
+def plate_poses(
+    plate: PlaneStressPlate, bodies: Sequence[LinkBody], moved_mm: Array, *, large: bool
+) -> dict[str, BodyPose]:
+    """Find the pose of every body that moves from the displacements of a mesh.
+
+    The nodes at the middles of the edges stand for a third of their triangles each, which integrates the quadratic
+    displacements of a triangle exactly.
+
+    Parameters
+    ----------
+    plate : PlaneStressPlate
+        The mesh, with or without the flexures between the bodies.
+    bodies : sequence of LinkBody
+        Bodies.
+    moved_mm : ndarray of float, shape (unknowns,)
+        Displacements.
+    large : bool
+        Whether they are large.
+    """
+    return {name: rigid_motion(plate.nodes_mm, np.stack([moved_mm[plate.x_dofs], moved_mm[plate.y_dofs]]), weights,
+                               centroid, large=large)
+            for name, (weights, centroid) in body_weights(plate, bodies).items()}  # fmt: skip
+
+
+def body_weights(plate: PlaneStressPlate, bodies: Sequence[LinkBody]) -> Mapping[str, tuple[Array, Array]]:
+    """Return the area that each node stands for, shape (nodes,), and the centroid, of every body that moves."""
+    corners = plate.nodes_mm[:, plate.corner_triangles]
+    one, two = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+    third = np.abs(one[0] * two[1] - one[1] * two[0]) / 6.0
+    middles = corners.mean(axis=1)
+    place_of = np.empty(plate.unknowns, dtype=np.int64)
+    place_of[plate.x_dofs] = np.arange(plate.x_dofs.size)
+    edges = place_of[plate.unknowns_of_triangles[:, 3:6]]
+    found: dict[str, tuple[Array, Array]] = {}
+    for body in bodies:
+        if not body.is_fixed:
+            own = body.holds(middles)
+            shares = np.repeat(third[own], 3)
+            weights = np.asarray(np.bincount(edges[own].ravel(), shares, plate.x_dofs.size), dtype=np.float64)
+            found[body.name] = weights, body.centroid_mm
+    return found
+
+
+def column_name(name: str) -> str:
+    """Return a body's name as it stands in a column's name."""
+    return re.sub(r"[^0-9A-Za-z_-]+", "_", name).strip("_") or "body"
+
+
+def _names(mechanism: Mechanism, pieces: Sequence[Loop]) -> list[str]:
+    """Name every piece by the first named shape that mostly lies in it; the others are numbered."""
+    names: dict[int, str] = {}
+    polygons = [_polygon(loop) for loop in pieces]
+    for (added, shape), name in zip(mechanism.bodies, mechanism.body_names, strict=False):
+        if added and name:
+            points = _points_in(shape)
+            share = [int(polygon.holds(points).sum()) for polygon in polygons]
+            names.setdefault(int(np.argmax(share)), column_name(name))
+    found: list[str] = []
+    for number in range(len(pieces)):
+        name = names.get(number, f"body_{number + 1}")
+        same = sum(other == name or other.startswith(f"{name}_part") for other in found)
+        found.append(f"{name}_part{same + 1}" if same else name)
+    return found
+
+
+def _points_in(shape: Shape) -> Array:
+    ends = np.concatenate([curve.at(np.linspace(curve.t0, curve.t1, _CHORDS)) for curve in shape.curves()], axis=1)
+    low, high = ends.min(axis=1), ends.max(axis=1)
+    along = (np.arange(_SAMPLES) + 0.5) / _SAMPLES
+    grid = np.stack(np.meshgrid(*(low[i] + along * (high[i] - low[i]) for i in range(2)))).reshape(2, -1)
+    return np.asarray(grid[:, shape.holds(grid)])
+
+
+def _corners(loop: Loop) -> Array:
+    """Corners of a loop with its arcs as chords, shape (2, n)."""
+    return np.concatenate(
+        [c.at(np.linspace(c.t0, c.t1, 2 if c.is_straight else _CHORDS))[:, :-1] for c in loop.curves], axis=1
+    )
+
+
+def _polygon(loop: Loop) -> Polygon:
+    return Polygon(tuple((float(x), float(y)) for x, y in _corners(loop).T))
+
+
+def _point(loop: Loop) -> tuple[float, float]:
+    x, y = loop.curves[0].at(np.array([0.5 * (loop.curves[0].t0 + loop.curves[0].t1)]))[:, 0]
+    return float(x), float(y)
+
+
+def _centroid_mm(loops: Sequence[Loop]) -> Array:
+    """Centroid of an area by Green's formula; holes run the other way and count against it."""
+    area, moment = 0.0, np.zeros(2)
+    for loop in loops:
+        a = _corners(loop)
+        b = np.roll(a, -1, axis=1)
+        cross = a[0] * b[1] - a[1] * b[0]
+        area += 0.5 * float(cross.sum())
+        moment += (a + b) @ cross / 6.0
+    return np.asarray(moment / area)
+
+
+def _touches(loop: Loop, face: Face, near_mm: float) -> bool:
+    x0, x1, y0, y1 = face.box_mm
+    x, y = np.concatenate([c.at(np.linspace(c.t0, c.t1, _CHORDS)) for c in loop.curves], axis=1)
+    return bool(np.any((x >= x0 - near_mm) & (x <= x1 + near_mm) & (y >= y0 - near_mm) & (y <= y1 + near_mm)))

@@ -1,0 +1,274 @@
+"""How a mechanism answers with one of its places changed: a hinge's stiffness, where a hinge sits, a pivot's slip.
+
+Bodies keep their condensed stiffness; a flexure that sits elsewhere is joined to them by a rigid arm, and a flexure of
+another thickness keeps its ends. A changed answer then costs one small system of equations, a thousandth of a new mesh.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import cho_factor, cho_solve
+from scipy.optimize import brentq
+
+from fingervision.domain.gripper import PointMm
+from fingervision.models.corotational_frame import CorotationalFrame
+from fingervision.models.mechanism import Mechanism
+from fingervision.models.mechanism_bodies import LinkBody, body_weights
+from fingervision.models.mechanism_frame import MechanismFrame
+
+Array = NDArray[np.float64]
+
+_UNIT = 1e-3
+"""Motion by which a linear functional of the motions is told, in mm and rad: any would do."""
+_THINNEST, _THICKEST = 0.3, 2.5
+"""Of a flexure's drawn thickness: its bending stiffness then lies between 0.03 and 15 times the drawn one."""
+
+
+@dataclass(frozen=True, slots=True)
+class PlaceChanges:
+    """What differs from the drawing.
+
+    Parameters
+    ----------
+    stiffness : mapping of int to float
+        Relative change of a flexure's bending stiffness, by its thickness; by the flexure's number.
+    moved_mm : mapping of int to (float, float)
+        How far a flexure sits from where it is drawn.
+    probes_mm : mapping of str to (float, float)
+        How far a probe sits from where it is drawn.
+    """
+
+    stiffness: Mapping[int, float]
+    moved_mm: Mapping[int, PointMm]
+    probes_mm: Mapping[str, PointMm]
+
+
+AS_DRAWN = PlaceChanges({}, {}, {})
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LinearAnswer:
+    """Small displacements of a mechanism.
+
+    Parameters
+    ----------
+    by_input : ndarray of float, shape (channels,)
+        Every channel by 1 mm of input.
+    by_slip : ndarray of float, shape (flexures, channels, 2)
+        Every channel by 1 mm that the far body of a flexure slips along x and y against its near one, at its middle,
+        the drive held.
+    load_by_input : ndarray of float, shape (flexures, 2)
+        Force on the slip of each flexure by 1 mm of input, in N: what its pivot carries.
+    slip_stiffness : ndarray of float, shape (flexures, 2, 2)
+        Force against a slip, in N/mm.
+    """
+
+    by_input: Array
+    by_slip: Array
+    load_by_input: Array
+    slip_stiffness: Array
+
+
+class PlaceAnswers:
+    """A mechanism of lumped flexures whose places can be changed.
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+        The drawing.
+    model : MechanismFrame or None
+        Its lumped model, where it was built already.
+    """
+
+    def __init__(self, mechanism: Mechanism, model: MechanismFrame | None = None) -> None:
+        self.mechanism = mechanism
+        self.model = model or MechanismFrame(mechanism)
+        self._make_observers()
+
+    @cached_property
+    def channels(self) -> tuple[str, ...]:
+        """Names of what is answered: poses of bodies, angles of hinges, probes, pairs, the force at the drive."""
+        bodies = [f"{name}.{part}" for name in self._weights for part in ("x_mm", "y_mm", "angle_mrad")]
+        hinges = [f"{flexure.name}.angle_mrad" for flexure in self.mechanism.flexures]
+        probes = [f"{name}_{axis}_mm" for name in self.mechanism.probes for axis in "xy"]
+        return (*bodies, *hinges, *probes, *(f"{name}_mm" for name in self.mechanism.pairs), "force_n")
+
+    def _make_observers(self) -> None:
+        """Channels as linear functionals of the motions of frames; angles of hinges follow from these."""
+        model, plate = self.model, self.model.plate
+        self._weights = body_weights(plate, model.bodies)
+        size = model.frame.unknowns
+        self._probe_of: dict[str, tuple[int, Array]] = {}
+        rows = len(self._weights) * 3
+        self._poses = np.zeros((rows, size))
+        assembly = model.assembly
+        for number, body in enumerate(assembly.bodies):
+            nodes = np.flatnonzero(assembly.piece == number)
+            for place, (weights, centroid) in enumerate(self._weights.values()):
+                if weights[nodes].sum() > 0.5 * weights.sum():
+                    share = weights[nodes] / weights[nodes].sum()
+                    at = plate.nodes_mm[:, nodes]
+                    middle = at @ share
+                    arm = at - middle[:, None]
+                    x, y = body.shapes_mm[plate.x_dofs[nodes]], body.shapes_mm[plate.y_dofs[nodes]]
+                    mean = np.stack([share @ x, share @ y])
+                    angle = (share * arm[0]) @ y - (share * arm[1]) @ x
+                    angle /= float(share @ np.sum(arm**2, axis=0))
+                    reach = centroid - middle
+                    own = np.stack([mean[0] - angle * reach[1], mean[1] + angle * reach[0], 1e3 * angle])
+                    self._poses[3 * place : 3 * place + 3, body.unknowns] = own
+        for name, point in self.mechanism.probes.items():
+            number = int(assembly.piece[np.argmin(np.hypot(*(plate.nodes_mm - np.array(point)[:, None])))])
+            own = np.zeros((3, size))
+            body = assembly.bodies[number]
+            for dof in body.unknowns.tolist():
+                moved = np.zeros(size)
+                moved[dof] = _UNIT
+                own[:2, dof] = np.array(assembly.motion_mm(moved, point, large=False)) / _UNIT
+            # The body's own turn carries a probe that sits elsewhere.
+            own[2] = self._turn_of(number)
+            self._probe_of[name] = number, own
+
+    def _turn_of(self, body: int) -> Array:
+        """Mean rotation of a body in rad, as a functional of the motions."""
+        assembly, plate = self.model.assembly, self.model.plate
+        nodes = np.flatnonzero(assembly.piece == body)
+        arm = plate.nodes_mm[:, nodes] - plate.nodes_mm[:, nodes].mean(axis=1)[:, None]
+        shapes = assembly.bodies[body].shapes_mm
+        row = np.zeros(self.model.frame.unknowns)
+        turn = arm[0] @ shapes[plate.y_dofs[nodes]] - arm[1] @ shapes[plate.x_dofs[nodes]]
+        row[assembly.bodies[body].unknowns] = turn / float(np.sum(arm**2))
+        return row
+
+    @property
+    def moving_bodies(self) -> tuple[str, ...]:
+        """Names of the bodies that have a pose."""
+        return tuple(self._weights)
+
+    def numbered_bodies(self) -> dict[int, LinkBody]:
+        """Return the drawing's body of every number."""
+        model, found = self.model, {}
+        for number in range(len(model.assembly.bodies)):
+            nodes = np.flatnonzero(model.assembly.piece == number)
+            held = [float(body.holds(model.plate.nodes_mm[:, nodes[::7]]).mean()) for body in model.bodies]
+            found[number] = model.bodies[int(np.argmax(held))]
+        return found
+
+    def body_of_frame(self, frame: int) -> int:
+        """Number of the body that a frame belongs to."""
+        return next(n for n, body in enumerate(self.model.assembly.bodies) if frame in body.frames)
+
+    def ends(self, flexure: int) -> tuple[int, int]:
+        """Numbers of the two bodies that a flexure joins."""
+        first, last = self.model.assembly.ends[flexure]
+        return self.body_of_frame(first), self.body_of_frame(last)
+
+    def body_of_probe(self, probe: str) -> int:
+        """Number of the body that a probe lies on."""
+        return self._probe_of[probe][0]
+
+    def thickness_for(self, flexure: int, ratio: float) -> float:
+        """Thickness at which a flexure's bending stiffness is (1 + ratio) times the drawn one."""
+        drawn = self.mechanism.flexures[flexure].thickness_mm
+        softness = self._bending_compliance(flexure, drawn) / (1.0 + ratio)
+        return float(brentq(lambda t: np.log(self._bending_compliance(flexure, t) / softness),
+                            _THINNEST * drawn, _THICKEST * drawn, xtol=1e-9 * drawn))  # fmt: skip
+
+    def _bending_compliance(self, flexure: int, thickness_mm: float) -> float:
+        return float(self._compliances(flexure, thickness_mm)[:, 2, 2].sum())
+
+    def _compliances(self, flexure: int, thickness_mm: float) -> Array:
+        mechanism, span = self.mechanism, self.model.spans[flexure]
+        changed = replace(span, flexure=replace(span.flexure, thickness_mm=thickness_mm))
+        own = changed.compliances(mechanism.plate_mm, mechanism.material, self.model.theory, width_effect=True)
+        # The stations follow the thickness; the segments stay where they are, and keep their number.
+        return np.asarray(own)
+
+    def answer(self, changes: PlaceChanges = AS_DRAWN) -> LinearAnswer:
+        """Answer all channels with some places changed."""
+        model, frame = self.model, self.model.frame
+        size = frame.unknowns
+        compliance = frame.end_compliance.copy()
+        for flexure, ratio in changes.stiffness.items():
+            own = model.segments[flexure]
+            compliance[list(own)] = self._compliances(flexure, self.thickness_for(flexure, ratio))
+        changed = CorotationalFrame(frame.nodes_mm, frame.ends, compliance)
+        stiffness = changed.stiffness_n_mm().toarray()
+        arms = np.eye(size)
+        for flexure, (x, y) in changes.moved_mm.items():
+            for node in model.assembly.ends[flexure]:
+                # The body's own frame stays; what the flexure holds is the end of a rigid arm.
+                arms[3 * node, 3 * node + 2], arms[3 * node + 1, 3 * node + 2] = y, -x
+        for body in model.assembly.bodies:
+            dofs = body.unknowns
+            arm = arms[np.ix_(dofs, dofs)]
+            stiffness[np.ix_(dofs, dofs)] += arm.T @ body.stiffness_n_mm @ arm
+        free, unit = model.free, model.by_input
+        factor = cho_factor(stiffness[np.ix_(free, free)])
+        loads, energies = self._slips(changed)
+        sides = np.column_stack([-(stiffness @ unit), loads])[free]
+        moved = np.zeros((size, sides.shape[1]))
+        moved[free] = cho_solve(factor, sides)
+        moved[:, 0] += unit
+        observe = self._observer(arms, changes)
+        seen = observe @ moved
+        # The drive's force: of the motion itself, and of a slip with the drive held.
+        seen[-1] = unit @ (stiffness @ moved - np.column_stack([np.zeros(size), loads]))
+        count = len(self.mechanism.flexures)
+        by_slip = seen[:, 1:].reshape(seen.shape[0], count, 2).transpose(1, 0, 2).copy()
+        load_by_input = (loads.T @ moved[:, 0]).reshape(count, 2)
+        back = loads.T @ moved[:, 1:]
+        slip_stiffness = np.array([energies[n] - back[2 * n : 2 * n + 2, 2 * n : 2 * n + 2] for n in range(count)])
+        return LinearAnswer(seen[:, 0], by_slip, load_by_input, slip_stiffness)
+
+    def _slips(self, frame: CorotationalFrame) -> tuple[Array, Array]:
+        """Loads of a unit slip at the middle of every flexure, shape (unknowns, 2 n), and its own stiffness."""
+        loads, own = [], []
+        for segments in self.model.segments:
+            element = segments[len(segments) // 2 - 1]
+            alone = CorotationalFrame(
+                frame.nodes_mm, frame.ends[[element]], frame.end_compliance[[element]]
+            ).stiffness_n_mm()
+            node = int(frame.ends[element, 1])
+            at = [3 * node, 3 * node + 1]
+            # The element ends short of its node by the slip: its force on the node is that of a shorter way.
+            block = alone[:, at].toarray()
+            loads.append(block)
+            own.append(block[at])
+        return np.concatenate(loads, axis=1), np.array(own)
+
+    def _observer(self, arms: Array, changes: PlaceChanges) -> Array:
+        rows = [*(self._poses @ arms)]
+        for number in range(len(self.mechanism.flexures)):
+            first, last = self.ends(number)
+            rows.append(1e3 * (self._turn_of(last) - self._turn_of(first)) @ arms)
+        probes: dict[str, Array] = {}
+        for name, (_, own) in self._probe_of.items():
+            x, y = changes.probes_mm.get(name, (0.0, 0.0))
+            probes[name] = np.stack([own[0] - y * own[2], own[1] + x * own[2]]) @ arms
+            rows += [*probes[name]]
+        for a, b in self.mechanism.pairs.values():
+            apart = np.array(self.mechanism.probes[b]) - self.mechanism.probes[a]
+            rows.append((apart / np.hypot(*apart)) @ (probes[b] - probes[a]))
+        rows.append(np.zeros(arms.shape[0]))
+        return np.array(rows)
+
+
+def attachments(answers: PlaceAnswers) -> Sequence[Mapping[str, PointMm]]:
+    """Points of every body at which something holds it: its flexures' middles, then supports and the drive."""
+    model = answers.model
+    found: list[dict[str, PointMm]] = [{} for _ in model.assembly.bodies]
+    for number, flexure in enumerate(answers.mechanism.flexures):
+        for body in answers.ends(number):
+            found[body][flexure.name] = flexure.at_mm
+    mechanism = answers.mechanism
+    for face in (*mechanism.fixed, *(face for face, _ in mechanism.slides), mechanism.drive.face):
+        x0, x1, y0, y1 = face.box_mm
+        middle = (0.5 * (x0 + x1), 0.5 * (y0 + y1))
+        nodes = model.plate.nodes_mm
+        nearest = int(np.argmin(np.hypot(nodes[0] - middle[0], nodes[1] - middle[1])))
+        found[int(model.assembly.piece[nearest])][face.name] = middle
+    return found

@@ -1,0 +1,65 @@
+"""Columns of a measured table that are channels of one's own: `name_mm`, `name_mrad` and their `u_`."""
+
+from collections.abc import Collection, Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from fingervision.domain.errors import FingervisionError
+from fingervision.domain.measured_table import Channel
+from fingervision.storage.csv_columns import header_of, read_columns
+from fingervision.storage.number_columns import Numbers, numbers_in
+
+UNITS = ("_mm", "_mrad")
+NO_CHANNELS = ("held_mm", "target_mm", "u_force_n")
+"""Columns of the project's own tables that end so and are no channel."""
+
+
+def channel_names(names: Sequence[str], taken: Collection[str]) -> list[str]:
+    """Pick the columns that are channels, and the `u_` that belong to one, out of a header's names."""
+    found = [
+        name
+        for name in names
+        if name.endswith(UNITS) and not name.startswith("u_") and name not in taken and name not in NO_CHANNELS
+    ]
+    return [*found, *(f"u_{name}" for name in found if f"u_{name}" in names)]
+
+
+def read_channels(path: Path, taken: Collection[str]) -> tuple[dict[str, Numbers], list[str]]:
+    """Read the channels of a table in the project's own format; one that holds no numbers is left out and said.
+
+    Parameters
+    ----------
+    path : Path
+        The table, whose other columns were read already.
+    taken : collection of str
+        Names that mean something else.
+    """
+    names = header_of(path)
+    wanted = [name for name in channel_names(names, taken) if names.count(name) == 1]
+    if not wanted:
+        return {}, []
+    cells = read_columns(path, (), tuple(wanted))
+    found: dict[str, Numbers] = {}
+    notes = []
+    for name in wanted:
+        try:
+            found[name] = numbers_in(path, name, cells[name])
+        except FingervisionError as error:
+            notes.append(f"the column {name} was left out: {error}")
+    return found, notes
+
+
+def channels_of(values: Mapping[str, Numbers], rows: np.ndarray[tuple[int], np.dtype[np.intp]]) -> dict[str, Channel]:
+    """Take the rows of channels that are kept, in their order; `u_` that are no uncertainties are left out."""
+    found = {}
+    for name, numbers in values.items():
+        if name.startswith("u_") or not numbers.present[rows].any():
+            continue
+        u = values.get(f"u_{name}")
+        present = numbers.present[rows]
+        stated = None
+        if u is not None and u.present[rows][present].all() and np.all(u.value[rows][present] >= 0.0):
+            stated = u.value[rows]
+        found[name] = Channel(numbers.value[rows], present, stated)
+    return found

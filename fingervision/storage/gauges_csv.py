@@ -1,0 +1,82 @@
+"""gauges.csv: one row a number, frame by frame: `time_s,gauge,quantity,value,u,unit,status`."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from types import TracebackType
+
+from fingervision.storage.line_file import LineFile, cell, quoted
+
+COLUMNS = "time_s,gauge,quantity,value,u,unit,status"
+# As in gaps.csv; a microradian is a thousandth of a milliradian.
+TIME_PLACES, PLACES = 9, 7
+
+
+@dataclass(frozen=True, slots=True)
+class GaugeRow:
+    """One row; None is an empty cell.
+
+    Parameters
+    ----------
+    time_s : float or None
+        Presentation time.
+    gauge, quantity : str
+        Which number.
+    value, u : float or None
+        The number and its standard uncertainty.
+    unit : str
+        Of both: mm, px or mrad.
+    status : str
+        `ok`, or why there is no number.
+    """
+
+    time_s: float | None
+    gauge: str
+    quantity: str
+    value: float | None
+    u: float | None
+    unit: str
+    status: str
+
+
+class GaugesCsv:
+    """Writes gauges.csv row by row; whole rows reach the file at least every second.
+
+    Parameters
+    ----------
+    path : Path
+        The file; replaced if there is one.
+
+    Raises
+    ------
+    FingervisionError
+        The file cannot be written; also from `add` and `close`.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self._file = LineFile(path, COLUMNS)
+
+    def __enter__(self) -> "GaugesCsv":
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def add(self, rows: Sequence[GaugeRow]) -> None:
+        """Add rows, in order."""
+        self._file.add([_line(row) for row in rows])
+
+    def close(self) -> None:
+        """Write what is pending and close; closing twice is allowed."""
+        self._file.close()
+
+
+def _line(row: GaugeRow) -> str:
+    return ",".join(
+        (
+            cell(row.time_s, TIME_PLACES), quoted(row.gauge), row.quantity, cell(row.value, PLACES),
+            cell(row.u, PLACES), row.unit, row.status,
+        )
+    )  # fmt: skip

@@ -1,0 +1,326 @@
+"""Which hinge, link or pivot is off: hidden in finite elements of the changed outline, looked for by lumped flexures.
+
+    PYTHONPATH=. python -m tests.benchmarks.which_hinge --tables 60
+
+Every hidden thing is drawn into the outline of the paper's sample and answered by plane-stress finite elements on a
+mesh of its own (a pivot's play by a cut through the neck whose two faces are tied but for the slip); none of it passes
+through the condensed bodies that the diagnosis answers with. Tables have two runs, noise that differs in size and
+correlation from table to table, an input that is off by 0.2 um, and a drawing that lies turned by a milliradian in the
+picture.
+"""
+
+import argparse
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import bmat, csr_matrix
+from scipy.sparse.linalg import spsolve
+
+from fingervision.diagnosis.bodies.body_evidence import body_evidence
+from fingervision.domain.measured_table import Channel, MeasuredTable
+from fingervision.models.gripper_mechanism import whole_mechanism
+from fingervision.models.mechanism import Mechanism
+from fingervision.models.mechanism_bodies import bodies_of, plate_poses
+from fingervision.models.mechanism_plate import MechanismPlate
+from fingervision.models.place_answers import PlaceAnswers
+from fingervision.models.plane_shapes import Polygon
+from fingervision.models.plane_stress import PlaneStressPlate
+from fingervision.models.triangulate import triangulate
+from fingervision.storage.gripper_toml import read_gripper
+
+Array = NDArray[np.float64]
+
+BODIES = ("left_finger", "right_finger", "drive")
+POSES = tuple(f"{body}.{part}" for body in BODIES for part in ("x_mm", "y_mm", "angle_mrad"))
+TIPS = ("left tip_x_mm", "right tip_x_mm")
+HINGES = ("left hinge 1", "left hinge 2", "right hinge 1", "right hinge 2")
+NECK_MM = 0.01
+"""Width of the cut through a pivot's neck."""
+
+
+@dataclass(frozen=True)
+class Hidden:
+    """What is hidden: the effect, the places that name it rightly, and what each channel does by the input."""
+
+    effect: str
+    places: tuple[str, ...]
+    words: str
+    slopes: dict[str, float]
+    slip: tuple[Array, Array, dict[str, Array], float] | None = None
+
+
+@cache
+def drawn() -> Mechanism:
+    """Draw the sample."""
+    gripper = read_gripper(Path("sample_frames/paper/gripper.toml"))
+    return whole_mechanism(gripper, gripper, "gripper")
+
+
+def slopes_of(mechanism: Mechanism) -> dict[str, float]:
+    """Answer every channel by 1 mm of input, poses about the reference points of the sample as drawn."""
+    own = MechanismPlate(mechanism)
+    state = own.state(1.0)
+    points = {body.name: body.centroid_mm for body in bodies_of(drawn())}
+    bodies = [replace(body, centroid_mm=points[body.name]) for body in own.bodies]
+    return _channels(own.plate, bodies, state.displacement_mm, state.force_n, state.probes_mm)
+
+
+def _channels(plate, bodies, moved, force_n, probes) -> dict[str, float]:  # type: ignore[no-untyped-def]
+    poses = plate_poses(plate, bodies, moved, large=False)
+    found = {f"{name}.{part}": getattr(pose, part) for name, pose in poses.items()
+             for part in ("x_mm", "y_mm", "angle_mrad")}  # fmt: skip
+    left, right = probes["left tip"], probes["right tip"]
+    return found | {"gap_mm": right[0] - left[0], "force_n": force_n, TIPS[0]: left[0], TIPS[1]: right[0]}
+
+
+def thicker(number: int, thickness_mm: float) -> Mechanism:
+    """Give one hinge another thickness."""
+    mechanism = drawn()
+    flexures = list(mechanism.flexures)
+    flexures[number] = replace(flexures[number], thickness_mm=thickness_mm)
+    return replace(mechanism, flexures=tuple(flexures))
+
+
+def shifted(number: int, x_mm: float, y_mm: float) -> Mechanism:
+    """Let one hinge sit elsewhere."""
+    mechanism = drawn()
+    flexures = list(mechanism.flexures)
+    x, y = flexures[number].at_mm
+    flexures[number] = replace(flexures[number], at_mm=(x + x_mm, y + y_mm))
+    return replace(mechanism, flexures=tuple(flexures))
+
+
+def slipping(number: int) -> tuple[Array, Array, dict[str, Array]]:
+    """Cut a neck and tie its faces: load by input, stiffness against a slip, and every channel by a slip."""
+    mechanism = drawn()
+    flexure = mechanism.flexures[number]
+    h, w = flexure.thickness_mm, 0.5 * NECK_MM
+    slab = Polygon(tuple(flexure.point_mm(a, b) for a, b in ((-w, -h), (w, -h), (w, h), (-w, h))))
+    region = mechanism.region
+    cut = type(region)((*region.steps, (False, slab)), region.marks_mm)
+    zones = tuple(each.zone(mechanism.plate_mm) for each in mechanism.flexures)
+    plate = PlaneStressPlate(
+        triangulate(cut, 4.0, 0.025 * region.size_mm), mechanism.material, mechanism.plate_mm, zones
+    )
+    x, y = plate.nodes_mm
+    near = 1e-6 * region.size_mm
+    held, drive = [], []
+    for face in mechanism.fixed:
+        x0, x1, y0, y1 = face.box_mm
+        on = (x > x0 - near) & (x < x1 + near) & (np.abs(y - y0) < near)
+        held += [plate.x_dofs[on], plate.y_dofs[on]]
+        del y1
+    x0, x1, y0, _ = mechanism.drive.face.box_mm
+    on = (x > x0 - near) & (x < x1 + near) & (np.abs(y - y0) < near)
+    held.append(plate.x_dofs[on])
+    drive.append(plate.y_dofs[on])
+    fixed, driven = np.concatenate(held), np.concatenate(drive)
+    along = (x - flexure.at_mm[0]) * np.cos(np.radians(flexure.axis_deg)) + (y - flexure.at_mm[1]) * np.sin(
+        np.radians(flexure.axis_deg)
+    )
+    across = -(x - flexure.at_mm[0]) * np.sin(np.radians(flexure.axis_deg)) + (y - flexure.at_mm[1]) * np.cos(
+        np.radians(flexure.axis_deg)
+    )
+    inside = np.abs(across) < 0.6 * h
+    faces = [inside & (np.abs(along - side * w) < 1e-6) for side in (-1.0, 1.0)]
+    size = plate.unknowns
+    alike = np.ones_like(across)
+    ties = [
+        _mean(faces[1], dofs, alike, size) - _mean(faces[0], dofs, alike, size) for dofs in (plate.x_dofs, plate.y_dofs)
+    ]
+    normal = (np.cos(np.radians(flexure.axis_deg)), np.sin(np.radians(flexure.axis_deg)))
+    near_turn, far_turn = (
+        sum(n * _mean(face, dofs, across, size) for n, dofs in zip(normal, (plate.x_dofs, plate.y_dofs), strict=True))
+        for face in faces
+    )
+    ties.append(far_turn - near_turn)
+    tie = csr_matrix(np.array(ties))
+    free = np.setdiff1d(np.arange(size), np.concatenate([fixed, driven]))
+    K = plate.stiffness_n_mm.tocsr()
+    T = tie[:, free]
+    whole = bmat([[K[free][:, free], T.T], [T, None]], format="csc")
+    unit = np.zeros(size)
+    unit[driven] = 1.0
+    right = np.zeros((free.size + 3, 3))
+    right[: free.size, 0] = -(K @ unit)[free]
+    # The flexure's axis says which face is the far one: a slip moves the far body against the near one.
+    right[free.size, 1], right[free.size + 1, 2] = 1.0, 1.0
+    solved = spsolve(whole, right)
+    moved = np.zeros((size, 3))
+    moved[free] = solved[: free.size]
+    moved[:, 0] += unit
+    forces = -solved[free.size : free.size + 2]
+    points = {body.name: body.centroid_mm for body in bodies_of(drawn())}
+    bodies = [replace(body, centroid_mm=points[body.name]) for body in bodies_of(drawn())]
+    tips = {}
+    for probe in ("left tip", "right tip"):
+        at = mechanism.probes[probe]
+        node = np.argsort(np.hypot(x - at[0], y - at[1]))[:2]
+        tips[probe] = node
+    columns: dict[str, list[float]] = {}
+    for k in range(3):
+        own = moved[:, k]
+        probes = {name: (float(own[plate.x_dofs[n]].mean()), 0.0) for name, n in tips.items()}
+        for name, value in _channels(plate, bodies, own, float(unit @ (K @ own)), probes).items():
+            columns.setdefault(name, []).append(value)
+    return -forces[:, 0], forces[:, 1:], {name: np.array(values) for name, values in columns.items()}
+
+
+def _mean(face: NDArray[np.bool_], dofs: NDArray[np.int64], weight: Array, size: int) -> Array:
+    row = np.zeros(size)
+    w = weight[face]
+    row[dofs[face]] = (w / w.sum()) if np.ptp(w) == 0.0 else w / np.sum(w * w)
+    return row
+
+
+def slip_at(load: Array, stiffness: Array, u: float, radius: float) -> Array:
+    """Find the pin's place in its hole by trying 3600 directions of the rim: slow, and shares nothing."""
+    free = np.linalg.solve(stiffness, load * u)
+    if np.hypot(*free) <= radius:
+        return np.asarray(free)
+    angle = np.linspace(0.0, 2.0 * np.pi, 3601)
+    rim = radius * np.stack([np.cos(angle), np.sin(angle)])
+    energy = 0.5 * np.einsum("in,ij,jn->n", rim, stiffness, rim) - (load * u) @ rim
+    return np.asarray(rim[:, int(np.argmin(energy))])
+
+
+def hidden_things(seed: int) -> list[Hidden]:
+    """Draw what is hidden: nothing, hinges 10 to 20 % off, links 1 to 1.5 % off, pivots with 20 um of play."""
+    rng = np.random.default_rng(seed)
+    found = [Hidden("", (), "nothing", slopes_of(drawn()))]
+    for number, hinge in enumerate(HINGES):
+        # Bending stiffness of a notch goes with t^2.5 / sqrt(R): (1.10 to 1.20)^0.4.
+        ratio = rng.uniform(0.10, 0.20) * (1.0 if number % 2 else -1.0)
+        found.append(Hidden("hinge_stiffness_error", (hinge,), f"{hinge} {100 * ratio:+.0f} %",
+                            slopes_of(thicker(number, (1.0 + ratio) ** 0.4))))  # fmt: skip
+    for number, (hinge, x) in enumerate(zip(HINGES, (-35.5, -17.68, 35.5, 17.68), strict=True)):
+        side = hinge.split()[0]
+        ratio = rng.uniform(0.010, 0.015) * (1.0 if number in (0, 3) else -1.0)
+        out = np.sign(x) * (1.0 if hinge.endswith("1") else -1.0)
+        place = f"{side}_finger, {side} hinge 1 to {side} hinge 2"
+        found.append(Hidden("link_length_error", (place,), f"{place} {100 * ratio:+.1f} % at {hinge}",
+                            slopes_of(shifted(number, out * 17.82 * ratio, 0.0))))  # fmt: skip
+    for number in (0, 2):
+        side, ratio = HINGES[number].split()[0], rng.uniform(0.010, 0.015)
+        place = f"{side}_pillar, {side} clamp to {side} hinge 1"
+        found.append(Hidden("link_length_error", (place,), f"{place} {100 * ratio:+.1f} %",
+                            slopes_of(shifted(number, 0.0, 30.0 * ratio))))  # fmt: skip
+    for number, hinge in enumerate(HINGES):
+        load, stiffness, columns = slipping(number)
+        slopes = {name: float(values[0]) for name, values in columns.items()}
+        by_slip = {name: values[1:] for name, values in columns.items()}
+        found.append(Hidden("hinge_play", (hinge,), f"{hinge} 20 um of play", slopes, (load, stiffness, by_slip, 0.01)))
+    return found
+
+
+def table_of(hidden: Hidden, rng: np.random.Generator, rows: int = 200) -> MeasuredTable:
+    """Make a table: two runs, one there and one back."""
+    low, high = rng.uniform(-0.45, -0.3), rng.uniform(1.0, 1.5)
+    way = np.linspace(low, high, rows // 2)
+    u = np.concatenate([way, way[::-1]])
+    u_mm, u_mrad, rho = rng.uniform(0.6e-3, 1.2e-3), rng.uniform(0.03, 0.06), rng.choice([0.0, 0.0, 0.3, 0.5])
+    turned = rng.normal(0.0, 1e-3)
+    real = u + rng.normal(0.0, 0.0002, u.size)
+    slip = np.zeros((u.size, 2))
+    if hidden.slip is not None:
+        load, stiffness, _, radius = hidden.slip
+        slip = np.array([slip_at(load, stiffness, float(value), radius) for value in real])
+
+    def clean(name: str) -> Array:
+        own = hidden.slopes[name] * real
+        return own if hidden.slip is None else own + slip @ hidden.slip[2][name]
+
+    def noise(sd: float) -> Array:
+        white = rng.normal(0.0, sd, u.size)
+        for k in range(1, u.size):
+            white[k] = rho * white[k - 1] + np.sqrt(1.0 - rho**2) * white[k]
+        return white
+
+    channels = {}
+    for body in BODIES:
+        x, y, angle = (clean(f"{body}.{part}") for part in ("x_mm", "y_mm", "angle_mrad"))
+        seen = {"x_mm": x - turned * y, "y_mm": y + turned * x, "angle_mrad": angle}
+        for part, rows_of in seen.items():
+            sd = u_mrad if part == "angle_mrad" else u_mm
+            value = rows_of + rng.normal(0.0, 0.01) + noise(sd)
+            channels[f"{body}.{part}"] = Channel(value, np.ones(u.size, dtype=bool), np.full(u.size, sd))
+    left, right = (clean(name) + side * 2.0 + noise(0.7 * u_mm) for name, side in zip(TIPS, (-1.0, 1.0), strict=True))
+    half = u.size // 2
+    return MeasuredTable(
+        u, right - left, 0.5 * (left + right), 0.1 * np.arange(u.size), (slice(0, half), slice(half, u.size)),
+        ("1", "2"), np.full(u.size, u_mm), channels=channels,
+    )  # fmt: skip
+
+
+def gap_alone(table: MeasuredTable) -> MeasuredTable:
+    """Return what two fingertips alone show: both tips across the fingers."""
+    left, right = table.midline_mm - 0.5 * table.gap_mm, table.midline_mm + 0.5 * table.gap_mm
+    seen = np.ones(left.size, dtype=bool)
+    own = {name: Channel(side, seen, table.u_random_mm) for name, side in zip(TIPS, (left, right), strict=True)}
+    return replace(table, channels=own)
+
+
+def judged(hidden: Hidden, answers: PlaceAnswers, table: MeasuredTable) -> tuple[str, int, str]:
+    """Say whether a table's answer holds the truth, how many places are in it, and what it is."""
+    evidence, _ = body_evidence(table, answers, table.input_mm, np.random.default_rng(1))
+    if evidence is None:
+        return "nothing", 0, ""
+    findings = evidence.findings
+    keys = list(dict.fromkeys(m.candidate.key for m in findings.members)) if not findings.structure else []
+    if not keys:
+        return "nothing", 0, f"structure {findings.structure:.0f}" if findings.structure else ""
+    right = any(key == f"{hidden.effect}@{place}" for key in keys for place in hidden.places)
+    return ("named" if len(keys) == 1 else "in the set") if right else "wrong", len(keys), " | ".join(keys)
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Print the tables that were answered, and the figures."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--tables", type=int, default=60)
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--verbose", action="store_true")
+    given = parser.parse_args(arguments)
+    began = time.perf_counter()
+    answers = PlaceAnswers(drawn())
+    things = hidden_things(given.seed)
+    print(f"{len(things)} hidden things by finite elements: {time.perf_counter() - began:.0f} s")
+    counts: dict[str, dict[str, int]] = {}
+    sizes: dict[str, list[int]] = {"gap": [], "bodies": []}
+    rng = np.random.default_rng(given.seed + 1000)
+    for number in range(given.tables):
+        # Every fourth table hides nothing.
+        thing = things[0] if number % 4 == 0 else things[1 + (number - number // 4 - 1) % (len(things) - 1)]
+        table = table_of(thing, rng)
+        verdict, size, words = judged(thing, answers, table)
+        kind = thing.effect or "nothing"
+        own = counts.setdefault(kind, {"named": 0, "in the set": 0, "wrong": 0, "nothing": 0})
+        own[verdict] += 1
+        if thing.effect:
+            other, plain, _ = judged(thing, answers, gap_alone(table))
+            if verdict in ("named", "in the set") and other in ("named", "in the set"):
+                sizes["gap"].append(plain)
+                sizes["bodies"].append(size)
+        if given.verbose or verdict == "wrong" or (verdict == "nothing") == bool(thing.effect):
+            print(f"  {thing.words}: {verdict} {words}", flush=True)
+    for kind, own in counts.items():
+        print(f"{kind}: " + ", ".join(f"{name} {count}" for name, count in own.items()))
+    planted = sum(sum(own.values()) for kind, own in counts.items() if kind != "nothing")
+    found = sum(own["named"] + own["in the set"] for kind, own in counts.items() if kind != "nothing")
+    wrong = sum(own["wrong"] for kind, own in counts.items() if kind != "nothing")
+    print(f"{given.tables} tables: {found} of {planted} at the right place or in the set, {wrong} wrong")
+    null = counts.get("nothing", {"nothing": 0})
+    print(f"claims where nothing is hidden: {sum(null.values()) - null['nothing']} of {sum(null.values())}")
+    if sizes["gap"]:
+        print(
+            f"places in the answer: tips alone {np.mean(sizes['gap']):.1f}, with bodies {np.mean(sizes['bodies']):.1f}"
+        )
+    print(f"{time.perf_counter() - began:.0f} s")
+
+
+if __name__ == "__main__":
+    main()
