@@ -1,6 +1,7 @@
 """Options of every command that measures pictures: the scale, the height, the tips' direction, the region."""
 
 from collections.abc import Callable
+from functools import wraps
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -11,7 +12,31 @@ from fingervision.domain.errors import UsageError
 if TYPE_CHECKING:
     from fingervision.domain.region import Region
 
+
+def _take_settings(context: click.Context, parameter: click.Parameter, path: Path | None) -> Path | None:
+    """Let a settings file stand for options that are not given."""
+    if path is None:
+        return None
+    from fingervision.storage.settings_toml import read_settings
+
+    found = read_settings(path)
+    camera = found.pop("camera", {})
+    if any(each.name == "exposure_ms" for each in context.command.params):
+        found |= camera
+    known = {each.name for each in context.command.params}
+    context.default_map = {name: value for name, value in found.items() if name in known}
+    return path
+
+
 OPTIONS = (
+    click.option(
+        "--settings",
+        type=click.Path(path_type=Path),
+        is_eager=True,
+        expose_value=False,
+        callback=_take_settings,
+        help="File with settings, as the page saves them; options that are given come before it.",
+    ),
     click.option(
         "--calibration", type=click.Path(path_type=Path), help="calibration.json: the scale with its uncertainty."
     ),
@@ -38,9 +63,22 @@ OPTIONS = (
 
 def where_to_measure(command: Callable[..., Any]) -> Callable[..., Any]:
     """Give a command these options."""
+
+    @wraps(command)
+    def with_one_scale(**options: Any) -> Any:
+        context = click.get_current_context()
+        from_file = click.core.ParameterSource.DEFAULT_MAP
+        for given, other in (("px_per_mm", "calibration"), ("calibration", "px_per_mm")):
+            sources = [context.get_parameter_source(name) for name in (given, other)]
+            if options[given] is not None and sources[0] is not from_file and sources[1] is from_file:
+                # The scale of the command line comes before the file's, of whichever kind.
+                options[other] = None
+        return command(**options)
+
+    decorated: Callable[..., Any] = with_one_scale
     for option in reversed(OPTIONS):
-        command = option(command)
-    return command
+        decorated = option(decorated)
+    return decorated
 
 
 def region_of(words: str | None) -> "Region | None":

@@ -1,15 +1,12 @@
 """`fingervision live`: the camera's picture with the measured points, the gap and its history."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import click
 
-from fingervision.cli._where_to_measure import region_of, where_to_measure
+from fingervision.cli._live_choices import choices_of
+from fingervision.cli._where_to_measure import where_to_measure
 from fingervision.domain.errors import UsageError
-
-if TYPE_CHECKING:
-    from fingervision.live.choices import Choices
 
 EXAMPLES = """
 \b
@@ -20,6 +17,10 @@ Examples:
   fingervision live /dev/video2 --size 1280x720 --rate-hz 30 --exposure-ms 8 --gain 0 --focus 30
   fingervision live http://192.168.1.20/video.mjpg --px-per-mm 34 --tips down
   fingervision live rtsp://camera/stream --calibration calibration.json --out runs
+  fingervision live opening.mp4 --px-per-mm 34         look through a recording: scrub, step, play, measure a range
+  fingervision live runs/2026-05-04T10-11-12Z          look through a run, measured as it was
+  fingervision live opening.mp4 --calibration calibration.json --drive drive.csv --model comsol.csv
+  fingervision live --bed simulated --hide backlash:play_mm=0.03 --allow-motion
   fingervision live 0 --px-per-mm 34 --no-page         gap, status and rate in the terminal
   fingervision live 0 --px-per-mm 34 --no-page --json  one line of JSON a frame
   fingervision live 0 --px-per-mm 34 --no-page --out runs   also records, from the first frame
@@ -40,10 +41,18 @@ USUAL_OUT, USUAL_PORT = Path("live"), 8025
 @click.argument("source", required=False)
 @click.option("--list", "list_cameras", is_flag=True, help="List the cameras of this machine.")
 @click.option("--out", type=click.Path(path_type=Path), help="Folder for runs and snapshots.  [default: live]")
+@click.option("--as-camera", is_flag=True, help="Play a recording once at its own pace, as if it came from a camera.")
 @click.option("--no-page", is_flag=True, help="No page: gap, status and rate in the terminal.")
 @click.option("--json", "as_json", is_flag=True, help="Print one line of JSON a frame, with the columns of gaps.csv.")
 @click.option("--host", default="127.0.0.1", show_default=True, help="Address that the page is served at.")
 @click.option("--port", type=click.IntRange(0, 65535), default=USUAL_PORT, show_default=True, help="0: any free one.")
+@click.option(
+    "--password-file",
+    type=click.Path(path_type=Path),
+    help="Text file with the password that the page asks for; needed beyond this machine.",
+)
+@click.option("--tls-cert", type=click.Path(path_type=Path), help="Certificate (PEM): the page is served over TLS.")
+@click.option("--tls-key", type=click.Path(path_type=Path), help="Its key (PEM).")
 @click.option("--size", metavar="WxH", help="Size that the camera is asked for.")
 @click.option("--rate-hz", type=float, help="Frames in a second that the camera is asked for.")
 @click.option("--format", "pixel_format", metavar="FOUR", help="Format, such as YUYV (raw) or MJPG.  [default: raw]")
@@ -51,15 +60,38 @@ USUAL_OUT, USUAL_PORT = Path("live"), 8025
 @click.option("--gain", type=float, help="Amplification, in the camera's own units.")
 @click.option("--focus", type=float, help="Focus, in the camera's own units.")
 @click.option("--white-balance-k", type=float, help="Colour temperature.")
+@click.option(
+    "--model", "model_path", type=click.Path(path_type=Path), help="Hold the gap against this model as it is measured."
+)
+@click.option(
+    "--kind",
+    type=click.Choice(["stiffness_matrix", "lumped", "finite_element"]),
+    default="lumped",
+    show_default=True,
+    help="Which model answers for a gripper.toml.",
+)
+@click.option(
+    "--drive", type=click.Path(path_type=Path), help="The stage's log, on this view's or the recording's time."
+)
+@click.option("--drive-offset-s", type=float, help="Added to the drive's times; a recording's is found if not given.")
+@click.option("--bed", "bed_name", metavar="simulated|CONFIG.toml", help="Show this test bed through its own camera.")
+@click.option(
+    "--hide", multiple=True, metavar="EFFECT[:PARAMETER=VALUE,...]", help="Hide an effect in a simulated bed."
+)
+@click.option("--allow-motion", is_flag=True, help="Let the page move the bed; without it, it only looks and stops.")
 @where_to_measure
 def command(
     source: str | None,
     list_cameras: bool,
     out: Path | None,
+    as_camera: bool,
     no_page: bool,
     as_json: bool,
     host: str,
     port: int,
+    password_file: Path | None,
+    tls_cert: Path | None,
+    tls_key: Path | None,
     size: str | None,
     rate_hz: float | None,
     pixel_format: str | None,
@@ -67,36 +99,77 @@ def command(
     gain: float | None,
     focus: float | None,
     white_balance_k: float | None,
+    model_path: Path | None,
+    kind: str,
+    drive: Path | None,
+    drive_offset_s: float | None,
+    bed_name: str | None,
+    hide: tuple[str, ...],
+    allow_motion: bool,
     calibration: Path | None,
     px_per_mm: float | None,
     below_tip_mm: float,
     tips: str,
     roi: str | None,
 ) -> None:
-    """Show SOURCE live: a camera's number, a /dev path, an rtsp:// or http:// stream, a file, or the word simulated.
+    """Show SOURCE: a camera's number, a /dev path, a stream, a recording, the folder of a run, or the word simulated.
 
     Every frame is measured. The page shows the picture with the measured points, the gap with its uncertainty, and its
-    history; it records, calibrates and saves.
+    history; it records, calibrates and saves. A recording is opened to scrub, step and play in, and measured as
+    `fingervision measure` does.
     """
     if list_cameras:
         _list()
         return
-    if source is None:
+    if bed_name is not None and source not in (None, "simulated", bed_name):
+        raise UsageError(f"With --bed the bed's own camera is the source, but {source} is named too: leave it out.")
+    if bed_name is None and (hide or allow_motion):
+        raise UsageError("--hide and --allow-motion are for a bed, but there is none: name it with --bed.")
+    if bed_name is not None and (no_page or drive is not None):
+        raise UsageError("--bed is for the page, and its stage says its own input: leave out --no-page and --drive.")
+    if drive_offset_s is not None and drive is None:
+        raise UsageError("--drive-offset-s needs a --drive.")
+    if source is None and bed_name is None:
         raise UsageError("The source must be given, but is not: name a camera, stream or file, or use `simulated`.")
     from fingervision.frames.source import CameraWish, Wish
+    from fingervision.live.access import access
+    from fingervision.live.beside import Beside
     from fingervision.live.opening import opened
-    from fingervision.live.running import Showing, run
+    from fingervision.live.playback.recorded import is_recording, recorded
+    from fingervision.live.running import Showing, look_through, run
 
-    choices = _choices(source, calibration, px_per_mm, below_tip_mm, tips, roi)
+    beside = Beside(model_path, kind, drive, drive_offset_s or 0.0, allow_motion)
+    choices = choices_of(source, calibration, px_per_mm, below_tip_mm, tips, roi)
     if no_page and choices.scale is None:
         raise UsageError(
             "Without a page the scale must be given, but is not: add --calibration FILE (made by `fingervision "
             "calibrate`) or --px-per-mm S."
         )
+    way = access(host, port, password_file, tls_cert, tls_key)
+    showing = Showing(page=not no_page, json_lines=as_json, way=way, record=no_page and out is not None)
+    if bed_name is not None:
+        from fingervision.live.bed.opening import opened_bed
+
+        bed_capture, bed_choices = opened_bed(bed_name, hide, choices)
+        run(bed_capture, bed_choices, out or USUAL_OUT, showing, beside)
+        return
+    assert source is not None  # noqa: S101 - asked before
+    if not no_page and not as_camera and is_recording(source):
+        if size is not None:
+            raise UsageError(f"--size is for cameras, but {source} is a recording: leave it out.")
+        look_through(
+            recorded(source, rate_hz, choices, _drive_options(drive, drive_offset_s)), out or USUAL_OUT, showing, beside
+        )
+        return
     camera = CameraWish(pixel_format, exposure_ms, gain, focus, white_balance_k)
     capture = opened(source, Wish(rate_hz, None if size is None else _size(size), camera))
-    showing = Showing(page=not no_page, json_lines=as_json, host=host, port=port, record=no_page and out is not None)
-    run(capture, choices, out or USUAL_OUT, showing)
+    run(capture, choices, out or USUAL_OUT, showing, beside)
+
+
+def _drive_options(drive: Path | None, offset_s: float | None) -> tuple[str, ...]:
+    if drive is None:
+        return ()
+    return ("--drive", str(drive), *(() if offset_s is None else ("--drive-offset-s", repr(offset_s))))
 
 
 def _list() -> None:
@@ -107,34 +180,6 @@ def _list() -> None:
         click.echo(f"{name}  {words}")
     if not cameras:
         click.echo("No camera was found. The source `simulated` works without one.")
-
-
-def _choices(
-    source: str, calibration: Path | None, px_per_mm: float | None, below_tip_mm: float, tips: str, roi: str | None
-) -> "Choices":
-    from calib.calibration import BareScale
-    from fingervision.domain.direction import Direction
-    from fingervision.frames import simulated
-    from fingervision.live.choices import Choices
-    from fingervision.measuring.scale import check_px_per_mm
-    from fingervision.storage.calibration_json import read_calibration
-
-    if calibration is not None and px_per_mm is not None:
-        raise UsageError("Either --calibration or --px-per-mm gives the scale, but both are there: leave one out.")
-    own = simulated.PX_PER_MM if simulated.accepts(source) else None
-    stated = own if px_per_mm is None else px_per_mm
-    if stated is not None and not 0.0 < stated < float("inf"):
-        raise UsageError(f"--px-per-mm must be positive, but is {stated:g}.")
-    if stated is not None:
-        check_px_per_mm(stated)
-    scale = None if calibration is None else read_calibration(calibration)
-    return Choices(
-        scale=scale or (None if stated is None else BareScale(stated)),
-        scale_file=calibration,
-        below_tip_mm=below_tip_mm,
-        direction=None if tips == "auto" else Direction(tips),
-        region=region_of(roi),
-    )
 
 
 def _size(words: str) -> tuple[int, int]:

@@ -7,6 +7,7 @@ import click
 
 from fingervision.cli._columns_option import columns_option
 from fingervision.cli._where_to_measure import region_of, where_to_measure
+from fingervision.domain.errors import UsageError
 
 if TYPE_CHECKING:
     from fingervision.measuring.frame_loop import Progress
@@ -22,6 +23,7 @@ Examples:
   fingervision measure opening.mp4 --calibration calibration.json --drive drive.csv
   fingervision measure opening.mp4 --calibration calibration.json --drive drive.csv --drive-offset-s 0.12
   fingervision measure opening.mp4 --px-per-mm 34 --steps 10
+  fingervision measure opening.mp4 --px-per-mm 34 --frames 20:60
   fingervision measure opening.mp4 --px-per-mm 34 --gauges gauges.toml --overlay
 
 \b
@@ -43,6 +45,7 @@ Exit codes: 0 done; 1 could not, or no frame gave a number; 2 wrong usage;
 @click.argument("recording")
 @where_to_measure
 @click.option("--rate-hz", type=float, help="Images in a second, where they have no times of their own.")
+@click.option("--frames", metavar="FIRST:LAST", help="Measure these frames alone; counted from 0, both included.")
 @click.option(
     "--drive",
     type=click.Path(path_type=Path),
@@ -97,6 +100,7 @@ def command(
     tips: str,
     roi: str | None,
     rate_hz: float | None,
+    frames: str | None,
     drive: Path | None,
     columns: Path | None,
     drive_offset_s: float | None,
@@ -132,12 +136,22 @@ def command(
         face=face,
         overlay=overlay,
         steps_frame=steps_frame,
+        frames=_frames(frames),
         gauges=gauges,
     )
     with _Bar() as bar:
         measured = measure_into(out, recording, task, rate_hz, bar)
     _report(measured, as_json)
     raise SystemExit(int(measured.exit_code))
+
+
+def _frames(words: str | None) -> tuple[int, int] | None:
+    if words is None:
+        return None
+    first, _, last = words.partition(":")
+    if not (first.isascii() and first.isdigit() and last.isascii() and last.isdigit()):
+        raise UsageError(f"--frames must be FIRST:LAST, two whole numbers such as 100:250, but is '{words}'.")
+    return int(first), int(last)
 
 
 class _Bar:

@@ -30,6 +30,25 @@ class OwnPacket:
     is_key: bool
 
 
+@dataclass(frozen=True, slots=True)
+class Driven:
+    """The stage at a frame's exposure.
+
+    Parameters
+    ----------
+    input_mm : float
+        Where it stood.
+    force_n : float or None
+        How hard it pushed, where that is measured.
+    run : str
+        Run that the frame belongs to; what has a memory begins anew with each.
+    """
+
+    input_mm: float
+    force_n: float | None = None
+    run: str = "1"
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Received:
     """A frame of a live source.
@@ -42,11 +61,14 @@ class Received:
         When the host had all of it, on the host's monotonic clock.
     packets : tuple of OwnPacket
         What came in since the frame before; empty where the source codes nothing.
+    driven : Driven or None
+        What moved the gripper when the frame was exposed, where the source knows it.
     """
 
     item: Frame | LostFrame
     arrived_s: float
     packets: tuple[OwnPacket, ...] = ()
+    driven: Driven | None = None
 
 
 class LiveSource(Protocol):

@@ -130,7 +130,7 @@ class VideoFile:
                     yield LostFrame(index, time_s, Status.DAMAGED, found)
                     last_tick = tick
                     continue
-                pixels = _upright(luma(found), found.rotation)
+                pixels = upright(luma(found), found.rotation)
                 if pixels.shape[1::-1] != (self.description.width_px, self.description.height_px):
                     yield LostFrame(index, time_s, Status.DAMAGED, _of_another_size(pixels, self.description))
                 elif tick is not None and tick == last_tick:
@@ -169,7 +169,7 @@ def _rotation_deg(container: av.container.InputContainer, stream: av.VideoStream
     return 0 if first is None else int(first.rotation)
 
 
-def _upright(pixels: Pixels, rotation_deg: int) -> Pixels:
+def upright(pixels: Pixels, rotation_deg: int) -> Pixels:
     """Turn a picture by quarters as its file asks; other angles are left alone."""
     if rotation_deg % QUARTER_DEG or not rotation_deg:
         return pixels

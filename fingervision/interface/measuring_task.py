@@ -97,6 +97,7 @@ def measuring_task(
     face: str = "front",
     overlay: bool = False,
     steps_frame: int | None = None,
+    frames: tuple[int, int] | None = None,
     gauges: Path | None = None,
 ) -> Task:
     """Put options or arguments together; see `fingervision.measure`.
@@ -132,6 +133,7 @@ def measuring_task(
         bits=depth,
         fingers_are_dark=FINGERS[one_of("fingers", fingers, FINGERS)],
         is_outline=one_of("face", face, FACES) == "outline",
+        frames=frames,
         gauges=() if gauges is None else read_gauges(gauges),
     )
 

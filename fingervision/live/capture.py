@@ -8,7 +8,7 @@ from time import monotonic
 
 from fingervision.domain.errors import FingervisionError
 from fingervision.domain.frame import Frame, LostFrame
-from fingervision.frames.received import LiveSource, OwnPacket, Received
+from fingervision.frames.received import Driven, LiveSource, OwnPacket, Received
 from fingervision.live.promptness import be_prompt
 from fingervision.live.timeline import Timeline
 
@@ -33,11 +33,14 @@ class Arrival:
         On the host's monotonic clock.
     packets : tuple of OwnPacket
         The camera's own, on the same time.
+    driven : Driven or None
+        What moved the gripper, where the source knows it.
     """
 
     item: Frame | LostFrame
     arrived_s: float
     packets: tuple[OwnPacket, ...]
+    driven: Driven | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -168,7 +171,7 @@ class Capture:
             replace(own, time_s=self._timeline.on_this(own.time_s), decode_s=self._timeline.on_this(own.decode_s))
             for own in received.packets
         )
-        self._put(Arrival(item, received.arrived_s, packets))
+        self._put(Arrival(item, received.arrived_s, packets, received.driven))
 
     def _put(self, what: Arrival | Happening | Ended) -> None:
         try:

@@ -1,7 +1,8 @@
 """What the user chose for a live view, and may change while it runs."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 from fingervision.domain.direction import Direction
 from fingervision.domain.errors import FingervisionError, UsageError
@@ -9,6 +10,10 @@ from fingervision.domain.region import Region
 from fingervision.frames.source import Description
 from fingervision.measuring.scale import Scale
 from fingervision.measuring.task import Task
+
+MOVES_ZERO = frozenset({"scale", "below_tip_mm", "direction", "region", "fingers_are_dark"})
+"""After a change of these a gap is another one."""
+ZERO_IS_OFF = "The zero is off: it was taken with another scale, height, region or direction."
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,6 +32,8 @@ class Choices:
         Where the tips point; None finds out.
     region : Region or None
         The part of the frame that is looked at.
+    fingers_are_dark : bool or None
+        Whether the fingers are darker than the ground; None finds out.
     zero_mm : float
         What is taken off the gap where it is shown; never in a file.
     least_mm, greatest_mm : float or None
@@ -38,16 +45,36 @@ class Choices:
     below_tip_mm: float = 0.3
     direction: Direction | None = None
     region: Region | None = None
+    fingers_are_dark: bool | None = None
     zero_mm: float = 0.0
     least_mm: float | None = None
     greatest_mm: float | None = None
+
+    def changed(self, **changes: Any) -> tuple["Choices", bool]:
+        """Choose otherwise; also whether that took a zero off.
+
+        A zero is a gap as it was measured with its scale, height, direction and region; after a change of these it
+        would be the gap of something else.
+        """
+        moves_zero = bool(MOVES_ZERO & set(changes))
+        if self.zero_mm and moves_zero:
+            changes.setdefault("zero_mm", 0.0)
+        chosen = replace(self, **changes)
+        return chosen, bool(self.zero_mm) and chosen.zero_mm == 0.0 and moves_zero
 
     @property
     def task(self) -> Task | None:
         """The task of measuring, once the scale is known."""
         if self.scale is None:
             return None
-        return Task(self.scale, self.scale_file, self.below_tip_mm, self.direction, self.region)
+        return Task(
+            self.scale,
+            self.scale_file,
+            self.below_tip_mm,
+            self.direction,
+            self.region,
+            fingers_are_dark=self.fingers_are_dark,
+        )
 
     def check(self, description: Description) -> None:
         """Refuse what cannot be meant for these frames.

@@ -1,6 +1,7 @@
 """One frame of a live view: what it says, and the row of the table that it becomes."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from pathlib import Path
 
 from fingervision.domain.frame import Frame, LostFrame
 from fingervision.domain.gap import GapMeasurement, NoGap
@@ -37,10 +38,16 @@ class FrameMeasurement:
     ----------
     frame_size_px : (int, int)
         Width and height of the frames.
+    files : tuple of Path
+        What a recording is made of, which may say how its levels are coded; empty for a live source.
+    fingers_are_dark : bool or None
+        Where it is known of the recording; None finds out in every frame.
     """
 
-    def __init__(self, frame_size_px: tuple[int, int]) -> None:
-        self._frame_size_px = frame_size_px
+    def __init__(
+        self, frame_size_px: tuple[int, int], files: tuple[Path, ...] = (), fingers_are_dark: bool | None = None
+    ) -> None:
+        self._frame_size_px, self._files, self._fingers_are_dark = frame_size_px, files, fingers_are_dark
         self._pictures = SoundPictures()
 
     def measured(
@@ -75,4 +82,7 @@ class FrameMeasurement:
 
     def _found(self, frame: Frame, choices: Choices) -> GapMeasurement | NoGap | LostFrame:
         assert choices.task is not None  # noqa: S101 - asked before
-        return self._pictures.judged(frame, measure_frame(frame, choices.task.settings))
+        settings, _ = choices.task.settings_for(self._files)
+        if self._fingers_are_dark is not None:
+            settings = replace(settings, fingers_are_dark=self._fingers_are_dark)
+        return self._pictures.judged(frame, measure_frame(frame, settings))

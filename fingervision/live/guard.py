@@ -1,5 +1,8 @@
 """Who may talk to the page's server: this machine's own pages, with the token, under the name that was bound."""
 
+import asyncio
+import base64
+import binascii
 import hmac
 import ipaddress
 import socket
@@ -29,7 +32,9 @@ HEADERS: Mapping[str, str] = {
 }
 # Script, style and licence are the program's own and the same for everybody.
 PUBLIC_PATH = "/page/"
-POLICY_VIOLATION = 1008
+POLICY_VIOLATION, UNAUTHORISED = 1008, 401
+WRITER, VIEWER = "writer", "viewer"
+GUESS_COSTS_S = 1.0
 
 
 class Guard:
@@ -46,12 +51,20 @@ class Guard:
         Address that was bound.
     port : int
         Its port.
-    token : str
-        What every address must hold.
+    tokens : mapping of str to str
+        What every address must hold one of, and the role that it gives (`WRITER` or `VIEWER`).
+    password : str
+        Asked of everybody and for everything, where it is not empty.
+    scheme : str
+        Of the page's address: http or https.
     """
 
-    def __init__(self, app: ASGIApp, host: str, port: int, token: str) -> None:
-        self._app, self._host, self._port, self._token = app, host, port, token
+    def __init__(
+        self, app: ASGIApp, host: str, port: int, tokens: Mapping[str, str], password: str = "", scheme: str = "http"
+    ) -> None:
+        self._app, self._host, self._port, self._tokens = app, host, port, dict(tokens)
+        self._password, self._scheme = password, scheme
+        self._guess = asyncio.Lock()
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Serve one request, or refuse it."""
@@ -59,12 +72,17 @@ class Guard:
             await self._app(scope, receive, send)
             return
         refused = self._refusal(scope)
+        if refused is not None and refused[0] == UNAUTHORISED:
+            # One guess a second, whoever guesses; who has the password does not wait.
+            async with self._guess:
+                await asyncio.sleep(GUESS_COSTS_S)
         if refused is None:
             await self._app(scope, receive, _with_headers(send))
         elif scope["type"] == "websocket":
             await WebSocketClose(POLICY_VIOLATION, refused[1])(scope, receive, send)
         else:
-            await PlainTextResponse(refused[1], refused[0])(scope, receive, _with_headers(send))
+            asks = {"WWW-Authenticate": 'Basic realm="fingervision"'} if refused[0] == UNAUTHORISED else None
+            await PlainTextResponse(refused[1], refused[0], asks)(scope, receive, _with_headers(send))
 
     def _refusal(self, scope: Scope) -> tuple[int, str] | None:
         headers = Headers(scope=scope)
@@ -73,18 +91,24 @@ class Guard:
         origin = headers.get("origin")
         if origin is None and scope["type"] == "websocket":
             return 403, "The Origin must be this live view's page, but is missing."
-        if origin is not None and origin != f"http://{headers.get('host', '')}":
+        if origin is not None and origin != f"{self._scheme}://{headers.get('host', '')}":
             return 403, "The Origin must be this live view's page."
+        if self._password and not is_password(headers.get("authorization", ""), self._password):
+            return UNAUTHORISED, "The password is asked for: any name will do."
         if scope["type"] == "http" and scope["path"].startswith(PUBLIC_PATH):
             return None
         given = parse_qs(scope["query_string"].decode("latin-1")).get("token", [""])[0]
-        if not hmac.compare_digest(given.encode(), self._token.encode()):
+        # Each is compared, so that the time tells nothing of which was nearly right.
+        roles = [role for token, role in self._tokens.items() if hmac.compare_digest(given.encode(), token.encode())]
+        if not roles:
             return 403, "The address must hold the token: open the one that the terminal shows."
+        scope["role"] = roles[0]
         return None
 
     def _is_ours(self, stated: str) -> bool:
-        # Browsers leave out the port of http, 80.
-        full = f"{stated}:80" if self._port == 80 and not stated.endswith(":80") else stated
+        # Browsers leave out the port of http, 80, and of https, 443.
+        usual = 443 if self._scheme == "https" else 80
+        full = f"{stated}:{usual}" if self._port == usual and not stated.endswith(f":{usual}") else stated
         name, _, port = full.rpartition(":")
         if not name or port != str(self._port):
             return False
@@ -92,6 +116,16 @@ class Guard:
         if name in LOOPBACK_NAMES | {self._host.lower()}:
             return True
         return self._host in EVERYWHERE and (_is_address(name) or name == socket.gethostname().lower())
+
+
+def is_password(header: str, password: str) -> bool:
+    """Whether an Authorization header (HTTP Basic, any user) holds the password; compared in constant time."""
+    kind, _, coded = header.partition(" ")
+    try:
+        given = base64.b64decode(coded, validate=True).partition(b":")[2] if kind.lower() == "basic" else b""
+    except (binascii.Error, ValueError):
+        return False
+    return hmac.compare_digest(given, password.encode())
 
 
 def _is_address(name: str) -> bool:

@@ -1,7 +1,7 @@
 """The last minutes of the gap, in memory that never grows."""
 
 from collections.abc import Iterator
-from dataclasses import astuple
+from dataclasses import astuple, replace
 from threading import Lock
 from typing import Any
 
@@ -13,7 +13,7 @@ from fingervision.storage.gaps_csv import GapRow
 # Ten minutes at 25 frames a second.
 ROWS_KEPT = 15_000
 STATUSES = tuple(Status)
-# frame, time_s, status and thirteen numbers; the drive's columns are not live.
+# frame, time_s, status and thirteen numbers; behind them input and force.
 COLUMNS_KEPT = 16
 
 
@@ -28,23 +28,30 @@ class History:
 
     def __init__(self, kept: int = ROWS_KEPT) -> None:
         # Filled, so that its memory is taken now and not while it fills. NaN is an empty cell, in memory alone.
-        self._cells = np.full((kept, COLUMNS_KEPT), np.nan)
+        self._cells = np.full((kept, COLUMNS_KEPT + 2), np.nan)
         self.count = 0
         self._lock = Lock()
 
     def add(self, row: GapRow) -> None:
         """Take in a row; the oldest leaves."""
-        cells = list(astuple(row)[:COLUMNS_KEPT])
+        cells = [*astuple(row)[:COLUMNS_KEPT], row.input_mm, row.force_n]
         cells[2] = STATUSES.index(row.status)
         with self._lock:
             self._cells[self.count % len(self._cells)] = [np.nan if cell is None else cell for cell in cells]
             self.count += 1
 
-    def rows(self, after: int = 0) -> Iterator[GapRow]:
-        """Rows from the number `after` on, counted from the first ever, as far as they are kept."""
+    @property
+    def oldest(self) -> int:
+        """Number of the oldest row that is kept, counted from the first ever."""
+        return max(0, self.count - len(self._cells))
+
+    def rows(self, after: int = 0, before: int | None = None) -> Iterator[GapRow]:
+        """Rows from the number `after` on and below `before`, counted from the first ever, as far as they are kept."""
         with self._lock:
-            asked = np.arange(max(after, self.count - len(self._cells)), self.count)
+            last = self.count if before is None else min(before, self.count)
+            asked = np.arange(max(after, self.count - len(self._cells)), last)
             kept = self._cells[asked % len(self._cells)].tolist()
         for frame, time_s, status, *numbers in kept:
             cells: list[Any] = [None if cell != cell else cell for cell in (time_s, *numbers)]
-            yield GapRow(int(frame), cells[0], STATUSES[int(status)], *cells[1:])
+            row = GapRow(int(frame), cells[0], STATUSES[int(status)], *cells[1:-2])
+            yield row if cells[-2] is None else replace(row, input_mm=cells[-2], force_n=cells[-1])

@@ -8,19 +8,26 @@ from pathlib import Path
 
 from fingervision.storage.out_folder import out_folder
 
-FILE = ".live_token"
+FILE, VIEWER_FILE = ".live_token", ".live_viewer_token"
 BYTES = 18
 
 
-def kept_token(out: Path) -> str:
-    """Read the folder's token, or make one that only this user can read.
+def kept_token(out: Path, file_name: str = FILE) -> str:
+    """Read a token of the folder, or make one that only this user can read.
+
+    Parameters
+    ----------
+    out : Path
+        The folder.
+    file_name : str
+        `FILE` for whoever works the live view, `VIEWER_FILE` for those who look on.
 
     Raises
     ------
     FingervisionError
         The folder cannot be written.
     """
-    path = out / FILE
+    path = out / file_name
     with out_folder(out):
         with suppress(FileNotFoundError, UnicodeDecodeError):
             found = path.read_text(encoding="ascii").strip()

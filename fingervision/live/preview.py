@@ -2,75 +2,118 @@
 
 import json
 import struct
+from collections.abc import Mapping
 from dataclasses import dataclass
+from threading import Lock
 from typing import Any
 
 import cv2
 
-from calib.measured_scale import Calibration
 from fingervision.domain.gap import NoGap
 from fingervision.domain.status import Status
+from fingervision.live.commands import section
 from fingervision.live.frame_measurement import Seen
-from fingervision.live.session import Session
+from fingervision.live.view import View
 from fingervision.storage.gaps_csv import GapRow
 from fingervision.vision.overlay import draw_overlay
 
 JPEG_QUALITY = 85
-# A page that was away gets so many rows at once.
+# A page gets at most so many rows in one message.
 ROWS_AT_ONCE = 3000
 _NOTHING = NoGap(Status.NO_FINGERS, "The scale is not known: nothing is measured yet.")
 
 
 @dataclass(frozen=True, slots=True)
+class Known:
+    """What a page has: of which count, and how many rows and messages of it.
+
+    Parameters
+    ----------
+    identity : str
+        Of the view that the rows are counted in; empty for a page that has nothing.
+    rows, messages : int
+        How many it has.
+    """
+
+    identity: str = ""
+    rows: int = 0
+    messages: int = 0
+
+
+@dataclass(frozen=True, slots=True)
 class Next:
-    """A message, and how many rows and messages the page then has."""
+    """A message, and what the page then has."""
 
     content: bytes
-    rows: int
-    messages: int
+    known: Known
 
 
-def message(session: Session, after_row: int, after_message: int, seen: Seen | None) -> Next:
+def message(view: View, known: Known, seen: Seen | None, about: Mapping[str, Any] | None = None) -> Next:
     """Put together the next message.
 
     Parameters
     ----------
-    session : Session
-        The live measurement.
-    after_row, after_message : int
-        How many rows and messages the page has.
+    view : View
+        What is shown.
+    known : Known
+        What the page has.
     seen : Seen or None
         The picture to send; None sends none.
+    about : mapping, optional
+        What this page alone is told.
 
     Returns
     -------
     Next
         Its content: length of the head (4 bytes, big end first), the head in JSON, the picture as JPEG or nothing.
     """
-    count = session.history.count
-    rows = list(session.history.rows(max(after_row, count - ROWS_AT_ONCE)))
-    said = [each for each in tuple(session.messages) if each.number > after_message]
+    identity, count = view.identity, view.row_count
+    is_same = known.identity == identity and known.rows <= count
+    first = max(known.rows, view.oldest_row) if is_same else view.shown_from
+    last = min(count, first + ROWS_AT_ONCE)
+    rows = list(view.rows(first, last))
+    said = [each for each in tuple(view.messages) if not is_same or each.number > known.messages]
     head = {
-        "points": [
-            [row.time_s if row.time_s is not None else row.frame, row.gap_mm, _u_mm(row), row.frame] for row in rows
-        ],
-        "now": _now(session),
-        "state": _state(session),
+        "view": identity,
+        "first": first,
+        "last": last,
+        "count": count,
+        "points": points(view, rows),
+        "now": _now(view, seen or view.seen),
+        "state": {**view.state(), **section(view), **(about or {})},
         "messages": [[each.number, each.name, each.words] for each in said],
     }
     words = json.dumps(head, ensure_ascii=False).encode()
-    picture = b"" if seen is None else _picture(seen, session.choices.zero_mm)
+    picture = b"" if seen is None else _PICTURES.of(seen, view.choices.zero_mm)
     content = struct.pack(">I", len(words)) + words + picture
-    return Next(content, count, max([after_message, *(each.number for each in said)]))
+    newest = max([known.messages if is_same else 0, *(each.number for each in said)])
+    return Next(content, Known(identity, last, newest))
+
+
+def points(view: View, rows: list[GapRow]) -> list[list[Any]]:
+    """Rows for the chart: time, gap, its standard uncertainty, frame, why there is none, and the model's gap."""
+    model = view.features.get("model")
+    predicted = [None] * len(rows) if model is None else model.predicted_mm(rows)
+    return [
+        [
+            row.time_s if row.time_s is not None else row.frame,
+            row.gap_mm,
+            _u_mm(row),
+            row.frame,
+            "" if row.status is Status.OK else row.status.value,
+            *([] if gap_mm is None else [gap_mm]),
+        ]
+        for row, gap_mm in zip(rows, predicted, strict=True)
+    ]
 
 
 def _u_mm(row: GapRow) -> float | None:
     return row.u_random_mm if row.u_gap_mm is None else row.u_gap_mm
 
 
-def _now(session: Session) -> dict[str, Any] | None:
-    """The newest row in figures."""
-    seen, choices = session.seen, session.choices
+def _now(view: View, seen: Seen | None) -> dict[str, Any] | None:
+    """A picture's row in figures."""
+    choices = view.choices
     if seen is None or seen.row is None:
         return None
     row = seen.row
@@ -87,37 +130,6 @@ def _now(session: Session) -> dict[str, Any] | None:
     }
 
 
-def _state(session: Session) -> dict[str, Any]:
-    choices, cadence, recorder = session.choices, session.cadence, session.recording
-    region, description = choices.region, session.description
-    scale = choices.scale
-    return {
-        "source": description.name,
-        "kind": description.kind,
-        "width_px": description.width_px,
-        "height_px": description.height_px,
-        "rate_hz": cadence.rate_hz,
-        "camera": ", ".join(f"{name} {value}" for name, value in session.capture.source.description.camera.items()),
-        "jitter_ms": None if cadence.jitter_s is None else 1e3 * cadence.jitter_s,
-        "dropped": cadence.missing + session.capture.overflowed,
-        "duplicates": session.counts[Status.DUPLICATE],
-        "damaged": session.counts[Status.DAMAGED],
-        "exposure": session.exposure.words,
-        "silent_s": session.silent_s,
-        "ended": session.ended.is_set(),
-        "trouble": session.trouble,
-        "zero_mm": choices.zero_mm,
-        "px_per_mm": None if scale is None else scale.px_per_mm,
-        "u_px_per_mm": scale.u_px_per_mm if isinstance(scale, Calibration) else None,
-        "region": None if region is None else [region.x_px, region.y_px, region.width_px, region.height_px],
-        "tips": "auto" if choices.direction is None else choices.direction.value,
-        "below_tip_mm": choices.below_tip_mm,
-        "least_mm": choices.least_mm,
-        "greatest_mm": choices.greatest_mm,
-        "recording": None if recorder is None else {"path": str(recorder.run.path), "frames": recorder.run.frames},
-    }
-
-
 def _picture(seen: Seen, zero_mm: float) -> bytes:
     if seen.outcome is None:
         drawn = draw_overlay(seen.frame, _NOTHING, _NOTHING.words)
@@ -129,3 +141,21 @@ def _picture(seen: Seen, zero_mm: float) -> bytes:
             words += f"  {row.status.value}" if row.gap_mm is None else f"  gap {row.gap_mm - zero_mm:.4f} mm{less}"
         drawn = draw_overlay(seen.frame, seen.outcome, words)
     return cv2.imencode(".jpg", drawn[:, :, ::-1], [cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY])[1].tobytes()
+
+
+class _Pictures:
+    """The newest picture, drawn once however many pages look."""
+
+    def __init__(self) -> None:
+        self._lock = Lock()
+        self._seen: Seen | None = None
+        self._zero_mm, self._coded = 0.0, b""
+
+    def of(self, seen: Seen, zero_mm: float) -> bytes:
+        with self._lock:
+            if self._seen is not seen or self._zero_mm != zero_mm:
+                self._seen, self._zero_mm, self._coded = seen, zero_mm, _picture(seen, zero_mm)
+            return self._coded
+
+
+_PICTURES = _Pictures()

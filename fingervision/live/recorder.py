@@ -2,8 +2,10 @@
 
 from queue import Empty, Full, Queue
 from threading import Thread
+from time import monotonic
 
 from fingervision.domain.errors import FingervisionError
+from fingervision.live.free_space import minutes_left
 from fingervision.live.promptness import be_prompt
 from fingervision.live.run_folder import RecordedFrame, RunFolder
 
@@ -13,6 +15,7 @@ FRAMES_WAITING = 250
 FRAMES_UNTIL_HURRY = 12
 # How long the disk may take for what waits when the recording is stopped.
 PATIENCE_S = 30.0
+DISK_EVERY_S = 1.0
 
 
 class Recorder:
@@ -26,6 +29,9 @@ class Recorder:
 
     def __init__(self, run: RunFolder) -> None:
         self.run = run
+        self.began_s = monotonic()
+        self.minutes_left: float | None = None
+        self._looked_s = self.began_s
         self.failure = ""
         self._waiting: Queue[RecordedFrame | tuple[str, str] | None] = Queue(FRAMES_WAITING)
         self._why = "Recording was stopped."
@@ -69,6 +75,18 @@ class Recorder:
             "then is valid: name a folder on another disk with --out."
         )
 
+    def _look_at_the_disk(self) -> None:
+        """Notice a folder that was taken away, which no write tells, and how long the disk lasts."""
+        if monotonic() - self._looked_s < DISK_EVERY_S:
+            return
+        self._looked_s = monotonic()
+        if not self.run.is_there:
+            raise FingervisionError(
+                f"The folder {self.run.path} is gone (its disk was removed, or it was deleted), so recording ended: "
+                "put the disk back, or name another folder with --out."
+            )
+        self.minutes_left = minutes_left(self.run.path, monotonic() - self.began_s)
+
     def _write(self) -> None:
         be_prompt()
         try:
@@ -85,6 +103,7 @@ class Recorder:
                     self.run.add(what)
                 else:
                     self.run.event(*what)
+                self._look_at_the_disk()
         except FingervisionError as error:
             self.failure = str(error)
         try:

@@ -69,6 +69,11 @@ class RunFolder:
         self._last_s = 0.0
         self.event("recording", "Recording began.")
 
+    @property
+    def is_there(self) -> bool:
+        """Whether what is written lies in the folder still; the system goes on writing to files that are gone."""
+        return (self.path / EVENTS).exists()
+
     def add(self, frame: RecordedFrame) -> None:
         """Write one frame: first the mark of a lost one, then its picture, then its row."""
         if isinstance(frame.item, LostFrame):
@@ -146,6 +151,7 @@ def _about(description: Description, task: Task, began: datetime) -> dict[str, A
         "settings": {
             "below_tip_mm": task.below_tip_mm,
             "tips": "auto" if task.direction is None else task.direction.value,
+            "fingers": {None: "auto", True: "dark", False: "light"}[task.fingers_are_dark],
             "roi": None if region is None else list(asdict(region).values()),
         },
         "scale": {

@@ -12,10 +12,14 @@ from types import FrameType
 from typing import TextIO
 
 from fingervision.domain.errors import ExitCode, FingervisionError
+from fingervision.live.access import Access
+from fingervision.live.beside import Beside, stand_beside
 from fingervision.live.capture import Capture
 from fingervision.live.choices import Choices
-from fingervision.live.guard import LOOPBACK_NAMES
+from fingervision.live.comparison.comparison import Comparison
 from fingervision.live.outlet import Outlet
+from fingervision.live.playback.playback import Playback
+from fingervision.live.playback.recorded import Recorded
 from fingervision.live.server import Page, bound
 from fingervision.live.session import Session
 from fingervision.live.terminal import JsonLines, StatusLine, told
@@ -31,22 +35,54 @@ class Showing:
         In a browser.
     json_lines : bool
         One line a frame on standard output.
-    host : str
-        Address that the page is served at.
-    port : int
-        0 takes any free one.
+    way : Access
+        How the page is reached.
     record : bool
         Whether a run is recorded from the first frame.
     """
 
     page: bool
     json_lines: bool
-    host: str
-    port: int
+    way: Access
     record: bool
 
 
-def run(capture: Capture, choices: Choices, out: Path, showing: Showing) -> None:
+def look_through(recording: Recorded, out: Path, showing: Showing, beside: Beside) -> None:
+    """Show a recording in the page until the user ends it.
+
+    Raises
+    ------
+    FingervisionError
+        The scale is for other frames, or the port is in use.
+    """
+    playback = Playback(recording, out)
+    comparison = None if beside.model is None else Comparison(playback, beside.model, beside.kind)
+    if comparison is not None:
+        playback.features["model"] = comparison
+        playback.on_table = comparison.add_all
+    page = Page(playback, bound(showing.way.host, showing.way.port), showing.way)
+    if showing.way.warning:
+        playback.say("network", showing.way.warning)
+    out_there, said = Outlet(sys.stdout), Outlet(sys.stderr)
+    playback.on_message.append(lambda message: told(message, said, in_place=is_terminal(sys.stderr)))
+    for message in tuple(playback.messages):
+        told(message, said, in_place=is_terminal(sys.stderr))
+    try:
+        with _until_signalled() as signalled:
+            playback.start()
+            try:
+                _announce(page, out_there)
+                page.serve(signalled)
+            finally:
+                playback.stop()
+                if comparison is not None:
+                    comparison.stop()
+    finally:
+        out_there.close()
+        said.close()
+
+
+def run(capture: Capture, choices: Choices, out: Path, showing: Showing, beside: Beside | None = None) -> None:
     """Run a live view until the user or the source ends it.
 
     Raises
@@ -56,17 +92,14 @@ def run(capture: Capture, choices: Choices, out: Path, showing: Showing) -> None
     """
     try:
         session = Session(capture, choices, out)
+        stand_beside(session, beside or Beside())
         # Before the camera runs: a port in use is said at once.
-        page = Page(session, bound(showing.host, showing.port), showing.host) if showing.page else None
+        page = Page(session, bound(showing.way.host, showing.way.port), showing.way) if showing.page else None
     except FingervisionError:
         capture.source.close()
         raise
-    if page is not None and showing.host not in LOOPBACK_NAMES:
-        session.say(
-            "network",
-            "The page is served beyond this machine, over plain HTTP: who can listen to the network "
-            "can read it and its token. Use it on a bench's own network alone, or through an SSH tunnel.",
-        )
+    if page is not None and showing.way.warning:
+        session.say("network", showing.way.warning)
     out_there, said = Outlet(sys.stdout), Outlet(sys.stderr)
     on_terminal = is_terminal(sys.stderr)
     session.on_message.append(lambda message: told(message, said, in_place=on_terminal))
@@ -93,6 +126,9 @@ def run(capture: Capture, choices: Choices, out: Path, showing: Showing) -> None
                     page.serve(signalled)
             finally:
                 session.stop()
+                comparison = session.features.get("model")
+                if isinstance(comparison, Comparison):
+                    comparison.stop()
                 if status is not None:
                     status.end()
     finally:
@@ -112,6 +148,7 @@ def run(capture: Capture, choices: Choices, out: Path, showing: Showing) -> None
 
 def _announce(page: Page, outlet: Outlet) -> None:
     outlet.put(f"The live view is at {page.address}  (Ctrl-C ends it)\n")
+    outlet.put(f"For those who only look: {page.viewer_address}\n")
     if is_terminal(sys.stdout):
         # Everybody on this machine sees what stands on a command line: the browser gets a file of this user's alone.
         webbrowser.open(page.door().as_uri())

@@ -1,47 +1,37 @@
 """The page's server: files of the page, a socket for the live view, the gaps as a file. Bound to loopback."""
 
 import asyncio
-import contextlib
 import errno
 import html
-import json
 import os
 import socket
-from collections import deque
 from pathlib import Path
 from threading import Event, Thread
-from time import monotonic
-from typing import Any
 
 import uvicorn
 from starlette.applications import Starlette
 from starlette.requests import Request
-from starlette.responses import FileResponse, PlainTextResponse, Response
+from starlette.responses import FileResponse, HTMLResponse, PlainTextResponse, Response
 from starlette.routing import Route, WebSocketRoute
-from starlette.websockets import WebSocket, WebSocketDisconnect
+from starlette.websockets import WebSocket
 
 from fingervision.domain.errors import FingervisionError, UsageError
-from fingervision.live.commands import Answer, obey, save_gaps
-from fingervision.live.frame_measurement import Seen
-from fingervision.live.guard import EVERYWHERE, POLICY_VIOLATION, Guard
+from fingervision.live.access import Access
+from fingervision.live.guard import EVERYWHERE, VIEWER, WRITER, Guard
 from fingervision.live.half_open import PatientProtocol
-from fingervision.live.page_token import kept_token
-from fingervision.live.preview import message
+from fingervision.live.page_files import PAGE, files, index
+from fingervision.live.page_socket import TRY_AGAIN_LATER, PageSocket
+from fingervision.live.page_token import VIEWER_FILE, kept_token
+from fingervision.live.pen import Pen
 from fingervision.live.promptness import be_prompt
-from fingervision.live.session import Session
+from fingervision.live.save_gaps import save_gaps
+from fingervision.live.view import View
 from fingervision.storage.out_folder import out_folder
 
-PAGE = Path(__file__).parent / "page"
-FILES = frozenset({"icon.svg", "live.js", "live.css", "uPlot.iife.min.js", "uPlot.min.css", "uPlot.LICENSE"})
-MESSAGE_BYTES, MESSAGES_A_SECOND, PAGES_AT_ONCE = 4096, 120, 4
+MESSAGE_BYTES = 4096
+# Looking on costs a share of a core each; connections are those of pages, and of files that are fetched meanwhile.
+PAGES_AT_ONCE, CONNECTIONS_AT_ONCE = 32, 128
 DOOR = ".live_page.html"
-TRY_AGAIN_LATER = 1013
-# The preview is as fast as a screen needs it; without a new picture the page hears of the state so often.
-PREVIEW_EVERY_S, STATE_EVERY_S, LOOK_EVERY_S = 0.03, 0.2, 0.01
-# When measuring or the disk lags, a picture now and then must do.
-PREVIEW_IN_A_HURRY_EVERY_S = 0.5
-# A page that does not acknowledge is gone.
-ACKNOWLEDGED_WITHIN_S = 20.0
 
 
 def bound(host: str, port: int) -> socket.socket:
@@ -73,28 +63,29 @@ def bound(host: str, port: int) -> socket.socket:
 
 
 class Page:
-    """Serves one session.
+    """Serves one view.
 
     Parameters
     ----------
-    session : Session
+    view : View
         What is shown.
     listening : socket.socket
         See `bound`.
-    host : str
-        The address as the user named it.
+    way : Access, optional
+        How it may be reached.
     """
 
-    def __init__(self, session: Session, listening: socket.socket, host: str) -> None:
-        self._session, self._listening = session, listening
-        self._pages = 0
-        self._steps: tuple[tuple[str, bytes], ...] = ()
-        self._ending = False
+    def __init__(self, view: View, listening: socket.socket, way: Access | None = None) -> None:
+        way = way or Access()
+        self._view, self._listening = view, listening
+        self._sockets: set[PageSocket] = set()
+        self._pen = Pen()
+        self._steps: list[tuple[str, bytes]] = []
         port = listening.getsockname()[1]
-        token = kept_token(session.out)
-        named = socket.gethostname() if host in EVERYWHERE else host
+        tokens = {kept_token(view.out): WRITER, kept_token(view.out, VIEWER_FILE): VIEWER}
+        named = socket.gethostname() if way.host in EVERYWHERE else way.host
         shown = f"[{named}]" if ":" in named else named
-        self.address = f"http://{shown}:{port}/?token={token}"
+        self.address, self.viewer_address = (f"{way.scheme}://{shown}:{port}/?token={token}" for token in tokens)
         app = Starlette(
             routes=[
                 Route("/", self._index),
@@ -106,12 +97,14 @@ class Page:
         )
         self._server = uvicorn.Server(
             uvicorn.Config(
-                Guard(app, host, port, token),
+                Guard(app, way.host, port, tokens, way.password, way.scheme),
+                ssl_certfile=way.certificate,
+                ssl_keyfile=way.key,
                 http=PatientProtocol,
                 ws="websockets-sansio",
                 ws_max_size=MESSAGE_BYTES,
                 ws_per_message_deflate=False,
-                limit_concurrency=64,
+                limit_concurrency=CONNECTIONS_AT_ONCE,
                 timeout_graceful_shutdown=2,
                 lifespan="off",
                 log_level="critical",
@@ -122,8 +115,8 @@ class Page:
 
     def door(self) -> Path:
         """Write a page that only this user can read, and that leads to the address."""
-        path = self._session.out.resolve() / DOOR
-        with out_folder(self._session.out):
+        path = self._view.out.resolve() / DOOR
+        with out_folder(self._view.out):
             path.unlink(missing_ok=True)
             descriptor = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600)
             with os.fdopen(descriptor, "w", encoding="utf-8") as file:
@@ -136,7 +129,8 @@ class Page:
         thread.start()
         while not until.wait(0.2) and thread.is_alive():
             pass
-        self._ending = True
+        for page in tuple(self._sockets):
+            page.ending = True
         self._server.should_exit = True
         thread.join(5.0)
         self._listening.close()
@@ -146,17 +140,17 @@ class Page:
         asyncio.run(self._server.serve(sockets=[self._listening]))
 
     async def _index(self, request: Request) -> Response:
-        return FileResponse(PAGE / "index.html", media_type="text/html")
+        return HTMLResponse(index())
 
     async def _file(self, request: Request) -> Response:
         name = request.path_params["name"]
-        if name not in FILES:
+        if name not in files():
             return PlainTextResponse("There is no such file.", 404)
         return FileResponse(PAGE / name)
 
     async def _gaps(self, request: Request) -> Response:
         try:
-            path = await asyncio.to_thread(save_gaps, self._session)
+            path = await asyncio.to_thread(save_gaps, self._view)
         except FingervisionError as error:
             return PlainTextResponse(str(error), 500)
         return FileResponse(path, media_type="text/csv", filename="gaps.csv")
@@ -169,85 +163,12 @@ class Page:
         return Response(picture, media_type="image/png")
 
     async def _socket(self, page: WebSocket) -> None:
-        if self._pages >= PAGES_AT_ONCE:
+        if len(self._sockets) >= PAGES_AT_ONCE:
             await page.close(TRY_AGAIN_LATER, f"At most {PAGES_AT_ONCE} pages may look at once: close one.")
             return
-        self._pages += 1
+        socket_of_page = PageSocket(page, self._view, self._pen, self._steps)
+        self._sockets.add(socket_of_page)
         try:
-            await page.accept()
-            acknowledged = asyncio.Event()
-            tasks = [asyncio.create_task(self._send(page, acknowledged))]
-            tasks.append(asyncio.create_task(self._receive(page, acknowledged)))
-            try:
-                # When either ends, however it ends, the page is let go, and connects anew if it is still there.
-                done, _ = await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
-            finally:
-                for task in tasks:
-                    task.cancel()
-                await asyncio.gather(*tasks, return_exceptions=True)
-            failed = next((error for task in done if (error := task.exception()) is not None), None)
-            if failed is not None and not isinstance(failed, WebSocketDisconnect):
-                silent = isinstance(failed, TimeoutError)
-                why = "The page did not answer." if silent else f"Sending failed ({type(failed).__name__})."
-                if not silent:
-                    self._session.say("page", f"{why} The page connects again.")
-                with contextlib.suppress(RuntimeError, WebSocketDisconnect):
-                    await page.close(TRY_AGAIN_LATER, why)
+            await socket_of_page.serve()
         finally:
-            self._pages -= 1
-
-    async def _send(self, page: WebSocket, acknowledged: asyncio.Event) -> None:
-        """Send the newest, then wait until the page has it: nothing ever queues up."""
-        session = self._session
-        rows = messages = 0
-        shown: Seen | None = None
-        pictured_s = float("-inf")
-        while not self._ending:
-            asked_s = monotonic()
-            while monotonic() - asked_s < STATE_EVERY_S and session.seen is shown:
-                await asyncio.sleep(LOOK_EVERY_S)
-            seen = session.seen
-            every_s = PREVIEW_IN_A_HURRY_EVERY_S if session.in_a_hurry else 0.0
-            picture = seen if seen is not shown and monotonic() - pictured_s >= every_s else None
-            if picture is not None:
-                pictured_s = monotonic()
-            following = await asyncio.to_thread(message, session, rows, messages, picture)
-            rows, messages = following.rows, following.messages
-            shown = seen
-            acknowledged.clear()
-            await page.send_bytes(following.content)
-            await asyncio.wait_for(acknowledged.wait(), ACKNOWLEDGED_WITHIN_S)
-            await asyncio.sleep(max(0.0, PREVIEW_EVERY_S - (monotonic() - asked_s)))
-        await page.close(1012, "The live view has ended.")
-
-    async def _receive(self, page: WebSocket, acknowledged: asyncio.Event) -> None:
-        received_s: deque[float] = deque(maxlen=MESSAGES_A_SECOND)
-        with contextlib.suppress(WebSocketDisconnect):
-            while True:
-                text = await page.receive_text()
-                if len(received_s) == MESSAGES_A_SECOND and monotonic() - received_s[0] < 1.0:
-                    await page.close(POLICY_VIOLATION, f"At most {MESSAGES_A_SECOND} messages a second.")
-                    return
-                received_s.append(monotonic())
-                request = _request(text)
-                if request.get("do") == "ack":
-                    acknowledged.set()
-                else:
-                    await page.send_text(json.dumps(await self._answer(request)))
-
-    async def _answer(self, request: dict[str, Any]) -> dict[str, Any]:
-        try:
-            answer: Answer = await asyncio.to_thread(obey, self._session, request)
-        except FingervisionError as error:
-            return {"refused": str(error), "do": str(request.get("do"))[:40]}
-        if answer.pictures:
-            self._steps = answer.pictures
-        return {"words": answer.words, "steps": [name for name, _ in answer.pictures], "do": request.get("do")}
-
-
-def _request(text: str) -> dict[str, Any]:
-    try:
-        request = json.loads(text)
-    except ValueError:
-        return {}
-    return request if isinstance(request, dict) else {}
+            self._sockets.discard(socket_of_page)

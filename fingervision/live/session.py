@@ -1,7 +1,8 @@
 """The live measurement: every frame measured as it comes, what is known of it kept for whoever looks."""
 
+import secrets
 from collections import Counter, deque
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
 from threading import Event, Lock, Thread
@@ -11,9 +12,10 @@ from typing import Any
 from fingervision.domain.errors import FingervisionError
 from fingervision.domain.frame import Frame
 from fingervision.domain.status import Status
+from fingervision.frames.received import Driven
 from fingervision.live.cadence import Cadence
 from fingervision.live.capture import Arrival, Capture, Ended, Happening
-from fingervision.live.choices import Choices
+from fingervision.live.choices import MOVES_ZERO, ZERO_IS_OFF, Choices
 from fingervision.live.exposure import Exposure
 from fingervision.live.frame_measurement import FrameMeasurement, Seen
 from fingervision.live.history import History
@@ -22,6 +24,7 @@ from fingervision.live.overflow_report import OverflowReport
 from fingervision.live.promptness import be_prompt
 from fingervision.live.recorder import Recorder
 from fingervision.live.run_folder import RecordedFrame, RunFolder
+from fingervision.live.session_state import state_of_session
 from fingervision.measuring.other_camera import other_camera
 from fingervision.measuring.rehearsal import rehearse
 from fingervision.storage.gaps_csv import GapRow
@@ -32,9 +35,10 @@ SILENT_S, SILENT_PERIODS = 0.5, 5.0
 FRAMES_UNTIL_HURRY = 1
 
 
-MOVES_ZERO = {"scale", "below_tip_mm", "direction", "region"}
-"""After a change of these a gap is another one."""
+ROWS_SHOWN = 3000
+"""Rows that a page which comes new is sent: two minutes at 25 frames a second."""
 
+DrivenAt = Callable[[float | None], Driven | None]
 RowListener = Callable[[GapRow, float], None]
 
 
@@ -56,6 +60,8 @@ class Session:
         self.description = capture.source.description
         choices.check(self.description)
         self.choices = choices
+        self.identity = secrets.token_hex(4)
+        self.features: dict[str, Any] = {}
         self.history = History()
         self.cadence, self.exposure = Cadence(), Exposure()
         self.counts: Counter[Status] = Counter()
@@ -63,9 +69,11 @@ class Session:
         self._messages = Messages()
         self.ended = Event()
         self.on_row: list[RowListener] = []
+        self.driven_at: DrivenAt = lambda time_s: None
+        """Who knows the gripper's input at a time of this view, where the source does not."""
         self._measurement = FrameMeasurement((self.description.width_px, self.description.height_px))
         self._frame_at_s = monotonic()
-        self._interrupted = False
+        self._interrupted, self._run = False, ""
         self._recorder: Recorder | None = None
         self._beginning = False
         self.trouble = ""
@@ -101,6 +109,31 @@ class Session:
             recorder.add((name, words))
         self._messages.say(name, words)
 
+    table: Path | None = None
+
+    @property
+    def row_count(self) -> int:
+        """Rows that there have been."""
+        return self.history.count
+
+    @property
+    def oldest_row(self) -> int:
+        """Number of the first row that is still kept."""
+        return self.history.oldest
+
+    @property
+    def shown_from(self) -> int:
+        """A page that comes new gets the last two minutes."""
+        return max(self.oldest_row, self.history.count - ROWS_SHOWN)
+
+    def rows(self, first: int, last: int) -> Iterator[GapRow]:
+        """Rows from one number on, before another."""
+        return self.history.rows(first, last)
+
+    def state(self) -> dict[str, Any]:
+        """What is known of source and measurement, for the page."""
+        return state_of_session(self)
+
     @property
     def messages(self) -> deque[Message]:
         """What was said last."""
@@ -120,18 +153,13 @@ class Session:
             It cannot be meant for these frames, or would change a recording under way.
         """
         with self._lock:
-            measured = {"scale", "below_tip_mm", "direction", "region"} & set(changes)
-            if measured and (self._recorder is not None or self._beginning):
+            if MOVES_ZERO & set(changes) and (self._recorder is not None or self._beginning):
                 raise FingervisionError("While a run is recorded the measurement stays as it is: stop recording first.")
-            if self.choices.zero_mm and MOVES_ZERO & set(changes):
-                # A zero is a gap as it was measured then; after this it would be the gap of something else.
-                changes.setdefault("zero_mm", 0.0)
-            unzeroed = bool(self.choices.zero_mm) and changes.get("zero_mm") == 0.0 and bool(measured)
-            chosen = replace(self.choices, **changes)
+            chosen, unzeroed = self.choices.changed(**changes)
             chosen.check(self.description)
             self.choices = chosen
         if unzeroed:
-            self.say("zero", "The zero is off: it was taken with another scale, height, region or direction.")
+            self.say("zero", ZERO_IS_OFF)
 
     def record(self) -> Path:
         """Begin a recording.
@@ -234,6 +262,13 @@ class Session:
             self._interrupted = False
             came = arrival.item
             item, outcome, row = self._measurement.measured(came, self.choices)
+            driven = arrival.driven or self.driven_at(came.time_s)
+            if driven is not None and driven.run != self._run:
+                # Between two runs of a bed nobody looks: that is no drop.
+                self._run = driven.run
+                self.cadence.restart()
+            if row is not None and driven is not None:
+                row = replace(row, run=driven.run, input_mm=driven.input_mm, force_n=driven.force_n)
             if isinstance(came, Frame):
                 if came.time_s is not None:
                     self.cadence.add(came.time_s)

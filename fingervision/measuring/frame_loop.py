@@ -10,6 +10,7 @@ from fingervision.domain.frame import Coding, Frame, LostFrame
 from fingervision.domain.gap import GapMeasurement, NoGap
 from fingervision.frames.ahead import decoded_ahead
 from fingervision.frames.camera_settings import coding_of
+from fingervision.frames.frame_range import frame_range
 from fingervision.frames.source import Description, FrameSource
 from fingervision.measuring.asked_to_stop import asked_to_stop
 from fingervision.measuring.marked import marked
@@ -44,11 +45,14 @@ class Prepared:
         What vision needs.
     row_maker : RowMaker
         From pixels to rows.
+    frames : (int, int) or None
+        First and last frame that are measured; None measures all.
     """
 
     description: Description
     settings: Settings
     row_maker: RowMaker
+    frames: tuple[int, int] | None = None
 
 
 def prepared(description: Description, task: Task) -> Prepared:
@@ -65,7 +69,7 @@ def prepared(description: Description, task: Task) -> Prepared:
     given_s = task.drive_offset_s
     frame_size_px = (description.width_px, description.height_px)
     row_maker = RowMaker(task.scale, frame_size_px, None if given_s is None else task.drive, given_s or 0.0)
-    return Prepared(description, settings, row_maker)
+    return Prepared(description, settings, row_maker, task.frames)
 
 
 def measure_frames(
@@ -101,6 +105,9 @@ def measure_frames(
     description = how.description
     marks = lost_frames(description.files)
     stopped = False
+    items: Iterable[Frame | LostFrame] = marked(source, marks) if marks else source
+    if how.frames is not None:
+        items = frame_range(items, *how.frames)
     with ExitStack() as stack:
         asked = stack.enter_context(asked_to_stop())
         pending: list[Result] = []
@@ -116,9 +123,7 @@ def measure_frames(
         stack.callback(hand_over)
         handed_over_at = monotonic()
         try:
-            for item, outcome in _outcomes(
-                marked(source, marks) if marks else source, how.settings, description.coding, series.votes, asked.is_set
-            ):
+            for item, outcome in _outcomes(items, how.settings, description.coding, series.votes, asked.is_set):
                 result = Result(item.index, item.time_s, outcome)
                 pending.append(result)
                 if see_item is not None:

@@ -49,6 +49,8 @@ class Task:
         Whether the fingers are darker than the ground; None finds out in every frame.
     is_outline : bool
         Whether a thick part is measured at its whole outline, side walls included, and not at its front face.
+    frames : (int, int) or None
+        First and last frame that are measured, counted from 0, both included; None measures all.
     gauges : tuple of Gauge
         What is measured beside the gap; none by default.
     """
@@ -66,6 +68,7 @@ class Task:
     bits: int | None = None
     fingers_are_dark: bool | None = None
     is_outline: bool = False
+    frames: tuple[int, int] | None = None
     gauges: tuple[Gauge, ...] = ()
 
     def __post_init__(self) -> None:
@@ -75,6 +78,10 @@ class Task:
             raise UsageError(f"--drive-offset-s must be a number of seconds, but is {self.drive_offset_s:g}.")
         if self.steps_frame is not None and self.steps_frame < 0:
             raise UsageError(f"--steps must be the number of a frame, from 0, but is {self.steps_frame}.")
+        if self.frames is not None and not 0 <= self.frames[0] <= self.frames[1]:
+            raise UsageError(
+                f"--frames must be FIRST:LAST, from 0 and rising, but is {self.frames[0]}:{self.frames[1]}."
+            )
 
     @property
     def settings(self) -> Settings:
@@ -160,6 +167,7 @@ def in_words(task: Task, settings: Settings) -> dict[str, Any]:
         "bits": task.bits,
         "fingers": {None: "auto", True: "dark", False: "light"}[task.fingers_are_dark],
         "face": "outline" if task.is_outline else "front",
+        "frames": None if task.frames is None else list(task.frames),
         "drive": task.drive is not None,
         "drive_offset_s": task.drive_offset_s if task.drive is not None else None,
     }

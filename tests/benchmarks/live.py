@@ -138,7 +138,7 @@ def told(what: str, figure: str, bar: str = "", met: bool | None = None) -> None
 
 def looked_at(session: Session) -> "subprocess.Popen[bytes]":
     """Serve the page, and look at it from a process of its own."""
-    page = Page(session, bound("127.0.0.1", 0), "127.0.0.1")
+    page = Page(session, bound("127.0.0.1", 0))
     Thread(target=page.serve, args=(Event(),), daemon=True).start()
     return subprocess.Popen([sys.executable, "-c", LOOKS, page.address])
 

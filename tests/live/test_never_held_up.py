@@ -2,6 +2,7 @@
 
 import io
 import json
+import shutil
 import struct
 import sys
 import time
@@ -20,13 +21,15 @@ from fingervision.domain.errors import FingervisionError
 from fingervision.domain.frame import Frame
 from fingervision.domain.status import Status
 from fingervision.frames.source import Wish
-from fingervision.live import server
+from fingervision.live import page_socket, server
+from fingervision.live import recorder as recorder_module
 from fingervision.live.cadence import Cadence
 from fingervision.live.choices import Choices
 from fingervision.live.frame_measurement import Seen
+from fingervision.live.free_space import minutes_left
 from fingervision.live.opening import opened
 from fingervision.live.outlet import PATIENCE_S, Outlet
-from fingervision.live.preview import message
+from fingervision.live.preview import Known, message
 from fingervision.live.session import Session
 from fingervision.live.terminal import JsonLines
 from fingervision.storage.gaps_csv import GapRow
@@ -40,7 +43,7 @@ def session(tmp_path: Path) -> Session:
 
 
 def head_of(session: Session) -> dict[str, Any]:
-    content = message(session, 0, 0, None).content
+    content = message(session, Known(), None).content
     (length,) = struct.unpack(">I", content[:4])
     head: dict[str, Any] = json.loads(content[4 : 4 + length])
     return head
@@ -129,7 +132,7 @@ def test_rate_and_jitter_can_be_asked_for_while_frames_come() -> None:
 @pytest.fixture
 def page(session: Session) -> Iterator[server.Page]:
     ending = Event()
-    page = server.Page(session, server.bound("127.0.0.1", 0), "127.0.0.1")
+    page = server.Page(session, server.bound("127.0.0.1", 0))
     thread = Thread(target=page.serve, args=(ending,))
     thread.start()
     yield page
@@ -155,13 +158,13 @@ def test_a_fault_in_sending_closes_the_socket_so_that_the_page_connects_again(
     def fail(*_: object) -> None:
         raise RuntimeError("a fault of ours")
 
-    monkeypatch.setattr(server, "message", fail)
-    assert closing_code(page) == server.TRY_AGAIN_LATER
+    monkeypatch.setattr(page_socket, "message", fail)
+    assert closing_code(page) == page_socket.TRY_AGAIN_LATER
 
 
 def test_a_page_that_is_silent_is_let_go(page: server.Page, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(server, "ACKNOWLEDGED_WITHIN_S", 0.2)
-    assert closing_code(page) == server.TRY_AGAIN_LATER
+    monkeypatch.setattr(page_socket, "ACKNOWLEDGED_WITHIN_S", 0.2)
+    assert closing_code(page) == page_socket.TRY_AGAIN_LATER
 
 
 def test_a_zero_does_not_outlive_the_scale_that_it_was_taken_with(session: Session) -> None:
@@ -203,3 +206,36 @@ def test_a_recording_that_failed_is_told_until_the_next_one(session: Session) ->
     session.record()
     assert head_of(session)["state"]["trouble"] == ""
     session.stop()
+
+
+def test_a_folder_that_is_taken_away_ends_the_recording_with_a_sentence(
+    session: Session, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(recorder_module, "DISK_EVERY_S", 0.1)
+    run = session.record()
+    session.start()
+    until_s = time.monotonic() + 30.0
+    while session.history.count < 5 and time.monotonic() < until_s:
+        time.sleep(0.02)
+    away = run.with_name("away")
+    run.rename(away)
+    while not session.trouble and time.monotonic() < until_s:
+        time.sleep(0.02)
+    assert str(run) in session.trouble
+    assert "is gone" in session.trouble
+    measured = session.history.count
+    while session.history.count < measured + 5 and time.monotonic() < until_s:
+        time.sleep(0.02)
+    assert session.history.count >= measured + 5
+    session.stop()
+    # What was written until then is whole.
+    assert len((away / "gaps.csv").read_text().splitlines()) >= 5
+    assert (away / "video.mp4").stat().st_size > 0
+
+
+def test_the_room_left_is_that_of_the_disk_at_the_rate_so_far(tmp_path: Path) -> None:
+    (tmp_path / "video.mp4").write_bytes(b"\0" * 3_000_000)
+    free = shutil.disk_usage(tmp_path).free
+    assert minutes_left(tmp_path, 30.0) == pytest.approx(free / 100_000 / 60.0, rel=0.05)
+    assert minutes_left(tmp_path, 1.0) is None
+    assert minutes_left(tmp_path / "missing", 30.0) is None

@@ -3,13 +3,11 @@
 import csv
 import io
 import json
-import os
 import re
-import shutil
 import subprocess
 import time
 from collections import deque
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 from urllib.error import HTTPError
@@ -19,91 +17,16 @@ import cv2
 import numpy as np
 import pytest
 
-from fingervision.live.server import STATE_EVERY_S
+from fingervision.live.page_socket import STATE_EVERY_S
 from fingervision.live.session import SILENT_S
+from tests.live.browser import PATIENCE_MS, browser, drag, needs_chromium, opened, says, shown
 
-playwright_api = pytest.importorskip("playwright.sync_api", reason="playwright is not installed.")
-CHROMIUM = shutil.which("chromium")
-pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="Chromium is not installed: the page is tested in it.")
-# Screenshots stay where the environment says, for whoever looks at a failure in CI.
-SCREENSHOTS = os.environ.get("FINGERVISION_SCREENSHOTS")
-QUIET = [
-    "--headless",
-    "--no-sandbox",
-    "--disable-gpu",
-    "--disable-quic",
-    "--no-first-run",
-    "--disable-background-networking",
-    "--disable-component-update",
-    "--disable-sync",
-]
-PATIENCE_MS = 120_000
+__all__ = ["browser", "opened"]
+pytestmark = needs_chromium
 # What the page shows has four decimals, the table seven.
 SHOWN_MM = 0.00005
 BAR_PX, BAR_MM = 136, 4.0
 SAID_WITHIN_S = 1.0
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Any]:
-    with playwright_api.sync_playwright() as playwright:
-        found = playwright.chromium.launch(executable_path=CHROMIUM, args=QUIET, timeout=PATIENCE_MS)
-        yield found
-        found.close()
-
-
-@pytest.fixture
-def opened(browser: Any, tmp_path: Path, request: pytest.FixtureRequest) -> Iterator[Callable[..., Any]]:
-    """Open pages; their requests and errors are noted, a screenshot is kept, and nothing may leave the machine."""
-    contexts, requests, errors = [], [], []
-
-    def open_page(address: str, **context: Any) -> Any:
-        contexts.append(browser.new_context(**context))
-        page = contexts[-1].new_page()
-        page.set_default_timeout(PATIENCE_MS)
-        page.on("request", lambda each: requests.append(each.url))
-        page.on("websocket", lambda each: requests.append(each.url))
-        page.on("pageerror", lambda each: errors.append(str(each)))
-        page.goto(address)
-        return page
-
-    yield open_page
-    folder = Path(SCREENSHOTS) if SCREENSHOTS else tmp_path
-    folder.mkdir(parents=True, exist_ok=True)
-    for number, context in enumerate(contexts):
-        for page in context.pages:
-            page.screenshot(path=folder / f"{request.node.name}_{number}.png", full_page=True)
-        context.close()
-    assert errors == []
-    assert requests
-    assert all(re.match(r"(http|ws|blob:http)://127\.0\.0\.1:\d+/", url) for url in requests), requests
-
-
-def shown(page: Any, words: str) -> None:
-    """Wait until an expression is true; asked from outside, because the page's policy lets no text be run in it."""
-    end_s = time.monotonic() + PATIENCE_MS / 1e3
-    while not page.evaluate(words):
-        assert time.monotonic() < end_s, f"not true in time: {words}"
-        page.wait_for_timeout(50)
-
-
-def says(page: Any, words: str) -> None:
-    page.locator("#log li", has_text=words).first.wait_for()
-
-
-def drag(page: Any, box: tuple[int, int, int, int]) -> None:
-    """Drag over a part of the picture, in its own pixels."""
-    page.locator("#picture").scroll_into_view_if_needed()
-    frame = page.locator("#picture").bounding_box()
-    width, height = page.evaluate(
-        "[document.querySelector('#picture').width, document.querySelector('#picture').height]"
-    )
-    x, y = frame["width"] / width, frame["height"] / height
-    page.mouse.move(frame["x"] + box[0] * x, frame["y"] + box[1] * y)
-    page.mouse.down()
-    page.mouse.move(frame["x"] + (box[0] + box[2] / 2) * x, frame["y"] + (box[1] + box[3] / 2) * y)
-    page.mouse.move(frame["x"] + (box[0] + box[2]) * x, frame["y"] + (box[1] + box[3]) * y)
-    page.mouse.up()
 
 
 def no_value_is_left(page: Any, status: str) -> None:
@@ -185,8 +108,8 @@ def under_cursor_s(page: Any, share: float) -> float:
     """Time that the chart's legend gives with the cursor at a share of its width."""
     box = page.locator("#chart .u-over").bounding_box()
     page.mouse.move(box["x"] + share * box["width"], box["y"] + box["height"] / 2)
-    page.wait_for_function("() => /\\d/.test(document.querySelector('.u-legend .u-value').textContent)")
-    return float(page.locator("#chart .u-legend .u-value").first.inner_text())
+    page.wait_for_function("() => document.querySelector('#readout').dataset.time")
+    return float(page.get_attribute("#readout", "data-time"))
 
 
 @pytest.mark.slow
@@ -273,7 +196,7 @@ def test_a_scale_is_asked_for_and_found_on_a_reference(
     for index in range(200):
         noisy = np.clip(blurred + rng.normal(0.0, 2.0, picture.shape), 0, 255).astype(np.uint8)
         cv2.imwrite(str(folder / f"{index:03d}.png"), noisy)
-    view = live(folder, "--rate-hz", "10", "--port", "0")
+    view = live(folder, "--as-camera", "--rate-hz", "10", "--port", "0")
     page = opened(view.address)
     page.locator("#alarm", has_text="The scale is not known").wait_for()
     page.locator("body").press("r")

@@ -30,7 +30,7 @@ def session(tmp_path: Path) -> Session:
 @pytest.fixture
 def page(session: Session) -> Iterator[server.Page]:
     ending = Event()
-    found = server.Page(session, server.bound("127.0.0.1", 0), "127.0.0.1")
+    found = server.Page(session, server.bound("127.0.0.1", 0))
     thread = Thread(target=found.serve, args=(ending,))
     thread.start()
     yield found

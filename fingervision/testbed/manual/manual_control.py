@@ -1,8 +1,10 @@
 """Single motions on request, watched until they end and stopped at a limit."""
 
 import signal
+import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass
 from math import copysign, inf, isfinite
 from types import FrameType
 
@@ -18,9 +20,38 @@ class Interrupted(BaseException):
     """Ctrl-C, or a request to end; the motor was stopped before it was raised."""
 
 
+@dataclass(frozen=True, slots=True)
+class Looking:
+    """How a motion is looked at while it lasts: as a rule by its instruments alone, in the page frame by frame.
+
+    Parameters
+    ----------
+    wait : callable
+        Lets a little time of the bed pass.
+    position_mm, force_n : callable
+        The newest readings; None where there is no force sensor.
+    """
+
+    wait: Callable[[], None]
+    position_mm: Callable[[], float]
+    force_n: Callable[[], float | None]
+
+
+def by_instruments(bed: Bed) -> Looking:
+    """Look at a motion by the bed's own readings."""
+    return Looking(
+        lambda: bed.clock.wait_until(bed.clock.now_s() + LOOK_EVERY_S),
+        lambda: bed.actuator.readings()[-1].value,
+        lambda: None if bed.force_sensor is None else bed.force_sensor.readings()[-1].value,
+    )
+
+
 @contextmanager
 def motor_stops_first(stop: Callable[[], None]) -> Iterator[None]:
-    """Let Ctrl-C and SIGTERM stop the motor before anything else."""
+    """Let Ctrl-C and SIGTERM stop the motor before anything else; signals are the main thread's alone."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
 
     def note(number: int, frame: FrameType | None) -> None:
         stop()
@@ -34,12 +65,12 @@ def motor_stops_first(stop: Callable[[], None]) -> Iterator[None]:
             signal.signal(each, handler)
 
 
-def home(bed: Bed) -> float:
+def home(bed: Bed, looking: Looking | None = None) -> float:
     """Go to the reference; give the position then."""
-    return _watched(bed, bed.actuator.home)
+    return _watched(bed, bed.actuator.home, looking=looking)
 
 
-def move(bed: Bed, to_mm: float, speed_mm_s: float) -> float:
+def move(bed: Bed, to_mm: float, speed_mm_s: float, looking: Looking | None = None) -> float:
     """Move within the bed's limits; give the position then.
 
     Raises
@@ -57,10 +88,10 @@ def move(bed: Bed, to_mm: float, speed_mm_s: float) -> float:
             f"{to_mm:g} mm is {beyond_mm:.4g} mm beyond: nothing was moved."
         )
     _check_speed(bed, speed_mm_s)
-    return _watched(bed, lambda: bed.actuator.move(to_mm, speed_mm_s))
+    return _watched(bed, lambda: bed.actuator.move(to_mm, speed_mm_s), looking=looking)
 
 
-def jog(bed: Bed, speed_mm_s: float, for_s: float = inf) -> float:
+def jog(bed: Bed, speed_mm_s: float, for_s: float = inf, looking: Looking | None = None) -> float:
     """Move at a signed speed until stopped, for a time, or to the bed's limit; give the position then."""
     _check_speed(bed, abs(speed_mm_s))
     end_mm = bed.limits.upper_mm if speed_mm_s > 0.0 else bed.limits.lower_mm
@@ -70,7 +101,7 @@ def jog(bed: Bed, speed_mm_s: float, for_s: float = inf) -> float:
     def enough(at_mm: float) -> bool:
         return copysign(1.0, speed_mm_s) * (at_mm - last_mm) >= 0.0
 
-    return _watched(bed, lambda: bed.actuator.jog(speed_mm_s), for_s, enough)
+    return _watched(bed, lambda: bed.actuator.jog(speed_mm_s), for_s, enough, looking)
 
 
 def run_step(bed: Bed, number: int) -> float:
@@ -87,35 +118,37 @@ def _check_speed(bed: Bed, speed_mm_s: float) -> None:
 
 
 def _watched(
-    bed: Bed, begin: Callable[[], None], for_s: float = inf, enough: Callable[[float], bool] = lambda at_mm: False
+    bed: Bed,
+    begin: Callable[[], None],
+    for_s: float = inf,
+    enough: Callable[[float], bool] = lambda at_mm: False,
+    looking: Looking | None = None,
 ) -> float:
+    looking = looking or by_instruments(bed)
     began_s = bed.clock.now_s()
     try:
         with motor_stops_first(bed.actuator.stop):
             begin()
             while bed.actuator.busy:
-                _check(bed)
-                if bed.clock.now_s() - began_s >= for_s or enough(bed.actuator.readings()[-1].value):
+                _check(bed, looking.force_n())
+                if bed.clock.now_s() - began_s >= for_s or enough(looking.position_mm()):
                     bed.actuator.stop()
-                bed.clock.wait_until(bed.clock.now_s() + LOOK_EVERY_S)
-            _check(bed)
+                looking.wait()
+            _check(bed, looking.force_n())
     except Interrupted:
-        at_mm = bed.actuator.readings()[-1].value
+        at_mm = looking.position_mm()
         raise FingervisionError(f"Stopped: the motor stands near {at_mm:.3f} mm.") from None
     except FingervisionError:
         bed.actuator.stop()
         raise
-    return bed.actuator.readings()[-1].value
+    return looking.position_mm()
 
 
-def _check(bed: Bed) -> None:
+def _check(bed: Bed, force_n: float | None) -> None:
     alarm = bed.actuator.alarm
     if alarm is not None:
         raise FingervisionError(f"The actuator has an alarm ({alarm.code}: {alarm.words}): the motor was stopped.")
-    if bed.force_sensor is None:
-        return
-    force_n = bed.force_sensor.readings()[-1].value
-    if abs(force_n) > bed.limits.force_n:
+    if force_n is not None and abs(force_n) > bed.limits.force_n:
         raise FingervisionError(
             f"The force must stay below {bed.limits.force_n:g} N, but is {force_n:.3g} N: the motor was stopped."
         )

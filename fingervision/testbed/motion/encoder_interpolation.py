@@ -98,6 +98,9 @@ class StageTrack:
             if not at_once and self._last.device_s - device_s < WAIT_FOR_BORDER_S:
                 return None
             return self._onwards_mm(device_s, self._last.value)
+        if len(self._knots) == 1:
+            # Before the first reading: nothing else is known.
+            return self._knots[0].position_mm
         after = max(bisect_right(self._times, device_s), 1)
         a, b = self._knots[after - 1], self._knots[after]
         share = min(max((device_s - a.device_s) / (b.device_s - a.device_s), 0.0), 1.0)

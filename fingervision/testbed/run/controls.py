@@ -1,6 +1,7 @@
 """Pause, go on, stop: by Ctrl-C, by a request to terminate, or by a letter on the terminal."""
 
 import signal
+import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from types import FrameType
@@ -56,6 +57,13 @@ class Controls:
             Stops the motor at once, from a signal handler or another thread.
         """
         self._stop_motor = stop_motor
+        if threading.current_thread() is not threading.main_thread():
+            # Signals are the main thread's alone; whoever runs a recipe elsewhere stops it by these controls.
+            try:
+                yield
+            finally:
+                self._stop_motor = lambda: None
+            return
 
         def note(number: int, frame: FrameType | None) -> None:
             self.stop()

@@ -14,7 +14,7 @@ from fingervision.testbed.run.plan import Plan, plan
 from fingervision.testbed.run.plan_feasibility import check_moves
 from fingervision.testbed.run.plan_runner import Progress, Runner
 from fingervision.testbed.run.run_folder import BedRunFolder
-from fingervision.testbed.run.run_record import Counts, RunRecord
+from fingervision.testbed.run.run_record import Counts, OnRow, RunRecord
 from fingervision.testbed.run.safety_monitor import Say, Watch
 from fingervision.testbed.run.synchronised_acquisition import Sight
 from fingervision.testbed.simulation.injected_effects import NOTHING, Hidden
@@ -50,6 +50,7 @@ def run_recipe(
     on_progress: Progress = lambda done, total: None,
     say: Say = lambda words: None,
     on_plan: Callable[[Plan], None] = lambda planned: None,
+    on_row: OnRow = lambda row, picture: None,
 ) -> RunDone:
     """Run a recipe; nothing moves before all of it was held against the limits and the fingers were seen.
 
@@ -67,8 +68,9 @@ def run_recipe(
         Rows of an earlier run on this bed, which this one goes on from: its runs are numbered on, on the same clock.
     controls : Controls, optional
         Pause and stop.
-    on_progress, say, on_plan : callable
-        Told of the way: seconds done and expected, sentences, and the plan before it is run.
+    on_progress, say, on_plan, on_row : callable
+        Told of the way: seconds done and expected, sentences, the plan before it is run, and every row as it is
+        written, with its picture.
 
     Raises
     ------
@@ -90,7 +92,7 @@ def run_recipe(
         size_px = (sight.camera.description.width_px, sight.camera.description.height_px)
         left = max(sum(planned.seconds) * sight.rate_hz - len(folder.rows), 0.0)
         folder.needs_room(left, size_px)
-        record = RunRecord(folder, lambda bed_s, at_once: sight.position.at(bed_s, at_once=at_once))
+        record = RunRecord(folder, lambda bed_s, at_once: sight.position.at(bed_s, at_once=at_once), on_row)
         watch = Watch(bed, sight, record, controls or Controls(), recipe.below_force_n, say)
         runner = Runner(planned, watch, on_progress)
         if before:

@@ -18,6 +18,8 @@ TURNED = "turned"
 
 PlaceAt = Callable[[float, bool], float | None]
 """Where the stage was at a time of the bed; None where that is not known yet, and need not be known at once."""
+OnRow = Callable[[SampleRow, Frame], None]
+"""Told of a row that was written, and its picture."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,17 +40,19 @@ class RunRecord:
         Where it is written.
     place_at : callable
         The stage's place.
+    on_row : callable, optional
+        Told of every row as it is written, with its picture.
     """
 
-    def __init__(self, folder: BedRunFolder, place_at: PlaceAt) -> None:
+    def __init__(self, folder: BedRunFolder, place_at: PlaceAt, on_row: OnRow = lambda row, picture: None) -> None:
         self.folder = folder
-        self._place_at = place_at
+        self._place_at, self._on_row = place_at, on_row
         self._run, self.turned, self._rezeroed = 1, False, False
         self._rows = self._with_gap = self._lost = self._events = 0
         # Zero of the run's time on the camera's clock, once there is a frame, and the run's time there.
         self._zero_s: float | None = None
         self._base_s = 0.0
-        self._waiting: deque[tuple[SampleRow, float]] = deque()
+        self._waiting: deque[tuple[SampleRow, float, Frame]] = deque()
 
     @property
     def counts(self) -> Counts:
@@ -124,7 +128,7 @@ class RunRecord:
             arrived_s=round(look.shot.arrived_s, 6),
         )
         self.folder.add_picture(picture, row.time_s)
-        self._waiting.append((row, look.exposed_s))
+        self._waiting.append((row, look.exposed_s, picture))
         self._count(row)
 
     def lose(self) -> None:
@@ -134,12 +138,14 @@ class RunRecord:
     def write(self, *, at_once: bool = False) -> None:
         """Write the rows whose place between the encoder's steps is known by now, or all."""
         while self._waiting:
-            row, exposed_s = self._waiting[0]
+            row, exposed_s, picture = self._waiting[0]
             input_mm = self._place_at(exposed_s, at_once)
             if input_mm is None:
                 return
-            self.folder.add_row(replace(row, input_mm=round(input_mm, MM_PLACES)))
+            row = replace(row, input_mm=round(input_mm, MM_PLACES))
+            self.folder.add_row(row)
             self._waiting.popleft()
+            self._on_row(row, picture)
 
     # Events.
 

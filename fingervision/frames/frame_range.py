@@ -1,0 +1,30 @@
+"""A part of a recording: the frames from one to another, with the numbers and times that they have in the whole."""
+
+from collections.abc import Iterable, Iterator
+
+from fingervision.domain.frame import Frame, LostFrame
+
+
+def frame_range(frames: Iterable[Frame | LostFrame], first: int, last: int) -> Iterator[Frame | LostFrame]:
+    """Frames of a range.
+
+    Parameters
+    ----------
+    frames : iterable of Frame or LostFrame
+        The recording; read from its beginning, because what a frame hangs on comes before it, and no further than
+        the range.
+    first, last : int
+        Numbers of the first and the last frame, from 0, both included.
+
+    Yields
+    ------
+    Frame or LostFrame
+        Those frames, as they are in the whole recording.
+    """
+    for item in frames:
+        if item.index > last:
+            return
+        if item.index >= first:
+            yield item
+            if item.index == last:
+                return

@@ -1,0 +1,80 @@
+"""A frame of a recording by its time, without reading what comes before: for looking, never for measuring a series."""
+
+from pathlib import Path
+from typing import Protocol
+
+import av
+
+from fingervision.domain.frame import Coding, Frame
+from fingervision.frames import image_folder, video_file
+from fingervision.frames.luma import luma
+from fingervision.frames.video_file import upright
+
+# From one key frame to the next; a stream with longer groups is read by counting.
+MOST_FRAMES_TO_DECODE = 600
+
+
+class Seeking(Protocol):
+    """A recording whose frames can be found one by one."""
+
+    def frame(self, index: int, time_s: float) -> Frame | None:
+        """Frame of exactly that time; None where there is none such, or it cannot be decoded by itself."""
+        ...
+
+
+def seeking(name: str) -> Seeking | None:
+    """Seek in a video file; None where frames are found by counting anyway.
+
+    Parameters
+    ----------
+    name : str
+        The recording.
+    """
+    if image_folder.accepts(name) or not video_file.accepts(name) or not Path(name).is_file():
+        return None
+    return VideoSeeking(name)
+
+
+class VideoSeeking:
+    """Seeks in a video file; the decoder goes on from where it was when the next frame is asked for.
+
+    Parameters
+    ----------
+    name : str
+        Its path.
+    """
+
+    def __init__(self, name: str) -> None:
+        self._name = name
+        self._coding = video_file.VideoFile(name).description.coding
+        self._container: av.container.InputContainer | None = None
+        self._tick: int | None = None
+
+    def frame(self, index: int, time_s: float) -> Frame | None:
+        """Frame of exactly that time; None where there is none such, or it cannot be decoded by itself."""
+        try:
+            return self._found(index, time_s)
+        except (av.FFmpegError, OSError, ValueError):
+            self._close()
+            return None
+
+    def _found(self, index: int, time_s: float) -> Frame | None:
+        if self._container is None:
+            self._container = av.open(f"file:{self._name}")
+        stream = self._container.streams.video[0]
+        if stream.time_base is None:
+            return None
+        wanted = round(time_s / float(stream.time_base))
+        self._container.seek(wanted, stream=stream, backward=True)
+        for number, picture in enumerate(self._container.decode(stream)):
+            if picture.pts == wanted and not picture.is_corrupt:
+                hangs = self._coding is Coding.INTERFRAME and not picture.key_frame
+                return Frame(upright(luma(picture), picture.rotation), index, time_s, self._coding, hangs)
+            if number > MOST_FRAMES_TO_DECODE or picture.pts is None or picture.pts > wanted:
+                return None
+        return None
+
+    def _close(self) -> None:
+        if self._container is not None:
+            self._container.close()
+        self._container = None

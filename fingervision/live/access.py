@@ -1,0 +1,85 @@
+"""How the page is reached: by which tokens, with which password beyond this machine, and over TLS where it can be."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from fingervision.domain.errors import FingervisionError, UsageError
+from fingervision.live.guard import LOOPBACK_NAMES
+
+LEAST_LETTERS = 12
+"""Guesses are answered one a second (`guard.GUESS_COSTS_S`): so many letters outlast any bench."""
+PLAIN = (
+    "The page is served beyond this machine, over plain HTTP: who can listen to the network can read it, its token and "
+    "its password. Use it on a bench's own network alone, through an SSH tunnel, or with --tls-cert and --tls-key."
+)
+ENCRYPTED = "The page is served beyond this machine, over TLS: whoever has the password and the address can look."
+
+
+@dataclass(frozen=True, slots=True)
+class Access:
+    """How the page may be reached.
+
+    Parameters
+    ----------
+    host : str
+        Address that is bound.
+    port : int
+        0 takes any free one.
+    password : str
+        Asked of everybody; empty asks for none.
+    certificate, key : Path or None
+        For TLS.
+    """
+
+    host: str = "127.0.0.1"
+    port: int = 0
+    password: str = ""
+    certificate: Path | None = None
+    key: Path | None = None
+
+    @property
+    def scheme(self) -> str:
+        """As addresses begin."""
+        return "http" if self.certificate is None else "https"
+
+    @property
+    def warning(self) -> str:
+        """What the user must know; empty on this machine alone."""
+        if self.host in LOOPBACK_NAMES:
+            return ""
+        return PLAIN if self.certificate is None else ENCRYPTED
+
+
+def access(host: str, port: int, password_file: Path | None, certificate: Path | None, key: Path | None) -> Access:
+    """Check how the page shall be reached.
+
+    Raises
+    ------
+    UsageError
+        It would be reached from beyond this machine without a password, or only half of what TLS needs is there.
+    FingervisionError
+        A file cannot be read, or the password is too short.
+    """
+    if (certificate is None) != (key is None):
+        raise UsageError("TLS needs both --tls-cert and --tls-key, but one is missing.")
+    for file in (certificate, key):
+        if file is not None and not file.is_file():
+            raise FingervisionError(f"There is no file {file}: name the certificate and its key.")
+    if password_file is None and host not in LOOPBACK_NAMES:
+        raise UsageError(
+            f"--host {host} lets other machines in, which needs a password: write one of at least {LEAST_LETTERS} "
+            "letters into a file and name it with --password-file."
+        )
+    return Access(host, port, "" if password_file is None else _password(password_file), certificate, key)
+
+
+def _password(file: Path) -> str:
+    try:
+        words = file.read_text(encoding="utf-8").strip()
+    except (OSError, UnicodeDecodeError) as error:
+        raise FingervisionError(f"The password cannot be read from {file}: give a text file.") from error
+    if len(words) < LEAST_LETTERS:
+        raise FingervisionError(
+            f"The password in {file} must have at least {LEAST_LETTERS} letters, but has {len(words)}."
+        )
+    return words

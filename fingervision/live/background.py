@@ -1,0 +1,82 @@
+"""A command of fingervision in a process of its own, at the lowest priority: it never slows what is live."""
+
+import os
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+from fingervision.domain.errors import FingervisionError
+
+# Threads of the live view ask to be served first, and a process begins with the priority of the thread that starts it.
+BEGIN = (
+    "import os, sys\n"
+    "if hasattr(os, 'setpriority'): os.setpriority(os.PRIO_PROCESS, 0, 19)\n"
+    "from fingervision.cli import main\n"
+    "sys.argv[0] = 'fingervision'\n"
+    "main()\n"
+)
+ENDS_WITHIN_S = 5.0
+# Libraries that compute would each take all cores.
+ONE_THREAD = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
+
+
+class BackgroundCommand:
+    """One run of the command line.
+
+    Parameters
+    ----------
+    *arguments : str or Path
+        As after `fingervision`.
+
+    Raises
+    ------
+    FingervisionError
+        No process can be started.
+    """
+
+    def __init__(self, *arguments: str | Path) -> None:
+        root = str(Path(__file__).parents[2])
+        paths = os.pathsep.join(filter(None, (root, os.environ.get("PYTHONPATH", ""))))
+        try:
+            self._folder = tempfile.TemporaryDirectory(prefix="fingervision_")
+            self._out, self._error = (Path(self._folder.name) / name for name in ("out", "error"))
+            with self._out.open("w") as out, self._error.open("w") as error_stream:
+                self._process = subprocess.Popen(
+                    [sys.executable, "-c", BEGIN, *map(str, arguments)],
+                    stdin=subprocess.DEVNULL,
+                    stdout=out,
+                    stderr=error_stream,
+                    env={**os.environ, **ONE_THREAD, "PYTHONPATH": paths},
+                    # Ctrl-C in the terminal is the live view's, which ends this one.
+                    start_new_session=True,
+                )
+        except OSError as error:
+            raise FingervisionError(f"No process could be started ({error.strerror}): close other programs.") from error
+
+    @property
+    def exit_code(self) -> int | None:
+        """How it ended; None as long as it runs."""
+        return self._process.poll()
+
+    @property
+    def output(self) -> str:
+        """What it has printed so far."""
+        return self._out.read_text(encoding="utf-8")
+
+    @property
+    def complaint(self) -> str:
+        """Its last sentence on the error stream, without the program's name."""
+        lines = [line for line in self._error.read_text(encoding="utf-8").splitlines() if line.strip()]
+        return lines[-1].removeprefix("fingervision: ").removeprefix("Error: ") if lines else ""
+
+    def stop(self) -> None:
+        """End it, if it runs."""
+        if self._process.poll() is None:
+            self._process.terminate()
+            try:
+                self._process.wait(ENDS_WITHIN_S)
+            except subprocess.TimeoutExpired:
+                self._process.kill()
+                self._process.wait()
+        self._folder.cleanup()

@@ -1,0 +1,254 @@
+"""The bed's own thread: it looks frame by frame, and does what is asked of it between two frames."""
+
+from collections import deque
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from pathlib import Path
+from queue import Empty, Full, Queue
+from threading import Event, Thread
+from time import monotonic
+from typing import Any
+
+import av
+
+from fingervision.domain.errors import FingervisionError
+from fingervision.domain.frame import Frame
+from fingervision.domain.recipe import Recipe
+from fingervision.frames.received import Driven, Received
+from fingervision.frames.source import Description
+from fingervision.storage.samples_csv import SampleRow
+from fingervision.storage.toml_section import Section
+from fingervision.testbed.bed import Bed
+from fingervision.testbed.manual.manual_control import Looking, home, jog, move
+from fingervision.testbed.run.controls import Controls
+from fingervision.testbed.run.recipe_run import run_recipe
+from fingervision.testbed.run.synchronised_acquisition import Look, Sight
+from fingervision.testbed.simulation.injected_effects import NOTHING, Hidden
+
+# Frames that may wait for the live view; the bed waits for nobody.
+FRAMES_WAITING = 50
+# Runs of page and recipes are numbered on: what has a memory begins anew with each.
+ENDS_WITHIN_S = 5.0
+
+Say = Callable[[str, str], None]
+
+
+@dataclass(frozen=True, slots=True)
+class Task:
+    """Something that the bed does: its name for the page, and how."""
+
+    name: str
+    act: Callable[[], str]
+
+
+class Bench:
+    """A bed as a live source, with one thread that alone touches camera and motor.
+
+    Parameters
+    ----------
+    bed : Bed
+        Open, with a camera and a scale.
+    hidden : Hidden
+        What the bed was put together with; its digest belongs to every run.
+
+    Raises
+    ------
+    FingervisionError
+        There is no camera, or no scale for its frames.
+    """
+
+    has_own_clock = True
+    template: av.VideoStream | None = None
+
+    def __init__(self, bed: Bed, hidden: Hidden = NOTHING) -> None:
+        self.bed, self.hidden = bed, hidden
+        self._sight = _eyes(bed)
+        self.description: Description = self._sight.camera.description
+        self.say: Say = lambda name, words: None
+        self.doing, self.position_mm = "", 0.0
+        self.force_n: float | None = None
+        self.progress: tuple[float, float] | None = None
+        self.newest_run: Path | None = None
+        self._frames: Queue[Received | str] = Queue(FRAMES_WAITING)
+        self._waiting: deque[tuple[Look, Frame]] = deque()
+        self._asked: Queue[Task] = Queue(1)
+        self._controls: Controls | None = None
+        self._run, self._index = 1, 0
+        self._ending, self._stop_asked = Event(), False
+        self._thread = Thread(target=self._work, name="bed", daemon=True)
+
+    # ---- a live source
+    def received(self) -> Iterator[Received]:
+        """Frames with the stage's place at their exposure, until the bed is closed or fails."""
+        self._thread.start()
+        while True:
+            try:
+                following = self._frames.get(timeout=0.1)
+            except Empty:
+                if self._ending.is_set():
+                    return
+                continue
+            if isinstance(following, str):
+                raise FingervisionError(following)
+            yield following
+
+    def close(self) -> None:
+        """Stop the motor first, then let go of the bed."""
+        if self._ending.is_set():
+            return
+        self.stop()
+        self._ending.set()
+        if self._thread.is_alive():
+            self._thread.join(ENDS_WITHIN_S)
+        self.bed.close()
+
+    # ---- what may be asked; from any thread
+    def stop(self) -> None:
+        """Stop the motor at once, whatever it does, and forget what was asked."""
+        self._stop_asked = True
+        if self._controls is not None:
+            self._controls.stop()
+        self.bed.actuator.stop()
+
+    def home(self) -> None:
+        """Go to the reference."""
+        self._ask(Task("homing", lambda: f"At the reference: {home(self.bed, self._looking()):.4f} mm."))
+
+    def move(self, to_mm: float, speed_mm_s: float) -> None:
+        """Move within the limits."""
+
+        def act() -> str:
+            return f"At {move(self.bed, to_mm, speed_mm_s, self._looking()):.4f} mm."
+
+        self._ask(Task(f"moving to {to_mm:g} mm", act))
+
+    def jog(self, speed_mm_s: float, for_s: float) -> None:
+        """Move at a signed speed for a time, at most to the limit."""
+        self._ask(Task("jogging", lambda: f"At {jog(self.bed, speed_mm_s, for_s, looking=self._looking()):.4f} mm."))
+
+    def run(self, recipe: Recipe[Section], out: Path) -> None:
+        """Run a recipe into a folder."""
+        self._ask(Task(f"running {recipe.name}", lambda: self._recipe(recipe, out)))
+
+    def _ask(self, task: Task) -> None:
+        if self.doing:
+            raise FingervisionError(f"The bed is {self.doing}: wait for it, or stop it first.")
+        if self._ending.is_set():
+            raise FingervisionError("The bed is closed: start the live view again.")
+        self._stop_asked = False
+        try:
+            self._asked.put_nowait(task)
+        except Full:
+            raise FingervisionError("The bed was asked something already: wait for it, or stop it first.") from None
+
+    # ---- the thread
+    def _work(self) -> None:
+        try:
+            while not self._ending.is_set():
+                try:
+                    task = self._asked.get_nowait()
+                except Empty:
+                    self._look()
+                    continue
+                self._do(task)
+        except FingervisionError as error:
+            self.bed.actuator.stop()
+            self._hand_over(str(error))
+        except Exception as error:  # a fault of ours or a driver's must stop the motor, and be seen
+            self.bed.actuator.stop()
+            self._hand_over(f"The bed failed ({type(error).__name__}: {error}).")
+
+    def _do(self, task: Task) -> None:
+        if self._stop_asked:
+            self.say("bed", "Stopped before it began.")
+            return
+        self.doing = task.name
+        try:
+            self.say("bed", task.act())
+        except FingervisionError as error:
+            self.say("bed_refused", str(error))
+        finally:
+            self.doing, self.progress = "", None
+
+    def _looking(self) -> Looking:
+        return Looking(self._look, lambda: self.position_mm, lambda: self.force_n)
+
+    def _look(self) -> None:
+        """Look once; a frame waits until the stage's place between the encoder's steps is known."""
+        look = self._sight.look()
+        self.position_mm, self.force_n = look.encoder_mm, look.force_now_n
+        item = look.shot.item()
+        if isinstance(item, Frame):
+            self._waiting.append((look, item))
+        while self._waiting:
+            first, frame = self._waiting[0]
+            input_mm = self._sight.position.at(first.exposed_s)
+            if input_mm is None:
+                return
+            self._waiting.popleft()
+            self._hand_over(Received(frame, monotonic(), (), Driven(input_mm, first.force_n, str(self._run))))
+
+    def _recipe(self, recipe: Recipe[Section], out: Path) -> str:
+        self._waiting.clear()
+        self._run += 1
+        first_run = self._run
+        self._controls = Controls()
+        self.newest_run = out
+
+        def on_row(row: SampleRow, picture: Frame) -> None:
+            number, *rest = row.run.split()
+            self._run = first_run + int(number) - 1
+            self.position_mm = row.encoder_mm or 0.0
+            self.force_n = row.force_n
+            if row.input_mm is not None:
+                driven = Driven(row.input_mm, row.force_n, " ".join([str(self._run), *rest]))
+                frame = replace(picture, time_s=row.camera_s)
+                self._hand_over(Received(frame, monotonic(), (), driven))
+
+        try:
+            done = run_recipe(
+                recipe,
+                self.bed,
+                out,
+                self.hidden,
+                controls=self._controls,
+                on_progress=self._note_progress,
+                say=lambda words: self.say("bed", words),
+                on_row=on_row,
+            )
+        finally:
+            self._controls = None
+            self._run += 1
+            # Readings that the run took are missing in what was followed before it.
+            self._sight = _eyes(self.bed)
+        return f"{done.counts.recorded} frames, {done.counts.with_gap} with a gap: {done.folder}."
+
+    def _note_progress(self, now_s: float, total_s: float) -> None:
+        self.progress = (now_s, total_s)
+
+    def _hand_over(self, what: Received | str) -> None:
+        if isinstance(what, Received):
+            what = replace(what, item=replace(what.item, index=self._index))
+            self._index += 1
+        try:
+            self._frames.put(what, timeout=0.0 if isinstance(what, Received) else 1.0)
+        except Full:
+            return
+
+    @property
+    def limits(self) -> dict[str, Any]:
+        """The bed's soft limits, for the page."""
+        limits = self.bed.limits
+        return {
+            "lower_mm": limits.lower_mm,
+            "upper_mm": limits.upper_mm,
+            "speed_mm_s": limits.speed_mm_s,
+            "force_n": limits.force_n,
+            "gap_mm": limits.gap_mm,
+        }
+
+
+def _eyes(bed: Bed) -> Sight:
+    sight = Sight(bed)
+    sight.position.read()
+    return sight

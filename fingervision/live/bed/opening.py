@@ -1,0 +1,38 @@
+"""From a bed's name to the capture of its camera."""
+
+from dataclasses import replace
+
+from fingervision.domain.errors import FingervisionError
+from fingervision.live.bed.bench import Bench
+from fingervision.live.capture import Capture
+from fingervision.live.choices import Choices
+from fingervision.testbed.bed_factory import open_bed
+from fingervision.testbed.simulation.parse_injected_effects import hidden_from
+
+
+def opened_bed(name: str, hide: tuple[str, ...], choices: Choices) -> tuple[Capture, Choices]:
+    """Open a bed; a simulated one takes the time that it would take.
+
+    Parameters
+    ----------
+    name : str
+        The word simulated, or a configuration.
+    hide : tuple of str
+        Effects that act in its simulated parts.
+    choices : Choices
+        What the user chose; scale and height are the bed's where none is given.
+
+    Raises
+    ------
+    FingervisionError
+        It cannot be opened, or has neither camera nor scale.
+    """
+    hidden = hidden_from(hide)
+    bed = open_bed(name, hidden, pace=1.0)
+    try:
+        bench = Bench(bed, hidden)
+    except FingervisionError:
+        bed.close()
+        raise
+    chosen = replace(choices, scale=bed.scale, scale_file=None, below_tip_mm=bed.below_tip_mm)
+    return Capture(bench, again=None), chosen

@@ -1,0 +1,72 @@
+"""What stands beside a live measurement: a bed, its input, a model."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from fingervision.domain.errors import FingervisionError
+from fingervision.frames.received import Driven
+from fingervision.live.bed.bench import Bench
+from fingervision.live.comparison.comparison import Comparison
+from fingervision.live.session import Session
+from fingervision.measuring.drive_at import drive_at
+from fingervision.storage.out_folder import make_out_folder
+from fingervision.tables.read import read_drive
+from fingervision.testbed.run.run_metadata import SIMULATION, write_expected
+
+
+@dataclass(frozen=True, slots=True)
+class Beside:
+    """What stands beside the measurement.
+
+    Parameters
+    ----------
+    model : Path or None
+        Predicts the gap.
+    kind : str
+        Which model answers for a gripper.toml.
+    drive : Path or None
+        The stage's log, of a live source.
+    drive_offset_s : float
+        Added to its times.
+    allow_motion : bool
+        Whether the page may move a bed.
+    """
+
+    model: Path | None = None
+    kind: str = "lumped"
+    drive: Path | None = None
+    drive_offset_s: float = 0.0
+    allow_motion: bool = False
+
+
+def stand_beside(session: Session, beside: Beside) -> None:
+    """Put bed, input and model beside a session.
+
+    Raises
+    ------
+    FingervisionError
+        The model or the log cannot be read.
+    """
+    model, bench = beside.model, session.capture.source
+    if isinstance(bench, Bench):
+        session.features |= {"bed": bench, "allow_motion": beside.allow_motion}
+        bench.say = session.say
+        if model is None and bench.bed.model is not None:
+            # What the bed's gripper should do, without what is hidden in it: as beside a run's table.
+            make_out_folder(session.out)
+            model = session.out / SIMULATION
+            write_expected(model, bench.bed.model, bench.bed.limits)
+    if beside.drive is not None:
+        drive = read_drive(beside.drive)
+        if drive.time_s.size < 2:
+            raise FingervisionError(f"{beside.drive} must have at least two rows, but has {drive.time_s.size}.")
+
+        def driven_at(time_s: float | None) -> Driven | None:
+            found = None if time_s is None else drive_at(drive, time_s - beside.drive_offset_s)
+            return None if found is None else Driven(found.input_mm, found.force_n, found.run or "1")
+
+        session.driven_at = driven_at
+    if model is not None:
+        comparison = Comparison(session, model, beside.kind)
+        session.features["model"] = comparison
+        session.on_row.append(comparison.add)

@@ -1,0 +1,123 @@
+"""What a request holds, checked value by value, and what it is answered with."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from fingervision.domain.errors import FingervisionError, UsageError
+from fingervision.domain.region import Region
+from fingervision.live.frame_measurement import Seen
+from fingervision.live.view import View
+
+GREATEST = 10**12
+"""No number that the page may ask for is larger; comparing is safe where converting is not (nan is not below it)."""
+MOST_LETTERS = 1000
+"""Of a text that the page may give: a path, a name."""
+
+
+@dataclass(frozen=True, slots=True)
+class Answer:
+    """What became of a request.
+
+    Parameters
+    ----------
+    words : str
+        For the user; empty where the page shows it anyway.
+    pictures : tuple of (str, bytes)
+        Names and PNG pictures of the steps.
+    more : mapping
+        What the page's script that asked makes something of; goes out as JSON.
+    """
+
+    words: str = ""
+    pictures: tuple[tuple[str, bytes], ...] = ()
+    more: Mapping[str, Any] = field(default_factory=dict)
+
+
+Request = Mapping[str, Any]
+Command = Callable[[View, Request], Answer]
+
+
+def seen_of(view: View) -> Seen:
+    """The picture that is shown.
+
+    Raises
+    ------
+    FingervisionError
+        There is none yet.
+    """
+    if view.seen is None:
+        raise FingervisionError("There is no picture yet: wait for the source.")
+    return view.seen
+
+
+def number(request: Request, name: str) -> float:
+    """A number of a request.
+
+    Raises
+    ------
+    UsageError
+        It is none.
+    """
+    value = request.get(name)
+    if not isinstance(value, bool) and isinstance(value, int | float) and abs(value) <= GREATEST:
+        return float(value)
+    raise UsageError(f"{name} must be a number, but is {shown(value)}.")
+
+
+def number_or_none(request: Request, name: str) -> float | None:
+    """A number of a request, or None where it gives none."""
+    return None if request.get(name) is None else number(request, name)
+
+
+def whole(request: Request, name: str) -> int:
+    """A whole number of a request.
+
+    Raises
+    ------
+    UsageError
+        It is none.
+    """
+    value = request.get(name)
+    if isinstance(value, int) and not isinstance(value, bool) and abs(value) <= GREATEST:
+        return value
+    raise UsageError(f"{name} must be a whole number, but is {shown(value)}.")
+
+
+def words(request: Request, name: str) -> str:
+    """A text of a request.
+
+    Raises
+    ------
+    UsageError
+        It is none, or one that is too long.
+    """
+    value = request.get(name)
+    if isinstance(value, str) and 0 < len(value) <= MOST_LETTERS and value.isprintable():
+        return value
+    raise UsageError(f"{name} must be a text of 1 to {MOST_LETTERS} letters, but is {shown(value)}.")
+
+
+def shown(value: Any) -> str:
+    """What was asked, in as few characters as tell; a number may have more digits than can be written."""
+    if isinstance(value, int) and not isinstance(value, bool) and abs(value) > GREATEST:
+        return "too large"
+    return repr(str(value)[:40])
+
+
+def box(request: Request) -> Region:
+    """A part of the picture.
+
+    Raises
+    ------
+    UsageError
+        It is none.
+    """
+    sides = request.get("box")
+    if not (
+        isinstance(sides, list)
+        and len(sides) == 4
+        and all(isinstance(side, int) and not isinstance(side, bool) and abs(side) <= GREATEST for side in sides)
+    ):
+        raise UsageError("The region must be four whole numbers (column, row, width, height), but are not.")
+    return Region(*sides)

@@ -1,0 +1,97 @@
+"""The test bed: home, move, jog, run a recipe, stop; for whoever started the live view with `--allow-motion`."""
+
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+from fingervision.domain.errors import FingervisionError, UsageError
+from fingervision.live.bed.bench import Bench
+from fingervision.live.commands.asking import Answer, Request, number, shown, words
+from fingervision.live.view import View
+from fingervision.storage.recipe_toml import read_recipe
+
+BED, MOTION = "bed", "allow_motion"
+LONGEST_JOG_S = 10.0
+"""A jog ends by itself: nobody may hold a button any more."""
+READ_ONLY = "This page may look at the bed and not move it: start the live view with --allow-motion to move it."
+
+
+def _bench(view: View) -> Bench:
+    bench = view.features.get(BED)
+    if not isinstance(bench, Bench):
+        raise FingervisionError("There is no bed here: start the live view with --bed.")
+    return bench
+
+
+def _movable(view: View) -> Bench:
+    bench = _bench(view)
+    if not view.features.get(MOTION):
+        raise FingervisionError(READ_ONLY)
+    return bench
+
+
+def _stop(view: View, request: Request) -> Answer:
+    # Whoever sees a danger may stop, also where nothing may be moved.
+    _bench(view).stop()
+    return Answer("Stopped.")
+
+
+def _home(view: View, request: Request) -> Answer:
+    _movable(view).home()
+    return Answer()
+
+
+def _move(view: View, request: Request) -> Answer:
+    bench = _movable(view)
+    to_mm, speed_mm_s = number(request, "to_mm"), number(request, "speed_mm_s")
+    bench.move(to_mm, speed_mm_s)
+    return Answer()
+
+
+def _jog(view: View, request: Request) -> Answer:
+    bench = _movable(view)
+    speed_mm_s, for_s = number(request, "speed_mm_s"), number(request, "for_s")
+    if not 0.0 < for_s <= LONGEST_JOG_S:
+        raise UsageError(f"A jog must last more than 0 and at most {LONGEST_JOG_S:g} s, but {for_s:g} was asked.")
+    bench.jog(speed_mm_s, for_s)
+    return Answer()
+
+
+def _run(view: View, request: Request) -> Answer:
+    bench = _movable(view)
+    recipe = read_recipe(_inside(view, words(request, "recipe")))
+    out = view.out / f"bed_{datetime.now(UTC).strftime('%Y-%m-%dT%H-%M-%S-%f')}Z"
+    bench.run(recipe, out)
+    return Answer(f"Running {recipe.name} into {out}.")
+
+
+def _inside(view: View, name: str) -> Path:
+    """A file that a page may name: below the folder in which the live view was started, or below its output folder."""
+    path = Path(name).resolve()
+    if not any(path.is_relative_to(folder.resolve()) for folder in (Path.cwd(), view.out)):
+        raise UsageError(
+            f"A recipe must lie below {Path.cwd()} or {view.out}, but {shown(name)} does not: copy it there."
+        )
+    return path
+
+
+def section(view: View) -> dict[str, Any]:
+    """Where the bed stands, and what it does."""
+    bench = view.features.get(BED)
+    if not isinstance(bench, Bench):
+        return {"bed": None}
+    return {
+        "bed": {
+            "movable": bool(view.features.get(MOTION)),
+            "limits": bench.limits,
+            "position_mm": bench.position_mm,
+            "force_n": bench.force_n,
+            "doing": bench.doing,
+            "progress": bench.progress,
+            "newest_run": None if bench.newest_run is None else str(bench.newest_run),
+        }
+    }
+
+
+COMMANDS = {"bed_stop": _stop, "bed_home": _home, "bed_move": _move, "bed_jog": _jog, "bed_run": _run}
+HARMLESS = frozenset({"bed_stop"})

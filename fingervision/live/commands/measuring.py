@@ -1,0 +1,142 @@
+"""What is measured and how it is shown: region, tips, height, scale, zero, tolerance; the steps as pictures."""
+
+from dataclasses import replace
+from datetime import UTC, datetime
+from typing import Any
+
+import cv2
+
+from calib.calibration import BareScale
+from fingervision import __version__
+from fingervision.domain.direction import Direction
+from fingervision.domain.errors import FingervisionError, UsageError
+from fingervision.domain.gap import GapMeasurement
+from fingervision.live.commands.asking import Answer, Request, box, number, number_or_none, seen_of, shown
+from fingervision.live.picture_calibration import calibrated
+from fingervision.live.view import View
+from fingervision.storage.calibration_json import write_calibration
+from fingervision.storage.out_folder import make_out_folder
+from fingervision.vision.overlay import in_eight_bits
+from fingervision.vision.pipeline import steps
+
+POLARITIES = ("auto", "dark", "light")
+TIPS = ("auto", *(direction.value for direction in Direction))
+
+
+def _region(view: View, request: Request) -> Answer:
+    view.choose(region=None if request.get("box") is None else box(request))
+    return Answer()
+
+
+def _tips(view: View, request: Request) -> Answer:
+    tips = request.get("tips")
+    if tips not in TIPS:
+        raise UsageError(f"The tips must be one of {', '.join(TIPS)}, but are {shown(tips)}.")
+    view.choose(direction=None if tips == "auto" else Direction(tips))
+    return Answer()
+
+
+def _fingers(view: View, request: Request) -> Answer:
+    fingers = request.get("fingers")
+    if fingers not in POLARITIES:
+        raise UsageError(f"The fingers must be one of {', '.join(POLARITIES)}, but are {shown(fingers)}.")
+    view.choose(fingers_are_dark={"auto": None, "dark": True, "light": False}[str(fingers)])
+    return Answer()
+
+
+def _height_at(view: View, request: Request) -> Answer:
+    """Measure at the height of a place in the picture."""
+    outcome, scale = seen_of(view).outcome, view.choices.scale
+    if scale is None or not isinstance(outcome, GapMeasurement):
+        raise FingervisionError("The height is counted from the tips, which this frame does not show: mend the view.")
+    at_px = number(request, "y" if outcome.direction.is_vertical else "x")
+    tips_px = 0.5 * (outcome.left.tip_px + outcome.right.tip_px)
+    roots_are_after = outcome.direction in (Direction.UP, Direction.LEFT)
+    below_px = at_px - tips_px if roots_are_after else tips_px - at_px
+    if below_px <= 0.0:
+        raise UsageError(f"The height must be on the fingers, but is {-below_px:.0f} px beyond their tips.")
+    view.choose(below_tip_mm=round(below_px / scale.px_per_mm, 3))
+    return Answer(f"Measured {view.choices.below_tip_mm:g} mm below the tips.")
+
+
+def _height(view: View, request: Request) -> Answer:
+    view.choose(below_tip_mm=number(request, "below_tip_mm"))
+    return Answer()
+
+
+def _zero(view: View, request: Request) -> Answer:
+    if request.get("off"):
+        view.choose(zero_mm=0.0)
+        return Answer()
+    row = seen_of(view).row
+    if row is None or row.gap_mm is None:
+        raise FingervisionError("Zero needs a gap, but this frame has none: bring the fingers into view.")
+    view.choose(zero_mm=row.gap_mm)
+    return Answer(f"Gaps are shown less {row.gap_mm:.4f} mm; files hold them whole.")
+
+
+def _limits(view: View, request: Request) -> Answer:
+    view.choose(least_mm=number_or_none(request, "least"), greatest_mm=number_or_none(request, "greatest"))
+    return Answer()
+
+
+def _scale(view: View, request: Request) -> Answer:
+    px_per_mm = number(request, "px_per_mm")
+    if px_per_mm <= 0.0:
+        raise UsageError(f"px_per_mm must be positive, but is {px_per_mm:g}.")
+    view.choose(scale=BareScale(px_per_mm), scale_file=None)
+    return Answer()
+
+
+def _calibrate(view: View, request: Request) -> Answer:
+    kind = request.get("kind")
+    if kind not in ("bar", "slot"):
+        raise UsageError(f"The reference must be a bar or a slot, but is {shown(kind)}.")
+    found = calibrated(
+        seen_of(view).frame, box(request), str(kind), number(request, "size_mm"), number(request, "u_size_mm")
+    )
+    made_at = datetime.now(UTC).isoformat(timespec="seconds")
+    camera = dict(view.description.camera)
+    found = replace(found, camera=camera, made_at=made_at, software=f"fingervision {__version__}")
+    make_out_folder(view.out)
+    # A name of its own: a calibration that lies there is somebody's.
+    path = view.out / f"calibration_{made_at.replace(':', '-').removesuffix('+00-00')}Z.json"
+    write_calibration(found, path)
+    try:
+        view.choose(scale=found, scale_file=path)
+    except FingervisionError:
+        path.unlink(missing_ok=True)
+        raise
+    u = found.covariance[0, 0] ** 0.5
+    return Answer(f"Calibrated: {found.px_per_mm:.4f} px/mm, u {u:.4f} px/mm; written to {path}.")
+
+
+def _steps(view: View, request: Request) -> Answer:
+    task, frame = view.choices.task, seen_of(view).frame
+    if task is None:
+        raise FingervisionError("The steps need the scale, which is not known: give it first.")
+    return Answer(
+        pictures=tuple(
+            (name, _png(in_eight_bits(picture) if picture.ndim == 2 else picture[:, :, ::-1]))
+            for name, picture in steps(frame, task.settings)
+        )
+    )
+
+
+COMMANDS = {
+    "region": _region,
+    "tips": _tips,
+    "fingers": _fingers,
+    "height": _height,
+    "height_at": _height_at,
+    "zero": _zero,
+    "limits": _limits,
+    "scale": _scale,
+    "calibrate": _calibrate,
+    "steps": _steps,
+}
+HARMLESS = frozenset({"steps"})
+
+
+def _png(picture: Any) -> bytes:
+    return cv2.imencode(".png", picture)[1].tobytes()

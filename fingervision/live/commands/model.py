@@ -1,0 +1,35 @@
+"""The model beside the measurement, and an input that somebody types."""
+
+from typing import Any
+
+from fingervision.domain.errors import FingervisionError
+from fingervision.frames.received import Driven
+from fingervision.live.commands.asking import Answer, Request, number_or_none
+from fingervision.live.comparison.comparison import Comparison
+from fingervision.live.session import Session
+from fingervision.live.view import View
+
+MODEL, TYPED = "model", "typed_input"
+
+
+def _input(view: View, request: Request) -> Answer:
+    if not isinstance(view, Session):
+        raise FingervisionError("A recording's input is that of its drive: name it with --drive.")
+    if "bed" in view.features:
+        raise FingervisionError("The bed's own stage says where it is: nothing needs to be typed.")
+    input_mm = number_or_none(request, "input_mm")
+    view.features[TYPED] = input_mm
+    if input_mm is None:
+        view.driven_at = lambda time_s: None
+        return Answer("The input is not known from now on.")
+    view.driven_at = lambda time_s: Driven(input_mm)
+    return Answer(f"The input is {input_mm:g} mm from now on.")
+
+
+def section(view: View) -> dict[str, Any]:
+    """Prediction, residual and verdict."""
+    comparison = view.features.get(MODEL)
+    return {"model": comparison.state() if isinstance(comparison, Comparison) else None}
+
+
+COMMANDS = {"input": _input}

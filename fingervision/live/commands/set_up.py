@@ -1,0 +1,119 @@
+"""The set-up: findings with their remedies, meters of focus and light, the scale's budget, settings kept in a file."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from calib.calibration import BareScale
+from calib.measured_scale import Calibration
+from fingervision.domain.direction import Direction
+from fingervision.domain.errors import FingervisionError, UsageError
+from fingervision.domain.gap import GapMeasurement
+from fingervision.domain.region import Region
+from fingervision.live.commands.asking import Answer, Request, shown, words
+from fingervision.live.playback.playback import Playback
+from fingervision.live.set_up import SetUp
+from fingervision.live.view import View
+from fingervision.storage.calibration_json import read_calibration
+from fingervision.storage.settings_toml import read_settings, write_settings
+from fingervision.vision.grey import full_scale, to_grey
+
+SET_UP, FILE = "set_up", "settings.toml"
+STEP_PX, BRIGHTEST_PERCENT = 8, 99.0
+
+
+def _inspect(view: View, request: Request) -> Answer:
+    if isinstance(view, Playback) and not view.is_playing:
+        view.play(on=True, speed=1.0)
+    running = view.features.get(SET_UP)
+    if isinstance(running, SetUp) and running.is_busy:
+        raise FingervisionError("The set-up is being looked at already: wait for it.")
+    view.features[SET_UP] = SetUp(view)
+    return Answer()
+
+
+def _save(view: View, request: Request) -> Answer:
+    path, choices = view.out / FILE, view.choices
+    region, scale = choices.region, choices.scale
+    write_settings(
+        path,
+        {
+            "calibration": choices.scale_file,
+            "px_per_mm": None if scale is None or choices.scale_file is not None else scale.px_per_mm,
+            "below_tip_mm": choices.below_tip_mm,
+            "tips": "auto" if choices.direction is None else choices.direction.value,
+            "roi": None if region is None else [region.x_px, region.y_px, region.width_px, region.height_px],
+            "fingers": {None: "auto", True: "dark", False: "light"}[choices.fingers_are_dark],
+        },
+    )
+    return Answer(f"Settings written to {path}; `measure`, `live` and `inspect` take them with --settings.")
+
+
+def _load(view: View, request: Request) -> Answer:
+    path = Path(words(request, "path")).resolve()
+    if not any(path.is_relative_to(folder.resolve()) for folder in (Path.cwd(), view.out)):
+        raise UsageError(f"Settings must lie below {Path.cwd()} or {view.out}, but {shown(str(path))} does not.")
+    found = read_settings(path)
+    changes: dict[str, Any] = {}
+    if "calibration" in found:
+        changes |= {"scale": read_calibration(found["calibration"]), "scale_file": found["calibration"]}
+    if "px_per_mm" in found:
+        changes |= {"scale": BareScale(found["px_per_mm"]), "scale_file": None}
+    if "below_tip_mm" in found:
+        changes["below_tip_mm"] = found["below_tip_mm"]
+    if "tips" in found:
+        changes["direction"] = None if found["tips"] == "auto" else Direction(found["tips"])
+    if "fingers" in found:
+        changes["fingers_are_dark"] = {"auto": None, "dark": True, "light": False}[found["fingers"]]
+    if "roi" in found:
+        changes["region"] = Region(*(int(side) for side in found["roi"].split(",")))
+    view.choose(**changes)
+    return Answer(f"Settings of {path} are in force{'; those of the camera at the next start' * ('camera' in found)}.")
+
+
+def section(view: View) -> dict[str, Any]:
+    """Findings, meters, budget."""
+    looked = view.features.get(SET_UP)
+    found = looked if isinstance(looked, SetUp) else None
+    return {
+        "set_up": {
+            "busy": found is not None and found.is_busy,
+            "words": "" if found is None else found.words,
+            "findings": None if found is None else found.findings,
+        },
+        "meters": _meters(view),
+        "budget": _budget(view),
+    }
+
+
+def _meters(view: View) -> dict[str, float | None]:
+    seen = view.seen
+    if seen is None:
+        return {"blur_px": None, "contrast": None, "light": None}
+    grey = to_grey(np.ascontiguousarray(seen.frame.pixels[::STEP_PX, ::STEP_PX]))  # type: ignore[arg-type]
+    scale = full_scale(grey)
+    light = float(np.percentile(grey, BRIGHTEST_PERCENT)) / scale
+    if not isinstance(seen.outcome, GapMeasurement):
+        return {"blur_px": None, "contrast": None, "light": light}
+    edges = (seen.outcome.left, seen.outcome.right)
+    return {
+        "blur_px": max(edge.blur_px for edge in edges),
+        "contrast": min(abs(edge.contrast) for edge in edges) / scale,
+        "light": light,
+    }
+
+
+def _budget(view: View) -> list[list[Any]] | None:
+    """Contributions to the gap that is shown, the largest first: source, micrometres (k = 1), what was taken."""
+    seen, scale = view.seen, view.choices.scale
+    if seen is None or not isinstance(scale, Calibration) or not isinstance(seen.outcome, GapMeasurement):
+        return None
+    outcome = seen.outcome
+    points = np.array([[[edge.x_px, edge.y_px] for edge in (outcome.left, outcome.right)]])
+    budget = scale.budget(points, np.array([outcome.u_gap_px]), np.array([outcome.light_gap]))
+    lines = sorted(budget.lines, key=lambda line: -float(line.u_mm[0]))
+    return [[line.source, 1e3 * float(line.u_mm[0]), line.supplied] for line in lines]
+
+
+COMMANDS = {"inspect": _inspect, "save_settings": _save, "load_settings": _load}

@@ -1,0 +1,116 @@
+"""A model beside the measurement: the feature `model` of a view."""
+
+from collections import deque
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from fingervision.live.comparison.prediction import Prediction
+from fingervision.live.comparison.verdict import MOST_ROWS, VerdictSeeker
+from fingervision.live.view import View
+from fingervision.storage.gaps_csv import GapRow
+from fingervision.tables.read import read_model
+
+# Ten seconds at 25 frames a second: the residual's mean and scatter that the page shows.
+ROWS_SHOWN = 250
+# Once a second at 25 frames a second it is asked whether there is enough for a verdict.
+ROWS_BETWEEN = 25
+
+
+class Comparison:
+    """Holds rows with a known input against a model.
+
+    Parameters
+    ----------
+    view : View
+        Where the rows come from.
+    path : Path
+        Any model that `diagnose` takes.
+    kind : str
+        Which model answers for a gripper.toml.
+
+    Raises
+    ------
+    FingervisionError
+        The model cannot be read.
+    """
+
+    def __init__(self, view: View, path: Path, kind: str = "lumped") -> None:
+        model = read_model(path, kind)
+        self.path, self.input_mm = path, None
+        self._prediction = Prediction(model)
+        self.verdicts = VerdictSeeker(path, kind, model.input_range_mm, view.out / "verdicts", view.say)
+        self._rows: deque[GapRow] = deque(maxlen=MOST_ROWS)
+        self._recent: deque[GapRow] = deque(maxlen=ROWS_SHOWN)
+        self._total = self._moved = self._still = 0
+
+    def predicted_mm(self, rows: Sequence[GapRow]) -> list[float | None]:
+        """The model's gap at rows; None where their input is not known."""
+        return self._prediction.predicted_mm(rows)
+
+    def add(self, row: GapRow, arrived_s: float = 0.0) -> None:
+        """Take in a row as it is measured."""
+        if row.input_mm is None or row.time_s is None:
+            return
+        self._take(row)
+        if self._total % ROWS_BETWEEN == 0 or self._still == ROWS_BETWEEN:
+            self.verdicts.consider(tuple(self._rows), self._moved, at_rest=self._still >= ROWS_BETWEEN)
+
+    def add_all(self, rows: Sequence[GapRow]) -> None:
+        """Take in a recording that is measured to its end."""
+        self._rows.clear()
+        self._recent.clear()
+        self._prediction.clear()
+        self._total = self._moved = self._still = 0
+        for row in rows:
+            if row.input_mm is not None and row.time_s is not None:
+                self._take(row)
+        self.verdicts.consider(tuple(self._rows), self._moved, at_rest=True)
+
+    def _take(self, row: GapRow) -> None:
+        """Keep a row; of a long rest one in so many, since it would outweigh the motion and say nothing new."""
+        stands = bool(self._recent) and self._recent[-1].input_mm == row.input_mm
+        self._still = self._still + 1 if stands else 0
+        self._recent.append(row)
+        self._total += 1
+        self._moved += not stands
+        if self._still < ROWS_BETWEEN or self._still % ROWS_BETWEEN == 0:
+            self._rows.append(row)
+
+    def stop(self) -> None:
+        """Seek no more verdicts."""
+        self.verdicts.stop()
+
+    def state(self) -> dict[str, Any]:
+        """What the page is told."""
+        rows = list(self._recent)
+        pairs = [
+            (row.gap_mm - gap_mm, row.u_random_mm if row.u_gap_mm is None else row.u_gap_mm)
+            for row, gap_mm in zip(rows, self._prediction.predicted_mm(rows), strict=True)
+            if gap_mm is not None and row.gap_mm is not None
+        ]
+        residual = np.array([each for each, _ in pairs])
+        u_mm = [u for _, u in pairs if u is not None]
+        found = self.verdicts.newest
+        return {
+            "path": str(self.path),
+            "samples": self._total,
+            "moved": self._moved,
+            "input_mm": rows[-1].input_mm if rows else None,
+            "mean_um": float(1e3 * residual.mean()) if residual.size else None,
+            "rms_um": float(1e3 * np.sqrt(np.mean(residual**2))) if residual.size else None,
+            "band_um": float(2e3 * np.median(u_mm)) if u_mm else None,
+            "busy": self.verdicts.is_busy,
+            "verdict": None
+            if found is None
+            else {
+                "rows": found.rows,
+                "verdict": found.verdict,
+                "sentence": found.sentence,
+                "effects": [list(each) for each in found.effects],
+                "next_run": found.next_run,
+                "report": found.report,
+            },
+        }

@@ -1,0 +1,193 @@
+"""A first verdict of `diagnose` while measuring goes on: the command, in a process of its own."""
+
+import csv
+import json
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from threading import Event, Thread
+from typing import Any
+
+from fingervision.live.background import BackgroundCommand
+from fingervision.storage.gaps_csv import GapRow
+
+# Of motion, four seconds at 25 frames a second: fewer tell next to nothing of what has a memory or a period.
+LEAST_ROWS = 100
+# A motion there and back: what differs between the two directions shows in no other.
+LEAST_TURNS = 1
+# A motion of less than this share of the model's range is noise of the stage.
+LEAST_SHARE = 0.02
+# A further verdict is asked for when there is so much more to judge by.
+MORE_ROWS, MORE_AT_REST = 1.5, 1.1
+# The newest two minutes at 25 frames a second are judged: the time that a diagnosis takes grows with its rows.
+MOST_ROWS = 3000
+LOOK_EVERY_S = 0.1
+COLUMNS = ("run", "time_s", "input_mm", "gap_mm", "left_mm", "right_mm", "u_gap_mm", "u_random_mm", "force_n")
+
+
+@dataclass(frozen=True, slots=True)
+class Verdict:
+    """What `diagnose` said.
+
+    Parameters
+    ----------
+    rows : int
+        Samples that it judged.
+    verdict, sentence : str
+        As in report.json.
+    effects : tuple of (str, str)
+        Name of each effect of the answer, and its parameters in words.
+    next_run : str
+        Path of the recipe that would settle what is open; empty where there is none.
+    report : str
+        Path of the report for people.
+    """
+
+    rows: int
+    verdict: str
+    sentence: str
+    effects: tuple[tuple[str, str], ...]
+    next_run: str
+    report: str
+
+
+class VerdictSeeker:
+    """Asks for verdicts as rows come in.
+
+    Parameters
+    ----------
+    model : Path
+        Any model that `diagnose` takes.
+    kind : str
+        Which model answers for a gripper.toml.
+    range_mm : (float, float)
+        Inputs that the model covers.
+    out : Path
+        Folder for tables and answers.
+    tell : callable
+        Takes a name and a sentence.
+    """
+
+    def __init__(
+        self, model: Path, kind: str, range_mm: tuple[float, float], out: Path, tell: Callable[[str, str], None]
+    ) -> None:
+        self._model, self._kind, self._out, self._tell = model, kind, out, tell
+        self._least_mm = LEAST_SHARE * (range_mm[1] - range_mm[0])
+        self.newest: Verdict | None = None
+        self._judged = 0
+        self._number = 0
+        self._ending = Event()
+        self._thread: Thread | None = None
+
+    @property
+    def is_busy(self) -> bool:
+        """Whether a verdict is being sought."""
+        return self._thread is not None and self._thread.is_alive()
+
+    def consider(self, rows: Sequence[GapRow], moved: int, *, at_rest: bool) -> None:
+        """Seek a verdict if there is enough to judge by, and more than the last time.
+
+        Parameters
+        ----------
+        rows : sequence of GapRow
+            With inputs, in order, the newest.
+        moved : int
+            How many there have been while the input moved.
+        at_rest : bool
+            Whether the motion has come to its end: then less that is new is worth a verdict.
+        """
+        if self.is_busy or self._ending.is_set() or moved < LEAST_ROWS:
+            return
+        if moved < (MORE_AT_REST if at_rest else MORE_ROWS) * self._judged or turns(rows, self._least_mm) < LEAST_TURNS:
+            return
+        self._judged = moved
+        self._number += 1
+        kept = list(rows[-MOST_ROWS:])
+        self._thread = Thread(target=self._seek, args=(kept,), name="verdict", daemon=True)
+        self._thread.start()
+
+    def stop(self) -> None:
+        """Seek no more."""
+        self._ending.set()
+        if self._thread is not None:
+            self._thread.join()
+
+    def _seek(self, rows: list[GapRow]) -> None:
+        folder = self._out / f"verdict_{self._number}"
+        table = folder / "live_samples.csv"
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+            write_table(table, rows)
+        except OSError as error:
+            self._tell("verdict_failed", f"{table} could not be written ({error.strerror}): make room.")
+            return
+        arguments = ("diagnose", str(table), "--model", str(self._model), "--kind", self._kind, "--out", str(folder))
+        command = BackgroundCommand(*arguments)
+        while command.exit_code is None and not self._ending.wait(LOOK_EVERY_S):
+            pass
+        code, complaint = command.exit_code, command.complaint
+        command.stop()
+        if code is None:
+            return
+        if code != 0:
+            self._tell("verdict_failed", complaint or f"diagnose ended with exit code {code}.")
+            return
+        self.newest = read_verdict(folder, len(rows))
+        self._tell("verdict", f"After {len(rows)} samples: {self.newest.sentence}")
+
+
+def turns(rows: Sequence[GapRow], least_mm: float) -> int:
+    """How often the input turned, after ways of at least `least_mm`."""
+    count, way, extreme = 0, 0, None
+    for row in rows:
+        at = row.input_mm
+        if at is None:
+            continue
+        if extreme is None:
+            extreme = at
+        elif way >= 0 and at < extreme - least_mm:
+            count, way, extreme = count + (way > 0), -1, at
+        elif way <= 0 and at > extreme + least_mm:
+            count, way, extreme = count + (way < 0), 1, at
+        else:
+            extreme = max(extreme, at) if way > 0 else min(extreme, at) if way < 0 else extreme
+    return count
+
+
+def write_table(path: Path, rows: Sequence[GapRow]) -> None:
+    """Write rows as a measured table."""
+    with path.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file)
+        writer.writerow(COLUMNS)
+        for row in rows:
+            cells = [row.run or "1", *(getattr(row, name) for name in COLUMNS[1:])]
+            writer.writerow(
+                ["" if each is None else f"{each:.9g}" if isinstance(each, float) else each for each in cells]
+            )
+
+
+def _cell(value: float | str | None) -> str:
+    return "" if value is None else f"{value:.9g}" if isinstance(value, float) else str(value)
+
+
+def read_verdict(folder: Path, rows: int) -> Verdict:
+    """Read what `diagnose` left in its folder."""
+    report: dict[str, Any] = json.loads((folder / "report.json").read_text(encoding="utf-8"))
+    proposal = report.get("next_run") or {}
+    return Verdict(
+        rows=rows,
+        verdict=report["verdict"],
+        sentence=report.get("sentence") or report["verdict"],
+        effects=tuple((each["name"], _in_words(each["parameters"])) for each in report["effects"]),
+        next_run=str(folder / proposal["recipe"]) if proposal.get("recipe") else "",
+        report=str(folder / "report.html"),
+    )
+
+
+def _in_words(parameters: dict[str, Any]) -> str:
+    words = []
+    for name, each in parameters.items():
+        if isinstance(each, dict) and "value" in each:
+            u = "" if each.get("u") is None else f" ± {2.0 * each['u']:.2g}"
+            words.append(f"{name} {each['value']:.4g}{u} {each.get('unit', '')}".strip())
+    return ", ".join(words)

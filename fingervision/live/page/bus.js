@@ -1,0 +1,71 @@
+// What the scripts of the page share: the newest state, who listens to what, and one way to ask the server.
+export const at = (id) => document.getElementById(id);
+export const token = new URLSearchParams(location.search).get("token") || "";
+
+// `state` is the server's newest word, `now` the newest row in figures.
+export const page = { state: null, now: null, paused: false };
+
+const listeners = new Map();
+export function listen(kind, act) {
+  if (!listeners.has(kind)) listeners.set(kind, []);
+  listeners.get(kind).push(act);
+}
+// One listener's fault must not keep the others from what they wait for.
+export function tell(kind, ...what) {
+  for (const act of listeners.get(kind) || []) {
+    try { act(...what); } catch (error) { console.error(error); }
+  }
+}
+
+let send = null;
+export function sendBy(way) { send = way; }
+export function ask(request) {
+  if (!send || !send(request)) tell("message", "The live view does not answer: nothing was asked.", "refused");
+}
+
+// ---- elements
+export function say(id, words, kind) {
+  if (at(id).textContent !== words) at(id).textContent = words;
+  if (kind !== undefined && at(id).className !== kind) at(id).className = kind;
+}
+export const on = (id, what, act) => at(id).addEventListener(what, act);
+export const number = (id) => (at(id).value === "" ? null : Number(at(id).value));
+// A refusal is shown beside the form that asked.
+const askedBy = new Map();
+export function submit(id, act) {
+  const form = at(id), words = document.createElement("p");
+  words.className = "refused";
+  words.setAttribute("role", "status");
+  form.after(words);
+  form.addEventListener("submit", (event) => {
+    event.preventDefault();
+    words.textContent = "";
+    const request = act();
+    if (request) { askedBy.set(request.do, words); ask(request); }
+  });
+}
+listen("reply", (reply) => {
+  const words = askedBy.get(reply.do);
+  if (words) words.textContent = reply.refused || "";
+});
+
+// A panel beside the bench; what is in it is the panel's own.
+export function panel(id, title, content, { open = false, order = 50 } = {}) {
+  const details = document.createElement("details"), summary = document.createElement("summary");
+  details.id = id;
+  details.open = open;
+  details.dataset.order = String(order);
+  summary.innerHTML = title;
+  details.innerHTML = content;
+  details.prepend(summary);
+  const before = [...at("panels").children].find((other) => Number(other.dataset.order) > order);
+  at("panels").insertBefore(details, before || null);
+  return details;
+}
+export function download(address, name) {
+  const link = document.createElement("a");
+  link.href = address; link.download = name; link.click();
+}
+export const withToken = (path) => `${path}${path.includes("?") ? "&" : "?"}token=${encodeURIComponent(token)}`;
+export const colour = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
+export const calm = matchMedia("(prefers-reduced-motion: reduce)");

@@ -1,0 +1,48 @@
+// The value with its uncertainty, its status, and the facts of the source.
+import { at, listen, page, say } from "/page/bus.js";
+
+function stale(words) {
+  at("gap_mm").textContent = "–";
+  at("uncertainty").textContent = "\u00a0";
+  at("zeroed").hidden = true;
+  say("status", words, "badge bad");
+  at("why").textContent = "";
+  at("verdict").hidden = true;
+}
+listen("gone", () => stale("not connected"));
+
+listen("now", (now) => {
+  const gap = at("gap_mm"), state = page.state;
+  // What is old looks old: no value, and no green.
+  if (state && (state.silent_s > 0 || state.ended)) { stale(state.ended ? "ended" : "no picture"); return; }
+  if (!now || now.gap_mm === null) {
+    gap.textContent = "–";
+    at("uncertainty").textContent = "\u00a0";
+  } else {
+    gap.textContent = (now.gap_mm - now.zero_mm).toFixed(4);
+    const what = now.has_budget ? "k = 2" : "k = 2, from frame to frame; the scale has no uncertainty";
+    at("zeroed").hidden = now.zero_mm === 0;
+    at("zeroed").textContent = `less zero ${now.zero_mm.toFixed(4)} mm`;
+    at("uncertainty").textContent = now.u_mm === null ? "" : `± ${(2000 * now.u_mm).toFixed(2)} µm (${what})`;
+  }
+  gap.dataset.frame = now ? String(now.frame) : "";
+  say("status", now ? now.status : "–", `badge ${now && now.status === "ok" ? "good" : "bad"}`);
+  say("why", now ? now.words : "");
+  at("unzero").hidden = !now || now.zero_mm === 0;
+  if (now) say("unzero", `Zero off (${now.zero_mm.toFixed(4)} mm)`);
+  const verdict = now ? now.verdict : "";
+  at("verdict").hidden = !verdict;
+  say("verdict", verdict, `badge ${{ pass: "good", fail: "bad", unsure: "unsure" }[verdict] || ""}`);
+});
+
+listen("state", (state) => {
+  say("source", state.source);
+  say("rate", state.rate_hz === null ? "–" : state.rate_hz.toFixed(2));
+  say("jitter", state.jitter_ms === null ? "–" : state.jitter_ms.toFixed(2));
+  for (const id of ["dropped", "duplicates", "damaged"]) say(id, String(state[id]));
+  say("frame_size", `${state.width_px}×${state.height_px}`);
+  at("camera").hidden = !state.camera;
+  say("camera", `Camera: ${state.camera}`);
+  at("exposure").hidden = !state.exposure;
+  say("exposure", state.exposure);
+});

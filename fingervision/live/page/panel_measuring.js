@@ -1,0 +1,64 @@
+// Region, tips, height, tolerance and scale.
+import { ask, at, listen, number, on, page, panel, say, submit } from "/page/bus.js";
+import { shown, wantBox } from "/page/dragging.js";
+
+panel("measuring", "Region and tips", `
+  <div class="row">
+    <button id="drag_region" aria-pressed="false">Drag region</button>
+    <button id="whole">Whole picture</button>
+    <label>Tips <select id="tips"><option>auto</option><option>up</option><option>down</option><option>left</option><option>right</option></select></label>
+    <label>Below tip <input id="below_tip" type="number" step="0.05" min="0.01" size="5"> mm</label>
+  </div>
+  <form id="region_form" class="row">
+    <label>x <input id="region_x" type="number" min="0" required></label>
+    <label>y <input id="region_y" type="number" min="0" required></label>
+    <label>w <input id="region_w" type="number" min="1" required></label>
+    <label>h <input id="region_h" type="number" min="1" required></label>
+    <button>Set region</button>
+  </form>`, { open: true, order: 10 });
+panel("tolerance", "Tolerance", `
+  <form id="limits_form" class="row">
+    <label>from <input id="least" type="number" step="any"></label>
+    <label>to <input id="greatest" type="number" step="any"> mm</label>
+    <button>Set</button>
+  </form>`, { open: true, order: 20 });
+panel("scaling", 'Scale: <span id="scale" class="quiet">not known</span>', `
+  <form id="scale_form" class="row">
+    <label><input id="px_per_mm" type="number" step="any" min="0" required> px/mm</label>
+    <button>Set</button>
+  </form>
+  <form id="calibrate_form" class="row">
+    <select id="kind" aria-label="Kind of reference"><option>bar</option><option>slot</option></select>
+    <label><input id="size_mm" type="number" step="any" min="0" required> mm</label>
+    <label>u <input id="u_size_mm" type="number" step="any" min="0" value="0.001" required> mm</label>
+    <button id="drag_reference" type="button" aria-pressed="false">Drag over it</button>
+    <button>Calibrate</button>
+  </form>`, { open: true, order: 30 });
+
+on("drag_region", "click", () => wantBox("drag_region", "Drag over the part of the picture to look at.", (box) => ask({ do: "region", box })));
+on("whole", "click", () => { shown.box = null; ask({ do: "region", box: null }); });
+on("drag_reference", "click", () => wantBox("drag_reference", "Drag over the reference, with some ground around it.", (box) => {
+  shown.box = box;
+  at("hint").textContent = "Give the reference's size and press Calibrate.";
+  at("size_mm").focus();
+}));
+on("tips", "change", () => ask({ do: "tips", tips: at("tips").value }));
+on("below_tip", "change", () => ask({ do: "height", below_tip_mm: number("below_tip") }));
+submit("region_form", () => ({ do: "region", box: ["region_x", "region_y", "region_w", "region_h"].map(number) }));
+submit("limits_form", () => ({ do: "limits", least: number("least"), greatest: number("greatest") }));
+submit("scale_form", () => ({ do: "scale", px_per_mm: number("px_per_mm") }));
+submit("calibrate_form", () => {
+  const box = shown.box || (page.state && [0, 0, page.state.width_px, page.state.height_px]);
+  shown.box = null;
+  at("hint").textContent = "";
+  return { do: "calibrate", box, kind: at("kind").value, size_mm: number("size_mm"), u_size_mm: number("u_size_mm") };
+});
+listen("state", (state) => {
+  const u = state.u_px_per_mm === null ? " (no uncertainty)" : ` ± ${(2 * state.u_px_per_mm).toFixed(4)}`;
+  say("scale", state.px_per_mm === null ? "not known" : `${state.px_per_mm.toFixed(4)}${u} px/mm`);
+  if (document.activeElement !== at("tips")) at("tips").value = state.tips;
+  if (document.activeElement !== at("below_tip")) at("below_tip").value = state.below_tip_mm;
+  const whole = state.region || [0, 0, state.width_px, state.height_px];
+  if (!at("region_form").contains(document.activeElement))
+    ["region_x", "region_y", "region_w", "region_h"].forEach((id, i) => { at(id).value = whole[i]; });
+});

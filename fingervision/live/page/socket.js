@@ -1,0 +1,97 @@
+// One socket, one acknowledgement a message: the server sends the newest, and nothing queues.
+import { at, page, listen, say, sendBy, tell, token } from "/page/bus.js";
+
+const AGAIN_AFTER_MS = 500, SILENT_MS = 1000;
+let socket = null, lastAt = 0, view = "", rows = 0, said = 0, goneAt = 0, fresh = true;
+
+function connect() {
+  const scheme = location.protocol === "https:" ? "wss" : "ws";
+  const known = view ? `&view=${encodeURIComponent(view)}&rows=${rows}&messages=${said}` : "";
+  socket = new WebSocket(`${scheme}://${location.host}/socket?token=${encodeURIComponent(token)}${known}`);
+  socket.binaryType = "arraybuffer";
+  socket.onopen = () => { fresh = true; say("connection", "connected", ""); };
+  socket.onclose = () => {
+    if (!goneAt) goneAt = performance.now();
+    say("connection", "The live view does not answer: trying again.", "bad");
+    tell("gone", "The live view is not running, or out of reach. This page goes on by itself when it is back.");
+    setTimeout(connect, AGAIN_AFTER_MS);
+  };
+  socket.onmessage = (event) => {
+    if (typeof event.data === "string") answer(JSON.parse(event.data));
+    else take(event.data);
+  };
+}
+sendBy((request) => {
+  if (!socket || socket.readyState !== WebSocket.OPEN) return false;
+  socket.send(JSON.stringify(request));
+  return true;
+});
+
+// What this page missed while it was away, and whether it is in the chart now.
+function cameBack(head) {
+  if (!goneAt) return;
+  const away_s = ((performance.now() - goneAt) / 1000).toFixed(1);
+  goneAt = 0;
+  if (head.view !== view) { tell("message", `Away for ${away_s} s: the live view was started anew meanwhile.`, "away"); return; }
+  const missed = head.count - rows, lost = head.first - rows;
+  const chart = lost > 0 ? `; the chart has all but the oldest ${lost}, which are no longer kept` : ", all of them in the chart";
+  tell("message", `Away for ${away_s} s: ${missed} frames came meanwhile${missed ? chart : ""}.`, "away");
+}
+
+async function take(buffer) {
+  const length = new DataView(buffer).getUint32(0);
+  const head = JSON.parse(new TextDecoder().decode(new Uint8Array(buffer, 4, length)));
+  lastAt = performance.now();
+  page.state = head.state;
+  page.now = head.now;
+  if (fresh) {
+    fresh = false;
+    cameBack(head);
+  }
+  if (head.view !== view) { // after a restart, or with other settings, the server counts anew
+    view = head.view;
+    said = 0;
+    tell("cleared");
+  }
+  rows = head.last;
+  tell("points", head.points);
+  for (const [name_number, name, words] of head.messages) { said = name_number; tell("message", words, name); }
+  tell("state", head.state);
+  if (!page.paused) {
+    // The value is that of the picture beside it.
+    if (buffer.byteLength > 4 + length) await draw(new Uint8Array(buffer, 4 + length));
+    if (!page.paused) tell("now", head.now);
+  }
+  if (socket.readyState === WebSocket.OPEN) socket.send('{"do":"ack"}');
+}
+
+async function draw(bytes) {
+  const canvas = at("picture");
+  try {
+    const picture = await createImageBitmap(new Blob([bytes], { type: "image/jpeg" }));
+    if (canvas.width !== picture.width || canvas.height !== picture.height) {
+      canvas.width = picture.width;
+      canvas.height = picture.height;
+    }
+    at("stage").style.setProperty("--aspect", String(picture.width / picture.height));
+    canvas.getContext("2d").drawImage(picture, 0, 0);
+    picture.close();
+    canvas.dataset.shown = String(Number(canvas.dataset.shown || 0) + 1);
+    tell("picture");
+  } catch { tell("message", "A picture could not be shown.", "picture"); }
+}
+
+function answer(reply) {
+  if (reply.refused) tell("message", reply.refused, "refused");
+  else if (reply.words) tell("message", reply.words, reply.do);
+  tell("reply", reply);
+}
+
+setInterval(() => {
+  if (!lastAt || !socket || socket.readyState !== WebSocket.OPEN) return;
+  if (performance.now() - lastAt > SILENT_MS) {
+    say("connection", "The live view does not answer.", "bad");
+    tell("gone", "The live view does not answer.");
+  } else say("connection", "connected", "");
+}, 250);
+listen("start", connect);

@@ -1,0 +1,154 @@
+"""One page's socket: the newest goes out when the page has the one before; requests come in, checked and counted."""
+
+import asyncio
+import contextlib
+import json
+from collections import deque
+from time import monotonic
+from typing import Any
+
+from starlette.websockets import WebSocket, WebSocketDisconnect
+
+from fingervision.domain.errors import FingervisionError
+from fingervision.live.commands import Answer, harmless, obey
+from fingervision.live.frame_measurement import Seen
+from fingervision.live.guard import POLICY_VIOLATION, WRITER
+from fingervision.live.pen import Pen
+from fingervision.live.preview import Known, message
+from fingervision.live.view import View
+
+MESSAGES_A_SECOND, MOST_DIGITS = 120, 12
+TRY_AGAIN_LATER = 1013
+# The preview is as fast as a screen needs it; without a new picture the page hears of the state so often.
+PREVIEW_EVERY_S, STATE_EVERY_S, LOOK_EVERY_S = 0.03, 0.2, 0.01
+# When measuring or the disk lags, a picture now and then must do.
+PREVIEW_IN_A_HURRY_EVERY_S = 0.5
+# A page that does not acknowledge is gone.
+ACKNOWLEDGED_WITHIN_S = 20.0
+ONLY_LOOKS = "This address only looks: whoever started the live view has the one that works it."
+TAKE_OVER = "take_over"
+
+
+class PageSocket:
+    """Serves one page until either end is gone.
+
+    Parameters
+    ----------
+    page : WebSocket
+        Not yet accepted.
+    view : View
+        What is shown.
+    pen : Pen
+        Who may change what.
+    steps : list
+        Takes in the pictures of the steps that were asked for.
+    """
+
+    def __init__(self, page: WebSocket, view: View, pen: Pen, steps: list[tuple[str, bytes]]) -> None:
+        self._page, self._view, self._pen, self._steps = page, view, pen, steps
+        self._is_viewer = page.scope.get("role") != WRITER
+        self._acknowledged = asyncio.Event()
+        self.ending = False
+
+    async def serve(self) -> None:
+        """Send and receive; when either ends, however it ends, the page is let go, and connects anew if it is there."""
+        page = self._page
+        await page.accept()
+        tasks = [asyncio.create_task(self._send()), asyncio.create_task(self._receive())]
+        try:
+            done, _ = await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
+        finally:
+            self._pen.let_go(self)
+            for task in tasks:
+                task.cancel()
+            await asyncio.gather(*tasks, return_exceptions=True)
+        failed = next((error for task in done if (error := task.exception()) is not None), None)
+        if failed is not None and not isinstance(failed, WebSocketDisconnect):
+            silent = isinstance(failed, TimeoutError)
+            why = "The page did not answer." if silent else f"Sending failed ({type(failed).__name__})."
+            if not silent:
+                self._view.say("page", f"{why} The page connects again.")
+            with contextlib.suppress(RuntimeError, WebSocketDisconnect):
+                await page.close(TRY_AGAIN_LATER, why)
+
+    def _about(self) -> dict[str, Any]:
+        return {"viewer": self._is_viewer, "holds_pen": not self._is_viewer and self._pen.may_write(self)}
+
+    async def _send(self) -> None:
+        """Send the newest, then wait until the page has it: nothing ever queues up."""
+        view, known = self._view, known_by(self._page)
+        shown: Seen | None = None
+        pictured_s = float("-inf")
+        while not self.ending:
+            asked_s = monotonic()
+            while monotonic() - asked_s < STATE_EVERY_S and view.seen is shown:
+                await asyncio.sleep(LOOK_EVERY_S)
+            seen = view.seen
+            every_s = PREVIEW_IN_A_HURRY_EVERY_S if view.in_a_hurry else 0.0
+            picture = seen if seen is not shown and monotonic() - pictured_s >= every_s else None
+            if picture is not None:
+                pictured_s = monotonic()
+            following = await asyncio.to_thread(message, view, known, picture, self._about())
+            known = following.known
+            shown = seen
+            self._acknowledged.clear()
+            await self._page.send_bytes(following.content)
+            await asyncio.wait_for(self._acknowledged.wait(), ACKNOWLEDGED_WITHIN_S)
+            await asyncio.sleep(max(0.0, PREVIEW_EVERY_S - (monotonic() - asked_s)))
+        await self._page.close(1012, "The live view has ended.")
+
+    async def _receive(self) -> None:
+        received_s: deque[float] = deque(maxlen=MESSAGES_A_SECOND)
+        with contextlib.suppress(WebSocketDisconnect):
+            while True:
+                text = await self._page.receive_text()
+                if len(received_s) == MESSAGES_A_SECOND and monotonic() - received_s[0] < 1.0:
+                    await self._page.close(POLICY_VIOLATION, f"At most {MESSAGES_A_SECOND} messages a second.")
+                    return
+                received_s.append(monotonic())
+                request = request_of(text)
+                if request.get("do") == "ack":
+                    self._acknowledged.set()
+                else:
+                    await self._page.send_text(json.dumps(await self._answer(request)))
+
+    def _may_write(self, takes_over: bool) -> None:
+        if self._is_viewer:
+            raise FingervisionError(ONLY_LOOKS)
+        if takes_over:
+            self._pen.take(self)
+            self._view.say("pen", "Another page works the live view from now on.")
+        self._pen.write(self)
+
+    async def _answer(self, request: dict[str, Any]) -> dict[str, Any]:
+        name = request.get("do")
+        try:
+            if not (isinstance(name, str) and name in harmless()):
+                self._may_write(name == TAKE_OVER)
+            if name == TAKE_OVER:
+                return {"words": "", "do": name}
+            answer: Answer = await asyncio.to_thread(obey, self._view, request)
+        except FingervisionError as error:
+            return {"refused": str(error), "do": str(name)[:40]}
+        if answer.pictures:
+            self._steps[:] = answer.pictures
+        steps = [title for title, _ in answer.pictures]
+        return {**answer.more, "words": answer.words, "steps": steps, "do": name}
+
+
+def known_by(page: WebSocket) -> Known:
+    """What a page that comes back has; numbers that are none count as nothing."""
+    asked = page.query_params
+    numbers = [asked.get(name, "") for name in ("rows", "messages")]
+    if not all(number.isascii() and number.isdigit() and len(number) <= MOST_DIGITS for number in numbers):
+        return Known()
+    return Known(asked.get("view", ""), *(int(number) for number in numbers))
+
+
+def request_of(text: str) -> dict[str, Any]:
+    """What a message asks; what is no request asks for nothing."""
+    try:
+        request = json.loads(text)
+    except (ValueError, RecursionError):
+        return {}
+    return request if isinstance(request, dict) else {}

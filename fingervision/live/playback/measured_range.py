@@ -1,0 +1,82 @@
+"""A range of a recording, measured by the command and kept."""
+
+import json
+from pathlib import Path
+from threading import Thread
+from time import sleep
+
+from fingervision.domain.errors import FingervisionError
+from fingervision.live.background import BackgroundCommand
+from fingervision.live.playback.playback import Playback
+from fingervision.live.playback.track import WHOLE, arguments_of
+
+LOOK_EVERY_S = 0.1
+
+
+class RangeMeasurement:
+    """One run of `fingervision measure`, in a process of its own.
+
+    Parameters
+    ----------
+    playback : Playback
+        The recording, and how it is measured.
+    frames : (int, int) or None
+        First and last frame; None measures all.
+
+    Raises
+    ------
+    FingervisionError
+        The scale is not known.
+    """
+
+    def __init__(self, playback: Playback, frames: tuple[int, int] | None) -> None:
+        if playback.choices.scale is None:
+            raise FingervisionError("The scale is not known: give it before measuring.")
+        path = Path(playback.recorded.name)
+        name = path.parent.resolve().name if path.name == "video.mp4" else path.stem
+        part = "" if frames is None else f"_{frames[0]}_{frames[1]}"
+        self.folder = playback.out / f"measured_{_plain(name)}{part}"
+        more = () if frames is None else ("--frames", f"{frames[0]}:{frames[1]}")
+        arguments = arguments_of(playback.recorded.name, playback.choices, playback.recorded.options)
+        self._playback = playback
+        self._command = BackgroundCommand(*arguments, *more, "--out", str(self.folder), "--json")
+        self._thread = Thread(target=self._wait, name="measuring a range", daemon=True)
+        self._thread.start()
+
+    @property
+    def is_running(self) -> bool:
+        """Whether it goes on."""
+        return self._thread.is_alive()
+
+    def stop(self) -> None:
+        """Break it off."""
+        self._command.stop()
+
+    def _wait(self) -> None:
+        while self._command.exit_code is None:
+            sleep(LOOK_EVERY_S)
+        code, complaint = self._command.exit_code, self._command.complaint
+        if code not in WHOLE:
+            self._playback.say("measure_failed", complaint or f"Measuring ended with exit code {code}.")
+        else:
+            self._playback.say("measured", f"{_words(self._command.output)} {complaint} Written to {self.folder}.")
+        self._command.stop()
+
+
+def _plain(name: str) -> str:
+    """A folder's name of letters, digits, dots and dashes."""
+    return "".join(sign if sign.isalnum() or sign in "._-" else "_" for sign in name).strip(".") or "recording"
+
+
+def _words(output: str) -> str:
+    try:
+        summary = json.loads(output)
+        gap = summary["gap"]
+        if not gap["count"]:
+            return "No frame gave a number."
+        return (
+            f"{gap['count']} frames measured: gap {gap['least_mm']:.4f} to {gap['greatest_mm']:.4f} mm, mean "
+            f"{gap['mean_mm']:.4f} mm."
+        )
+    except (ValueError, LookupError, TypeError):
+        return "Measured."

@@ -1,0 +1,296 @@
+"""A recording in the page: one frame after the other, or any; its table grows beside it as `measure` makes it."""
+
+import secrets
+from collections import Counter, deque
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
+from threading import Condition, Thread
+from time import monotonic
+from typing import Any
+
+from fingervision.domain.errors import FingervisionError
+from fingervision.domain.frame import LostFrame
+from fingervision.domain.status import Status
+from fingervision.frames.source import Description
+from fingervision.live.choices import MOVES_ZERO, ZERO_IS_OFF
+from fingervision.live.frame_measurement import Seen
+from fingervision.live.messages import Message, MessageListener, Messages
+from fingervision.live.playback.frame_reader import FrameReader
+from fingervision.live.playback.recorded import Recorded
+from fingervision.live.playback.recorded_frame import recorded_frame
+from fingervision.live.playback.track import Track, arguments_of
+from fingervision.live.session_state import state_of_choices
+from fingervision.measuring.marked import marked
+from fingervision.storage.gaps_csv import GapRow
+from fingervision.storage.lost_frames import lost_frames
+
+# Without times a recording is played at this rate.
+USUAL_RATE_HZ = 25.0
+# The player looks so often whether there is anything to do.
+LOOK_EVERY_S = 0.02
+SPEEDS = (0.01, 100.0)
+
+
+class Playback:
+    """Looks through a recording in a thread of its own.
+
+    Parameters
+    ----------
+    opened : Recorded
+        The recording, and how it is measured.
+    out : Path
+        Folder for what the user keeps.
+    """
+
+    def __init__(self, opened: Recorded, out: Path) -> None:
+        self.recorded, self.out, self.choices = opened, out, opened.choices
+        self.description: Description = opened.source.description
+        opened.choices.check(self.description)
+        self.features: dict[str, Any] = {}
+        self.seen: Seen | None = None
+        self.range: tuple[int, int] | None = None
+        self.trouble = ""
+        self.on_table: Callable[[Sequence[GapRow]], None] = lambda rows: None
+        """Told of the whole table, each time that one is made."""
+        self._told: Track | None = None
+        self.is_playing, self.speed, self.frame = False, 1.0, 0
+        self._messages = Messages()
+        self._track: Track | None = None
+        self._generation = 0
+        self._identity = secrets.token_hex(4)
+        marks = lost_frames(self.description.files)
+        source = opened.source
+        self._reader = FrameReader(lambda: iter(marked(source, marks) if marks else source), opened.name)
+        self._shown: object = None
+        self._stopped = False
+        self._changed = Condition()
+        self._thread = Thread(target=self._play, name="playing", daemon=True)
+        for note in self.description.notes:
+            self.say("recording", note)
+
+    def start(self) -> None:
+        """Begin to measure and to show."""
+        self._measure_anew()
+        self._thread.start()
+
+    def stop(self) -> None:
+        """End everything."""
+        with self._changed:
+            self._stopped = True
+            self._changed.notify_all()
+        self._thread.join()
+        if self._track is not None:
+            self._track.close()
+
+    # ---- what the page asks for
+    def seek(self, frame: int) -> None:
+        """Show a frame; beyond the ends, the end."""
+        with self._changed:
+            self.is_playing = False
+            self.frame = max(0, min(frame, self.frame_count - 1))
+            self._changed.notify_all()
+
+    def play(self, *, on: bool, speed: float) -> None:
+        """Play on from the frame that is shown, from the beginning where that is the last; or stand.
+
+        Raises
+        ------
+        FingervisionError
+            No recording is played so fast or slow.
+        """
+        if not SPEEDS[0] <= speed <= SPEEDS[1]:
+            raise FingervisionError(f"The speed must be {SPEEDS[0]:g} to {SPEEDS[1]:g}, but is {speed:g}.")
+        with self._changed:
+            self.speed = speed
+            if on and self.frame >= self.frame_count - 1:
+                self.frame = 0
+            self.is_playing = on
+            self._began = (monotonic(), self._time_of(self.frame))
+            self._changed.notify_all()
+
+    def mark(self, first: int | None, last: int | None) -> None:
+        """Mark a range of frames, or none.
+
+        Raises
+        ------
+        FingervisionError
+            It is no range of this recording.
+        """
+        if first is None or last is None:
+            self.range = None
+            return
+        if not 0 <= first <= last < self.frame_count:
+            raise FingervisionError(
+                f"The range must lie within frames 0 to {self.frame_count - 1} and rise, but is {first} to {last}."
+            )
+        self.range = (first, last)
+
+    def choose(self, **changes: Any) -> None:
+        """Change what is measured or shown; where it changes the measurement, all of it is measured anew.
+
+        Raises
+        ------
+        FingervisionError
+            It cannot be meant for these frames.
+        """
+        chosen, unzeroed = self.choices.changed(**changes)
+        chosen.check(self.description)
+        self.choices = chosen
+        if unzeroed:
+            self.say("zero", ZERO_IS_OFF)
+        if MOVES_ZERO & set(changes):
+            self._measure_anew()
+
+    # ---- what the page is told
+    @property
+    def identity(self) -> str:
+        """Changes when the recording is measured anew."""
+        return f"{self._identity}-{self._generation}"
+
+    @property
+    def messages(self) -> deque[Message]:
+        """What was said last."""
+        return self._messages.kept
+
+    @property
+    def on_message(self) -> list[MessageListener]:
+        """Who is told what is said."""
+        return self._messages.listeners
+
+    def say(self, name: str, words: str) -> None:
+        """Tell everybody who looks."""
+        self._messages.say(name, words)
+
+    in_a_hurry = False
+
+    @property
+    def table(self) -> Path | None:
+        """The whole recording's gaps.csv; None until it is whole."""
+        track = self._track
+        return track.table if track is not None and track.is_whole else None
+
+    @property
+    def row_count(self) -> int:
+        """Rows that are measured."""
+        track = self._track
+        return 0 if track is None else len(track.rows)
+
+    oldest_row = shown_from = 0
+
+    def rows(self, first: int, last: int) -> Iterator[GapRow]:
+        """Rows from one number on, before another."""
+        track = self._track
+        return iter(() if track is None else track.rows[first:last])
+
+    @property
+    def frame_count(self) -> int:
+        """Frames of the recording, as far as they are known."""
+        if self.table is not None:
+            return max(1, self.row_count)
+        return max(1, self.description.frame_count or 0, self.row_count)
+
+    def state(self) -> dict[str, Any]:
+        """What is known of the recording, for the page."""
+        counts = Counter(row.status for row in self.rows(0, self.row_count))
+        description = self.description
+        return {
+            "source": description.name,
+            "kind": description.kind,
+            "whole": True,
+            "width_px": description.width_px,
+            "height_px": description.height_px,
+            "rate_hz": description.rate_hz,
+            "camera": "",
+            "jitter_ms": None,
+            "dropped": 0,
+            "duplicates": counts[Status.DUPLICATE],
+            "damaged": counts[Status.DAMAGED],
+            "exposure": "",
+            "silent_s": 0.0,
+            "ended": False,
+            "trouble": self.trouble,
+            "recording": None,
+            **state_of_choices(self.choices),
+        }
+
+    @property
+    def failure(self) -> str:
+        """Why the recording could not be measured; empty where it could."""
+        return "" if self._track is None else self._track.failure
+
+    # ---- the thread
+    def _measure_anew(self) -> None:
+        with self._changed:
+            if self._track is not None:
+                self._track.close()
+            self._track = None
+            if self.choices.scale is not None:
+                arguments = arguments_of(self.recorded.name, self.choices, self.recorded.options)
+                self._track = Track(arguments)
+            self._generation += 1
+            self._shown = None
+            self._changed.notify_all()
+
+    def _row(self, frame: int) -> GapRow | None:
+        track = self._track
+        return track.rows[frame] if track is not None and frame < len(track.rows) else None
+
+    def _time_of(self, frame: int) -> float:
+        row = self._row(frame)
+        if row is not None and row.time_s is not None:
+            return row.time_s
+        return frame / (self.description.rate_hz or USUAL_RATE_HZ)
+
+    def _play(self) -> None:
+        while not self._stopped:
+            with self._changed:
+                self._follow_table()
+                self._advance()
+                frame, row = self.frame, self._row(self.frame)
+                wanted = (frame, row, self._generation, self.choices)
+                if self._shown == wanted:
+                    self._changed.wait(LOOK_EVERY_S)
+                    continue
+            self._show(frame, row)
+            self._shown = wanted
+
+    def _follow_table(self) -> None:
+        track = self._track
+        if track is None:
+            return
+        if track.refresh():
+            self._generation += 1
+        if track.is_whole and self._told is not track:
+            self._told = track
+            self.on_table(track.rows)
+
+    def _advance(self) -> None:
+        """Go on as far as the time says; frames that cannot be shown in time are passed over."""
+        if not self.is_playing:
+            return
+        began_s, from_s = self._began
+        until_s = from_s + (monotonic() - began_s) * self.speed
+        last = self.frame_count - 1
+        while self.frame < last and self._time_of(self.frame + 1) <= until_s:
+            self.frame += 1
+        if self.frame >= last:
+            self.is_playing = False
+
+    def _show(self, frame: int, row: GapRow | None) -> None:
+        try:
+            item = self._reader.at(frame, self._own_time(frame, row))
+            if item is None:
+                item = LostFrame(frame, None, Status.DAMAGED, "The recording ends before this frame.")
+            self.seen = recorded_frame(item, row, self.choices, self.description)
+            self.trouble = ""
+        except (FingervisionError, OSError) as error:
+            self.is_playing = False
+            self.trouble = f"The recording cannot be read any more: {error} Put it back, and go on."
+            self.say("failed", self.trouble)
+
+    def _own_time(self, frame: int, row: GapRow | None) -> float | None:
+        """A frame's time, where it has a picture and no neighbour has the same."""
+        if row is None or row.time_s is None or row.status in (Status.DAMAGED, Status.DUPLICATE):
+            return None
+        neighbours = [self._row(frame - 1) if frame else None, self._row(frame + 1)]
+        return None if any(each is not None and each.time_s == row.time_s for each in neighbours) else row.time_s

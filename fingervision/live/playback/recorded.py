@@ -1,0 +1,110 @@
+"""From a recording's name, or a run's folder, to what is looked through and how it was measured."""
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from calib.calibration import BareScale
+from fingervision.domain.direction import Direction
+from fingervision.domain.errors import FingervisionError
+from fingervision.domain.region import Region
+from fingervision.frames.source import FrameSource, Wish, open_source
+from fingervision.live.choices import Choices
+from fingervision.storage.calibration_json import read_calibration
+from fingervision.storage.run_files import RUN
+
+
+@dataclass(frozen=True, slots=True)
+class Recorded:
+    """A recording that is looked through.
+
+    Parameters
+    ----------
+    name : str
+        What `measure` is given: the run's video, where a run's folder was named.
+    source : FrameSource
+        Its frames.
+    choices : Choices
+        How it is measured: as its run was, unless the user said otherwise.
+    options : tuple of str
+        What else `measure` is given: a rate, a drive.
+    """
+
+    name: str
+    source: FrameSource
+    choices: Choices
+    options: tuple[str, ...]
+
+
+def is_recording(name: str) -> bool:
+    """Whether a source ends: a file, images, a run's folder; cameras and streams go on."""
+    path = Path(name)
+    if (path / RUN).is_file():
+        return True
+    if "://" in name or str(path).startswith("/dev/"):
+        return False
+    return path.exists() or any(sign in name for sign in "*?[")
+
+
+def recorded(name: str, rate_hz: float | None, choices: Choices, drive: tuple[str, ...]) -> Recorded:
+    """Open a recording or a run's folder.
+
+    Parameters
+    ----------
+    name : str
+        A video, images, a glob, or the folder of a run.
+    rate_hz : float or None
+        Of images without times.
+    choices : Choices
+        What the user chose; where no scale is given, that of the run and how it was measured.
+    drive : tuple of str
+        The options of `measure` for a stage's log, where one was given.
+
+    Raises
+    ------
+    FingervisionError
+        It cannot be opened, or the run's folder has no video.
+    """
+    path = Path(name)
+    folder = path if path.is_dir() else path.parent
+    about = _about(folder)
+    video = about.get("video")
+    if path.is_dir() and about:
+        if not isinstance(video, str) or not (folder / video).is_file():
+            raise FingervisionError(f"{name} must be the folder of a run with its video, but has none: name a video.")
+        name = str(folder / video)
+    is_of_run = isinstance(video, str) and (folder / video) == Path(name)
+    if is_of_run and choices.scale is None:
+        choices = _as_in_run(folder, about, choices)
+    samples = about.get("samples")
+    if is_of_run and not drive and isinstance(samples, str) and (folder / samples).is_file():
+        # A run of the bed: its table holds the stage's place at every frame, on the frames' own times.
+        drive = ("--drive", str(folder / samples), "--drive-offset-s", "0")
+    rate = () if rate_hz is None else ("--rate-hz", repr(rate_hz))
+    return Recorded(name, open_source(name, Wish(rate_hz=rate_hz)), choices, (*rate, *drive))
+
+
+def _about(folder: Path) -> dict[str, Any]:
+    try:
+        about = json.loads((folder / RUN).read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return {}
+    return about if isinstance(about, dict) else {}
+
+
+def _as_in_run(folder: Path, about: dict[str, Any], choices: Choices) -> Choices:
+    """Scale and settings of the run; what cannot be read is left to the user."""
+    try:
+        scale, settings = about["scale"], about["settings"]
+        file = scale.get("calibration")
+        box, tips = settings.get("roi"), settings.get("tips", "auto")
+        return Choices(
+            scale=BareScale(float(scale["px_per_mm"])) if file is None else read_calibration(folder / str(file)),
+            scale_file=None if file is None else folder / str(file),
+            below_tip_mm=float(settings["below_tip_mm"]),
+            direction=None if tips == "auto" else Direction(tips),
+            region=None if box is None else Region(*(int(side) for side in box)),
+        )
+    except (KeyError, TypeError, ValueError, AttributeError):
+        return choices

@@ -1,0 +1,49 @@
+"""One frame of a recording with what the table says of it, and what is seen in it by itself."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from fingervision.domain.frame import Frame, LostFrame
+from fingervision.domain.gap import GapMeasurement, NoGap
+from fingervision.frames.source import Description
+from fingervision.live.choices import Choices
+from fingervision.live.frame_measurement import FrameMeasurement, Seen
+from fingervision.storage.gaps_csv import GapRow
+
+# A picture that could not be decoded is shown as an even grey.
+NO_PICTURE_LEVEL = 90
+IN_THE_TABLE = "As the table has it; judged by the frames before."
+
+
+def recorded_frame(item: Frame | LostFrame, row: GapRow | None, choices: Choices, description: Description) -> Seen:
+    """Picture, points and row of a frame.
+
+    Parameters
+    ----------
+    item : Frame or LostFrame
+        As it was read.
+    row : GapRow or None
+        The recording's table at this frame; None as long as it has not come so far.
+    choices : Choices
+        How it is measured.
+    description : Description
+        The recording.
+
+    Returns
+    -------
+    Seen
+        Its row is the table's, which knows the frames before; before that comes it is what the frame says by itself.
+    """
+    if isinstance(item, LostFrame):
+        pixels = np.full((description.height_px, description.width_px), NO_PICTURE_LEVEL, np.uint8)
+        frame = Frame(pixels, item.index, item.time_s, description.coding)
+        return Seen(frame, NoGap(item.status, item.words), row or GapRow(item.index, item.time_s, item.status))
+    polarity = None if row is None or not row.fingers else row.fingers == "dark"
+    measurement = FrameMeasurement((description.width_px, description.height_px), description.files, polarity)
+    _, outcome, own = measurement.measured(item, choices)
+    if row is None or own is None or row.status is own.status:
+        return Seen(item, outcome, row or own)
+    if isinstance(outcome, GapMeasurement) or outcome is None:
+        outcome = NoGap(row.status, IN_THE_TABLE)
+    return Seen(item, replace(outcome, words=IN_THE_TABLE), row)

@@ -1,0 +1,86 @@
+"""The table of a recording as `fingervision measure` makes it, followed while it grows."""
+
+import tempfile
+from pathlib import Path
+
+from fingervision.live.background import BackgroundCommand
+from fingervision.live.choices import Choices
+from fingervision.storage.gaps_csv import GapRow
+from fingervision.storage.gaps_reader import GapsReader
+
+# Exit codes of `measure` with which the table is whole: done, no frame gave a number, damaged frames in it.
+WHOLE = (0, 1, 3)
+GAPS = "gaps.csv"
+
+
+def arguments_of(recording: str, choices: Choices, more: tuple[str, ...]) -> tuple[str, ...]:
+    """What `fingervision measure` is given for a recording and what was chosen.
+
+    Parameters
+    ----------
+    recording : str
+        Its name.
+    choices : Choices
+        With a scale.
+    more : tuple of str
+        Options of the recording itself: its rate, its drive.
+    """
+    region, scale = choices.region, choices.scale
+    assert scale is not None  # noqa: S101 - asked before
+    given = ("--px-per-mm", repr(scale.px_per_mm))
+    if choices.scale_file is not None:
+        given = ("--calibration", str(choices.scale_file))
+    where: tuple[str, ...] = ("--below-tip-mm", repr(choices.below_tip_mm))
+    if choices.direction is not None:
+        where += ("--tips", choices.direction.value)
+    if choices.fingers_are_dark is not None:
+        where += ("--fingers", "dark" if choices.fingers_are_dark else "light")
+    if region is not None:
+        where += ("--roi", f"{region.x_px},{region.y_px},{region.width_px},{region.height_px}")
+    return ("measure", recording, *given, *where, *more)
+
+
+class Track:
+    """Measures a recording in a process of its own.
+
+    Parameters
+    ----------
+    arguments : tuple of str
+        See `arguments_of`.
+    """
+
+    def __init__(self, arguments: tuple[str, ...]) -> None:
+        self._folder = tempfile.TemporaryDirectory(prefix="fingervision_")
+        self.table = Path(self._folder.name) / GAPS
+        self.rows: list[GapRow] = []
+        self.failure = ""
+        self.is_whole = False
+        self._reader = GapsReader(self.table)
+        self._command: BackgroundCommand | None = BackgroundCommand(*arguments, "--out", self._folder.name)
+
+    def refresh(self) -> bool:
+        """Take in what came; True where the rows are to be counted anew, since the drive's inputs have joined them."""
+        if self._command is None:
+            return False
+        ended = self._command.exit_code
+        self.rows += self._reader.fresh()
+        if ended is None:
+            return False
+        complaint = self._command.complaint
+        self._command.stop()
+        self._command = None
+        self.is_whole = ended in WHOLE and bool(self.rows)
+        if not self.is_whole or ended == 1:
+            self.failure = complaint or f"Measuring ended with exit code {ended}."
+        # At its end `measure` writes the table once more where it found the drive's clock itself.
+        rows = GapsReader(self.table).fresh()
+        is_other = rows != self.rows
+        self.rows = rows
+        return is_other
+
+    def close(self) -> None:
+        """End measuring, and take the table away."""
+        if self._command is not None:
+            self._command.stop()
+            self._command = None
+        self._folder.cleanup()

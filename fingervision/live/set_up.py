@@ -1,0 +1,79 @@
+"""A look at the set-up: the newest frames, and what `inspect` finds in them, beside measuring that goes on."""
+
+from threading import Thread
+from time import monotonic, sleep
+from typing import Any
+
+from fingervision.domain.errors import FingervisionError
+from fingervision.domain.frame import Frame
+from fingervision.inspection.catalogue import inspect
+from fingervision.inspection.report import as_json
+from fingervision.inspection.sample import take_sample
+from fingervision.live.promptness import be_prompt
+from fingervision.live.view import View
+
+# As long as `inspect` looks at a camera, and enough frames to average noise and see vibration.
+LOOKS_FOR_S, MOST_FRAMES, FEWEST_FRAMES = 3.0, 40, 5
+LOOK_EVERY_S = 0.005
+
+
+class SetUp:
+    """One inspection.
+
+    Parameters
+    ----------
+    view : View
+        With a scale.
+
+    Raises
+    ------
+    FingervisionError
+        The scale is not known.
+    """
+
+    def __init__(self, view: View) -> None:
+        if view.choices.task is None:
+            raise FingervisionError("The set-up is judged in micrometres: give the scale first.")
+        self.findings: list[dict[str, Any]] | None = None
+        self.words = "Looking at the picture for three seconds."
+        self._view = view
+        self._thread = Thread(target=self._look, name="set-up", daemon=True)
+        self._thread.start()
+
+    @property
+    def is_busy(self) -> bool:
+        """Whether it is looking."""
+        return self._thread.is_alive()
+
+    def _look(self) -> None:
+        # Not behind the others (see `promptness`): who holds Python and does not get the processor holds all up.
+        be_prompt()
+        try:
+            frames = self._frames()
+            task = self._view.choices.task
+            if task is None or len(frames) < FEWEST_FRAMES:
+                self.words = f"Only {len(frames)} pictures came in {LOOKS_FOR_S:g} s: mend the source first."
+                return
+            settings, _ = task.settings_for(self._view.description.files)
+            sample = take_sample(frames, self._view.description, settings, task.scale)
+            report = as_json(sample, inspect(sample))
+        except FingervisionError as error:
+            self.words = str(error)
+            return
+        except Exception as error:  # a fault of ours must not look like a set-up without faults
+            self.words = f"The set-up could not be judged ({type(error).__name__}: {error})."
+            return
+        self.findings = report["findings"]
+        self.words = (
+            f"{len(frames)} frames: nothing to mend." if report["nothing_to_mend"] else f"{len(frames)} frames judged."
+        )
+
+    def _frames(self) -> list[Frame]:
+        found: list[Frame] = []
+        until_s = monotonic() + LOOKS_FOR_S
+        while monotonic() < until_s and len(found) < MOST_FRAMES:
+            seen = self._view.seen
+            if seen is not None and (not found or seen.frame is not found[-1]):
+                found.append(seen.frame)
+            sleep(LOOK_EVERY_S)
+        return found

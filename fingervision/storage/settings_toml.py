@@ -1,0 +1,106 @@
+"""Settings of a bench in a file: what the page saves, and the commands take with `--settings`."""
+
+import json
+import os
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from fingervision.domain.direction import Direction
+from fingervision.domain.errors import FingervisionError
+from fingervision.storage.toml_section import Section, read_document
+
+SCHEMA = 1
+TIPS = ("auto", *(direction.value for direction in Direction))
+POLARITIES = ("auto", "dark", "light")
+TOP_KEYS = ("schema", "calibration", "px_per_mm", "below_tip_mm", "tips", "roi", "fingers", "camera")
+CAMERA_NUMBERS = ("rate_hz", "exposure_ms", "gain", "focus", "white_balance_k")
+CAMERA_KEYS = (*CAMERA_NUMBERS, "size", "pixel_format")
+
+
+def read_settings(path: Path) -> dict[str, Any]:
+    """Read settings as the options of the commands, by their names.
+
+    Parameters
+    ----------
+    path : Path
+        TOML; every key may be left out.
+
+    Returns
+    -------
+    dict
+        `calibration` is a Path, found from the file's own folder, `roi` the words that `--roi` takes, a camera's
+        settings stand under `camera`.
+
+    Raises
+    ------
+    FingervisionError
+        It cannot be read, or a key is unknown or has no such value.
+    """
+    values, text = read_document(path, "settings")
+    top = Section(path, text, "", values)
+    top.only(TOP_KEYS)
+    if top.values.get("schema") != SCHEMA:
+        top.refuse("schema", f"must be {SCHEMA}, but is {top.values.get('schema')}.")
+    if "calibration" in values and "px_per_mm" in values:
+        top.refuse("px_per_mm", "and calibration both give the scale: leave one out.")
+    found: dict[str, Any] = {}
+    if "calibration" in values:
+        found["calibration"] = path.parent / top.word("calibration")
+    if "px_per_mm" in values:
+        found["px_per_mm"] = top.number("px_per_mm", above=0.0)
+    if "below_tip_mm" in values:
+        found["below_tip_mm"] = top.number("below_tip_mm", above=0.0)
+    if "tips" in values:
+        found["tips"] = top.word("tips", of=TIPS)
+    if "fingers" in values:
+        found["fingers"] = top.word("fingers", of=POLARITIES)
+    if "roi" in values:
+        box = values["roi"]
+        if not (isinstance(box, list) and len(box) == 4 and all(type(side) is int and side >= 0 for side in box)):
+            top.refuse("roi", f"must be four whole numbers [x, y, width, height], but is {box}.")
+        found["roi"] = ",".join(str(side) for side in box)
+    if "camera" in values:
+        camera = top.table("camera")
+        camera.only(CAMERA_KEYS)
+        found["camera"] = {name: camera.number(name) for name in CAMERA_NUMBERS if name in camera.values}
+        found["camera"] |= {name: camera.word(name) for name in ("size", "pixel_format") if name in camera.values}
+    return found
+
+
+def write_settings(path: Path, settings: Mapping[str, Any]) -> None:
+    """Write settings; what is None is left out.
+
+    Parameters
+    ----------
+    path : Path
+        The file; replaced when the new one is whole.
+    settings : mapping
+        Keys as in the file; `calibration` is a Path, `roi` four whole numbers, `camera` a mapping.
+
+    Raises
+    ------
+    FingervisionError
+        It cannot be written.
+    """
+    lines = [
+        "# For `fingervision live SOURCE --settings FILE`, and `measure` alike.",
+        f"schema = {SCHEMA}",
+    ]
+    for key in TOP_KEYS[1:-1]:
+        value = settings.get(key)
+        if value is None:
+            continue
+        if isinstance(value, Path):
+            value = Path(os.path.relpath(value.resolve(), path.parent.resolve())).as_posix()
+        lines.append(f"{key} = {json.dumps(value, ensure_ascii=False)}")
+    camera = {key: value for key, value in (settings.get("camera") or {}).items() if value is not None}
+    if camera:
+        lines += ["", "[camera]", *(f"{key} = {json.dumps(value)}" for key, value in camera.items())]
+    part = path.with_name(f".{path.name}.part")
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        part.write_text("\n".join(lines) + "\n", encoding="utf-8")
+        part.replace(path)
+    except OSError as error:
+        raise FingervisionError(f"{path} could not be written ({error.strerror}): make room.") from error

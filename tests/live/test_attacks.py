@@ -1,0 +1,243 @@
+"""What a stranger, a foreign page, or a broken one may try: each test fails where its guard is missing."""
+
+import json
+import re
+import time
+from collections.abc import Callable, Iterator
+from contextlib import suppress
+from pathlib import Path
+from threading import Event, Thread
+from typing import Any
+from urllib.error import HTTPError
+from urllib.request import Request, urlopen
+
+import pytest
+from websockets.exceptions import ConnectionClosed, InvalidStatus
+from websockets.sync.client import ClientConnection, connect
+
+from calib.calibration import BareScale
+from fingervision.frames.source import Wish
+from fingervision.live.choices import Choices
+from fingervision.live.opening import opened as opened_source
+from fingervision.live.page_files import PAGE, files, index
+from fingervision.live.server import Page, bound
+from fingervision.live.session import Session
+from tests.live.browser import browser, needs_chromium, opened, shown
+
+__all__ = ["browser", "opened"]
+
+
+@pytest.fixture
+def session(tmp_path: Path) -> Iterator[Session]:
+    found = Session(opened_source("simulated", Wish()), Choices(scale=BareScale(34.0)), tmp_path)
+    yield found
+    found.capture.stop()
+
+
+@pytest.fixture
+def page(session: Session) -> Iterator[Page]:
+    ending = Event()
+    found = Page(session, bound("127.0.0.1", 0))
+    thread = Thread(target=found.serve, args=(ending,))
+    thread.start()
+    yield found
+    ending.set()
+    thread.join()
+
+
+def status(address: str, **headers: str) -> int:
+    try:
+        with urlopen(Request(address, headers=headers), timeout=10.0) as answer:
+            return int(answer.status)
+    except HTTPError as error:
+        return error.code
+
+
+def socket_of(address: str, **options: Any) -> ClientConnection:
+    origin = address.partition("/?")[0]
+    target = address.replace("http://", "ws://").replace("/?", "/socket?")
+    return connect(target, **{"origin": origin, "max_size": None, **options})
+
+
+def reply(socket: ClientConnection, request: Any) -> dict[str, Any]:
+    """What is answered; pictures that come meanwhile are acknowledged."""
+    socket.send(request if isinstance(request, str | bytes) else json.dumps(request))
+    while True:
+        got = socket.recv(timeout=10.0)
+        if isinstance(got, str):
+            return dict(json.loads(got))
+        socket.send('{"do": "ack"}')
+
+
+def closing_code(socket: ClientConnection) -> int:
+    """Wait until the server closes a socket, and tell with which code."""
+    with suppress(ConnectionClosed):
+        while True:
+            socket.recv(timeout=10.0)
+    return socket.close_code or 0
+
+
+def parts(address: str) -> tuple[str, str]:
+    origin, _, token = address.partition("/?token=")
+    return origin, token
+
+
+def test_a_name_that_is_pointed_here_is_not_served(page: Page) -> None:
+    for host in ("evil.example", "127.0.0.1.evil.example", "127.0.0.1", "127.0.0.1:1", "", "[::ffff:7f00:1]:80"):
+        assert status(page.address, Host=host) == 400
+    with pytest.raises(InvalidStatus):
+        socket_of(page.address, additional_headers={"Host": "evil.example"})
+
+
+def test_a_foreign_page_opens_no_socket(page: Page) -> None:
+    origin, _ = parts(page.address)
+    for foreign in ("http://evil.example", "null", origin.replace("http", "https"), origin + "0", None, "file://"):
+        with pytest.raises(InvalidStatus) as refused:
+            socket_of(page.address, origin=foreign)
+        assert refused.value.response.status_code == 403
+    assert status(page.address, Origin="http://evil.example") == 403
+
+
+def test_missing_stale_and_guessed_tokens_are_refused(page: Page, session: Session, tmp_path: Path) -> None:
+    origin, token = parts(page.address)
+    (session.out / ".live_token").unlink()
+    other = Page(session, bound("127.0.0.1", 0))
+    stale = parts(other.address)[1]
+    guesses = ("", "x", token[:-1], token + "x", token.swapcase(), stale, "%00", "a" * 4000)
+    for path in ("/", "/gaps.csv", "/steps/0.png", "/nothing"):
+        for guess in guesses:
+            assert status(f"{origin}{path}?token={guess}") == 403
+        assert status(f"{origin}{path}") == 403
+    for guess in guesses[:6]:
+        with pytest.raises(InvalidStatus):
+            socket_of(f"{origin}/?token={guess}")
+    other._listening.close()
+
+
+def test_the_token_is_in_no_log_file_and_no_referrer(page: Page, session: Session, capfd: Any) -> None:
+    origin, token = parts(page.address)
+    with urlopen(page.address) as answer:
+        assert answer.headers["Referrer-Policy"] == "no-referrer"
+        assert token not in answer.read().decode()
+    with socket_of(page.address) as socket:
+        head = b""
+        while not head:
+            got = socket.recv(timeout=10.0)
+            head = got if isinstance(got, bytes) else b""
+        assert token.encode() not in head
+        assert token not in json.dumps(reply(socket, {"do": "nothing"}))
+    status(f"{origin}/missing?token={token}")
+    printed = capfd.readouterr()
+    assert token not in printed.out + printed.err
+    for file in session.out.rglob("*"):
+        if file.is_file() and file.name not in (".live_token", ".live_viewer_token", ".live_page.html"):
+            assert token.encode() not in file.read_bytes()
+    assert not any(token in each.words for each in session.messages)
+
+
+def test_no_name_leads_out_of_the_pages_folder(page: Page) -> None:
+    origin, token = parts(page.address)
+    for name in (
+        "..%2f..%2fsession.py",
+        "../session.py",
+        "..%5csession.py",
+        "%2e%2e/server.py",
+        "%2fetc%2fpasswd",
+        "index.html%00.js",
+        "live.js%2f..%2f..%2fserver.py",
+        ".",
+        "",
+    ):
+        assert status(f"{origin}/page/{name}?token={token}") in (404, 403)
+    for number in ("..%2f0", "-1", "1e3", "0%00", "/etc/passwd", "9" * 300):
+        assert status(f"{origin}/steps/{number}.png?token={token}") in (404, 403)
+    assert all((PAGE / name).parent == PAGE for name in files())
+
+
+def test_malformed_messages_are_refused_and_the_page_lives_on(page: Page) -> None:
+    with socket_of(page.address) as socket:
+        for words in (
+            "", "{", "null", "[]", '"do"', "[" * 4000, '{"do": null}', '{"do": ["record"]}', '{"do": {"a": 1}}',
+            '{"do": "__class__"}', '{"do": "' + "x" * 3000 + '"}', '{"do": "region", "box": [1e999, 0, 0, 0]}',
+            '{"do": "height", "below_tip_mm": "<script>"}',
+            "\x00\x01\x02", '{"do":"tips","tips":"../up"}', '{"do":"calibrate","kind":"bar","box":[0,0,1]}',
+        ):  # fmt: skip
+            assert "refused" in reply(socket, words), words
+    with socket_of(page.address) as socket:
+        socket.send(b"\x00" * 10)
+        closing_code(socket)
+    assert status(page.address) == 200
+
+
+def test_an_oversized_message_and_a_flood_close_the_socket_and_nothing_else(page: Page) -> None:
+    with socket_of(page.address) as quiet:
+        with socket_of(page.address) as socket:
+            socket.send("x" * 5000)
+            assert closing_code(socket) == 1009
+        with socket_of(page.address) as socket:
+            with suppress(ConnectionClosed):
+                for _ in range(400):
+                    socket.send('{"do": "ack"}')
+            assert closing_code(socket) == 1008
+        assert "refused" in reply(quiet, {"do": "nothing"})
+
+
+def test_who_only_looks_changes_nothing_and_may_stop_a_motor(page: Page, session: Session) -> None:
+    with socket_of(page.viewer_address) as viewer:
+        for name in ("record", "zero", "scale", "region", "calibrate", "bed_move", "take_over", "snapshot", "measure"):
+            assert "only looks" in reply(viewer, {"do": name, "px_per_mm": 3.0})["refused"]
+        assert session.choices.scale == BareScale(34.0)
+        # There is no bed here; that is another refusal.
+        assert "no bed" in reply(viewer, {"do": "bed_stop"})["refused"]
+
+
+def test_one_page_writes_until_another_takes_over(page: Page, session: Session) -> None:
+    with socket_of(page.address) as first, socket_of(page.address) as second:
+        assert "refused" not in reply(first, {"do": "scale", "px_per_mm": 10.0})
+        assert "Take over" in reply(second, {"do": "scale", "px_per_mm": 20.0})["refused"]
+        assert "refused" not in reply(second, {"do": "take_over"})
+        assert "refused" not in reply(second, {"do": "scale", "px_per_mm": 20.0})
+        assert "Take over" in reply(first, {"do": "scale", "px_per_mm": 30.0})["refused"]
+        assert session.choices.scale == BareScale(20.0)
+        second.close()
+        end_s = time.monotonic() + 10.0
+        while "refused" in reply(first, {"do": "scale", "px_per_mm": 40.0}):
+            assert time.monotonic() < end_s
+
+
+def test_the_page_has_no_script_of_its_own_and_the_policy_lets_none_in() -> None:
+    from fingervision.live.guard import POLICY
+
+    scripts = re.findall(r"<script([^>]*)>(.*?)</script>", index(), re.S)
+    assert scripts
+    assert all("src=" in attributes and not body.strip() for attributes, body in scripts)
+    assert not re.search(r"\son\w+\s*=|javascript:|\sstyle\s*=", index())
+    assert "unsafe" not in POLICY
+    assert "default-src 'none'" in POLICY
+    for name in files():
+        if name.endswith(".js") and name != "uPlot.iife.min.js":
+            source = (PAGE / name).read_text(encoding="utf-8")
+            assert not re.search(r"\beval\(|new Function|document\.write|https?://", source), name
+            # What comes from elsewhere is set as text: markup is the page's own, whole and constant.
+            for made in re.findall(r"innerHTML = (`[^`]*`|'[^']*'|[^;]+);", source):
+                assert "${" not in made, (name, made)
+
+
+@pytest.mark.slow
+@needs_chromium
+def test_markup_in_a_name_is_text(live: Callable[..., Any], opened: Callable[..., Any], tmp_path: Path) -> None:
+    import cv2
+    import numpy as np
+
+    folder = tmp_path / "<img src=x onerror=document.title='got'><script>document.title='got'<"
+    folder.mkdir()
+    for number in range(3):
+        cv2.imwrite(str(folder / f"{number}.png"), np.full((240, 320), 200, np.uint8))
+    page = opened(live(folder, "--rate-hz", "10", "--port", "0").address)
+    shown(page, "document.querySelector('#source').textContent.includes('<script>')")
+    page.fill("#px_per_mm", "10")
+    page.press("#px_per_mm", "Enter")
+    shown(page, "Number(document.querySelector('#picture').dataset.shown) > 0")
+    assert page.title() == "fingervision live"
+    assert page.locator("#source *").count() == 0
+    assert page.evaluate("document.querySelectorAll('img[src=x], #log script').length") == 0

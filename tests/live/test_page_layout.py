@@ -1,0 +1,138 @@
+"""The page on every screen: what fits, what can be reached, and what a checker of accessibility says of it."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+import pytest
+
+from fingervision.rendering import Camera, render, two_fingers
+from tests.live.browser import browser, needs_chromium, opened, says, shown
+
+__all__ = ["browser", "opened"]
+pytestmark = [needs_chromium, pytest.mark.slow]
+SCREENS = {
+    "desk": ((1280, 720), "light"),
+    "phone upright": ((390, 844), "dark"),
+    "phone across": ((844, 390), "light"),
+    "wide": ((1920, 1080), "dark"),
+}
+RULES = ["wcag2a", "wcag2aa", "wcag21a", "wcag21aa", "wcag22aa", "best-practice"]
+CYCLE = 40
+
+
+def findings(page: Any) -> list[str]:
+    """What axe-core finds at level AA, and of its best practices."""
+    axe = pytest.importorskip("axe_playwright_python.sync_playwright", reason="axe-playwright-python is not installed.")
+    found = axe.Axe().run(page, options={"runOnly": {"type": "tag", "values": RULES}}).response["violations"]
+    return [f"{each['id']}: {each['help']} {[node['html'][:150] for node in each['nodes']]}" for each in found]
+
+
+@pytest.fixture
+def covered(tmp_path: Path) -> Path:
+    """Pictures of a gripper before which a hand passes: some frames have no fingers."""
+    folder = tmp_path / "covered"
+    folder.mkdir()
+    rng = np.random.default_rng(7)
+    for index in range(CYCLE):
+        picture = render(two_fingers(90.0 + index, radius_px=20.0), Camera(blur_px=0.9, noise_grey=2.0), rng)
+        if 15 <= index < 25:
+            picture[:] = 128
+        cv2.imwrite(str(folder / f"{index:03d}.png"), picture)
+    return folder
+
+
+def test_picture_value_chart_and_status_fit_every_screen_and_axe_finds_nothing(
+    live: Callable[..., Any], opened: Callable[..., Any]
+) -> None:
+    view = live("simulated", "--port", "0")
+    for name, ((width, height), scheme) in SCREENS.items():
+        page = opened(view.address, viewport={"width": width, "height": height}, color_scheme=scheme)
+        shown(page, "Number(document.querySelector('#picture').dataset.shown) > 30")
+        for part in ("#picture", "#gap_mm", "#status", "#chart", "#record"):
+            box = page.locator(part).bounding_box()
+            assert 0 <= box["x"] <= box["x"] + box["width"] <= width, (name, part, box)
+            assert 0 <= box["y"] <= box["y"] + box["height"] <= height, (name, part, box)
+            assert box["height"] > (80 if part in ("#picture", "#chart") else 10), (name, part, box)
+        assert page.evaluate("document.documentElement.scrollWidth") <= width
+        for panel in page.locator("#panels details").all():
+            panel.evaluate("each => { each.open = true; }")
+        assert findings(page) == [], name
+        page.locator("body").press("?")
+        assert findings(page) == [], name
+        page.close()
+
+
+def test_every_control_is_reached_by_tab_and_every_key_is_in_the_help(
+    live: Callable[..., Any], opened: Callable[..., Any]
+) -> None:
+    page = opened(live("simulated", "--port", "0").address)
+    shown(page, "Number(document.querySelector('#picture').dataset.shown) > 5")
+    page.evaluate("for (const each of document.querySelectorAll('#panels details')) each.open = true")
+    wanted = set(
+        page.evaluate(
+            "[...document.querySelectorAll('button, input, select, summary')]"
+            ".filter(e => e.offsetParent && !e.disabled).map((e, i) => { e.dataset.stop = i; return String(i); })"
+        )
+    )
+    reached = set()
+    for _ in range(3 * len(wanted)):
+        page.keyboard.press("Tab")
+        reached.add(page.evaluate("document.activeElement.dataset.stop"))
+    assert wanted <= reached
+    page.keyboard.press("Escape")
+    page.locator("body").press("?")
+    page.locator("#help_dialog").wait_for()
+    keys = page.locator("#help_keys kbd").all_inner_texts()
+    assert {"Space", "←", "→", "↑", "↓", "z", "r", "s", "?", "Escape"} <= set(keys)
+    page.keyboard.press("Escape")
+    page.locator("#help_dialog").wait_for(state="hidden")
+    page.locator("body").press(" ")
+    assert page.inner_text("#pause") == "Go on"
+    page.locator("body").press(" ")
+    # Arrows read the chart sample by sample.
+    page.locator("body").press("ArrowLeft")
+    first = page.inner_text("#readout")
+    page.locator("body").press("ArrowLeft")
+    assert page.inner_text("#readout") != first
+    assert page.inner_text("#announcer") == page.inner_text("#readout")
+    assert "mm" in first
+
+
+def test_failures_are_marked_on_the_chart_with_their_reason(
+    live: Callable[..., Any], opened: Callable[..., Any], covered: Path
+) -> None:
+    view = live(covered, "--rate-hz", "20", "--px-per-mm", "34", "--port", "0")
+    page = opened(view.address)
+    shown(page, f"document.querySelector('#place').textContent === 'frame 0 of {CYCLE}'")
+    marked = page.evaluate(
+        "import('/page/chart_failures.js').then(m => m.failures(-1, 1e9).map(f => [f.status, f.count]))"
+    )
+    assert len(marked) == 1
+    assert marked[0][1] == 10
+    # The mark is drawn where it stands in time, and nowhere else: hatched bars at the foot of the chart.
+    page.wait_for_timeout(400)
+    box = page.locator("#chart .u-over").bounding_box()
+    page.mouse.move(box["x"] + box["width"] * 0.5, box["y"] + box["height"] / 2)
+    shown(page, "document.querySelector('#readout').textContent.includes('no gap: ')")
+    assert marked[0][0].replace("_", " ") in page.inner_text("#readout")
+    with page.expect_download() as plot:
+        page.locator("body").press("g")
+    picture = cv2.imread(str(plot.value.path())).astype(int)
+    red = (picture[:, :, 2] - picture[:, :, 1] > 80).any(axis=0).nonzero()[0] / picture.shape[1]
+    assert 0.3 < red.min() < 0.5 < red.max() < 0.75
+    says(page, "The plot was saved")
+
+
+def test_who_wants_no_motion_gets_a_chart_that_moves_once_a_second(
+    live: Callable[..., Any], opened: Callable[..., Any]
+) -> None:
+    page = opened(live("simulated", "--port", "0").address, reduced_motion="reduce")
+    shown(page, "Number(document.querySelector('#picture').dataset.shown) > 5")
+    page.evaluate(
+        "import('/page/bus.js').then(m => { window.drawings = 0; m.listen('drawn', () => { window.drawings += 1; }); })"
+    )
+    page.wait_for_timeout(3000)
+    assert page.evaluate("window.drawings") <= 5

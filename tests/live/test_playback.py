@@ -1,0 +1,239 @@
+"""A recording looked through: every frame is the one it says, and what is measured is what `measure` gives."""
+
+import json
+import shutil
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from random import Random
+from typing import Any
+
+import cv2
+import numpy as np
+import pytest
+
+from calib.calibration import BareScale
+from fingervision.domain.errors import FingervisionError, UsageError
+from fingervision.domain.frame import Frame, LostFrame
+from fingervision.frames.frame_range import frame_range
+from fingervision.frames.source import open_source
+from fingervision.live.choices import Choices
+from fingervision.live.commands import obey
+from fingervision.live.playback.frame_reader import FrameReader
+from fingervision.live.playback.playback import Playback
+from fingervision.live.playback.recorded import is_recording, recorded
+from fingervision.rendering import Camera, render, two_fingers
+from tests.live.browser import browser, needs_chromium, opened, says, shown
+
+__all__ = ["browser", "opened"]
+FRAMES, BITS, CELL_PX = 60, 6, 16
+
+
+def numbered(number: int) -> np.ndarray:
+    """A picture of a gripper that carries its number as black and white squares along its foot."""
+    rng = np.random.default_rng(number)
+    picture = render(two_fingers(60.0 + number, frame=(320, 240)), Camera(blur_px=0.9, noise_grey=1.0), rng)
+    for bit in range(BITS):
+        picture[:CELL_PX, bit * CELL_PX : (bit + 1) * CELL_PX] = 255 if number >> bit & 1 else 0
+    return np.asarray(picture)
+
+
+def number_in(picture: np.ndarray) -> int:
+    cells = [picture[4:12, bit * CELL_PX + 4 : (bit + 1) * CELL_PX - 4].mean() > 128 for bit in range(BITS)]
+    return sum(1 << bit for bit, is_white in enumerate(cells) if is_white)
+
+
+CODINGS = {
+    "ffv1.mkv": ("-c:v", "ffv1"),
+    "h264.mp4": ("-c:v", "libx264", "-g", "25", "-bf", "3", "-crf", "16", "-pix_fmt", "yuv420p"),
+    "one_key.mp4": ("-c:v", "libx264", "-g", "600", "-crf", "16", "-pix_fmt", "yuv420p"),
+    "mjpeg.avi": ("-c:v", "mjpeg", "-q:v", "3", "-pix_fmt", "yuvj420p"),
+}
+
+
+@pytest.fixture(scope="module")
+def recordings(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
+    """One recording in several codings, and as images."""
+    if shutil.which("ffmpeg") is None:
+        pytest.skip("ffmpeg is not installed: it codes the recordings.")
+    folder = tmp_path_factory.mktemp("recordings")
+    images = folder / "images"
+    images.mkdir()
+    for number in range(FRAMES):
+        cv2.imwrite(str(images / f"{number}.png"), numbered(number))
+    for name, coding in CODINGS.items():
+        source = ["-framerate", "25", "-start_number", "0", "-i", str(images / "%d.png")]
+        subprocess.run(["ffmpeg", "-loglevel", "error", *source, *coding, str(folder / name)], check=True)
+    return {path.name: path for path in folder.iterdir()}
+
+
+@pytest.mark.parametrize("name", [*CODINGS, "images"])
+def test_every_frame_is_the_one_it_says_in_any_order(recordings: dict[str, Path], name: str) -> None:
+    source = open_source(str(recordings[name]))
+    whole = [item for item in source if isinstance(item, Frame)]
+    assert [number_in(item.pixels) for item in whole] == list(range(FRAMES))
+    reader = FrameReader(lambda: iter(source), str(recordings[name]))
+    order = [0, FRAMES - 1, 30, 29, 28, 5, 6, 7, *Random(1).sample(range(FRAMES), 25)]
+    for wanted in order:
+        # Asked for by its time where the table has one, and by counting.
+        for time_s in (whole[wanted].time_s, None):
+            found = reader.at(wanted, time_s)
+            assert isinstance(found, Frame)
+            assert found.index == wanted
+            assert number_in(found.pixels) == wanted
+            np.testing.assert_array_equal(found.pixels, whole[wanted].pixels)
+            reader._kept.clear()
+    assert reader.at(FRAMES, None) is None
+    assert isinstance(reader.at(3, None), Frame)
+
+
+def test_a_time_that_no_frame_has_is_not_taken_for_a_neighbours(recordings: dict[str, Path]) -> None:
+    source = open_source(str(recordings["h264.mp4"]))
+    reader = FrameReader(lambda: iter(source), str(recordings["h264.mp4"]))
+    found = reader.at(40, 1.611)
+    assert isinstance(found, Frame)
+    assert number_in(found.pixels) == 40
+
+
+def test_a_range_has_the_numbers_of_the_whole() -> None:
+    frames = [Frame(np.zeros((2, 2), np.uint8), index, index / 10) for index in range(10)]
+    read: list[int] = []
+
+    def source() -> Any:
+        for frame in frames:
+            read.append(frame.index)
+            yield frame
+
+    assert [item.index for item in frame_range(source(), 3, 5)] == [3, 4, 5]
+    assert read == [0, 1, 2, 3, 4, 5]
+    assert list(frame_range(frames, 11, 12)) == []
+
+
+def test_what_ends_is_a_recording_and_what_goes_on_is_none(recordings: dict[str, Path], tmp_path: Path) -> None:
+    assert is_recording(str(recordings["ffv1.mkv"]))
+    assert is_recording(str(recordings["images"] / "*.png"))
+    for name in ("0", "simulated", "/dev/video0", "rtsp://127.0.0.1/x", "http://127.0.0.1/x?y", str(tmp_path / "no")):
+        assert not is_recording(name)
+
+
+@pytest.fixture
+def playback(recordings: dict[str, Path], tmp_path: Path) -> Playback:
+    """A recording without a scale: nothing runs beside it."""
+    return Playback(recorded(str(recordings["images"]), 25.0, Choices(), ()), tmp_path / "out")
+
+
+def test_wrong_wishes_are_refused_in_a_sentence(playback: Playback) -> None:
+    refused = [
+        {"do": "seek"},
+        {"do": "seek", "frame": "3"},
+        {"do": "seek", "frame": 1.5},
+        {"do": "seek", "frame": 10**30},
+        {"do": "step", "by": None},
+        {"do": "play", "on": True, "speed": 0},
+        {"do": "play", "on": True, "speed": float("nan")},
+        {"do": "range", "first": 5, "last": 2},
+        {"do": "range", "first": -1, "last": 2},
+        {"do": "range", "first": 0, "last": FRAMES},
+        {"do": "range", "first": True, "last": 3},
+        {"do": "measure"},
+        {"do": "record"},
+        {"do": "height", "below_tip_mm": 0},
+        {"do": "region", "box": [0, 0, 5000, 10]},
+    ]
+    for request in refused:
+        with pytest.raises((UsageError, FingervisionError)):
+            obey(playback, request)
+    obey(playback, {"do": "seek", "frame": 10**9})
+    assert playback.frame == FRAMES - 1
+    obey(playback, {"do": "step", "by": -(10**9)})
+    assert playback.frame == 0
+    obey(playback, {"do": "range", "first": 3, "last": 3})
+    assert playback.range == (3, 3)
+
+
+def test_a_lost_frame_is_shown_as_lost(playback: Playback) -> None:
+    from fingervision.domain.status import Status
+    from fingervision.live.playback.recorded_frame import recorded_frame
+
+    lost = LostFrame(4, 0.16, Status.DAMAGED, "It could not be decoded.")
+    seen = recorded_frame(lost, None, Choices(scale=BareScale(34.0)), playback.description)
+    assert seen.row is not None
+    assert (seen.row.status, seen.row.gap_mm, seen.row.frame) == (Status.DAMAGED, None, 4)
+    assert np.ptp(seen.frame.pixels) == 0
+
+
+def frames_of(measured: Path) -> list[int]:
+    return [int(line.split(",")[0]) for line in measured.read_text().splitlines()[1:]]
+
+
+@pytest.mark.slow
+@needs_chromium
+def test_what_the_page_measures_is_what_the_command_gives(
+    live: Callable[..., Any],
+    opened: Callable[..., Any],
+    measured: Callable[..., str],
+    recordings: dict[str, Path],
+    tmp_path: Path,
+) -> None:
+    moved = tmp_path / "h264.mp4"
+    shutil.copy(recordings["h264.mp4"], moved)
+    view = live(moved, "--px-per-mm", "34", "--port", "0")
+    page = opened(view.address, viewport={"width": 1280, "height": 720})
+    shown(page, f"document.querySelector('#place').textContent === 'frame 0 of {FRAMES}'")
+    with page.expect_download() as saved:
+        page.locator("body").press("c")
+    assert Path(saved.value.path()).read_text() == measured(moved, "--px-per-mm", "34")
+
+    # Step, scrub, and play: the value is the table's of the frame that is shown.
+    table = Path(saved.value.path()).read_text().splitlines()[1:]
+    gap_mm = [float(line.split(",")[3]) for line in table]
+
+    def at_frame(number: int) -> None:
+        shown(page, f"document.querySelector('#gap_mm').dataset.frame === '{number}'")
+        assert float(page.inner_text("#gap_mm")) == pytest.approx(gap_mm[number], abs=0.00005)
+
+    page.locator("body").press("ArrowRight")
+    at_frame(1)
+    page.locator("body").press("Shift+ArrowRight")
+    at_frame(26)
+    page.locator("body").press("[")
+    page.locator("#scrub").fill("40")
+    at_frame(40)
+    page.locator("#scrub").evaluate("each => each.blur()")
+    page.locator("body").press("]")
+    shown(page, "document.querySelector('#range').textContent === 'marked 26 to 40'")
+    page.locator("body").press("End")
+    at_frame(FRAMES - 1)
+    page.locator("body").press(" ")
+    shown(page, "document.querySelector('#play').textContent === 'Stand'")
+    shown(page, "document.querySelector('#play').textContent === 'Play'")
+    at_frame(FRAMES - 1)
+    page.locator("body").press("i")
+    page.locator("#step_pictures img").first.wait_for()
+
+    page.locator("body").press("m")
+    says(page, "15 frames measured")
+    (folder,) = view.out.glob("measured_*_26_40")
+    whole = tmp_path / "by_command"
+    command = [sys.executable, "-m", "fingervision", "measure", str(moved), "--px-per-mm", "34", "--frames", "26:40"]
+    subprocess.run([*command, "--out", str(whole)], check=True, capture_output=True)
+    assert (folder / "gaps.csv").read_bytes() == (whole / "gaps.csv").read_bytes()
+    assert frames_of(folder / "gaps.csv") == list(range(26, 41))
+    assert json.loads((folder / "summary.json").read_text())["settings"]["frames"] == [26, 40]
+
+    # Another height measures all of it anew.
+    page.fill("#below_tip", "0.5")
+    page.press("#below_tip", "Enter")
+    page.press("#below_tip", "Escape")
+    shown(page, f"document.querySelector('#place').textContent === 'frame {FRAMES - 1} of {FRAMES}'")
+    with page.expect_download() as again:
+        page.locator("body").press("c")
+    other = Path(again.value.path()).read_text()
+    assert other == measured(moved, "--px-per-mm", "34", "--below-tip-mm", "0.5")
+
+    # Taken away while it is looked at: said, and nothing else breaks.
+    moved.rename(moved.with_suffix(".away"))
+    page.fill("#px_per_mm", "20")
+    page.press("#px_per_mm", "Enter")
+    shown(page, "document.querySelector('#place').textContent.includes('There is no')")
