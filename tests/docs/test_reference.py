@@ -11,7 +11,7 @@ import pytest
 
 from fingervision.domain import gripper
 from fingervision.domain.status import Status
-from fingervision.storage import gaps_csv, mechanism_toml, response_csv, samples_csv
+from fingervision.storage import gaps_csv, mechanism_toml, response_csv, samples_csv, settings_toml
 from fingervision.testbed import recipe_kinds
 
 ROOT = Path(__file__).parents[2]
@@ -34,6 +34,7 @@ def keys_in(*paths: str) -> set[str]:
         ("status", {str(status) for status in Status}),
         ("samples.csv", set(samples_csv.COLUMNS.split(","))),
         ("response.csv", set(response_csv.COLUMNS)),
+        ("settings.toml", {*settings_toml.TOP_KEYS, *settings_toml.CAMERA_KEYS}),
         ("report.json", keys_in("fingervision/storage/report_json.py")),
         ("calibration.json", keys_in("fingervision/storage/calibration_json.py") - {"tilt", "value", "stated"}),
         (
