@@ -82,7 +82,7 @@ Exit codes: 0 done; 1 could not, or no frame gave a number; 2 wrong usage;
 @click.option(
     "--gauges",
     type=click.Path(path_type=Path),
-    help="Gauges of your own (gauges.toml): edges, pairs, lines, patches, gaps.",
+    help="Gauges of your own (gauges.toml): edges, lines, circles, marks, patches.",
 )
 @click.option("--overlay", is_flag=True, help="Also write overlay.mp4.")
 @click.option("--steps", "steps_frame", type=int, metavar="FRAME", help="Also write every step of this frame (from 0).")
