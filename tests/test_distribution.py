@@ -57,17 +57,25 @@ def test_wheel_and_sdist_are_whole_and_the_wheel_works_alone(tmp_path: Path) -> 
     run(sys.executable, "-m", "build", *flags, "--outdir", dist, ROOT, cwd=tmp_path)
     (wheel,) = dist.glob("*.whl")
     (sdist,) = dist.glob("*.tar.gz")
-    # One library for every Python from 3.11 on, of this machine's kind.
+    # The loops in C are built for one kind of machine, for every Python from 3.11 on.
     assert wheel.name.startswith(f"fingervision-{__version__}-cp311-abi3-")
     assert "PASSED" in run(sys.executable, "-m", "twine", "check", "--strict", wheel, sdist, cwd=tmp_path)
     with zipfile.ZipFile(wheel) as archive:
         names = archive.namelist()
     assert {name.split("/")[0] for name in names} == {"fingervision", "calib", f"fingervision-{__version__}.dist-info"}
+    assert any(name.startswith("fingervision/domain/_loops-") for name in names)
     for needed in ("fingervision/py.typed", "fingervision/live/page/index.html", "fingervision/testbed/simulated.toml"):
         assert needed in names
     with tarfile.open(sdist) as archive:
         inside = {name.split("/", 1)[1] for name in archive.getnames() if "/" in name}
-    for needed in ("LICENSE", "CHANGELOG.md", "CITATION.cff", "docs/index.md", "tests/test_house.py"):
+    for needed in (
+        "LICENSE",
+        "CHANGELOG.md",
+        "CITATION.cff",
+        "docs/index.md",
+        "tests/test_house.py",
+        "fingervision/domain/loops.h",
+    ):
         assert needed in inside
 
     bare = tmp_path / "bare"

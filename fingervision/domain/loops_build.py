@@ -24,7 +24,7 @@ HEADER, DOOR = "domain/loops.h", "domain/loops.c"
 PREPARE = re.compile(r"^PREPARE\((\w+)\)", re.MULTILINE)
 LOOP = re.compile(r'^LOOP\((\w+), "(\w*)", "(\w*)"\)', re.MULTILINE)
 # Sums stay in the order in which they stand, on every processor; only what no digit shows is left to the compiler.
-FLAGS = ("-O3", "-std=c11", "-shared", "-fPIC", "-fvisibility=hidden", "-fno-math-errno", "-ffp-contract=off", "-w")
+FLAGS = ("-O3", "-std=c11", "-shared", "-fvisibility=hidden", "-fno-math-errno", "-ffp-contract=off", "-w")
 Number = int | float
 Constant = Number | tuple["Constant", ...]
 
@@ -99,10 +99,10 @@ def compiler() -> list[str] | None:
 
 
 def _links() -> list[str]:
-    """What Python's functions are found in: the running program, but for Windows."""
+    """What Python's functions are found in: the running program, but for Windows, where all code may lie anywhere."""
     if sys.platform == "win32":
         return [f"-L{Path(sys.base_prefix) / 'libs'}", "-lpython3"]
-    return ["-undefined", "dynamic_lookup"] if sys.platform == "darwin" else ["-lm"]
+    return ["-fPIC", "-undefined", "dynamic_lookup"] if sys.platform == "darwin" else ["-fPIC", "-lm"]
 
 
 def one_source() -> str:

@@ -7,7 +7,6 @@ tip out of view. Between the two there is nothing but ground, and no third thing
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
 from itertools import combinations
 
 import numpy as np
@@ -16,12 +15,15 @@ from numpy.typing import NDArray
 from fingervision.domain.direction import Direction
 from fingervision.domain.gap import NoGap
 from fingervision.domain.status import Status
+from fingervision.vision.coarse_fingers import CoarseFinger, CoarseFingers, is_hidden
 from fingervision.vision.flanks import follow_down, has_straight_flanks
 from fingervision.vision.likeness import MOST_TURNED, Build, are_alike, build, common_turn, end_alike
 from fingervision.vision.orientation import Orientation
 from fingervision.vision.outlines import Outline, Outlines, find_outlines, longest_first
 from fingervision.vision.tops import Top, find_tops
 from fingervision.vision.way_between import Place, inner_crossing, is_free
+
+__all__ = ["MORE_THAN_TWO", "UNLIKE", "CoarseFinger", "CoarseFingers", "find_fingers", "is_hidden"]
 
 # Two tops with a notch between them are touching fingers where the notch has so much of the measuring height, and the
 # fingers so many times of it.
@@ -39,8 +41,6 @@ ROOTED_HEIGHTS = 2.0
 # What stands beside the two, has so much of their height and leans by no more than this may be meant as well as they.
 THIRD_SHARE, THIRD_STEEPEST = 0.5, 1.0
 
-NOTHING_HIDDEN: NDArray[np.int64] = np.empty(0, dtype=np.int64)
-
 MORE_THAN_TWO = NoGap(
     Status.NO_FINGERS, "More than two things in the picture look like fingers: give the region that holds the two."
 )
@@ -48,67 +48,6 @@ UNLIKE = NoGap(
     Status.ONE_FINGER,
     "Of two things that stand side by side one is far wider than the other: give the region that holds two fingers.",
 )
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class CoarseFinger:
-    """A finger's outline to a pixel, in order from its inner side over the tip to its outer side.
-
-    Parameters
-    ----------
-    outline : ndarray of int32, shape (n, 2)
-        (across, along), the last pixels of the finger itself.
-    inner_sign : int
-        +1 where the gap lies at larger `across` (the left finger), -1 for the right finger.
-    top : Top
-        Where it begins.
-    hidden : ndarray of int64, shape (n,)
-        Coordinates along, in order, in which a part between the fingers hides the inner side.
-    """
-
-    outline: Outline
-    inner_sign: int
-    top: Top
-    hidden: NDArray[np.int64] = field(default_factory=lambda: NOTHING_HIDDEN)
-
-    @property
-    def top_along_px(self) -> int:
-        """The outermost pixel along the fingers."""
-        return self.top.along_px
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class CoarseFingers:
-    """The two fingers, to a pixel.
-
-    Parameters
-    ----------
-    left, right : CoarseFinger
-        Smaller and larger coordinate across.
-    orientation : Orientation
-        The axes that they are given in.
-    score : float
-        How much they look like two fingers; larger is better.
-    is_rooted : bool
-        Whether both go down as far as the picture does.
-    are_cut : bool
-        Whether the picture's border cuts off the outer sides of both.
-    held_along_px : float or None
-        Where along the fingers both hold a part.
-    """
-
-    left: CoarseFinger
-    right: CoarseFinger
-    orientation: Orientation
-    score: float
-    is_rooted: bool
-    are_cut: bool
-    held_along_px: float | None = None
-
-    @property
-    def is_joined(self) -> bool:
-        """Whether a base in view joins them."""
-        return self.left.top.outline is self.right.top.outline
 
 
 def find_fingers(
@@ -325,8 +264,3 @@ def _inner_places(
         for finger, height in zip((left, right), heights, strict=True)
     )
     return first, second
-
-
-def is_hidden(finger: CoarseFinger, along: float) -> bool:
-    """Whether a part hides a finger's inner edge at a place along the fingers."""
-    return bool(finger.hidden.size) and bool(np.isin(round(along), finger.hidden))

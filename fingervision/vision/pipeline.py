@@ -1,6 +1,5 @@
 """The order of the steps: grey, denoise, binarise, fingers, edges, tip, gap. Only this file knows it."""
 
-from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import lru_cache
@@ -9,90 +8,45 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from calib.camera_response import CameraResponse, standard_response
-from fingervision.domain.direction import Direction
+from calib.camera_response import CameraResponse
 from fingervision.domain.errors import FingervisionError
 from fingervision.domain.frame import Coding, Frame, Pixels
 from fingervision.domain.gap import GapMeasurement, NoGap
 from fingervision.domain.region import Region
 from fingervision.domain.status import Status
-from fingervision.vision.binarise import Binary, binarise, binarise_local, split_at
+from fingervision.vision.binarise import Binary, binarise, split_at
+from fingervision.vision.candidates import candidates, found, has_edges
 from fingervision.vision.denoise import denoise
 from fingervision.vision.edges import EdgePoints, fit_edges
-from fingervision.vision.fingers import MORE_THAN_TWO, UNLIKE, CoarseFingers, find_fingers
+from fingervision.vision.fingers import CoarseFingers
 from fingervision.vision.gap import measure_gap
 from fingervision.vision.grey import GreyImage, to_grey, top_level
 from fingervision.vision.held_part import visible_lines
 from fingervision.vision.interlace import at_half_way
 from fingervision.vision.longer_flanks import is_surer, with_longer_flanks
 from fingervision.vision.overlay import draw_boundary, draw_edge_points, draw_overlay, in_eight_bits
-from fingervision.vision.part_removal import is_likelier, looks_parted, without_part
 from fingervision.vision.profile_choice import with_profile
 from fingervision.vision.profile_lines import profile_lines
 from fingervision.vision.residuals import SHARED_POINTS
 from fingervision.vision.response_shift import gap_shift_px
+from fingervision.vision.settings import LINEAR, SRGB, Settings
 from fingervision.vision.stripes import with_stripes
 from fingervision.vision.third_tone import THIRD_TONE, other_threshold
 
-# A picture whose two classes differ by less (share of full scale, and in units of the spread within) shows nothing.
-CONTRAST_FLOOR, SEPARATION_FLOOR = 0.03, 3.0
-# Classes that stand so far apart are not two halves of uneven light: another split would find the same things again.
-CLEAR_SEPARATION = 8.0
+__all__ = ["LINEAR", "SRGB", "Settings", "look_closely", "measure_frame", "steps"]
+
+# A picture whose two classes differ by less (share of full scale) shows nothing.
+CONTRAST_FLOOR = 0.03
 SATURATED_SHARE = 0.99
-# An edge at the limit of blur (5 px) makes half of its contrast within so many pixels to either side, shade does not.
-EDGE_REACH_PX, EDGE_SHARE = 3, 0.2
 # Two fingers and the edges between them need so many pixels.
 SMALLEST_SIDE_PX = 16
 # Where fingers were found and this was wrong with them, nothing else in the picture is taken for fingers.
 FINAL = (Status.SATURATED, Status.BLURRED, Status.GRIPPING)
 # Beside a shadow or a pad a gap that is less sure than this (pixels) may be that of something else.
 LEAST_SURE_AGAIN_PX = 0.3
-# What is taken of a camera that says nothing, and what it may be as well.
-LINEAR, SRGB = standard_response("linear"), standard_response("srgb")
 # A codec that shares noise over more lines than this leaves nothing to be learnt of it in one picture.
 FARTHEST_SHARED = 7.0
 UNIFORM = NoGap(Status.LOW_CONTRAST, "The picture is uniform: nothing in it differs from anything else.")
-# Light ground left and right of one dark thing looks like two light fingers that the border cuts off.
-MAY_BE_GROUND = NoGap(
-    Status.NO_FINGERS,
-    "Light on both sides of something dark reaches the picture's borders: state --fingers light if these are fingers.",
-)
-# The outline is followed so far below the measuring height (pixels, or in units of that height).
-REACH_BELOW_PX, REACH_BELOW_HEIGHTS = 45.0, 1.5
-
-
-@dataclass(frozen=True, slots=True)
-class Settings:
-    """What the user chose.
-
-    Parameters
-    ----------
-    below_tip_px : float
-        Height of measuring below each finger's tip; positive.
-    direction : Direction or None
-        Where the tips point; None finds out in every frame.
-    region : Region or None
-        The part of the frame that is looked at; None is all of it.
-    response : CameraResponse
-        Which light a grey level is taken for.
-    other_response : CameraResponse or None
-        What the response may be as well (one of the standards); None where it is known.
-    bits : int or None
-        Depth of levels that are stored in 16 bits; None finds it in the picture.
-    fingers_are_dark : bool or None
-        Whether the fingers are darker than the ground; None finds out in every frame.
-    is_outline : bool
-        Whether a thick part is measured at its whole outline, side walls included, and not at its front face.
-    """
-
-    below_tip_px: float
-    direction: Direction | None = None
-    region: Region | None = None
-    response: CameraResponse = LINEAR
-    other_response: CameraResponse | None = SRGB
-    bits: int | None = None
-    fingers_are_dark: bool | None = None
-    is_outline: bool = False
 
 
 def measure_frame(frame: Frame, settings: Settings) -> GapMeasurement | NoGap:
@@ -205,9 +159,9 @@ def _attempt(grey: GreyImage, settings: Settings, coding: Coding) -> _Attempt:
     if binary.contrast < CONTRAST_FLOOR * scale:
         return _Attempt(UNIFORM, binary)
     first: _Attempt | None = None
-    for split, fingers, light_gap in _candidates(denoised, binary, settings):
+    for split, fingers, light_gap in candidates(denoised, binary, settings):
         if isinstance(fingers, NoGap):
-            if fingers.status is not Status.NO_FINGERS and not _has_edges(denoised, split, binary.contrast):
+            if fingers.status is not Status.NO_FINGERS and not has_edges(denoised, split, binary.contrast):
                 fingers = NoGap(Status.NO_FINGERS, "Light passes into shade without an edge.")
             attempt = _Attempt(fingers, split)
         else:
@@ -277,7 +231,7 @@ def _with_two_tones(
     if threshold is None or attempt.binary is None:
         return attempt
     split = split_at(denoised, attempt.binary, round(threshold))
-    fingers = _found(split, light_gap, (attempt.fingers.orientation.direction,), settings)
+    fingers = found(split, light_gap, (attempt.fingers.orientation.direction,), settings)
     if isinstance(fingers, CoarseFingers):
         again = _measured(grey, split, fingers, light_gap, settings, coding, scale)
         if isinstance(again.outcome, GapMeasurement) and again.edges is not None:
@@ -306,78 +260,6 @@ def _scale(grey: GreyImage, settings: Settings) -> int:
 @lru_cache(maxsize=4)
 def _light(response: CameraResponse, scale: int, levels: int) -> NDArray[np.float64]:
     return response.table(scale, levels)
-
-
-def _candidates(
-    denoised: GreyImage, binary: Binary, settings: Settings
-) -> Iterator[tuple[Binary, CoarseFingers | NoGap, bool]]:
-    """Where the fingers may be, the likeliest first: darker or lighter than the border, then against uneven light."""
-    directions = tuple(Direction) if settings.direction is None else (settings.direction,)
-    clear = False
-    for is_local in (False, True):
-        split = binarise_local(denoised) if is_local else binary
-        if split.separation < SEPARATION_FLOOR:
-            continue
-        dark_first = _border_is_light(split)
-        unsure: list[tuple[Binary, CoarseFingers | NoGap, bool]] = []
-        for light_gap in (dark_first, not dark_first):
-            if settings.fingers_are_dark not in (None, light_gap):
-                continue
-            fingers = _found(split, light_gap, directions, settings, has_parts=not is_local)
-            if (
-                not light_gap
-                and settings.fingers_are_dark is None
-                and isinstance(fingers, CoarseFingers)
-                and fingers.are_cut
-            ):
-                fingers = MAY_BE_GROUND
-            if isinstance(fingers, CoarseFingers) and not (fingers.is_rooted or fingers.is_joined):
-                unsure.append(
-                    (split, fingers, light_gap)
-                )  # something may come in from the border in the other polarity
-            else:
-                yield split, fingers, light_gap
-                clear = clear or fingers is UNLIKE or (fingers is MORE_THAN_TWO and split.separation > CLEAR_SEPARATION)
-        yield from unsure
-        if clear:
-            break
-
-
-def _found(
-    split: Binary, light_gap: bool, directions: tuple[Direction, ...], settings: Settings, *, has_parts: bool = True
-) -> CoarseFingers | NoGap:
-    """The fingers in one class of a binary picture, also with a part between them.
-
-    A picture that is split against its local mean has hollow things in it, whose rooms are no room between fingers.
-    """
-    below = settings.below_tip_px
-    reach = below + max(REACH_BELOW_PX, REACH_BELOW_HEIGHTS * below)
-    mask = split.dark if light_gap else split.light
-    fingers = find_fingers(mask, directions, below, reach)
-    if not has_parts:
-        return fingers
-    if isinstance(fingers, NoGap):
-        return fingers if fingers is UNLIKE else without_part(mask, directions, below, reach) or fingers
-    if looks_parted(fingers, below, reach):
-        parted = without_part(mask, (fingers.orientation.direction,), below, reach)
-        if parted is not None and is_likelier(parted, below):
-            return parted
-    return fingers
-
-
-def _has_edges(denoised: GreyImage, split: Binary, contrast: float) -> bool:
-    """Whether the grey level changes steeply where light and dark meet, as even the most blurred edge does."""
-    square = np.ones((2 * EDGE_REACH_PX + 1, 2 * EDGE_REACH_PX + 1), dtype=np.uint8)
-    border = np.asarray(cv2.morphologyEx(split.dark, cv2.MORPH_GRADIENT, np.ones((3, 3), dtype=np.uint8))) > 0
-    change = np.asarray(cv2.morphologyEx(denoised, cv2.MORPH_GRADIENT, square))[border]
-    return bool(change.size and np.median(change) > EDGE_SHARE * contrast)
-
-
-def _border_is_light(binary: Binary) -> bool:
-    """Whether most of the picture's border is ground of the light kind."""
-    dark = binary.dark
-    border = (dark[0], dark[-1], dark[:, 0], dark[:, -1])
-    return sum(int(np.count_nonzero(side)) for side in border) < 0.5 * sum(side.size for side in border)
 
 
 def _shifted(measured: GapMeasurement | NoGap, region: Region | None) -> GapMeasurement | NoGap:

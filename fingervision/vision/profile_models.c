@@ -106,20 +106,30 @@ LOOP(profile_models_fit_profile, "iFFFddidd", "bdddddd") {
             matrix[4] = 1.0;
             right[1] = 0.0;
         }
+        /* What stands at its limit and is drawn beyond it stays there: the others go on as if it were known. */
+        double limits[3][2] = {{-FARTHEST_PX, FARTHEST_PX}, {LEAST_BLUR_PX, LARGEST_BLUR_PX}, {in[7].d, in[8].d}};
+        double free_matrix[9], free_right[3];
+        memcpy(free_matrix, matrix, sizeof free_matrix);
+        memcpy(free_right, right, sizeof free_right);
+        for (int a = 0; a < free_count; a++) {
+            int is_drawn = (p[POSITION + a] <= limits[a][0] && right[a] < 0.0) || (p[POSITION + a] >= limits[a][1] && right[a] > 0.0);
+            if (!is_drawn) continue;
+            for (int b = 0; b < free_count; b++) free_matrix[a * 3 + b] = free_matrix[b * 3 + a] = 0.0;
+            free_matrix[a * 3 + a] = 1.0;
+            free_right[a] = 0.0;
+        }
         int has_moved = 0;
         for (int attempt = 0; attempt < 6; attempt++) {
             double damped[9], move[3], new[PARAMETERS];
             for (int a = 0; a < free_count; a++) {
-                for (int b = 0; b < free_count; b++) damped[a * free_count + b] = matrix[a * 3 + b];
-                damped[a * free_count + a] = matrix[a * 3 + a] * (1.0 + damping) + 1e-12;
-                move[a] = right[a];
+                for (int b = 0; b < free_count; b++) damped[a * free_count + b] = free_matrix[a * 3 + b];
+                damped[a * free_count + a] = free_matrix[a * 3 + a] * (1.0 + damping) + 1e-12;
+                move[a] = free_right[a];
             }
             if (!solve(damped, free_count, move, 1)) goto done;
             memcpy(new, p, sizeof new);
             for (int a = 0; a < free_count; a++) new[POSITION + a] += within(move[a], -1.0, 1.0);
-            new[POSITION] = within(new[POSITION], -FARTHEST_PX, FARTHEST_PX);
-            new[BLUR] = within(new[BLUR], LEAST_BLUR_PX, LARGEST_BLUR_PX);
-            if (free_count == 3) new[BREADTH] = within(new[BREADTH], in[7].d, in[8].d);
+            for (int a = 0; a < free_count; a++) new[POSITION + a] = within(new[POSITION + a], limits[a][0], limits[a][1]);
             double squares = squares_of(&s, new, other);
             if (squares < 0.0) goto done;
             if (squares < best) {

@@ -1,9 +1,10 @@
 """Speed, memory and start-up of `measure`.
 
-    python tests/benchmarks/speed.py [--frames 1500] [--runs 5] [--only rate|memory|start]
+    python tests/benchmarks/speed.py [--frames 1500] [--runs 5] [--only rate|kinds|memory|start]
 
 Rate: frames per second of decoding alone and of measuring, in turn on the same file, medians; and milliseconds of one
-core for everything after decoding, beside the same steps written plainly with OpenCV and with scikit-image. Memory:
+core for everything after decoding, beside the same steps written plainly with OpenCV and with scikit-image. Kinds: the
+same milliseconds for a picture of 3840x2160 and for each kind of picture without two fingers, which is refused. Memory:
 peak of a 10-minute file against a 10-second one. Start-up: `fingervision --help`. Every figure is that of the machine
 it runs on; the clip is 640x480, H.264 of about 5 Mbit/s.
 """
@@ -27,6 +28,7 @@ from skimage import measure as shapes
 from calib.calibration import BareScale
 from fingervision.domain.direction import Direction
 from fingervision.domain.frame import Coding, Frame, Pixels
+from fingervision.domain.gap import NoGap
 from fingervision.frames.source import open_source
 from fingervision.measuring.measure import measure
 from fingervision.measuring.task import Task
@@ -142,6 +144,26 @@ def rate(folder: Path, levels: list[Pixels], frames: int, runs: int) -> None:
         print(f"{name:34}{statistics.median(spent):10.2f}")
 
 
+def kinds(runs: int) -> None:
+    """Milliseconds of one core for a large picture, and for those that are refused."""
+    sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
+    from tests.benchmarks.scenes.empty import EMPTY
+
+    rng = np.random.default_rng(2)
+    large = two_fingers(700.0, below_tip_px=6.0 * BELOW_PX, width_px=500.0, radius_px=200.0, frame=(3840, 2160))
+    shown = [("3840x2160", render(large, Camera(blur_px=1.2, noise_grey=2.0), rng), 6.0 * BELOW_PX)]
+    shown += [(f"refused: {name}", draw(rng).picture, BELOW_PX) for name, draw in EMPTY.items()]
+    print(f"\n{'After decoding, ms of one core':34}{'ms/frame':>10}   what came out")
+    for name, pixels, below_px in shown:
+        spent = []
+        for _ in range(runs):
+            start = time.process_time()
+            outcome = measure_frame(Frame(pixels, 0), Settings(below_px))
+            spent.append(1e3 * (time.process_time() - start))
+        words = outcome.status.value if isinstance(outcome, NoGap) else f"{outcome.gap_px:.2f} px"
+        print(f"{name:34}{min(spent):10.2f}   {words}", flush=True)
+
+
 def peak_mb(path: Path, out: Path) -> float:
     """Largest resident memory of a whole `measure`."""
     command = [sys.executable, "-m", "fingervision", "measure", str(path), "--px-per-mm", "34", "--out", str(out)]
@@ -174,7 +196,7 @@ def memory(folder: Path, levels: list[Pixels]) -> None:
     clip, long = folder / "250.mp4", folder / "15000.mp4"
     write(clip, 250, levels)
     repeat(clip, long, 60)
-    peak_mb(clip, folder / "compiled")  # the very first run compiles, which takes more memory than any video
+    peak_mb(clip, folder / "built")  # the very first run of a source tree builds its loops
     first = None
     for words, path in (("10 seconds, 250 frames", clip), ("10 minutes, 15000 frames", long)):
         frames = decode(path)
@@ -195,12 +217,14 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--frames", type=int, default=1500)
     parser.add_argument("--runs", type=int, default=5)
-    parser.add_argument("--only", choices=["rate", "memory", "start"])
+    parser.add_argument("--only", choices=["rate", "kinds", "memory", "start"])
     asked = parser.parse_args()
     with tempfile.TemporaryDirectory() as name:
-        folder, levels = Path(name), pictures() if asked.only != "start" else []
+        folder, levels = Path(name), pictures() if asked.only not in ("start", "kinds") else []
         if asked.only in (None, "rate"):
             rate(folder, levels, asked.frames, asked.runs)
+        if asked.only in (None, "kinds"):
+            kinds(asked.runs)
         if asked.only in (None, "start"):
             start_up(asked.runs)
         if asked.only in (None, "memory"):

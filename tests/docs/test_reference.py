@@ -60,6 +60,16 @@ def test_every_key_of_a_recipe_stands_in_the_reference() -> None:
             assert f"`{key}`" in page, f"{key} of {name}"
 
 
+def test_every_file_that_a_page_names_is_there() -> None:
+    there = {path.name for top in ("fingervision", "calib", "tests", "docs") for path in (ROOT / top).rglob("*.py")}
+    written_by_readers = {"bent_screw.py", "my_stage.py"}
+    for page in (ROOT / "docs").rglob("*.md"):
+        for name in re.findall(r"`([\w/]+\.py)`", page.read_text(encoding="utf-8")):
+            assert name.split("/")[-1] in there | written_by_readers, f"{page.name} names {name}, which is not there"
+            if name.startswith(("fingervision/", "calib/", "tests/")):
+                assert (ROOT / name).exists(), f"{page.name} names {name}, which is elsewhere"
+
+
 @pytest.mark.parametrize("path", sorted((ROOT / "docs" / "figures").glob("*.svg")), ids=lambda path: path.stem)
 def test_a_figure_is_what_its_script_draws(path: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     drawn_by = re.search(r"Matplotlib v([\d.]+)", path.read_text(encoding="utf-8"))

@@ -1,0 +1,101 @@
+"""Where the fingers may be: in the darker or in the lighter class of a picture, split once or against its own light."""
+
+from collections.abc import Iterator
+
+import cv2
+import numpy as np
+
+from fingervision.domain.direction import Direction
+from fingervision.domain.gap import NoGap
+from fingervision.domain.status import Status
+from fingervision.vision.binarise import Binary, binarise_local
+from fingervision.vision.fingers import MORE_THAN_TWO, UNLIKE, CoarseFingers, find_fingers
+from fingervision.vision.grey import GreyImage
+from fingervision.vision.part_removal import is_likelier, looks_parted, without_part
+from fingervision.vision.settings import Settings
+
+# Classes that differ by less, in units of the spread within, show nothing.
+SEPARATION_FLOOR = 3.0
+# Classes that stand so far apart are not two halves of uneven light: another split would find the same things again.
+CLEAR_SEPARATION = 8.0
+# An edge at the limit of blur (5 px) makes half of its contrast within so many pixels to either side, shade does not.
+EDGE_REACH_PX, EDGE_SHARE = 3, 0.2
+# Light ground left and right of one dark thing looks like two light fingers that the border cuts off.
+MAY_BE_GROUND = NoGap(
+    Status.NO_FINGERS,
+    "Light on both sides of something dark reaches the picture's borders: state --fingers light if these are fingers.",
+)
+# The outline is followed so far below the measuring height (pixels, or in units of that height).
+REACH_BELOW_PX, REACH_BELOW_HEIGHTS = 45.0, 1.5
+
+
+def candidates(
+    denoised: GreyImage, binary: Binary, settings: Settings
+) -> Iterator[tuple[Binary, CoarseFingers | NoGap, bool]]:
+    """Where the fingers may be, the likeliest first: darker or lighter than the border, then against uneven light."""
+    directions = tuple(Direction) if settings.direction is None else (settings.direction,)
+    clear = False
+    for is_local in (False, True):
+        split = binarise_local(denoised) if is_local else binary
+        if split.separation < SEPARATION_FLOOR:
+            continue
+        dark_first = _border_is_light(split)
+        unsure: list[tuple[Binary, CoarseFingers | NoGap, bool]] = []
+        for light_gap in (dark_first, not dark_first):
+            if settings.fingers_are_dark not in (None, light_gap):
+                continue
+            fingers = found(split, light_gap, directions, settings, has_parts=not is_local)
+            if (
+                not light_gap
+                and settings.fingers_are_dark is None
+                and isinstance(fingers, CoarseFingers)
+                and fingers.are_cut
+            ):
+                fingers = MAY_BE_GROUND
+            if isinstance(fingers, CoarseFingers) and not (fingers.is_rooted or fingers.is_joined):
+                unsure.append(
+                    (split, fingers, light_gap)
+                )  # something may come in from the border in the other polarity
+            else:
+                yield split, fingers, light_gap
+                clear = clear or fingers is UNLIKE or (fingers is MORE_THAN_TWO and split.separation > CLEAR_SEPARATION)
+        yield from unsure
+        if clear:
+            break
+
+
+def found(
+    split: Binary, light_gap: bool, directions: tuple[Direction, ...], settings: Settings, *, has_parts: bool = True
+) -> CoarseFingers | NoGap:
+    """The fingers in one class of a binary picture, also with a part between them.
+
+    A picture that is split against its local mean has hollow things in it, whose rooms are no room between fingers.
+    """
+    below = settings.below_tip_px
+    reach = below + max(REACH_BELOW_PX, REACH_BELOW_HEIGHTS * below)
+    mask = split.dark if light_gap else split.light
+    fingers = find_fingers(mask, directions, below, reach)
+    if not has_parts:
+        return fingers
+    if isinstance(fingers, NoGap):
+        return fingers if fingers is UNLIKE else without_part(mask, directions, below, reach) or fingers
+    if looks_parted(fingers, below, reach):
+        parted = without_part(mask, (fingers.orientation.direction,), below, reach)
+        if parted is not None and is_likelier(parted, below):
+            return parted
+    return fingers
+
+
+def has_edges(denoised: GreyImage, split: Binary, contrast: float) -> bool:
+    """Whether the grey level changes steeply where light and dark meet, as even the most blurred edge does."""
+    square = np.ones((2 * EDGE_REACH_PX + 1, 2 * EDGE_REACH_PX + 1), dtype=np.uint8)
+    border = np.asarray(cv2.morphologyEx(split.dark, cv2.MORPH_GRADIENT, np.ones((3, 3), dtype=np.uint8))) > 0
+    change = np.asarray(cv2.morphologyEx(denoised, cv2.MORPH_GRADIENT, square))[border]
+    return bool(change.size and np.median(change) > EDGE_SHARE * contrast)
+
+
+def _border_is_light(binary: Binary) -> bool:
+    """Whether most of the picture's border is ground of the light kind."""
+    dark = binary.dark
+    border = (dark[0], dark[-1], dark[:, 0], dark[:, -1])
+    return sum(int(np.count_nonzero(side)) for side in border) < 0.5 * sum(side.size for side in border)
