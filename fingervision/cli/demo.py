@@ -11,7 +11,7 @@ EXAMPLES = """
 \b
 Examples:
   fingervision demo
-  fingervision demo --hide backlash:play_mm=0.15
+  fingervision demo --hide backlash:play_mm=0.15 --out backlash
   fingervision demo --seed 5 --out shown
 """
 

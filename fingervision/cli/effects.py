@@ -59,7 +59,7 @@ def command(name: str | None, figure: Path | None) -> None:
     place = f"{effect.order:g} within its stage" if effect.order < float("inf") else "last of its stage"
     click.echo(f"  acts      {place}\n  from      {origin_of(name)}")
     for p in effect.parameters:
-        click.echo(f"  {p.name} ({p.unit or 'ratio'}): {p.words}, {p.lower:g} to {p.upper:g}, narrowed by the data")
+        click.echo(f"  {p.words}: {p.name}, {p.unit or 'ratio'}, {p.lower:g} to {p.upper:g}, narrowed by the data")
     if figure is not None:
         from fingervision.diagnosis.report.effect_figure import effect_figure
         from fingervision.diagnosis.report.vector_figure import png_bytes

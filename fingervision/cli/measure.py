@@ -19,7 +19,7 @@ Examples:
   fingervision measure opening.mp4 --calibration calibration.json
   fingervision measure opening.mp4 --px-per-mm 34 --overlay --out results/opening
   fingervision measure frames/ --rate-hz 25 --px-per-mm 34
-  fingervision measure 'frames/*.png' --px-per-mm 34 --tips down --roi 100,80,400,300
+  fingervision measure 'frames/*.png' --px-per-mm 34 --tips up --roi 100,80,400,300
   fingervision measure opening.mp4 --calibration calibration.json --drive drive.csv
   fingervision measure opening.mp4 --calibration calibration.json --drive drive.csv --drive-offset-s 0.12
   fingervision measure opening.mp4 --px-per-mm 34 --steps 10

@@ -36,7 +36,7 @@ Examples:
   fingervision model gripper.toml --kind lumped --object-mm 3 --object-n-mm 50
   fingervision model gripper.toml --kind lumped --frequency 1:500 --modes 500Hz --film
   fingervision model mechanism.toml --vary lengths.t=0.2:0.4:5
-  fingervision model mechanism.toml --large-rotation --mesh --out model
+  fingervision model mechanism.toml --large-rotation --mesh --out stage
 """
 
 

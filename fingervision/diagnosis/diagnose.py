@@ -288,10 +288,13 @@ def _named(data: Observations, found: Findings) -> tuple[NamedEffect, ...]:
         # What these data cannot show stays at the value at which it does nothing.
         still = {p.name: Estimate(p.neutral or 0.0, None, p.unit) for p in effect.parameters if p.name not in known}
         ordered = {p.name: {**known, **still}[p.name] for p in effect.parameters}
-        out[name] = NamedEffect(name, str(effect.stage), {**ordered, **known})
+        shown = {p.name: p.words for p in (*effect.parameters, *(p for owner, p in listed if owner == name))}
+        out[name] = NamedEffect(name, str(effect.stage), {**ordered, **known}, shown=shown)
     curve = data.position_map
     if curve is not None:
         described = {"rms_mm": curve.rms_mm, "length_mm": curve.length_mm}
         points = tuple(zip(curve.nodes_mm.tolist(), curve.curve_mm.tolist(), strict=True))
-        out[NAME] = NamedEffect(NAME, str(catalogue()[NAME].stage), described, points)
+        entry = catalogue()[NAME]
+        shown = {p.name: p.words for p in entry.parameters}
+        out[NAME] = NamedEffect(NAME, str(entry.stage), described, points, shown=shown)
     return tuple(out[name] for name in catalogue() if name in out)

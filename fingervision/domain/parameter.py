@@ -19,7 +19,7 @@ class Parameter:
     lower, upper : float
         Physical bounds: the range that is searched.
     words : str
-        What it is, for a reader.
+        Display name: what sentences, pages and figures call it. Files keep `name`.
     neutral : float or None
         The value at which the effect changes nothing; None for a shape (a period, a time constant) that by itself
         changes nothing while the effect's amplitude is at its neutral value.

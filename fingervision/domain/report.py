@@ -1,8 +1,9 @@
 """What a diagnosis found: the noun that report.json and report.html are written from."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import StrEnum
+from types import MappingProxyType
 
 from fingervision.domain.parameter import Estimate
 
@@ -18,10 +19,22 @@ class Verdict(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class NamedEffect:
-    """An effect of the answer with its parameters; `points` is the curve of a map, input and error in mm.
+    """An effect of the answer with its parameters.
 
-    `place` is the hinge or link that it is the effect of, as the drawing calls it, and `end` the end of a link that
-    sits off; empty where the effect has no place.
+    Parameters
+    ----------
+    name, stage : str
+        As in the catalogue.
+    parameters : mapping of str to Estimate
+        By their keys, which every file uses.
+    points : tuple of (float, float)
+        The curve of a map, input and error in mm.
+    place : str
+        The hinge or link that it is the effect of, as the drawing calls it; empty where the effect has no place.
+    end : str
+        The end of a link that sits off; likewise.
+    shown : mapping of str to str
+        Display names by key, as the effect's own file declares them; for sentences, pages and figures.
     """
 
     name: str
@@ -30,6 +43,11 @@ class NamedEffect:
     points: tuple[tuple[float, float], ...] = ()
     place: str = ""
     end: str = ""
+    shown: Mapping[str, str] = field(default_factory=lambda: MappingProxyType({}))
+
+    def display_name(self, key: str) -> str:
+        """What people read in the place of a parameter's key; the key where nothing is declared."""
+        return self.shown.get(key, key)
 
 
 @dataclass(frozen=True, slots=True)

@@ -19,7 +19,7 @@ EFFECT = PointEffect(
     formula="right share 1/2 + share, left 1/2 - share; the gap does not change",
     source="definition",
     residual="the midline moves in proportion to the opening",
-    parameters=(Parameter("share", "", -0.5, 0.5, "share that moves from left to right", typical=0.05),),
+    parameters=(Parameter("share", "", -0.5, 0.5, "share of the motion that moves from left to right", typical=0.05),),
     needs_edges=True,
     checks={FurtherCheck.TURN: True},
     odd=("share",),

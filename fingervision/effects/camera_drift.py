@@ -19,7 +19,7 @@ EFFECT = PointEffect(
     formula="x + rate_mm_per_s t",
     source="definition",
     residual="the midline moves evenly in time",
-    parameters=(Parameter("rate_mm_per_s", "mm/s", -0.05, 0.05, "drift", typical=0.001),),
+    parameters=(Parameter("rate_mm_per_s", "mm/s", -0.05, 0.05, "drift of the camera", typical=0.001),),
     needs_times=True,
     needs_shared_clock=True,
     needs_edges=True,

@@ -41,7 +41,7 @@ EFFECT = PointEffect(
     formula="everything at t - delay_s",
     source="a pure delay",
     residual="proportional to the speed of the points, drifts included",
-    parameters=(Parameter("delay_s", "s", 0.0, 1.0, "delay", starts=8, logarithmic=True),),
+    parameters=(Parameter("delay_s", "s", 0.0, 1.0, "delay of the picture", starts=8, logarithmic=True),),
     needs_times=True,
     narrow=narrow,
     checks={FurtherCheck.LIGHT: True},

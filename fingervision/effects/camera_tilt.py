@@ -25,7 +25,9 @@ EFFECT = PointEffect(
     formula="x / (1 + k_per_mm x)",
     source="central projection of a tilted plane",
     residual="the square of the coordinate: the midline moves with the opening squared",
-    parameters=(Parameter("k_per_mm", "1/mm", -0.02, 0.02, "keystone", typical=0.002),),
+    parameters=(
+        Parameter("k_per_mm", "1/mm", -0.02, 0.02, "keystone, change of the scale across the picture", typical=0.002),
+    ),
     needs_edges=True,
     checks={FurtherCheck.TURN: False},
     odd=("k_per_mm",),

@@ -29,7 +29,7 @@ EFFECT = DriveEffect(
     formula="u(t - delay_s)",
     source="a pure delay: transport in the controller and the log",
     residual="proportional to the speed; changes sign at a reversal; nothing in holds",
-    parameters=(Parameter("delay_s", "s", 0.0, 1.0, "delay", starts=8, logarithmic=True),),
+    parameters=(Parameter("delay_s", "s", 0.0, 1.0, "delay of the drive", starts=8, logarithmic=True),),
     needs_times=True,
     memory=True,
     narrow=narrow,

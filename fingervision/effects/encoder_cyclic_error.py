@@ -38,9 +38,9 @@ EFFECT = DriveEffect(
     source="interpolation error of incremental encoders (Heydemann 1981)",
     residual="a sinusoid over the input, the same in every run",
     parameters=(
-        Parameter("amplitude_mm", "mm", 0.0, 0.2, "amplitude"),
+        Parameter("amplitude_mm", "mm", 0.0, 0.2, "amplitude of the cyclic error"),
         Parameter("period_mm", "mm", 0.0001, 10.0, "period of the scale", neutral=None, starts=24, reciprocal=True),
-        Parameter("phase_rad", "rad", -3.15, 3.15, "phase", neutral=None, starts=4),
+        Parameter("phase_rad", "rad", -3.15, 3.15, "phase of the cyclic error", neutral=None, starts=4),
     ),
     narrow=narrow,
     wave=("amplitude_mm", "period_mm"),

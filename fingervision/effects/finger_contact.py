@@ -36,7 +36,7 @@ EFFECT = PointEffect(
     source="unilateral contact with compliance",
     residual="zero above the floor, then the simulation goes on closing and the fingers do not",
     parameters=(
-        Parameter("floor_mm", "mm", 0.0, 100.0, "gap at which they meet", starts=10),
+        Parameter("floor_mm", "mm", 0.0, 100.0, "gap at which the fingers meet", starts=10),
         Parameter("remaining_slope", "", 0.0, 0.5, "share of the closing that goes on", neutral=None, starts=2),
     ),
     narrow=narrow,

@@ -36,7 +36,7 @@ EFFECT = DriveEffect(
     source="Iwan 1966; Maxwell slip",
     residual="a lens-shaped loop that closes at the reversals",
     parameters=(
-        Parameter("fraction", "", 0.0, 0.9, "share of the drive that the sliders hold back"),
+        Parameter("fraction", "", 0.0, 0.9, "share of the drive that friction holds back"),
         Parameter(
             "reach_mm",
             "mm",

@@ -88,7 +88,7 @@ EFFECT = DriveEffect(
     residual="the same curve over the input in both directions and in every run",
     parameters=(
         Parameter("rms_mm", "mm", 0.0, 1.0, "root mean square of the errors"),
-        Parameter("length_mm", "mm", 1e-4, 1e4, "length over which they change", neutral=None, logarithmic=True),
+        Parameter("length_mm", "mm", 1e-4, 1e4, "length over which the errors change", neutral=None, logarithmic=True),
     ),
     narrow=narrow,
     act=act,

@@ -23,8 +23,8 @@ EFFECT = PointEffect(
     source="first-order warming",
     residual="an exponential over the time of the whole table, gap only",
     parameters=(
-        Parameter("amplitude_mm", "mm", -2.0, 2.0, "final change"),
-        Parameter("tau_s", "s", 2.0, 3000.0, "time constant", neutral=None, starts=5, logarithmic=True),
+        Parameter("amplitude_mm", "mm", -2.0, 2.0, "final thermal change"),
+        Parameter("tau_s", "s", 2.0, 3000.0, "thermal time constant", neutral=None, starts=5, logarithmic=True),
     ),
     needs_times=True,
     needs_shared_clock=True,

@@ -50,6 +50,15 @@ def exposures(folder: Path) -> None:
         _write(folder / name, np.rint(255.0 * light ** (1.0 / 2.2)).astype(np.uint8))
 
 
+def step_wedge(folder: Path) -> None:
+    """Draw a step wedge of 20 fields with densities from 0.05 to 1.95, by the camera of `exposures`."""
+    rng = np.random.default_rng(SEED)
+    light = np.full((480, 640), 0.5)
+    light[200:260, 40:600] = np.repeat(10.0 ** -np.arange(0.05, 2.0, 0.1), 28)
+    light = np.clip(0.9 * light + 1e-3 * rng.standard_normal(light.shape), 0.0, 1.0)
+    _write(folder / "wedge.png", np.rint(255.0 * light ** (1.0 / 2.2)).astype(np.uint8))
+
+
 def micrometer(folder: Path) -> None:
     """Draw a line scale of 0.1 mm pitch, 34 pixels apart, seen a degree off the picture's rows."""
     import cv2
@@ -87,4 +96,4 @@ def _write(path: Path, picture: "Pixels") -> None:
     path.write_bytes(cv2.imencode(".png", picture)[1].tobytes())
 
 
-__all__ = ["board_pictures", "exposures", "micrometer"]
+__all__ = ["board_pictures", "exposures", "micrometer", "step_wedge"]

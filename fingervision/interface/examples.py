@@ -7,7 +7,7 @@ from pathlib import Path
 
 import fingervision
 from fingervision.domain.errors import OutputError, UnknownNameError, UsageError
-from fingervision.interface.example_pictures import board_pictures, exposures, micrometer
+from fingervision.interface.example_pictures import board_pictures, exposures, micrometer, step_wedge
 from fingervision.storage.sample_folder import sample_folder
 
 OWN = "own:"
@@ -44,7 +44,12 @@ class Case:
 CASES = {
     "measure": Case(
         "the gap between two fingers in a video and in single pictures, joined with the stage's log",
-        {**OPENING, "drive.csv": "opening/drive.csv", **FRAMES},
+        {
+            **OPENING,
+            "drive.csv": "opening/drive.csv",
+            "gauges.toml": "opening/gauges.toml",
+            **FRAMES,
+        },
         "fingervision measure opening.mp4 --calibration calibration.json --drive drive.csv",
     ),
     "inspect": Case(
@@ -60,6 +65,9 @@ CASES = {
             "ref17.png": "reference/bar_17mm.png",
             "ref3.png": "reference/slot_03mm.png",
             "object.png": "reference/bar_08mm.png",
+            "bar1.png": "reference/bar_02mm.png",
+            "bar2.png": "reference/bar_08mm.png",
+            "bar3.png": "reference/bar_14mm.png",
             "calibration.json": "reference/calibration.json",
             "opening.mp4": "opening/opening.mp4",
             **{
@@ -68,7 +76,7 @@ CASES = {
             },
         },
         "fingervision calibrate bar ref5.png=5.000 ref11.png=11.000 ref17.png=17.000 -o own.json",
-        (board_pictures, exposures, micrometer),
+        (board_pictures, exposures, micrometer, step_wedge),
     ),
     "compare": Case(
         "where a measured table and a simulation disagree",
@@ -99,6 +107,11 @@ CASES = {
             "gripper.csv": "paper_run/gripper.csv",
         },
         "fingervision bed run recipe.toml --hide sealed.toml --out run",
+    ),
+    "effects": Case(
+        "an effect of one's own in a file, listed and diagnosed beside the catalogue",
+        {"mine.py": f"{OWN}examples/effects/mine.py", **PAPER_RUN},
+        "fingervision effects --effects ./mine.py",
     ),
     "table": Case(
         "foreign tables, and what they are understood as",

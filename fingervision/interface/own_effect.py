@@ -11,9 +11,12 @@ from fingervision.domain.parameter import Parameter
 from fingervision.effects import catalogue, register, withdraw
 from fingervision.interface.argument_checks import one_of
 from fingervision.interface.argument_names import speaks_python
+from fingervision.plugins.watched_import import importing
 
 ARGUMENTS = 3
 """Of an effect's function: the signal, the history, the values of its parameters."""
+_registered: dict[str, Effect] = {}
+"""What the decorator added, by name, as it was given back."""
 
 
 @speaks_python
@@ -97,20 +100,22 @@ def effect(
             raise ArgumentTypeError("effect", "decorate a function of (signal, history, values)", f"is {function!r}")
         words, formula = _sentences(function)
         kind: Any = DriveEffect if where == Stage.DRIVE else PointEffect
-        return register(
-            kind(
-                name=name or function.__name__,
-                stage=where,
-                order=order,
-                words=words,
-                formula=formula,
-                source=source,
-                residual=residual,
-                parameters=listed,
-                act=function,
-                **needs,
-            )
+        own: Effect = kind(
+            name=name or function.__name__,
+            stage=where,
+            order=order,
+            words=words,
+            formula=formula,
+            source=source,
+            residual=residual,
+            parameters=listed,
+            act=function,
+            **needs,
         )
+        # Whoever imports a file of effects adds what it holds, and says where it comes from.
+        if not importing():
+            _registered[own.name] = register(own)
+        return own
 
     return made
 
@@ -119,7 +124,7 @@ def effect(
 def added(effects: Iterable[Effect]) -> Iterator[None]:
     """Add effects to the catalogue for as long as a block lasts; those that stand in it stay as they are."""
     known = catalogue()
-    new = [each for each in effects if known.get(each.name) is not each]
+    new = [each for each in effects if not (each.name in known and _registered.get(each.name) is each)]
     try:
         for each in new:
             register(each)
@@ -128,7 +133,7 @@ def added(effects: Iterable[Effect]) -> Iterator[None]:
         for each in new:
             withdraw(each.name)
             if each.name in known:
-                register(known[each.name])
+                register(_registered.get(each.name, known[each.name]))
 
 
 def _order(stage: Stage, after: str | None) -> float:

@@ -13,6 +13,7 @@ from click.testing import CliRunner, Result
 from fingervision.cli import cli
 from fingervision.diagnosis.report.effect_figure import effect_figure
 from fingervision.diagnosis.report.frame_strip import strip_html, turning_rows
+from fingervision.domain.errors import UsageError
 from fingervision.effects import catalogue
 
 CHROMIUM = shutil.which("chromium")
@@ -110,7 +111,7 @@ def test_one_model_is_diagnosed_at_a_time(rig: Path) -> None:
 
 def test_the_same_model_twice_is_refused(rig: Path) -> None:
     done = run("compare", rig / "measured.csv", "--model", rig / "steep.csv", "--model", rig / "steep.csv")
-    assert done.exit_code == 2
+    assert isinstance(done.exception, UsageError)
 
 
 @pytest.mark.slow

@@ -258,5 +258,6 @@ def _named(best: Fitted) -> NamedEffect:
     estimates = {candidate.parameter.name: Estimate(best.size, best.u, candidate.parameter.unit)}
     for parameter in catalogue()[candidate.name].parameters:
         estimates.setdefault(parameter.name, Estimate(parameter.neutral or 0.0, None, parameter.unit))
+    shown = {p.name: p.words for p in (*catalogue()[candidate.name].parameters, candidate.parameter)}
     return NamedEffect(candidate.name, str(catalogue()[candidate.name].stage), estimates, (), candidate.place,
-                       candidate.detail)  # fmt: skip
+                       candidate.detail, shown)  # fmt: skip

@@ -67,7 +67,7 @@ def report_page(diagnosis: Diagnosis, made: Provenance, frames: str) -> str:
         figure = png_bytes(residual_figure(before, after if report.effects else None, history))
         residuals += _picture(figure, "Measured minus predicted of each finger and channel, over input and time")
     parameters = [
-        [escape(effect.name), escape(name), *interval(e)]
+        [escape(effect.name), escape(effect.display_name(name)), *interval(e)]
         for effect in report.effects
         for name, e in effect.parameters.items()
     ]

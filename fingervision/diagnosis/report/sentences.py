@@ -8,6 +8,8 @@ from fingervision.diagnosis.input.observations import Observations
 from fingervision.domain.effect import Array
 from fingervision.domain.report import Disagreement, NamedEffect, Verdict
 
+COVERAGE_FACTOR = 2.0
+"""Standard uncertainties in an expanded one: about 95 % for a normal distribution (JCGM 100:2008, 6.2)."""
 ODD_SIGMAS = 2.5
 """In a table of a few rows a person wants to know of any row this far off, even where it was not set aside."""
 FEW_ROWS = 60
@@ -15,12 +17,14 @@ FEW_ROWS = 60
 
 
 def phrase(effect: NamedEffect) -> str:
-    """Name an effect with its parameters and their standard uncertainties."""
+    """Name an effect with its parameters, by their display names, and their expanded uncertainties (k = 2)."""
     parts = []
-    for name, e in effect.parameters.items():
-        u = "" if e.u is None else f" +-{e.u:.2g}"
-        parts.append(f"{name} = {e.value:.4g}{u}{' ' + e.unit if e.unit else ''}")
-    return f"{effect.name} ({', '.join(parts)})"
+    for key, e in effect.parameters.items():
+        unit = f" {e.unit}" if e.unit else ""
+        u = "" if e.u is None else f", U = {COVERAGE_FACTOR * e.u:.2g}{unit}"
+        parts.append(f"{effect.display_name(key)} {e.value:.4g}{unit}{u}")
+    coverage = "; k = 2" if any(e.u is not None for e in effect.parameters.values()) else ""
+    return f"{effect.name} ({'; '.join(parts)}{coverage})"
 
 
 def answer(
