@@ -13,7 +13,6 @@ Examples:
   fingervision effects
   fingervision effects backlash
   fingervision effects backlash --figure backlash.png
-  fingervision effects --effects ./mine.py
 """
 
 

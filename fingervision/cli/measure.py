@@ -31,6 +31,7 @@ Files written to --out:
   gaps.csv      one row a frame: gap with its uncertainty, points, tips, or why there is no number
   summary.json  counts, statistics, settings, scale, what the uncertainty covers and what it does not
   gap.png       the gap over time
+  bodies.csv    with --mechanism: pose and status of every body and hinge, frame by frame
   gauges.csv    with --gauges: one row a number, time_s,gauge,quantity,value,u,unit,status
   overlay.mp4   with --overlay: edges, tips, points and value drawn in
   steps/        with --steps: a picture of every step
@@ -84,6 +85,19 @@ Exit codes: 0 done; 1 could not, or no frame gave a number; 2 wrong usage;
     type=click.Path(path_type=Path),
     help="Gauges of your own (gauges.toml): edges, lines, circles, marks, patches.",
 )
+@click.option(
+    "--mechanism",
+    type=click.Path(path_type=Path),
+    metavar="FILE",
+    help="gripper.toml or mechanism.toml: also follow the bodies that it draws, bodies.csv.",
+)
+@click.option(
+    "--at",
+    "points",
+    multiple=True,
+    metavar="X,Y=XMM,YMM",
+    help="With --mechanism: where a point of the drawing lies in the first picture, in px and in mm; three tell all.",
+)
 @click.option("--overlay", is_flag=True, help="Also write overlay.mp4.")
 @click.option("--steps", "steps_frame", type=int, metavar="FRAME", help="Also write every step of this frame (from 0).")
 @click.option(
@@ -109,6 +123,8 @@ def command(
     fingers: str,
     face: str,
     gauges: Path | None,
+    mechanism: Path | None,
+    points: tuple[str, ...],
     overlay: bool,
     steps_frame: int | None,
     out: Path | None,
@@ -119,9 +135,12 @@ def command(
     The gap is the distance between the fingers' inner edges, 0.3 mm below their tips, in every frame, with its standard
     uncertainty. One of --calibration and --px-per-mm is required.
     """
+    from fingervision.domain.errors import UsageError
     from fingervision.interface.measure import measure_into
     from fingervision.interface.measuring_task import measuring_task, scale_of
 
+    if points and mechanism is None:
+        raise UsageError("--at says where a drawing lies, but there is none: add --mechanism FILE, or leave --at out.")
     task = measuring_task(
         scale=scale_of(calibration, px_per_mm),
         below_tip_mm=below_tip_mm,
@@ -142,6 +161,12 @@ def command(
     with _Bar() as bar:
         measured = measure_into(out, recording, task, rate_hz, bar)
     _report(measured, as_json)
+    if mechanism is not None:
+        from fingervision.cli._measure_bodies import follow_bodies
+        from fingervision.frames.source import Wish, open_source
+
+        source = open_source(recording, Wish(rate_hz=rate_hz))
+        follow_bodies(source, mechanism, points, task.scale, measured.folder.path, as_json)
     raise SystemExit(int(measured.exit_code))
 
 

@@ -164,7 +164,9 @@ def command(
         rows[name] = {**row, "seconds": round(time.perf_counter() - began, 3)}
         folder = out / name if kind == "all" else out
         folder.mkdir(exist_ok=True)
-        write_simulation(folder / "simulation.csv", inputs, answers[name], model.body_poses(inputs))
+        # A model from outside the package need not know where each body stands.
+        poses = model.body_poses(inputs) if hasattr(model, "body_poses") else {}
+        write_simulation(folder / "simulation.csv", inputs, answers[name], poses)
     if inputs is None or not rows:
         raise next(iter(refusals.values()))
     _draw(gripper_toml.stem, gripper, inputs, models, answers, out, mesh=mesh)

@@ -17,6 +17,7 @@ from starlette.websockets import WebSocket
 
 from fingervision.domain.errors import FingervisionError, UsageError
 from fingervision.live.access import Access
+from fingervision.live.commands import modules
 from fingervision.live.guard import EVERYWHERE, VIEWER, WRITER, Guard
 from fingervision.live.half_open import PatientProtocol
 from fingervision.live.page_files import PAGE, files, index
@@ -77,6 +78,8 @@ class Page:
 
     def __init__(self, view: View, listening: socket.socket, way: Access | None = None) -> None:
         way = way or Access()
+        # What commands need is loaded now, and not while pictures come: loading holds all threads up.
+        modules()
         self._view, self._listening = view, listening
         self._sockets: set[PageSocket] = set()
         self._pen = Pen()

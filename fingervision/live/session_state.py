@@ -29,6 +29,7 @@ def state_of_choices(choices: Choices) -> dict[str, Any]:
 def state_of_session(session: "Session") -> dict[str, Any]:
     """Source, rate, losses and recording, for the page."""
     cadence, recorder, description = session.cadence, session.recording, session.description
+    jitter_s = cadence.jitter_s
     return {
         "source": description.name,
         "kind": description.kind,
@@ -37,7 +38,7 @@ def state_of_session(session: "Session") -> dict[str, Any]:
         "height_px": description.height_px,
         "rate_hz": cadence.rate_hz,
         "camera": ", ".join(f"{name} {value}" for name, value in session.capture.source.description.camera.items()),
-        "jitter_ms": None if cadence.jitter_s is None else 1e3 * cadence.jitter_s,
+        "jitter_ms": None if jitter_s is None else 1e3 * jitter_s,
         "dropped": cadence.missing + session.capture.overflowed,
         "duplicates": session.counts[Status.DUPLICATE],
         "damaged": session.counts[Status.DAMAGED],

@@ -54,6 +54,7 @@ class SetUp:
             if task is None or len(frames) < FEWEST_FRAMES:
                 self.words = f"Only {len(frames)} pictures came in {LOOKS_FOR_S:g} s: mend the source first."
                 return
+            self.words = f"Judging {len(frames)} pictures."
             settings, _ = task.settings_for(self._view.description.files)
             sample = take_sample(frames, self._view.description, settings, task.scale)
             report = as_json(sample, inspect(sample))

@@ -40,7 +40,10 @@ class GripperModel(Model, Protocol):
         ...
 
     def body_poses(self, input_mm: NDArray[np.float64]) -> dict[str, NDArray[np.float64]]:
-        """Answer the poses of the bodies at each input: x_mm, y_mm, angle_mrad, shape (n, 3) each."""
+        """Answer the poses of the bodies at each input: x_mm, y_mm, angle_mrad, shape (n, 3) each.
+
+        A model from outside the package may be without.
+        """
         ...
 
     def figures(self) -> ModelFigures:

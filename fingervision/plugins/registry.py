@@ -185,7 +185,7 @@ class Registry(Generic[T]):
         """Add what some files hold for as long as the block lasts."""
         before = list(self._added)
         try:
-            for path in paths:
+            for path in {path.resolve(): path for path in reversed(paths)}.values():  # a file named twice counts once
                 for name, value in self.in_file(path).items():
                     self.add(name, value, check_file(path, self.noun))
             yield

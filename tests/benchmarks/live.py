@@ -1,6 +1,6 @@
 """Live measuring of a network camera on loopback: frames lost, lateness, processor, memory.
 
-    python tests/benchmarks/live.py [--seconds 600] [--size 640x480] [--rate-hz 25] [--record] [--page]
+    python tests/benchmarks/live.py [--seconds 600] [--size 640x480] [--rate-hz 25] [--record] [--page] [--viewers 4]
 
 ffmpeg serves MJPEG over HTTP; capture and measuring run in this process, as `fingervision live` runs them. It ends by
 itself. Each line is a figure, with its bar where it has one.
@@ -11,11 +11,13 @@ itself. Each line is a figure, with its bar where it has one.
 * core: processor time of this process, as a share of one core (decoding, measuring, watching);
 * memory: resident, after a tenth of the time and at the end.
 
-With --page somebody looks: the page is served and each picture acknowledged, by a process of its own.
+With --page somebody looks: the page is served and each picture acknowledged, by a process of its own. With --viewers so
+many look on by the other address, and one more that sleeps (its process is stopped while pictures come).
 """
 
 import argparse
 import os
+import signal
 import socket
 import subprocess
 import sys
@@ -37,6 +39,7 @@ from fingervision.live.session import Session
 from fingervision.rendering import Camera, render, two_fingers
 from fingervision.storage.gaps_csv import GapRow
 
+ASLEEP_AFTER_S = 5.0
 CYCLE, PX_PER_MM = 50, 34.0
 MOST_CORE, MOST_GROWN = 0.25, 1.05
 # What a page does: take each message and acknowledge it.
@@ -60,6 +63,7 @@ def main() -> None:
     parser.add_argument("--rate-hz", type=int, default=25)
     parser.add_argument("--record", action="store_true")
     parser.add_argument("--page", action="store_true")
+    parser.add_argument("--viewers", type=int, default=0)
     wanted = parser.parse_args()
     width_px, height_px = (int(part) for part in wanted.size.split("x"))
     with tempfile.TemporaryDirectory() as folder:
@@ -93,7 +97,7 @@ def run(address: str, folder: Path, wanted: argparse.Namespace) -> None:
         frames.append(row.frame)
 
     session.on_row.append(note)
-    looking = looked_at(session) if wanted.page else None
+    looking = looked_at(session, wanted.viewers) if wanted.page else []
     session.start()
     while len(frames) < 2 * wanted.rate_hz:  # the period is known then, and what ffmpeg had ready has come
         time.sleep(0.1)
@@ -109,15 +113,15 @@ def run(address: str, folder: Path, wanted: argparse.Namespace) -> None:
     last, late_bytes = len(frames) - 1, resident_bytes()
     lost = session.capture.overflowed + session.cadence.missing + (frames[last] - frames[first]) - (last - first)
     load = os.getloadavg()[0]
-    if looking is not None:
-        looking.kill()
-        looking.wait()
+    for each in looking:
+        each.kill()
+        each.wait()
     session.stop()
     expected = (arrived[last] - arrived[first]) * wanted.rate_hz
     period_ms = 1e3 / wanted.rate_hz
     late_ms = 1e3 * np.array(late_s[first : last + 1])
     p50_ms, p99_ms = np.percentile(late_ms, (50, 99))
-    looked = ", page open" if wanted.page else ""
+    looked = f", page open, {wanted.viewers} viewers" if wanted.page else ""
     recorded = ", recording" if wanted.record else ""
     print(f"{wanted.size} at {wanted.rate_hz} frames/s for {arrived[last] - arrived[first]:.1f} s{recorded}{looked}")
     told("frames measured, of so many expected", f"{last - first} of {expected:.1f}")
@@ -136,11 +140,16 @@ def told(what: str, figure: str, bar: str = "", met: bool | None = None) -> None
     print(f"{what:38} {figure:>20}  {bar:18} {'' if met is None else 'met' if met else 'MISSED'}", flush=True)
 
 
-def looked_at(session: Session) -> "subprocess.Popen[bytes]":
-    """Serve the page, and look at it from a process of its own."""
+def looked_at(session: Session, viewers: int) -> "list[subprocess.Popen[bytes]]":
+    """Serve the page, and look at it from processes of their own; with viewers one of them goes to sleep."""
     page = Page(session, bound("127.0.0.1", 0))
     Thread(target=page.serve, args=(Event(),), daemon=True).start()
-    return subprocess.Popen([sys.executable, "-c", LOOKS, page.address])
+    addresses = [page.address, *[page.viewer_address] * (viewers + 1 if viewers else 0)]
+    looking = [subprocess.Popen([sys.executable, "-c", LOOKS, address]) for address in addresses]
+    if viewers:
+        time.sleep(ASLEEP_AFTER_S)
+        looking[-1].send_signal(signal.SIGSTOP)
+    return looking
 
 
 def draw(path: Path, width_px: int, height_px: int) -> None:

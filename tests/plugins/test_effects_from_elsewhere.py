@@ -45,7 +45,7 @@ def test_a_file_adds_its_effects_for_one_command(tmp_path: Path) -> None:
     file.write_text(effect_source())
     assert f"[{file}]" in run("effects", "--effects", str(file)).output
     assert "screw_bend" not in catalogue()
-    again = run("effects", "screw_bend", "--effects", str(file))
+    again = run("effects", "screw_bend", "--effects", str(file), "--effects", str(file.parent / "." / file.name))
     assert str(file) in again.output
     assert run("effects", "screw_bend").exit_code != 0
 

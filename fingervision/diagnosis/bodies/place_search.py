@@ -167,6 +167,7 @@ class PlaceSearch:
         size = np.maximum(np.linalg.norm(whitened, axis=0), 1e-300)
         bounded = np.array([0.0 if not np.isfinite(s) else 1.0 / s for s in spread])
         self._columns, self._unit = columns, size
+        self._is_free = [not np.isfinite(s) for s in spread]
         stacked = np.vstack([whitened / size, np.diag(bounded / size)])
         self._basis, self._triangle = np.linalg.qr(stacked)
         self._rows = whitened.shape[0]
@@ -176,11 +177,15 @@ class PlaceSearch:
         padded = np.concatenate([signal, np.zeros(self._basis.shape[0] - signal.size)])
         return np.asarray(padded - self._basis @ (self._basis.T @ padded))
 
-    def _constants_out(self, rows: Array) -> Array:
-        """Take the fitted nuisances out of a residual, in its own units; shape (n, channels)."""
+    def _unknown_part(self, rows: Array) -> Array:
+        """Fit what nobody knows to a residual, and give its free part: constants, turn and bend; shape (n, channels).
+
+        Errors that the model may have are fitted beside them and stay in the residual: they may be the disagreement.
+        """
         padded = np.concatenate([self.noise.whitened(rows), np.zeros(self._basis.shape[0] - self._rows)])
         shares = np.linalg.lstsq(self._triangle, self._basis.T @ padded, rcond=None)[0] / self._unit
-        return np.asarray(rows - sum(s * column for s, column in zip(shares, self._columns, strict=True)))
+        free = [s * column for s, column, is_free in zip(shares, self._columns, self._is_free, strict=True) if is_free]
+        return np.asarray(np.sum(free, axis=0))
 
     def signature(self, candidate: Candidate, size: float) -> Array:
         """What a candidate of a size adds, whitened, beside what nobody knows."""
@@ -286,14 +291,15 @@ class PlaceSearch:
         members = [best, *(f for f in among if f is not best and self._alike(best, f))] if claims else []
         structure = self.structure(self._left - best.signature if claims else self._left)
         explained = best.candidate.added(best.size) if claims else np.zeros_like(self.residual)
+        unknown = self._unknown_part(self.residual - explained)
         return PlaceFindings(
             members=tuple(sorted(members, key=lambda f: -f.gain)),
             limit=limit,
             structure=structure if not claims or structure > STRUCTURE_SHARE * best.gain else 0.0,
             smallest=smallest,
             noise=self.noise,
-            before=self._constants_out(self.residual),
-            after=self._constants_out(self.residual - explained),
+            before=self.residual - unknown,
+            after=self.residual - explained - unknown,
         )
 
     def _alike(self, best: Fitted, other: Fitted) -> bool:

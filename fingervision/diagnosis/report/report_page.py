@@ -6,6 +6,7 @@ from html import escape
 
 import numpy as np
 
+from fingervision.diagnosis.bodies.body_evidence import drawing_of
 from fingervision.diagnosis.diagnose import Diagnosis, by_channel
 from fingervision.diagnosis.report.chart_data import charts_of
 from fingervision.diagnosis.report.effect_figure import effect_figure
@@ -20,6 +21,7 @@ from fingervision.diagnosis.report.html_parts import (
     provenance_html,
     table,
 )
+from fingervision.diagnosis.report.mechanism_sketch import sketch_html
 from fingervision.diagnosis.report.positioning_of_data import positioning_html
 from fingervision.diagnosis.report.report_parts import added_sections
 from fingervision.diagnosis.report.residual_figure import residual_figure
@@ -90,6 +92,9 @@ def report_page(diagnosis: Diagnosis, made: Provenance, frames: str) -> str:
         *added_sections(diagnosis),
         ("Where this comes from", provenance_html(made)),
     ]
+    answers = drawing_of(diagnosis.data.model) if diagnosis.bodies is not None else None
+    if diagnosis.bodies is not None and answers is not None:
+        sections.insert(1, ("The mechanism, measured and predicted", sketch_html(diagnosis.bodies, answers)))
     positioning = positioning_html(diagnosis.positioning)
     if positioning is not None:
         sections.insert(7, ("Positioning accuracy and repeatability (ISO 230-2)", positioning))

@@ -1,0 +1,1 @@
+"""Adapters to the software of laboratories, one a file; each needs a library of its own, which is an extra."""

@@ -1,0 +1,146 @@
+"""The mechanism on the page: every body as predicted and as measured, its difference magnified, by a slider."""
+
+import json
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fingervision.diagnosis.bodies.body_evidence import BodyEvidence
+from fingervision.models.mechanism_bodies import LinkBody
+from fingervision.models.place_answers import PlaceAnswers
+
+Array = NDArray[np.float64]
+
+STEPS = 15
+"""Positions of the slider: parts of the input's range, each the mean of its rows."""
+SHOWN = 0.05
+"""Of the mechanism's size: the largest difference as it is drawn."""
+CHORDS = 9
+PARTS = ("x_mm", "y_mm", "angle_mrad")
+COLOURS = (("#7a8b99", 3.0), ("#c9a227", 6.0), ("#c1440e", np.inf))
+"""Of a body whose mean is off by up to so many standard deviations."""
+
+
+def sketch_html(evidence: BodyEvidence, answers: PlaceAnswers) -> str:
+    """Draw the bodies that have a pose; a slider goes through the input's range.
+
+    Parameters
+    ----------
+    evidence : BodyEvidence
+        What the channels said.
+    answers : PlaceAnswers
+        The drawing.
+    """
+    u, kept = evidence.prediction.input_mm, evidence.findings.noise.kept
+    order = np.flatnonzero(kept)[np.argsort(u[kept], kind="stable")]
+    parts = [part for part in np.array_split(order, min(STEPS, order.size)) if part.size]
+    bodies = [body for body in answers.model.bodies if body.is_fixed or body.name in answers.moving_bodies]
+    corners = {body.name: _corners(body) for body in bodies}
+    every = np.concatenate(list(corners.values()), axis=1)
+    low, high = every.min(axis=1), every.max(axis=1)
+    size = float(np.hypot(*(high - low)))
+    reach = {body.name: float(np.hypot(*(corners[body.name] - body.centroid_mm[:, None])).max()) for body in bodies}
+    off = {body.name: _differences(body.name, evidence, parts) for body in bodies}
+    largest = max(
+        (float(np.hypot(*rows[:2])) + 1e-3 * abs(float(rows[2])) * reach[name]
+         for name, (means, _) in off.items() for rows in means), default=0.0,
+    )  # fmt: skip
+    magnified = SHOWN * size / largest if largest > 0.0 else 1.0
+    places = [list(answers.channels).index(f"{body.name}.{part}") if not body.is_fixed else -1
+              for body in bodies for part in PARTS]  # fmt: skip
+    slopes = answers.answer().by_input
+    frames = []
+    for step, part in enumerate(parts):
+        at = float(u[part].mean())
+        shown = []
+        for number, body in enumerate(bodies):
+            own = [slopes[k] * at if k >= 0 else 0.0 for k in places[3 * number : 3 * number + 3]]
+            means, sigma = off[body.name]
+            seen = [own[k] + magnified * float(means[step][k]) for k in range(3)]
+            shown.append({"predicted": own, "measured": seen, "colour": _colour(float(sigma[step])),
+                          "sigma": round(float(sigma[step]), 1)})  # fmt: skip
+        frames.append({"input": round(at, 4), "bodies": shown})
+    shapes = []
+    for kind in ("drawn", "predicted", "measured"):
+        for number, body in enumerate(bodies):
+            points = " ".join(f"{x:.3f},{y:.3f}" for x, y in corners[body.name].T)
+            shapes.append(f'<polygon class="{kind}" id="{kind}-{number}" points="{points}"><title>{body.name}</title>'
+                          "</polygon>")  # fmt: skip
+    margin = 0.12 * size
+    box = f"{low[0] - margin:.2f} {-high[1] - margin:.2f} {high[0] - low[0] + 2 * margin:.2f} " + (
+        f"{high[1] - low[1] + 2 * margin:.2f}"
+    )
+    data = json.dumps({"frames": frames, "centres": [body.centroid_mm.tolist() for body in bodies],
+                       "names": [body.name for body in bodies]})  # fmt: skip
+    said = (
+        f"Grey: as drawn. Dashed: as predicted, to scale. Filled: as measured, its difference from the prediction "
+        f"magnified {magnified:.3g} times. Colour: how far a body's mean is off, up to 3 standard deviations grey, up "
+        "to 6 yellow, beyond red."
+    )
+    return (
+        f"<style>{_STYLE}</style>"
+        f'<svg id="mechanism" viewBox="{box}" role="img" aria-label="The mechanism as predicted and as measured">'
+        f'<g transform="scale(1,-1)">{"".join(shapes)}</g></svg>'
+        f'<p><label>Input <input id="mechanism-at" type="range" min="0" max="{len(frames) - 1}" '
+        f'value="{len(frames) - 1}"></label> <output id="mechanism-said"></output></p><p class="hint">{said}</p>'
+        f'<script type="application/json" id="mechanism-data">{data}</script><script>{_SCRIPT}</script>'
+    )
+
+
+def _differences(name: str, evidence: BodyEvidence, parts: Sequence[NDArray[np.intp]]) -> tuple[Array, Array]:
+    """Mean of measured minus predicted of a body in every part, shape (parts, 3), and its largest significance."""
+    means, sigma = np.zeros((len(parts), 3)), np.zeros(len(parts))
+    for k, part in enumerate(PARTS):
+        channel = f"{name}.{part}"
+        if channel not in evidence.prediction.channels:
+            continue
+        place = evidence.prediction.channels.index(channel)
+        for step, rows in enumerate(parts):
+            mean = float(evidence.findings.before[rows, place].mean())
+            means[step, k] = mean
+            noise = float(evidence.findings.noise.sd[place]) / float(np.sqrt(rows.size))
+            sigma[step] = max(sigma[step], abs(mean) / noise)
+    return means, sigma
+
+
+def _colour(sigma: float) -> str:
+    return next(colour for colour, limit in COLOURS if sigma <= limit)
+
+
+def _corners(body: LinkBody) -> Array:
+    return np.concatenate(
+        [c.at(np.linspace(c.t0, c.t1, 2 if c.is_straight else CHORDS))[:, :-1] for c in body.outline.curves], axis=1
+    )
+
+
+_STYLE = """
+#mechanism { width: 100%; max-height: 70vh }
+#mechanism polygon { vector-effect: non-scaling-stroke; fill: none }
+#mechanism .drawn { stroke: #bbb; stroke-width: 1 }
+#mechanism .predicted { stroke: currentColor; stroke-width: 1.2; stroke-dasharray: 5 4 }
+#mechanism .measured { fill-opacity: .45; stroke-width: 1.4 }
+#mechanism-at { width: min(60%, 30rem); vertical-align: middle }
+"""
+_SCRIPT = """
+(() => {
+  const data = JSON.parse(document.getElementById("mechanism-data").textContent);
+  const slider = document.getElementById("mechanism-at"), said = document.getElementById("mechanism-said");
+  const place = (shape, [x, y, mrad], [cx, cy]) =>
+    shape.setAttribute("transform", `translate(${x},${y}) rotate(${mrad * 0.18 / Math.PI},${cx},${cy})`);
+  const show = () => {
+    const frame = data.frames[slider.value];
+    const off = [];
+    frame.bodies.forEach((body, k) => {
+      place(document.getElementById(`predicted-${k}`), body.predicted, data.centres[k]);
+      const shape = document.getElementById(`measured-${k}`);
+      place(shape, body.measured, data.centres[k]);
+      shape.style.fill = shape.style.stroke = body.colour;
+      if (body.sigma > 3) off.push(`${data.names[k]} ${body.sigma} \\u03c3`);
+    });
+    said.textContent = `${frame.input} mm` + (off.length ? `: ${off.join(", ")}` : ": nothing off beyond 3 \\u03c3");
+  };
+  slider.addEventListener("input", show);
+  show();
+})();
+"""

@@ -1,0 +1,40 @@
+"""Where the bodies of a mechanism were seen in a frame."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+OK, COVERED, OUT_OF_VIEW, DAMAGED = "ok", "covered", "out_of_view", "damaged"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SeenPose:
+    """Where a body, or a hinge, was seen in a frame, in the drawing's axes.
+
+    Parameters
+    ----------
+    status : str
+        `ok`; `covered`: too little of its outline is seen; `out_of_view`; `damaged`: there is no picture.
+    x_mm, y_mm, angle_mrad : float or None
+        Counted from the drawing as it was laid on the first frame; a hinge has an angle alone.
+    covariance : ndarray of float, shape (3, 3), or None
+        Of x and y in mm and the angle in mrad, from frame to frame: neither the scale's own uncertainty nor that of
+        where the drawing was laid is in it; all frames share these.
+    """
+
+    status: str
+    x_mm: float | None = None
+    y_mm: float | None = None
+    angle_mrad: float | None = None
+    covariance: NDArray[np.float64] | None = None
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FramePoses:
+    """All bodies and hinges of one frame, by name."""
+
+    frame: int
+    time_s: float | None
+    poses: Mapping[str, SeenPose]

@@ -1,0 +1,145 @@
+"""The outlines of a drawing's bodies, cut into chunks, and where the drawing lies in the picture."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fingervision.models.mechanism import Mechanism
+from fingervision.models.mechanism_bodies import LinkBody, bodies_of
+from fingervision.vision.rigid_outline import REACH_PX, Chunks
+
+Array = NDArray[np.float64]
+
+CHUNK_PX = 24.0
+"""Length of a chunk: long enough for a blur of its own, short enough to be covered as a whole or not."""
+FROM_CORNERS_PX = 4.0
+"""Beside a corner the blur of the other edge counts: three blurs of 1.2 px."""
+BESIDE = 1e-4
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Placement:
+    """Where the drawing lies in the picture.
+
+    Parameters
+    ----------
+    px_per_mm : float
+        Scale.
+    origin_px : ndarray of float, shape (2,)
+        The drawing's origin in the picture.
+    angle_rad : float
+        Direction of the drawing's x axis in the picture, from the picture's x towards its y.
+    is_mirrored : bool
+        Whether the picture shows the drawing's back: its y axis then lies to the right of its x axis as the picture is
+        seen, and not to the left.
+    """
+
+    px_per_mm: float
+    origin_px: Array
+    angle_rad: float
+    is_mirrored: bool
+
+    @property
+    def axes(self) -> Array:
+        """The drawing's unit vectors in the picture, by column."""
+        c, s = np.cos(self.angle_rad), np.sin(self.angle_rad)
+        # Rows of a picture run downwards: a drawing seen from its front has its y axis upwards.
+        side = 1.0 if self.is_mirrored else -1.0
+        return np.array([[c, -side * s], [s, side * c]])
+
+    def to_px(self, points_mm: Array) -> Array:
+        """Place points, shape (2, n)."""
+        return np.asarray(self.origin_px[:, None] + self.px_per_mm * self.axes @ points_mm)
+
+    def to_mm(self, points_px: Array) -> Array:
+        """Take points of the picture back into the drawing, shape (2, n)."""
+        return np.asarray(self.axes.T @ (points_px - self.origin_px[:, None]) / self.px_per_mm)
+
+    @property
+    def turn_sign(self) -> float:
+        """Sign of a rotation in the drawing by one in the picture."""
+        return float(np.sign(np.linalg.det(self.axes)))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class BodyOutline:
+    """A body and the straight stretches of its outline, in millimetres.
+
+    Parameters
+    ----------
+    body : LinkBody
+        As drawn.
+    starts_mm, ends_mm : ndarray of float, shape (2, k)
+        Ends of the stretches, the body on their left.
+    """
+
+    body: LinkBody
+    starts_mm: Array
+    ends_mm: Array
+
+    def chunks(self, place: Placement) -> Chunks:
+        """Cut the stretches into chunks as they lie in the picture."""
+        starts, ends = place.to_px(self.starts_mm), place.to_px(self.ends_mm)
+        length = np.hypot(*(ends - starts))
+        middles, normals = [], []
+        for k in range(length.size):
+            free = length[k] - 2.0 * FROM_CORNERS_PX
+            count = int(free // CHUNK_PX)
+            if count < 1:
+                continue
+            way = (ends[:, k] - starts[:, k]) / length[k]
+            # The body lies to the left in the drawing: its outward normal is to the right there.
+            out = place.turn_sign * np.array([way[1], -way[0]])
+            for at in FROM_CORNERS_PX + free * (np.arange(count) + 0.5) / count:
+                middles.append(starts[:, k] + at * way)
+                normals.append(out)
+        shape = (2, 0)
+        return Chunks(
+            np.array(middles).T if middles else np.zeros(shape),
+            np.array(normals).T if normals else np.zeros(shape),
+            0.5 * CHUNK_PX,
+        )
+
+    def about_px(self, place: Placement) -> Array:
+        """Reference point in the picture."""
+        return np.asarray(place.to_px(self.body.centroid_mm[:, None])[:, 0])
+
+
+def outlines_of(mechanism: Mechanism) -> tuple[BodyOutline, ...]:
+    """Take the straight stretches of every body's outline that are the drawing's own, and no cut through a flexure."""
+    region = mechanism.region
+    beside = BESIDE * region.size_mm
+    found = []
+    for body in bodies_of(mechanism):
+        starts, ends = [], []
+        for loop in (body.outline, *body.holes):
+            for curve in loop.curves:
+                if not curve.is_straight:
+                    continue
+                a, b = curve.start_mm, curve.end_mm
+                way = (b - a) / np.hypot(*(b - a))
+                outside = 0.5 * (a + b) + beside * np.array([way[1], -way[0]])
+                if not region.holds(outside[:, None])[0]:
+                    starts.append(a)
+                    ends.append(b)
+        found.append(BodyOutline(body, np.array(starts).reshape(-1, 2).T, np.array(ends).reshape(-1, 2).T))
+    return tuple(found)
+
+
+def silhouette(mechanism: Mechanism, place: Placement, width_px: int, height_px: int, step_px: int) -> Array:
+    """Where the drawing covers the picture, every few pixels; shape (height / step, width / step), 0 or 1."""
+    x, y = np.meshgrid(np.arange(0, width_px, step_px), np.arange(0, height_px, step_px))
+    points = place.to_mm(np.stack([x.ravel(), y.ravel()]).astype(float))
+    return np.asarray(mechanism.region.holds(points).reshape(x.shape), dtype=np.float64)
+
+
+def in_sight(chunks: Sequence[Chunks], width_px: int, height_px: int) -> list[float]:
+    """Share of each body's chunks that lie in the picture."""
+    shares = []
+    for each in chunks:
+        x, y = each.middles
+        inside = (x > REACH_PX) & (x < width_px - REACH_PX) & (y > REACH_PX) & (y < height_px - REACH_PX)
+        shares.append(float(inside.mean()) if inside.size else 0.0)
+    return shares

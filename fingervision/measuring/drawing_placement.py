@@ -1,0 +1,275 @@
+"""Lay a drawing on a picture: by its silhouette, or by two or three points that are given in both."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from fingervision.domain.errors import FingervisionError, UsageError
+from fingervision.measuring.body_outlines import BodyOutline, Placement, in_sight, silhouette
+from fingervision.models.mechanism import Mechanism
+from fingervision.vision.rigid_outline import Chunks, capture_rigid, halved
+
+Array = NDArray[np.float64]
+
+TURNS = 36
+"""Directions that are tried: 10 degrees apart, half of which every thin bar still overlaps itself."""
+GRID = 160
+"""Points along the picture's longer side at which silhouettes are compared."""
+SKIPPED = 2
+"""Of these, every second one is looked at for a first idea of the direction."""
+LEAST_OVERLAP = 0.7
+"""Common share of the area of picture and drawing (intersection over union) below which a drawing is not this one."""
+AS_GOOD = 0.03
+"""Difference of that share within which two ways of laying a drawing are as good: blur and a moved finger give it."""
+ALIKE = 0.9
+"""Share at which two ways of laying the drawing are one and the same picture, which is then symmetric: bars of 50 px
+that lie half a point of the grid apart have that much in common."""
+APART_RAD = 0.35
+LEVELS = 4
+"""Times that the picture is halved for the first fit: edges are then found from up to 50 px away."""
+OTHER_SCALE = 0.1
+"""Relative: a given point is set to a few pixels in some hundred."""
+
+
+@dataclass(frozen=True, slots=True)
+class GivenPoint:
+    """A point of the picture and what it is in the drawing.
+
+    Parameters
+    ----------
+    x_px, y_px : float
+        In the picture.
+    x_mm, y_mm : float
+        In the drawing.
+    """
+
+    x_px: float
+    y_px: float
+    x_mm: float
+    y_mm: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Placed:
+    """A drawing on a picture.
+
+    Parameters
+    ----------
+    place : Placement
+        Where.
+    body_is_dark : bool
+        Whether the mechanism is darker than its ground.
+    notes : tuple of str
+        What a reader must know.
+    """
+
+    place: Placement
+    body_is_dark: bool
+    notes: tuple[str, ...]
+
+
+def parse_point(text: str) -> GivenPoint:
+    """Read `X,Y=XMM,YMM`.
+
+    Raises
+    ------
+    UsageError
+        It is no such thing.
+    """
+    try:
+        (x_px, y_px), (x_mm, y_mm) = (tuple(map(float, half.split(","))) for half in text.split("="))
+    except ValueError:
+        raise UsageError(
+            f"--at must be X,Y=XMM,YMM, a point in pixels and the same point of the drawing in mm, such as "
+            f"312,80=2,100, but is {text}."
+        ) from None
+    return GivenPoint(x_px, y_px, x_mm, y_mm)
+
+
+def by_points(points: Sequence[GivenPoint], px_per_mm: float) -> Placement:
+    """Lay a drawing by points; two leave its front towards the camera, three tell its side.
+
+    Raises
+    ------
+    UsageError
+        There are too few, or they are of another scale.
+    """
+    if len(points) < 2:
+        raise UsageError(f"--at must be given for at least two points of the drawing, but is given for {len(points)}.")
+    px = np.array([(p.x_px, p.y_px) for p in points]).T
+    mm = np.array([(p.x_mm, p.y_mm) for p in points]).T
+    here, there = px - px.mean(axis=1)[:, None], mm - mm.mean(axis=1)[:, None]
+    size = float(np.sqrt(np.sum(there**2)))
+    if size == 0.0 or float(np.sqrt(np.sum(here**2))) == 0.0:
+        raise UsageError("--at must give points at different places, but they are one.")
+    scale = float(np.sqrt(np.sum(here**2))) / size
+    if abs(scale / px_per_mm - 1.0) > OTHER_SCALE:
+        raise UsageError(
+            f"The points of --at must be as far apart as the scale of {px_per_mm:g} px/mm says, but they say "
+            f"{scale:.4g} px/mm: check the points, the drawing's lengths and the calibration."
+        )
+    found = []
+    for is_mirrored in (False, True) if len(points) > 2 else (False,):
+        flipped = there * np.array([[1.0], [1.0 if is_mirrored else -1.0]])
+        angle = float(np.arctan2(np.sum(flipped[0] * here[1] - flipped[1] * here[0]), np.sum(flipped * here)))
+        place = Placement(px_per_mm, np.zeros(2), angle, is_mirrored)
+        place = replace(place, origin_px=px.mean(axis=1) - px_per_mm * place.axes @ mm.mean(axis=1))
+        found.append((float(np.sum((place.to_px(mm) - px) ** 2)), is_mirrored, place))
+    return min(found, key=lambda entry: entry[:2])[2]
+
+
+def by_silhouette(grey: Array, mechanism: Mechanism, px_per_mm: float) -> Placed:
+    """Lay a drawing so that its silhouette covers what is dark, or light, in the picture.
+
+    Raises
+    ------
+    FingervisionError
+        It fits nowhere, or in several ways.
+    """
+    height, width = grey.shape
+    step = max(1, max(width, height) // GRID)
+    small = grey[::step, ::step]
+    level, _ = cv2.threshold(_bytes(small), 0, 255, cv2.THRESH_BINARY + cv2.THRESH_OTSU)
+    is_light = _bytes(small) > level
+    found: list[tuple[float, Placement, bool]] = []
+    for body_is_dark, mask in ((True, ~is_light), (False, is_light)):
+        rows, columns = np.nonzero(mask)
+        if not rows.size:
+            continue
+        middle = step * np.array([columns.mean(), rows.mean()])
+        for is_mirrored in (False, True):
+            for angle in np.linspace(-np.pi, np.pi, TURNS, endpoint=False):
+                place = _centred(Placement(px_per_mm, np.zeros(2), float(angle), is_mirrored), mechanism, middle)
+                rough = silhouette(mechanism, place, width, height, SKIPPED * step)
+                overlap = _overlap(mask[::SKIPPED, ::SKIPPED], rough)
+                found.append((overlap, place, body_is_dark))
+    found.sort(key=lambda entry: -entry[0])
+    best: list[tuple[float, Placement, bool]] = []
+    for overlap, place, body_is_dark in found:
+        if len(best) < 4 and not any(_near(place, other[1]) for other in best):
+            mask = ~is_light if body_is_dark else is_light
+            best.append((*_climbed(mask, mechanism, place, (width, height, step), overlap), body_is_dark))
+    best.sort(key=lambda entry: -entry[0])
+    if not best or best[0][0] < LEAST_OVERLAP:
+        share = best[0][0] if best else 0.0
+        raise FingervisionError(
+            f"The drawing {mechanism.name} must cover what the picture shows, but at best {100.0 * share:.0f} % of "
+            "both is common: show the whole mechanism, check the scale, or give --at X,Y=XMM,YMM for three points."
+        )
+    top = best[0]
+    others = [entry for entry in best[1:] if entry[0] > top[0] - AS_GOOD]
+    if not others:
+        return Placed(top[1], top[2], ())
+    drawn = silhouette(mechanism, top[1], width, height, step) > 0.5
+    size = (width, height, step)
+    if any(_climbed(drawn, mechanism, entry[1], size, 0.0)[0] < ALIKE for entry in others):
+        raise FingervisionError(
+            f"The drawing {mechanism.name} lies on the picture in {1 + len(others)} ways as well as one: give --at "
+            "X,Y=XMM,YMM for three points of it."
+        )
+    # A symmetric drawing: its front is towards the camera, turned as little as may be.
+    chosen = min((top, *others), key=lambda entry: (entry[1].is_mirrored, abs(_wrapped(entry[1].angle_rad))))
+    note = (
+        "the drawing is symmetric and lies on the picture in more than one way; its front was taken to be towards the "
+        "camera and turned as little as possible: --at for three points says otherwise."
+    )
+    return Placed(chosen[1], chosen[2], (note,))
+
+
+def refined(grey: Array, outlines: Sequence[BodyOutline], place: Placement, body_is_dark: bool) -> Placement | None:
+    """Lay the drawing by the edges of its fixed bodies, or of all where none is in view; None where they are lost."""
+    height, width = grey.shape
+    cut = [outline.chunks(place) for outline in outlines]
+    shares = in_sight(cut, width, height)
+    fixed = [c for c, o, share in zip(cut, outlines, shares, strict=True) if o.body.is_fixed and share > 0.5]
+    chunks = together(fixed or cut)
+    about = chunks.middles.mean(axis=1)
+    found = capture_rigid(grey, halved(grey, LEVELS), chunks, about, body_is_dark, (np.zeros(2), 0.0))
+    if found is None:
+        return None
+    angle = place.angle_rad + found.angle_rad
+    turn = np.array([[np.cos(found.angle_rad), -np.sin(found.angle_rad)],
+                     [np.sin(found.angle_rad), np.cos(found.angle_rad)]])  # fmt: skip
+    return replace(place, angle_rad=angle, origin_px=turn @ (place.origin_px - about) + about + found.shift_px)
+
+
+def together(parts: Sequence[Chunks]) -> Chunks:
+    """Take the chunks of several bodies as those of one."""
+    return Chunks(
+        np.concatenate([part.middles for part in parts], axis=1),
+        np.concatenate([part.normals for part in parts], axis=1),
+        parts[0].half_length,
+    )
+
+
+def darkness(grey: Array, mechanism: Mechanism, place: Placement) -> bool:
+    """Whether the mechanism is darker than its ground, where it lies."""
+    height, width = grey.shape
+    step = max(1, max(width, height) // GRID)
+    inside = silhouette(mechanism, place, width, height, step) > 0.5
+    small = grey[::step, ::step]
+    if inside.all() or not inside.any():
+        raise FingervisionError(
+            f"The drawing {mechanism.name} must lie in the picture and leave some of its ground, but covers "
+            f"{'all' if inside.any() else 'none'} of it: check --at and the scale."
+        )
+    return bool(np.median(small[inside]) < np.median(small[~inside]))
+
+
+def _bytes(grey: Array) -> NDArray[np.uint8]:
+    low, high = float(grey.min()), float(grey.max())
+    return np.asarray((grey - low) * (255.0 / max(high - low, 1e-9)), dtype=np.uint8)
+
+
+def _centred(place: Placement, mechanism: Mechanism, middle_px: Array) -> Placement:
+    x, y = np.meshgrid(*(np.linspace(low, high, 60) for low, high in _box_mm(mechanism)))
+    points = np.stack([x.ravel(), y.ravel()])
+    centre = points[:, mechanism.region.holds(points)].mean(axis=1)
+    return replace(place, origin_px=middle_px - place.px_per_mm * place.axes @ centre)
+
+
+def _box_mm(mechanism: Mechanism) -> list[tuple[float, float]]:
+    ends = np.concatenate([c.at(np.linspace(c.t0, c.t1, 9)) for added, shape in mechanism.bodies if added
+                           for c in shape.curves()], axis=1)  # fmt: skip
+    return [(float(low), float(high)) for low, high in zip(ends.min(axis=1), ends.max(axis=1), strict=True)]
+
+
+def _overlap(mask: NDArray[np.bool_], drawn: Array) -> float:
+    inside = drawn[: mask.shape[0], : mask.shape[1]] > 0.5
+    return float(np.sum(mask & inside)) / max(float(np.sum(mask | inside)), 1.0)
+
+
+def _near(one: Placement, other: Placement) -> bool:
+    return one.is_mirrored == other.is_mirrored and abs(_wrapped(one.angle_rad - other.angle_rad)) < APART_RAD
+
+
+def _wrapped(angle: float) -> float:
+    return float((angle + np.pi) % (2.0 * np.pi) - np.pi)
+
+
+def _climbed(
+    mask: NDArray[np.bool_], mechanism: Mechanism, place: Placement, size: tuple[int, int, int], overlap: float
+) -> tuple[float, Placement]:
+    """Turn and shift a drawing as long as it covers more, in steps that are halved."""
+    width, height, step = size
+    turn, shift = np.pi / TURNS, 6.0 * step
+    while shift > 0.5 * step:
+        middle = 0.5 * np.array([width, height])
+        trials = [replace(place, origin_px=place.origin_px + shift * np.array(way))
+                  for way in ((1, 0), (-1, 0), (0, 1), (0, -1))]  # fmt: skip
+        for sign in (-1.0, 1.0):
+            c, s = np.cos(sign * turn), np.sin(sign * turn)
+            origin = np.array([[c, -s], [s, c]]) @ (place.origin_px - middle) + middle
+            trials.append(replace(place, angle_rad=place.angle_rad + sign * turn, origin_px=origin))
+        scored = [
+            (_overlap(mask, silhouette(mechanism, trial, width, height, step)), n) for n, trial in enumerate(trials)
+        ]
+        better = max(scored)
+        if better[0] > overlap:
+            overlap, place = better[0], trials[better[1]]
+        else:
+            turn, shift = 0.5 * turn, 0.5 * shift
+    return overlap, place

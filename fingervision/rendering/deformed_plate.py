@@ -1,0 +1,79 @@
+"""Outlines of a plate that finite elements have deformed: quadratic edges chained to loops, as a picture shows them."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fingervision.domain.errors import FingervisionError
+from fingervision.rendering.outline import Outline
+from fingervision.rendering.polygon import polygon
+
+SAGITTA_PX = 2e-4
+"""How far a chord may lie beside the curve that it stands for; five times below what a drawn outline is good to."""
+MOST_CHORDS = 16
+
+
+def deformed_outlines(edges: NDArray[np.int64], nodes_px: NDArray[np.float64]) -> tuple[Outline, ...]:
+    """Chain the outline's edges into loops, and each edge, a parabola through three nodes, into chords.
+
+    Parameters
+    ----------
+    edges : ndarray of int, shape (3, k)
+        First node, last node and the node between them, of every edge of the outline, in any order; the body on the
+        same side of all.
+    nodes_px : ndarray of float, shape (2, n)
+        Places of the nodes in the picture.
+
+    Returns
+    -------
+    tuple of Outline
+        Closed; holes, which run against the largest loop, run the other way.
+
+    Raises
+    ------
+    FingervisionError
+        The edges do not close.
+    """
+    following = {int(edge[0]): place for place, edge in enumerate(edges.T)}
+    left = set(range(edges.shape[1]))
+    loops = []
+    while left:
+        first = place = min(left)
+        corners: list[tuple[float, float]] = []
+        while place in left:
+            left.discard(place)
+            corners += _chords(*(nodes_px[:, node] for node in edges[:, place]))
+            end = int(edges[1, place])
+            if end not in following:
+                x, y = nodes_px[:, end]
+                msg = f"The edges of an outline must close, but end at ({x:g}, {y:g}) px: give all of them."
+                raise FingervisionError(msg)
+            place = following[end]
+        if place != first:
+            msg = "The edges of an outline must close without touching themselves, but do not."
+            raise FingervisionError(msg)
+        loops.append(tuple(corners))
+    areas = [_area_px2(loop) for loop in loops]
+    solid = np.sign(max(areas, key=abs, default=1.0))
+    outlines = (polygon(loop) for loop in loops)
+    # A polygon runs one way however its corners are given; what runs against the largest loop is a hole.
+    return tuple(
+        outline if np.sign(area) == solid else outline.backwards()
+        for outline, area in zip(outlines, areas, strict=True)
+    )
+
+
+def _area_px2(corners: tuple[tuple[float, float], ...]) -> float:
+    x, y = np.array(corners).T
+    return 0.5 * float(np.sum(x * np.roll(y, -1) - y * np.roll(x, -1)))
+
+
+def _chords(
+    start: NDArray[np.float64], end: NDArray[np.float64], middle: NDArray[np.float64]
+) -> list[tuple[float, float]]:
+    """Points of a parabola through three, its end left out."""
+    bend = start + end - 2.0 * middle
+    # A parabola lies an eighth of its second difference beside each of n chords, over n squared.
+    count = int(np.clip(np.ceil(np.sqrt(0.5 * float(np.hypot(*bend)) / SAGITTA_PX)), 1, MOST_CHORDS))
+    t = np.arange(count) / count
+    x, y = np.outer(start, (1 - t) * (1 - 2 * t)) + np.outer(middle, 4 * t * (1 - t)) + np.outer(end, t * (2 * t - 1))
+    return list(zip(x.tolist(), y.tolist(), strict=True))

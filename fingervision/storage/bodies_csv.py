@@ -1,0 +1,87 @@
+"""bodies.csv, poses of a mechanism's bodies and angles of its hinges frame by frame; and their columns in gaps.csv."""
+
+import csv
+import os
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+from fingervision.domain.body_poses import OK, FramePoses, SeenPose
+from fingervision.domain.errors import FingervisionError
+
+COLUMNS = (
+    "frame", "time_s", "body", "status", "x_mm", "y_mm", "angle_mrad", "u_x_mm", "u_y_mm", "u_angle_mrad",
+    "cov_x_y_mm2", "cov_x_angle_mm_mrad", "cov_y_angle_mm_mrad",
+)  # fmt: skip
+"""A row a body or hinge and frame; a hinge has an angle alone. `u_` and `cov_` are those from frame to frame."""
+PARTS = ("x_mm", "y_mm", "angle_mrad")
+
+
+def write_bodies(path: Path, poses: Sequence[FramePoses]) -> None:
+    """Write bodies.csv; an empty cell is no value."""
+    with path.open("w", encoding="utf-8", newline="") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(COLUMNS)
+        for frame in poses:
+            time_s = "" if frame.time_s is None else f"{frame.time_s:.9g}"
+            for body, pose in frame.poses.items():
+                writer.writerow([frame.frame, time_s, body, pose.status, *_cells(pose)])
+
+
+def _cells(pose: SeenPose) -> list[str]:
+    values = [pose.x_mm, pose.y_mm, pose.angle_mrad]
+    u: list[float | None] = [None, None, None]
+    shared: list[float | None] = [None, None, None]
+    if pose.covariance is not None:
+        u = [float(pose.covariance[k, k]) ** 0.5 if values[k] is not None else None for k in range(3)]
+        if pose.x_mm is not None:
+            shared = [float(pose.covariance[a, b]) for a, b in ((0, 1), (0, 2), (1, 2))]
+    return ["" if value is None else f"{value:.9g}" for value in (*values, *u, *shared)]
+
+
+def add_channels(gaps: Path, poses: Sequence[FramePoses], names: Mapping[str, str]) -> None:
+    """Add the poses of every frame to its row of gaps.csv, as channels that compare and diagnose read.
+
+    Parameters
+    ----------
+    gaps : Path
+        gaps.csv of the same recording.
+    poses : sequence of FramePoses
+        Of every frame.
+    names : mapping of str to str
+        Bodies and hinges that become channels, and what their columns are called.
+
+    Raises
+    ------
+    FingervisionError
+        The table is of another recording.
+    """
+    with gaps.open(encoding="utf-8", newline="") as file:
+        rows = list(csv.reader(file))
+    header, body = rows[0], rows[1:]
+    at = header.index("frame")
+    seen = {frame.frame: frame.poses for frame in poses}
+    if missing := [row[at] for row in body if int(row[at]) not in seen]:
+        raise FingervisionError(f"{gaps} must be of the same recording, but its frame {missing[0]} was not followed.")
+    first = next(iter(seen.values()), {})
+    wanted = [(name, part) for name in names for part in PARTS if name in first and _has(seen.values(), name, part)]
+    header = [*header, *(f"{prefix}{names[name]}.{part}" for prefix in ("", "u_") for name, part in wanted)]
+    lines = []
+    for row in body:
+        own = seen[int(row[at])]
+        cells = {name: dict(zip(PARTS, _pairs(own[name]), strict=True)) for name in names if name in own}
+        lines.append([*row, *(cells[name][part][k] for k in (0, 1) for name, part in wanted)])
+    partial = gaps.with_suffix(".part")
+    with partial.open("w", encoding="utf-8", newline="") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(header)
+        writer.writerows(lines)
+    os.replace(partial, gaps)  # noqa: PTH105 - atomic on every system
+
+
+def _pairs(pose: SeenPose) -> list[tuple[str, str]]:
+    cells = _cells(pose)
+    return [(cells[k] if pose.status == OK else "", cells[3 + k] if pose.status == OK else "") for k in range(3)]
+
+
+def _has(frames: object, name: str, part: str) -> bool:
+    return any(getattr(poses[name], part) is not None for poses in frames)  # type: ignore[attr-defined]

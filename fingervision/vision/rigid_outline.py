@@ -1,0 +1,278 @@
+"""The rigid motion of one body in a picture, from every stretch of its outline that can be seen.
+
+The straight stretches of an outline are cut into chunks about a millimetre long. In each chunk all pixels within reach
+of the edge are fitted by one blurred step, I = a + b Phi(-(s - d) / sigma_e), s the pixel's distance along the outward
+normal: no resampling, so that a pixel's phase does not bias it. The chunks' offsets d are then one rigid motion by
+weighted least squares, with Tukey's weights for what covers an edge. What the chunks scatter beyond their own noise
+widens the covariance.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from math import ceil
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import ndtr
+
+Array = NDArray[np.float64]
+
+REACH_PX = 6.0
+"""Pixels on either side of an edge: three blurs of 1.5 px, and room for the search."""
+LEAST_CONTRAST = 5.0
+"""Standard deviations of a pixel's noise below which a step is no edge."""
+FARTHEST_PX = 3.5
+"""How far from where it is expected an edge may be found: beyond, the window does not hold it."""
+STEPS = 5
+SETTLED_PX = 0.01
+BLURS_PX = (0.4, 3.5)
+TUKEY = 4.685
+"""Of Tukey's biweight: 95 % efficient for normal errors (Huber (1981), Robust Statistics, DOI 10.1002/0471725250)."""
+SINGULAR = 1e8
+"""Condition beyond which edges leave a motion free: half the digits of a double."""
+FEWEST = 6
+"""Chunks: twice the unknowns of a rigid motion, so that their scatter is known too."""
+LEAST_SHARE = 0.4
+"""Of the chunks in view that must be seen: less is a body that something covers."""
+LEAST_IN_VIEW = 0.4
+LEAST_WINDOW = 0.7
+"""Of a chunk's window that must lie in the picture: an edge in its middle then has ground and body on its sides."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Chunks:
+    """Stretches of a body's outline.
+
+    Parameters
+    ----------
+    middles : ndarray of float, shape (2, m)
+        Their middles.
+    normals : ndarray of float, shape (2, m)
+        Unit vectors out of the body.
+    half_length : float
+        Half their length.
+    """
+
+    middles: Array
+    normals: Array
+    half_length: float
+
+    def moved(self, shift: Array, angle: float, about: Array) -> "Chunks":
+        """Move them rigidly: turned about a point, then shifted."""
+        c, s = np.cos(angle), np.sin(angle)
+        turn = np.array([[c, -s], [s, c]])
+        middles = turn @ (self.middles - about[:, None]) + (about + shift)[:, None]
+        return replace(self, middles=middles, normals=turn @ self.normals)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class RigidFit:
+    """A rigid motion in a picture.
+
+    Parameters
+    ----------
+    shift_px : ndarray of float, shape (2,)
+        Motion of the reference point.
+    angle_rad : float
+        Rotation, from x to y of the picture.
+    covariance : ndarray of float, shape (3, 3)
+        Of x and y in px and the angle in rad.
+    seen, in_view, all : int
+        Chunks that were fitted, that lie in the picture, and that there are.
+    blur_px : float
+        Standard deviation of the edges' blur.
+    """
+
+    shift_px: Array
+    angle_rad: float
+    covariance: Array
+    seen: int
+    in_view: int
+    all: int
+    blur_px: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Edges:
+    offset: Array
+    variance: Array
+    blur: Array
+    used: NDArray[np.bool_]
+    in_view: NDArray[np.bool_]
+
+
+def fit_rigid(
+    grey: NDArray[np.float64], chunks: Chunks, about: Array, body_is_dark: bool, start: tuple[Array, float]
+) -> RigidFit | None:
+    """Fit a body's motion from near a start; None where too little of its outline is seen.
+
+    Parameters
+    ----------
+    grey : ndarray of float, shape (height, width)
+        Levels proportional to light.
+    chunks : Chunks
+        Of the body where it is drawn, in pixels.
+    about : ndarray of float, shape (2,)
+        Reference point where it is drawn, in pixels.
+    body_is_dark : bool
+        Whether the body is darker than its ground.
+    start : (ndarray of float, float)
+        Shift in pixels and angle in rad from which to look; the edges lie within some 3 px of there.
+    """
+    shift, angle = np.array(start[0], dtype=float), float(start[1])
+    blur, found = 1.2, None
+    for _ in range(STEPS):
+        now = chunks.moved(shift, angle, about)
+        edges = _edges(grey, now, body_is_dark, blur)
+        if edges.used.sum() < max(FEWEST, LEAST_SHARE * edges.in_view.sum()):
+            return None
+        blur = float(np.clip(np.median(edges.blur[edges.used]), *BLURS_PX))
+        step = _rigid(now, edges, about + shift)
+        if step is None:
+            return None
+        move, covariance = step
+        shift, angle = shift + move[:2], angle + float(move[2])
+        found = RigidFit(shift, angle, covariance, int(edges.used.sum()), int(edges.in_view.sum()),
+                         edges.used.size, blur)  # fmt: skip
+        reach = float(np.abs(chunks.middles - about[:, None]).max())
+        if float(np.hypot(*move[:2])) + abs(float(move[2])) * reach < SETTLED_PX:
+            break
+    return found
+
+
+def capture_rigid(
+    grey: NDArray[np.float64],
+    pyramid: Sequence[NDArray[np.float64]],
+    chunks: Chunks,
+    about: Array,
+    body_is_dark: bool,
+    start: tuple[Array, float],
+) -> RigidFit | None:
+    """Fit from farther away: in the picture halved again and again, the coarsest first.
+
+    Parameters
+    ----------
+    grey : ndarray of float, shape (height, width)
+        The picture.
+    pyramid : sequence of ndarray of float
+        It halved once, twice and so on (`halved`).
+    chunks, about, body_is_dark, start
+        As `fit_rigid`.
+    """
+    shift, angle = start
+    for level in range(len(pyramid), 0, -1):
+        scale = 0.5**level
+        # The middle of a pixel of the halved picture lies between those of two.
+        offset = 0.5 * scale - 0.5
+        small = Chunks(chunks.middles * scale + offset, chunks.normals, max(chunks.half_length * scale, 2.0))
+        rough = fit_rigid(pyramid[level - 1], small, about * scale + offset, body_is_dark, (shift * scale, angle))
+        if rough is not None:
+            shift, angle = rough.shift_px / scale, rough.angle_rad
+    return fit_rigid(grey, chunks, about, body_is_dark, (shift, angle))
+
+
+def halved(grey: NDArray[np.float64], times: int) -> list[NDArray[np.float64]]:
+    """Halve a picture so many times, four pixels to one."""
+    out = []
+    for _ in range(times):
+        height, width = (size // 2 * 2 for size in grey.shape)
+        cut = grey[:height, :width]
+        grey = 0.25 * (cut[::2, ::2] + cut[1::2, ::2] + cut[::2, 1::2] + cut[1::2, 1::2])
+        out.append(grey)
+    return out
+
+
+def _edges(grey: NDArray[np.float64], chunks: Chunks, body_is_dark: bool, blur: float) -> _Edges:
+    """Fit a blurred step to the pixels about every chunk."""
+    count = chunks.middles.shape[1]
+    height, width = grey.shape
+    half, reach = chunks.half_length, REACH_PX
+    box = ceil(np.hypot(half, reach)) + 1
+    offset, variance, blurs = np.zeros(count), np.full(count, np.inf), np.full(count, blur)
+    used, in_view = np.zeros(count, dtype=bool), np.zeros(count, dtype=bool)
+    steps = np.arange(-box, box + 1)
+    for k in range(count):
+        x, y = chunks.middles[:, k]
+        column, row = round(float(x)), round(float(y))
+        columns = steps[(steps >= -column) & (steps < width - column)]
+        rows = steps[(steps >= -row) & (steps < height - row)]
+        if not (0 <= column < width and 0 <= row < height):
+            continue
+        nx, ny = chunks.normals[:, k]
+        dx, dy = columns[None, :] + column - x, rows[:, None] + row - y
+        s, t = dx * nx + dy * ny, -dx * ny + dy * nx
+        inside = (np.abs(t) <= half) & (np.abs(s) <= reach)
+        if inside.sum() < LEAST_WINDOW * 4.0 * half * reach:
+            continue
+        in_view[k] = True
+        window = grey[row + rows[0] : row + rows[-1] + 1, column + columns[0] : column + columns[-1] + 1]
+        values = window[inside]
+        fitted = _step(values, s[inside], blur, body_is_dark)
+        if fitted is not None:
+            offset[k], variance[k], blurs[k] = fitted
+            used[k] = True
+    return _Edges(offset, variance, blurs, used, in_view)
+
+
+def _step(values: Array, s: Array, blur: float, body_is_dark: bool) -> tuple[float, float, float] | None:
+    """Offset of a blurred step, its variance and its blur, by Gauss and Newton's iteration; None where there is none.
+
+    Pixels are squares: their own width adds 1/12 to the square of the blur (measuring.md).
+    """
+    d, sigma = 0.0, float(np.hypot(blur, 12**-0.5))
+    for _ in range(4):
+        z = (s - d) / sigma
+        step, bell = ndtr(-z), np.exp(-0.5 * z**2) / (sigma * np.sqrt(2.0 * np.pi))
+        columns = np.stack([np.ones_like(s), step, bell, bell * z], axis=1)
+        normal = columns.T @ columns
+        try:
+            inverse = np.linalg.inv(normal)
+        except np.linalg.LinAlgError:
+            return None
+        a, b, by_d, by_sigma = inverse @ (columns.T @ values)
+        rest = values - columns @ np.array([a, b, by_d, by_sigma])
+        noise2 = float(rest @ rest) / max(values.size - 4, 1)
+        if b == 0.0 or (b < 0.0) != body_is_dark or abs(b) < LEAST_CONTRAST * np.sqrt(noise2):
+            return None
+        move = float(by_d / b)
+        d = float(np.clip(d + np.clip(move, -2.0, 2.0), -FARTHEST_PX - 1.0, FARTHEST_PX + 1.0))
+        wider = float(by_sigma / b)
+        sigma = float(np.clip(sigma + np.clip(wider, -0.3 * sigma, 0.3 * sigma), *BLURS_PX))
+        if abs(move) < 1e-3:
+            break
+    if abs(d) > FARTHEST_PX:
+        return None
+    variance = noise2 * float(inverse[2, 2]) / float(b) ** 2
+    return d, variance, float(np.sqrt(max(sigma**2 - 1.0 / 12.0, BLURS_PX[0] ** 2)))
+
+
+def _rigid(chunks: Chunks, edges: _Edges, about: Array) -> tuple[Array, Array] | None:
+    """Small rigid motion by the chunks' offsets, and its covariance; None where they do not hold it."""
+    used = edges.used
+    arm = chunks.middles[:, used] - about[:, None]
+    nx, ny = chunks.normals[:, used]
+    columns = np.stack([nx, ny, -nx * arm[1] + ny * arm[0]], axis=1)
+    offset, sd = edges.offset[used], np.sqrt(edges.variance[used])
+    weight = np.ones(offset.size)
+    move = np.zeros(3)
+    scatter = 1.0
+    for _ in range(12):
+        w = weight / sd**2
+        normal = columns.T @ (w[:, None] * columns)
+        if (
+            np.diag(normal).min() <= 0.0
+            or np.linalg.cond(normal / np.sqrt(np.outer(np.diag(normal), np.diag(normal)))) > 1e8
+        ):
+            return None
+        move = np.linalg.solve(normal, columns.T @ (w * offset))
+        rest = (offset - columns @ move) / sd
+        scatter = max(1.0, 1.4826 * float(np.median(np.abs(rest))))
+        weight = np.clip(1.0 - (rest / (TUKEY * scatter)) ** 2, 0.0, None) ** 2
+        if weight.sum() < FEWEST:
+            return None
+    kept = weight > 0.0
+    if kept.sum() < max(FEWEST, LEAST_SHARE * edges.in_view.sum()):
+        return None
+    degrees = float(weight.sum()) - 3.0
+    spread = max(1.0, float(np.sum(weight * rest**2)) / max(degrees, 1.0))
+    return move, spread * np.linalg.inv(normal)

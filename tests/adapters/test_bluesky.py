@@ -1,0 +1,170 @@
+"""The bed as bluesky's devices, with a real RunEngine: scans, flights, a stop, and the agent around the next run."""
+
+import threading
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+pytest.importorskip("bluesky", reason="the extra `bluesky` is not installed")
+
+import bluesky.plan_stubs as bps
+import bluesky.plans as bp
+from bluesky import RunEngine
+from bluesky.protocols import Flyable, Movable, Readable, Stoppable, Triggerable
+
+from fingervision.adapters.bluesky import Devices, NextRunAgent, ThreadStatus, devices, run_steps
+from fingervision.domain.errors import FingervisionError
+from fingervision.tables.read import read_model
+from fingervision.testbed.bed_factory import open_bed
+from fingervision.testbed.simulation.injected_effects import Hidden
+
+PLAY_MM, GAIN = 0.12, 7.7
+pytestmark = pytest.mark.filterwarnings("default")  # of bluesky and its libraries
+
+
+@pytest.fixture
+def made() -> Iterator[Devices]:
+    bed = open_bed("simulated", Hidden({"backlash": {"play_mm": PLAY_MM}}), pace=1.0)
+    yield devices(bed)
+    bed.close()
+
+
+@pytest.fixture(scope="module")
+def engine() -> Iterator[RunEngine]:
+    engine = RunEngine({}, context_managers=[])
+    yield engine
+    engine.loop.call_soon_threadsafe(engine.loop.stop)
+    engine._th.join(5.0)
+
+
+def documents(engine: RunEngine, plan: Any) -> list[tuple[str, dict[str, Any]]]:
+    seen: list[tuple[str, dict[str, Any]]] = []
+    engine(plan, lambda name, document: seen.append((name, document)))
+    return seen
+
+
+def rows(seen: list[tuple[str, dict[str, Any]]], key: str) -> list[Any]:
+    out = []
+    for name, document in seen:
+        if name == "event" and key in document["data"]:
+            out.append(document["data"][key])
+        if name == "event_page" and key in document["data"]:
+            out += document["data"][key]
+    return out
+
+
+def test_the_devices_keep_blueskys_protocols(made: Devices) -> None:
+    for protocol in (Readable, Movable, Stoppable, Flyable):
+        assert isinstance(made.stage, protocol)
+    for protocol in (Readable, Triggerable, Flyable):
+        assert isinstance(made.gap, protocol)
+    assert isinstance(made.force, Readable)
+
+
+@pytest.mark.slow
+def test_a_scan_moves_and_measures_at_each_place(made: Devices, engine: RunEngine) -> None:
+    seen = documents(engine, bp.list_scan([made.gap, made.force], made.stage, [0.0, 0.3, 0.6]))
+    np.testing.assert_allclose(rows(seen, "stage"), [0.0, 0.3, 0.6], atol=0.11)  # the stage's accuracy and encoder
+    gaps, inputs = np.array(rows(seen, "gap_gap_mm")), np.array(rows(seen, "gap_input_mm"))
+    # The play is taken up on the first way: from there on the gap follows the input.
+    assert gaps[2] - gaps[1] == pytest.approx(GAIN * (inputs[2] - inputs[1]), abs=GAIN * 0.03)
+    assert gaps[1] - gaps[0] == pytest.approx(GAIN * (inputs[1] - inputs[0] - 0.5 * PLAY_MM), abs=GAIN * 0.03)
+    np.testing.assert_allclose(inputs, rows(seen, "stage"), atol=0.03)
+    assert set(rows(seen, "gap_status")) == {"ok"}
+    assert all(abs(force) < 5.5 for force in rows(seen, "force"))
+
+
+@pytest.mark.slow
+def test_a_flight_gives_an_event_a_frame_and_the_agent_names_what_is_hidden(
+    made: Devices, engine: RunEngine, tmp_path: Path
+) -> None:
+    assert made.gap is not None
+    table = tmp_path / "simulation.csv"
+    ideal = open_bed("simulated")
+    assert ideal.model is not None
+    inputs = np.linspace(-1.0, 2.0, 61)
+    answer = ideal.model.respond(inputs)
+    ideal.close()
+    lines = [f"{u},{g}" for u, g in zip(inputs.tolist(), answer.gap_mm.tolist(), strict=True)]
+    table.write_text("input_mm,gap_mm\n" + "\n".join(lines) + "\n", encoding="utf-8")
+    agent = NextRunAgent(read_model(table))
+    token = engine.subscribe(agent)
+    steps = [{"kind": "triangle", "from_mm": 0.0, "to_mm": 1.0, "speed_mm_s": 0.8, "cycles": 2}]
+    seen = documents(engine, run_steps(steps, made.stage, made.gap))
+    engine.unsubscribe(token)
+    inputs = np.array(rows(seen, "gap_input_mm"))
+    assert inputs.size > 25  # 125 where the machine keeps up
+    assert np.ptp(inputs) == pytest.approx(1.0, abs=0.2)
+    report = agent.report().report
+    assert ["backlash"] in [list(names) for names in report.alternatives], report.sentence
+    suggested = agent.suggest()
+    assert bool(suggested) == (report.next_run is not None)
+
+
+def test_a_flight_of_the_stage_gives_its_readings(made: Devices, engine: RunEngine) -> None:
+    def flight() -> Iterator[Any]:
+        yield from bps.open_run()
+        yield from bps.prepare(made.stage, (0.3, 1.0), wait=True)
+        yield from bps.kickoff(made.stage, wait=True)
+        yield from bps.complete(made.stage, wait=True)
+        yield from bps.collect(made.stage)
+        yield from bps.close_run()
+
+    positions = rows(documents(engine, flight()), "stage")
+    assert len(positions) > 20
+    assert positions[-1] == pytest.approx(0.3, abs=0.11)
+
+
+def test_a_stop_ends_a_motion(made: Devices) -> None:
+    status = made.stage.set(1.4)
+    assert not status.done
+    made.stage.stop()
+    assert status.exception(5.0) is None
+    assert made.stage.read()["stage"]["value"] < 1.2
+
+
+def test_beyond_the_limits_nothing_moves(made: Devices) -> None:
+    before = made.stage.read()["stage"]["value"]
+    with pytest.raises(FingervisionError, match="nothing was moved"):
+        made.stage.set(100.0)
+    with pytest.raises(FingervisionError, match="prepared"):
+        made.stage.kickoff()
+    assert made.stage.read()["stage"]["value"] == before
+    assert made.gap is not None
+    with pytest.raises(FingervisionError, match="triggered"):
+        made.gap.read()
+
+
+def test_a_status_tells_its_failure_and_calls_back_once() -> None:
+    hold, called = threading.Event(), []
+
+    def fails() -> None:
+        hold.wait(5.0)
+        raise FingervisionError("no")
+
+    status = ThreadStatus(fails)
+    status.add_callback(called.append)
+    with pytest.raises(TimeoutError):
+        status.exception(0.0)
+    hold.set()
+    assert isinstance(status.exception(5.0), FingervisionError)
+    assert not status.success
+    status.add_callback(called.append)
+    for _ in range(500):
+        if len(called) == 2:
+            break
+        threading.Event().wait(0.01)
+    assert called == [status, status]
+
+
+def test_rows_without_an_input_and_strange_steps_are_refused(made: Devices, engine: RunEngine, tmp_path: Path) -> None:
+    table = tmp_path / "s.csv"
+    table.write_text("input_mm,gap_mm\n0,4\n1,11.7\n", encoding="utf-8")
+    with pytest.raises(FingervisionError, match="input_mm"):
+        NextRunAgent(read_model(table)).ingest([{"gap_mm": 1.0}])
+    assert made.gap is not None
+    with pytest.raises(FingervisionError, match="pirouette"):
+        list(run_steps([{"kind": "pirouette"}], made.stage, made.gap))
