@@ -17,7 +17,6 @@ from fingervision import __version__
 
 ROOT = Path(__file__).parents[1]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
-SAMPLE = ROOT / "sample_frames" / "table1"
 
 
 def run(*command: str | Path, cwd: Path) -> str:
@@ -87,6 +86,10 @@ def test_wheel_and_sdist_are_whole_and_the_wheel_works_alone(tmp_path: Path) -> 
     fingervision = programs / ("fingervision.exe" if os.name == "nt" else "fingervision")
     assert run(fingervision, "--version", cwd=tmp_path).strip().endswith(__version__)
     assert "measure" in run(fingervision, "--help", cwd=tmp_path)
-    said = run(fingervision, "measure", SAMPLE, "--px-per-mm", "34", "--out", "measured", cwd=tmp_path)
+    # Far from this checkout: the samples come with the wheel.
+    run(fingervision, "example", "measure", "--out", "trial", cwd=tmp_path)
+    run(fingervision, "example", "paper", "--out", "paper", cwd=tmp_path)
+    (frames,) = (path.parent for path in (tmp_path / "paper").rglob("frame_00.png"))
+    said = run(fingervision, "measure", frames, "--px-per-mm", "34", "--out", "measured", cwd=tmp_path)
     assert "17 of 17 frames measured" in said
     assert len((tmp_path / "measured" / "gaps.csv").read_text(encoding="utf-8").splitlines()) == 18

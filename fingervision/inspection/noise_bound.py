@@ -13,7 +13,7 @@ def edge_noise_px(noise: float, blur_px: float, rows: int = 1) -> float:
     """Standard uncertainty of one edge of unknown levels and blur.
 
     sigma_x^2 = r^2 / (N (1 / (2 sqrt(pi) sigma_e) - 1 / W)); Gatherer, Stanford CSL-TR-93-560; Kakarala & Hero, IEEE
-    PAMI 14(7), 1992, doi:10.1109/34.142910.
+    PAMI 14(7), 777-781, 1992.
 
     Parameters
     ----------

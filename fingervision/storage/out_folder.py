@@ -1,4 +1,4 @@
-"""The folder that `--out` names: made, and a sentence where the system refuses."""
+"""Make the folder that `--out` names; a refusal of the system becomes a sentence."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager

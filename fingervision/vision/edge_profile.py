@@ -39,7 +39,7 @@ _edge_mark = loop("edge_profile_edge_mark")
 
 
 class EdgeMark(NamedTuple):
-    """What one flank shows that a blurred step does not; zero where nothing is significant.
+    """How one flank's profile departs from a blurred step; zero where the departure is not significant.
 
     Parameters
     ----------

@@ -104,6 +104,11 @@ def run_block(block: Block, names: dict[str, object], printed: dict[str, str]) -
     printed : dict
         What commands printed that were run in this folder before; they are not run again. Grows.
     """
+    # A file that the page has its reader save: its name is the first comment.
+    written = re.match(r"# (?P<name>[\w./-]+\.(?:py|toml))\n", block.body)
+    if written:
+        Path(written["name"]).parent.mkdir(parents=True, exist_ok=True)
+        Path(written["name"]).write_text(block.body, encoding="utf-8")
     if block.language == "python":
         heard = io.StringIO()
         with contextlib.redirect_stdout(heard):
@@ -114,11 +119,6 @@ def run_block(block: Block, names: dict[str, object], printed: dict[str, str]) -
             if command not in printed and not command.startswith(SET_UP):
                 printed[command] = run_command(command)
         return "".join(printed.get(command, "") for command in commands_of(block))
-    # A file that the page has its reader write: its name is the first comment.
-    written = re.match(r"# (?P<name>[\w./-]+)\n", block.body)
-    if written:
-        Path(written["name"]).parent.mkdir(parents=True, exist_ok=True)
-        Path(written["name"]).write_text(block.body, encoding="utf-8")
     return ""
 
 

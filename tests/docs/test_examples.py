@@ -12,7 +12,7 @@ PAGES = sorted(
     path for path in (ROOT / "docs").rglob("*.md") if not {"_build", "_generated"} & set(path.relative_to(ROOT).parts)
 )
 # Pages that only define or explain have no example; those with examples that take less than a second or two.
-QUICK = {"docs/how_to/extend.md", "docs/reference/python.md"}
+QUICK: set[str] = {"docs/how_to/recipes.md"}
 # Pages that show the same command as another: one run serves all of them.
 TOGETHER = {
     "docs/tutorials/first_measurement.md": ["README.md", "docs/how_to/synchronise.md"],

@@ -11,7 +11,7 @@ import pytest
 
 from fingervision.domain import gripper
 from fingervision.domain.status import Status
-from fingervision.storage import gaps_csv, mechanism_toml, response_csv, samples_csv
+from fingervision.storage import gaps_csv, mechanism_toml, response_csv, samples_csv, settings_toml
 from fingervision.testbed import recipe_kinds
 
 ROOT = Path(__file__).parents[2]
@@ -34,6 +34,7 @@ def keys_in(*paths: str) -> set[str]:
         ("status", {str(status) for status in Status}),
         ("samples.csv", set(samples_csv.COLUMNS.split(","))),
         ("response.csv", set(response_csv.COLUMNS)),
+        ("settings.toml", {*settings_toml.TOP_KEYS, *settings_toml.CAMERA_KEYS}),
         ("report.json", keys_in("fingervision/storage/report_json.py")),
         ("calibration.json", keys_in("fingervision/storage/calibration_json.py") - {"tilt", "value", "stated"}),
         (
@@ -57,6 +58,16 @@ def test_every_key_of_a_recipe_stands_in_the_reference() -> None:
     for name in recipe_kinds.step_kinds():
         for key in importlib.import_module(f"{recipe_kinds.__name__}.{name}").KEYS:
             assert f"`{key}`" in page, f"{key} of {name}"
+
+
+def test_every_file_that_a_page_names_is_there() -> None:
+    there = {path.name for top in ("fingervision", "calib", "tests", "docs") for path in (ROOT / top).rglob("*.py")}
+    written_by_readers = {"bent_screw.py", "my_stage.py"}
+    for page in (ROOT / "docs").rglob("*.md"):
+        for name in re.findall(r"`([\w/]+\.py)`", page.read_text(encoding="utf-8")):
+            assert name.split("/")[-1] in there | written_by_readers, f"{page.name} names {name}, which is not there"
+            if name.startswith(("fingervision/", "calib/", "tests/")):
+                assert (ROOT / name).exists(), f"{page.name} names {name}, which is elsewhere"
 
 
 @pytest.mark.parametrize("path", sorted((ROOT / "docs" / "figures").glob("*.svg")), ids=lambda path: path.stem)

@@ -1,4 +1,4 @@
-"""Which run: every protocol judged by how much of what is open it settles, and in how much of the rig's time."""
+"""Choose the next run: every protocol is judged by the open questions that it settles, per minute of rig time."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass

@@ -71,7 +71,7 @@ class SimulatedActuator:
         return self._alarm
 
     def raise_alarm(self, alarm: Alarm | None) -> None:
-        """Let it fail as a controller does, or clear that: it stops and refuses to move."""
+        """Raise an alarm as a motor controller does (the stage stops and refuses to move), or clear it with None."""
         self._alarm = alarm
         if alarm is not None:
             self.stop()

@@ -54,7 +54,7 @@ class Motions:
 
     @property
     def busy(self) -> bool:
-        """Whether one is under way."""
+        """Whether a motion is under way."""
         return self._worker is not None and self._worker.is_alive()
 
     def forget_stop(self) -> None:

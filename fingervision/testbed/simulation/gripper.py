@@ -30,7 +30,7 @@ CONTACT_N_PER_MM = 3.0
 
 @dataclass(frozen=True, slots=True)
 class Motion:
-    """Where the drive's stage is, was, and as far as planned will be.
+    """Position of the stage over time: past, present, and as far ahead as its motion is planned.
 
     Parameters
     ----------
