@@ -3,9 +3,9 @@ import { ask, at, listen, page } from "/page/bus.js";
 import { board, change, chosen, isFirst, request, show, tables, told, usual, works } from "/page/gauge_board.js";
 import { dragged, drawn, handles, outline } from "/page/gauge_shapes.js";
 
-const SVG = "http://www.w3.org/2000/svg", ASK_EVERY_MS = 100, LETTER = 12, POINT = 6, LEAST_PX = 3;
+const ASK_EVERY_MS = 100, LETTER = 12, POINT = 6, LEAST_PX = 3;
 at("stage").insertAdjacentHTML("beforeend", '<svg id="gauge_drawing" aria-hidden="true" preserveAspectRatio="none"></svg>');
-const svg = at("gauge_drawing");
+const svg = at("gauge_drawing"), SVG = svg.namespaceURI;
 let drag = null, askedAt = 0, taken = [];
 export const drawing = { kind: null, name: "", said: () => {} };
 

@@ -188,3 +188,11 @@ listen("state", (state) => {
   build();
 });
 listen("state", () => { if (page.paused) draw(); });
+// What is old looks old: no number, and no green.
+listen("gone", () => {
+  if (!told() || !told().is_open) return;
+  told().readings = null;
+  told().trouble = "Not connected: the gauges are not read.";
+  list();
+  draw();
+});
