@@ -15,12 +15,12 @@ Examples, in the folder of `fingervision example measure`:
   fingervision gauge opening.mp4 --px-per-mm 34
   fingervision gauge opening.mp4 --px-per-mm 34 --gauges levers.toml
   fingervision gauge opening.mp4 --calibration calibration.json --no-browser
-  fingervision measure opening.mp4 --px-per-mm 34 --gauges gauges.toml    what was saved, in every frame
 
 \b
 A gauge is added in the panel: choose its kind, and drag over the picture's first frame (across an edge, along a line,
 over a circle or a patch), or press Add and type its numbers. Arrow keys move the chosen one by 1 px (with Shift 10).
-What is drawn is read at once, by the code of `measure`; Save writes the file, with what else stands in it.
+What is drawn is read at once, by the code of `measure`. Save writes the file, and keeps its comments; then
+`fingervision measure opening.mp4 --px-per-mm 34 --gauges gauges.toml` measures it in every frame.
 """
 USUAL_GAUGES = Path("gauges.toml")
 

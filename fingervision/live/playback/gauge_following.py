@@ -72,7 +72,7 @@ class GaugeFollowing:
     def readings(self, frame: int, version: int) -> list[dict[str, Any]] | None:
         """Give what the gauges of a version of the board say of a frame; None as long as that is not known."""
         key, told = self._key, self._told
-        if key is None or key[0] != version or not 0 <= frame < len(told):
+        if key != (version, self._playback.identity) or not 0 <= frame < len(told):
             return None
         found: list[dict[str, Any]] = json.loads(zlib.decompress(told[frame]))
         return found
