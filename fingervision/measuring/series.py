@@ -71,6 +71,7 @@ class GapSeries:
     _u_mm: array[float] = field(default_factory=lambda: array("d"))
     _u_random_mm: array[float] = field(default_factory=lambda: array("d"))
     _u_gap_px: array[float] = field(default_factory=lambda: array("d"))
+    _response_px: array[float] = field(default_factory=lambda: array("d"))
     _bad_frame: array[int] = field(default_factory=lambda: array("q"))
     _bad_time_s: array[float] = field(default_factory=lambda: array("d"))
 
@@ -94,6 +95,7 @@ class GapSeries:
             self._gap_mm.append(row.gap_mm)
             self._u_random_mm.append(row.u_random_mm)
             self._u_gap_px.append(row.u_gap_px)
+            self._response_px.append(abs(getattr(result.outcome, "response_shift_px", 0.0)))
             self.has_budget = row.u_gap_mm is not None
             self._u_mm.append(row.u_random_mm if row.u_gap_mm is None else row.u_gap_mm)
 
@@ -126,6 +128,11 @@ class GapSeries:
     def u_gap_px(self) -> NDArray[np.float64]:
         """Random part in pixels."""
         return np.array(self._u_gap_px)
+
+    @property
+    def response_px(self) -> NDArray[np.float64]:
+        """By how much the other response that the camera may have would move each gap; 0 where it is known."""
+        return np.array(self._response_px)
 
     def times_s(self) -> tuple[NDArray[np.float64], NDArray[np.float64]] | None:
         """Give the times of the frames with and without a gap; None where frames have no times."""

@@ -3,6 +3,8 @@
 from collections.abc import Mapping
 from typing import Any
 
+import numpy as np
+
 from fingervision.domain.status import Status
 from fingervision.measuring.series import GapSeries
 
@@ -29,7 +31,23 @@ def result_sentences(summary: Mapping[str, Any], series: GapSeries) -> list[str]
                 f"U = {2e3 * gap['median_u_random_mm']:.2f} µm (k = 2, median) from frame to frame; the scale was "
                 "stated without an uncertainty, which is not in it."
             )
+        lines += _assumed_response(summary, series)
     return [*lines, *summary["advice"]]
+
+
+def _assumed_response(summary: Mapping[str, Any], series: GapSeries) -> list[str]:
+    """Say what an assumed response may cost, where no budget holds it and it is more than the uncertainty printed."""
+    gap, settings = summary["gap"], summary["settings"]
+    if settings.get("response_known", True) or gap["median_u_gap_mm"] is not None:
+        return []
+    moved_mm = float(np.median(series.response_px)) / summary["scale"]["px_per_mm"]
+    if moved_mm <= COVERAGE_FACTOR * gap["median_u_random_mm"]:
+        return []
+    return [
+        f"The camera's response is not known and was taken as {settings['response']}; another usual one would move the "
+        f"gap by {1e3 * moved_mm:.1f} µm (median), which is not in U: state it with --response, or measure it with "
+        "`fingervision calibrate response`."
+    ]
 
 
 def in_one_line(summary: Mapping[str, Any], series: GapSeries) -> str:

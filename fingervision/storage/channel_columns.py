@@ -11,7 +11,7 @@ from fingervision.storage.csv_columns import header_of, read_columns
 from fingervision.storage.number_columns import Numbers, numbers_in
 
 UNITS = ("_mm", "_mrad")
-NO_CHANNELS = ("held_mm", "target_mm", "u_force_n")
+NO_CHANNELS = ("held_mm", "target_mm", "encoder_mm", "u_force_n")
 """Columns of the project's own tables that end so and are no channel."""
 
 

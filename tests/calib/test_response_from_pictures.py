@@ -69,15 +69,15 @@ def test_a_wedge_that_is_not_in_the_region_is_refused() -> None:
 @pytest.mark.slow
 def test_the_shape_of_edges_tells_the_exponent_within_its_uncertainty() -> None:
     away = []
-    for seed in range(24):
+    for seed in range(10):
         rng = np.random.default_rng([seed, 8])
         exponent, blur_px, noise = rng.choice([1.0, 1.8, 2.2]), rng.uniform(0.8, 2.5), rng.uniform(0.5, 2.0)
-        pictures = [coded(bar(blur_px, rng.uniform(-0.3, 0.3)), exponent, noise, rng) for _ in range(2)]
+        pictures = [coded(bar(blur_px, rng.uniform(-0.3, 0.3)), exponent, noise, rng) for _ in range(1)]
         found = response_from_edges(pictures, 255, "edges")
         assert found.u_exponent is not None
         away.append((found.exponent - exponent) / found.u_exponent)
-    # At most one of 24 beyond 2 u is what 95 % allow often enough, three are seen in one case of thirty.
-    assert np.sum(np.abs(away) > 2.0) <= 3
+    # Of ten true 95 % intervals three or more fail once in a hundred times.
+    assert np.sum(np.abs(away) > 2.0) <= 2
     assert np.max(np.abs(away)) < 4.0
 
 
