@@ -49,7 +49,7 @@ def look(address: str, until_s: float, seen: Viewer) -> None:
                     (length,) = struct.unpack(">I", content[:4])  # type: ignore[arg-type]
                     points = json.loads(content[4 : 4 + length])["points"]
                     seen.messages += 1
-                    for *_, frame in points:
+                    for _, _, _, frame, *_ in points:
                         seen.rows += 1
                         seen.holes += last_frame is not None and frame > last_frame + 1
                         last_frame = frame
