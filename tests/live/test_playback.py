@@ -226,6 +226,8 @@ def test_what_the_page_measures_is_what_the_command_gives(
     page.fill("#below_tip", "0.5")
     page.press("#below_tip", "Enter")
     page.press("#below_tip", "Escape")
+    # The table of before is let go, and the new one grows.
+    shown(page, "document.querySelector('#place').textContent.includes('measured')")
     shown(page, f"document.querySelector('#place').textContent === 'frame {FRAMES - 1} of {FRAMES}'")
     with page.expect_download() as again:
         page.locator("body").press("c")
