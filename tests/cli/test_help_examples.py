@@ -91,19 +91,10 @@ def test_every_example_can_be_parsed(name: str, monkeypatch: pytest.MonkeyPatch,
         command.make_context(command.name, words)
 
 
-# Half a minute and more each; CI runs the shorter ones, and every example is parsed in any case.
-MINUTES = ("batch", "batch diagnose", "batch measure", "compare", "diagnose", "measure", "model")
-
-
+# Minutes in all: CI runs the examples of the manual and of the README, and every example is parsed in any case.
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    "name",
-    [
-        pytest.param(name, marks=[pytest.mark.long] if name in MINUTES else [])
-        for name, examples in ALL.items()
-        if examples
-    ],
-)
+@pytest.mark.long
+@pytest.mark.parametrize("name", [name for name, examples in ALL.items() if examples])
 def test_every_example_runs_in_its_folder(name: str, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     case = name.partition(" ")[0]
     folder = tmp_path / "case"
