@@ -4,7 +4,7 @@ from collections.abc import Set
 from dataclasses import replace
 from typing import Any
 
-from fingervision.domain.errors import FingervisionError
+from fingervision.domain.errors import DataError
 from fingervision.domain.status import Status
 from fingervision.measuring.clock.alignment import ClockOffset, NoClockOffset
 from fingervision.measuring.clock.common_clock import clock_of, refusal, sentence
@@ -61,7 +61,7 @@ def refuse_undriven(task: Task, series: GapSeries, clock: Clock, driven: Set[boo
     if isinstance(clock, NoClockOffset) and series.counts[Status.OK]:
         raise refusal(clock, where)
     if task.drive is not None and task.drive_offset_s is not None and driven == {False}:
-        raise FingervisionError(
+        raise DataError(
             f"No frame lies within the drive's times ({task.drive.time_s[0]:g} to {task.drive.time_s[-1]:g} s, shifted "
             f"by {task.drive_offset_s:g} s), so no row has an input; the gaps are {where}. Give another "
             "--drive-offset-s, or leave it out to have it found from the motion."

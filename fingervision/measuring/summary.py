@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from calib.measured_scale import Calibration
 from fingervision import __version__
-from fingervision.domain.errors import FingervisionError
+from fingervision.domain.errors import InputFileError
 from fingervision.domain.status import Status
 from fingervision.frames.source import Description
 from fingervision.measuring.scale import Scale
@@ -239,5 +239,5 @@ def _hash_of(file: Path) -> str:
             while block := content.read(BYTES_AT_ONCE):
                 found.update(block)
     except OSError as error:
-        raise FingervisionError(f"{file} could not be read again ({error.strerror}).") from error
+        raise InputFileError(f"{file} could not be read again ({error.strerror}).") from error
     return found.hexdigest()

@@ -16,7 +16,7 @@ from fingervision.diagnosis.input.recorded_input import AT_REST_SHARE, RecordedI
 from fingervision.diagnosis.input.row_screening import screened_rows
 from fingervision.diagnosis.noise.replicates import visits
 from fingervision.domain.effect import REZEROED, Array, History
-from fingervision.domain.errors import FingervisionError
+from fingervision.domain.errors import DataError
 from fingervision.domain.measured_table import MeasuredTable
 from fingervision.domain.model import PhysicalModel
 from fingervision.domain.response import Response
@@ -37,13 +37,13 @@ def prepare(table: MeasuredTable, model: CorrectedModel, without: frozenset[str]
     ratio = float(np.ptp(u)) / (high - low)
     for factor, unit in ((1e3, "micrometres"), (1e-3, "metres")):
         if 0.1 < ratio / factor < 3.0:
-            raise FingervisionError(
+            raise DataError(
                 f"input_mm must be in millimetres within the model's {low:g} to {high:g}, but runs from {u.min():g} to "
                 f"{u.max():g}, as if in {unit}: convert the column."
             )
     slack = 1e-9 * (high - low)
     if u.min() < low - slack or u.max() > high + slack:
-        raise FingervisionError(
+        raise DataError(
             f"input_mm must lie within the model's {low:g} to {high:g} mm, but runs from {u.min():g} to {u.max():g}: "
             "simulate the missing inputs, or leave those rows out."
         )
