@@ -107,6 +107,17 @@ class DataError(FingervisionError, ValueError):
     """A file, a recording or an array can be read, but does not hold what it must."""
 
 
+def unreadable(error: Exception) -> type[InputFileError] | type[DataError]:
+    """Class for a file that could not be taken in: the system refused it, or its content is another.
+
+    Examples
+    --------
+    >>> unreadable(PermissionError()).__name__, unreadable(UnicodeError()).__name__
+    ('InputFileError', 'DataError')
+    """
+    return InputFileError if isinstance(error, OSError) else DataError
+
+
 class OutputError(FingervisionError, OSError):
     """A result cannot be written: no room, no permission, or the place is taken by something else."""
 

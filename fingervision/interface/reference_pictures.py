@@ -18,7 +18,7 @@ from fingervision.domain.errors import (
 )
 from fingervision.frames.array_levels import levels_of, stated_shape, what_it_is
 from fingervision.frames.image_file import UnreadableImageError, read_image
-from fingervision.interface.argument_checks import number, one_of, whole_number
+from fingervision.interface.argument_checks import number, one_of
 from fingervision.vision.grey import GreyImage, to_grey
 
 KINDS = ("bar", "slot")
@@ -134,22 +134,6 @@ def files_of(sources: Sequence[Any]) -> list[Path]:
     return [Path(each) for each in sources if isinstance(each, str | os.PathLike)]
 
 
-def region_tuple(roi: Any) -> tuple[int, int, int, int] | None:
-    """Take a region of interest: first column, first row, width, height in pixels.
-
-    Raises
-    ------
-    UsageError
-        It is not four whole numbers.
-    """
-    if roi is None:
-        return None
-    if isinstance(roi, str) or not hasattr(roi, "__len__") or len(roi) != 4:
-        raise UsageError(f"--roi must be X,Y,W,H in whole pixels, but is {roi!r}.")
-    x, y, width, height = (whole_number("roi", each, 0) for each in roi)
-    return x, y, width, height
-
-
 def _read(source: Any, index: int) -> tuple[str, GreyImage]:
     if isinstance(source, np.ndarray) or hasattr(source, "__array__"):
         stack = stated_shape(source, ARGUMENT)
@@ -167,4 +151,4 @@ def _read(source: Any, index: int) -> tuple[str, GreyImage]:
         raise DataError(f"The picture {path} cannot be used: {error}") from error
 
 
-__all__ = ["KINDS", "Reference", "files_of", "known_sizes", "read_pictures", "references_of", "region_tuple"]
+__all__ = ["KINDS", "Reference", "files_of", "known_sizes", "read_pictures", "references_of"]

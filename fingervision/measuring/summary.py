@@ -103,7 +103,7 @@ def summarise(
             for status, found in series.first_without.items()
         },
         "gap": _statistics(series),
-        "uncertainty": _uncertainty(scale, settings),
+        "uncertainty": {**_uncertainty(scale, settings), "parts": series.budget},
         "advice": [
             *([LOSSLESS_ADVICE.format(codec=description.codec)] if description.lossy else []),
             *_about_fingers(series),

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from fingervision.domain.errors import DataError, InputFileError
+from fingervision.domain.errors import DataError, InputFileError, unreadable
 from fingervision.storage.number_block import number_block
 
 CHUNK_LINES = 1000
@@ -117,7 +117,7 @@ def _text(path: Path) -> str:
     except FileNotFoundError:
         raise InputFileError(f"There is no table {path}.") from None
     except (OSError, UnicodeDecodeError) as error:
-        raise InputFileError(f"{path} must be a CSV table in UTF-8, but could not be read: {error}.") from error
+        raise unreadable(error)(f"{path} must be a CSV table in UTF-8, but could not be read: {error}.") from error
 
 
 def _cells(path: Path, text: str) -> Iterator[list[str]]:

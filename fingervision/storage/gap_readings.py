@@ -4,7 +4,7 @@ import csv
 from math import isfinite
 from pathlib import Path
 
-from fingervision.domain.errors import DataError, InputFileError
+from fingervision.domain.errors import DataError, unreadable
 from fingervision.storage.plain_file import plain
 
 # Inputs nearer than this are one part (mm): stages return to a place no better.
@@ -30,7 +30,7 @@ def read_gap_readings(path: Path, by_input: bool) -> dict[float | None, list[flo
     try:
         lines = [line for line in plain(path).read_text(encoding="utf-8").splitlines() if not line.startswith("#")]
     except (OSError, UnicodeDecodeError) as error:
-        raise InputFileError(f"The table {path} could not be read: {error}; give a gaps.csv.") from error
+        raise unreadable(error)(f"The table {path} could not be read: {error}; give a gaps.csv.") from error
     table = csv.DictReader(lines)
     needed = {"gap_mm"} | ({"input_mm"} if by_input else set())
     missing = needed - set(table.fieldnames or ())

@@ -9,7 +9,7 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
-from fingervision.domain.errors import DataError, InputFileError
+from fingervision.domain.errors import DataError, InputFileError, unreadable
 from fingervision.domain.parameter import Estimate
 from fingervision.models.flexure import Flexure
 from fingervision.models.mechanism import Contact, Drive, Face, Mechanism, check_mechanism
@@ -112,7 +112,7 @@ def read_drawing(path: Path) -> MechanismDrawing:
     except FileNotFoundError:
         raise InputFileError(f"There is no mechanism {path}.") from None
     except (OSError, ValueError, RecursionError) as error:
-        raise DataError(f"{path} must be TOML in UTF-8, but is not: {error}.") from error
+        raise unreadable(error)(f"{path} must be TOML in UTF-8, but is not: {error}.") from error
     return MechanismDrawing(path, *bare_tables(tables, str(path)))
 
 

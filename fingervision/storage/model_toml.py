@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from fingervision.domain.effect import effect_key, split_key
-from fingervision.domain.errors import DataError, InputFileError
+from fingervision.domain.errors import DataError, InputFileError, unreadable
 from fingervision.domain.parameter import Estimate
 from fingervision.effects import catalogue
 from fingervision.effects.position_error_map import curve_points, curve_values
@@ -65,7 +65,7 @@ def read_model(
     except FileNotFoundError:
         raise InputFileError(f"There is no model {path}.") from None
     except (ValueError, RecursionError, OSError) as error:
-        raise InputFileError(f"{path} must be a TOML file, but could not be read: {error}.") from error
+        raise unreadable(error)(f"{path} must be a TOML file, but could not be read: {error}.") from error
     if "base" not in document:
         return _gripper(path, kind)
     if document.get("schema", 1) != 1:

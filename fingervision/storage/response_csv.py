@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from calib.camera_response import CURVES, CameraResponse, standard_response
 from calib.errors import CalibrationError
-from fingervision.domain.errors import DataError, InputFileError, OutputError, UsageError
+from fingervision.domain.errors import DataError, OutputError, UsageError, unreadable
 from fingervision.storage.plain_file import plain
 
 COLUMNS = ("level", "light")
@@ -50,7 +50,7 @@ def read_response(path: Path) -> CameraResponse:
         with plain(path).open(newline="", encoding="utf-8-sig") as file:
             rows = list(csv.reader(line for line in file if not line.startswith("#")))
     except (OSError, UnicodeDecodeError) as error:
-        raise InputFileError(f"The camera response {path} could not be read: {error}.") from error
+        raise unreadable(error)(f"The camera response {path} could not be read: {error}.") from error
     if not rows or tuple(cell.strip() for cell in rows[0]) != COLUMNS:
         raise DataError(f"{path} must begin with the line {','.join(COLUMNS)}, but does not.")
     try:

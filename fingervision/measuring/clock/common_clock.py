@@ -6,7 +6,7 @@ from types import MappingProxyType
 from typing import Any
 
 from fingervision.domain.drive import DriveHistory
-from fingervision.domain.errors import DataError, FingervisionError
+from fingervision.domain.errors import DataError
 from fingervision.measuring.clock.alignment import ClockOffset, NoClockOffset, find_clock_offset
 from fingervision.measuring.drive_at import DriveState, drive_at
 from fingervision.measuring.series import GapSeries
@@ -76,7 +76,7 @@ def sentence(clock: ClockOffset) -> str:
     )
 
 
-def refusal(found: NoClockOffset, where: str) -> FingervisionError:
+def refusal(found: NoClockOffset, where: str) -> DataError:
     """Say why the rows have no input; `where` says where the gaps are (`in measured/run/gaps.csv`)."""
     return DataError(
         f"The offset between the recording's clock and the drive's was not found: {found.words} The gaps are "
