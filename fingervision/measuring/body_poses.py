@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fingervision.domain.body_poses import COVERED, DAMAGED, OK, OUT_OF_VIEW, FramePoses, SeenPose
-from fingervision.domain.errors import FingervisionError
+from fingervision.domain.errors import DataError
 from fingervision.domain.frame import Frame, LostFrame
 from fingervision.frames.source import FrameSource
 from fingervision.measuring.body_outlines import BodyOutline, Placement, outlines_of
@@ -109,7 +109,7 @@ class BodyTracker:
             placed = by_silhouette(grey, self.mechanism, self.px_per_mm)
         exact = refined(grey, self.outlines, placed.place, placed.body_is_dark)
         if exact is None:
-            raise FingervisionError(
+            raise DataError(
                 f"The edges of {self.mechanism.name} must be seen where it is laid on frame {index}, but are not: "
                 "check the scale and the drawing, or give --at X,Y=XMM,YMM for three points."
             )

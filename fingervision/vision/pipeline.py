@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from calib.camera_response import CameraResponse
-from fingervision.domain.errors import FingervisionError
+from fingervision.domain.errors import DataError
 from fingervision.domain.frame import Coding, Frame, Pixels
 from fingervision.domain.gap import GapMeasurement, NoGap
 from fingervision.domain.region import Region
@@ -253,7 +253,7 @@ def _scale(grey: GreyImage, settings: Settings) -> int:
             f"The camera response {settings.response.name} was measured on levels up to {known}, but these pictures "
             f"have levels up to {found}: measure it on pictures of this depth."
         )
-        raise FingervisionError(msg)
+        raise DataError(msg)
     return found
 
 

@@ -17,7 +17,7 @@ from fingervision.diagnosis.input.recorded_input import AT_REST_SHARE, RecordedI
 from fingervision.diagnosis.input.row_screening import screened_rows
 from fingervision.diagnosis.noise.replicates import visits
 from fingervision.domain.effect import REZEROED, Array, History
-from fingervision.domain.errors import FingervisionError
+from fingervision.domain.errors import DataError
 from fingervision.domain.measured_table import MeasuredTable
 from fingervision.domain.model import PhysicalModel
 from fingervision.domain.response import Response
@@ -33,7 +33,7 @@ def prepare(table: MeasuredTable, model: CorrectedModel, without: frozenset[str]
 
     Raises
     ------
-    FingervisionError
+    DataError
         The model does not cover the inputs, or the inputs are in another unit.
     """
     model, function = at_rest_beside(table, model)
@@ -73,13 +73,13 @@ def _refuse_other_inputs(input_mm: Array, range_mm: tuple[float, float]) -> None
     (low, high), span = range_mm, float(np.ptp(input_mm))
     for factor, unit in ((1e3, "micrometres"), (1e-3, "metres")):
         if UNIT_SHARES[0] < span / (high - low) / factor < UNIT_SHARES[1]:
-            raise FingervisionError(
+            raise DataError(
                 f"input_mm must be in millimetres within the model's {low:g} to {high:g}, but runs from "
                 f"{input_mm.min():g} to {input_mm.max():g}, as if in {unit}: convert the column."
             )
     slack = 1e-9 * (high - low)
     if input_mm.min() < low - slack or input_mm.max() > high + slack:
-        raise FingervisionError(
+        raise DataError(
             f"input_mm must lie within the model's {low:g} to {high:g} mm, but runs from {input_mm.min():g} to "
             f"{input_mm.max():g}: simulate the missing inputs, or leave those rows out."
         )
