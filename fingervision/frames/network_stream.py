@@ -15,6 +15,7 @@ from fingervision.domain.frame import Coding, Frame, LostFrame
 from fingervision.domain.status import Status
 from fingervision.frames.damage import DamageTrail, Picture
 from fingervision.frames.luma import luma
+from fingervision.frames.quantiser_steps import EXPORTED, quantiser_steps
 from fingervision.frames.received import OwnPacket, Received
 from fingervision.frames.sound_jpeg import SoundJpeg
 from fingervision.frames.source import Description, Wish
@@ -103,7 +104,7 @@ class NetworkStream:
         self._kept = av.open(io.BytesIO(), "w", format="matroska")
         self.template: av.VideoStream | None = self._kept.add_stream_from_template(self._stream)
         codec = self._stream.codec_context
-        codec.options = STRICT
+        codec.options = STRICT | EXPORTED
         DamageTrail.prepare(codec)
         codec.thread_count = 1  # threads of frames would each keep one back
         if codec.width < 1 or codec.height < 1:
@@ -206,7 +207,8 @@ class NetworkStream:
             return LostFrame(index, time_s, Status.DAMAGED, words)
         if time_s == last_s:
             return LostFrame(index, time_s, Status.DUPLICATE, "It has the same time as the frame before.")
-        return Frame(luma(found), index, time_s, self.description.coding, not found.key_frame)
+        coding = self.description.coding
+        return Frame(luma(found), index, time_s, coding, not found.key_frame, quantiser_steps(found))
 
     def _own(self, packet: "av.Packet[av.VideoStream]", arrived_s: float) -> OwnPacket:
         shown_s = self._time_s(packet.pts, arrived_s)
