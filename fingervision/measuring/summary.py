@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from calib.measured_scale import Calibration
 from fingervision import __version__
-from fingervision.domain.errors import FingervisionError
+from fingervision.domain.errors import InputFileError
 from fingervision.domain.status import Status
 from fingervision.frames.source import Description
 from fingervision.measuring.scale import Scale
@@ -103,7 +103,7 @@ def summarise(
             for status, found in series.first_without.items()
         },
         "gap": _statistics(series),
-        "uncertainty": _uncertainty(scale, settings),
+        "uncertainty": {**_uncertainty(scale, settings), "parts": series.budget},
         "advice": [
             *([LOSSLESS_ADVICE.format(codec=description.codec)] if description.lossy else []),
             *_about_fingers(series),
@@ -239,5 +239,5 @@ def _hash_of(file: Path) -> str:
             while block := content.read(BYTES_AT_ONCE):
                 found.update(block)
     except OSError as error:
-        raise FingervisionError(f"{file} could not be read again ({error.strerror}).") from error
+        raise InputFileError(f"{file} could not be read again ({error.strerror}).") from error
     return found.hexdigest()

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from fingervision.domain.effect import effect_key, split_key
-from fingervision.domain.errors import FingervisionError
+from fingervision.domain.errors import DataError, InputFileError, unreadable
 from fingervision.domain.parameter import Estimate
 from fingervision.effects import catalogue
 from fingervision.effects.position_error_map import curve_points, curve_values
@@ -63,18 +63,18 @@ def read_model(
     try:
         document = tomllib.loads(plain(path).read_text(encoding="utf-8-sig"))
     except FileNotFoundError:
-        raise FingervisionError(f"There is no model {path}.") from None
+        raise InputFileError(f"There is no model {path}.") from None
     except (ValueError, RecursionError, OSError) as error:
-        raise FingervisionError(f"{path} must be a TOML file, but could not be read: {error}.") from error
+        raise unreadable(error)(f"{path} must be a TOML file, but could not be read: {error}.") from error
     if "base" not in document:
         return _gripper(path, kind)
     if document.get("schema", 1) != 1:
-        raise FingervisionError(
+        raise DataError(
             f"schema in {path} must be 1, but is {document['schema']}: a newer fingervision wrote it; use that one."
         )
     place = path.resolve()
     if place in inside:
-        raise FingervisionError(f"The base of {path} must be another model, but leads back to itself: mend `base`.")
+        raise DataError(f"The base of {path} must be another model, but leads back to itself: mend `base`.")
     kind = str(document.get("kind", kind))
     base = read_model(path.parent / str(document["base"]), kind, (*inside, place), table)
     names: dict[str, str] = {key: str(document[key]) for key in ("input", "gap") if key in document}
@@ -83,7 +83,7 @@ def read_model(
     effects: dict[str, Mapping[str, Estimate]] = dict(base.effects)
     entries = document.get("effect", [])
     if not isinstance(entries, list):
-        raise FingervisionError(f"The effects in {path} must be [[effect]] tables, but `effect` is {entries}: mend it.")
+        raise DataError(f"The effects in {path} must be [[effect]] tables, but `effect` is {entries}: mend it.")
     for entry in entries:
         try:
             parameters = dict(entry["parameters"])
@@ -96,7 +96,7 @@ def read_model(
             key = effect_key(str(entry["name"]), str(entry.get("place", "")), str(entry.get("end", "")))
             effects[key] = stated | {name: Estimate(value, None) for name, value in curve.items()}
         except (KeyError, TypeError, ValueError, AttributeError, OverflowError) as error:
-            raise FingervisionError(
+            raise DataError(
                 f"An effect in {path} must have a name and parameters like play_mm = {{ value = 0.01, u = 0.001 }}, "
                 f"but is {entry}: mend it."
             ) from error
@@ -110,7 +110,7 @@ def read_model(
 def _function(path: Path, names: Mapping[str, str]) -> CorrectedModel:
     """Take an FMU or a Python file as a model, which covers whatever it answers."""
     if not path.is_file():
-        raise FingervisionError(f"There is no model {path}.")
+        raise InputFileError(f"There is no model {path}.")
     everywhere = (-float("inf"), float("inf"))
     return CorrectedModel(path.name, FunctionModel(path, names), str(path), everywhere, {})
 
@@ -120,11 +120,11 @@ def _check(name: str, values: Mapping[str, Estimate], path: Path) -> None:
     if name not in catalogue():
         near = get_close_matches(name, catalogue(), n=1)
         hint = f"did you mean {near[0]}?" if near else "`fingervision effects` lists them."
-        raise FingervisionError(f"An effect in {path} must be one of the catalogue, but is {name}: {hint}")
+        raise DataError(f"An effect in {path} must be one of the catalogue, but is {name}: {hint}")
     wanted = [parameter.name for parameter in catalogue()[name].parameters]
     missing = [key for key in wanted if key not in values]
     if missing:
-        raise FingervisionError(
+        raise DataError(
             f"The effect {name} in {path} must state {', '.join(wanted)}, but {', '.join(missing)} is not there "
             f"(it states {', '.join(values) or 'nothing'}): add it."
         )
@@ -132,12 +132,12 @@ def _check(name: str, values: Mapping[str, Estimate], path: Path) -> None:
         estimate = values[parameter.name]
         slack = BOUND_SLACK * (parameter.upper - parameter.lower)
         if not parameter.lower - slack <= estimate.value <= parameter.upper + slack:
-            raise FingervisionError(
+            raise DataError(
                 f"{parameter.name} of the effect {name} in {path} must be {parameter.lower:g} to {parameter.upper:g}, "
                 f"but is {estimate.value:g}: mend it."
             )
         if estimate.u is not None and not 0.0 <= estimate.u < float("inf"):
-            raise FingervisionError(
+            raise DataError(
                 f"The u of {parameter.name} of the effect {name} in {path} must be a number from 0, but is "
                 f"{estimate.u:g}: mend it, or leave it out."
             )
@@ -152,7 +152,7 @@ def _check_curve(name: str, values: Mapping[str, Estimate], path: Path) -> None:
         and np.all(np.isfinite(errors))
         and np.all(np.diff(inputs) > 0.0)
     ):
-        raise FingervisionError(
+        raise DataError(
             f"{POINTS} of the effect {name} in {path} must be two or more pairs of finite numbers with rising inputs, "
             f"but the inputs are {inputs.tolist()}: mend them."
         )
@@ -161,9 +161,7 @@ def _check_curve(name: str, values: Mapping[str, Estimate], path: Path) -> None:
 def _gripper(path: Path, kind: str) -> CorrectedModel:
     """Build a gripper whose effects are its own physics."""
     if kind not in kinds():
-        raise FingervisionError(
-            f"The kind of model for {path} must be one of {', '.join(kinds())}, but is {kind}: choose one."
-        )
+        raise DataError(f"The kind of model for {path} must be one of {', '.join(kinds())}, but is {kind}: choose one.")
     if is_mechanism(path):
         drawn = MechanismModelOfGap(read_mechanism(path), kind)
         return CorrectedModel(f"{path.name} ({kind})", drawn, str(path), drawn.input_range_mm, {}, kind)

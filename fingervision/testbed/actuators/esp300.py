@@ -11,7 +11,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, TypeVar
 
-from fingervision.domain.errors import FingervisionError
+from fingervision.domain.errors import DeviceError, FingervisionError, LimitError, StateError
 from fingervision.storage.toml_section import Section
 from fingervision.testbed.actuator import Alarm, StageLimits
 from fingervision.testbed.build_context import BuildContext
@@ -57,7 +57,7 @@ class Esp300Stage:
         self._closed = False
         units = self._asked(lambda: axis.units)
         if units != MILLIMETRE:
-            raise FingervisionError(
+            raise DeviceError(
                 f"{self.name} must count in {MILLIMETRE}s, but counts in {units}: set it (1SN2) and home it."
             )
         self._do(axis.enable)
@@ -101,7 +101,7 @@ class Esp300Stage:
 
     def run_step(self, number: int) -> None:
         """Refuse: this controller keeps programs, no step data."""
-        raise FingervisionError(f"Step {number} must be kept by the controller, but an ESP300 has none: use move.")
+        raise LimitError(f"Step {number} must be kept by the controller, but an ESP300 has none: use move.")
 
     def stop(self) -> None:
         """Stop at once."""
@@ -128,7 +128,7 @@ class Esp300Stage:
 
     def _ready(self) -> None:
         if self.busy:
-            raise FingervisionError("The stage must stand before it moves again, but is busy: stop it first.")
+            raise StateError("The stage must stand before it moves again, but is busy: stop it first.")
 
     def _do(self, act: Callable[[], None]) -> None:
         """Give a command, and ask whether the controller took it."""
@@ -138,7 +138,7 @@ class Esp300Stage:
         if errors:
             words = "; ".join(str(getattr(one, "message", one)).lower() for one in errors)
             self._alarm = Alarm(str(getattr(errors[0], "error", "")), words)
-            raise FingervisionError(f"{self.name} must take the command, but refused it ({words}): nothing was moved.")
+            raise DeviceError(f"{self.name} must take the command, but refused it ({words}): nothing was moved.")
         self._alarm = None
 
     def _asked(self, act: Callable[[], T]) -> T:
@@ -149,7 +149,7 @@ class Esp300Stage:
             raise
         except Exception as error:  # serial lines, VISA and pymeasure each have classes of their own
             said = f"{type(error).__name__}: {error}".replace("\n", " ")[:200].rstrip(".")
-            raise FingervisionError(f"{self.name} must answer, but did not ({said}): check its cable.") from error
+            raise DeviceError(f"{self.name} must answer, but did not ({said}): check its cable.") from error
 
 
 def _limits(section: Section) -> StageLimits:
