@@ -27,7 +27,7 @@ from fingervision.vision.held_part import visible_lines
 from fingervision.vision.interlace import at_half_way
 from fingervision.vision.longer_flanks import is_surer, with_longer_flanks
 from fingervision.vision.overlay import draw_boundary, draw_edge_points, draw_overlay, in_eight_bits
-from fingervision.vision.profile_choice import with_profile
+from fingervision.vision.profile_choice import STRIP, with_profile
 from fingervision.vision.profile_lines import profile_lines
 from fingervision.vision.response_shift import gap_shift_px
 from fingervision.vision.settings import LINEAR, SRGB, Settings
@@ -222,6 +222,8 @@ def _edges_and_gap(
         edges, apart_px = at_half_way(edges)
     with suppress(np.linalg.LinAlgError):  # what stands beside the edges is none of the models
         edges = with_profile(upright, edges, light, scale, settings.is_outline)
+    if edges.beside == STRIP:
+        return edges, THIRD_TONE
     edges = with_stripes(upright, edges, light)
     outcome = measure_gap(fingers, edges, settings.below_tip_px, scale, light_gap, coded.coding)
     if isinstance(outcome, GapMeasurement):
