@@ -179,17 +179,18 @@ def _explained(
     after = data.stacked_mm - data.chain.stacked(_values(data, found))
     stands = standing(data, found.problem, before, after)
     digit = resolution(data.table.gap_mm) if data.recorded.commanded else 0.0
-    if stands.after_mm > stands.before_mm or stands.before_mm < digit:
-        # What makes the disagreement larger explains nothing, and less than the digit of a reading that stands still is
-        # its rounding, the same in every hold.
+    n, edges = data.chain.history.input_mm.size, data.chain.history.both_edges
+    larger = stands.after_mm > stands.before_mm or rms_mm(after, n, edges) > rms_mm(before, n, edges)
+    if larger or stands.before_mm < digit:
+        # What makes the disagreement larger, outliers included, explains nothing, and less than the digit of a reading
+        # that stands still is its rounding, the same in every hold.
         unknown = None if stands.before_mm < digit else found.unknown
         found = replace(found, best=found.problem.nothing(), alternatives=(), unknown=unknown)
         data = replace(data, position_map=None, run_gains=None)
         after, stands = before, standing(data, found.problem, before, before)
     mapped = data.position_map is not None
     decided, unknown = verdict(found, mapped=mapped, stands=stands)
-    history, best = data.chain.history, found.best
-    n, edges = history.input_mm.size, history.both_edges
+    best = found.best
     unseen = left_out_rms_mm(data, found.problem, best)
     channels = {
         name: {

@@ -212,8 +212,9 @@ def fit(
         part, pull = scale[:, None] * normal[np.ix_(free, free)] * scale, scale * gradient[free]
         gained = 0.0
         for _ in range(5):
+            bounds = ((lower - x)[free] / scale, (upper - x)[free] / scale)
             trial = x.copy()
-            trial[free] += scale * np.linalg.lstsq(part + damping * np.eye(scale.size), pull, rcond=1e-12)[0]
+            trial[free] += scale * bounded_step(part + damping * np.eye(scale.size), pull, bounds)
             trial = np.clip(trial, lower, upper)
             rest = aim - problem.whitened(settings(trial))
             new = offsets.squared(rest, metric)
@@ -254,6 +255,41 @@ def fit(
     price = float(np.sum(np.minimum(prices, np.log(max(2, aim.size)))))
     names_of = settings(x)
     return Explanation(order, names_of, cost + penalty, residual, covariance, int((free & own).sum()), spread, price)
+
+
+def bounded_step(matrix: Array, pull: Array, bounds: tuple[Array, Array]) -> Array:
+    """Minimise a quadratic form within bounds, to the accuracy that a step of a search needs.
+
+    What would go beyond its bound is held there and the others are solved again beside it: clipped alone it would
+    leave them where they suit a step that was never made.
+
+    Parameters
+    ----------
+    matrix : ndarray of float, shape (p, p)
+        Half the second derivatives.
+    pull : ndarray of float, shape (p,)
+        Half the downward slope.
+    bounds : tuple of ndarray of float, each of shape (p,)
+        Least and largest step of each parameter; they enclose zero.
+
+    Returns
+    -------
+    ndarray of float, shape (p,)
+        The step.
+    """
+    step, held = np.zeros(pull.size), np.zeros(pull.size, dtype=bool)
+    for _ in range(pull.size):
+        loose = ~held
+        rest = pull[loose] - matrix[np.ix_(loose, held)] @ step[held]
+        step[loose] = np.linalg.lstsq(matrix[np.ix_(loose, loose)], rest, rcond=1e-12)[0]
+        beyond = loose & ((step < bounds[0]) | (step > bounds[1]))
+        if not beyond.any():
+            break
+        held |= beyond
+        step = np.where(held, np.clip(step, *bounds), step)
+        if held.all():
+            break
+    return step
 
 
 def _together(listed: list[tuple[str, Parameter]]) -> list[list[int]]:
