@@ -40,8 +40,8 @@ PEAK_STEP = 0.2
 MOST_LINES = 400
 """Lines over the range at most: finer ones are no finer than the noise of other records."""
 MOST_EQUAL = 0.8
-"""Share of the changes that go equally many lines on, above which a steady motion looks like lines: a speed between two
-whole numbers of an encoder's lines a row has at least a fifth of another number, but for one speed in two and a half."""
+"""Share of the changes that go equally many lines on, above which a steady motion looks like lines. Where it is an
+encoder after all, at a speed near a whole number of lines a row, only its jitter stays in the record."""
 FEWEST_SINGLE = 3
 """Single steps that tell an encoder from set points in round numbers."""
 

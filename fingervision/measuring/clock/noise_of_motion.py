@@ -115,7 +115,7 @@ def _stretch_of(motion: Motion, found: Fit, log_s: Array) -> NDArray[np.intp]:
 
 
 FEWEST_SHARED = 8
-"""Frames of a stretch whose mean may be taken out before the rest is taken for noise: fewer would lose their scatter."""
+"""Frames of a stretch whose mean may be taken out before the rest is noise: fewer would lose their scatter."""
 
 
 def _without_shared(residual_mm: Array, stretch: NDArray[np.intp], shared_mm: Array) -> tuple[Array, float]:

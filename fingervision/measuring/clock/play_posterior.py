@@ -46,8 +46,8 @@ class Posterior:
 def most_likely(motion: Motion, start: Alignment, plays: tuple[float, ...] = FIRST_PLAYS) -> Fit:
     """Fit from several plays and keep the best; `plays` over the largest possible one.
 
-    Play and offset trade with each other along narrow valleys, in which a search at a fixed play halts beside the lowest
-    place: the best two of them, and where the search began, are followed with the play free.
+    Play and offset trade with each other along narrow valleys, in which a search at a fixed play halts beside the
+    lowest place: the best two of them, and where the search began, are followed with the play free.
     """
     longest_mm = _longest_mm(motion)
     held = [fit(motion, replace(start, play_mm=share * longest_mm), free_play=False) for share in plays]
