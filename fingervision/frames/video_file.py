@@ -10,11 +10,13 @@ import numpy as np
 
 from fingervision.domain.errors import DataError, FingervisionError, InputFileError, UsageError
 from fingervision.domain.frame import Coding, Frame, LostFrame, Pixels
+from fingervision.domain.quantiser import Quantiser
 from fingervision.domain.status import Status
 from fingervision.frames.damage import DamageTrail
 from fingervision.frames.file_pictures import pictures
 from fingervision.frames.image_file import IMAGE_SUFFIXES
 from fingervision.frames.luma import luma
+from fingervision.frames.quantiser_steps import EXPORTED, quantiser_steps
 from fingervision.frames.source import Description, Wish
 from fingervision.frames.spoken_damage import STRICT
 from fingervision.frames.told_times import believable
@@ -117,7 +119,7 @@ class VideoFile:
         last_tick: int | None = None
         with self._opened() as container:
             stream = _stream(container, self.name)
-            stream.codec_context.options = STRICT
+            stream.codec_context.options = STRICT | EXPORTED
             if self.description.coding is Coding.INTERFRAME:
                 # With threads for slices FFmpeg's H.264 neither fills in nor marks what is missing in a picture
                 # (libavcodec/h264_slice.c, enable_er): parts of older pictures would stand there, unsaid.
@@ -136,7 +138,8 @@ class VideoFile:
                 elif tick is not None and tick == last_tick:
                     yield LostFrame(index, time_s, Status.DUPLICATE, "It has the same time as the frame before.")
                 else:
-                    yield Frame(pixels, index, time_s, self.description.coding, not found.key_frame)
+                    hangs = not found.key_frame
+                    yield Frame(pixels, index, time_s, self.description.coding, hangs, upright_steps(found))
                 last_tick = tick
 
     def _opened(self) -> av.container.InputContainer:
@@ -175,6 +178,14 @@ def upright(pixels: Pixels, rotation_deg: int) -> Pixels:
         return pixels
     turned: Pixels = np.ascontiguousarray(np.rot90(pixels, rotation_deg // QUARTER_DEG))  # type: ignore[assignment]
     return turned
+
+
+def upright_steps(picture: av.VideoFrame) -> Quantiser | None:
+    """Quantiser of a picture as the file asks to turn it."""
+    steps = quantiser_steps(picture)
+    if steps is None or picture.rotation % QUARTER_DEG:
+        return steps
+    return steps.turned(picture.rotation // QUARTER_DEG, picture.width, picture.height)
 
 
 def _of_another_size(pixels: Pixels, description: Description) -> str:

@@ -100,7 +100,9 @@ class Look:
     @property
     def u_camera_px(self) -> float:
         """Random uncertainty of the gap as far as noise of the camera makes it, without what a codec shares."""
-        return self.outcome.u_gap_px / float(np.sqrt(SHARED_POINTS[self.frame.coding]))
+        alone = max(self.outcome.u_gap_px**2 - self.outcome.u_coding_px**2, 0.0)
+        shared = 1.0 if self.frame.quantiser is not None else SHARED_POINTS[self.frame.coding]
+        return float(np.sqrt(alone / shared))
 
     @property
     def noise(self) -> float:

@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fingervision.diagnosis.diagnose import Diagnosis as Found
-from fingervision.diagnosis.diagnose import by_channel
 from fingervision.diagnosis.diagnose import diagnose as diagnose_table
 from fingervision.diagnosis.report.answer_files import corrected, write_answer
+from fingervision.diagnosis.report.residual_channels import by_channel
 from fingervision.diagnosis.report.residual_figure import residual_figure
 from fingervision.domain.effect import Effect
 from fingervision.domain.errors import ArgumentError

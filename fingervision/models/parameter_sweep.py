@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from itertools import product
 from operator import attrgetter
 
@@ -10,6 +11,7 @@ from numpy.typing import NDArray
 
 from fingervision.domain.errors import FingervisionError, ModelError, UsageError
 from fingervision.domain.gripper import Gripper
+from fingervision.models.drive_block_sweep import block_compliances
 from fingervision.models.gripper_outline import check_outline
 from fingervision.models.hinge_correction import HingeTheory
 from fingervision.models.lumped import LumpedGripper
@@ -119,9 +121,11 @@ def sweep_answers(gripper: Gripper, variations: Sequence[Variation], theory: Hin
     for corner in product(*((min(v.values), max(v.values)) for v in variations)):
         check_outline(varied(gripper, variations, corner), f"the variant {_spelt(variations, corner)}")
     rows = []
+    corrected = theory is HingeTheory.CORRECTED
+    blocks = block_compliances(partial(varied, gripper, variations), [v.values for v in variations])
     for values in grid:
         drawn = varied(gripper, variations, values)
-        model = LumpedGripper(drawn, theory=theory)
+        model = LumpedGripper(drawn, theory=theory, block=blocks(values) if corrected else None)
         stress, touch = model.peak_stress().mpa_per_mm, model.half.first_touch_mm()
         force = model.half.equilibrium(1.0).force_n
         at_yield = drawn.material.yield_mpa / stress
