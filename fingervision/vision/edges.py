@@ -76,7 +76,8 @@ class EdgePoints:
     noise_flat : float
         Standard deviation of the light in the flat parts beside the edges; 0 where none is in view.
     beside : str
-        What stands beside the edges or has moved them, where anything is seen: wall, shadow, glare, motion, sharpening.
+        What stands beside the edges or has moved them, where anything is seen: wall, shadow, glare, motion, sharpening;
+        or a strip of a third tone, which is not measured.
     """
 
     lines: ProfileLines

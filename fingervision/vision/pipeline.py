@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from calib.camera_response import CameraResponse
-from fingervision.domain.errors import FingervisionError
+from fingervision.domain.errors import DataError
 from fingervision.domain.frame import Coding, Frame, Pixels
 from fingervision.domain.gap import GapMeasurement, NoGap
 from fingervision.domain.quantiser import Quantiser
@@ -28,7 +28,7 @@ from fingervision.vision.held_part import visible_lines
 from fingervision.vision.interlace import at_half_way
 from fingervision.vision.longer_flanks import is_surer, with_longer_flanks
 from fingervision.vision.overlay import draw_boundary, draw_edge_points, draw_overlay, in_eight_bits
-from fingervision.vision.profile_choice import with_profile
+from fingervision.vision.profile_choice import STRIP, with_profile
 from fingervision.vision.profile_lines import profile_lines
 from fingervision.vision.response_shift import gap_shift_px
 from fingervision.vision.settings import LINEAR, SRGB, Settings
@@ -223,6 +223,8 @@ def _edges_and_gap(
         edges, apart_px = at_half_way(edges)
     with suppress(np.linalg.LinAlgError):  # what stands beside the edges is none of the models
         edges = with_profile(upright, edges, light, scale, settings.is_outline)
+    if edges.beside == STRIP:
+        return edges, THIRD_TONE
     edges = with_stripes(upright, edges, light)
     outcome = measure_gap(fingers, edges, settings.below_tip_px, scale, light_gap, coded.coding)
     if isinstance(outcome, GapMeasurement):
@@ -277,7 +279,7 @@ def _scale(grey: GreyImage, settings: Settings) -> int:
             f"The camera response {settings.response.name} was measured on levels up to {known}, but these pictures "
             f"have levels up to {found}: measure it on pictures of this depth."
         )
-        raise FingervisionError(msg)
+        raise DataError(msg)
     return found
 
 

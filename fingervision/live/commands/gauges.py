@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import asdict
 from typing import Any
 
-from fingervision.domain.errors import FingervisionError, UsageError
+from fingervision.domain.errors import StateError, UsageError
 from fingervision.gauges.fields import fields_of
 from fingervision.gauges.kinds import kinds
 from fingervision.live.commands.asking import GREATEST, MOST_LETTERS, Answer, Request, shown, words
@@ -21,7 +21,7 @@ def _beside(view: View) -> GaugesBeside:
     if isinstance(found, GaugesBeside):
         return found
     if not isinstance(view, Playback):
-        raise FingervisionError("Gauges are drawn on a recording: record, and open the recording.")
+        raise StateError("Gauges are drawn on a recording: record, and open the recording.")
     return put_gauges_beside(view, USUAL_FILE)
 
 
