@@ -27,9 +27,9 @@ FEWEST_ROWS, STEEPEST = 8, 0.3
 # Of a window's pixels so many are taken up by level, contrast, position and (shared by all rows) blur.
 FITTED, FITTED_BY_ROW = 4, 3
 # Even profiles: variance of the mean over that of rows with noise of their own, beyond which it is no chance. In 99.9 %
-# of pictures without anything shared the mean over four flanks of five even profiles each is below this (chi-square of
-# 20), and the whole profile's below the first.
-LEAST_WHOLE, LEAST_EVEN = 1.5, 2.3
+# of pictures without anything shared the mean over four flanks of four even profiles each is below this (chi-square of
+# 16), and the whole profile's below the first.
+LEAST_WHOLE, LEAST_EVEN = 1.5, 2.45
 # Profiles that the fit takes up but for this share of their power say nothing.
 LEAST_OWN = 1e-3
 
@@ -127,12 +127,15 @@ def _whole(flank: Flank) -> float:
 
 
 def _even(flank: Flank) -> float:
-    """Variance of a pixel's mean, by what the fit has left of the even part of the profile."""
+    """Variance of a pixel's mean, by what the fit has left of the even part of the profile.
+
+    Light that falls off over the window, on either side of the edge, is no matter of the edge and is left out as well.
+    """
     half = 0.5 * flank.mean.size
     away = np.arange(flank.mean.size) + 0.5 - half - flank.offset_px
     waves = np.cos(np.arange(int(half) + 1)[:, None] * np.pi * away / half)
     _, by_position, _ = blurred_step(np.append(away - 0.5, away[-1] + 0.5), np.array([flank.sigma_px]))
-    taken, _ = np.linalg.qr(np.stack((np.ones_like(away), by_position), axis=1))
+    taken, _ = np.linalg.qr(np.stack((np.ones_like(away), by_position, np.abs(away)), axis=1))
     own = waves - (waves @ taken) @ taken.T
     power, direction = np.linalg.eigh(own @ own.T)
     is_own = power > LEAST_OWN * power[-1]
