@@ -45,7 +45,7 @@ NECK_MM = 0.01
 
 @dataclass(frozen=True)
 class Hidden:
-    """What is hidden: the effect, the places that name it rightly, and what each channel does by 1 mm of input, and the size."""
+    """What is hidden: the effect, the places that name it rightly, what 1 mm of input does to each channel, the size."""
 
     effect: str
     places: tuple[str, ...]
@@ -268,7 +268,7 @@ def gap_alone(table: MeasuredTable) -> MeasuredTable:
 
 
 def judged(hidden: Hidden, answers: PlaceAnswers, table: MeasuredTable) -> tuple[str, int, str, float | None]:
-    """Say whether a table's answer holds the truth, how many places are in it, what it is, and the size's error in u."""
+    """Say whether an answer holds the truth, how many places are in it, what it is, and the size's error in u."""
     evidence, _ = body_evidence(table, answers, table.input_mm, np.random.default_rng(1))
     if evidence is None:
         return "nothing", 0, "", None
@@ -282,11 +282,51 @@ def judged(hidden: Hidden, answers: PlaceAnswers, table: MeasuredTable) -> tuple
     return ("named" if len(keys) == 1 else "in the set") if right else "wrong", len(keys), " | ".join(keys), off
 
 
+def together(one: Hidden, other: Hidden) -> Hidden:
+    """Hide two things at once: what each does to the slopes is added, which holds to their product, some 1e-4."""
+    plain = slopes_of_drawn()
+    slopes = {name: one.slopes[name] + other.slopes[name] - plain[name] for name in plain}
+    slips = [each for each in (one, other) if each.slip is not None]
+    words = f"{one.words} and {other.words}"
+    return Hidden("two", (), words, slopes, 0.0, slips[0].slip if slips else None)
+
+
+@cache
+def slopes_of_drawn() -> dict[str, float]:
+    """Answer the sample as drawn."""
+    return slopes_of(drawn())
+
+
+def two_causes(things: Sequence[Hidden], answers: PlaceAnswers, tables: int, rng: np.random.Generator) -> None:
+    """Print what tables with two things hidden come to: a wrong place is one that neither of them is in."""
+    counts: dict[str, int] = {"one of them, or both in a set": 0, "wrong place": 0, "unknown": 0, "nothing": 0}
+    for _ in range(tables):
+        first, second = (things[k] for k in rng.choice(np.arange(1, len(things)), 2, replace=False))
+        if first.slip is not None and second.slip is not None:
+            continue
+        table = table_of(together(first, second), rng)
+        evidence, _ = body_evidence(table, answers, table.input_mm, np.random.default_rng(1))
+        findings = None if evidence is None else evidence.findings
+        keys = [] if findings is None else [m.candidate.key for m in findings.members]
+        true = {f"{each.effect}@{place}" for each in (first, second) for place in each.places}
+        if findings is not None and findings.structure:
+            said = "unknown"
+        elif not keys:
+            said = "nothing"
+        else:
+            said = "one of them, or both in a set" if true & set(keys) else "wrong place"
+        counts[said] += 1
+        if said in ("wrong place", "nothing"):
+            print(f"  {first.words} and {second.words}: {said} {' | '.join(dict.fromkeys(keys))}", flush=True)
+    print("two causes: " + ", ".join(f"{name} {count}" for name, count in counts.items()))
+
+
 def main(arguments: Sequence[str] | None = None) -> None:
     """Print the tables that were answered, and the figures."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--tables", type=int, default=60)
     parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--two", type=int, default=0, help="tables with two things hidden")
     parser.add_argument("--verbose", action="store_true")
     given = parser.parse_args(arguments)
     began = time.perf_counter()
@@ -314,6 +354,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
                 sizes["bodies"].append(size)
         if given.verbose or verdict == "wrong" or (verdict == "nothing") == bool(thing.effect):
             print(f"  {thing.words}: {verdict} {words}", flush=True)
+    two_causes(things, answers, given.two, rng)
     for kind, own in counts.items():
         print(f"{kind}: " + ", ".join(f"{name} {count}" for name, count in own.items()))
     planted = sum(sum(own.values()) for kind, own in counts.items() if kind != "nothing")
@@ -321,9 +362,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
     wrong = sum(own["wrong"] for kind, own in counts.items() if kind != "nothing")
     for effect, values in offs.items():
         inside = 100.0 * np.mean(np.abs(values) < 1.96)
-        print(
-            f"{effect}: size within 1.96 u in {inside:.0f} % of {len(values)}, RMS {np.sqrt(np.mean(np.square(values))):.2f}"
-        )
+        spread = np.sqrt(np.mean(np.square(values)))
+        print(f"{effect}: size within 1.96 u in {inside:.0f} % of {len(values)}, RMS of error / u {spread:.2f}")
     print(f"{given.tables} tables: {found} of {planted} at the right place or in the set, {wrong} wrong")
     null = counts.get("nothing", {"nothing": 0})
     print(f"claims where nothing is hidden: {sum(null.values()) - null['nothing']} of {sum(null.values())}")
