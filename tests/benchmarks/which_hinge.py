@@ -45,7 +45,7 @@ NECK_MM = 0.01
 
 @dataclass(frozen=True)
 class Hidden:
-    """What is hidden: the effect, the places that name it rightly, what 1 mm of input does to each channel, the size."""
+    """What is hidden: the effect, the places that name it, what 1 mm of input does to each channel, the size."""
 
     effect: str
     places: tuple[str, ...]
