@@ -12,7 +12,7 @@ import numpy as np
 from fingervision.domain.effect import effect_key, split_key
 from fingervision.domain.errors import DataError, InputFileError, unreadable
 from fingervision.domain.parameter import Estimate
-from fingervision.effects import catalogue
+from fingervision.effects import catalogue, origin_of
 from fingervision.effects.position_error_map import curve_points, curve_values
 from fingervision.models.corrected import CorrectedModel
 from fingervision.models.drawn_mechanism import MechanismModelOfGap
@@ -20,6 +20,7 @@ from fingervision.models.function_model import SUFFIXES, FunctionModel
 from fingervision.models.kinds import kinds
 from fingervision.models.physical_gripper import PhysicalGripper
 from fingervision.models.table import TableModel
+from fingervision.plugins.origin import SESSION
 from fingervision.storage.gripper_toml import read_gripper
 from fingervision.storage.mechanism_toml import is_mechanism, read_mechanism
 from fingervision.storage.plain_file import plain
@@ -81,6 +82,7 @@ def read_model(
     if names and isinstance(base.base, FunctionModel):
         base = _function(base.base.path, names)
     effects: dict[str, Mapping[str, Estimate]] = dict(base.effects)
+    origins: dict[str, str] = {}
     entries = document.get("effect", [])
     if not isinstance(entries, list):
         raise DataError(f"The effects in {path} must be [[effect]] tables, but `effect` is {entries}: mend it.")
@@ -94,6 +96,7 @@ def read_model(
             }
             curve = curve_values([at for at, _ in points], [error for _, error in points])
             key = effect_key(str(entry["name"]), str(entry.get("place", "")), str(entry.get("end", "")))
+            origins[key] = str(entry.get("from", ""))
             effects[key] = stated | {name: Estimate(value, None) for name, value in curve.items()}
         except (KeyError, TypeError, ValueError, AttributeError, OverflowError) as error:
             raise DataError(
@@ -102,7 +105,7 @@ def read_model(
             ) from error
     for key, values in effects.items():
         name = split_key(key)[0]
-        _check(name, values, path)
+        _check(name, values, path, origins.get(key, ""))
         _check_curve(name, values, path)
     return CorrectedModel(base.name, base.base, base.base_path, base.input_range_mm, effects, base.kind)
 
@@ -115,8 +118,13 @@ def _function(path: Path, names: Mapping[str, str]) -> CorrectedModel:
     return CorrectedModel(path.name, FunctionModel(path, names), str(path), everywhere, {})
 
 
-def _check(name: str, values: Mapping[str, Estimate], path: Path) -> None:
-    """Refuse what is no effect of the catalogue, or lacks one of its parameters."""
+def _check(name: str, values: Mapping[str, Estimate], path: Path, origin: str) -> None:
+    """Refuse what is no effect of the catalogue, or lacks one of its parameters; `origin` is where it came from."""
+    if name not in catalogue() and origin:
+        advice = f"add `--effects {origin}`" if origin.endswith(".py") else f"install {origin}"
+        if origin == str(SESSION):
+            advice = "register it with @fingervision.effect, or keep it in a file for --effects"
+        raise DataError(f"The effect {name} in {path} must be known here, but is not; it came from {origin}: {advice}.")
     if name not in catalogue():
         near = get_close_matches(name, catalogue(), n=1)
         hint = f"did you mean {near[0]}?" if near else "`fingervision effects` lists them."
@@ -180,6 +188,9 @@ def write_model(
         lines += ["", "[[effect]]", f'name = "{effect}"']
         lines += [f"place = {json.dumps(place, ensure_ascii=False)}"] if place else []
         lines += [f"end = {json.dumps(end, ensure_ascii=False)}"] if end else []
+        # Whoever reads the file needs the effect too, where it is no built-in one.
+        origin = origin_of(effect) if effect in catalogue() else None
+        lines += [] if origin is None or origin.built_in else [f"from = {json.dumps(str(origin), ensure_ascii=False)}"]
         lines.append("[effect.parameters]")
         inputs, errors = curve_points({key: estimate.value for key, estimate in parameters.items()})
         if inputs.size:

@@ -17,9 +17,11 @@ from fingervision.testbed.actuator import Alarm, StageLimits
 from fingervision.testbed.build_context import BuildContext
 from fingervision.testbed.clocks.clock import Clock
 from fingervision.testbed.motion.move_limits import FreeMoves, check_move, check_speed
+from fingervision.testbed.motion.stated_limits import KEYS as LIMITS
+from fingervision.testbed.motion.stated_limits import stated_limits
 from fingervision.testbed.reading import Reading
 
-KEYS = ("port", "axis", "lower_mm", "upper_mm", "speed_mm_s", "force_n", "accuracy_mm", "encoder_step_mm")
+KEYS = ("port", "axis", *LIMITS)
 SIMULATED = False
 MILLIMETRE = "millimeter"
 """As pymeasure calls the unit that the axis must be set to (SN2)."""
@@ -152,21 +154,9 @@ class Esp300Stage:
             raise DeviceError(f"{self.name} must answer, but did not ({said}): check its cable.") from error
 
 
-def _limits(section: Section) -> StageLimits:
-    lower_mm = section.number("lower_mm")
-    return StageLimits(
-        lower_mm=lower_mm,
-        upper_mm=section.number("upper_mm", above=lower_mm),
-        speed_mm_s=section.number("speed_mm_s", above=0.0),
-        force_n=section.number("force_n", float("1e9"), above=0.0),
-        accuracy_mm=section.number("accuracy_mm", 0.0, low=0.0),
-        encoder_step_mm=section.number("encoder_step_mm", 0.0, low=0.0),
-    )
-
-
 def without_hardware(section: Section, folder: Path) -> FreeMoves:
     """What the stage can do, for a plan that is checked away from the bed."""
-    return FreeMoves(_limits(section))
+    return FreeMoves(stated_limits(section))
 
 
 def build(section: Section, context: BuildContext) -> Esp300Stage:
@@ -176,7 +166,7 @@ def build(section: Section, context: BuildContext) -> Esp300Stage:
         from pymeasure.instruments.newport.esp300 import Axis
     except ImportError as error:
         section.refuse("kind", f"needs pymeasure, which is not here ({error}): pip install 'fingervision[pymeasure]'.")
-    limits, port, number = _limits(section), section.word("port"), section.whole("axis", 1, low=1, high=3)
+    limits, port, number = stated_limits(section), section.word("port"), section.whole("axis", 1, low=1, high=3)
     try:
         with warnings.catch_warnings():
             # pymeasure asks its own maintainers whether this controller knows SCPI; nothing of that is used here.
