@@ -269,7 +269,7 @@ def _rows_between(looked_at: Ints) -> Ints:
         return rows
     after = np.searchsorted(looked_at, rows)
     before = looked_at[np.maximum(np.searchsorted(looked_at, rows, side="right") - 1, 0)]
-    return rows[looked_at[after] - before <= most]
+    return np.asarray(rows[looked_at[after] - before <= most])
 
 
 def _across(edges: EdgePoints) -> Floats:
