@@ -9,6 +9,7 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
+from numpy.typing import NDArray
 
 from fingervision.domain.direction import Direction
 from fingervision.vision.grey import GreyImage
@@ -50,10 +51,10 @@ class Orientation:
         upright = image if self.direction.is_vertical else image.T
         return upright[::-1] if self.is_flipped else upright
 
-    def upright(self, image: GreyImage) -> GreyImage:
-        """The same in memory of its own, row after row: ten times as fast as NumPy's copy of a transposed view."""
-        turned = image if self.direction.is_vertical else np.asarray(cv2.transpose(image))
-        return np.ascontiguousarray(np.asarray(cv2.flip(turned, 0)) if self.is_flipped else turned)
+    def upright(self, mask: NDArray[np.uint8]) -> NDArray[np.uint8]:
+        """The same of a mask, row after row in memory: faster than NumPy's copy of a transposed view."""
+        turned = mask if self.direction.is_vertical else cv2.transpose(mask)
+        return np.ascontiguousarray(cv2.flip(turned, 0) if self.is_flipped else turned, dtype=np.uint8)
 
     def to_pixels(self, across: float, along: float) -> tuple[float, float]:
         """(across, along) to pixel coordinates (x, y)."""
