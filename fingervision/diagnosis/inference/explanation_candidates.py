@@ -4,7 +4,8 @@ from collections.abc import Callable
 
 import numpy as np
 
-from fingervision.diagnosis.inference.hypothesis_fit import FORM_SHARE, Explanation, Problem, fit, scan
+from fingervision.diagnosis.inference.hypothesis import FORM_SHARE, Explanation, Problem
+from fingervision.diagnosis.inference.hypothesis_fit import fit, scan
 from fingervision.diagnosis.inference.null_bootstrap import LONG
 from fingervision.diagnosis.inference.signatures import Signatures, tangents
 from fingervision.diagnosis.input.input_uncertainty import below_the_input

@@ -6,7 +6,8 @@ import numpy as np
 
 from fingervision.diagnosis.inference.ambiguity_set import choices
 from fingervision.diagnosis.inference.harmonics import harmonics
-from fingervision.diagnosis.inference.hypothesis_fit import MANY_STEPS, SMALL_SHARE, Explanation, Problem, fit
+from fingervision.diagnosis.inference.hypothesis import SMALL_SHARE, Explanation, Problem
+from fingervision.diagnosis.inference.hypothesis_fit import MANY_STEPS, fit
 from fingervision.diagnosis.inference.map_imitators import LINE_SHARE
 from fingervision.diagnosis.inference.null_bootstrap import FEWEST, jumps_astray, linear_thresholds, noise_alone, rare
 from fingervision.diagnosis.inference.probe_basis import Probes, probes

@@ -7,7 +7,8 @@ import numpy as np
 from scipy.stats import t as student
 
 from fingervision.diagnosis.inference.explanation_candidates import Progress
-from fingervision.diagnosis.inference.hypothesis_fit import Explanation, Point, Problem, fit
+from fingervision.diagnosis.inference.hypothesis import Explanation, Point, Problem
+from fingervision.diagnosis.inference.hypothesis_fit import fit
 from fingervision.diagnosis.inference.map_imitators import imitating_effects, imitating_parts
 from fingervision.diagnosis.inference.position_map import (
     NAME,

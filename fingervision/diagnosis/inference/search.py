@@ -19,7 +19,8 @@ from fingervision.diagnosis.inference.explanation_candidates import (
     swapped,
     within_a_step,
 )
-from fingervision.diagnosis.inference.hypothesis_fit import SMALL_SHARE, Explanation, Problem, fit
+from fingervision.diagnosis.inference.hypothesis import SMALL_SHARE, Explanation, Problem
+from fingervision.diagnosis.inference.hypothesis_fit import fit
 from fingervision.diagnosis.inference.model_adequacy import imitated, remaining_structure, shapes_of
 from fingervision.diagnosis.inference.probe_basis import Probes
 from fingervision.diagnosis.inference.signatures import Signatures, signatures

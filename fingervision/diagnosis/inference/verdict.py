@@ -5,7 +5,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.stats import f as fisher
 
-from fingervision.diagnosis.inference.hypothesis_fit import Explanation, Problem, fit
+from fingervision.diagnosis.inference.hypothesis import Explanation, Problem
+from fingervision.diagnosis.inference.hypothesis_fit import fit
 from fingervision.diagnosis.inference.model_adequacy import is_a_line, own_shapes
 from fingervision.diagnosis.inference.search import Findings
 from fingervision.diagnosis.input.observations import Observations
