@@ -130,11 +130,11 @@ def _print(found: "Account") -> None:
 
 def _draw(found: "Account", png: Path) -> None:
     """Draw the curve with the file's name, as it was understood."""
-    from fingervision.domain.errors import FingervisionError
+    from fingervision.domain.errors import DataError, OutputError
 
     curve = found.curve()
     if curve is None:
-        raise found.question or FingervisionError(f"{found.path} has no two columns to draw: leave out --png.")
+        raise found.question or DataError(f"{found.path} has no two columns to draw: leave out --png.")
     from matplotlib.figure import Figure
 
     x_name, x, y_name, y = curve
@@ -148,6 +148,4 @@ def _draw(found: "Account", png: Path) -> None:
     try:
         figure.savefig(png, dpi=120)
     except (OSError, ValueError) as error:
-        raise FingervisionError(
-            f"{png} could not be written ({error}): name another picture, such as t.png."
-        ) from error
+        raise OutputError(f"{png} could not be written ({error}): name another picture, such as t.png.") from error

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
-from fingervision.domain.errors import FingervisionError
+from fingervision.domain.errors import DataError
 from fingervision.storage.number_columns import Numbers
 from fingervision.tables.column_names import ColumnName, column_name
 from fingervision.tables.mapping import Entry
@@ -123,7 +123,7 @@ def _named_column(raw: RawTable, role: str, name: str, given: Entry) -> int:
             return found[0]
     if name.isdecimal() and 1 <= int(name) <= len(raw.columns):
         return int(name) - 1
-    raise FingervisionError(
+    raise DataError(
         f"columns.{role} of {given.source} must name a column of {raw.path} "
         f"({', '.join(column.name for column in raw.columns)}), but is {name}: mend it."
     )

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from fingervision.domain.drive import DriveHistory
-from fingervision.domain.errors import FingervisionError
+from fingervision.domain.errors import DataError
 from fingervision.domain.measured_table import MeasuredTable
 from fingervision.models.corrected import CorrectedModel
 from fingervision.models.table import TableModel
@@ -83,7 +83,7 @@ def drive_of(table: Understood, given: Entry) -> DriveHistory:
     path = table.path
     kept = np.flatnonzero(table.columns["time"].present & table.columns["input"].present)
     if not kept.size:
-        raise FingervisionError(f"{path} must have at least one row with a time and an input, but has none.")
+        raise DataError(f"{path} must have at least one row with a time and an input, but has none.")
     if "backward_time" in given.accept:
         kept = kept[np.argsort(table.columns["time"].value[kept], kind="stable")]
     steps = np.diff(table.columns["time"].value[kept])
