@@ -2,6 +2,8 @@
 
 from dataclasses import replace
 from datetime import UTC, datetime
+from itertools import count
+from pathlib import Path
 from typing import Any
 
 import cv2
@@ -99,8 +101,7 @@ def _calibrate(view: View, request: Request) -> Answer:
     camera = dict(view.description.camera)
     found = replace(found, camera=camera, made_at=made_at, software=f"fingervision {__version__}")
     make_out_folder(view.out)
-    # A name of its own: a calibration that lies there is somebody's.
-    path = view.out / f"calibration_{made_at.replace(':', '-').removesuffix('+00-00')}Z.json"
+    path = _free_name(view.out, f"calibration_{made_at.replace(':', '-').removesuffix('+00-00')}Z")
     write_calibration(found, path)
     try:
         view.choose(scale=found, scale_file=path)
@@ -109,6 +110,22 @@ def _calibrate(view: View, request: Request) -> Answer:
         raise
     u = found.covariance[0, 0] ** 0.5
     return Answer(f"Calibrated: {found.px_per_mm:.4f} px/mm, u {u:.4f} px/mm; written to {path}.")
+
+
+def _free_name(folder: Path, stem: str) -> Path:
+    """Take a name of its own: a calibration that lies there is somebody's, also one of this second."""
+    for again in count(1):
+        path = folder / (f"{stem}.json" if again == 1 else f"{stem}-{again}.json")
+        try:
+            path.touch(exist_ok=False)
+        except FileExistsError:
+            continue
+        except OSError as error:
+            raise FingervisionError(
+                f"The folder {folder} cannot be written ({error.strerror}): name another with --out."
+            ) from error
+        return path
+    raise AssertionError("names do not end")
 
 
 def _steps(view: View, request: Request) -> Answer:
