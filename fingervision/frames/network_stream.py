@@ -10,11 +10,12 @@ from typing import Any
 
 import av
 
-from fingervision.domain.errors import FingervisionError, UsageError
+from fingervision.domain.errors import DeviceError, UsageError
 from fingervision.domain.frame import Coding, Frame, LostFrame
 from fingervision.domain.status import Status
 from fingervision.frames.damage import DamageTrail, Picture
 from fingervision.frames.luma import luma
+from fingervision.frames.quantiser_steps import EXPORTED, quantiser_steps
 from fingervision.frames.received import OwnPacket, Received
 from fingervision.frames.sound_jpeg import SoundJpeg
 from fingervision.frames.source import Description, Wish
@@ -91,24 +92,24 @@ class NetworkStream:
         try:
             self._container = av.open(name, options=dict(OPTIONS), timeout=(OPEN_TIMEOUT_S, READ_TIMEOUT_S))
         except (av.FFmpegError, OSError, ValueError) as error:
-            raise FingervisionError(
+            raise DeviceError(
                 f"The stream {self.name} must answer with a video, but does not ({_reason(error)}): check the address, "
                 "and that the camera is on and nobody else has it."
             ) from error
         if not self._container.streams.video or self._container.streams.video[0].codec_context is None:
             self._container.close()
-            raise FingervisionError(f"The stream {self.name} must hold a video that can be decoded, but has none.")
+            raise DeviceError(f"The stream {self.name} must hold a video that can be decoded, but has none.")
         self._stream = self._container.streams.video[0]
         # How the stream is coded, in a container of our own: a recording may begin after the camera's is closed.
         self._kept = av.open(io.BytesIO(), "w", format="matroska")
         self.template: av.VideoStream | None = self._kept.add_stream_from_template(self._stream)
         codec = self._stream.codec_context
-        codec.options = STRICT
+        codec.options = STRICT | EXPORTED
         DamageTrail.prepare(codec)
         codec.thread_count = 1  # threads of frames would each keep one back
         if codec.width < 1 or codec.height < 1:
             self._container.close()
-            raise FingervisionError(
+            raise DeviceError(
                 f"The stream {self.name} must state the size of its pictures, but does not: choose another "
                 "format in the camera's own settings."
             )
@@ -172,9 +173,9 @@ class NetworkStream:
                 packet = next(demuxed, None)
             except (av.FFmpegError, OSError) as error:
                 why = "it broke off" if isinstance(error, av.InvalidDataError) else _reason(error)
-                raise FingervisionError(self._cut(why)) from error
+                raise DeviceError(self._cut(why)) from error
             if packet is None or not packet.size:
-                raise FingervisionError(self._cut("the camera ended it"))
+                raise DeviceError(self._cut("the camera ended it"))
             yield packet, monotonic()
 
     def _cut(self, why: str) -> str:
@@ -208,7 +209,8 @@ class NetworkStream:
             return LostFrame(index, time_s, Status.DAMAGED, words)
         if time_s == last_s:
             return LostFrame(index, time_s, Status.DUPLICATE, "It has the same time as the frame before.")
-        return Frame(luma(found), index, time_s, self.description.coding, not found.key_frame)
+        coding = self.description.coding
+        return Frame(luma(found), index, time_s, coding, not found.key_frame, quantiser_steps(found))
 
     def _own(self, packet: "av.Packet[av.VideoStream]", arrived_s: float, sent_s: float | None) -> OwnPacket:
         shown_s = self._time_s(packet.pts, arrived_s, sent_s)

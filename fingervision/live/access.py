@@ -4,7 +4,7 @@ import ssl
 from dataclasses import dataclass
 from pathlib import Path
 
-from fingervision.domain.errors import FingervisionError, UsageError
+from fingervision.domain.errors import DataError, InputFileError, UsageError
 from fingervision.live.guard import LOOPBACK_NAMES
 
 LEAST_LETTERS = 12
@@ -65,7 +65,7 @@ def access(host: str, port: int, password_file: Path | None, certificate: Path |
         raise UsageError("TLS needs both --tls-cert and --tls-key, but one is missing.")
     for file in (certificate, key):
         if file is not None and not file.is_file():
-            raise FingervisionError(f"There is no file {file}: name the certificate and its key.")
+            raise InputFileError(f"There is no file {file}: name the certificate and its key.")
     if certificate is not None and key is not None:
         _check_pair(certificate, key)
     if password_file is None and host not in LOOPBACK_NAMES:
@@ -82,7 +82,7 @@ def _check_pair(certificate: Path, key: Path) -> None:
         ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER).load_cert_chain(certificate, key, password=lambda: "")
     except (ssl.SSLError, OSError, ValueError) as error:
         why = getattr(error, "reason", None) or getattr(error, "strerror", None) or str(error)
-        raise FingervisionError(
+        raise InputFileError(
             f"The certificate {certificate} and the key {key} must be PEM files that belong together, the key without "
             f"a password, but cannot be used ({str(why).lower().replace('_', ' ')}): make a new pair."
         ) from error
@@ -92,9 +92,7 @@ def _password(file: Path) -> str:
     try:
         words = file.read_text(encoding="utf-8").strip()
     except (OSError, UnicodeDecodeError) as error:
-        raise FingervisionError(f"The password cannot be read from {file}: give a text file.") from error
+        raise InputFileError(f"The password cannot be read from {file}: give a text file.") from error
     if len(words) < LEAST_LETTERS:
-        raise FingervisionError(
-            f"The password in {file} must have at least {LEAST_LETTERS} letters, but has {len(words)}."
-        )
+        raise DataError(f"The password in {file} must have at least {LEAST_LETTERS} letters, but has {len(words)}.")
     return words
