@@ -136,7 +136,7 @@ class StageDevice:
 
     @property
     def hints(self) -> dict[str, list[str]]:
-        """What plots show by themselves."""
+        """Fields that bluesky plots by default."""
         return {"fields": [self.name]}
 
     def set(self, value: float) -> ThreadStatus:

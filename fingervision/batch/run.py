@@ -72,7 +72,7 @@ class Plan:
 
 @dataclass(frozen=True, slots=True)
 class Batch:
-    """What became of a job.
+    """Result of a batch.
 
     Parameters
     ----------

@@ -59,7 +59,7 @@ Perform = Callable[[str, tuple[str, ...]], Ended]
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
-    """What became of one input.
+    """Result for one input.
 
     Parameters
     ----------

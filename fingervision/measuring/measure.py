@@ -28,7 +28,7 @@ from fingervision.storage.summary_json import write_summary
 
 @dataclass(frozen=True, slots=True)
 class Measured:
-    """What a measurement left behind.
+    """Result of a measurement that was written to files.
 
     Parameters
     ----------

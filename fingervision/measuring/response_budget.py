@@ -1,4 +1,4 @@
-"""The camera response: which one a recording is read with, and what it costs where it is assumed."""
+"""The camera response of a recording, and the uncertainty where it is assumed and not measured."""
 
 from collections.abc import Sequence
 from pathlib import Path

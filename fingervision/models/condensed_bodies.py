@@ -50,7 +50,7 @@ class CondensedBody:
 
     @property
     def unknowns(self) -> Indices:
-        """Motions of its frames among those of all frames, three each."""
+        """Indices of the three displacements of each of its frames in the vector of all frames."""
         return np.asarray((3 * np.array(self.frames)[:, None] + np.arange(3)).ravel())
 
 

@@ -333,7 +333,7 @@ class _State:
         variance: float,
         wanted: slice,
     ) -> None:
-        """Add what the flanks alone would say otherwise, where that is more than noise."""
+        """Add the misfit of the flanks to the uncertainty where it exceeds the noise."""
         width = CORE_SIGMAS * float(np.hypot(self.blur_px, ROUNDING**0.5)) + 0.5
         weight = np.zeros(t.size)
         for k in range(self.position.size):

@@ -1,4 +1,4 @@
-"""Choose the next run: every protocol is judged by the open questions that it settles, per minute of rig time."""
+"""Choose the next run: the protocol that separates most pairs of explanations per minute of bench time."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -95,7 +95,7 @@ class RunPlan:
         return float(min(self.gains[j, k], back))
 
     def pairs(self) -> list[tuple[int, int]]:
-        """Pairs that are told apart, those that are told apart least first."""
+        """Pairs of explanations that the run separates, in ascending order of their separation."""
         truths, members = self.gains.shape
         found = [(j, k) for j in range(truths) for k in range(j + 1, members) if self.apart(j, k) >= WORTH]
         return sorted(found, key=lambda pair: self.apart(*pair))

@@ -1,4 +1,4 @@
-"""The gate of *unknown*: structure that the best explanation leaves, found by generic probes."""
+"""Model adequacy: a test for structure in the residual of the best explanation, which makes it *unknown*."""
 
 from dataclasses import dataclass
 

@@ -1,4 +1,4 @@
-"""The verdict from what stands: a name is given only where little of the disagreement is left beside it."""
+"""Decide the verdict: effects are named only where they explain nearly all of the disagreement."""
 
 from dataclasses import dataclass, replace
 
@@ -32,7 +32,7 @@ LACK_OF_FIT = 1e-3
 
 @dataclass(frozen=True, slots=True)
 class Standing:
-    """How much of the disagreement an explanation leaves.
+    """Share of the disagreement that an explanation leaves unexplained.
 
     All as RMS over left and right where both exist, else over the gap; the midline's constant, the runs' departure
     from their common mean and outliers taken out.

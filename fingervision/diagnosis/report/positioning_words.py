@@ -90,7 +90,7 @@ def positioning_notes(report: PositioningReport) -> tuple[str, ...]:
 
 
 def positioning_words(report: PositioningReport) -> tuple[str, ...]:
-    """Sentences for a person: each main figure, which effect makes how much of it, what remains."""
+    """Describe each main figure in a sentence: its value, the share of each effect, and the residual."""
     out = []
     for plain in SENTENCES:
         symbols = [plain]
