@@ -1,4 +1,4 @@
-"""A recording goes in; the gap over time, its summary and its figure come out."""
+"""Measure a recording: write the gap over time, a summary and a figure."""
 
 from collections.abc import Sequence
 from contextlib import ExitStack

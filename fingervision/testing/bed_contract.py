@@ -1,4 +1,4 @@
-"""What holds for every actuator, force sensor and camera, looked at through a bed that it belongs to."""
+"""Contract tests of actuators, force sensors and cameras, run through a bed that has them."""
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager

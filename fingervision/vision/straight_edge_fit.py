@@ -81,7 +81,7 @@ class EdgeStart:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class StraightEdges:
-    """Edges that were fitted together; arrays over the k edges.
+    """k edges fitted jointly; arrays of shape (k,).
 
     Parameters
     ----------

@@ -101,7 +101,7 @@ class RunPlan:
         return sorted(found, key=lambda pair: self.apart(*pair))
 
     def worst(self, floor: float) -> float:
-        """Least gain of the pairs that gain so much at all; nothing where none does."""
+        """Smallest separation among the pairs that the run separates; None if it separates none."""
         settled = self.gains[(self.gains >= floor) & np.isfinite(self.gains)]
         return float(settled.min()) if settled.size else 0.0
 

@@ -40,7 +40,7 @@ class _Basis:
 
     @classmethod
     def of(cls, problem: Problem, columns: Array) -> "_Basis":
-        """Work out once what every look at the columns needs."""
+        """Precompute what every evaluation of the probes needs."""
         return cls(columns, np.einsum("ij,ij->j", columns, columns), problem.offsets.design.T @ columns)
 
     def beside_offsets(self, metric: Array) -> Array:
@@ -135,7 +135,7 @@ def _is_an_effect_itself(problem: Problem, found: Explanation, basis: _Basis) ->
 
 
 def _of_jumps_astray(problem: Problem, columns: Array, best: Explanation, rng: np.random.Generator) -> float:
-    """Give the largest gain of a probe where the recorded input's errors alone move the jumps."""
+    """Largest gain of a probe that errors of the recorded input alone produce at jumps."""
     most, basis = [], _Basis.of(problem, columns)
     for _ in range(FEWEST):
         shaken, target = noise_alone(problem, best, rng)

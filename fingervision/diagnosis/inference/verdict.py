@@ -136,7 +136,7 @@ def short_scatter(residual_mm: Array, runs: tuple[slice, ...]) -> float:
 
 
 def _without_scatter(values: Array, runs: tuple[slice, ...]) -> Array:
-    """Take out by how much each run departs from the mean of all: a constant that all share stays."""
+    """Subtract each run's deviation from the mean of all runs; a common constant remains."""
     means = np.array([values[run].mean() for run in runs])
     out = values.copy()
     for run, mean in zip(runs, means, strict=True):

@@ -182,7 +182,7 @@ class Playback:
     oldest_row = shown_from = 0
 
     def rows(self, first: int, last: int) -> Iterator[GapRow]:
-        """Rows from one number on, before another."""
+        """Rows from frame `first` up to, and without, frame `last`."""
         track = self._track
         return iter(() if track is None else track.rows[first:last])
 
