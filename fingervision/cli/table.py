@@ -114,6 +114,9 @@ def _print(found: "Account") -> None:
         wide = [max(len(row[k]) for row in rows) for k in range(3)]
         for row in rows:
             click.echo("  " + "  ".join([*(f"{row[k]:<{wide[k]}}" for k in range(3)), row[3]]).rstrip())
+    if found.channels.names:
+        listed = ", ".join(f"{text} as {name}" for name, text in found.channels.names.items())
+        click.echo(f"  channels: {listed}")
     if found.unused:
         click.echo(f"  not used: {', '.join(name or '(no name)' for name in found.unused)}")
     for sentence in found.left_out:

@@ -69,6 +69,10 @@ class DamageTrail:
     def hole(self, why: str) -> None:
         """Note that something is missing between the packet that went in last, whose end may be hurt, and the next."""
         self.breaks(why)
+        self.missing(why)
+
+    def missing(self, why: str) -> None:
+        """Note that a whole picture is missing between the packet that went in last, which is sound, and the next."""
         self._last = next(self._numbers)
         self._broken[self._last] = why
 

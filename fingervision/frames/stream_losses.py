@@ -30,7 +30,7 @@ class StreamLosses:
         link = self._chain.link(packet)
         leaps = self._transport.leaps(packet)
         if link is Link.BROKEN:
-            trail.hole(LOST_REFERENCE)
+            trail.missing(LOST_REFERENCE)
         elif leaps and link is not Link.FOLLOWS:
             trail.hole("Frames are missing before it.")
         return MISSING if leaps else ""

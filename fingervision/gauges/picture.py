@@ -10,9 +10,11 @@ from fingervision.domain.frame import Coding, Frame
 from fingervision.vision.coding_error import EIGHT_BITS, displaced_px
 from fingervision.vision.grey import GreyImage, to_grey, top_level
 from fingervision.vision.pipeline import Settings
-from fingervision.vision.residuals import SHARED_POINTS
 
 Floats = NDArray[np.float64]
+
+# So many pixels count as one in what a codec has left: what it does to a whole block looks like the thing itself.
+SHARED_PIXELS = {Coding.LOSSLESS: 1.0, Coding.INTRAFRAME: 2.5, Coding.INTERFRAME: 12.0}
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -52,7 +54,7 @@ class Picture:
     @property
     def shared_pixels(self) -> float:
         """So many pixels count as one, as far as the codec is known to share its errors."""
-        return SHARED_POINTS[self.frame.coding]
+        return SHARED_PIXELS[self.frame.coding]
 
     @property
     def edge_shared_pixels(self) -> float:

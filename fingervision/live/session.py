@@ -10,7 +10,7 @@ from time import monotonic
 from typing import Any
 
 from fingervision.domain.errors import StateError
-from fingervision.domain.frame import Frame
+from fingervision.domain.frame import Frame, LostFrame
 from fingervision.domain.status import Status
 from fingervision.frames.received import Driven
 from fingervision.live.cadence import Cadence
@@ -40,6 +40,7 @@ ROWS_SHOWN = 3000
 
 DrivenAt = Callable[[float | None], Driven | None]
 RowListener = Callable[[GapRow, float], None]
+PictureListener = Callable[[Frame | LostFrame, GapRow | None], None]
 
 
 class Session:
@@ -69,6 +70,8 @@ class Session:
         self._messages = Messages()
         self.ended = Event()
         self.on_row: list[RowListener] = []
+        self.on_picture: list[PictureListener] = []
+        """Told of every frame before it is shown, in the measuring thread: what is measured besides the gap."""
         self.driven_at: DrivenAt = lambda time_s: None
         """Who knows the gripper's input at a time of this view, where the source does not."""
         self._measurement = FrameMeasurement((self.description.width_px, self.description.height_px))
@@ -269,6 +272,8 @@ class Session:
                 self.cadence.restart()
             if row is not None and driven is not None:
                 row = replace(row, run=driven.run, input_mm=driven.input_mm, force_n=driven.force_n)
+            for look in self.on_picture:
+                look(item, row)
             if isinstance(came, Frame):
                 if came.time_s is not None:
                     self.cadence.add(came.time_s)

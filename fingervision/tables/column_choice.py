@@ -54,7 +54,7 @@ def choose(raw: RawTable, names: Sequence[ColumnName], kind: str, given: Entry, 
     fixed = set(chosen.values())
     roles: dict[str, list[int]] = {}
     for place, name in enumerate(names):
-        role = _own_role(name) or name.role
+        role = name.role
         if place in fixed or role is None:
             continue
         # A target without a direction is a commanded position.
@@ -94,14 +94,6 @@ def choose(raw: RawTable, names: Sequence[ColumnName], kind: str, given: Entry, 
                 )
             )
     return chosen
-
-
-def _own_role(name: ColumnName) -> str | None:
-    """Role of a column of the project's own tables in another unit, `u_random_um`."""
-    for role in ("u_random", "u_gap"):
-        if name.text.startswith(f"{role}_"):
-            return role
-    return None
 
 
 def _one_clock(

@@ -52,7 +52,7 @@ def read_measured_table(path: Path, columns: Path | None = None) -> MeasuredTabl
         left, right = values["left_mm"], values["right_mm"]
         both = left.present & right.present
         values["gap_mm"] = Numbers(np.where(both, right.value - left.value, 0.0), both)
-    return measured_table.measured_rows(path, values, table.runs, _said(table, given))
+    return measured_table.measured_rows(path, values, table.runs, _said(table, given), channels=table.channels.columns)
 
 
 def read_drive(path: Path, columns: Path | None = None) -> DriveHistory:
@@ -172,7 +172,9 @@ def read_model(path: Path, kind: str = "lumped", columns: Path | None = None) ->
 
 def _said(table: Understood, given: Entry) -> list[str]:
     roles = ", ".join(f"{each.role} = '{each.name}'" + (f" [{each.unit}]" if each.unit else "") for each in table.taken)
-    return [*said(given, table.raw.what, table.notes, table.left_out), f"Columns: {roles}."]
+    beside = ", ".join(f"{name} = '{text}'" for name, text in table.channels.names.items())
+    channels = [f"Channels: {beside}."] if beside else []
+    return [*said(given, table.raw.what, table.notes, table.left_out), f"Columns: {roles}.", *channels]
 
 
 def said(given: Entry, what: str, notes: tuple[str, ...], left_out: tuple[str, ...]) -> list[str]:

@@ -8,11 +8,12 @@ contrast A the coefficients change by some A per pixel of displacement, so that 
 """
 
 from dataclasses import replace
-from math import hypot, sqrt
+from math import hypot
 
 import numpy as np
 from numpy.typing import NDArray
 
+from fingervision.domain.frame import Coding
 from fingervision.domain.gap import GapMeasurement
 from fingervision.domain.quantiser import Quantiser
 
@@ -24,6 +25,9 @@ DISPLACED = 0.42
 # The blocks this far across (standard deviations of the blur, and pixels more) and along the finger from the measuring
 # point carry the edge.
 ACROSS_SIGMAS, ACROSS_PX, ALONG_PX = 3.0, 2.0, 40.0
+# Where the stream does not state its quantiser: the same in units of what the rows of a flank share. A picture that is
+# coded by itself is displaced by less than one that is copied from its neighbours.
+SHARED_SHIFTS = {Coding.LOSSLESS: 0.0, Coding.INTRAFRAME: 0.5, Coding.INTERFRAME: 1.5}
 # Quantisers are stated for 8 bits.
 EIGHT_BITS = 255.0
 
@@ -42,7 +46,7 @@ def displaced_px(step: float, contrast: float) -> float:
 
 
 def with_coding_error(
-    found: GapMeasurement, quantiser: Quantiser | None, inside: tuple[float, float], light: Floats, top_level: int
+    found: GapMeasurement, quantiser: Quantiser, inside: tuple[float, float], light: Floats, top_level: int
 ) -> GapMeasurement:
     """The same measurement, less sure by what the codec may have done to either edge.
 
@@ -50,8 +54,8 @@ def with_coding_error(
     ----------
     found : GapMeasurement
         In the picture's pixels.
-    quantiser : Quantiser or None
-        Of the picture; None where none is known.
+    quantiser : Quantiser
+        Of the picture.
     inside : (float, float)
         Light of either finger beside its edge.
     light : ndarray of float, shape (levels,)
@@ -59,18 +63,36 @@ def with_coding_error(
     top_level : int
         End of the scale.
     """
-    if quantiser is None:
-        return found
-    edges, variance = [], 0.0
+    displaced = []
     for edge, level in zip((found.left, found.right), inside, strict=True):
         stored = np.interp([level, level + edge.contrast], light[: top_level + 1], np.arange(top_level + 1.0))
         across, along = ACROSS_SIGMAS * edge.blur_px + ACROSS_PX, ALONG_PX
         if not found.direction.is_vertical:
             across, along = along, across
         step = quantiser.near(edge.x_px, edge.y_px, across, along)
-        u = displaced_px(step, float(np.ptp(stored)) * EIGHT_BITS / top_level)
-        variance += u**2
-        edges.append(replace(edge, u_across_px=hypot(edge.u_across_px, u)))
-    u_coding = sqrt(variance)
-    u_gap = hypot(found.u_gap_px, u_coding)
-    return replace(found, left=edges[0], right=edges[1], u_gap_px=u_gap, u_coding_px=u_coding)
+        displaced.append(displaced_px(step, float(np.ptp(stored)) * EIGHT_BITS / top_level))
+    return _less_sure(found, displaced[0], displaced[1])
+
+
+def with_shared_shift(found: GapMeasurement, shared_px: float, coding: Coding) -> GapMeasurement:
+    """The same for a codec whose quantiser is not known.
+
+    Parameters
+    ----------
+    found : GapMeasurement
+        What was measured.
+    shared_px : float
+        What the rows of a flank share (`shared_profile.shared_shift_px`).
+    coding : Coding
+        How the picture is coded.
+    """
+    return _less_sure(found, SHARED_SHIFTS[coding] * shared_px, SHARED_SHIFTS[coding] * shared_px)
+
+
+def _less_sure(found: GapMeasurement, left_px: float, right_px: float) -> GapMeasurement:
+    left, right = (
+        replace(edge, u_across_px=hypot(edge.u_across_px, u))
+        for edge, u in ((found.left, left_px), (found.right, right_px))
+    )
+    u_coding = hypot(left_px, right_px)
+    return replace(found, left=left, right=right, u_gap_px=hypot(found.u_gap_px, u_coding), u_coding_px=u_coding)

@@ -17,7 +17,7 @@ from fingervision.domain.region import Region
 from fingervision.domain.status import Status
 from fingervision.vision.binarise import Binary, binarise, split_at
 from fingervision.vision.candidates import candidates, found, has_edges
-from fingervision.vision.coding_error import with_coding_error
+from fingervision.vision.coding_error import with_coding_error, with_shared_shift
 from fingervision.vision.denoise import denoise
 from fingervision.vision.edges import EdgePoints, fit_edges
 from fingervision.vision.fingers import CoarseFingers
@@ -27,11 +27,11 @@ from fingervision.vision.held_part import visible_lines
 from fingervision.vision.interlace import at_half_way
 from fingervision.vision.longer_flanks import is_surer, with_longer_flanks
 from fingervision.vision.overlay import draw_boundary, draw_edge_points, draw_overlay, in_eight_bits
-from fingervision.vision.profile_choice import with_profile
+from fingervision.vision.profile_choice import STRIP, with_profile
 from fingervision.vision.profile_lines import profile_lines
-from fingervision.vision.residuals import SHARED_POINTS
 from fingervision.vision.response_shift import gap_shift_px
 from fingervision.vision.settings import LINEAR, SRGB, Settings
+from fingervision.vision.shared_profile import shared_shift_px
 from fingervision.vision.stripes import with_stripes
 from fingervision.vision.third_tone import THIRD_TONE, other_threshold
 
@@ -46,8 +46,6 @@ SMALLEST_SIDE_PX = 16
 FINAL = (Status.SATURATED, Status.BLURRED, Status.GRIPPING)
 # Beside a shadow or a pad a gap that is less sure than this (pixels) may be that of something else.
 LEAST_SURE_AGAIN_PX = 0.3
-# A codec that shares noise over more lines than this leaves nothing to be learnt of it in one picture.
-FARTHEST_SHARED = 7.0
 UNIFORM = NoGap(Status.LOW_CONTRAST, "The picture is uniform: nothing in it differs from anything else.")
 
 
@@ -219,16 +217,20 @@ def _edges_and_gap(
     """Edges of fingers that were found, and what they say."""
     light = _light(settings.response, scale, int(np.iinfo(upright.dtype).max) + 1)
     lines = visible_lines(profile_lines((fingers.left, fingers.right)), fingers)
-    is_shared_known = SHARED_POINTS[coded.coding] > FARTHEST_SHARED
-    edges, apart_px = fit_edges(upright, lines, light, scale, is_shared_known), 0.0
+    edges, apart_px = fit_edges(upright, lines, light, scale), 0.0
     if fingers.orientation.direction.is_vertical:
         edges, apart_px = at_half_way(edges)
     with suppress(np.linalg.LinAlgError):  # what stands beside the edges is none of the models
         edges = with_profile(upright, edges, light, scale, settings.is_outline)
+    if edges.beside == STRIP:
+        return edges, THIRD_TONE
     edges = with_stripes(upright, edges, light)
     outcome = measure_gap(fingers, edges, settings.below_tip_px, scale, light_gap, coded.coding)
     if isinstance(outcome, GapMeasurement):
-        outcome = with_coding_error(outcome, coded.quantiser, edges.inside, light, scale)
+        if coded.quantiser is not None:
+            outcome = with_coding_error(outcome, coded.quantiser, edges.inside, light, scale)
+        elif coded.coding is not Coding.LOSSLESS:
+            outcome = with_shared_shift(outcome, shared_shift_px(upright, edges, light), coded.coding)
     if (apart_px or edges.beside) and isinstance(outcome, GapMeasurement):
         outcome = replace(outcome, fields_apart_px=apart_px, beside=edges.beside)
     return edges, outcome

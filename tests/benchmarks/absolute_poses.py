@@ -28,6 +28,7 @@ from fingervision.measuring.body_poses import BodyTracker
 from fingervision.measuring.drawing_placement import GivenPoint
 from fingervision.measuring.scale import Scale
 from fingervision.storage.mechanism_toml import mechanism_from_tables
+from fingervision.vision.pipeline import Settings
 from tests.diagnosis.lever_drawing import TABLES
 
 Array = NDArray[np.float64]
@@ -41,6 +42,8 @@ BOXES = {
 }
 """The lever of `tests/diagnosis/lever_drawing.py` between its notches, x and y in mm."""
 NECKS = ((34.6, 35.4, 31, 37), (17.6, 18.4, 31, 37))
+KNOWN_LIGHT = Settings(below_tip_px=1.0, other_response=None)
+"""The pictures' levels are light, and that is known."""
 MIDDLE_MM = np.array([24.5, 45.0])
 SUB = (np.arange(4) + 0.5) / 4.0 - 0.5
 
@@ -159,7 +162,9 @@ def main(arguments: Sequence[str] | None = None) -> None:
                 grey = cv2.imdecode(cv2.imencode(".jpg", grey, [cv2.IMWRITE_JPEG_QUALITY, 85])[1], cv2.IMREAD_GRAYSCALE)
                 coding = Coding.INTRAFRAME
             points = tuple(given_point(truth, scale, at, rng) for at in ((31.0, 0.0), (39.0, 0.0), (35.0, 20.0)))
-            seen = next(BodyTracker(mechanism_of(), scale, points).poses([Frame(grey, 0, 0.0, coding)])).poses
+            seen = next(
+                BodyTracker(mechanism_of(), scale, points, KNOWN_LIGHT).poses([Frame(grey, 0, 0.0, coding)])
+            ).poses
             for name in ("finger", "shuttle"):
                 pose = seen[name]
                 if pose.x_mm is None or pose.y_mm is None or pose.angle_mrad is None or pose.covariance is None:

@@ -255,7 +255,7 @@ def _composed(
 
 def _named(best: Fitted) -> NamedEffect:
     candidate = best.candidate
-    estimates = {candidate.parameter.name: Estimate(best.size, best.u, candidate.parameter.unit)}
+    estimates = {candidate.parameter.name: Estimate(best.size, best.u_stated, candidate.parameter.unit)}
     for parameter in catalogue()[candidate.name].parameters:
         estimates.setdefault(parameter.name, Estimate(parameter.neutral or 0.0, None, parameter.unit))
     shown = {p.name: p.words for p in (*catalogue()[candidate.name].parameters, candidate.parameter)}

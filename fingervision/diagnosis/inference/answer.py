@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass, replace
 
+from fingervision.diagnosis.inference.cross_validation import rms_mm
 from fingervision.diagnosis.inference.measuring_chain import Settings
 from fingervision.diagnosis.inference.position_map import NAME
 from fingervision.diagnosis.inference.search import Findings
@@ -52,9 +53,11 @@ def judged(data: Observations, found: Findings) -> Answer:
     after = data.stacked_mm - data.chain.stacked(_values(data, found))
     stands = standing(data, found.problem, before, after)
     digit = resolution(data.table.gap_mm) if data.recorded.commanded else 0.0
-    if stands.after_mm > stands.before_mm or stands.before_mm < digit:
-        # What makes the disagreement larger explains nothing, and less than the digit of a reading that stands still is
-        # its rounding, the same in every hold.
+    n, edges = data.chain.history.input_mm.size, data.chain.history.both_edges
+    is_larger = stands.after_mm > stands.before_mm or rms_mm(after, n, edges) > rms_mm(before, n, edges)
+    if is_larger or stands.before_mm < digit:
+        # What makes the disagreement larger, outliers included, explains nothing, and less than the digit of a reading
+        # that stands still is its rounding, the same in every hold.
         data, found = without_names(data, found, None if stands.before_mm < digit else found.unknown)
         after, stands = before, standing(data, found.problem, before, before)
     return Answer(data, found, before, after, stands)

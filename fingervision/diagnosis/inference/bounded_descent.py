@@ -97,8 +97,8 @@ def descend(squares: Weighted, start: Array, lower: Array, upper: Array, iterati
         gained = 0.0
         for _ in range(TRIALS):
             trial = x.copy()
-            damped = part + damping * np.eye(scale.size)
-            trial[free] += scale * np.linalg.lstsq(damped, scale * pull[free], rcond=1e-12)[0]
+            reach = ((lower - x)[free] / scale, (upper - x)[free] / scale)
+            trial[free] += scale * bounded_step(part + damping * np.eye(scale.size), scale * pull[free], reach)
             trial = np.clip(trial, lower, upper)
             rest = squares.residual(trial)
             new = squares.squared(rest)
@@ -112,6 +112,41 @@ def descend(squares: Weighted, start: Array, lower: Array, upper: Array, iterati
         if gained < SMALLEST_GAIN + SMALLEST_GAIN_SHARE * cost and step_number > 0:
             break
     return Descent(squares, x, residual, cost, normal, free)
+
+
+def bounded_step(matrix: Array, pull: Array, bounds: tuple[Array, Array]) -> Array:
+    """Minimise a quadratic form within bounds, to the accuracy that a step of a search needs.
+
+    What would go beyond its bound is held there and the others are solved again beside it: clipped alone it would
+    leave them where they suit a step that was never made.
+
+    Parameters
+    ----------
+    matrix : ndarray of float, shape (p, p)
+        Half the second derivatives.
+    pull : ndarray of float, shape (p,)
+        Half the downward slope.
+    bounds : tuple of ndarray of float, each of shape (p,)
+        Least and largest step of each parameter; they enclose zero.
+
+    Returns
+    -------
+    ndarray of float, shape (p,)
+        The step.
+    """
+    step, held = np.zeros(pull.size), np.zeros(pull.size, dtype=bool)
+    for _ in range(pull.size):
+        loose = ~held
+        rest = pull[loose] - matrix[np.ix_(loose, held)] @ step[held]
+        step[loose] = np.linalg.lstsq(matrix[np.ix_(loose, loose)], rest, rcond=1e-12)[0]
+        beyond = loose & ((step < bounds[0]) | (step > bounds[1]))
+        if not beyond.any():
+            break
+        held |= beyond
+        step = np.where(held, np.clip(step, *bounds), step)
+        if held.all():
+            break
+    return step
 
 
 def _free(x: Array, pull: Array, normal: Array, lower: Array, upper: Array) -> NDArray[np.bool_]:

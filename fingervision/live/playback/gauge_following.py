@@ -138,10 +138,15 @@ class GaugeFollowing:
 
 def _packed(gauges: Sequence[Gauge], readings: Sequence[Reading], plane: PlaneScale) -> bytes:
     """Readings as the page shows them, in few bytes: a recording has many frames."""
-    told = []
+    return zlib.compress(json.dumps(told(gauges, readings, plane)).encode())
+
+
+def told(gauges: Sequence[Gauge], readings: Sequence[Reading], plane: PlaneScale) -> list[dict[str, Any]]:
+    """Readings of one frame as the page shows them."""
+    found: list[dict[str, Any]] = []
     for gauge, reading in zip(gauges, readings, strict=True):
         cells = cells_of(reading.quantities, plane)
-        told.append(
+        found.append(
             {
                 "name": gauge.name,
                 "status": reading.status.value,
@@ -151,7 +156,7 @@ def _packed(gauges: Sequence[Gauge], readings: Sequence[Reading], plane: PlaneSc
                 "marks": [_points(mark) for mark in reading.marks],
             }
         )
-    return zlib.compress(json.dumps(told).encode())
+    return found
 
 
 def _points(mark: Mark | None) -> list[tuple[float, float]]:
