@@ -25,7 +25,7 @@ class NextRunAgent:
     Parameters
     ----------
     model : CorrectedModel
-        What the measurement is held against (`fingervision.tables.read.read_model`).
+        Model that is compared with the measurement (`fingervision.tables.read.read_model`).
     gap : str
         Name of the `GapDevice` whose events it takes as a subscriber (`RE.subscribe(agent)`).
     seed : int

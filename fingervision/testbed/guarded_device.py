@@ -12,7 +12,7 @@ from fingervision.testbed.reading import Reading
 
 
 def guarded(build: Callable[[], Any], protocol: type, who: str, origin: Origin) -> Any:
-    """Build a device and hold it against its protocol.
+    """Build a device and check that it follows its protocol.
 
     Parameters
     ----------

@@ -408,7 +408,7 @@ def _lagged(grid: Floats, down: int, right: int) -> tuple[Floats, Floats]:
 
 
 def _lost(design: Floats, residual: Floats, variance: float, contrast: float, cut_off: int) -> tuple[float, float]:
-    """How much of the first step is cut off, from the bend that this gives its profile."""
+    """Estimate the share of the first edge that clipping removed, from the bend of its profile."""
     step = design[2] if contrast * cut_off > 0.0 else 1.0 - design[2]
     bend = cut_off * (np.minimum((1.0 + CUT) * step, 1.0) - step)
     scaled = design / np.maximum(np.sqrt(np.einsum("ij,ij->i", design, design)), 1e-12)[:, None]

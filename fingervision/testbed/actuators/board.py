@@ -128,7 +128,7 @@ class BoardActuator:
         )
 
     def check(self, from_mm: float, to_mm: float, speed_mm_s: float) -> None:
-        """Refuse what is beyond the limits, and where no steps lead."""
+        """Refuse targets beyond the limits, and targets that no sequence of steps reaches."""
         Routes(self._data, self.limits).check(from_mm, to_mm, speed_mm_s)
 
     def move(self, to_mm: float, speed_mm_s: float) -> None:
