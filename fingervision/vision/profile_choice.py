@@ -1,4 +1,4 @@
-"""What stands beside a finger's edge, by the evidence of all rows together, and where the finger's own edge then is.
+"""Select the model of the mean profile across a flank, and from it the position of the finger's edge.
 
 A shadow, a wall and a line of glare each leave their own mean profile. Some of them cannot be told apart on one flank
 alone: a wall half as light as the ground looks like motion during the exposure, and glare like a wall on the other side

@@ -1,4 +1,4 @@
-"""Which effects: singles, pairs and triples, refitted in the chain; thresholds from a bootstrap of the null."""
+"""Search over single effects, pairs and triples, with significance thresholds from the null bootstrap."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
@@ -49,7 +49,7 @@ SHORT = 100
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Findings:
-    """What the search found; explanations sorted best first."""
+    """Result of a search, explanations in descending order of their score."""
 
     best: Explanation
     alternatives: tuple[Explanation, ...]

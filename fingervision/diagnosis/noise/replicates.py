@@ -199,7 +199,7 @@ def _trend_sigmas(groups: list[Array], pooled: float) -> float:
 def resolution(values: Array) -> float:
     """Smallest difference of values that all lie on one grid, as a reading of few digits gives them; 0 without one.
 
-    Of a few different values nobody can tell a grid: then the reading is taken for one of 12 bits over their range.
+    From few distinct values no step can be estimated: a 12-bit reading over their range is assumed.
     """
     steps = np.diff(np.unique(np.round(values, 10)))
     steps = steps[steps > 1e-9]
