@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from pathlib import Path
 
-from fingervision.domain.errors import FingervisionError
+from fingervision.domain.errors import DataError
 from fingervision.frames.received import Driven
 from fingervision.live.bed.bench import Bench
 from fingervision.live.comparison.comparison import Comparison
@@ -65,7 +65,7 @@ def stand_beside(session: Session, beside: Beside) -> None:
     if beside.drive is not None:
         drive = read_drive(beside.drive)
         if drive.time_s.size < 2:
-            raise FingervisionError(f"{beside.drive} must have at least two rows, but has {drive.time_s.size}.")
+            raise DataError(f"{beside.drive} must have at least two rows, but has {drive.time_s.size}.")
 
         def driven_at(time_s: float | None) -> Driven | None:
             found = None if time_s is None else drive_at(drive, time_s - beside.drive_offset_s)

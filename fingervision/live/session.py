@@ -9,7 +9,7 @@ from threading import Event, Lock, Thread
 from time import monotonic
 from typing import Any
 
-from fingervision.domain.errors import FingervisionError
+from fingervision.domain.errors import StateError
 from fingervision.domain.frame import Frame, LostFrame
 from fingervision.domain.status import Status
 from fingervision.frames.received import Driven
@@ -157,7 +157,7 @@ class Session:
         """
         with self._lock:
             if MOVES_ZERO & set(changes) and (self._recorder is not None or self._beginning):
-                raise FingervisionError("While a run is recorded the measurement stays as it is: stop recording first.")
+                raise StateError("While a run is recorded the measurement stays as it is: stop recording first.")
             chosen, unzeroed = self.choices.changed(**changes)
             chosen.check(self.description)
             self.choices = chosen
@@ -175,15 +175,15 @@ class Session:
         with self._lock:
             task = self.choices.task
             if self.ended.is_set():
-                raise FingervisionError("The source has ended, so nothing can be recorded: start again.")
+                raise StateError("The source has ended, so nothing can be recorded: start again.")
             if self._recorder is not None:
-                raise FingervisionError(f"A run is being recorded already, in {self._recorder.run.path}.")
+                raise StateError(f"A run is being recorded already, in {self._recorder.run.path}.")
             if self._beginning:
-                raise FingervisionError("A recording is being begun already.")
+                raise StateError("A recording is being begun already.")
             if task is None:
-                raise FingervisionError("The scale is not known: give it before recording, so that the run has gaps.")
+                raise StateError("The scale is not known: give it before recording, so that the run has gaps.")
             if not self.description.has_times:
-                raise FingervisionError("These images have no times, which a recording needs: give --rate-hz.")
+                raise StateError("These images have no times, which a recording needs: give --rate-hz.")
             self._beginning = True
         try:
             # Not while measuring waits: a slow disk would hold it up.
@@ -206,7 +206,7 @@ class Session:
         with self._lock:
             recorder, self._recorder = self._recorder, None
         if recorder is None:
-            raise FingervisionError("Nothing is being recorded.")
+            raise StateError("Nothing is being recorded.")
         recorder.stop()
         self.say("stopped", f"Recorded {recorder.run.frames} frames to {recorder.run.path}.")
         return recorder.run.path

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from calib.limits import rectangular
 from calib.measured_scale import Calibration
 from fingervision.domain.body_poses import COVERED, DAMAGED, OK, OUT_OF_VIEW, FramePoses, SeenPose
-from fingervision.domain.errors import FingervisionError
+from fingervision.domain.errors import DataError
 from fingervision.domain.frame import Frame, LostFrame
 from fingervision.gauges.picture import Picture, picture_of
 from fingervision.gauges.plane_scale import PlaneScale
@@ -148,7 +148,7 @@ class BodyTracker:
         view = replace(view, body_level=inside, contrast=ground - inside)
         laid = refined(grey, self.outlines, placed.place, placed.body_is_dark, view)
         if laid is None:
-            raise FingervisionError(
+            raise DataError(
                 f"The edges of {self.mechanism.name} must be seen where it is laid on frame {index}, but are not: "
                 "check the scale and the drawing, or give --at X,Y=XMM,YMM for three points."
             )

@@ -7,7 +7,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from fingervision.domain.errors import FingervisionError, UsageError
+from fingervision.domain.errors import DataError, UsageError
 from fingervision.measuring.body_outlines import BodyOutline, Placement, in_sight, silhouette
 from fingervision.models.mechanism import Mechanism
 from fingervision.vision.rigid_outline import PLAIN, Chunks, EdgeView, FlatMap, RigidFit, capture_rigid, halved
@@ -161,7 +161,7 @@ def by_silhouette(grey: Array, mechanism: Mechanism, px_per_mm: float, flat: Fla
     best.sort(key=lambda entry: -entry[0])
     if not best or best[0][0] < LEAST_OVERLAP:
         share = best[0][0] if best else 0.0
-        raise FingervisionError(
+        raise DataError(
             f"The drawing {mechanism.name} must cover what the picture shows, but at best {100.0 * share:.0f} % of "
             "both is common: show the whole mechanism, check the scale, or give --at X,Y=XMM,YMM for three points."
         )
@@ -172,7 +172,7 @@ def by_silhouette(grey: Array, mechanism: Mechanism, px_per_mm: float, flat: Fla
     drawn = silhouette(mechanism, top[1], width, height, step) > 0.5
     size = (width, height, step)
     if any(_climbed(drawn, mechanism, entry[1], size, 0.0)[0] < ALIKE for entry in others):
-        raise FingervisionError(
+        raise DataError(
             f"The drawing {mechanism.name} lies on the picture in {1 + len(others)} ways as well as one: give --at "
             "X,Y=XMM,YMM for three points of it."
         )
@@ -243,7 +243,7 @@ def levels_of(grey: Array, mechanism: Mechanism, place: Placement) -> tuple[floa
     inside = silhouette(mechanism, place, width, height, step) > 0.5
     small = grey[::step, ::step]
     if inside.all() or not inside.any():
-        raise FingervisionError(
+        raise DataError(
             f"The drawing {mechanism.name} must lie in the picture and leave some of its ground, but covers "
             f"{'all' if inside.any() else 'none'} of it: check --at and the scale."
         )

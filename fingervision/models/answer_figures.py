@@ -63,9 +63,11 @@ class ModelFigures:
         Input at which the fingers first touch.
     swaying_modes_hz, out_of_plane_modes_hz : tuple of float
         First antisymmetric in-plane modes, the drive free to go sideways; first modes out of the plane, drive held.
-    slope_error, force_error, mode_error, out_of_plane_error : float
+    sag_out_of_plane_mm : float or None
+        Sag of the measuring point of a horizontal plate by its own weight, drive held.
+    slope_error, force_error, mode_error, out_of_plane_error, sag_error : float
         Relative model errors, as known for the kind: of the gap per input, of the force, of the frequencies in the
-        plane and out of it. Each is a bound that held for the grippers that the kind was checked on.
+        plane and out of it, of the sag out of it. Each is a bound that held for the grippers that the kind was checked on.
     """
 
     gap_per_input: float
@@ -76,7 +78,9 @@ class ModelFigures:
     contact_input_mm: float | None = None
     swaying_modes_hz: tuple[float, ...] = ()
     out_of_plane_modes_hz: tuple[float, ...] = ()
+    sag_out_of_plane_mm: float | None = None
     slope_error: float = 0.0
     force_error: float = 0.0
     mode_error: float = 0.0
     out_of_plane_error: float = 0.0
+    sag_error: float = 0.0

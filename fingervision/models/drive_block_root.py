@@ -6,6 +6,7 @@ face and on the symmetry axis; of the compliance at the stub's end the bar's own
 and is computed once per block.
 """
 
+from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
@@ -29,66 +30,112 @@ _STUB = 1.5
 _ACROSS, _BODY = 2.0, 0.12
 """Triangles across and edge length over the size: within 2 % of a mesh twice as fine, which is
 0.01 % of the gap per input of the paper's sample."""
+_DIGITS = 12
+"""Of a block's numbers: two drawings that differ by rounding have the same block."""
 _NEAR = 1e-7
 _LEAST = 1e-3
 """Of the largest eigenvalue: no direction is stiffer than that, which keeps the frame well conditioned."""
 
 
-def drive_block_compliance(gripper: Gripper, entry_mm: PointMm) -> Array:
+@dataclass(frozen=True, slots=True)
+class BlockShape:
+    """Block and shuttle in widths of the shuttle, counted from the middle of the drive's face.
+
+    Parameters
+    ----------
+    half_width, low, high : float
+        Of the block.
+    start, end : (float, float)
+        Ends of the shuttle's axis.
+    face_half : float
+        Half width of the drive's face.
+    poisson : float
+        Of the material.
+    """
+
+    half_width: float
+    low: float
+    high: float
+    start: PointMm
+    end: PointMm
+    face_half: float
+    poisson: float
+
+    @property
+    def numbers(self) -> tuple[float, ...]:
+        """All of it, in one row."""
+        return (self.half_width, self.low, self.high, *self.start, *self.end, self.face_half, self.poisson)
+
+    @property
+    def entry(self) -> PointMm:
+        """Where the shuttle's axis enters the block."""
+        (xa, ya), (xb, yb) = self.start, self.end
+        return self.half_width, ya + (yb - ya) * (self.half_width - xa) / (xb - xa)
+
+
+def block_shape(gripper: Gripper) -> BlockShape:
+    """Take block and shuttle from a drawing."""
+    links, lever = gripper.links, gripper.lever
+    width_mm, face_y_mm = links.shuttle_width_mm, lever.drive_face_y_mm
+    _, half_mm, low_mm, high_mm = links.drive_block_mm
+
+    def placed(x: float, y: float) -> PointMm:
+        return round(x / width_mm, _DIGITS), round((y - face_y_mm) / width_mm, _DIGITS)
+
+    start = placed(*links.shuttle_from_mm)
+    x, y = np.subtract(placed(*links.shuttle_to_mm), start)
+    length = float(np.hypot(x, y))
+    # However long the shuttle is, the stub is a stub: its direction is what counts.
+    end = round(start[0] + x / length, _DIGITS), round(start[1] + y / length, _DIGITS)
+    return BlockShape(placed(half_mm, 0.0)[0], placed(0.0, low_mm)[1], placed(0.0, high_mm)[1], start, end,
+                      placed(lever.drive_face_half_width_mm, 0.0)[0], gripper.material.poisson_ratio)  # fmt: skip
+
+
+def drive_block_compliance(gripper: Gripper, unit: Array | None = None) -> Array:
     """Compliance that the drive block adds at the place where the shuttle's axis enters it.
 
     Parameters
     ----------
     gripper : Gripper
         The drawing.
-    entry_mm : (float, float)
-        Where bars and block are taken to meet.
+    unit : ndarray of float, shape (3, 3), or None
+        `unit_compliance` of its block, where known already.
 
     Returns
     -------
     ndarray of float, shape (3, 3)
         Motion x, y, rotation by load there, in the ground's axes.
     """
-    links, lever, material = gripper.links, gripper.lever, gripper.material
-    unit = _unit_compliance(
-        links.drive_block_mm, links.shuttle_from_mm, links.shuttle_to_mm, links.shuttle_width_mm, entry_mm,
-        lever.drive_face_y_mm, lever.drive_face_half_width_mm, material.poisson_ratio,
-    )  # fmt: skip
-    return unit / (material.youngs_modulus_mpa * gripper.body.plate_mm)
+    turned = np.array([1.0, 1.0, 1.0 / gripper.links.shuttle_width_mm])
+    unit = unit_compliance(block_shape(gripper)) if unit is None else unit
+    return np.outer(turned, turned) * unit / (gripper.material.youngs_modulus_mpa * gripper.body.plate_mm)
 
 
 @lru_cache(maxsize=256)
-def _unit_compliance(
-    block_mm: tuple[float, float, float, float],
-    start_mm: PointMm,
-    end_mm: PointMm,
-    width_mm: float,
-    entry_mm: PointMm,
-    face_y_mm: float,
-    face_half_mm: float,
-    poisson: float,
-) -> Array:
-    """The same by unit modulus and plate thickness."""
-    material = Material("unit", 1.0, poisson, 1.0, 1.0)
-    entry = np.array(entry_mm)
-    along = np.subtract(end_mm, start_mm) / np.hypot(*np.subtract(end_mm, start_mm))
-    stub_mm = _STUB * width_mm
-    section = entry + stub_mm * along
-    shapes = (box(*block_mm), bar(*start_mm, float(section[0]), float(section[1]), width_mm))
+def unit_compliance(shape: BlockShape) -> Array:
+    """Compute the same by unit modulus, plate thickness and width of the shuttle; shape (3, 3)."""
+    material = Material("unit", 1.0, shape.poisson, 1.0, 1.0)
+    entry = np.array(shape.entry)
+    along = np.subtract(shape.end, shape.start) / np.hypot(*np.subtract(shape.end, shape.start))
+    section = entry + _STUB * along
+    shapes = (
+        box(0.0, shape.half_width, shape.low, shape.high),
+        bar(*shape.start, float(section[0]), float(section[1]), 1.0),
+    )
     region = PlanarRegion(
-        tuple((True, Polygon(right_of_axis(shape.corners_mm))) for shape in shapes), ((face_half_mm, face_y_mm),)
+        tuple((True, Polygon(right_of_axis(part.corners_mm))) for part in shapes), ((shape.face_half, 0.0),)
     )
     size = region.size_mm
     plate = PlaneStressPlate(triangulate(region, _ACROSS, _BODY * size), material, 1.0)
     x, y = plate.nodes_mm
     outline = np.unique(plate.outline_edges)
-    on_face = outline[(np.abs(y[outline] - face_y_mm) < _NEAR * size) & (x[outline] <= face_half_mm + _NEAR * size)]
+    on_face = outline[(np.abs(y[outline]) < _NEAR * size) & (x[outline] <= shape.face_half + _NEAR * size)]
     on_axis = outline[np.abs(x[outline]) < _NEAR * size]
     taken: set[int] = set()
     frames = [
         face_frame(plate, on_face, ("y",), taken)[0],
         face_frame(plate, on_axis, ("x",), taken)[0],
-        section_frame(plate, section, along, 1.1 * width_mm, _NEAR * size),
+        section_frame(plate, section, along, 1.1, _NEAR * size),
     ]
     K = condensed(plate, np.arange(plate.unknowns), frames, range(3)).stiffness_n_mm
     # Held: y and the turn of the drive face, x and the turn of the axis; the faces slide.
@@ -96,8 +143,8 @@ def _unit_compliance(
     whole = np.linalg.inv(K[np.ix_(moving, moving)])[2:, 2:]
     c, s = along
     axes = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
-    own = axes @ bar_compliance(stub_mm, width_mm, 1.0, material)[_PLANAR] @ axes.T
-    back = np.array([[1.0, 0.0, stub_mm * s], [0.0, 1.0, -stub_mm * c], [0.0, 0.0, 1.0]])
+    own = axes @ bar_compliance(_STUB, 1.0, 1.0, material)[_PLANAR] @ axes.T
+    back = np.array([[1.0, 0.0, _STUB * s], [0.0, 1.0, -_STUB * c], [0.0, 0.0, 1.0]])
     root = back @ (whole - own) @ back.T
     values, vectors = np.linalg.eigh(0.5 * (root + root.T))
     return np.asarray(vectors @ np.diag(np.maximum(values, _LEAST * values.max())) @ vectors.T)

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import eigh
 from scipy.sparse import csr_matrix
-from scipy.sparse.linalg import SuperLU, eigsh, splu
+from scipy.sparse.linalg import LinearOperator, SuperLU, eigsh, splu
 
 from fingervision.models.signorini import contact_forces_n
 
@@ -206,8 +206,10 @@ class DrivenBody:
             inverse, kept = eigh(mass.toarray(), stiffness.toarray(), subset_by_index=reciprocal)
             squared, kept = 1.0 / inverse, kept / np.sqrt(inverse)
         else:
+            solver = self._solver if np.array_equal(free, self.free) else factorised(stiffness)
+            inverse = LinearOperator(stiffness.shape, solver.solve, dtype=np.float64)
             start = np.ones(free.size)
-            squared, kept = eigsh(stiffness.tocsc(), count, mass.tocsc(), sigma=0.0, v0=start)
+            squared, kept = eigsh(stiffness.tocsc(), count, mass.tocsc(), sigma=0.0, OPinv=inverse, v0=start)
         order = np.argsort(squared)
         shapes = np.zeros((self.unknowns, count))
         shapes[free] = kept[:, order]

@@ -9,6 +9,7 @@ validation.
 """
 
 from collections.abc import Sequence
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,9 +20,11 @@ from fingervision.models.answer_figures import LoadedState, ModelFigures, PeakSt
 from fingervision.models.covered_inputs import covered_inputs_mm
 from fingervision.models.driven_body import Equilibrium
 from fingervision.models.gripper_bodies import gripper_poses, poses_of_plate
+from fingervision.models.gripper_mechanism import half_mechanism
 from fingervision.models.gripper_outline import notch_centres_mm
 from fingervision.models.half_plate import half_plate
 from fingervision.models.hinge_correction import HingeTheory
+from fingervision.models.out_of_plane import MODE_ERROR, SAG_ERROR, OutOfPlane, out_of_plane
 from fingervision.models.physics import LINEAR, Physics
 from fingervision.models.plane_stress import PlaneStressPlate
 from fingervision.models.reference_mesh import mesh_of
@@ -131,6 +134,11 @@ class FiniteElementGripper:
         rad_s, _ = self.half.swaying_modes(count=count)
         return tuple((rad_s / (2.0 * np.pi)).tolist())
 
+    @cached_property
+    def across_plane(self) -> OutOfPlane:
+        """First mode and sag across the plane, the drive held, in three dimensions (`deep_plate`)."""
+        return out_of_plane(half_mechanism(self.gripper))
+
     def figures(self) -> ModelFigures:
         """Compute the model's row of the comparison."""
         return ModelFigures(
@@ -141,9 +149,13 @@ class FiniteElementGripper:
             self.modes_hz(drive_held=True),
             contact_onset_mm(self.half, self.physics),
             self.swaying_modes_hz(),
+            self.across_plane.modes_hz,
+            self.across_plane.sag_mm["tip"],
             slope_error=_SLOPE_ERROR,
             force_error=_FORCE_ERROR + 2.0 * force_uncertainty(self.gripper.material),
             mode_error=_MODE_ERROR + force_uncertainty(self.gripper.material),
+            out_of_plane_error=MODE_ERROR,
+            sag_error=SAG_ERROR,
         )
 
 

@@ -1,7 +1,7 @@
 """Poses of the gripper's bodies by every kind of model of a `gripper.toml`: both fingers and the drive."""
 
 from collections.abc import Callable, Mapping
-from functools import partial
+from functools import lru_cache, partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,8 +28,9 @@ _ON_AXIS = np.array([0.0, 1.0, 0.0])
 """A body that both halves share moves along the axis alone; its half also bends aside, against the other half."""
 
 
+@lru_cache(maxsize=8)
 def gripper_bodies(gripper: Gripper) -> tuple[LinkBody, ...]:
-    """Cut the right half into its bodies."""
+    """Cut the right half into its bodies; every kind of model of one drawing has the same."""
     return bodies_of(half_mechanism(gripper))
 
 

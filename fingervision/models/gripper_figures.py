@@ -14,7 +14,6 @@ from fingervision.models.driven_body import DrivenBody
 from fingervision.models.endurance import Endurance, endurance
 from fingervision.models.finite_element import FiniteElementGripper
 from fingervision.models.operating_figures import OperatingFigures, operating_figures
-from fingervision.models.stiffness_matrix import StiffnessMatrixGripper
 from fingervision.models.yield_limit import opening_at_yield_mm
 
 _UNITS = {
@@ -76,7 +75,7 @@ def gripper_figures(
     if not isinstance(model, FiniteElementGripper):
         # Bars that end where their axes meet grow otherwise: by more than the sample's gap does.
         row["gap_per_kelvin_mm"] = row["force_per_kelvin_n"] = None
-    row["sag_out_of_plane_mm"] = model.gravity_sag_mm()[0] if isinstance(model, StiffnessMatrixGripper) else None
+    row["sag_out_of_plane_mm"] = figures.sag_out_of_plane_mm
     ends = [float(min(inputs)), float(max(inputs))]
     if peak is not None:
         states = model.loaded(ends)
@@ -97,6 +96,7 @@ def gripper_figures(
         "model_error_out_of_plane_percent": 100.0 * figures.out_of_plane_error
         if figures.out_of_plane_modes_hz
         else None,
+        "model_error_sag_percent": None if figures.sag_out_of_plane_mm is None else 100.0 * figures.sag_error,
     }
     return row
 

@@ -126,18 +126,25 @@ _BLOCKS_OVER_PLANES = (
 )
 
 
+@lru_cache(maxsize=1)
+def _by_t_over_r() -> tuple[PchipInterpolator, PchipInterpolator, PchipInterpolator]:
+    """Curves over log(t / R): shares and ratios by b / t, plane stress over beam theory, blocks over planes."""
+    table = np.array(_BRICKS_OVER_BEAM)
+    shares = (1.0 - table / table[:, :1, :]) / _POISSON**2
+    mixed = np.where(np.isin(np.arange(6), (_X, _Y, _ABOUT_Z)), shares, np.log(table))
+    bricks, plane, blocks = (PchipInterpolator(np.log(_T_OVER_R), rows, axis=0)
+                             for rows in (mixed, np.array(_PLANES_OVER_BEAM), np.array(_BLOCKS_OVER_PLANES)))  # fmt: skip
+    return bricks, plane, blocks
+
+
 @lru_cache(maxsize=512)
 def _bricks(t_over_r: float, b_over_t: float) -> tuple[float, ...]:
     """Interpolated factors: shares of plane strain along, across and about z, and ratios of the other directions."""
-    table = np.array(_BRICKS_OVER_BEAM)
-    narrow = table[:, :1, :]
-    shares = (1.0 - table / narrow) / _POISSON**2
-    mixed = np.where(np.isin(np.arange(6), (_X, _Y, _ABOUT_Z)), shares, np.log(table))
     if t_over_r < _T_OVER_R[0]:
         # What counts is the width over the length that bends, sqrt(t R).
         b_over_t *= np.sqrt(t_over_r / _T_OVER_R[0])
     at = np.log(np.clip(t_over_r, _T_OVER_R[0], _T_OVER_R[-1]))
-    row = PchipInterpolator(np.log(_T_OVER_R), mixed, axis=0)(at)
+    row = _by_t_over_r()[0](at)
     curves = PchipInterpolator(np.log(_B_OVER_T), row, axis=0)
     values = curves(np.log(np.clip(b_over_t, _B_OVER_T[0], _B_OVER_T[-1])))
     # Wide plates twist by bending their strips to and fro: beam theory falls behind with the square of the width.
@@ -156,7 +163,7 @@ def planes_ratio(notch: Notch, material: Material) -> Array:
     bricks = np.array(_bricks(notch.curvature_ratio, notch.plate_mm / notch.thickness_mm))
     ratio: Array = np.exp(bricks)
     at = np.log(np.clip(notch.curvature_ratio, _T_OVER_R[0], _T_OVER_R[-1]))
-    plane = PchipInterpolator(np.log(_T_OVER_R), np.array(_PLANES_OVER_BEAM), axis=0)(at)
+    plane = _by_t_over_r()[1](at)
     for place, value in zip((_X, _Y, _ABOUT_Z), plane.tolist(), strict=True):
         ratio[place] = value * (1.0 - bricks[place] * material.poisson_ratio**2)
     return ratio
@@ -165,7 +172,7 @@ def planes_ratio(notch: Notch, material: Material) -> Array:
 def blocks_over_planes(notch: Notch) -> Array:
     """Ratio of the compliance between elastic blocks to that between rigid planes, shape (6,)."""
     at = np.log(np.clip(notch.curvature_ratio, _T_OVER_R[0], _T_OVER_R[-1]))
-    along, bending = PchipInterpolator(np.log(_T_OVER_R), np.array(_BLOCKS_OVER_PLANES), axis=0)(at)
+    along, bending = _by_t_over_r()[2](at)
     ratio = np.ones(6)
     ratio[_X], ratio[_ABOUT_Z], ratio[_Y] = along, bending, bending
     return ratio

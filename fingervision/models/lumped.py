@@ -51,6 +51,8 @@ class LumpedGripper:
         Of the hinges.
     segments : int
         Per notch; the paper's n.
+    block : ndarray of float, shape (3, 3), or None
+        `drive_block_root.unit_compliance` of the drive block, where known already.
     """
 
     name = KIND
@@ -61,11 +63,12 @@ class LumpedGripper:
         physics: Physics = LINEAR,
         theory: HingeTheory = HingeTheory.CORRECTED,
         segments: int = _SEGMENTS,
+        block: NDArray[np.float64] | None = None,
     ) -> None:
         self.gripper = gripper
         self.physics = physics
         self.theory = theory
-        self.skeleton = skeleton_of(gripper, theory, segments)
+        self.skeleton = skeleton_of(gripper, theory, segments, block=block)
         self.frame = frame_of(gripper, self.skeleton)
         self.half = half_frame(gripper, self.skeleton, self.frame)
 

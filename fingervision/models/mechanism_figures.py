@@ -3,6 +3,7 @@
 from fingervision.models.mechanism_chain import MechanismChain
 from fingervision.models.mechanism_frame import MechanismFrame
 from fingervision.models.mechanism_plate import MechanismPlate
+from fingervision.models.out_of_plane import MODE_ERROR, SAG_ERROR, out_of_plane
 
 MechanismModel = MechanismPlate | MechanismFrame | MechanismChain
 
@@ -37,4 +38,10 @@ def mechanism_figures(model: MechanismModel) -> dict[str, float]:
     for held, label in ((False, "drive_free"), (True, "drive_held")):
         for place, value in enumerate(model.modes_hz(drive_held=held), 1):
             figures[f"mode_{place}_{label}_hz"] = value
-    return figures | {"model_error_force_percent": 100.0 * model.force_error}
+    errors = {"model_error_force_percent": 100.0 * model.force_error}
+    if isinstance(model, MechanismPlate):
+        across = out_of_plane(model.mechanism)
+        figures["first_out_of_plane_mode_hz"] = across.modes_hz[0]
+        figures |= {f"{name}: sag out of the plane [mm]": value for name, value in across.sag_mm.items()}
+        errors |= {"model_error_out_of_plane_percent": 100.0 * MODE_ERROR, "model_error_sag_percent": 100.0 * SAG_ERROR}
+    return figures | errors

@@ -5,10 +5,11 @@ from functools import cached_property, partial
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_matrix, hstack, identity
-from scipy.sparse.linalg import eigsh
+from scipy.sparse.linalg import LinearOperator, eigsh
 
-from fingervision.domain.errors import FingervisionError
+from fingervision.domain.errors import ModelError
 from fingervision.models.contact_pairs import contact_pair
+from fingervision.models.driven_body import factorised
 from fingervision.models.mechanism import Mechanism, check_mechanism
 from fingervision.models.mechanism_bodies import LinkBody, bodies_of, plate_poses
 from fingervision.models.mechanism_equilibrium import DrivenMechanism
@@ -107,7 +108,7 @@ class MechanismPlate:
             Where a contact's faces are none, or nothing holds the mechanism.
         """
         if self._wanders():
-            raise FingervisionError(f"{self.mechanism.name} must be held by its fixed faces, but can move freely.")
+            raise ModelError(f"{self.mechanism.name} must be held by its fixed faces, but can move freely.")
         plate = self.plate
         pairs = [contact_pair(plate, contact, self.mechanism, self._size_mm) for contact in self.mechanism.contacts]
         return DrivenMechanism(
@@ -189,7 +190,8 @@ class MechanismPlate:
             columns = hstack([columns, csr_matrix(self._by_input[:, None])], format="csr")
         K = (columns.T @ self.plate.stiffness_n_mm @ columns).tocsc()
         M = (columns.T @ self.plate.mass_t @ columns).tocsc()
-        squared, sought = eigsh(K, count, M, sigma=0.0, v0=np.ones(K.shape[0]))
+        inverse = LinearOperator(K.shape, factorised(K).solve, dtype=np.float64)
+        squared, sought = eigsh(K, count, M, sigma=0.0, OPinv=inverse, v0=np.ones(K.shape[0]))
         order = np.argsort(squared)
         drive = np.zeros(count) if drive_held else sought[-1, order]
         return np.sqrt(squared[order]), np.asarray(columns @ sought[:, order]), drive

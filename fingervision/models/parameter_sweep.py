@@ -2,14 +2,16 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from itertools import product
 from operator import attrgetter
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fingervision.domain.errors import FingervisionError, UsageError
+from fingervision.domain.errors import FingervisionError, ModelError, UsageError
 from fingervision.domain.gripper import Gripper
+from fingervision.models.drive_block_sweep import block_compliances
 from fingervision.models.gripper_outline import check_outline
 from fingervision.models.hinge_correction import HingeTheory
 from fingervision.models.lumped import LumpedGripper
@@ -119,9 +121,11 @@ def sweep_answers(gripper: Gripper, variations: Sequence[Variation], theory: Hin
     for corner in product(*((min(v.values), max(v.values)) for v in variations)):
         check_outline(varied(gripper, variations, corner), f"the variant {_spelt(variations, corner)}")
     rows = []
+    corrected = theory is HingeTheory.CORRECTED
+    blocks = block_compliances(partial(varied, gripper, variations), [v.values for v in variations])
     for values in grid:
         drawn = varied(gripper, variations, values)
-        model = LumpedGripper(drawn, theory=theory)
+        model = LumpedGripper(drawn, theory=theory, block=blocks(values) if corrected else None)
         stress, touch = model.peak_stress().mpa_per_mm, model.half.first_touch_mm()
         force = model.half.equilibrium(1.0).force_n
         at_yield = drawn.material.yield_mpa / stress
@@ -171,7 +175,7 @@ def mechanism_sweep_answers(
             else:
                 rows.append({})
         except FingervisionError as error:
-            raise FingervisionError(f"The variant {_spelt(variations, values)} has no answer: {error}") from error
+            raise ModelError(f"The variant {_spelt(variations, values)} has no answer: {error}") from error
     found = rows[len(corners) :]
     columns = tuple(dict.fromkeys(name for row in found for name in row if not name.startswith("model_error")))
     return np.array(grid), columns, np.array([[row.get(name, np.inf) for name in columns] for row in found])

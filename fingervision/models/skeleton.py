@@ -13,7 +13,7 @@ from math import cos, radians, sin
 import numpy as np
 from numpy.typing import NDArray
 
-from fingervision.domain.errors import FingervisionError
+from fingervision.domain.errors import DataError
 from fingervision.domain.gripper import Gripper, PointMm
 from fingervision.models.drive_block_root import drive_block_compliance
 from fingervision.models.hinge_compliance import bar_compliance, beam_compliance
@@ -123,7 +123,9 @@ class _Tree:
         return parent
 
 
-def skeleton_of(gripper: Gripper, theory: HingeTheory, segments: int, *, rigid_links: bool = False) -> Skeleton:
+def skeleton_of(
+    gripper: Gripper, theory: HingeTheory, segments: int, *, rigid_links: bool = False, block: Array | None = None
+) -> Skeleton:
     """Reduce a drawing to its tree.
 
     Parameters
@@ -137,6 +139,8 @@ def skeleton_of(gripper: Gripper, theory: HingeTheory, segments: int, *, rigid_l
         whole hinge's own compliance.
     rigid_links : bool
         Whether only the hinges yield, as in the paper's equations.
+    block : ndarray of float, shape (3, 3), or None
+        `drive_block_root.unit_compliance`, where known already.
 
     Raises
     ------
@@ -153,7 +157,7 @@ def skeleton_of(gripper: Gripper, theory: HingeTheory, segments: int, *, rigid_l
     pillar_x = lever.hinge1_mm[0]
     pillar_width = links.pillar_and_root_mm[1] - links.pillar_and_root_mm[0]
     if not lower1[1] > links.pillar_and_root_mm[2] or not cross_y > max(upper1[1], upper2[1]):
-        raise FingervisionError(
+        raise DataError(
             f"Bars and hinges can stand for the body only where both hinges lie between the clamp and the cross bar, "
             f"whose axis is at y = {cross_y:g} mm, but they reach from y = {lower1[1]:g} to "
             f"{max(upper1[1], upper2[1]):g} mm; take --kind finite_element."
@@ -178,18 +182,18 @@ def skeleton_of(gripper: Gripper, theory: HingeTheory, segments: int, *, rigid_l
     at = joint
     at = link(at, meeting, upper2, "stub", links.shuttle_width_mm)
     at = tree.hinge(at, upper2, lower2, "hinge 2", theory, segments)
-    block = links.drive_block_mm
-    entry = _at_x(shuttle, block[1])
+    box_mm = links.drive_block_mm
+    entry = _at_x(shuttle, box_mm[1])
     if not lower2[0] > entry[0]:
-        raise FingervisionError(
+        raise DataError(
             f"Hinge 2 must end outside the drive block, at x > {entry[0]:g} mm, but ends at x = {lower2[0]:g} mm; "
             "make the block narrower or lever.l4_mm longer."
         )
     at = link(at, lower2, entry, "shuttle", links.shuttle_width_mm)
-    drive = tree.rigid(at, entry, lever.drive_mm, "drive block", (block[1] - block[0]) * (block[3] - block[2]),
-                       block[3] - block[2])  # fmt: skip
+    drive = tree.rigid(at, entry, lever.drive_mm, "drive block", (box_mm[1] - box_mm[0]) * (box_mm[3] - box_mm[2]),
+                       box_mm[3] - box_mm[2])  # fmt: skip
     if not rigid_links and theory is HingeTheory.CORRECTED:
-        tree.members[drive] = _yielding(tree.members[drive], drive_block_compliance(gripper, entry))
+        tree.members[drive] = _yielding(tree.members[drive], drive_block_compliance(gripper, block))
         tree.members[drive] = _bending_out_of_plane(tree.members[drive], gripper)
     at = link(joint, meeting, foot, "cross bar's end", links.cross_bar_width_mm)
     tip = links.tip_polygon_mm

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from fingervision.domain.body_poses import OK, FramePoses, SeenPose
-from fingervision.domain.errors import FingervisionError
+from fingervision.domain.errors import DataError
 
 COLUMNS = (
     "frame", "time_s", "body", "status", "x_mm", "y_mm", "angle_mrad", "u_x_mm", "u_y_mm", "u_angle_mrad",
@@ -66,7 +66,7 @@ def add_channels(gaps: Path, poses: Sequence[FramePoses], names: Mapping[str, st
     at = header.index("frame")
     seen = {frame.frame: frame.poses for frame in poses}
     if missing := [row[at] for row in body if int(row[at]) not in seen]:
-        raise FingervisionError(f"{gaps} must be of the same recording, but its frame {missing[0]} was not followed.")
+        raise DataError(f"{gaps} must be of the same recording, but its frame {missing[0]} was not followed.")
     first = next(iter(seen.values()), {})
     wanted = [(name, part) for name in names for part in PARTS if name in first and _has(seen.values(), name, part)]
     prefixes = ("", "u_", "u_random_")

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import asdict
 from typing import Any
 
-from fingervision.domain.errors import FingervisionError, UsageError
+from fingervision.domain.errors import StateError, UsageError
 from fingervision.gauges.fields import fields_of
 from fingervision.gauges.kinds import kinds
 from fingervision.live.commands.asking import GREATEST, MOST_LETTERS, Answer, Request, shown, words
@@ -25,7 +25,7 @@ def _beside(view: View) -> GaugesBeside:
     if isinstance(view, Session):
         return put_live_gauges(view, USUAL_FILE)
     if not isinstance(view, Playback):
-        raise FingervisionError("Gauges are drawn on a recording or a camera's picture, but this is neither.")
+        raise StateError("Gauges are drawn on a recording or a camera's picture, but this is neither.")
     return put_gauges_beside(view, USUAL_FILE)
 
 

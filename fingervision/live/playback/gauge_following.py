@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from threading import Event, Thread
 from typing import Any
 
-from fingervision.domain.errors import FingervisionError
+from fingervision.domain.errors import FingervisionError, StateError
 from fingervision.domain.frame import LostFrame
 from fingervision.domain.status import Status
 from fingervision.gauges.gauge_file import Gauge
@@ -131,7 +131,7 @@ class GaugeFollowing:
                 if row is not None:
                     return row.status
                 if playback.failure:
-                    raise FingervisionError(playback.failure)
+                    raise StateError(playback.failure)
             self._stopped.wait(LOOK_EVERY_S)
         return None
 

@@ -1,0 +1,175 @@
+"""A plate of any depth out of its plane: quadratic triangles in the plane, polynomials through the depth.
+
+Displacements are u_i(x, y, z) = sum N_a(x, y) P_k(2 z / b) q_iak with Legendre's polynomials P_k: along the plane the odd
+ones, across it the even ones, which is what bends, twists and shears a plate that is alike on both sides of its middle
+plane. Three-dimensional elasticity is met in the limit of the order (Szabo and Babuska, Finite Element Analysis, Wiley
+1991, chapter 14: hierarchic plate models), without the assumptions of plates or beams: a neck deeper than it is thick
+twists as restrained warping lets it, and bodies bend right up to where they join.
+"""
+
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+import skfem
+from numpy.polynomial import legendre
+from numpy.typing import NDArray
+from scipy.sparse import bmat, csr_matrix, kron
+from scipy.sparse.linalg import LinearOperator, eigsh
+
+from fingervision.domain.gripper import Material
+from fingervision.models.driven_body import factorised
+from fingervision.models.plane_mesh import PlaneMesh
+
+Array = NDArray[np.float64]
+Indices = NDArray[np.int64]
+
+_ORDER = 3
+"""Of the polynomials along the plane; across it one less. The first mode of the paper's sample is then within 0.1 % of
+order 7, and of a hinge 20 times as wide as thick within 0.5 % (`tests/benchmarks/models_out_of_plane.py`)."""
+
+_NEAREST = 12
+"""Nodes that a quadratic is laid through, twice what it needs."""
+
+
+class DeepPlate:
+    """A meshed plate that moves out of its plane.
+
+    Parameters
+    ----------
+    mesh : PlaneMesh
+        Quadratic triangles.
+    material : Material
+        Linear elastic.
+    plate_mm : float
+        Depth.
+    order : int
+        Of the polynomials along the plane, odd.
+    """
+
+    def __init__(self, mesh: PlaneMesh, material: Material, plate_mm: float, order: int = _ORDER) -> None:
+        self.material, self.plate_mm = material, plate_mm
+        self._basis = skfem.Basis(skfem.MeshTri2(mesh.nodes_mm, mesh.triangles), skfem.ElementTriP2(), intorder=4)
+        self.nodes_mm: Array = self._basis.doflocs
+        odd = [np.eye(order + 1)[k] for k in range(1, order + 1, 2)]
+        even = [np.eye(order + 1)[k] for k in range(0, order, 2)]
+        self._shapes = odd, odd, even
+
+    @property
+    def unknowns(self) -> int:
+        """Number of coefficients."""
+        return int(self.nodes_mm.shape[1]) * sum(len(shapes) for shapes in self._shapes)
+
+    def coefficients(self, nodes: Indices, component: int) -> Indices:
+        """Unknowns of one component (0 x, 1 y, 2 z) at some nodes."""
+        count = [len(shapes) for shapes in self._shapes]
+        start = self.nodes_mm.shape[1] * sum(count[:component])
+        return np.asarray(start + (count[component] * nodes[:, None] + np.arange(count[component])).ravel())
+
+    def _through(self, first: int, second: int, *, slopes: tuple[int, int]) -> Array:
+        """Integrals through the depth of two components' polynomials or their slopes by z."""
+        points, weights = legendre.leggauss(2 * len(self._shapes[0]) + 2)
+        values = []
+        for component, order in zip((first, second), slopes, strict=True):
+            rows = [legendre.legval(points, legendre.legder(shape, order) if order else shape)
+                    for shape in self._shapes[component]]  # fmt: skip
+            values.append(np.array(rows) * (2.0 / self.plate_mm) ** order)
+        return np.asarray((values[0] * weights) @ values[1].T * 0.5 * self.plate_mm)
+
+    @cached_property
+    def _plane(self) -> dict[tuple[int, int], csr_matrix]:
+        """Integrals over the plane of two shape functions, each differentiated by x (0), y (1) or not at all (2)."""
+
+        def part(shape: Any, way: int) -> Any:
+            return shape if way == 2 else shape.grad[way]
+
+        def integral(first: int, second: int) -> csr_matrix:
+            # skfem hands over the second function, the column, first.
+            form = skfem.BilinearForm(lambda u, v, _: part(v, first) * part(u, second))
+            return csr_matrix(form.assemble(self._basis))
+
+        found = {pair: integral(*pair) for pair in ((0, 0), (0, 1), (1, 1), (0, 2), (1, 2), (2, 2))}
+        return found | {(b, a): csr_matrix(matrix.T) for (a, b), matrix in found.items() if a != b}
+
+    @cached_property
+    def stiffness_n_mm(self) -> csr_matrix:
+        """Linear stiffness matrix by Hooke's law in three dimensions."""
+        E, nu = self.material.youngs_modulus_mpa, self.material.poisson_ratio
+        lame, shear = E * nu / ((1.0 + nu) * (1.0 - 2.0 * nu)), self.material.shear_modulus_mpa
+
+        def gradients(i: int, way: int, j: int, other: int) -> csr_matrix:
+            through = self._through(i, j, slopes=(int(way == 2), int(other == 2)))
+            return csr_matrix(kron(self._plane[way, other], through))
+
+        blocks = [[lame * gradients(i, i, j, j) + shear * gradients(i, j, j, i) for j in range(3)] for i in range(3)]
+        for i in range(3):
+            for way in range(3):
+                blocks[i][i] = blocks[i][i] + shear * gradients(i, way, i, way)
+        return csr_matrix(bmat(blocks))
+
+    @cached_property
+    def mass_t(self) -> csr_matrix:
+        """Consistent mass matrix in tonnes."""
+        parts = [kron(self._plane[2, 2], self._through(i, i, slopes=(0, 0))) for i in range(3)]
+        rows = [[part if i == j else None for j in range(3)] for i, part in enumerate(parts)]
+        return csr_matrix(self.material.density_t_mm3 * bmat(rows))
+
+    @cached_property
+    def lifted(self) -> Array:
+        """Coefficients of a lift of the whole plate by 1 mm."""
+        lift = np.zeros(self.unknowns)
+        lift[self.coefficients(np.arange(self.nodes_mm.shape[1]), 2)[:: len(self._shapes[2])]] = 1.0
+        return lift
+
+    def middle_mm(self, moved: Array, point: tuple[float, float]) -> float:
+        """Motion of a point of the middle plane across it, by the nearest node's tangent plane of a quadratic fit."""
+        x, y = self.nodes_mm - np.array(point)[:, None]
+        near = np.argsort(np.hypot(x, y))[:_NEAREST]
+        x, y = x[near], y[near]
+        values = moved[self.coefficients(near, 2)].reshape(near.size, -1) @ _even_at_middle(len(self._shapes[2]))
+        around = np.column_stack([np.ones(near.size), x, y, x**2, y**2, x * y])
+        scale = np.abs(around).max(axis=0)
+        return float(np.linalg.lstsq(around / scale, values, rcond=None)[0][0] / scale[0])
+
+    def supported(self, held: Indices) -> "SupportedPlate":
+        """Hold some coefficients."""
+        return SupportedPlate(self, np.setdiff1d(np.arange(self.unknowns), held))
+
+
+class SupportedPlate:
+    """A plate with some of its coefficients held.
+
+    Parameters
+    ----------
+    plate : DeepPlate
+        The plate.
+    free : ndarray of int
+        Coefficients that nothing holds.
+    """
+
+    def __init__(self, plate: DeepPlate, free: Indices) -> None:
+        self._plate, self._free = plate, free
+        self._stiffness = plate.stiffness_n_mm[free][:, free]
+        self._factors = factorised(self._stiffness)
+
+    def modes_hz(self, count: int) -> tuple[float, ...]:
+        """First natural frequencies."""
+        free = self._free
+        mass = self._plate.mass_t[free][:, free].tocsc()
+        inverse = LinearOperator(mass.shape, self._factors.solve, dtype=np.float64)
+        squared = eigsh(self._stiffness.tocsc(), count, mass, sigma=0.0, OPinv=inverse, v0=np.ones(free.size),
+                        return_eigenvectors=False)  # fmt: skip
+        return tuple((np.sqrt(np.sort(squared)) / (2.0 * np.pi)).tolist())
+
+    def sag(self, gravity_mm_s2: float) -> Array:
+        """Displacements by the plate's own weight across it, shape (unknowns of the plate,)."""
+        plate = self._plate
+        load = gravity_mm_s2 * (plate.mass_t @ plate.lifted)
+        moved = np.zeros(plate.unknowns)
+        moved[self._free] = self._factors.solve(load[self._free])
+        return moved
+
+
+def _even_at_middle(count: int) -> Array:
+    """Values of the even Legendre polynomials at 0."""
+    return np.array([legendre.legval(0.0, np.eye(2 * count)[2 * k]) for k in range(count)])

@@ -1,0 +1,96 @@
+"""How the drive block yields over a grid of drawings: computed at a few of them, interpolated between.
+
+The block is meshed, which costs more than all the rest of a lumped model, and hardly changes from one drawing of a grid
+to the next. Along every number that changes it Chebyshev's points are computed and a polynomial is laid through them.
+"""
+
+from collections.abc import Callable, Sequence
+from itertools import product
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fingervision.domain.errors import FingervisionError
+from fingervision.domain.gripper import Gripper
+from fingervision.models.drive_block_root import block_shape, unit_compliance
+
+Array = NDArray[np.float64]
+
+_NODES = 5
+"""Along a number: beside the block itself within 1 % for a third more or less of a link's length."""
+_TOLERANCE = 0.03
+"""Of the largest entry, at the points that are tried: 2 % is what the meshes of a block leave (`drive_block_root`)."""
+_TRIED = 3
+_SAME = 1e-9
+
+Blocks = Callable[[Sequence[float]], Array | None]
+
+
+def block_compliances(drawn: Callable[[Sequence[float]], Gripper], axes: Sequence[Sequence[float]]) -> Blocks:
+    """Prepare the unit compliances of the drive blocks of a grid of drawings.
+
+    Parameters
+    ----------
+    drawn : callable
+        Values to the drawing that has them.
+    axes : sequence of sequence of float
+        Values that each number takes.
+
+    Returns
+    -------
+    callable
+        Values to the unit compliance, shape (3, 3); None where it is to be computed for the drawing itself, because the
+        grid is too small for an interpolation or the block changes too abruptly.
+    """
+    changing = [place for place in range(len(axes)) if _changes(drawn, axes, place)]
+    if not changing or int(np.prod([len(axes[place]) for place in changing])) <= 2 * _NODES ** len(changing):
+        return lambda _: None
+    first = [float(values[0]) for values in axes]
+    spans = [(float(min(axes[place])), float(max(axes[place]))) for place in changing]
+    unit = np.cos(np.pi * (np.arange(_NODES) + 0.5) / _NODES)
+    nodes = [0.5 * (a + b) + 0.5 * (b - a) * unit for a, b in spans]
+
+    def at(values: Sequence[float]) -> Array:
+        whole = list(first)
+        for place, value in zip(changing, values, strict=True):
+            whole[place] = value
+        return unit_compliance(block_shape(drawn(whole)))
+
+    try:
+        table = np.array([at(values) for values in product(*(row.tolist() for row in nodes))])
+    except FingervisionError:
+        return lambda _: None
+    table = table.reshape(*(_NODES for _ in changing), 3, 3)
+
+    def interpolated(values: Sequence[float]) -> Array:
+        found = table
+        for place, row in zip(changing, nodes, strict=True):
+            found = np.tensordot(_lagrange(row, float(values[place])), found, axes=1)
+        return np.asarray(found)
+
+    for share in np.linspace(0.1, 0.8, _TRIED).tolist():
+        tried = [a + share * (b - a) for a, b in spans]
+        whole = list(first)
+        for place, value in zip(changing, tried, strict=True):
+            whole[place] = value
+        own = at(tried)
+        if np.abs(interpolated(whole) - own).max() > _TOLERANCE * np.abs(own).max():
+            return lambda _: None
+    return interpolated
+
+
+def _changes(drawn: Callable[[Sequence[float]], Gripper], axes: Sequence[Sequence[float]], place: int) -> bool:
+    """Whether a number changes the block's shape."""
+    values = [float(row[0]) for row in axes]
+    shapes = []
+    for value in (min(axes[place]), float(np.mean(axes[place])), max(axes[place])):
+        values[place] = value
+        shapes.append(block_shape(drawn(values)).numbers)
+    return not np.allclose(shapes, shapes[0], rtol=0.0, atol=_SAME)
+
+
+def _lagrange(nodes: Array, at: float) -> Array:
+    """Weights of the values at the nodes in those of their polynomial at a point."""
+    apart = nodes[:, None] - nodes[None, :] + np.eye(nodes.size)
+    way = np.where(np.eye(nodes.size, dtype=bool), 1.0, at - nodes[None, :])
+    return np.asarray(np.prod(way / apart, axis=1))

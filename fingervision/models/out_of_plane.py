@@ -1,0 +1,79 @@
+"""How a mechanism moves out of its plane with its drive held: natural modes, and the sag of a horizontal plate.
+
+Fixed faces and the drive's face are held in all directions; a face that slides keeps its own direction, at every depth,
+which on a plane of symmetry is the mode that is alike on both sides.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fingervision.models.deep_plate import DeepPlate
+from fingervision.models.mechanism import Mechanism
+from fingervision.models.mechanism_faces import supports_of
+from fingervision.models.plane_stress import PlaneStressPlate
+from fingervision.models.steady_loads import STANDARD_GRAVITY_MM_S2
+from fingervision.models.triangulate import PlaneMesh, triangulate
+
+Array = NDArray[np.float64]
+Indices = NDArray[np.int64]
+
+MODE_ERROR, SAG_ERROR = 0.01, 0.02
+"""Relative, beside three-dimensional elements (`python -m tests.benchmarks.models_out_of_plane`)."""
+
+_ACROSS, _BODY = 2.0, 0.05
+"""Triangles across what is thin, and edge length over the size: within 0.1 % of a mesh twice as fine."""
+
+
+@dataclass(frozen=True, slots=True)
+class OutOfPlane:
+    """Motion across the plane.
+
+    Parameters
+    ----------
+    modes_hz : tuple of float
+        First natural frequencies, the drive held.
+    sag_mm : mapping of str to float
+        Sag of every probe of a horizontal plate under its own weight, the drive held.
+    """
+
+    modes_hz: tuple[float, ...]
+    sag_mm: Mapping[str, float]
+
+
+def out_of_plane(
+    mechanism: Mechanism, count: int = 1, *, mesh: PlaneMesh | None = None, order: int | None = None
+) -> OutOfPlane:
+    """Compute modes and sag across the plane.
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+        The drawing.
+    count : int
+        How many modes.
+    mesh : PlaneMesh or None
+        Its triangles; made where None.
+    order : int or None
+        Of the polynomials through the depth, odd; as `DeepPlate` has it where None.
+
+    Raises
+    ------
+    FingervisionError
+        Where a face holds no part of the outline.
+    """
+    region = mechanism.region
+    size_mm = region.size_mm
+    mesh = mesh or triangulate(region, _ACROSS, _BODY * size_mm)
+    flat = PlaneStressPlate(mesh, mechanism.material, mechanism.plate_mm)
+    supports = supports_of(flat, mechanism, size_mm)
+    plate = DeepPlate(mesh, mechanism.material, mechanism.plate_mm, *(() if order is None else (order,)))
+    held = [plate.coefficients(nodes, way) for nodes in supports.fixed for way in range(3)]
+    held += [plate.coefficients(nodes, "xy".index(component)) for nodes, component in supports.slides]
+    held += [plate.coefficients(supports.driven, way) for way in range(3)]
+    body = plate.supported(np.concatenate(held))
+    moved = body.sag(STANDARD_GRAVITY_MM_S2)
+    sag_mm = {name: plate.middle_mm(moved, point) for name, point in mechanism.probes.items()}
+    return OutOfPlane(body.modes_hz(count), sag_mm)

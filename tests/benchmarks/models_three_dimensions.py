@@ -1,0 +1,122 @@
+"""Print how slope, force and the modes of drawings that nothing was fitted to stand beside CalculiX's wedges."""
+
+import argparse
+import shutil
+import sys
+import time
+from dataclasses import fields, is_dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from fingervision.domain.gripper import Gripper
+from fingervision.models.gripper_mechanism import half_mechanism, whole_mechanism
+from fingervision.models.mechanism import Mechanism
+from fingervision.models.mechanism_frame import MechanismFrame
+from fingervision.models.mechanism_plate import MechanismPlate
+from fingervision.models.out_of_plane import out_of_plane
+from fingervision.models.planar_region import PlanarRegion
+from fingervision.models.stiffness_matrix import StiffnessMatrixGripper
+from fingervision.models.triangulate import triangulate
+from fingervision.storage.gripper_toml import read_gripper
+from fingervision.storage.mechanism_toml import read_drawing
+from tests.benchmarks.models_held_out import ABS, ALUMINIUM, SILICON, STEEL, TITANIUM, drawn
+from tests.benchmarks.solid_reference import solid_answer
+
+ROOT = Path(__file__).parents[2]
+# Material, scale of the sample's drawing (its links are 17.7 to 19.4 mm long), then thickness, radius and plate in mm,
+# and what l2 and l3 are longer by before the scale.
+GRIPPERS = (
+    (ALUMINIUM, 0.7, 0.05, 4.0, 1.0, 0.0, 0.0),
+    (STEEL, 0.55, 0.05, 1.0, 1.0, 2.0, 1.0),
+    (ABS, 2.5, 2.0, 8.0, 20.0, 0.0, 0.0),
+    (TITANIUM, 1.0, 0.4, 2.0, 4.0, 5.0, 6.0),
+    (SILICON, 1.0, 0.15, 3.0, 1.5, -4.0, 0.0),
+    (STEEL, 3.0, 2.0, 6.0, 2.0, 0.0, 1.0),
+    (ABS, 1.0, 0.8, 3.5, 16.0, 3.0, -2.0),
+    (TITANIUM, 2.0, 0.8, 7.0, 2.5, -2.0, 0.0),
+)
+FINER = (2.0, 0.05)
+"""Triangles across and edge length over the size of the solids' plane mesh."""
+
+
+def scaled(thing: Any, factor: float) -> Any:
+    """Multiply every length of a drawing's records."""
+    if not is_dataclass(thing):
+        return thing
+    changed: dict[str, Any] = {}
+    for field in fields(thing):
+        value = getattr(thing, field.name)
+        changed[field.name] = _times(value, factor) if field.name.endswith("_mm") else scaled(value, factor)
+    return replace(thing, **changed)  # type: ignore[type-var]
+
+
+def _times(value: Any, factor: float) -> Any:
+    return tuple(_times(part, factor) for part in value) if isinstance(value, tuple) else factor * value
+
+
+def gripper_of(sample: Gripper, row: tuple[Any, ...]) -> Gripper:
+    """Draw one of `GRIPPERS`."""
+    material, scale, thickness_mm, radius_mm, plate_mm, l2_by, l3_by = row
+    own = (material, thickness_mm / scale, radius_mm / scale, plate_mm / scale, l2_by, l3_by)
+    gripper: Gripper = scaled(drawn(sample, own), scale)
+    return gripper
+
+
+def cases() -> list[tuple[str, Mechanism, Gripper | None]]:
+    """Give every drawing: half grippers, an asymmetric whole one, and mechanisms drawn by bodies."""
+    sample = read_gripper(ROOT / "sample_frames" / "paper" / "gripper.toml")
+    found: list[tuple[str, Mechanism, Gripper | None]] = []
+    for row in GRIPPERS:
+        gripper = gripper_of(sample, row)
+        name = f"{row[0].name} x{row[1]:g}, t {row[2]:g}, R {row[3]:g}, plate {row[4]:g}"
+        found.append((name, half_mechanism(gripper), gripper))
+    other = replace(sample, hinge=replace(sample.hinge, thickness_mm=0.7))
+    found.append(("asymmetric gripper, t 1 and 0.7", whole_mechanism(sample, other, "asymmetric"), None))
+    for path in sorted((Path(__file__).parent / "mechanisms").glob("*.toml")):
+        mechanism = read_drawing(path).mechanism()
+        found.append((mechanism.name, mechanism, None))
+    return found
+
+
+def main() -> None:
+    """Print one line per drawing: errors in % of the plane models against three dimensions."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--only", type=int, nargs="*", help="places of drawings in the list; all without")
+    parser.add_argument("--layers", type=int, default=4, help="wedges through the plate")
+    asked = parser.parse_args()
+    if shutil.which("ccx") is None:
+        sys.exit("CalculiX (ccx, Debian package calculix-ccx) must be installed, but is not.")
+    print("drawing | largest motion of a probe: finite_element, lumped | force: same | mode in the plane, drive held: "
+          "same | out of the plane: finite_element, stiffness_matrix | processor s of CalculiX's frequencies alone")  # fmt: skip
+    for place, (name, mechanism, gripper) in enumerate(cases()):
+        if asked.only and place not in asked.only:
+            continue
+        region = mechanism.region
+        marked = PlanarRegion(region.steps, (*region.marks_mm, *mechanism.probes.values()))
+        began = time.perf_counter()
+        solid = solid_answer(mechanism, triangulate(marked, FINER[0], FINER[1] * region.size_mm), layers=asked.layers,
+                             modes=3)  # fmt: skip
+        seconds = time.perf_counter() - began
+        flat = next((value for value, out in solid.modes if not out), None)
+        lifted = next((value for value, out in solid.modes if out), None)
+        cells = [[], [], []]
+        for kind in (MechanismPlate, MechanismFrame):
+            model = kind(mechanism)
+            unit = model.state(1.0)
+            far, way = max(((n, i) for n in solid.probes_mm for i in (0, 1)), key=lambda p: abs(solid.probes_mm[p[0]][p[1]]))
+            cells[0].append(_percent(unit.probes_mm[far][way], solid.probes_mm[far][way]))
+            cells[1].append(_percent(unit.force_n, solid.force_n))
+            cells[2].append(_percent(model.modes_hz(drive_held=True, count=1)[0], flat))
+        across = [_percent(out_of_plane(mechanism).modes_hz[0], lifted)]
+        if gripper is not None:
+            across.append(_percent(StiffnessMatrixGripper(gripper).out_of_plane_modes_hz()[0], lifted))
+        print(f"{place:2d} {name:44s} | {' | '.join(' '.join(part) for part in (*cells, across))} | {seconds:.0f} s",
+              flush=True)  # fmt: skip
+
+
+def _percent(ours: float, solid: float | None) -> str:
+    return f"{100.0 * (ours / solid - 1.0):+7.3f}" if solid else "      -"
+
+
+if __name__ == "__main__":
+    main()

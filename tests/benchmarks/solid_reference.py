@@ -1,0 +1,195 @@
+"""A mechanism in three dimensions by CalculiX: quadratic wedges through the plate, which share nothing with the models.
+
+The plane mesh is a finer one than the model's. Fixed faces are held in all directions, sliding ones in theirs.
+"""
+
+import subprocess
+import tempfile
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fingervision.models.mechanism import Face, Mechanism
+from fingervision.models.plane_mesh import PlaneMesh
+
+Array = NDArray[np.float64]
+Indices = NDArray[np.int64]
+
+_ON = 1e-6
+_MIDDLES = ((0, 1), (1, 2), (0, 2))
+
+
+@dataclass(frozen=True, slots=True)
+class SolidAnswer:
+    """What three dimensions give.
+
+    Parameters
+    ----------
+    force_n : float
+        At the drive by 1 mm of input, small displacements.
+    probes_mm : dict of str to (float, float)
+        Motion of the probes by 1 mm of input, at the node of the middle plane nearest to each.
+    modes : tuple of (float, bool)
+        Natural frequencies with the drive held, each with whether it is out of the plane.
+    """
+
+    force_n: float
+    probes_mm: dict[str, tuple[float, float]]
+    modes: tuple[tuple[float, bool], ...]
+
+
+class Wedges:
+    """Fifteen-node wedges over a plane mesh, layers close together at the plate's faces.
+
+    Parameters
+    ----------
+    mesh : PlaneMesh
+        Quadratic triangles.
+    plate_mm : float
+        Depth.
+    layers : int
+        Even, so that the middle plane holds nodes.
+    """
+
+    def __init__(self, mesh: PlaneMesh, plate_mm: float, layers: int) -> None:
+        self.plane, self.layers = mesh, layers
+        count = mesh.nodes_mm.shape[1]
+        corners = np.unique(mesh.triangles[:3])
+        levels = 0.5 * plate_mm * np.sin(0.5 * np.pi * np.linspace(-1.0, 1.0, layers + 1))
+        levels = np.sort(np.concatenate([levels, 0.5 * (levels[1:] + levels[:-1])]))
+        number = np.zeros((2 * layers + 1, count), dtype=np.int64)
+        places, planes = [], []
+        for level, z in enumerate(levels):
+            nodes = np.arange(count) if level % 2 == 0 else corners
+            number[level, nodes] = 1 + sum(map(len, places)) + np.arange(nodes.size)
+            places.append(np.vstack([mesh.nodes_mm[:, nodes], np.full(nodes.size, z)]).T)
+            planes.append(nodes)
+        self.nodes_mm: Array = np.vstack(places)
+        self.plane_node: Indices = np.concatenate(planes)
+        self.middle: Indices = number[layers]
+        a, b, c, ab, bc, ac = mesh.triangles
+        rows = []
+        for layer in range(layers):
+            low, half, high = number[2 * layer : 2 * layer + 3]
+            rows.append([low[a], low[b], low[c], high[a], high[b], high[c], low[ab], low[bc], low[ac],
+                         high[ab], high[bc], high[ac], half[a], half[b], half[c]])  # fmt: skip
+        self.elements: Indices = np.hstack([np.array(row) for row in rows]).T
+
+    def on(self, face: Face, size_mm: float) -> Indices:
+        """Nodes in a face's box that lie on the outline, at every depth."""
+        x, y = self.plane.nodes_mm
+        x0, x1, y0, y1 = face.box_mm
+        near = _ON * size_mm
+        inside = (x >= x0 - near) & (x <= x1 + near) & (y >= y0 - near) & (y <= y1 + near)
+        return np.flatnonzero((inside & _on_outline(self.plane))[self.plane_node]) + 1
+
+
+def _on_outline(mesh: PlaneMesh) -> NDArray[np.bool_]:
+    """Whether nodes belong to an edge that only one triangle has."""
+    edges = np.hstack([np.vstack([np.sort(mesh.triangles[list(pair)], axis=0), mesh.triangles[3 + place]])
+                       for place, pair in enumerate(_MIDDLES)])  # fmt: skip
+    _, first, counts = np.unique(edges[:2], axis=1, return_index=True, return_counts=True)
+    found = np.zeros(mesh.nodes_mm.shape[1], dtype=bool)
+    found[edges[:, first[counts == 1]].ravel()] = True
+    return found
+
+
+def solid_answer(mechanism: Mechanism, mesh: PlaneMesh, *, layers: int = 4, modes: int = 2) -> SolidAnswer:
+    """Run CalculiX for a unit input and for the natural frequencies.
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+        The drawing, driven along x or y, and free across or held.
+    mesh : PlaneMesh
+        Its triangles.
+    layers, modes : int
+        Wedges through the plate; how many natural frequencies.
+    """
+    size_mm = mechanism.region.size_mm
+    body = Wedges(mesh, mechanism.plate_mm, layers)
+    drive = body.on(mechanism.drive.face, size_mm)
+    lines = ["*NODE, NSET=ALL", *(f"{i},{x:.12g},{y:.12g},{z:.12g}" for i, (x, y, z) in enumerate(body.nodes_mm, 1))]
+    lines.append("*ELEMENT, TYPE=C3D15, ELSET=BODY")
+    lines += [f"{i}," + ",".join(map(str, row)) for i, row in enumerate(body.elements.tolist(), 1)]
+    sets = {"DRIVE": drive} | {f"FIXED{i}": body.on(face, size_mm) for i, face in enumerate(mechanism.fixed)}
+    sets |= {f"SLIDE{i}": body.on(face, size_mm) for i, (face, _) in enumerate(mechanism.slides)}
+    watched = {name: int(body.middle[_nearest(mesh, point)]) for name, point in mechanism.probes.items()}
+    sets |= {"WATCHED": np.array(sorted(set(watched.values())))}
+    for name, members in sets.items():
+        lines += [f"*NSET, NSET={name}", *(f"{node}," for node in members.tolist())]
+    material = mechanism.material
+    lines += ["*MATERIAL, NAME=BULK", "*ELASTIC", f"{material.youngs_modulus_mpa:.12g},{material.poisson_ratio:.12g}"]
+    lines += ["*DENSITY", f"{material.density_t_mm3:.12g}", "*SOLID SECTION, ELSET=BODY, MATERIAL=BULK", "*BOUNDARY"]
+    lines += [f"FIXED{i},1,3" for i in range(len(mechanism.fixed))]
+    axes = [1 + "xy".index(component) for _, component in mechanism.slides]
+    lines += [f"SLIDE{i},{axis},{axis}" for i, axis in enumerate(axes)]
+    across = 1 if mechanism.drive.across == "held" else 0
+    along = 1 if mechanism.drive.direction[0] != 0.0 else 2
+    sign = mechanism.drive.direction[along - 1]
+    kept = [f"DRIVE,{3 - along},{3 - along}"] if across else []
+    # The middle plane stays in it: without that a body on slides alone could drift away.
+    static = ["*STEP", "*STATIC", "*BOUNDARY", f"DRIVE,{along},{along},{sign:g}", "DRIVE,3,3", *kept]
+    static += ["*NODE PRINT, NSET=WATCHED", "U", "*NODE PRINT, NSET=DRIVE, TOTALS=ONLY", "RF", "*END STEP"]
+    vibrating = ["*BOUNDARY", "DRIVE,1,3", "*STEP", "*FREQUENCY", f"{modes}", "*NODE FILE", "U", "*END STEP"]
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        moved, force = _static(_run(folder, "static", [*lines, *static], ".dat"), sign, along)
+        text = _run(folder, "modes", [*lines, *vibrating], ".dat")
+        shapes = (folder / "modes.frd").read_text(encoding="ascii", errors="replace")
+    frequencies = _frequencies(text)
+    out = _out_of_plane(shapes, len(body.nodes_mm), len(frequencies))
+    probes = {name: moved[node] for name, node in watched.items()}
+    return SolidAnswer(force, probes, tuple(zip(frequencies, out, strict=True)))
+
+
+def _nearest(mesh: PlaneMesh, point: tuple[float, float]) -> int:
+    x, y = mesh.nodes_mm
+    return int(np.argmin(np.hypot(x - point[0], y - point[1])))
+
+
+def _run(folder: Path, job: str, lines: list[str], ending: str) -> str:
+    (folder / f"{job}.inp").write_text("\n".join(lines) + "\n", encoding="ascii")
+    subprocess.run(["ccx", job], cwd=folder, check=True, capture_output=True, timeout=1200)
+    return (folder / f"{job}{ending}").read_text(encoding="ascii", errors="replace")
+
+
+def _static(text: str, sign: float, along: int) -> tuple[dict[int, tuple[float, float]], float]:
+    moved: dict[int, tuple[float, float]] = {}
+    force = 0.0
+    for line in text.splitlines():
+        cells = line.split()
+        if len(cells) == 4 and cells[0].isdigit():
+            moved[int(cells[0])] = (float(cells[1]), float(cells[2]))
+        elif len(cells) == 3 and not cells[0][0].isalpha():
+            force = sign * float(cells[along - 1])
+    return moved, force
+
+
+def _frequencies(text: str) -> list[float]:
+    found = []
+    for line in text.splitlines():
+        cells = line.split()
+        if len(cells) == 5 and cells[0].isdigit():
+            found.append(float(cells[3]))
+        elif "P A R T I C I P A T I O N" in line:
+            break
+    return found
+
+
+def _out_of_plane(text: str, nodes: int, modes: int) -> list[bool]:
+    """Whether most of each shape's squared displacement is along z, from the fixed columns of a .frd file."""
+    squares: list[Array] = []
+    reading = False
+    for line in text.splitlines():
+        if line.startswith(" -4  DISP"):
+            reading = True
+            squares.append(np.zeros(3))
+        elif line.startswith(" -3"):
+            reading = False
+        elif reading and line.startswith(" -1"):
+            squares[-1] += [float(line[13 + 12 * i : 25 + 12 * i]) ** 2 for i in range(3)]
+    del nodes
+    return [bool(part[2] > part[0] + part[1]) for part in squares[:modes]]
