@@ -180,7 +180,7 @@ class BodyTracker:
             f"{'larger' if error > 0.0 else 'smaller'} than drawn at {self.scale.px_per_mm:.5g} px/mm"
         )
         if abs(error) > MOST_SIZE_ERROR:
-            raise FingervisionError(
+            raise DataError(
                 f"The drawing must have the size of what is seen, but on frame {index} {words}: check the scale and "
                 "the lengths of the drawing."
             )
