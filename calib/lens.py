@@ -56,6 +56,16 @@ class Lens:
             x, y = (seen_x - shift_x) / radial, (seen_y - shift_y) / radial
         return np.stack([x * f_x + c_x, y * f_y + c_y], axis=-1)
 
+    def distort(self, points_px: Floats) -> Floats:
+        """Where points that an undistorted pinhole camera would see are seen; the inverse of `undistort`."""
+        f_x, f_y, c_x, c_y, k1, k2, p1, p2, k3 = self.parameters
+        x, y = (points_px[..., 0] - c_x) / f_x, (points_px[..., 1] - c_y) / f_y
+        r2 = x * x + y * y
+        radial = 1.0 + r2 * (k1 + r2 * (k2 + r2 * k3))
+        seen_x = x * radial + 2.0 * p1 * x * y + p2 * (r2 + 2.0 * x * x)
+        seen_y = y * radial + p1 * (r2 + 2.0 * y * y) + 2.0 * p2 * x * y
+        return np.stack([seen_x * f_x + c_x, seen_y * f_y + c_y], axis=-1)
+
     def moved(self, index: int, step: float) -> "Lens":
         """Return the same lens with one parameter moved, for propagating `covariance`."""
         parameters = self.parameters.copy()

@@ -170,6 +170,13 @@ class Calibration:
             flat = lens.undistort(flat)
         return flat if self.plane is None else self.plane.flatten(flat)
 
+    def unflatten(self, points_px: Floats) -> Floats:
+        """Put lens and perspective on points of the flat plane, shape (..., 2); the inverse of `flatten`."""
+        seen = np.asarray(points_px, dtype=np.float64)
+        if self.plane is not None:
+            seen = self.plane.unflatten(seen)
+        return seen if self.lens is None else self.lens.distort(seen)
+
     def budget(self, points_px: Floats, u_random_px: Floats, light_gap: NDArray[np.bool_]) -> Budget:
         """Where the uncertainty of each distance comes from; arguments as for `distances`."""
         return self._measured(points_px, u_random_px, light_gap)[1]

@@ -26,6 +26,10 @@ class Plane:
         """Where the points would be seen by a camera that looks squarely; `points_px` has shape (..., 2)."""
         return apply_homography(self.homography, points_px)
 
+    def unflatten(self, points_px: Floats) -> Floats:
+        """Where points of the squarely seen plane are in the picture; the inverse of `flatten`."""
+        return apply_homography(np.asarray(np.linalg.inv(self.homography), dtype=np.float64), points_px)
+
 
 def apply_homography(homography: Floats, points: Floats) -> Floats:
     """Map points of one plane to another; `points` has shape (..., 2)."""

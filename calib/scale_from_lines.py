@@ -92,13 +92,8 @@ def scale_from_lines(
     CalibrationError
         The pitch or an uncertainty cannot be one, or the lines do not stand at equal distances.
     """
-    if not 0.0 < pitch_mm < float("inf"):
-        raise CalibrationError(f"The pitch of a line scale must be positive, but is {pitch_mm} mm.")
-    for name, value in (("u_line_mm", u_line_mm), ("u_length_mm", u_length_mm)):
-        if not 0.0 <= value < float("inf"):
-            raise CalibrationError(f"{name} must be a number of zero or more, but is {value}.")
+    _check(pitch_mm, u_line_mm, u_length_mm)
     index, used = _numbered(lines.at_px)
-    span_mm = pitch_mm * float(np.ptp(index[used]))
     at: Floats = lines.at_px[used]
     k: Floats = np.asarray(pitch_mm * index[used], dtype=np.float64)
     rough = float(np.ptp(at) / np.ptp(k))
@@ -106,16 +101,101 @@ def scale_from_lines(
     estimator = rectangular(limits.estimator_px) / np.sqrt(2.0)
     u_edges: Floats = np.hypot(lines.u_at_px[used], estimator)
     u_places: Floats = np.hypot(u_edges, rough * u_line_mm)
-    weight = 1.0 / u_places**2
-    centred = np.asarray(k - np.average(k, weights=weight), dtype=np.float64)
-    gain = weight * centred / float(np.sum(weight * centred**2))
+    line = _straight_line(k, at, 1.0 / u_places**2)
+    residual: Floats = np.asarray(lines.at_px - line.intercept - line.slope * pitch_mm * index, dtype=np.float64)
+    bends = _bends(lines, used, frame_size_px, line.slope, limits)
+    chi_square, freedom = _chi_square(residual[used], k, u_places, bends, limits)
+    probability = float(chdtrc(freedom, chi_square)) if freedom > 0 else 1.0
+    span_mm = float(np.ptp(k))
+    parts = _budget(line, span_mm, u_line_mm, u_length_mm, u_edges, limits, stated)
+    if probability < CHANCE:
+        found = parts[1].covariance + parts[2].covariance
+        parts.append(
+            ScalePart("misfit of the lines", (chi_square / freedom - 1.0) * found, "the lines' residuals (Birge ratio)")
+        )
+    lens, *tilts = (np.array([float(line.gain @ bend), 0.0]) for bend in bends)
+    calibration = Calibration(
+        px_per_mm=line.slope,
+        edge_bias_px=0.0,
+        parts=tuple(parts),
+        frame_size_px=frame_size_px,
+        limits=limits,
+        stated=stated,
+        response=Response(lens=lens, tilt=np.array(tilts)),
+        references=(Reference(reference.what, span_mm, u_length_mm, reference.certificate, reference.date),),
+    )
+    width = None if lines.width_px is None else lines.width_px[used] / line.slope
+    return LineScaleFit(
+        calibration=calibration,
+        index=index,
+        used=used,
+        residual_um=1e3 * residual / line.slope,
+        by_edge=(float(line.gain @ lines.rising_px[used]), float(line.gain @ lines.falling_px[used])),
+        width_mm=None if width is None else float(np.mean(width)),
+        u_width_mm=None if width is None else float(np.std(width, ddof=1) / np.sqrt(width.size)),
+        chi_square=chi_square,
+        freedom=freedom,
+        probability=probability,
+    )
+
+
+def _check(pitch_mm: float, u_line_mm: float, u_length_mm: float) -> None:
+    if not 0.0 < pitch_mm < float("inf"):
+        raise CalibrationError(f"The pitch of a line scale must be positive, but is {pitch_mm} mm.")
+    for name, value in (("u_line_mm", u_line_mm), ("u_length_mm", u_length_mm)):
+        if not 0.0 <= value < float("inf"):
+            raise CalibrationError(f"{name} must be a number of zero or more, but is {value}.")
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Line:
+    """A weighted straight line.
+
+    Parameters
+    ----------
+    slope, intercept : float
+        Of the line.
+    gain : ndarray of float, shape (n,)
+        By how much each ordinate moves the slope.
+    """
+
+    slope: float
+    intercept: float
+    gain: Floats
+
+
+def _straight_line(k: Floats, at: Floats, weight: Floats) -> _Line:
+    centred = k - np.average(k, weights=weight)
+    gain: Floats = np.asarray(weight * centred / np.sum(weight * centred**2), dtype=np.float64)
     slope = float(gain @ at)
-    intercept = float(np.average(at, weights=weight) - slope * np.average(k, weights=weight))
-    residual: Floats = np.asarray(lines.at_px - intercept - slope * pitch_mm * index, dtype=np.float64)
-    parts = [
-        _part("reference size", slope * u_length_mm / span_mm, "length of the scale, the certificate (--u-length-mm)"),
-        _part("reference lines", slope * u_line_mm * float(np.linalg.norm(gain)), "(--u-line-mm)"),
-        _part("reference edges", float(np.linalg.norm(gain * u_edges)), "the fit of the lines"),
+    return _Line(slope, float(np.average(at, weights=weight) - slope * np.average(k, weights=weight)), gain)
+
+
+def _bends(
+    lines: ScaleLines, used: NDArray[np.bool_], frame_size_px: tuple[int, int], slope: float, limits: Limits
+) -> tuple[Floats, ...]:
+    """Shift of each line by the lens, and by a tilt about either axis, each at one unit of its limit."""
+    points = lines.middle_px[used]
+    distance_px = limits.camera_distance_mm * slope
+    lens = lens_shift_px(points, frame_size_px) @ lines.across
+    return (lens, *(tilt_shift_px(points, frame_size_px, distance_px, axis) @ lines.across for axis in (0, 1)))
+
+
+def _budget(
+    line: _Line,
+    span_mm: float,
+    u_line_mm: float,
+    u_length_mm: float,
+    u_edges_px: Floats,
+    limits: Limits,
+    stated: frozenset[str],
+) -> list[ScalePart]:
+    """What the scale owes to the certificate, to the single lines, to the fit of their edges, and to the edge bias."""
+    size, one_line = line.slope * u_length_mm / span_mm, line.slope * u_line_mm * float(np.linalg.norm(line.gain))
+    return [
+        _part("reference size", size, "length of the scale, the certificate (--u-length-mm)"),
+        _part("reference lines", one_line, "(--u-line-mm)"),
+        _part("reference edges", float(np.linalg.norm(line.gain * u_edges_px)), "the fit of the lines"),
         ScalePart(
             "edge bias",
             np.diag([0.0, rectangular(limits.edge_bias_px) ** 2]),
@@ -123,43 +203,6 @@ def scale_from_lines(
             "know it; a bar and a slot would find it",
         ),
     ]
-    points = lines.middle_px[used]
-    lens = lens_shift_px(points, frame_size_px) @ lines.across
-    distance_px = limits.camera_distance_mm * slope
-    tilts = [tilt_shift_px(points, frame_size_px, distance_px, axis) @ lines.across for axis in (0, 1)]
-    chi_square, freedom = _chi_square(residual[used], k, u_places, (lens, *tilts), limits)
-    probability = float(chdtrc(freedom, chi_square)) if freedom > 0 else 1.0
-    if probability < CHANCE:
-        found = parts[1].covariance + parts[2].covariance
-        parts.append(
-            ScalePart("misfit of the lines", (chi_square / freedom - 1.0) * found, "the lines' residuals (Birge ratio)")
-        )
-    calibration = Calibration(
-        px_per_mm=slope,
-        edge_bias_px=0.0,
-        parts=tuple(parts),
-        frame_size_px=frame_size_px,
-        limits=limits,
-        stated=stated,
-        response=Response(
-            lens=np.array([float(gain @ lens), 0.0]), tilt=np.array([[float(gain @ each), 0.0] for each in tilts])
-        ),
-        references=(Reference(reference.what, span_mm, u_length_mm, reference.certificate, reference.date),),
-    )
-    by_edge = tuple(float(gain @ edge[used]) for edge in (lines.rising_px, lines.falling_px))
-    width = None if lines.width_px is None else lines.width_px[used] / slope
-    return LineScaleFit(
-        calibration=calibration,
-        index=index,
-        used=used,
-        residual_um=1e3 * residual / slope,
-        by_edge=(by_edge[0], by_edge[1]),
-        width_mm=None if width is None else float(np.mean(width)),
-        u_width_mm=None if width is None else float(np.std(width, ddof=1) / np.sqrt(width.size)),
-        chi_square=chi_square,
-        freedom=freedom,
-        probability=probability,
-    )
 
 
 def _part(source: str, u_scale: float, supplied: str) -> ScalePart:

@@ -37,6 +37,15 @@ _HOMES = {
     "ArgumentError": "domain.errors",
     "DataError": "domain.errors",
     "OutputError": "domain.errors",
+    "DeviceError": "domain.errors",
+    "InputFileError": "domain.errors",
+    "LimitError": "domain.errors",
+    "MissingLibraryError": "domain.errors",
+    "ModelError": "domain.errors",
+    "NoCalibrationError": "domain.errors",
+    "ProcessError": "domain.errors",
+    "StateError": "domain.errors",
+    "UnknownNameError": "domain.errors",
 }
 """Where each public name lives, below this package; `effects` is the sub-package itself."""
 

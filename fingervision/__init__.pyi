@@ -2,8 +2,17 @@
 
 from fingervision.domain.errors import ArgumentError as ArgumentError
 from fingervision.domain.errors import DataError as DataError
+from fingervision.domain.errors import DeviceError as DeviceError
 from fingervision.domain.errors import FingervisionError as FingervisionError
+from fingervision.domain.errors import InputFileError as InputFileError
+from fingervision.domain.errors import LimitError as LimitError
+from fingervision.domain.errors import MissingLibraryError as MissingLibraryError
+from fingervision.domain.errors import ModelError as ModelError
+from fingervision.domain.errors import NoCalibrationError as NoCalibrationError
 from fingervision.domain.errors import OutputError as OutputError
+from fingervision.domain.errors import ProcessError as ProcessError
+from fingervision.domain.errors import StateError as StateError
+from fingervision.domain.errors import UnknownNameError as UnknownNameError
 from fingervision.domain.errors import UsageError as UsageError
 from fingervision.domain.parameter import Parameter as Parameter
 from fingervision.effects.effect_list import EffectList

@@ -20,7 +20,7 @@ from tempfile import TemporaryDirectory
 from typing import Any, NamedTuple
 
 from fingervision.diagnosis.diagnose import Diagnosis, diagnose
-from fingervision.domain.errors import FingervisionError
+from fingervision.domain.errors import DataError, DeviceError, LimitError, StateError
 from fingervision.models.corrected import CorrectedModel
 from fingervision.tables.read import read_measured_table
 from fingervision.testbed.bed import Bed
@@ -175,7 +175,7 @@ class StageDevice:
     def kickoff(self) -> ThreadStatus:
         """Begin to fly."""
         if self._flight is None:
-            raise FingervisionError(f"{self.name} must be prepared with (to_mm, speed_mm_s) before it flies.")
+            raise StateError(f"{self.name} must be prepared with (to_mm, speed_mm_s) before it flies.")
         self._flown = []
         self._consumer.readings()
         self._actuator.move(*map(float, self._flight))
@@ -204,7 +204,7 @@ class StageDevice:
     def _within(self, to_mm: float) -> None:
         limits = self._bed.limits
         if not limits.lower_mm <= float(to_mm) <= limits.upper_mm:
-            raise FingervisionError(
+            raise LimitError(
                 f"{self.name} must stay between {limits.lower_mm:g} and {limits.upper_mm:g} mm, but {float(to_mm):g} "
                 "mm is asked for: nothing was moved."
             )
@@ -214,7 +214,7 @@ class StageDevice:
         while self._actuator.busy:
             clock.wait_until(clock.now_s() + POLL_S)
         if self._actuator.alarm is not None:
-            raise FingervisionError(f"{self.name} stopped with an alarm: {self._actuator.alarm.words}.")
+            raise DeviceError(f"{self.name} stopped with an alarm: {self._actuator.alarm.words}.")
 
 
 class ForceDevice:
@@ -273,7 +273,7 @@ class GapDevice:
     def read(self) -> dict[str, dict[str, Any]]:
         """Gap, edges, stage and force of the frame that was triggered last; None where a frame has no gap."""
         if self._newest is None:
-            raise FingervisionError(f"{self.name} must be triggered before it is read: no frame was taken yet.")
+            raise StateError(f"{self.name} must be triggered before it is read: no frame was taken yet.")
         at_s = self._unix_s + self._at_s
         return {key: {"value": value, "timestamp": at_s} for key, value in self._newest.items()}
 
@@ -324,7 +324,7 @@ class GapDevice:
             one.read()
         while any(one.clock.joined() is None for one in instruments):
             if self._clock.now_s() > until_s:
-                raise FingervisionError(
+                raise DeviceError(
                     f"The clocks of stage and force sensor must be joined to the bed's within {JOINED_WITHIN_S:g} s, "
                     "but are not: see that they answer."
                 )
@@ -407,7 +407,7 @@ class NextRunAgent:
         """Take rows with `input_mm` and any of `gap_mm`, `run`, `time_s`, `left_mm`, `right_mm`, `force_n`."""
         for row in rows:
             if row.get("input_mm") is None:
-                raise FingervisionError(f"Every row must have input_mm, but one has {sorted(row)}: add it.")
+                raise DataError(f"Every row must have input_mm, but one has {sorted(row)}: add it.")
             self._rows.append({"run": str(self._run), **{key: row.get(key) for key in ROW if row.get(key) is not None}})
         self._answer = None
 
@@ -470,7 +470,7 @@ def run_steps(steps: Sequence[Mapping[str, Any]], stage: StageDevice, gap: GapDe
                 yield from bps.mv(stage, float(step["at_mm"]))
                 yield from bps.sleep(float(step["seconds"]))
             else:
-                raise FingervisionError(
+                raise DataError(
                     f"A step must be a triangle, move or hold here, but is {kind!r}: `fingervision bed run` runs it."
                 )
 

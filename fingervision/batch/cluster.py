@@ -12,7 +12,7 @@ from typing import Any
 from fingervision.batch.task import Outcome, Perform, Task, failure
 from fingervision.batch.versions import difference, versions
 from fingervision.batch.work import work
-from fingervision.domain.errors import FingervisionError, UsageError
+from fingervision.domain.errors import MissingLibraryError, ProcessError, UsageError
 
 PATIENCE_S = 10
 """How long a scheduler may take to answer, and a worker to be there."""
@@ -46,16 +46,14 @@ def connected(scheduler: str, patience_s: float = PATIENCE_S) -> Iterator[Any]:
     try:
         from distributed import Client
     except ImportError:
-        raise FingervisionError(
-            "--scheduler needs Dask, which is not installed here: pip install 'fingervision[cluster]'."
-        ) from None
+        raise MissingLibraryError("Dask", "cluster", "--scheduler") from None
     if not scheduler.startswith(("tcp://", "tls://")) or not scheduler.rpartition(":")[2].isdigit():
         raise UsageError(f"--scheduler must be like tcp://host:8786, but is {scheduler}.")
     logging.getLogger("distributed").setLevel(logging.CRITICAL)  # what matters is said in a sentence
     try:
         client = Client(scheduler, timeout=patience_s, set_as_default=False)
     except (OSError, ValueError, RuntimeError) as error:
-        raise FingervisionError(
+        raise ProcessError(
             f"The scheduler must answer within {patience_s:g} s, but {scheduler} does not: start `dask "
             "scheduler` there, or check address and firewall."
         ) from error
@@ -70,7 +68,7 @@ def _check_workers(client: Any, scheduler: str, patience_s: float) -> None:
     try:
         client.wait_for_workers(1, timeout=patience_s)
     except TimeoutError:
-        raise FingervisionError(
+        raise ProcessError(
             f"The cluster must have workers, but {scheduler} has none after {patience_s:g} s: "
             f"start `dask worker {scheduler} --nthreads 1` on its machines."
         ) from None
@@ -79,7 +77,7 @@ def _check_workers(client: Any, scheduler: str, patience_s: float) -> None:
     for address, there in found.items():
         words = difference(here, there) if isinstance(there, dict) else f"no fingervision ({there})"
         if words:
-            raise FingervisionError(
+            raise ProcessError(
                 f"Every worker must run what runs here, but {address} has {words}: install the same there "
                 "and restart it."
             )
@@ -122,7 +120,7 @@ def outcomes_of(client: Any, tasks: Sequence[Task], perform: Perform) -> Generat
                 outcome = failure(tasks[number], words)
             except Exception as error:
                 if client.status != "running" or future.status in ("cancelled", "lost"):
-                    raise FingervisionError(
+                    raise ProcessError(
                         "The scheduler went away; what is done is kept: start it again, and call again."
                     ) from error
                 outcome = failure(tasks[number], f"{tasks[number].input} could not be done on its worker ({error}).")

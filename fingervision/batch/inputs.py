@@ -6,7 +6,7 @@ import os
 import re
 from pathlib import Path
 
-from fingervision.domain.errors import FingervisionError, UsageError
+from fingervision.domain.errors import InputFileError, UsageError
 
 
 def inputs_of(names: tuple[str, ...], out: Path) -> tuple[str, ...]:
@@ -41,7 +41,7 @@ def inputs_of(names: tuple[str, ...], out: Path) -> tuple[str, ...]:
         raise UsageError(f"--out must lie apart from the inputs, but they are in {out}: name another folder.")
     if not matched:
         words = ", ".join(names)
-        raise FingervisionError(
+        raise InputFileError(
             f"There must be something to work on, but nothing matches {words}: check the path, and put patterns "
             "in quotes ('recordings/**/*.mp4')."
         )

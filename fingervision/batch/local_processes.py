@@ -13,7 +13,7 @@ from typing import Self
 
 from fingervision.batch.task import Ended, Outcome, Perform, Task, failure
 from fingervision.batch.work import work
-from fingervision.domain.errors import FingervisionError
+from fingervision.domain.errors import ProcessError
 
 ATTEMPTS = 2
 """Times that a task is tried whose process dies under it: once may have been the system's choice of victim."""
@@ -90,7 +90,7 @@ class LocalCrew:
                     continue
                 worker.is_asked = False
                 return ended
-        raise FingervisionError(
+        raise ProcessError(
             f"Every process ended before its first task: try `fingervision {command}` on one input to see why."
         )
 

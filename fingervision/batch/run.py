@@ -14,7 +14,7 @@ from fingervision.batch.overview import write_overview
 from fingervision.batch.result_folder import Record, is_whole, read_record, remove_left_parts, replace_text
 from fingervision.batch.task import Outcome, Task, failure
 from fingervision.batch.work import outcome_of
-from fingervision.domain.errors import ExitCode, FingervisionError
+from fingervision.domain.errors import ExitCode, OutputError
 
 MARK = "batch.json"
 SCHEMA = 1
@@ -195,7 +195,7 @@ def run(plan: Plan, crew: Crew, on_progress: Progress | None = None) -> Batch:
     try:
         write_overview(plan.job.out, plan.job.command, every)
     except OSError as error:
-        raise FingervisionError(
+        raise OutputError(
             f"{stopped or 'All results are there'} The overview in {plan.job.out} could not be written "
             f"({error.strerror}): make room and call again."
         ) from error
@@ -209,16 +209,16 @@ def _check_folder(job: Job) -> None:
     except FileNotFoundError:
         return
     except NotADirectoryError:
-        raise FingervisionError(f"--out must be a folder, but {job.out} is a file: name another.") from None
+        raise OutputError(f"--out must be a folder, but {job.out} is a file: name another.") from None
     except OSError as error:
-        raise FingervisionError(f"The folder {job.out} cannot be read ({error.strerror}): name another.") from error
+        raise OutputError(f"The folder {job.out} cannot be read ({error.strerror}): name another.") from error
     if entries and MARK not in entries:
-        raise FingervisionError(
+        raise OutputError(
             f"--out must be a new folder or one of an earlier batch, but {job.out} holds something else "
             f"({min(entries)}): name another."
         )
     if entries and (command := _command_of(job.out / MARK)) != job.command:
-        raise FingervisionError(
+        raise OutputError(
             f"--out must be a folder of batch {job.command}, but {job.out} is one of batch {command}: name another."
         )
 
@@ -232,7 +232,7 @@ def _claim(job: Job) -> None:
             replace_text(mark, json.dumps({"schema": SCHEMA, "command": job.command}) + "\n")
         remove_left_parts(job.out)
     except OSError as error:
-        raise FingervisionError(
+        raise OutputError(
             f"The folder {job.out} cannot be written ({error.strerror}): make room or name another with --out."
         ) from error
 

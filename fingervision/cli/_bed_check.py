@@ -26,7 +26,7 @@ def command(recipe_toml: Path, bed_name: str, as_json: bool) -> None:
     import json
     from dataclasses import asdict
 
-    from fingervision.domain.errors import FingervisionError
+    from fingervision.domain.errors import LimitError
     from fingervision.storage.recipe_toml import read_recipe
     from fingervision.testbed.planned_bed import planned_bed
     from fingervision.testbed.run.recipe_check import CheckedStep, check_recipe
@@ -69,6 +69,6 @@ def command(recipe_toml: Path, bed_name: str, as_json: bool) -> None:
             f"least {limits.gap_mm:g} mm"
         )
     if done.refusals:
-        raise FingervisionError("\n".join(done.refusals))
+        raise LimitError("\n".join(done.refusals))
     if not as_json:
         click.echo("The recipe fits the bed.")

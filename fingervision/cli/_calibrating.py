@@ -9,7 +9,7 @@ from typing import Any
 import click
 
 from fingervision.cli._references import named_references, region_from
-from fingervision.domain.errors import FingervisionError, UsageError
+from fingervision.domain.errors import NoCalibrationError, UsageError
 
 
 @contextmanager
@@ -20,7 +20,7 @@ def sentences() -> Iterator[None]:
     try:
         yield
     except CalibrationError as error:
-        raise FingervisionError(str(error)) from error
+        raise NoCalibrationError(str(error)) from error
 
 
 def calibrate_on_sizes(kind: str, items: Sequence[str], roi: str | None, **options: Any) -> None:

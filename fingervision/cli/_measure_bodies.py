@@ -4,11 +4,11 @@ from pathlib import Path
 
 import click
 
-from fingervision.domain.errors import UsageError
 from fingervision.frames.source import FrameSource
 from fingervision.measuring.body_poses import measure_bodies
 from fingervision.measuring.drawing_placement import parse_point
-from fingervision.measuring.scale import Scale
+from fingervision.measuring.frame_loop import coded, prepared
+from fingervision.measuring.task import Task
 from fingervision.models.gripper_mechanism import whole_mechanism
 from fingervision.models.mechanism import Mechanism
 from fingervision.storage.gripper_toml import read_gripper
@@ -16,16 +16,13 @@ from fingervision.storage.mechanism_toml import is_mechanism, read_mechanism
 
 
 def follow_bodies(
-    source: FrameSource, drawing: Path, points: tuple[str, ...], scale: Scale, folder: Path, as_json: bool
+    source: FrameSource, drawing: Path, points: tuple[str, ...], task: Task, folder: Path, as_json: bool
 ) -> None:
     """Follow the bodies, write bodies.csv, and say how often each was seen."""
     given = [parse_point(text) for text in points]
-    if getattr(scale, "lens", None) is not None or getattr(scale, "plane", None) is not None:
-        raise UsageError(
-            "--mechanism takes poses by the scale alone, but the calibration holds a lens or a plane: calibrate with a "
-            "bar or a slot in the plane of the mechanism, or give --px-per-mm."
-        )
-    done = measure_bodies(source, mechanism_of(drawing), scale.px_per_mm, given, folder)
+    how = prepared(source.description, task)
+    frames = coded(source, how.description.coding)
+    done = measure_bodies(frames, mechanism_of(drawing), task.scale, given, folder, how.settings)
     if as_json:
         return
     for name, counts in done.counts.items():

@@ -12,7 +12,7 @@ from fingervision.cli._body_picture import draw_body, extent_mm, framed
 from fingervision.cli._model_motion import MotionAsked, move_mechanism
 from fingervision.cli._model_sweep import sweep_mechanism
 from fingervision.cli._model_uncertainty import write_uncertainty
-from fingervision.domain.errors import FingervisionError, UsageError
+from fingervision.domain.errors import FingervisionError, OutputError, UsageError
 from fingervision.models.gripper_figures import unit_of
 from fingervision.models.mechanism import Mechanism
 from fingervision.models.mechanism_chain import MechanismChain
@@ -94,7 +94,7 @@ def predict(
     try:
         out.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        raise FingervisionError(f"--out must be a folder that can be written, but {out}: {error.strerror}.") from error
+        raise OutputError(f"--out must be a folder that can be written, but {out}: {error.strerror}.") from error
     for name, rows in states.items():
         folder = out if name == chief else out / name
         folder.mkdir(exist_ok=True)

@@ -14,7 +14,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 
-from fingervision.domain.errors import FingervisionError
+from fingervision.domain.errors import OutputError
 from fingervision.models.driven_body import DrivenBody
 from fingervision.models.kinds import by_trust
 from fingervision.models.mode_shapes import ModeShape, ModesWanted, gripper_mode_shapes
@@ -130,4 +130,4 @@ def _film(shapes: Sequence[ModeShape], title: str, path: Path) -> None:
                 container.mux(stream.encode(frame))
             container.mux(stream.encode(None))
     except (av.FFmpegError, OSError) as error:
-        raise FingervisionError(f"The film of the modes could not be written to {path}: {error}.") from error
+        raise OutputError(f"The film of the modes could not be written to {path}: {error}.") from error

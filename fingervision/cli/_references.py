@@ -47,5 +47,5 @@ def region_from(roi: str | None) -> tuple[int, int, int, int] | None:
     try:
         x, y, width, height = (int(part) for part in roi.split(","))
     except ValueError:
-        raise UsageError(f"--roi must be X,Y,W,H in whole pixels, but is {roi!r}.") from None
+        raise UsageError(f"--roi must be four whole numbers X,Y,W,H in pixels, but is {roi!r}.") from None
     return x, y, width, height

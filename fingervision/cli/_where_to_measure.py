@@ -7,8 +7,6 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from fingervision.domain.errors import UsageError
-
 if TYPE_CHECKING:
     from fingervision.domain.region import Region
 
@@ -89,12 +87,8 @@ def region_of(words: str | None) -> "Region | None":
     UsageError
         It is not four whole numbers.
     """
+    from fingervision.cli._references import region_from
     from fingervision.domain.region import Region
 
-    if words is None:
-        return None
-    try:
-        x_px, y_px, width_px, height_px = (int(part) for part in words.split(","))
-    except ValueError:
-        raise UsageError(f"--roi must be four whole numbers X,Y,W,H in pixels, but is '{words}'.") from None
-    return Region(x_px, y_px, width_px, height_px)
+    box = region_from(words)
+    return None if box is None else Region(*box)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from fingervision.cli import cli
-from fingervision.domain.errors import FingervisionError
+from fingervision.domain.errors import FingervisionError, InputFileError, StateError
 
 if TYPE_CHECKING:
     from fingervision.batch.run import Batch, Plan
@@ -157,9 +157,9 @@ def _content(path: Path, inside: tuple[Path, ...] = ()) -> str:
         found = content_hash(plain(path))
         base = tomllib.loads(path.read_text(encoding="utf-8")).get("base") if path.suffix.lower() == ".toml" else None
     except FileNotFoundError:
-        raise FingervisionError(f"There is no file {path}: check the options.") from None
+        raise InputFileError(f"There is no file {path}: check the options.") from None
     except (OSError, ValueError) as error:
-        raise FingervisionError(f"{path} could not be read ({error}): check the options.") from error
+        raise InputFileError(f"{path} could not be read ({error}): check the options.") from error
     place = path.resolve()
     if base is None or (path.parent / str(base)).resolve() in (*inside, place):
         return found  # a model that rests on itself is said where it is read
@@ -179,7 +179,7 @@ def _check_options(name: str, arguments: tuple[str, ...], ask: "Perform") -> Non
         try:
             ended = ask(name, (*arguments, "--out", str(Path(nowhere) / "out"), "--", str(Path(nowhere) / "nothing")))
         except KeyboardInterrupt:
-            raise FingervisionError("Stopped by the user before any work: call again.") from None
+            raise StateError("Stopped by the user before any work: call again.") from None
     if nowhere not in ended.words:
         kind = UsageError if ended.exit_code == ExitCode.WRONG_USAGE else FingervisionError
         raise kind(ended.words)

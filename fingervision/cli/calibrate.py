@@ -10,7 +10,7 @@ import click
 from fingervision.cli._bench_limits import limit_options
 from fingervision.cli._calibrating import calibrate_on_board, calibrate_on_lines, calibrate_on_sizes, sentences
 from fingervision.cli._references import named_references, region_from
-from fingervision.domain.errors import FingervisionError, UsageError
+from fingervision.domain.errors import DataError, UsageError
 
 BAR_EXAMPLES = """
 \b
@@ -274,7 +274,7 @@ def repeat(tables: Sequence[Path], tolerance_mm: float | None, by_input: bool, a
         recordings = [read_gap_readings(table, by_input) for table in tables]
         parts = [part for part in recordings[0] if all(len(each.get(part, ())) >= 2 for each in recordings)]
         if not parts:
-            raise FingervisionError(
+            raise DataError(
                 "The recordings must share at least one part with two readings in each, but share none: "
                 "record the same thing in all of them."
             )

@@ -66,8 +66,8 @@ def command(
     if not is_recording(recording):
         raise UsageError(
             "Gauges are drawn on a recording that is there (a video, images, a run's folder), but "
-            f"{recording} is none: name another, or record a camera with "
-            "`fingervision live CAMERA --no-page --out runs`."
+            f"{recording} is none: name another, or draw them on a camera's picture with "
+            "`fingervision live CAMERA --gauges FILE`."
         )
     choices = choices_of(None, calibration, px_per_mm, below_tip_mm, tips, roi)
     showing = Showing(page=True, json_lines=False, way=Access(port=port), record=False, browser=not no_browser)

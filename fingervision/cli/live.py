@@ -21,6 +21,7 @@ Examples:
   fingervision live runs/2026-05-04T10-11-12Z          look through a run, measured as it was
   fingervision live opening.mp4 --calibration calibration.json --drive drive.csv --model comsol.csv
   fingervision live --bed simulated --hide backlash:play_mm=0.03 --allow-motion
+  fingervision live 0 --px-per-mm 34 --gauges my.toml  edges, marks and patches of one's own, drawn in the picture
   fingervision live 0 --px-per-mm 34 --no-page         gap, status and rate in the terminal
   fingervision live 0 --px-per-mm 34 --no-page --json  one line of JSON a frame
   fingervision live 0 --px-per-mm 34 --no-page --out runs   also records, from the first frame
@@ -74,6 +75,11 @@ USUAL_OUT, USUAL_PORT = Path("live"), 8025
     "--drive", type=click.Path(path_type=Path), help="The stage's log, on this view's or the recording's time."
 )
 @click.option("--drive-offset-s", type=float, help="Added to the drive's times; a recording's is found if not given.")
+@click.option(
+    "--gauges",
+    type=click.Path(path_type=Path),
+    help="Gauges of one's own: drawn, followed and read in the page; read from this file where it exists.",
+)
 @click.option("--bed", "bed_name", metavar="simulated|CONFIG.toml", help="Show this test bed through its own camera.")
 @click.option(
     "--hide", multiple=True, metavar="EFFECT[:PARAMETER=VALUE,...]", help="Hide an effect in a simulated bed."
@@ -103,6 +109,7 @@ def command(
     kind: str,
     drive: Path | None,
     drive_offset_s: float | None,
+    gauges: Path | None,
     bed_name: str | None,
     hide: tuple[str, ...],
     allow_motion: bool,
@@ -127,6 +134,8 @@ def command(
         raise UsageError("--hide and --allow-motion are for a bed, but there is none: name it with --bed.")
     if bed_name is not None and (no_page or drive is not None):
         raise UsageError("--bed is for the page, and its stage says its own input: leave out --no-page and --drive.")
+    if gauges is not None and no_page:
+        raise UsageError("--gauges are shown in the page: leave out --no-page, or use `fingervision measure --gauges`.")
     if drive_offset_s is not None and drive is None:
         raise UsageError("--drive-offset-s needs a --drive.")
     if source is None and bed_name is None:
@@ -138,7 +147,7 @@ def command(
     from fingervision.live.playback.recorded import is_recording, recorded
     from fingervision.live.running import Showing, look_through, run
 
-    beside = Beside(model_path, kind, drive, drive_offset_s or 0.0, allow_motion)
+    beside = Beside(model_path, kind, drive, drive_offset_s or 0.0, allow_motion, gauges)
     choices = choices_of(source, calibration, px_per_mm, below_tip_mm, tips, roi)
     if no_page and choices.scale is None:
         raise UsageError(
@@ -157,9 +166,8 @@ def command(
     if not no_page and not as_camera and is_recording(source):
         if size is not None:
             raise UsageError(f"--size is for cameras, but {source} is a recording: leave it out.")
-        look_through(
-            recorded(source, rate_hz, choices, _drive_options(drive, drive_offset_s)), out or USUAL_OUT, showing, beside
-        )
+        seen = recorded(source, rate_hz, choices, _drive_options(drive, drive_offset_s))
+        look_through(seen, out or USUAL_OUT, showing, beside, gauges)
         return
     camera = CameraWish(pixel_format, exposure_ms, gain, focus, white_balance_k)
     capture = opened(source, Wish(rate_hz, None if size is None else _size(size), camera))

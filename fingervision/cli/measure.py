@@ -166,7 +166,7 @@ def command(
         from fingervision.frames.source import Wish, open_source
 
         source = open_source(recording, Wish(rate_hz=rate_hz))
-        follow_bodies(source, mechanism, points, task.scale, measured.folder.path, as_json)
+        follow_bodies(source, mechanism, points, task, measured.folder.path, as_json)
     raise SystemExit(int(measured.exit_code))
 
 

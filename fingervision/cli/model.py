@@ -202,14 +202,12 @@ def command(
 
 
 def _make_folder(out: Path) -> None:
-    from fingervision.domain.errors import FingervisionError
+    from fingervision.domain.errors import OutputError
 
     try:
         out.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        raise FingervisionError(
-            f"--out must be a folder that can be written, but {out} is not: {error.strerror}."
-        ) from error
+        raise OutputError(f"--out must be a folder that can be written, but {out} is not: {error.strerror}.") from error
 
 
 def _inputs_mm(drive: Path, columns: Path | None, gripper: "Gripper") -> "NDArray[np.float64]":

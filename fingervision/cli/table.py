@@ -114,6 +114,9 @@ def _print(found: "Account") -> None:
         wide = [max(len(row[k]) for row in rows) for k in range(3)]
         for row in rows:
             click.echo("  " + "  ".join([*(f"{row[k]:<{wide[k]}}" for k in range(3)), row[3]]).rstrip())
+    if found.channels.names:
+        listed = ", ".join(f"{text} as {name}" for name, text in found.channels.names.items())
+        click.echo(f"  channels: {listed}")
     if found.unused:
         click.echo(f"  not used: {', '.join(name or '(no name)' for name in found.unused)}")
     for sentence in found.left_out:
@@ -127,11 +130,11 @@ def _print(found: "Account") -> None:
 
 def _draw(found: "Account", png: Path) -> None:
     """Draw the curve with the file's name, as it was understood."""
-    from fingervision.domain.errors import FingervisionError
+    from fingervision.domain.errors import DataError, OutputError
 
     curve = found.curve()
     if curve is None:
-        raise found.question or FingervisionError(f"{found.path} has no two columns to draw: leave out --png.")
+        raise found.question or DataError(f"{found.path} has no two columns to draw: leave out --png.")
     from matplotlib.figure import Figure
 
     x_name, x, y_name, y = curve
@@ -145,6 +148,4 @@ def _draw(found: "Account", png: Path) -> None:
     try:
         figure.savefig(png, dpi=120)
     except (OSError, ValueError) as error:
-        raise FingervisionError(
-            f"{png} could not be written ({error}): name another picture, such as t.png."
-        ) from error
+        raise OutputError(f"{png} could not be written ({error}): name another picture, such as t.png.") from error

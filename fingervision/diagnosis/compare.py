@@ -8,11 +8,11 @@ import numpy as np
 from fingervision.diagnosis.bodies.body_evidence import body_evidence, drawing_of
 from fingervision.diagnosis.bodies.place_diagnosis import without_places
 from fingervision.diagnosis.bodies.place_words import body_places
-from fingervision.diagnosis.diagnose import by_channel, places
 from fingervision.diagnosis.inference.cross_validation import rms_mm
 from fingervision.diagnosis.input.intersample_interpolation import likelier_interpolation
 from fingervision.diagnosis.input.observations import Observations
 from fingervision.diagnosis.input.preparation import prepare
+from fingervision.diagnosis.report.residual_channels import by_channel, places
 from fingervision.domain.effect import Array, History
 from fingervision.domain.measured_table import MeasuredTable
 from fingervision.domain.report import Place

@@ -20,8 +20,10 @@ class SeenPose:
     x_mm, y_mm, angle_mrad : float or None
         Counted from the drawing as it was laid on the first frame; a hinge has an angle alone.
     covariance : ndarray of float, shape (3, 3), or None
-        Of x and y in mm and the angle in mrad, from frame to frame: neither the scale's own uncertainty nor that of
-        where the drawing was laid is in it; all frames share these.
+        Of x and y in mm and the angle in mrad: of the body's edges in this frame, of where the drawing was laid, and of
+        the calibration (scale, edge bias, plane, tilt, lens); a scale that was merely stated has none.
+    random : ndarray of float, shape (3, 3), or None
+        The part of it that differs from frame to frame.
     """
 
     status: str
@@ -29,6 +31,7 @@ class SeenPose:
     y_mm: float | None = None
     angle_mrad: float | None = None
     covariance: NDArray[np.float64] | None = None
+    random: NDArray[np.float64] | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -7,9 +7,18 @@ Whoever catches an error asks for its class, and for the facts that it carries; 
     │   └── ArgumentError            one argument or option, also a ValueError
     │       ├── ArgumentTypeError    of the wrong kind, also a TypeError
     │       └── UnknownNameError     no such name, with the nearest one that there is
-    ├── DataError                    a file or array does not hold what it must; also a ValueError
+    ├── InputFileError               a file or folder cannot be found or read; also an OSError
+    ├── DataError                    a file, recording or array does not hold what it must; also a ValueError
     ├── OutputError                  a result cannot be written; also an OSError
-    └── MissingLibraryError          an optional library is not installed; also an ImportError
+    ├── NoCalibrationError           pictures of known sizes give no calibration; also a ValueError
+    ├── ModelError                   a model of the mechanism has no answer
+    ├── DeviceError                  a camera, stage, board or sensor fails or does not answer
+    ├── LimitError                   a motion beyond what bed or device allows
+    ├── StateError                   not now: busy, recording, position unknown, nobody there to ask
+    ├── ProcessError                 a worker process, cluster or server cannot be started or was lost
+    ├── InstallationError            a part of fingervision itself is missing
+    │   └── MissingLibraryError      an optional library is not installed; also an ImportError
+    └── PluginError                  a plug-in cannot be used; its classes are in `fingervision.plugins`
 """
 
 from collections.abc import Iterable
@@ -90,15 +99,58 @@ class UnknownNameError(ArgumentError):
         self.args = (self.args[0].replace("?.", "?"),)
 
 
+class InputFileError(FingervisionError, OSError):
+    """A file or folder that shall be read cannot be found or opened."""
+
+
 class DataError(FingervisionError, ValueError):
-    """A file or an array does not hold what it must."""
+    """A file, a recording or an array can be read, but does not hold what it must."""
+
+
+def unreadable(error: Exception) -> type[InputFileError] | type[DataError]:
+    """Class for a file that could not be taken in: the system refused it, or its content is another.
+
+    Examples
+    --------
+    >>> unreadable(PermissionError()).__name__, unreadable(UnicodeError()).__name__
+    ('InputFileError', 'DataError')
+    """
+    return InputFileError if isinstance(error, OSError) else DataError
 
 
 class OutputError(FingervisionError, OSError):
-    """A result cannot be written."""
+    """A result cannot be written: no room, no permission, or the place is taken by something else."""
 
 
-class MissingLibraryError(FingervisionError, ImportError):
+class NoCalibrationError(FingervisionError, ValueError):
+    """The pictures of known sizes give no calibration."""
+
+
+class ModelError(FingervisionError):
+    """A model of the mechanism has no answer: no equilibrium, no mesh, a body that can move freely, no end in time."""
+
+
+class DeviceError(FingervisionError):
+    """A camera, stream, stage, board or sensor does not answer, has an alarm, or fails."""
+
+
+class LimitError(FingervisionError):
+    """A motion is beyond the limits of the bed, or beyond what the device can do."""
+
+
+class StateError(FingervisionError):
+    """The request is right, but cannot be done in the present state, such as during a recording or a motion."""
+
+
+class ProcessError(FingervisionError):
+    """A worker process, a cluster or the page's server cannot be started, or was lost."""
+
+
+class InstallationError(FingervisionError):
+    """A part of this installation is missing."""
+
+
+class MissingLibraryError(InstallationError, ImportError):
     """A library that is an optional extra is not installed.
 
     Parameters
@@ -109,8 +161,11 @@ class MissingLibraryError(FingervisionError, ImportError):
         The extra of this project that installs it.
     what : str
         What needs it.
+    instead : str
+        What to do without it, as it follows "or"; empty where there is nothing.
     """
 
-    def __init__(self, library: str, extra: str, what: str) -> None:
+    def __init__(self, library: str, extra: str, what: str, instead: str = "") -> None:
         self.library, self.extra = library, extra
-        super().__init__(f"{what} needs {library}, which is not installed: pip install 'fingervision[{extra}]'.")
+        advice = f"pip install 'fingervision[{extra}]'" + (f", or {instead}" if instead else "")
+        super().__init__(f"{what} needs {library}, which is not installed: {advice}.")

@@ -6,6 +6,7 @@ from enum import StrEnum
 import numpy as np
 from numpy.typing import NDArray
 
+from fingervision.domain.quantiser import Quantiser
 from fingervision.domain.status import Status
 
 Pixels = NDArray[np.uint8] | NDArray[np.uint16]
@@ -39,6 +40,8 @@ class Frame:
         Whether a lossy codec stood between the sensor and these pixels: their errors are then correlated.
     hangs_on_others : bool
         Whether the picture is coded as a difference to others.
+    quantiser : Quantiser or None
+        How coarsely the codec has rounded it, where the stream says so.
     """
 
     pixels: Pixels
@@ -46,6 +49,7 @@ class Frame:
     time_s: float | None = None
     coding: Coding = Coding.LOSSLESS
     hangs_on_others: bool = False
+    quantiser: Quantiser | None = None
 
     @property
     def lossy(self) -> bool:

@@ -108,6 +108,9 @@ class GapMeasurement:
         seen.
     held : HeldPart or None
         The part that is held, where one is seen.
+    u_coding_px : float
+        As much of `u_gap_px` (in quadrature) is what the codec may have done to each edge as a whole; zero where its
+        quantiser is not known.
     """
 
     left: FingerEdge
@@ -121,6 +124,7 @@ class GapMeasurement:
     fields_apart_px: float = 0.0
     beside: str = ""
     held: HeldPart | None = None
+    u_coding_px: float = 0.0
 
     @property
     def u_picture_px(self) -> float:

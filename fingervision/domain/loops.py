@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fingervision.domain import loops_build
-from fingervision.domain.errors import FingervisionError
+from fingervision.domain.errors import InstallationError
 
 NAME = "_loops"
 
@@ -65,7 +65,7 @@ def _library() -> ModuleType:
             place.mkdir(parents=True, exist_ok=True)
             loops_build.build(place / name)
         except loops_build.CannotBuildError as error:
-            raise FingervisionError(str(error)) from error
+            raise InstallationError(str(error)) from error
         except OSError:
             continue  # cannot be written to
         _forget_others(place, name)
@@ -74,7 +74,7 @@ def _library() -> ModuleType:
         f"The loops in C must be built once, and kept in one of {', '.join(map(str, places[1:]))}, but none of these "
         "can be written to: set XDG_CACHE_HOME to a folder that can."
     )
-    raise FingervisionError(msg)
+    raise InstallationError(msg)
 
 
 def _places() -> Iterator[Path]:
@@ -98,7 +98,7 @@ def _loaded(path: Path) -> ModuleType:
     spec = spec_from_file_location(NAME, path, loader=ExtensionFileLoader(NAME, str(path)))
     if spec is None or spec.loader is None:
         msg = f"{path} must be a library of this Python, but is not: delete it, and it is built anew."
-        raise FingervisionError(msg)
+        raise InstallationError(msg)
     module = module_from_spec(spec)
     spec.loader.exec_module(module)
     return module

@@ -22,7 +22,7 @@ class Channel:
     present : ndarray of bool, shape (n,)
         Whether there is one.
     u : ndarray of float, shape (n,), or None
-        Standard uncertainties, where they are stated.
+        Standard uncertainties from row to row, where they are stated.
     """
 
     value: NDArray[np.float64]

@@ -12,7 +12,7 @@ from typing import Any
 import av
 import cv2
 
-from fingervision.domain.errors import FingervisionError
+from fingervision.domain.errors import DeviceError
 from fingervision.domain.frame import Frame, LostFrame, Pixels
 from fingervision.frames.camera_settings import READ, coding_of, requests, settled
 from fingervision.frames.received import Received
@@ -81,7 +81,7 @@ class CameraFrames:
                 int(name) if name.isdigit() else name, BACKENDS.get(sys.platform, cv2.CAP_ANY)
             )
         if not self._capture.isOpened():
-            raise FingervisionError(
+            raise DeviceError(
                 f"The camera {name} cannot be opened: it is in use by another program, or no camera; close the other "
                 "program, or see `fingervision live --list`."
             )
@@ -89,7 +89,7 @@ class CameraFrames:
         read, pixels = self._capture.read()
         if not read or pixels is None:
             self._capture.release()
-            raise FingervisionError(
+            raise DeviceError(
                 f"The camera {name} is open but gives no picture: another program may use it, or it does not have the "
                 "format, size and rate asked for; leave out --format, --size and --rate-hz."
             )
@@ -112,7 +112,7 @@ class CameraFrames:
                 if not read or pixels is None:
                     failed += 1
                     if failed >= FAILED_READS:
-                        raise FingervisionError(f"The camera {self.name} gives no pictures any more: is it plugged in?")
+                        raise DeviceError(f"The camera {self.name} gives no pictures any more: is it plugged in?")
                     continue
                 failed = 0
                 arrived_s = monotonic()
@@ -165,7 +165,7 @@ def _check_device(name: str) -> None:
     device = Path(f"/dev/video{name}" if name.isdigit() else name)
     if not device.exists():
         found = ", ".join(source for source, _ in found_cameras()) or "none"
-        raise FingervisionError(
+        raise DeviceError(
             f"There is no camera {name} ({device} does not exist; cameras found: {found}): plug it in, or try the "
             "source `simulated`."
         )

@@ -26,6 +26,7 @@ class DamageTrail:
         self._last = -1
         self._broken: dict[int, str] = {}  # why, by number in coded order, until a sound key frame comes after it
         self._stated_keys: set[int] = set()  # numbers of packets that the container calls key frames
+        self._recoveries: dict[int, int] = {}  # packets that complete a recovery, and those that began it
         self._given_up: set[int] = set()  # ticks of lost pictures since the damage
 
     @staticmethod
@@ -48,6 +49,14 @@ class DamageTrail:
         """Note that the packet that went in last could not be decoded, or not be found whole."""
         self._broken.setdefault(self._last, why)
 
+    def recovers(self, over: int) -> None:
+        """Note that the packet that went in last is right whatever came before the packet so many before it.
+
+        Streams without key frames are refreshed part by part: once every part was, no picture hangs on older ones.
+        """
+        if self._broken:
+            self._recoveries[self._last] = self._last - over
+
     def fails(self, why: str) -> Iterator[Picture]:
         """Note that the packet that went in last, a picture by itself, gives none; its place is taken now."""
         self.breaks(why)
@@ -60,6 +69,10 @@ class DamageTrail:
     def hole(self, why: str) -> None:
         """Note that something is missing between the packet that went in last, whose end may be hurt, and the next."""
         self.breaks(why)
+        self.missing(why)
+
+    def missing(self, why: str) -> None:
+        """Note that a whole picture is missing between the packet that went in last, which is sound, and the next."""
         self._last = next(self._numbers)
         self._broken[self._last] = why
 
@@ -84,11 +97,13 @@ class DamageTrail:
         if picture.is_corrupt:
             self._broken.setdefault(number, "It was decoded with errors.")
         # One flipped bit makes a picture call itself a key frame: the container must say so too.
-        if picture.key_frame and number in self._stated_keys and number not in self._broken:
+        since = number if picture.key_frame and number in self._stated_keys else self._recoveries.get(number)
+        if since is not None and not any(since <= broken <= number for broken in self._broken):
             self._broken = {broken: why for broken, why in self._broken.items() if broken > number}
         if not self._broken:
             self._given_up.clear()
             self._stated_keys.clear()
+            self._recoveries.clear()
         yield tick, self._words(number) if self._hangs_on_damage(number) else picture
 
     def rest(self) -> Iterator[Picture]:

@@ -13,7 +13,7 @@ from fingervision.frames.damage import DamageTrail, Picture
 from fingervision.frames.matroska_times import ClusterTimes
 from fingervision.frames.sound_jpeg import SoundJpeg
 from fingervision.frames.spoken_damage import Heard, listening
-from fingervision.frames.transport_stream import TransportLosses
+from fingervision.frames.stream_losses import StreamLosses
 
 MISSING = "Bytes are damaged or missing in the file"
 NO_COUNT = f"{MISSING} here. AVI counts frames to tell the time, so the time of those behind is not known."
@@ -40,7 +40,7 @@ def pictures(container: av.container.InputContainer, stream: av.VideoStream, pat
     """
     trail = DamageTrail()
     packets, last_end_s, at_end = 0, None, ""
-    losses = TransportLosses(container.format.name, stream)
+    losses = StreamLosses(container.format.name, stream)
     with listening(stream.codec_context.name) as heard:
         jpegs = SoundJpeg(stream.codec_context.name)
         jpegs.learn(_first_packets(path, stream))

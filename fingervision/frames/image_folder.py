@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from fingervision.domain.errors import FingervisionError, UsageError
+from fingervision.domain.errors import InputFileError, UsageError
 from fingervision.domain.frame import Coding, Frame, LostFrame
 from fingervision.domain.status import Status
 from fingervision.frames.image_file import IMAGE_SUFFIXES, LOSSY_SUFFIXES, UnreadableImageError, read_image
@@ -123,7 +123,7 @@ def _files(name: str) -> tuple[Path, ...]:
         try:
             found = list(path.iterdir())
         except PermissionError:
-            raise FingervisionError(f"The folder {name} may not be read: change its permissions.") from None
+            raise InputFileError(f"The folder {name} may not be read: change its permissions.") from None
         what = f"The folder {name} must hold images"
     elif path.is_file():
         found = [path]
@@ -134,7 +134,7 @@ def _files(name: str) -> tuple[Path, ...]:
     images = [file for file in found if file.suffix.lower() in IMAGE_SUFFIXES and not file.name.startswith(".")]
     files = tuple(sorted((file for file in images if file.is_file()), key=_natural))
     if not files:
-        raise FingervisionError(f"{what} ({', '.join(sorted(IMAGE_SUFFIXES))}), but there is none.")
+        raise InputFileError(f"{what} ({', '.join(sorted(IMAGE_SUFFIXES))}), but there is none.")
     return files
 
 
@@ -154,4 +154,4 @@ def _first_readable(name: str, files: tuple[Path, ...]) -> tuple[int, int]:
             first_words = first_words or str(error)
             continue
         return int(pixels.shape[0]), int(pixels.shape[1])
-    raise FingervisionError(f"None of the {len(files)} images of {name} can be read: {first_words}")
+    raise InputFileError(f"None of the {len(files)} images of {name} can be read: {first_words}")

@@ -4,7 +4,7 @@ import csv
 from math import isfinite
 from pathlib import Path
 
-from fingervision.domain.errors import FingervisionError
+from fingervision.domain.errors import DataError
 
 TIMES_FILE = "times.csv"
 
@@ -29,26 +29,26 @@ def times_of(files: tuple[Path, ...]) -> tuple[float, ...] | None:
         return None
     rows = _rows(table)
     if not rows:
-        raise FingervisionError(f"{table} must have a header line with time_s, but is empty.")
+        raise DataError(f"{table} must have a header line with time_s, but is empty.")
     header = [cell.strip() for cell in rows[0][1]]
     if "time_s" not in header:
-        raise FingervisionError(f"{table} must have a column time_s, but has {', '.join(header)}.")
+        raise DataError(f"{table} must have a column time_s, but has {', '.join(header)}.")
     at, named = header.index("time_s"), header.index("file") if "file" in header else None
     times = {}
     for place, (line, cells) in enumerate(rows[1:]):
         if len(cells) != len(header):
-            raise FingervisionError(f"Line {line} of {table} must have {len(header)} cells, but has {len(cells)}.")
+            raise DataError(f"Line {line} of {table} must have {len(header)} cells, but has {len(cells)}.")
         times[cells[named].strip() if named is not None else place] = _seconds(table, line, cells[at])
     if named is None:
         if len(times) != len(files):
-            raise FingervisionError(
+            raise DataError(
                 f"{table} must have a time for each of the {len(files)} images, but has {len(times)}: "
                 "name the images in a column file."
             )
         return tuple(times.values())
     for file in files:
         if file.name not in times:
-            raise FingervisionError(f"{table} must have a time for each image, but has none for {file.name}.")
+            raise DataError(f"{table} must have a time for each image, but has none for {file.name}.")
     return tuple(times[file.name] for file in files)
 
 
@@ -57,7 +57,7 @@ def _rows(table: Path) -> list[tuple[int, list[str]]]:
     try:
         lines = table.read_text(encoding="utf-8-sig").splitlines()
     except (OSError, UnicodeDecodeError) as error:
-        raise FingervisionError(f"{table} could not be read as a table of times: {error}.") from error
+        raise DataError(f"{table} could not be read as a table of times: {error}.") from error
     return [
         (number, next(csv.reader([line])))
         for number, line in enumerate(lines, start=1)
@@ -71,5 +71,5 @@ def _seconds(table: Path, line: int, cell: str) -> float:
     except ValueError:
         time_s = float("nan")
     if not isfinite(time_s):
-        raise FingervisionError(f"time_s in line {line} of {table} must be a number of seconds, but is '{cell}'.")
+        raise DataError(f"time_s in line {line} of {table} must be a number of seconds, but is '{cell}'.")
     return time_s

@@ -10,16 +10,17 @@ from typing import Any
 
 import av
 
-from fingervision.domain.errors import FingervisionError, UsageError
+from fingervision.domain.errors import DeviceError, UsageError
 from fingervision.domain.frame import Coding, Frame, LostFrame
 from fingervision.domain.status import Status
 from fingervision.frames.damage import DamageTrail, Picture
 from fingervision.frames.luma import luma
+from fingervision.frames.quantiser_steps import EXPORTED, quantiser_steps
 from fingervision.frames.received import OwnPacket, Received
 from fingervision.frames.sound_jpeg import SoundJpeg
 from fingervision.frames.source import Description, Wish
 from fingervision.frames.spoken_damage import STRICT, Heard, listening
-from fingervision.frames.transport_stream import TransportLosses
+from fingervision.frames.stream_losses import StreamLosses
 
 # Names that cameras give to what nobody else shall know: password, pwd, token, key, auth, user, loginpas and the like.
 SECRET_PARAMETERS = re.compile(
@@ -91,24 +92,24 @@ class NetworkStream:
         try:
             self._container = av.open(name, options=dict(OPTIONS), timeout=(OPEN_TIMEOUT_S, READ_TIMEOUT_S))
         except (av.FFmpegError, OSError, ValueError) as error:
-            raise FingervisionError(
+            raise DeviceError(
                 f"The stream {self.name} must answer with a video, but does not ({_reason(error)}): check the address, "
                 "and that the camera is on and nobody else has it."
             ) from error
         if not self._container.streams.video or self._container.streams.video[0].codec_context is None:
             self._container.close()
-            raise FingervisionError(f"The stream {self.name} must hold a video that can be decoded, but has none.")
+            raise DeviceError(f"The stream {self.name} must hold a video that can be decoded, but has none.")
         self._stream = self._container.streams.video[0]
         # How the stream is coded, in a container of our own: a recording may begin after the camera's is closed.
         self._kept = av.open(io.BytesIO(), "w", format="matroska")
         self.template: av.VideoStream | None = self._kept.add_stream_from_template(self._stream)
         codec = self._stream.codec_context
-        codec.options = STRICT
+        codec.options = STRICT | EXPORTED
         DamageTrail.prepare(codec)
         codec.thread_count = 1  # threads of frames would each keep one back
         if codec.width < 1 or codec.height < 1:
             self._container.close()
-            raise FingervisionError(
+            raise DeviceError(
                 f"The stream {self.name} must state the size of its pictures, but does not: choose another "
                 "format in the camera's own settings."
             )
@@ -138,20 +139,22 @@ class NetworkStream:
     def received(self) -> Iterator[Received]:
         """Frames with the packets that they came in."""
         numbers, trail = count(), DamageTrail()
-        losses = TransportLosses(self._container.format.name, self._stream)
+        losses = StreamLosses(self._container.format.name, self._stream)
         last_s: float | None = None
+        sent_s: float | None = None
         waiting: list[OwnPacket] = []
         try:
             with listening(self._stream.codec_context.name, LOST_ON_THE_WAY) as heard:
                 for packet, arrived_s in self._packets():
-                    waiting.append(self._own(packet, arrived_s))
+                    waiting.append(self._own(packet, arrived_s, sent_s))
+                    sent_s = waiting[-1].decode_s
                     if said := heard.of_file():
                         trail.hole(f"Data of the stream were lost ({said}).")
                     losses.before(packet, trail)
                     trail.enters(packet)
                     losses.behind(packet, trail)
                     for tick, found in self._decoded(packet, trail, heard):
-                        time_s = self._time_s(tick, arrived_s)
+                        time_s = self._time_s(tick, arrived_s, last_s)
                         item = self._item(next(numbers), time_s, found, last_s)
                         last_s = time_s
                         yield Received(item, arrived_s, tuple(waiting))
@@ -170,9 +173,9 @@ class NetworkStream:
                 packet = next(demuxed, None)
             except (av.FFmpegError, OSError) as error:
                 why = "it broke off" if isinstance(error, av.InvalidDataError) else _reason(error)
-                raise FingervisionError(self._cut(why)) from error
+                raise DeviceError(self._cut(why)) from error
             if packet is None or not packet.size:
-                raise FingervisionError(self._cut("the camera ended it"))
+                raise DeviceError(self._cut("the camera ended it"))
             yield packet, monotonic()
 
     def _cut(self, why: str) -> str:
@@ -206,16 +209,21 @@ class NetworkStream:
             return LostFrame(index, time_s, Status.DAMAGED, words)
         if time_s == last_s:
             return LostFrame(index, time_s, Status.DUPLICATE, "It has the same time as the frame before.")
-        return Frame(luma(found), index, time_s, self.description.coding, not found.key_frame)
+        coding = self.description.coding
+        return Frame(luma(found), index, time_s, coding, not found.key_frame, quantiser_steps(found))
 
-    def _own(self, packet: "av.Packet[av.VideoStream]", arrived_s: float) -> OwnPacket:
-        shown_s = self._time_s(packet.pts, arrived_s)
-        decode_s = shown_s if packet.dts is None else self._time_s(packet.dts, arrived_s)
+    def _own(self, packet: "av.Packet[av.VideoStream]", arrived_s: float, sent_s: float | None) -> OwnPacket:
+        shown_s = self._time_s(packet.pts, arrived_s, sent_s)
+        decode_s = shown_s if packet.dts is None else self._time_s(packet.dts, arrived_s, sent_s)
         return OwnPacket(packet, shown_s, decode_s, packet.is_keyframe)
 
-    def _time_s(self, tick: int | None, arrived_s: float) -> float:
-        if not self.has_own_clock or tick is None or self._stream.time_base is None:
+    def _time_s(self, tick: int | None, arrived_s: float, before_s: float | None) -> float:
+        """Place a tick on the source's clock; without one, a tick behind what came before, so that order stays."""
+        if not self.has_own_clock or self._stream.time_base is None:
             return arrived_s
+        if tick is None:
+            # Its header was lost. The host's clock is another one: all frames behind would move in time.
+            return (before_s or 0.0) + float(self._stream.time_base)
         return float(tick * self._stream.time_base)
 
 

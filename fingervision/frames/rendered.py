@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from fingervision.domain.errors import FingervisionError
+from fingervision.domain.errors import DataError
 from fingervision.domain.frame import Coding, Frame, LostFrame
 from fingervision.frames.source import Description
 
@@ -42,10 +42,10 @@ class RenderedFrames:
 
     def __post_init__(self) -> None:
         if not self.scenes:
-            raise FingervisionError("A rendered recording must have at least one scene, but has none.")
+            raise DataError("A rendered recording must have at least one scene, but has none.")
         sizes = {(scene.width_px, scene.height_px) for scene in self.scenes}
         if len(sizes) > 1:
-            raise FingervisionError(f"Scenes of a recording must be of one size, but are of {sorted(sizes)}.")
+            raise DataError(f"Scenes of a recording must be of one size, but are of {sorted(sizes)}.")
 
     @property
     def description(self) -> Description:

@@ -8,7 +8,8 @@ import av
 from fingervision.domain.frame import Coding, Frame
 from fingervision.frames import image_folder, video_file
 from fingervision.frames.luma import luma
-from fingervision.frames.video_file import upright
+from fingervision.frames.quantiser_steps import EXPORTED
+from fingervision.frames.video_file import upright, upright_steps
 
 # From one key frame to the next; a stream with longer groups is read by counting.
 MOST_FRAMES_TO_DECODE = 600
@@ -61,6 +62,7 @@ class VideoSeeking:
     def _found(self, index: int, time_s: float) -> Frame | None:
         if self._container is None:
             self._container = av.open(f"file:{self._name}")
+            self._container.streams.video[0].codec_context.options = EXPORTED
         stream = self._container.streams.video[0]
         if stream.time_base is None:
             return None
@@ -69,7 +71,8 @@ class VideoSeeking:
         for number, picture in enumerate(self._container.decode(stream)):
             if picture.pts == wanted and not picture.is_corrupt:
                 hangs = self._coding is Coding.INTERFRAME and not picture.key_frame
-                return Frame(upright(luma(picture), picture.rotation), index, time_s, self._coding, hangs)
+                pixels = upright(luma(picture), picture.rotation)
+                return Frame(pixels, index, time_s, self._coding, hangs, upright_steps(picture))
             if number > MOST_FRAMES_TO_DECODE or picture.pts is None or picture.pts > wanted:
                 return None
         return None

@@ -11,10 +11,10 @@ from pathlib import Path
 from typing import Protocol, cast
 
 import fingervision.frames
-from fingervision.domain.errors import FingervisionError, UsageError
+from fingervision.domain.errors import FingervisionError, InputFileError, UsageError
 from fingervision.domain.frame import Coding, Frame, LostFrame
 from fingervision.plugins.entry import Entry
-from fingervision.plugins.faults import MisfitError
+from fingervision.plugins.faults import MisfitError, PluginShapeError
 from fingervision.plugins.registry import Registry
 
 LOG = logging.getLogger(__name__)
@@ -168,9 +168,7 @@ def open_source(name: str, wish: Wish | None = None) -> FrameSource:
     if not name:
         raise UsageError("The recording must have a name, but it is empty: give a file, a folder, or a glob in quotes.")
     if Path(name).exists() and not (Path(name).is_file() or Path(name).is_dir() or name.startswith("/dev/")):
-        raise FingervisionError(
-            f"{name} must be a file or a folder, but is a pipe or a device: save it as a file first."
-        )
+        raise InputFileError(f"{name} must be a file or a folder, but is a pipe or a device: save it as a file first.")
     claims = [entry for entry in REGISTRY.entries() if _accepts(entry, name)]
     claims = [entry for entry in claims if not getattr(entry.value, "TAKES_THE_REST", False)] or claims
     if len(claims) > 1:
@@ -178,9 +176,7 @@ def open_source(name: str, wish: Wish | None = None) -> FrameSource:
         raise UsageError(f"One kind of source must open {name}, but {who} would: rename it, or remove one of them.")
     if claims:
         return _opened(claims[0], name, wish or Wish())
-    raise FingervisionError(
-        f"There is no recording {name}: give a video file, a folder of images, or a glob in quotes."
-    )
+    raise InputFileError(f"There is no recording {name}: give a video file, a folder of images, or a glob in quotes.")
 
 
 def _accepts(entry: Entry[SourceKind], name: str) -> bool:
@@ -204,9 +200,9 @@ def _opened(entry: Entry[SourceKind], name: str, wish: Wish) -> FrameSource:
         raise
     except Exception as error:
         said = f"{type(error).__name__}: {error}".replace("\n", " ")[:200].rstrip(".")
-        raise FingervisionError(f"{who} could not open {name} ({said}): {entry.origin.remedy}.") from error
+        raise PluginShapeError(f"{who} could not open {name} ({said}): {entry.origin.remedy}.") from error
     if not (described and hasattr(source, "__iter__")):
-        raise FingervisionError(
+        raise PluginShapeError(
             f"{who} must give a source with a Description whose frames can be read in turn, but gave a "
             f"{type(source).__name__} without: {entry.origin.remedy}."
         )

@@ -8,8 +8,12 @@ from fingervision.frames.told_times import EvenRow
 MISSING = "Frames are missing here: the times leave an even row."
 
 
+# These codecs know no uneven rate: in whatever container, frames that leave the row were lost.
+EVEN_CODECS = frozenset({"mpeg1video", "mpeg2video"})
+
+
 class TransportLosses:
-    """Follows the packets of a transport stream; of another format it says nothing.
+    """Follows the packets of a transport stream, or of a codec of even rate; of another it says nothing.
 
     Parameters
     ----------
@@ -22,15 +26,13 @@ class TransportLosses:
     def __init__(self, container_format: str, stream: av.VideoStream) -> None:
         self._is_one = container_format == "mpegts"
         rate, tick_s = stream.codec_context.framerate, stream.time_base
+        self._is_even = self._is_one or stream.codec_context.name in EVEN_CODECS
         self._row = EvenRow(float(1 / (rate * tick_s)) if rate and tick_s else None)
         self._was_corrupt = False
 
-    def before(self, packet: "av.Packet[av.VideoStream]", trail: DamageTrail) -> str:
-        """Tell the trail of frames that are missing before a packet; gives a sentence if there are any."""
-        if not (self._is_one and packet.dts is not None and self._row.leaps(packet.dts)):
-            return ""
-        trail.hole("Frames are missing before it.")
-        return MISSING
+    def leaps(self, packet: "av.Packet[av.VideoStream]") -> bool:
+        """Whether frames are missing before a packet."""
+        return self._is_even and packet.dts is not None and self._row.leaps(packet.dts)
 
     def behind(self, packet: "av.Packet[av.VideoStream]", trail: DamageTrail) -> None:
         """Tell the trail, behind a packet that entered, whether it is incomplete without being marked."""

@@ -8,13 +8,15 @@ from pathlib import Path
 import av
 import numpy as np
 
-from fingervision.domain.errors import FingervisionError, UsageError
+from fingervision.domain.errors import DataError, FingervisionError, InputFileError, UsageError
 from fingervision.domain.frame import Coding, Frame, LostFrame, Pixels
+from fingervision.domain.quantiser import Quantiser
 from fingervision.domain.status import Status
 from fingervision.frames.damage import DamageTrail
 from fingervision.frames.file_pictures import pictures
 from fingervision.frames.image_file import IMAGE_SUFFIXES
 from fingervision.frames.luma import luma
+from fingervision.frames.quantiser_steps import EXPORTED, quantiser_steps
 from fingervision.frames.source import Description, Wish
 from fingervision.frames.spoken_damage import STRICT
 from fingervision.frames.told_times import believable
@@ -74,7 +76,7 @@ class VideoFile:
             stream = _stream(container, self.name)
             codec = stream.codec_context
             if codec.width < 1 or codec.height < 1:
-                raise FingervisionError(
+                raise DataError(
                     f"{self.name} has no pictures in its video: it is empty or was cut off at once; record it again."
                 )
             rate = float(stream.average_rate) if stream.average_rate else None
@@ -117,7 +119,7 @@ class VideoFile:
         last_tick: int | None = None
         with self._opened() as container:
             stream = _stream(container, self.name)
-            stream.codec_context.options = STRICT
+            stream.codec_context.options = STRICT | EXPORTED
             if self.description.coding is Coding.INTERFRAME:
                 # With threads for slices FFmpeg's H.264 neither fills in nor marks what is missing in a picture
                 # (libavcodec/h264_slice.c, enable_er): parts of older pictures would stand there, unsaid.
@@ -136,7 +138,8 @@ class VideoFile:
                 elif tick is not None and tick == last_tick:
                     yield LostFrame(index, time_s, Status.DUPLICATE, "It has the same time as the frame before.")
                 else:
-                    yield Frame(pixels, index, time_s, self.description.coding, not found.key_frame)
+                    hangs = not found.key_frame
+                    yield Frame(pixels, index, time_s, self.description.coding, hangs, upright_steps(found))
                 last_tick = tick
 
     def _opened(self) -> av.container.InputContainer:
@@ -144,16 +147,16 @@ class VideoFile:
             # FFmpeg takes what stands before a colon for a protocol: 12:30:05.mp4 is a file.
             return av.open(f"file:{self.name}")
         except (av.FFmpegError, OSError) as error:
-            raise FingervisionError(_not_a_video(self.name, error)) from error
+            raise _not_a_video(self.name, error) from error
 
 
 def _stream(container: av.container.InputContainer, name: str) -> av.VideoStream:
     """Find the first video stream, and its decoder."""
     if not container.streams.video:
-        raise FingervisionError(f"{name} must hold a video, but has no video stream: give another file.")
+        raise DataError(f"{name} must hold a video, but has no video stream: give another file.")
     stream = container.streams.video[0]
     if stream.codec_context is None:
-        raise FingervisionError(
+        raise DataError(
             f"{name} is stored with a codec that cannot be decoded here: convert it losslessly, for instance with "
             "`ffmpeg -i IN -c:v ffv1 OUT.mkv`."
         )
@@ -177,6 +180,14 @@ def upright(pixels: Pixels, rotation_deg: int) -> Pixels:
     return turned
 
 
+def upright_steps(picture: av.VideoFrame) -> Quantiser | None:
+    """Quantiser of a picture as the file asks to turn it."""
+    steps = quantiser_steps(picture)
+    if steps is None or picture.rotation % QUARTER_DEG:
+        return steps
+    return steps.turned(picture.rotation // QUARTER_DEG, picture.width, picture.height)
+
+
 def _of_another_size(pixels: Pixels, description: Description) -> str:
     return (
         f"It has {pixels.shape[1]}x{pixels.shape[0]} pixels, but the recording "
@@ -184,15 +195,15 @@ def _of_another_size(pixels: Pixels, description: Description) -> str:
     )
 
 
-def _not_a_video(name: str, error: Exception) -> str:
+def _not_a_video(name: str, error: Exception) -> FingervisionError:
     path = Path(name)
     if not path.exists():
-        return f"There is no file {name}."
+        return InputFileError(f"There is no file {name}.")
     if isinstance(error, PermissionError):
-        return f"{name} may not be read: change its permissions."
+        return InputFileError(f"{name} may not be read: change its permissions.")
     if path.is_file() and path.stat().st_size == 0:
-        return f"{name} must be a video, but the file is empty: record or copy it again."
-    return (
+        return DataError(f"{name} must be a video, but the file is empty: record or copy it again.")
+    return DataError(
         f"{name} must be a video, but cannot be read as one: it is of another kind, or was cut off before its index "
         "was written (an MP4 file needs its end); record or copy it again."
     )

@@ -283,7 +283,7 @@ def fit_near(
         return NotFound(GaugeStatus.OUT_OF_VIEW)
     try:
         cut_off = _cut_plateau(picture, levels)
-        fitted = fit_straight_edges(levels, origin, band, starts, blur, picture.shared_pixels, cut_off)
+        fitted = fit_straight_edges(levels, origin, band, starts, blur, picture.edge_shared_pixels, cut_off)
     except (NoEdgeFitError, np.linalg.LinAlgError) as why:
         return NotFound(GaugeStatus.NO_EDGE, str(why))
     found = []
@@ -352,10 +352,15 @@ def _edge(follower: EdgeFollower, picture: Picture, fitted: StraightEdges, k: in
     if other is not None:
         levels = (inside / picture.top, (inside + contrast) / picture.top)
         shift = edge_shift_px(picture.settings.response, other, *levels, fitted.blur_px)
+    at = follower.at_px + float(fitted.position_px[k])
+    reach, half = reach_px(fitted.blur_px), 0.5 * follower.length_px
+    wide, high = abs(cos(follower.axes.direction_rad)), abs(sin(follower.axes.direction_rad))
+    carried = (wide * reach + high * half, high * reach + wide * half)
+    displaced = picture.displaced_px(follower.axes.point(at), carried, inside, contrast)
     return EdgeFound(
-        follower.at_px + float(fitted.position_px[k]),
+        at,
         float(fitted.slope[k]),
-        float(np.sqrt(covariance[k, k])),
+        hypot(float(np.sqrt(covariance[k, k])), displaced),
         float(np.sqrt(covariance[count + k, count + k])),
         float(covariance[k, count + k]),
         contrast,

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from fingervision.domain.errors import FingervisionError
+from fingervision.domain.errors import DataError
 from fingervision.gauges.kinds import Kind, Spec, kind_named, kinds
 from fingervision.storage.toml_section import Section, read_document
 
@@ -91,9 +91,7 @@ def gauges_in(path: Path, values: Mapping[str, Any], text: str) -> tuple[Gauge, 
         top.refuse("schema", f"must be {SCHEMA}, but is {schema}: this program is older than the file.")
     sections = top.tables("gauge")
     if not 1 <= len(sections) <= MOST_GAUGES:
-        raise FingervisionError(
-            f"{path} must hold 1 to {MOST_GAUGES} tables [[gauge]], but holds {len(sections)}: add one."
-        )
+        raise DataError(f"{path} must hold 1 to {MOST_GAUGES} tables [[gauge]], but holds {len(sections)}: add one.")
     gauges: dict[str, Gauge] = {}
     for section in sections:
         gauge = gauge_of(section, gauges)
@@ -138,7 +136,7 @@ def check_gauges(gauges: tuple[Gauge, ...], width_px: int, height_px: int) -> No
     for gauge in gauges:
         x, y = gauge.spec.middle_px
         if not (-0.5 <= x <= width_px - 0.5 and -0.5 <= y <= height_px - 0.5):
-            raise FingervisionError(
+            raise DataError(
                 f"The gauge {gauge.name!r} must have its middle inside the frame of {width_px}x{height_px} pixels, but "
                 f"x_px = {x:g}, y_px = {y:g}: move it there."
             )
@@ -146,7 +144,7 @@ def check_gauges(gauges: tuple[Gauge, ...], width_px: int, height_px: int) -> No
         for key in SIZES:
             size = getattr(gauge.spec, key, 0.0)
             if size > largest:
-                raise FingervisionError(
+                raise DataError(
                     f"The gauge {gauge.name!r} must be smaller than the frame of {width_px}x{height_px} pixels, but "
                     f"its {key} is {size:g}: lower it."
                 )

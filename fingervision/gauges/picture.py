@@ -7,11 +7,14 @@ from numpy.typing import NDArray
 
 from calib.camera_response import CameraResponse
 from fingervision.domain.frame import Coding, Frame
+from fingervision.vision.coding_error import EIGHT_BITS, displaced_px
 from fingervision.vision.grey import GreyImage, to_grey, top_level
 from fingervision.vision.pipeline import Settings
-from fingervision.vision.residuals import SHARED_POINTS
 
 Floats = NDArray[np.float64]
+
+# So many pixels count as one in what a codec has left: what it does to a whole block looks like the thing itself.
+SHARED_PIXELS = {Coding.LOSSLESS: 1.0, Coding.INTRAFRAME: 2.5, Coding.INTERFRAME: 12.0}
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -51,7 +54,35 @@ class Picture:
     @property
     def shared_pixels(self) -> float:
         """So many pixels count as one, as far as the codec is known to share its errors."""
-        return SHARED_POINTS[self.frame.coding]
+        return SHARED_PIXELS[self.frame.coding]
+
+    @property
+    def edge_shared_pixels(self) -> float:
+        """The same for edges: where the quantiser is known, `displaced_px` says what they share."""
+        return self.shared_pixels if self.frame.quantiser is None else 1.0
+
+    def displaced_px(
+        self, place_px: tuple[float, float], half_px: tuple[float, float], inside: float, contrast: float
+    ) -> float:
+        """Standard uncertainty of an edge's place for what the codec may have done to all of it alike.
+
+        Parameters
+        ----------
+        place_px : (float, float)
+            Middle of the edge.
+        half_px : (float, float)
+            The pixels that carry it reach so far to the sides, and up and down.
+        inside, contrast : float
+            Light on one side of it, and how much more there is on the other.
+        """
+        quantiser = self.frame.quantiser
+        if quantiser is None:
+            return 0.0
+        levels = [inside, inside + contrast]
+        if self.light is not None:
+            scale = self.light[: int(self.top) + 1]
+            levels = list(np.interp(levels, scale, np.arange(scale.size)))
+        return displaced_px(quantiser.near(*place_px, *half_px), (levels[1] - levels[0]) * EIGHT_BITS / self.top)
 
     def part(self, x_px: int, y_px: int, width_px: int, height_px: int) -> tuple[Floats, tuple[int, int]]:
         """Light in a rectangle, cut to the picture, and the rectangle's first column and row as far as it is inside."""

@@ -20,7 +20,7 @@ from fingervision.gauges.quantities import Cell
 from fingervision.gauges.reading import Reading
 from fingervision.gauges.status import GaugeStatus
 from fingervision.measuring.scale import Scale
-from fingervision.storage.gauges_csv import GaugeRow, GaugesCsv
+from fingervision.storage.gauges_csv import GaugeRow, GaugeRows, GaugesCsv
 from fingervision.vision.overlay import in_eight_bits
 from fingervision.vision.pipeline import Settings
 
@@ -61,8 +61,8 @@ class GaugeRecording:
         Width and height of the frames.
     settings : Settings
         How the recording is measured.
-    path : Path
-        gauges.csv.
+    path : Path or GaugeRows
+        gauges.csv, or a list in memory that takes its rows.
 
     Raises
     ------
@@ -72,7 +72,7 @@ class GaugeRecording:
 
     def __init__(
         self, gauges: tuple[Gauge, ...], scale: Scale | None, frame_size_px: tuple[int, int], settings: Settings,
-        path: Path,
+        path: Path | GaugeRows,
     ) -> None:  # fmt: skip
         check_gauges(gauges, *frame_size_px)
         self._gauges, self._settings = gauges, settings
@@ -80,7 +80,7 @@ class GaugeRecording:
         self._followers = [gauge.spec.follower() for gauge in gauges]
         self._pending: list[tuple[float | None, int, Sequence[Reading]]] = []
         self._newest: Sequence[Reading] = ()
-        self._table = GaugesCsv(path)
+        self._table = path if isinstance(path, GaugeRows) else GaugesCsv(path)
         self.tallies = {gauge.name: Tally() for gauge in gauges}
 
     def __enter__(self) -> "GaugeRecording":

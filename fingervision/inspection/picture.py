@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 from matplotlib.figure import Figure
 
-from fingervision.domain.errors import FingervisionError
+from fingervision.domain.errors import OutputError
 from fingervision.domain.frame import Frame
 from fingervision.inspection.catalogue import to_mend
 from fingervision.inspection.finding import Finding, Severity
@@ -66,7 +66,7 @@ def draw_inspection(path: Path, sample: Sample, findings: list[Finding]) -> None
     try:
         figure.savefig(path, dpi=110)
     except OSError as error:
-        raise FingervisionError(f"The picture {path} could not be written ({error.strerror}).") from error
+        raise OutputError(f"The picture {path} could not be written ({error.strerror}).") from error
 
 
 def _canvas(sample: Sample) -> np.ndarray | None:

@@ -25,6 +25,7 @@ from fingervision.vision.denoise import denoise
 from fingervision.vision.edge_filters import PIXEL_VARIANCE
 from fingervision.vision.edges import EdgePoints
 from fingervision.vision.fingers import CoarseFingers
+from fingervision.vision.gap import SMEARED
 from fingervision.vision.grey import GreyImage, to_grey, top_level
 from fingervision.vision.pipeline import Settings, look_closely, measure_frame
 from fingervision.vision.profile_choice import WIDER
@@ -100,7 +101,9 @@ class Look:
     @property
     def u_camera_px(self) -> float:
         """Random uncertainty of the gap as far as noise of the camera makes it, without what a codec shares."""
-        return self.outcome.u_gap_px / float(np.sqrt(SHARED_POINTS[self.frame.coding]))
+        alone = max(self.outcome.u_gap_px**2 - self.outcome.u_coding_px**2, 0.0)
+        shared = 1.0 if self.frame.quantiser is not None else SHARED_POINTS[self.frame.coding]
+        return float(np.sqrt(alone / shared))
 
     @property
     def noise(self) -> float:
@@ -224,6 +227,11 @@ class Sample:
         steepest = float(np.quantile(slope, STEEPEST))
         spread = contrast / max(steepest, 1e-6) / float(np.sqrt(2.0 * np.pi))
         return float(np.sqrt(max(spread**2 - 1.0, 0.0)))
+
+    @property
+    def is_smeared(self) -> bool:
+        """Whether frames gave no number because the fingers moved too fast for the shutter."""
+        return Status.BLURRED in self.refused and self.refused[Status.BLURRED].words.startswith(SMEARED)
 
     @property
     def is_lost_in_blur(self) -> bool:

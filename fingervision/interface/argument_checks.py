@@ -1,11 +1,11 @@
 """Checks of single arguments: a number, a whole number, one of several words, a file's name."""
 
 import os
-from collections.abc import Iterable
+from collections.abc import Iterable, Sized
 from numbers import Integral, Real
 from pathlib import Path
 
-from fingervision.domain.errors import ArgumentError, ArgumentTypeError, UnknownNameError
+from fingervision.domain.errors import ArgumentError, ArgumentTypeError, UnknownNameError, UsageError
 
 
 def number(argument: str, value: object) -> float:
@@ -77,4 +77,20 @@ def path_of(argument: str, value: object, what: str) -> Path:
     return Path(name)
 
 
-__all__ = ["number", "one_of", "path_of", "whole_number"]
+def region_of(roi: object) -> tuple[int, int, int, int] | None:
+    """Take a region of interest: first column, first row, width, height in pixels.
+
+    Raises
+    ------
+    UsageError
+        It is not four whole numbers.
+    """
+    if roi is None:
+        return None
+    if isinstance(roi, str) or not isinstance(roi, Sized) or not isinstance(roi, Iterable) or len(roi) != 4:
+        raise UsageError(f"--roi must be four whole numbers X,Y,W,H in pixels, but is {roi!r}.")
+    x_px, y_px, width_px, height_px = (whole_number("roi", each, 0) for each in roi)
+    return x_px, y_px, width_px, height_px
+
+
+__all__ = ["number", "one_of", "path_of", "region_of", "whole_number"]

@@ -7,7 +7,7 @@ from contextvars import ContextVar
 from functools import wraps
 from typing import ParamSpec, TypeVar
 
-from fingervision.domain.errors import ArgumentError, FingervisionError
+from fingervision.domain.errors import ArgumentError, FingervisionError, NoCalibrationError
 
 P = ParamSpec("P")
 R = TypeVar("R")
@@ -80,7 +80,7 @@ def python_words() -> Iterator[None]:
         yield
     except CalibrationError as error:
         said = str(error) if _of_command.get() else in_python(str(error))
-        raise FingervisionError(said) from error
+        raise NoCalibrationError(said) from error
     except FingervisionError as error:
         if not _of_command.get():
             error.args = (in_python(str(error)), *error.args[1:])

@@ -6,11 +6,11 @@ from typing import Any
 from calib.board import Board
 from fingervision.domain.errors import ArgumentError, ArgumentTypeError
 from fingervision.frames.array_levels import what_it_is
-from fingervision.interface.argument_checks import number, one_of
+from fingervision.interface.argument_checks import number, one_of, region_of
 from fingervision.interface.argument_names import speaks_python
 from fingervision.interface.calibration import Calibration
 from fingervision.interface.calibration_fits import Noted, on_board, on_lines, on_sizes
-from fingervision.interface.reference_pictures import references_of, region_tuple
+from fingervision.interface.reference_pictures import references_of
 
 KINDS = ("bar", "slot", "chessboard", "charuco", "scale")
 MARKER_SHARE = 0.75
@@ -111,7 +111,7 @@ def calibrate(
     stated = {name: None if value is None else number(name, value) for name, value in limits.items()}
     noted = Noted(certificate, date, response, dict(camera or {}))
     if kind in ("bar", "slot"):
-        return on_sizes(references_of(pictures, kind), u_size_mm, region_tuple(roi), stated, noted)
+        return on_sizes(references_of(pictures, kind), u_size_mm, region_of(roi), stated, noted)
     if kind == "scale":
         single = pictures if not isinstance(pictures, list | tuple) else _only(pictures)
         lines = (
@@ -119,7 +119,7 @@ def calibrate(
             number("u_line_mm", u_line_mm),
             number("u_length_mm", u_length_mm),
         )
-        return on_lines(single, lines, region_tuple(roi), stated, noted)
+        return on_lines(single, lines, region_of(roi), stated, noted)
     if roi is not None:
         raise ArgumentError("roi", "be left out for boards", f"is {roi!r}")
     board = _board(kind, squares, _needed("square_mm", square_mm, kind), u_square_mm, marker_mm)

@@ -11,7 +11,7 @@ import numpy as np
 from calib.agreement import Agreement
 from calib.known_widths import KnownSize, find_widths
 from calib.measured_scale import Calibration as MeasuredScale
-from fingervision.interface.argument_checks import path_of
+from fingervision.interface.argument_checks import path_of, region_of
 from fingervision.interface.argument_names import speaks_python
 from fingervision.interface.calibration_report import budget_lines, scale_lines
 from fingervision.interface.picture_response import PictureResponse
@@ -154,9 +154,9 @@ class Calibration:
         FingervisionError
             A picture cannot be read, or is of another size than the calibration's.
         """
-        from fingervision.interface.reference_pictures import known_sizes, references_of, region_tuple
+        from fingervision.interface.reference_pictures import known_sizes, references_of
 
-        return self.check_sizes(known_sizes(references_of(references, "bar"), u_size_mm), region_tuple(roi))
+        return self.check_sizes(known_sizes(references_of(references, "bar"), u_size_mm), region_of(roi))
 
     def check_sizes(
         self, pictures: Sequence[KnownSize], region: tuple[int, int, int, int] | None

@@ -2,7 +2,6 @@
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
-from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -13,13 +12,13 @@ from fingervision.diagnosis.compare import Comparison as OneComparison
 from fingervision.diagnosis.compare import compare as compare_one
 from fingervision.diagnosis.report.comparison_files import comparison_document, residuals_of, write_comparison
 from fingervision.domain.report import Place
-from fingervision.interface.argument_checks import path_of, whole_number
+from fingervision.interface.argument_checks import whole_number
 from fingervision.interface.argument_names import speaks_python
-from fingervision.interface.notebook import image_html, png_of_figure
+from fingervision.interface.saved_results import cell_html, save_results
 from fingervision.interface.tables import measured_given, models_given
 from fingervision.storage.out_folder import out_folder
 from fingervision.storage.provenance import Provenance, provenance
-from fingervision.storage.result_owner import mark_owner, own_folder
+from fingervision.storage.result_owner import mark_owner
 
 if TYPE_CHECKING:
     import os
@@ -112,7 +111,6 @@ class Comparison:
         """Draw the residuals, as compare.png has them."""
         return residuals_of(self.models)
 
-    @speaks_python
     def save(self, folder: "str | os.PathLike[str]") -> Path:
         """Write what `fingervision compare --out FOLDER` writes: compare.html, compare.json and the figures.
 
@@ -128,9 +126,7 @@ class Comparison:
         FingervisionError
             It cannot be written.
         """
-        out = own_folder(path_of("folder", folder, "a folder"), self.measured, named=True)
-        self.write(out)
-        return out
+        return save_results(self, folder)
 
     def write(self, out: Path) -> None:
         """Write the files into a folder that may be used."""
@@ -146,7 +142,7 @@ class Comparison:
         return f"Comparison({'; '.join(words)})"
 
     def _repr_html_(self) -> str:
-        return f"<pre>{escape(self.report())}</pre>{image_html(png_of_figure(self.figure()))}"
+        return cell_html(self, self.report())
 
 
 @speaks_python

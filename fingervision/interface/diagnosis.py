@@ -2,7 +2,6 @@
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
-from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -10,22 +9,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fingervision.diagnosis.diagnose import Diagnosis as Found
-from fingervision.diagnosis.diagnose import by_channel
 from fingervision.diagnosis.diagnose import diagnose as diagnose_table
 from fingervision.diagnosis.report.answer_files import corrected, write_answer
+from fingervision.diagnosis.report.residual_channels import by_channel
 from fingervision.diagnosis.report.residual_figure import residual_figure
 from fingervision.domain.effect import Effect
 from fingervision.domain.errors import ArgumentError
 from fingervision.domain.report import DiagnosisReport, NamedEffect, Verdict
-from fingervision.interface.argument_checks import path_of, whole_number
+from fingervision.interface.argument_checks import whole_number
 from fingervision.interface.argument_names import speaks_python
-from fingervision.interface.notebook import image_html, png_of_figure
 from fingervision.interface.own_effect import added
+from fingervision.interface.saved_results import cell_html, save_results
 from fingervision.interface.tables import effect_names, measured_given, model_given, own_base
 from fingervision.models.corrected import CorrectedModel
 from fingervision.storage.out_folder import out_folder
 from fingervision.storage.provenance import Provenance, provenance
-from fingervision.storage.result_owner import mark_owner, own_folder
+from fingervision.storage.result_owner import mark_owner
 
 if TYPE_CHECKING:
     import os
@@ -110,7 +109,6 @@ class Diagnosis:
             lines.append(f"  next: {report.next_run.words}")
         return "\n".join(lines)
 
-    @speaks_python
     def save(self, folder: "str | os.PathLike[str]") -> Path:
         """Write what `fingervision diagnose --out FOLDER` writes: report.html, report.json, model.toml, figures.
 
@@ -126,9 +124,7 @@ class Diagnosis:
         FingervisionError
             It cannot be written.
         """
-        out = own_folder(path_of("folder", folder, "a folder"), self.measured, named=True)
-        self.write(out)
-        return out
+        return save_results(self, folder)
 
     def write(self, out: Path) -> dict[str, object]:
         """Write the files into a folder that may be used, and give what report.json holds."""
@@ -141,7 +137,7 @@ class Diagnosis:
         return f"Diagnosis({self.verdict}: {self.report.sentence})"
 
     def _repr_html_(self) -> str:
-        return f"<pre>{escape(self.sentences())}</pre>{image_html(png_of_figure(self.figure()))}"
+        return cell_html(self, self.sentences())
 
 
 @speaks_python

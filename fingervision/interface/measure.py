@@ -6,11 +6,13 @@ from typing import TYPE_CHECKING, Any
 
 from calib.calibration import BareScale
 from fingervision.domain.errors import ArgumentError
+from fingervision.domain.region import Region
 from fingervision.frames.source import FrameSource, Wish, open_source
+from fingervision.interface.argument_checks import region_of
 from fingervision.interface.argument_names import speaks_python
 from fingervision.interface.frame_sources import recording_of
 from fingervision.interface.measurement import Measurement
-from fingervision.interface.measuring_task import measuring_task, region_of, scale_of
+from fingervision.interface.measuring_task import measuring_task, range_of, scale_of
 from fingervision.measuring.frame_loop import Progress
 from fingervision.measuring.in_memory import measure_in_memory
 from fingervision.measuring.measure import Measured
@@ -27,6 +29,7 @@ if TYPE_CHECKING:
 
     from calib.camera_response import CameraResponse
     from fingervision.domain.drive import DriveHistory
+    from fingervision.gauges.gauge_file import Gauge
     from fingervision.interface.calibration import Calibration
 
 FLOAT_BITS = 16
@@ -52,7 +55,8 @@ def measure(
     fingers: str = "auto",
     face: str = "front",
     coding: str = "lossless",
-    frames: int | None = None,
+    frames: int | tuple[int, int] | None = None,
+    gauges: "str | os.PathLike[str] | Sequence[Gauge] | None" = None,
     progress: Callable[[int, int | None], None] | None = None,
 ) -> Measurement:
     """Measure the gap between two fingers in a picture, a recording or a camera's next frames; write nothing.
@@ -98,8 +102,11 @@ def measure(
     coding : str
         What an array's pictures went through before: lossless, intraframe (JPEG) or interframe (H.264); the errors of
         neighbouring pixels are then correlated, and the uncertainty is larger.
-    frames : int or None
-        How many frames of a camera are measured.
+    frames : int, (int, int) or None
+        How many frames of a camera are measured; or the first and the last frame of a recording, counted from 0 and
+        both included.
+    gauges : path, sequence of Gauge, or None
+        Gauges to read beside the gap, as a gauges.toml states them; what they read is in `gauge_rows`.
     progress : callable or None
         Called now and then with the frames done and the frames that the source announces.
 
@@ -130,13 +137,14 @@ def measure(
         scale: Any = (BareScale(_own_scale(source)), None)
     else:
         scale = scale_of(calibration, px_per_mm)
-    again = recording_of(source, rate_hz=rate_hz, times_s=times_s, frames=frames, coding=coding)
+    part, count = range_of(frames)
+    again = recording_of(source, rate_hz=rate_hz, times_s=times_s, frames=count, coding=coding)
     recording = again()
     task = measuring_task(
         scale=scale,
         below_tip_mm=below_tip_mm,
         tips=tips,
-        roi=region_of(roi),
+        roi=None if (box := region_of(roi)) is None else Region(*box),
         drive=drive,
         drive_offset_s=drive_offset_s,
         columns=None if columns is None else Path(columns),
@@ -144,6 +152,8 @@ def measure(
         bits=FLOAT_BITS if bits is None and getattr(recording, "has_float_levels", False) else bits,
         fingers=fingers,
         face=face,
+        frames=part,
+        gauges=gauges,
     )
     if progress is not None and not callable(progress):
         raise ArgumentError("progress", "be a function of two numbers", f"is {progress!r}")

@@ -1,35 +1,30 @@
 """What `fingervision.measure` gives back: the rows of gaps.csv as an object that prints, draws and saves itself."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field, replace
-from html import escape
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, overload
 
 import numpy as np
 from numpy.typing import NDArray
 
+from calib.budget import Budget
 from fingervision.domain.drive import DriveHistory
-from fingervision.domain.errors import MissingLibraryError, UsageError
-from fingervision.domain.frame import Frame
+from fingervision.domain.errors import UsageError
+from fingervision.domain.gap import GapMeasurement
 from fingervision.domain.measured_table import MeasuredTable
-from fingervision.domain.status import Status
 from fingervision.interface.argument_checks import path_of, whole_number
-from fingervision.interface.argument_names import speaks_python
+from fingervision.interface.argument_names import in_python, python_words, speaks_python
 from fingervision.interface.frame_sources import Opener
-from fingervision.interface.notebook import image_html, png_of, png_of_figure
-from fingervision.measuring.clock.alignment import ClockOffset
 from fingervision.measuring.in_memory import MeasuredInMemory
-from fingervision.measuring.outcome import clock_drawn
 from fingervision.measuring.words import in_one_line, result_sentences
-from fingervision.storage.gaps_csv import COLUMNS, FORCE_PLACES, MM_PLACES, TIME_PLACES, GapRow
+from fingervision.storage.gaps_csv import GapRow
+from fingervision.storage.gauges_csv import GaugeRow
 
 if TYPE_CHECKING:
     import pandas as pd
     import xarray as xr
     from matplotlib.axes import Axes
-
-TEXTS = ("status", "fingers", "run")
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -85,7 +80,9 @@ class Measurement:
     @property
     def columns(self) -> tuple[str, ...]:
         """Names of the columns of gaps.csv, in its order."""
-        return (*COLUMNS.split(","), *self._found.task.drive_columns)
+        from fingervision.interface.measurement_tables import columns_of
+
+        return columns_of(self._found)
 
     @property
     def gap_mm(self) -> NDArray[np.float64]:
@@ -125,8 +122,43 @@ class Measurement:
 
     @property
     def advice(self) -> tuple[str, ...]:
-        """What to change, and what to know, in sentences."""
-        return tuple(self._found.summary["advice"])
+        """What to change, and what to know, in sentences; why no frame has an input stands first."""
+        refusal = () if self.no_input is None else (self.no_input,)
+        return (*refusal, *self._found.summary["advice"])
+
+    @property
+    def no_input(self) -> str | None:
+        """Why the drive gave no frame an input, where there is a drive and it gave none; else None.
+
+        The gaps are measured all the same. `measured_table()` raises the same sentence.
+        """
+        return None if self._found.refusal is None else in_python(str(self._found.refusal))
+
+    @property
+    def budget(self) -> Budget:
+        """Where `u_gap_mm` comes from: every source with its standard uncertainty of each gap, shape (n,).
+
+        The squares of the sources add to the square of `u_gap_mm` (JCGM 100:2008, equation 10); what is not `shared`
+        is `u_random_mm`. A scale stated without an uncertainty leaves only what the pictures themselves show.
+        `print(measured.budget.table())` prints the sources of the first gap, the largest first.
+
+        Raises
+        ------
+        UsageError
+            No frame has a gap.
+        """
+        from fingervision.measuring.gap_budget import gap_budget
+
+        outcomes = [result.outcome for result in self._found.results]
+        measured = [each for each in outcomes if isinstance(each, GapMeasurement)]
+        if not measured:
+            raise UsageError("A budget needs a gap, but no frame has one: see counts and advice.")
+        return gap_budget(measured, self._found.task.scale)
+
+    @property
+    def gauge_rows(self) -> tuple[GaugeRow, ...]:
+        """What the gauges read, one row a number, as in gauges.csv; none without gauges."""
+        return self._found.gauge_rows
 
     @property
     def drive(self) -> DriveHistory | None:
@@ -143,47 +175,24 @@ class Measurement:
         FingervisionError
             There are too few such frames, or they do not move.
         """
-        from fingervision.interface.column_tables import measured_from_columns
-        from fingervision.storage.line_file import cell
-        from fingervision.storage.measured_table import NUMBERS
+        from fingervision.interface.measurement_tables import measured_table
 
-        task, clock = self._found.task, self._found.clock
-        if task.drive is None:
-            raise UsageError("measured must have a drive, but was measured without: give fingervision.measure one.")
-        columns: dict[str, list[Any]] = {
-            name: [
-                float(cell(value, _places(name))) if value is not None else None
-                for value in (_cell(row, name) for row in self)
-            ]
-            for name in NUMBERS
-            if name in self.columns
-        }
-        columns["run"] = [row.run for row in self]
-        table = measured_from_columns(columns)
-        return replace(table, u_clock_s=clock.u_time_s) if isinstance(clock, ClockOffset) else table
+        with python_words():
+            return measured_table(self._found)
 
     def report(self) -> str:
         """Say what was found as the command prints it."""
-        return "\n".join(result_sentences(self._found.summary, self._found.series))
+        lines = result_sentences(self._found.summary, self._found.series)
+        return "\n".join([*lines, *([self.no_input] if self.no_input else [])])
 
     def __repr__(self) -> str:
         return f"Measurement({in_one_line(self._found.summary, self._found.series)})"
 
     def _repr_html_(self) -> str:
         """Show the picture: what was measured in a single frame, the gap over time in a recording."""
-        content = self._png()
-        picture = "" if content is None else image_html(content)
-        return f"<p>{escape(in_one_line(self._found.summary, self._found.series))}</p>{picture}"
+        from fingervision.interface.measurement_pictures import cell_html
 
-    def _png(self) -> bytes | None:
-        if len(self) != 1:
-            from fingervision.measuring.gap_figure import gap_figure
-
-            task = self._found.task
-            return png_of_figure(gap_figure(self._found.series, task.drive, clock_drawn(self._found.clock, task)))
-        if self._found.first_frame is None:
-            return None
-        return png_of(self.picture(0))
+        return cell_html(self._found, self._again)
 
     def picture(self, frame: int = 0) -> NDArray[np.uint8]:
         """Draw what was measured into a frame: edges, tips, measuring points, and the value.
@@ -191,7 +200,7 @@ class Measurement:
         Parameters
         ----------
         frame : int
-            Its number, from 0. A recording is read up to it once more.
+            Its number in the recording, from 0. A recording is read up to it once more.
 
         Returns
         -------
@@ -203,19 +212,9 @@ class Measurement:
         UsageError
             There is no such frame, or it could not be read.
         """
-        from fingervision.measuring.overlay_video import words_of_row
-        from fingervision.vision.overlay import draw_overlay
+        from fingervision.interface.measurement_pictures import marked_picture
 
-        frame = whole_number("frame", frame, 0)
-        first = self._found.first_frame
-        found = first if first is not None and first.index == frame else None
-        if found is None and frame < len(self):
-            item = next((item for item in self._again() if item.index == frame), None)
-            found = item if isinstance(item, Frame) else None
-        outcome = self._found.results[frame].outcome if frame < len(self) else None
-        if found is None or outcome is None or outcome.status in (Status.DAMAGED, Status.DUPLICATE):
-            raise UsageError(f"frame must be one of the {len(self)} that can be read, but {frame} is not.")
-        return draw_overlay(found, outcome, words_of_row(self._found.rows[frame]))  # type: ignore[arg-type]
+        return marked_picture(self._found, self._again, whole_number("frame", frame, 0))
 
     def to_dataframe(self) -> "pd.DataFrame":
         """Give the rows as a pandas DataFrame with the columns of gaps.csv.
@@ -227,17 +226,9 @@ class Measurement:
         MissingLibraryError
             pandas is not installed (it comes with the extra `dataframe`).
         """
-        try:
-            import pandas as pd
-        except ImportError as error:
-            raise MissingLibraryError("pandas", "dataframe", "to_dataframe") from error
-        kinds = {"frame": "Int64", **dict.fromkeys(TEXTS, "string")}
-        return pd.DataFrame(
-            {
-                name: pd.array([_cell(row, name) for row in self], dtype=kinds.get(name, "Float64"))
-                for name in self.columns
-            }
-        )
+        from fingervision.interface.measurement_tables import dataframe
+
+        return dataframe(self._found)
 
     def to_xarray(self) -> "xr.Dataset":
         """Give the rows as an xarray Dataset over the dimension `frame`, with `time_s` as a coordinate.
@@ -250,21 +241,9 @@ class Measurement:
         MissingLibraryError
             xarray is not installed (it comes with the extra `dataframe`).
         """
-        try:
-            import xarray as xr
-        except ImportError as error:
-            raise MissingLibraryError("xarray", "dataframe", "to_xarray") from error
-        variables: dict[str, Any] = {}
-        for name in self.columns[1:]:
-            cells = [_cell(row, name) for row in self]
-            if name in TEXTS:
-                variables[name] = (("frame",), np.array(cells, dtype=object), {})
-            else:
-                numbers = np.array([np.nan if cell is None else cell for cell in cells], dtype=np.float64)
-                variables[name] = (("frame",), numbers, {"units": name.rpartition("_")[2]})
-        frames = np.array([row.frame for row in self], dtype=np.int64)
-        made = xr.Dataset(variables, coords={"frame": frames}, attrs={"recording": self.summary["recording"]["name"]})
-        return made.set_coords("time_s")
+        from fingervision.interface.measurement_tables import dataset
+
+        return dataset(self._found)
 
     def plot(self, axes: "tuple[Axes, Axes] | None" = None) -> "tuple[Axes, Axes]":
         """Draw the gap over time with its expanded uncertainty (k = 2), as gap.png has it.
@@ -279,17 +258,9 @@ class Measurement:
         (Axes, Axes)
             What was drawn in.
         """
-        from fingervision.measuring.gap_figure import SIZE_INCHES, draw_gap_axes
+        from fingervision.interface.measurement_pictures import plotted
 
-        if axes is None:
-            import matplotlib.pyplot as plt
-
-            _, made = plt.subplots(2, 1, sharex=True, height_ratios=(3, 1), figsize=SIZE_INCHES, layout="constrained")
-            axes = (made[0], made[1])
-        upper, lower = axes
-        task = self._found.task
-        draw_gap_axes(upper, lower, self._found.series, task.drive, clock_drawn(self._found.clock, task))
-        return upper, lower
+        return plotted(self._found, axes)
 
     @speaks_python
     def save(self, folder: str | Path, *, overlay: bool = False, steps: int | None = None) -> Path:
@@ -321,16 +292,6 @@ class Measurement:
         out = path_of("folder", folder, "a folder")
         steps_frame = None if steps is None else whole_number("steps", steps, 0)
         return save_measured(self._found, self._again(), out, overlay=overlay, steps_frame=steps_frame).path
-
-
-def _places(name: str) -> int:
-    """Decimal places of a column of gaps.csv."""
-    return {"time_s": TIME_PLACES, "force_n": FORCE_PLACES}.get(name, MM_PLACES)
-
-
-def _cell(row: GapRow, name: str) -> Any:
-    value = getattr(row, name)
-    return value.value if isinstance(value, Status) else value
 
 
 __all__ = ["Measurement"]

@@ -1,17 +1,20 @@
 """What shall be measured, from the options of the command or the arguments of the function."""
 
 import os
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
+
+import numpy as np
 
 from calib.calibration import BareScale
 from calib.measured_scale import Calibration as MeasuredScale
 from fingervision.domain.direction import Direction
 from fingervision.domain.drive import DriveHistory
-from fingervision.domain.errors import ArgumentTypeError, UsageError
+from fingervision.domain.errors import ArgumentError, ArgumentTypeError, UsageError
 from fingervision.domain.region import Region
 from fingervision.frames.array_levels import what_it_is
-from fingervision.gauges.gauge_file import read_gauges
+from fingervision.gauges.gauge_file import Gauge, read_gauges
 from fingervision.interface.argument_checks import number, one_of, whole_number
 from fingervision.measuring.scale import Scale, check_px_per_mm
 from fingervision.measuring.task import Task
@@ -67,21 +70,6 @@ def scale_of(calibration: Any, px_per_mm: Any) -> tuple[Scale, Path | None]:
     return bare, None
 
 
-def region_of(roi: Any) -> Region | None:
-    """Take a region of interest: first column, first row, width, height in pixels.
-
-    Raises
-    ------
-    UsageError
-        It is not four whole numbers.
-    """
-    if roi is None:
-        return None
-    if isinstance(roi, str) or not hasattr(roi, "__len__") or len(roi) != 4:
-        raise UsageError(f"--roi must be four whole numbers X,Y,W,H in pixels, but is {roi!r}.")
-    return Region(*(whole_number("roi", value, 0) for value in roi))
-
-
 def measuring_task(
     *,
     scale: tuple[Scale, Path | None],
@@ -98,7 +86,7 @@ def measuring_task(
     overlay: bool = False,
     steps_frame: int | None = None,
     frames: tuple[int, int] | None = None,
-    gauges: Path | None = None,
+    gauges: Any = None,
 ) -> Task:
     """Put options or arguments together; see `fingervision.measure`.
 
@@ -134,8 +122,45 @@ def measuring_task(
         fingers_are_dark=FINGERS[one_of("fingers", fingers, FINGERS)],
         is_outline=one_of("face", face, FACES) == "outline",
         frames=frames,
-        gauges=() if gauges is None else read_gauges(gauges),
+        gauges=_gauges(gauges),
     )
+
+
+def range_of(frames: Any) -> tuple[tuple[int, int] | None, Any]:
+    """Take `frames` for a range of a recording, or else for a camera's number of frames.
+
+    Returns
+    -------
+    (int, int) or None
+        First and last frame, both included.
+    object
+        The number of frames, unchecked; None where there is none.
+
+    Raises
+    ------
+    UsageError
+        It is neither.
+    """
+    if frames is None or isinstance(frames, int | np.integer):
+        return None, frames
+    if isinstance(frames, str) or not hasattr(frames, "__len__") or len(frames) != 2:
+        raise ArgumentTypeError(
+            "frames", "be how many frames of a camera, or the first and the last of a recording", f"is {frames!r}"
+        )
+    first, last = (whole_number("frames", value, 0) for value in frames)
+    if first > last:
+        raise ArgumentError("frames", "rise from the first to the last", f"is ({first}, {last})")
+    return (first, last), None
+
+
+def _gauges(gauges: Any) -> tuple[Gauge, ...]:
+    if gauges is None:
+        return ()
+    if isinstance(gauges, str | os.PathLike):
+        return read_gauges(Path(gauges))
+    if not isinstance(gauges, Sequence) or not gauges or not all(isinstance(each, Gauge) for each in gauges):
+        raise ArgumentTypeError("gauges", "be the name of a gauges.toml or a sequence of gauges", f"is {gauges!r}")
+    return tuple(gauges)
 
 
 def _drive(drive: Any, columns: Path | None) -> DriveHistory:
@@ -148,4 +173,4 @@ def _drive(drive: Any, columns: Path | None) -> DriveHistory:
     return drive_from_columns(drive)
 
 
-__all__ = ["measuring_task", "region_of", "scale_of"]
+__all__ = ["measuring_task", "range_of", "scale_of"]

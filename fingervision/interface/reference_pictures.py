@@ -9,10 +9,16 @@ from typing import Any
 import numpy as np
 
 from calib.known_widths import KnownSize
-from fingervision.domain.errors import ArgumentError, ArgumentTypeError, FingervisionError, UsageError
+from fingervision.domain.errors import (
+    ArgumentError,
+    ArgumentTypeError,
+    DataError,
+    InputFileError,
+    UsageError,
+)
 from fingervision.frames.array_levels import levels_of, stated_shape, what_it_is
 from fingervision.frames.image_file import UnreadableImageError, read_image
-from fingervision.interface.argument_checks import number, one_of, whole_number
+from fingervision.interface.argument_checks import number, one_of
 from fingervision.vision.grey import GreyImage, to_grey
 
 KINDS = ("bar", "slot")
@@ -116,7 +122,7 @@ def read_pictures(sources: Sequence[Any]) -> list[tuple[str, GreyImage]]:
         (name, grey), (first_name, first) = pictures[-1], pictures[0]
         if grey.shape != first.shape:
             (height, width), (first_height, first_width) = grey.shape, first.shape
-            raise FingervisionError(
+            raise DataError(
                 f"All pictures must be of one size, but {name} is {width}x{height} and {first_name} is "
                 f"{first_width}x{first_height}: take all of them with the camera set alike."
             )
@@ -126,22 +132,6 @@ def read_pictures(sources: Sequence[Any]) -> list[tuple[str, GreyImage]]:
 def files_of(sources: Sequence[Any]) -> list[Path]:
     """Give the files among pictures."""
     return [Path(each) for each in sources if isinstance(each, str | os.PathLike)]
-
-
-def region_tuple(roi: Any) -> tuple[int, int, int, int] | None:
-    """Take a region of interest: first column, first row, width, height in pixels.
-
-    Raises
-    ------
-    UsageError
-        It is not four whole numbers.
-    """
-    if roi is None:
-        return None
-    if isinstance(roi, str) or not hasattr(roi, "__len__") or len(roi) != 4:
-        raise UsageError(f"--roi must be X,Y,W,H in whole pixels, but is {roi!r}.")
-    x, y, width, height = (whole_number("roi", each, 0) for each in roi)
-    return x, y, width, height
 
 
 def _read(source: Any, index: int) -> tuple[str, GreyImage]:
@@ -154,11 +144,11 @@ def _read(source: Any, index: int) -> tuple[str, GreyImage]:
         raise ArgumentTypeError(ARGUMENT, "hold names of files or numpy arrays", f"holds {what_it_is(source)}")
     path = Path(source)
     if not path.exists():
-        raise FingervisionError(f"There is no picture {path}; check the name.")
+        raise InputFileError(f"There is no picture {path}; check the name.")
     try:
         return path.name, to_grey(read_image(path))
     except UnreadableImageError as error:
-        raise FingervisionError(f"The picture {path} cannot be used: {error}") from error
+        raise DataError(f"The picture {path} cannot be used: {error}") from error
 
 
-__all__ = ["KINDS", "Reference", "files_of", "known_sizes", "read_pictures", "references_of", "region_tuple"]
+__all__ = ["KINDS", "Reference", "files_of", "known_sizes", "read_pictures", "references_of"]

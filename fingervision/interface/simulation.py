@@ -13,7 +13,12 @@ from fingervision.diagnosis.inference.measuring_chain import MeasuringChain
 from fingervision.diagnosis.input.driven_model import with_dynamics
 from fingervision.domain.drive import DriveHistory
 from fingervision.domain.effect import History
-from fingervision.domain.errors import ArgumentError, ArgumentTypeError, FingervisionError, MissingLibraryError
+from fingervision.domain.errors import (
+    ArgumentError,
+    ArgumentTypeError,
+    MissingLibraryError,
+    OutputError,
+)
 from fingervision.domain.response import Response
 from fingervision.effects import catalogue
 from fingervision.frames.array_levels import what_it_is
@@ -161,7 +166,7 @@ class Simulation:
                 for row in zip(*columns.values(), strict=True):
                     writer.writerow([cell if isinstance(cell, str) else f"{cell:.9g}" for cell in row])
         except OSError as error:
-            raise FingervisionError(f"{out} could not be written ({error.strerror}): name another path.") from error
+            raise OutputError(f"{out} could not be written ({error.strerror}): name another path.") from error
         return out
 
     def __repr__(self) -> str:

@@ -10,7 +10,7 @@ from typing import Any, Literal, overload
 import numpy as np
 
 from fingervision.domain.drive import DriveHistory
-from fingervision.domain.errors import ArgumentTypeError, FingervisionError, UnknownNameError
+from fingervision.domain.errors import ArgumentTypeError, FingervisionError, OutputError, UnknownNameError
 from fingervision.domain.measured_table import MeasuredTable
 from fingervision.frames.array_levels import what_it_is
 from fingervision.interface.argument_checks import one_of, path_of
@@ -255,8 +255,10 @@ def own_base(model: CorrectedModel, out: Path) -> CorrectedModel:
     path = out / "simulation.csv"
     try:
         write_simulation(path, model.base.input_mm, model.base.respond(model.base.input_mm))
+    except FingervisionError:
+        raise
     except OSError as error:
-        raise FingervisionError(f"{path} could not be written ({error.strerror}): name another folder.") from error
+        raise OutputError(f"{path} could not be written ({error.strerror}): name another folder.") from error
     return replace(model, base_path=str(path))
 
 

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from pathlib import Path
 
-from fingervision.domain.errors import FingervisionError, UsageError
+from fingervision.domain.errors import DataError, InputFileError, UsageError
 from fingervision.live.guard import LOOPBACK_NAMES
 
 LEAST_LETTERS = 12
@@ -64,7 +64,7 @@ def access(host: str, port: int, password_file: Path | None, certificate: Path |
         raise UsageError("TLS needs both --tls-cert and --tls-key, but one is missing.")
     for file in (certificate, key):
         if file is not None and not file.is_file():
-            raise FingervisionError(f"There is no file {file}: name the certificate and its key.")
+            raise InputFileError(f"There is no file {file}: name the certificate and its key.")
     if password_file is None and host not in LOOPBACK_NAMES:
         raise UsageError(
             f"--host {host} lets other machines in, which needs a password: write one of at least {LEAST_LETTERS} "
@@ -77,9 +77,7 @@ def _password(file: Path) -> str:
     try:
         words = file.read_text(encoding="utf-8").strip()
     except (OSError, UnicodeDecodeError) as error:
-        raise FingervisionError(f"The password cannot be read from {file}: give a text file.") from error
+        raise InputFileError(f"The password cannot be read from {file}: give a text file.") from error
     if len(words) < LEAST_LETTERS:
-        raise FingervisionError(
-            f"The password in {file} must have at least {LEAST_LETTERS} letters, but has {len(words)}."
-        )
+        raise DataError(f"The password in {file} must have at least {LEAST_LETTERS} letters, but has {len(words)}.")
     return words

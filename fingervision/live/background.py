@@ -6,7 +6,7 @@ import sys
 import tempfile
 from pathlib import Path
 
-from fingervision.domain.errors import FingervisionError
+from fingervision.domain.errors import ProcessError
 
 # Threads of the live view ask to be served first, and a process begins with the priority of the thread that starts it.
 BEGIN = (
@@ -52,7 +52,7 @@ class BackgroundCommand:
                     start_new_session=True,
                 )
         except OSError as error:
-            raise FingervisionError(f"No process could be started ({error.strerror}): close other programs.") from error
+            raise ProcessError(f"No process could be started ({error.strerror}): close other programs.") from error
 
     @property
     def exit_code(self) -> int | None:

@@ -3,10 +3,11 @@
 from dataclasses import dataclass
 from pathlib import Path
 
-from fingervision.domain.errors import FingervisionError
+from fingervision.domain.errors import DataError
 from fingervision.frames.received import Driven
 from fingervision.live.bed.bench import Bench
 from fingervision.live.comparison.comparison import Comparison
+from fingervision.live.live_gauges import put_live_gauges
 from fingervision.live.session import Session
 from fingervision.measuring.drive_at import drive_at
 from fingervision.storage.out_folder import make_out_folder
@@ -30,6 +31,8 @@ class Beside:
         Added to its times.
     allow_motion : bool
         Whether the page may move a bed.
+    gauges : Path or None
+        File of gauges of one's own, read where it exists and saved to.
     """
 
     model: Path | None = None
@@ -37,6 +40,7 @@ class Beside:
     drive: Path | None = None
     drive_offset_s: float = 0.0
     allow_motion: bool = False
+    gauges: Path | None = None
 
 
 def stand_beside(session: Session, beside: Beside) -> None:
@@ -48,6 +52,8 @@ def stand_beside(session: Session, beside: Beside) -> None:
         The model or the log cannot be read.
     """
     model, bench = beside.model, session.capture.source
+    if beside.gauges is not None:
+        put_live_gauges(session, beside.gauges, is_asked_for=True)
     if isinstance(bench, Bench):
         session.features |= {"bed": bench, "allow_motion": beside.allow_motion}
         bench.say = session.say
@@ -59,7 +65,7 @@ def stand_beside(session: Session, beside: Beside) -> None:
     if beside.drive is not None:
         drive = read_drive(beside.drive)
         if drive.time_s.size < 2:
-            raise FingervisionError(f"{beside.drive} must have at least two rows, but has {drive.time_s.size}.")
+            raise DataError(f"{beside.drive} must have at least two rows, but has {drive.time_s.size}.")
 
         def driven_at(time_s: float | None) -> Driven | None:
             found = None if time_s is None else drive_at(drive, time_s - beside.drive_offset_s)

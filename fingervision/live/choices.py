@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from fingervision.domain.direction import Direction
-from fingervision.domain.errors import FingervisionError, UsageError
+from fingervision.domain.errors import DataError, UsageError
 from fingervision.domain.region import Region
 from fingervision.frames.source import Description
 from fingervision.measuring.scale import Scale
@@ -104,7 +104,7 @@ class Choices:
             try:
                 self.scale.check_frame_size(width_px, height_px)
             except ValueError as error:
-                raise FingervisionError(str(error)) from error
+                raise DataError(str(error)) from error
         limits = (self.least_mm, self.greatest_mm)
         if None not in limits and self.least_mm >= self.greatest_mm:  # type: ignore[operator]
             raise UsageError(

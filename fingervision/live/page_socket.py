@@ -9,7 +9,7 @@ from typing import Any
 
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
-from fingervision.domain.errors import FingervisionError
+from fingervision.domain.errors import FingervisionError, StateError
 from fingervision.live.commands import Answer, harmless, obey
 from fingervision.live.frame_measurement import Seen
 from fingervision.live.guard import POLICY_VIOLATION, WRITER
@@ -114,7 +114,7 @@ class PageSocket:
 
     def _may_write(self, takes_over: bool) -> None:
         if self._is_viewer:
-            raise FingervisionError(ONLY_LOOKS)
+            raise StateError(ONLY_LOOKS)
         if takes_over:
             self._pen.take(self)
             self._view.say("pen", "Another page works the live view from now on.")

@@ -1,6 +1,6 @@
 """One page at a time works the live view; the others of the same user look on until they take over."""
 
-from fingervision.domain.errors import FingervisionError
+from fingervision.domain.errors import StateError
 
 HELD = "Another page works this live view: press Take over to work it here."
 
@@ -27,7 +27,7 @@ class Pen:
             Another page has it.
         """
         if not self.may_write(page):
-            raise FingervisionError(HELD)
+            raise StateError(HELD)
         self._holder = page
 
     def take(self, page: object) -> None:

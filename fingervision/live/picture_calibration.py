@@ -5,7 +5,7 @@ from calib.known_widths import KnownSize, find_widths
 from calib.limits import Limits
 from calib.measured_scale import Calibration, Reference
 from calib.scale_from_sizes import MeasuredSize, scale_from_sizes
-from fingervision.domain.errors import FingervisionError
+from fingervision.domain.errors import NoCalibrationError
 from fingervision.domain.frame import Frame
 from fingervision.domain.region import Region
 from fingervision.vision.grey import to_grey
@@ -45,4 +45,4 @@ def calibrated(frame: Frame, region: Region, kind: str, size_mm: float, u_size_m
         size = MeasuredSize(reference, edges.width_px, edges.u_width_px, edges.points_px, edges.light)
         return scale_from_sizes((size,), (frame.width_px, frame.height_px), Limits()).calibration
     except CalibrationError as error:
-        raise FingervisionError(str(error)) from error
+        raise NoCalibrationError(str(error)) from error

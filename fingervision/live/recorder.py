@@ -4,7 +4,7 @@ from queue import Empty, Full, Queue
 from threading import Thread
 from time import monotonic
 
-from fingervision.domain.errors import FingervisionError
+from fingervision.domain.errors import FingervisionError, OutputError
 from fingervision.live.free_space import minutes_left
 from fingervision.live.promptness import be_prompt
 from fingervision.live.run_folder import RecordedFrame, RunFolder
@@ -67,7 +67,7 @@ class Recorder:
                 self.failure = self._too_slow()
         self._thread.join(PATIENCE_S)
         if self.failure:
-            raise FingervisionError(self.failure)
+            raise OutputError(self.failure)
 
     def _too_slow(self) -> str:
         return (
@@ -81,7 +81,7 @@ class Recorder:
             return
         self._looked_s = monotonic()
         if not self.run.is_there:
-            raise FingervisionError(
+            raise OutputError(
                 f"The folder {self.run.path} is gone (its disk was removed, or it was deleted), so recording ended: "
                 "put the disk back, or name another folder with --out."
             )

@@ -8,7 +8,7 @@ from typing import Any
 
 from calib.measured_scale import Calibration
 from fingervision import __version__
-from fingervision.domain.errors import FingervisionError
+from fingervision.domain.errors import FingervisionError, OutputError
 from fingervision.domain.frame import Frame, LostFrame
 from fingervision.frames.received import OwnPacket
 from fingervision.frames.source import Description
@@ -121,14 +121,14 @@ def _new_folder(out: Path) -> Path:
             path.mkdir(parents=True)
         except FileExistsError:
             if not path.is_dir():
-                raise FingervisionError(f"--out must be a folder, but {out} is a file: name another.") from None
+                raise OutputError(f"--out must be a folder, but {out} is a file: name another.") from None
             continue
         except OSError as error:
-            raise FingervisionError(
+            raise OutputError(
                 f"The folder {out} cannot be written ({error.strerror}): name another with --out."
             ) from error
         return path
-    raise FingervisionError(f"The folder {out} is full of runs of this second: name another with --out.")
+    raise OutputError(f"The folder {out} is full of runs of this second: name another with --out.")
 
 
 def _about(description: Description, task: Task, began: datetime) -> dict[str, Any]:

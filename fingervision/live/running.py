@@ -11,7 +11,7 @@ from threading import Event
 from types import FrameType
 from typing import TextIO
 
-from fingervision.domain.errors import ExitCode, FingervisionError
+from fingervision.domain.errors import DeviceError, ExitCode, FingervisionError
 from fingervision.live.access import Access
 from fingervision.live.beside import Beside, stand_beside
 from fingervision.live.capture import Capture
@@ -149,7 +149,7 @@ def run(capture: Capture, choices: Choices, out: Path, showing: Showing, beside:
             session.say("unread", "Nobody reads standard output any more: the live view has ended.")
         said.close()
     if page is None and not session.history.count and session.ended.is_set():
-        raise FingervisionError(f"{session.description.name} gave no frame: check the source.")
+        raise DeviceError(f"{session.description.name} gave no frame: check the source.")
     failed = [message for message in session.messages if message.name in ("failed", "recording_failed")]
     if failed:
         raise SystemExit(int(ExitCode.COULD_NOT))

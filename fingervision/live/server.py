@@ -15,7 +15,7 @@ from starlette.responses import FileResponse, HTMLResponse, PlainTextResponse, R
 from starlette.routing import Route, WebSocketRoute
 from starlette.websockets import WebSocket
 
-from fingervision.domain.errors import FingervisionError, UsageError
+from fingervision.domain.errors import FingervisionError, ProcessError, UsageError
 from fingervision.live.access import Access
 from fingervision.live.commands import modules
 from fingervision.live.guard import EVERYWHERE, VIEWER, WRITER, Guard
@@ -56,7 +56,7 @@ def bound(host: str, port: int) -> socket.socket:
         listening.close()
         if error.errno == errno.EADDRNOTAVAIL:
             raise UsageError(f"--host must be an address of this machine, but is {host}.") from error
-        raise FingervisionError(
+        raise ProcessError(
             f"The page cannot be served at {host} port {port} ({error.strerror}): another live view may run there; end "
             "it, or choose another port with --port (0 takes any free one)."
         ) from error

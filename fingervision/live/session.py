@@ -9,8 +9,8 @@ from threading import Event, Lock, Thread
 from time import monotonic
 from typing import Any
 
-from fingervision.domain.errors import FingervisionError
-from fingervision.domain.frame import Frame
+from fingervision.domain.errors import StateError
+from fingervision.domain.frame import Frame, LostFrame
 from fingervision.domain.status import Status
 from fingervision.frames.received import Driven
 from fingervision.live.cadence import Cadence
@@ -40,6 +40,7 @@ ROWS_SHOWN = 3000
 
 DrivenAt = Callable[[float | None], Driven | None]
 RowListener = Callable[[GapRow, float], None]
+PictureListener = Callable[[Frame | LostFrame, GapRow | None], None]
 
 
 class Session:
@@ -69,6 +70,8 @@ class Session:
         self._messages = Messages()
         self.ended = Event()
         self.on_row: list[RowListener] = []
+        self.on_picture: list[PictureListener] = []
+        """Told of every frame before it is shown, in the measuring thread: what is measured besides the gap."""
         self.driven_at: DrivenAt = lambda time_s: None
         """Who knows the gripper's input at a time of this view, where the source does not."""
         self._measurement = FrameMeasurement((self.description.width_px, self.description.height_px))
@@ -154,7 +157,7 @@ class Session:
         """
         with self._lock:
             if MOVES_ZERO & set(changes) and (self._recorder is not None or self._beginning):
-                raise FingervisionError("While a run is recorded the measurement stays as it is: stop recording first.")
+                raise StateError("While a run is recorded the measurement stays as it is: stop recording first.")
             chosen, unzeroed = self.choices.changed(**changes)
             chosen.check(self.description)
             self.choices = chosen
@@ -172,15 +175,15 @@ class Session:
         with self._lock:
             task = self.choices.task
             if self.ended.is_set():
-                raise FingervisionError("The source has ended, so nothing can be recorded: start again.")
+                raise StateError("The source has ended, so nothing can be recorded: start again.")
             if self._recorder is not None:
-                raise FingervisionError(f"A run is being recorded already, in {self._recorder.run.path}.")
+                raise StateError(f"A run is being recorded already, in {self._recorder.run.path}.")
             if self._beginning:
-                raise FingervisionError("A recording is being begun already.")
+                raise StateError("A recording is being begun already.")
             if task is None:
-                raise FingervisionError("The scale is not known: give it before recording, so that the run has gaps.")
+                raise StateError("The scale is not known: give it before recording, so that the run has gaps.")
             if not self.description.has_times:
-                raise FingervisionError("These images have no times, which a recording needs: give --rate-hz.")
+                raise StateError("These images have no times, which a recording needs: give --rate-hz.")
             self._beginning = True
         try:
             # Not while measuring waits: a slow disk would hold it up.
@@ -203,7 +206,7 @@ class Session:
         with self._lock:
             recorder, self._recorder = self._recorder, None
         if recorder is None:
-            raise FingervisionError("Nothing is being recorded.")
+            raise StateError("Nothing is being recorded.")
         recorder.stop()
         self.say("stopped", f"Recorded {recorder.run.frames} frames to {recorder.run.path}.")
         return recorder.run.path
@@ -269,6 +272,8 @@ class Session:
                 self.cadence.restart()
             if row is not None and driven is not None:
                 row = replace(row, run=driven.run, input_mm=driven.input_mm, force_n=driven.force_n)
+            for look in self.on_picture:
+                look(item, row)
             if isinstance(came, Frame):
                 if came.time_s is not None:
                     self.cadence.add(came.time_s)

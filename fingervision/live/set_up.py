@@ -4,7 +4,7 @@ from threading import Thread
 from time import monotonic, sleep
 from typing import Any
 
-from fingervision.domain.errors import FingervisionError
+from fingervision.domain.errors import FingervisionError, StateError
 from fingervision.domain.frame import Frame
 from fingervision.inspection.catalogue import inspect
 from fingervision.inspection.report import as_json
@@ -33,7 +33,7 @@ class SetUp:
 
     def __init__(self, view: View) -> None:
         if view.choices.task is None:
-            raise FingervisionError("The set-up is judged in micrometres: give the scale first.")
+            raise StateError("The set-up is judged in micrometres: give the scale first.")
         self.findings: list[dict[str, Any]] | None = None
         self.words = "Looking at the picture for three seconds."
         self._view = view

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from fingervision.models.mechanism import Mechanism
 from fingervision.models.mechanism_bodies import LinkBody, bodies_of
-from fingervision.vision.rigid_outline import REACH_PX, Chunks
+from fingervision.vision.rigid_outline import REACH_PX, Chunks, FlatMap
 
 Array = NDArray[np.float64]
 
@@ -34,12 +34,15 @@ class Placement:
     is_mirrored : bool
         Whether the picture shows the drawing's back: its y axis then lies to the right of its x axis as the picture is
         seen, and not to the left.
+    flat : FlatMap or None
+        Lens and perspective of the picture; origin and angle are then those on the plane without them.
     """
 
     px_per_mm: float
     origin_px: Array
     angle_rad: float
     is_mirrored: bool
+    flat: FlatMap | None = None
 
     @property
     def axes(self) -> Array:
@@ -49,13 +52,19 @@ class Placement:
         side = 1.0 if self.is_mirrored else -1.0
         return np.array([[c, -side * s], [s, side * c]])
 
-    def to_px(self, points_mm: Array) -> Array:
-        """Place points, shape (2, n)."""
+    def to_flat_px(self, points_mm: Array) -> Array:
+        """Place points, shape (2, n), on the plane as it is seen squarely and without distortion."""
         return np.asarray(self.origin_px[:, None] + self.px_per_mm * self.axes @ points_mm)
+
+    def to_px(self, points_mm: Array) -> Array:
+        """Place points, shape (2, n), in the picture."""
+        flat = self.to_flat_px(points_mm)
+        return flat if self.flat is None else self.flat.to_picture(flat)
 
     def to_mm(self, points_px: Array) -> Array:
         """Take points of the picture back into the drawing, shape (2, n)."""
-        return np.asarray(self.axes.T @ (points_px - self.origin_px[:, None]) / self.px_per_mm)
+        flat = points_px if self.flat is None else self.flat.to_flat(points_px)
+        return np.asarray(self.axes.T @ (flat - self.origin_px[:, None]) / self.px_per_mm)
 
     @property
     def turn_sign(self) -> float:
@@ -80,8 +89,8 @@ class BodyOutline:
     ends_mm: Array
 
     def chunks(self, place: Placement) -> Chunks:
-        """Cut the stretches into chunks as they lie in the picture."""
-        starts, ends = place.to_px(self.starts_mm), place.to_px(self.ends_mm)
+        """Cut the stretches into chunks as they lie on the flat plane."""
+        starts, ends = place.to_flat_px(self.starts_mm), place.to_flat_px(self.ends_mm)
         length = np.hypot(*(ends - starts))
         middles, normals = [], []
         for k in range(length.size):
@@ -103,8 +112,8 @@ class BodyOutline:
         )
 
     def about_px(self, place: Placement) -> Array:
-        """Reference point in the picture."""
-        return np.asarray(place.to_px(self.body.centroid_mm[:, None])[:, 0])
+        """Reference point on the flat plane."""
+        return np.asarray(place.to_flat_px(self.body.centroid_mm[:, None])[:, 0])
 
 
 def outlines_of(mechanism: Mechanism) -> tuple[BodyOutline, ...]:
@@ -135,11 +144,11 @@ def silhouette(mechanism: Mechanism, place: Placement, width_px: int, height_px:
     return np.asarray(mechanism.region.holds(points).reshape(x.shape), dtype=np.float64)
 
 
-def in_sight(chunks: Sequence[Chunks], width_px: int, height_px: int) -> list[float]:
+def in_sight(chunks: Sequence[Chunks], width_px: int, height_px: int, flat: FlatMap | None = None) -> list[float]:
     """Share of each body's chunks that lie in the picture."""
     shares = []
     for each in chunks:
-        x, y = each.middles
+        x, y = each.middles if flat is None else flat.to_picture(each.middles)
         inside = (x > REACH_PX) & (x < width_px - REACH_PX) & (y > REACH_PX) & (y < height_px - REACH_PX)
         shares.append(float(inside.mean()) if inside.size else 0.0)
     return shares

@@ -2,33 +2,42 @@
 
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
+from calib.limits import rectangular
+from calib.measured_scale import Calibration
 from fingervision.domain.body_poses import COVERED, DAMAGED, OK, OUT_OF_VIEW, FramePoses, SeenPose
-from fingervision.domain.errors import FingervisionError
+from fingervision.domain.errors import DataError
 from fingervision.domain.frame import Frame, LostFrame
-from fingervision.frames.source import FrameSource
-from fingervision.measuring.body_outlines import BodyOutline, Placement, outlines_of
+from fingervision.gauges.picture import Picture, picture_of
+from fingervision.gauges.plane_scale import PlaneScale
+from fingervision.measuring.body_outlines import BodyOutline, outlines_of
 from fingervision.measuring.drawing_placement import (
     LEVELS,
     GivenPoint,
     Placed,
     by_points,
     by_silhouette,
-    darkness,
+    levels_of,
     refined,
 )
+from fingervision.measuring.flat_picture import flat_map_of
+from fingervision.measuring.pose_uncertainty import SharedErrors, SharedPose, in_drawing
+from fingervision.measuring.scale import Scale
 from fingervision.models.mechanism import Mechanism
 from fingervision.models.mechanism_bodies import column_name
 from fingervision.storage.bodies_csv import add_channels, write_bodies
-from fingervision.vision.grey import to_grey
+from fingervision.vision.pipeline import Settings
+from fingervision.vision.response_shift import edge_shift_px
 from fingervision.vision.rigid_outline import (
     LEAST_IN_VIEW,
     Chunks,
+    EdgeView,
+    FlatMap,
     RigidFit,
     capture_rigid,
     fit_rigid,
@@ -38,6 +47,10 @@ from fingervision.vision.rigid_outline import (
 Array = NDArray[np.float64]
 
 BODIES, GAPS = "bodies.csv", "gaps.csv"
+LAID_BY_ALL = (
+    "no fixed body is in view: the drawing was laid by all bodies together, so that poses count from their mean place "
+    "in the first frame and not from the ground; only their motion and the angles of hinges mean something."
+)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -69,14 +82,19 @@ class BodyTracker:
     ----------
     mechanism : Mechanism
         The drawing.
-    px_per_mm : float
-        Scale.
+    scale : Scale
+        From pixels to millimetres; lens and plane of a calibration are taken off the outlines' points.
     points : sequence of GivenPoint
         Where points of the drawing lie in the first picture; none to find it by its silhouette.
+    settings : Settings
+        How the recording is measured: which light a level is taken for.
     """
 
-    def __init__(self, mechanism: Mechanism, px_per_mm: float, points: Sequence[GivenPoint] = ()) -> None:
-        self.mechanism, self.px_per_mm, self._points = mechanism, px_per_mm, tuple(points)
+    def __init__(
+        self, mechanism: Mechanism, scale: Scale, points: Sequence[GivenPoint] = (), settings: Settings | None = None
+    ) -> None:
+        self.mechanism, self.scale, self._points = mechanism, scale, tuple(points)
+        self.settings = Settings(below_tip_px=1.0) if settings is None else settings
         self.outlines = outlines_of(mechanism)
         self.placed: Placed | None = None
 
@@ -86,95 +104,125 @@ class BodyTracker:
         Raises
         ------
         FingervisionError
-            The drawing cannot be laid on that frame.
+            The drawing cannot be laid on that frame, or the scale is for frames of another size.
         """
         for item in frames:
             if isinstance(item, LostFrame):
                 yield FramePoses(item.index, item.time_s, {n: SeenPose(DAMAGED) for n in self._names()})
                 continue
-            grey = to_grey(item.pixels).astype(np.float64)
+            picture = picture_of(item, self.settings)
+            grey = np.asarray(picture.grey if picture.light is None else picture.light[picture.grey], dtype=np.float64)
+            view = self._view(picture)
             if self.placed is None:
-                self._place(grey, item.index)
-            yield FramePoses(item.index, item.time_s, self._seen(grey))
+                self._place(grey, item.index, view, picture)
+            yield FramePoses(item.index, item.time_s, self._seen(grey, view))
 
     def _names(self) -> list[str]:
         bodies = [outline.body.name for outline in self.outlines]
         return [*bodies, *(flexure.name for flexure in self.mechanism.flexures)]
 
-    def _place(self, grey: Array, index: int) -> None:
+    def _view(self, picture: Picture) -> EdgeView:
+        """How edges show: half of the edge bias widens what is dark on each of its sides."""
+        dark = self.placed is None or self.placed.body_is_dark
+        outward_px = (0.5 if dark else -0.5) * self.scale.edge_bias_px
+        return EdgeView(flat_map_of(self.scale), outward_px, picture.shared_pixels)
+
+    def _place(self, grey: Array, index: int, view: EdgeView, picture: Picture) -> None:
+        height, width = grey.shape
+        self.scale.check_frame_size(width, height)
+        px_per_mm, flat = self.scale.px_per_mm, view.flat
         if self._points:
-            place = by_points(self._points, self.px_per_mm)
-            placed = Placed(place, darkness(grey, self.mechanism, place), ())
+            place = by_points(self._points, px_per_mm, flat)
+            inside, ground = levels_of(grey, self.mechanism, place)
+            placed = Placed(place, inside < ground, ())
         else:
-            placed = by_silhouette(grey, self.mechanism, self.px_per_mm)
-        exact = refined(grey, self.outlines, placed.place, placed.body_is_dark)
-        if exact is None:
-            raise FingervisionError(
+            placed = by_silhouette(grey, self.mechanism, px_per_mm, flat)
+            inside, ground = levels_of(grey, self.mechanism, placed.place)
+        if not placed.body_is_dark:
+            view = replace(view, outward_px=-view.outward_px)
+        laid = refined(grey, self.outlines, placed.place, placed.body_is_dark, view)
+        if laid is None:
+            raise DataError(
                 f"The edges of {self.mechanism.name} must be seen where it is laid on frame {index}, but are not: "
                 "check the scale and the drawing, or give --at X,Y=XMM,YMM for three points."
             )
-        self.placed = Placed(exact, placed.body_is_dark, placed.notes)
-        self._chunks = [outline.chunks(exact) for outline in self.outlines]
-        self._about = [outline.about_px(exact) for outline in self.outlines]
+        notes = placed.notes if laid.by_fixed else (*placed.notes, LAID_BY_ALL)
+        self.placed = Placed(laid.place, placed.body_is_dark, notes)
+        plane = PlaneScale(self.scale, (width, height)) if isinstance(self.scale, Calibration) else None
+        other, shift_px = self.settings.other_response, 0.0
+        if other is not None:
+            shares = (inside / picture.top, ground / picture.top)
+            shift_px = edge_shift_px(self.settings.response, other, *shares, laid.fit.blur_px)
+        self._shared = SharedErrors(laid.fit, laid.about_px, plane, rectangular(abs(shift_px)))
+        self._chunks = [outline.chunks(laid.place) for outline in self.outlines]
+        self._about = [outline.about_px(laid.place) for outline in self.outlines]
         self._last: list[tuple[Array, float]] = [(np.zeros(2), 0.0)] * len(self.outlines)
 
-    def _fit(
-        self, grey: Array, pyramid: list[Array], chunks: Chunks, about: Array, last: tuple[Array, float]
-    ) -> RigidFit | None:
+    def _fit(self, grey: Array, pyramid: list[Array], number: int, view: EdgeView) -> RigidFit | None:
         """Fit near where it was last; else from farther away."""
         dark = self.placed is not None and self.placed.body_is_dark
-        found = fit_rigid(grey, chunks, about, dark, last)
+        chunks, about, last = self._chunks[number], self._about[number], self._last[number]
+        found = fit_rigid(grey, chunks, about, dark, last, view)
         if found is None or found.seen < 0.8 * found.in_view:
             if not pyramid:
                 pyramid += halved(grey, LEVELS)
-            wider = capture_rigid(grey, pyramid, chunks, about, dark, last)
+            wider = capture_rigid(grey, pyramid, chunks, about, dark, last, view)
             if found is None or (wider is not None and wider.seen > found.seen):
                 found = wider
         return found
 
-    def _seen(self, grey: Array) -> dict[str, SeenPose]:
+    def _seen(self, grey: Array, view: EdgeView) -> dict[str, SeenPose]:
         if self.placed is None:
             raise AssertionError("no drawing was laid")
         place, pyramid = self.placed.place, list[Array]()
         found: dict[str, SeenPose] = {}
+        shared: dict[str, SharedPose] = {}
         for number, outline in enumerate(self.outlines):
             name = outline.body.name
             chunks, about = self._chunks[number], self._about[number]
-            fit = self._fit(grey, pyramid, chunks, about, self._last[number]) if chunks.middles.shape[1] >= 3 else None
+            fit = self._fit(grey, pyramid, number, view) if chunks.middles.shape[1] >= 3 else None
             if fit is None:
-                found[name] = SeenPose(self._why(grey, chunks, about, self._last[number]))
+                found[name] = SeenPose(self._why(grey, chunks, about, self._last[number], view.flat))
                 continue
             self._last[number] = (fit.shift_px, fit.angle_rad)
             if fit.in_view < LEAST_IN_VIEW * fit.all:
                 found[name] = SeenPose(OUT_OF_VIEW)
                 continue
-            found[name] = _pose(fit, place)
-        return found | self._hinges(found)
+            at = (about + fit.shift_px)[:, None]
+            at = at if view.flat is None else view.flat.to_picture(at)
+            shared[name] = self._shared.of_pose(fit, about, at[:, 0])
+            into = in_drawing(place)
+            pose = into @ np.array([*fit.shift_px, fit.angle_rad])
+            random = into @ fit.covariance @ into.T
+            whole = random + into @ shared[name].covariance @ into.T
+            found[name] = SeenPose(OK, float(pose[0]), float(pose[1]), float(pose[2]), whole, random)
+        return found | self._hinges(found, shared)
 
-    def _why(self, grey: Array, chunks: Chunks, about: Array, last: tuple[Array, float]) -> str:
+    def _why(self, grey: Array, chunks: Chunks, about: Array, last: tuple[Array, float], flat: FlatMap | None) -> str:
         height, width = grey.shape
-        x, y = chunks.moved(last[0], last[1], about).middles
+        middles = chunks.moved(last[0], last[1], about).middles
+        x, y = middles if flat is None else flat.to_picture(middles)
         inside = (x > 0.0) & (x < width) & (y > 0.0) & (y < height)
         return COVERED if inside.size and inside.mean() >= LEAST_IN_VIEW else OUT_OF_VIEW
 
-    def _hinges(self, poses: Mapping[str, SeenPose]) -> dict[str, SeenPose]:
+    def _hinges(self, poses: Mapping[str, SeenPose], shared: Mapping[str, SharedPose]) -> dict[str, SeenPose]:
         """Angles of hinges: how far the body beyond turned against the one before."""
         found = {}
         for flexure in self.mechanism.flexures:
-            ends = [self._joined(flexure.name, side) for side in (-1.0, 1.0)]
-            seen = [poses[outline.body.name] for outline in ends]
+            first, last = (self._joined(flexure.name, side).body.name for side in (-1.0, 1.0))
+            seen = [poses[first], poses[last]]
             lost = [pose.status for pose in seen if pose.status != OK]
             if lost:
                 found[flexure.name] = SeenPose(lost[0])
                 continue
-            angle, variance = 0.0, 0.0
+            angle, random = 0.0, np.zeros((3, 3))
             for sign, pose in zip((-1.0, 1.0), seen, strict=True):
-                if pose.angle_mrad is not None and pose.covariance is not None:
+                if pose.angle_mrad is not None and pose.random is not None:
                     angle += sign * pose.angle_mrad
-                    variance += float(pose.covariance[2, 2])
-            covariance = np.zeros((3, 3))
-            covariance[2, 2] = variance
-            found[flexure.name] = SeenPose(OK, None, None, angle, covariance)
+                    random[2, 2] += float(pose.random[2, 2])
+            whole = random.copy()
+            whole[2, 2] += (1e3 * shared[last].u_turn_against(shared[first])) ** 2
+            found[flexure.name] = SeenPose(OK, None, None, angle, whole, random)
         return found
 
     def _joined(self, flexure: str, side: float) -> BodyOutline:
@@ -184,35 +232,32 @@ class BodyTracker:
         return held[0] if held else min(self.outlines, key=lambda o: float(np.hypot(*(o.body.centroid_mm - at))))
 
 
-def _pose(fit: RigidFit, place: Placement) -> SeenPose:
-    """Turn a motion in the picture into the drawing's axes."""
-    x, y = place.axes.T @ fit.shift_px / place.px_per_mm
-    into = np.zeros((3, 3))
-    into[:2, :2] = place.axes.T / place.px_per_mm
-    into[2, 2] = 1e3 * place.turn_sign
-    angle = 1e3 * place.turn_sign * fit.angle_rad
-    return SeenPose(OK, float(x), float(y), angle, into @ fit.covariance @ into.T)
-
-
 def measure_bodies(
-    source: FrameSource, mechanism: Mechanism, px_per_mm: float, points: Sequence[GivenPoint], out: Path
+    source: Iterable[Frame | LostFrame],
+    mechanism: Mechanism,
+    scale: Scale,
+    points: Sequence[GivenPoint],
+    out: Path,
+    settings: Settings | None = None,
 ) -> BodiesMeasured:
     """Follow the bodies of a recording into bodies.csv, and add them to the rows of its gaps.csv where there is one.
 
     Parameters
     ----------
-    source : FrameSource
+    source : iterable of Frame or LostFrame
         The recording; read once.
     mechanism : Mechanism
         The drawing.
-    px_per_mm : float
-        Scale.
+    scale : Scale
+        From pixels to millimetres.
     points : sequence of GivenPoint
         Where points of the drawing lie in the first picture; none to find it by its silhouette.
     out : Path
         Folder of the results.
+    settings : Settings or None
+        How the recording is measured; plain ones where None.
     """
-    tracker = BodyTracker(mechanism, px_per_mm, points)
+    tracker = BodyTracker(mechanism, scale, points, settings)
     poses = list(tracker.poses(source))
     write_bodies(out / BODIES, poses)
     gaps = out / GAPS

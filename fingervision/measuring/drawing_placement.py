@@ -7,10 +7,10 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from fingervision.domain.errors import FingervisionError, UsageError
+from fingervision.domain.errors import DataError, UsageError
 from fingervision.measuring.body_outlines import BodyOutline, Placement, in_sight, silhouette
 from fingervision.models.mechanism import Mechanism
-from fingervision.vision.rigid_outline import Chunks, capture_rigid, halved
+from fingervision.vision.rigid_outline import PLAIN, Chunks, EdgeView, FlatMap, RigidFit, capture_rigid, halved
 
 Array = NDArray[np.float64]
 
@@ -89,7 +89,7 @@ def parse_point(text: str) -> GivenPoint:
     return GivenPoint(x_px, y_px, x_mm, y_mm)
 
 
-def by_points(points: Sequence[GivenPoint], px_per_mm: float) -> Placement:
+def by_points(points: Sequence[GivenPoint], px_per_mm: float, flat: FlatMap | None = None) -> Placement:
     """Lay a drawing by points; two leave its front towards the camera, three tell its side.
 
     Raises
@@ -100,6 +100,7 @@ def by_points(points: Sequence[GivenPoint], px_per_mm: float) -> Placement:
     if len(points) < 2:
         raise UsageError(f"--at must be given for at least two points of the drawing, but is given for {len(points)}.")
     px = np.array([(p.x_px, p.y_px) for p in points]).T
+    px = px if flat is None else flat.to_flat(px)
     mm = np.array([(p.x_mm, p.y_mm) for p in points]).T
     here, there = px - px.mean(axis=1)[:, None], mm - mm.mean(axis=1)[:, None]
     size = float(np.sqrt(np.sum(there**2)))
@@ -115,13 +116,13 @@ def by_points(points: Sequence[GivenPoint], px_per_mm: float) -> Placement:
     for is_mirrored in (False, True) if len(points) > 2 else (False,):
         flipped = there * np.array([[1.0], [1.0 if is_mirrored else -1.0]])
         angle = float(np.arctan2(np.sum(flipped[0] * here[1] - flipped[1] * here[0]), np.sum(flipped * here)))
-        place = Placement(px_per_mm, np.zeros(2), angle, is_mirrored)
+        place = Placement(px_per_mm, np.zeros(2), angle, is_mirrored, flat)
         place = replace(place, origin_px=px.mean(axis=1) - px_per_mm * place.axes @ mm.mean(axis=1))
-        found.append((float(np.sum((place.to_px(mm) - px) ** 2)), is_mirrored, place))
+        found.append((float(np.sum((place.to_flat_px(mm) - px) ** 2)), is_mirrored, place))
     return min(found, key=lambda entry: entry[:2])[2]
 
 
-def by_silhouette(grey: Array, mechanism: Mechanism, px_per_mm: float) -> Placed:
+def by_silhouette(grey: Array, mechanism: Mechanism, px_per_mm: float, flat: FlatMap | None = None) -> Placed:
     """Lay a drawing so that its silhouette covers what is dark, or light, in the picture.
 
     Raises
@@ -140,9 +141,11 @@ def by_silhouette(grey: Array, mechanism: Mechanism, px_per_mm: float) -> Placed
         if not rows.size:
             continue
         middle = step * np.array([columns.mean(), rows.mean()])
+        middle = middle if flat is None else flat.to_flat(middle[:, None])[:, 0]
         for is_mirrored in (False, True):
             for angle in np.linspace(-np.pi, np.pi, TURNS, endpoint=False):
-                place = _centred(Placement(px_per_mm, np.zeros(2), float(angle), is_mirrored), mechanism, middle)
+                place = Placement(px_per_mm, np.zeros(2), float(angle), is_mirrored, flat)
+                place = _centred(place, mechanism, middle)
                 rough = silhouette(mechanism, place, width, height, SKIPPED * step)
                 overlap = _overlap(mask[::SKIPPED, ::SKIPPED], rough)
                 found.append((overlap, place, body_is_dark))
@@ -155,7 +158,7 @@ def by_silhouette(grey: Array, mechanism: Mechanism, px_per_mm: float) -> Placed
     best.sort(key=lambda entry: -entry[0])
     if not best or best[0][0] < LEAST_OVERLAP:
         share = best[0][0] if best else 0.0
-        raise FingervisionError(
+        raise DataError(
             f"The drawing {mechanism.name} must cover what the picture shows, but at best {100.0 * share:.0f} % of "
             "both is common: show the whole mechanism, check the scale, or give --at X,Y=XMM,YMM for three points."
         )
@@ -166,7 +169,7 @@ def by_silhouette(grey: Array, mechanism: Mechanism, px_per_mm: float) -> Placed
     drawn = silhouette(mechanism, top[1], width, height, step) > 0.5
     size = (width, height, step)
     if any(_climbed(drawn, mechanism, entry[1], size, 0.0)[0] < ALIKE for entry in others):
-        raise FingervisionError(
+        raise DataError(
             f"The drawing {mechanism.name} lies on the picture in {1 + len(others)} ways as well as one: give --at "
             "X,Y=XMM,YMM for three points of it."
         )
@@ -179,21 +182,46 @@ def by_silhouette(grey: Array, mechanism: Mechanism, px_per_mm: float) -> Placed
     return Placed(chosen[1], chosen[2], (note,))
 
 
-def refined(grey: Array, outlines: Sequence[BodyOutline], place: Placement, body_is_dark: bool) -> Placement | None:
+@dataclass(frozen=True, slots=True, eq=False)
+class Laid:
+    """A drawing laid by edges.
+
+    Parameters
+    ----------
+    place : Placement
+        Where.
+    fit : RigidFit
+        The fit of these edges, counted from where the drawing was thought to lie.
+    about_px : ndarray of float, shape (2,)
+        The point about which it was fitted, where it was found, on the flat plane.
+    by_fixed : bool
+        Whether they are those of fixed bodies.
+    """
+
+    place: Placement
+    fit: RigidFit
+    about_px: Array
+    by_fixed: bool
+
+
+def refined(
+    grey: Array, outlines: Sequence[BodyOutline], place: Placement, body_is_dark: bool, view: EdgeView = PLAIN
+) -> Laid | None:
     """Lay the drawing by the edges of its fixed bodies, or of all where none is in view; None where they are lost."""
     height, width = grey.shape
     cut = [outline.chunks(place) for outline in outlines]
-    shares = in_sight(cut, width, height)
+    shares = in_sight(cut, width, height, place.flat)
     fixed = [c for c, o, share in zip(cut, outlines, shares, strict=True) if o.body.is_fixed and share > 0.5]
     chunks = together(fixed or cut)
     about = chunks.middles.mean(axis=1)
-    found = capture_rigid(grey, halved(grey, LEVELS), chunks, about, body_is_dark, (np.zeros(2), 0.0))
+    found = capture_rigid(grey, halved(grey, LEVELS), chunks, about, body_is_dark, (np.zeros(2), 0.0), view)
     if found is None:
         return None
     angle = place.angle_rad + found.angle_rad
     turn = np.array([[np.cos(found.angle_rad), -np.sin(found.angle_rad)],
                      [np.sin(found.angle_rad), np.cos(found.angle_rad)]])  # fmt: skip
-    return replace(place, angle_rad=angle, origin_px=turn @ (place.origin_px - about) + about + found.shift_px)
+    exact = replace(place, angle_rad=angle, origin_px=turn @ (place.origin_px - about) + about + found.shift_px)
+    return Laid(exact, found, about + found.shift_px, bool(fixed))
 
 
 def together(parts: Sequence[Chunks]) -> Chunks:
@@ -205,18 +233,18 @@ def together(parts: Sequence[Chunks]) -> Chunks:
     )
 
 
-def darkness(grey: Array, mechanism: Mechanism, place: Placement) -> bool:
-    """Whether the mechanism is darker than its ground, where it lies."""
+def levels_of(grey: Array, mechanism: Mechanism, place: Placement) -> tuple[float, float]:
+    """Median level of the mechanism, where it lies, and of its ground."""
     height, width = grey.shape
     step = max(1, max(width, height) // GRID)
     inside = silhouette(mechanism, place, width, height, step) > 0.5
     small = grey[::step, ::step]
     if inside.all() or not inside.any():
-        raise FingervisionError(
+        raise DataError(
             f"The drawing {mechanism.name} must lie in the picture and leave some of its ground, but covers "
             f"{'all' if inside.any() else 'none'} of it: check --at and the scale."
         )
-    return bool(np.median(small[inside]) < np.median(small[~inside]))
+    return float(np.median(small[inside])), float(np.median(small[~inside]))
 
 
 def _bytes(grey: Array) -> NDArray[np.uint8]:

@@ -13,6 +13,7 @@ from fingervision.frames.camera_settings import coding_of
 from fingervision.frames.frame_range import frame_range
 from fingervision.frames.source import Description, FrameSource
 from fingervision.measuring.asked_to_stop import asked_to_stop
+from fingervision.measuring.gap_budget import gap_budget
 from fingervision.measuring.marked import marked
 from fingervision.measuring.one_polarity import one_polarity
 from fingervision.measuring.other_camera import other_camera
@@ -117,6 +118,8 @@ def measure_frames(
             pending.clear()
             rows = how.row_maker.rows(results)
             series.add(results, rows)
+            if measured := [result.outcome for result in results if isinstance(result.outcome, GapMeasurement)]:
+                series.add_budget(gap_budget(measured, how.row_maker.scale))
             take_rows(results, rows)
 
         # Whatever ends the loop.

@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from fingervision.domain.drive import DriveHistory
-from fingervision.domain.errors import FingervisionError
+from fingervision.domain.errors import OutputError
 from fingervision.domain.status import Status
 from fingervision.measuring.clock.alignment import ClockOffset
 from fingervision.measuring.series import GapSeries
@@ -41,7 +41,7 @@ def draw_gap(
         part.replace(path)
     except OSError as error:
         part.unlink(missing_ok=True)
-        raise FingervisionError(
+        raise OutputError(
             f"{path} could not be written ({error.strerror}): make room or name another --out, and measure again."
         ) from error
 

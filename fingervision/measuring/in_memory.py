@@ -1,19 +1,23 @@
 """A recording measured without a file: every row and result kept in memory."""
 
 from collections.abc import Sequence
+from contextlib import ExitStack
 from dataclasses import dataclass, field, replace
 from typing import Any
 
+from fingervision.domain.errors import DataError
 from fingervision.domain.frame import Frame, LostFrame
 from fingervision.frames.source import FrameSource
+from fingervision.gauges.recording import GaugeRecording
 from fingervision.measuring.clock.alignment import ClockOffset
 from fingervision.measuring.drive_at import drive_at
 from fingervision.measuring.frame_loop import Prepared, Progress, measure_frames, prepared
-from fingervision.measuring.outcome import Clock, clock_for, refuse_undriven, summary_of
+from fingervision.measuring.outcome import Clock, clock_for, summary_of, undriven
 from fingervision.measuring.rows import Result
 from fingervision.measuring.series import GapSeries
 from fingervision.measuring.task import Task, check_task
 from fingervision.storage.gaps_csv import TIME_PLACES, GapRow
+from fingervision.storage.gauges_csv import GaugeRow, GaugeRows
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -42,6 +46,10 @@ class MeasuredInMemory:
         The first picture that could be read.
     stopped : bool
         Whether the user stopped it before the recording's end.
+    refusal : DataError or None
+        Why the drive gave no frame an input, where there is a drive and it gave none.
+    gauge_rows : tuple of GaugeRow
+        What the gauges read; as in gauges.csv.
     """
 
     source: FrameSource
@@ -54,6 +62,8 @@ class MeasuredInMemory:
     summary: dict[str, Any] = field(repr=False)
     first_frame: Frame | None = field(repr=False)
     stopped: bool = False
+    refusal: DataError | None = None
+    gauge_rows: tuple[GaugeRow, ...] = field(default=(), repr=False)
 
 
 def measure_in_memory(source: FrameSource, task: Task, on_progress: Progress | None = None) -> MeasuredInMemory:
@@ -73,7 +83,7 @@ def measure_in_memory(source: FrameSource, task: Task, on_progress: Progress | N
     UsageError
         The region lies outside the frame.
     FingervisionError
-        The scale is for other frames, or the drive gives no frame an input.
+        The scale is for other frames, or a gauge lies outside of them.
     """
     check_task(task, source.description)
     how = prepared(source.description, task)
@@ -81,22 +91,36 @@ def measure_in_memory(source: FrameSource, task: Task, on_progress: Progress | N
     rows: list[GapRow] = []
     results: list[Result] = []
     first: list[Frame] = []
+    description = how.description
+    gauge_rows = GaugeRows()
+    gauges = (
+        GaugeRecording(task.gauges, task.scale, (description.width_px, description.height_px), how.settings, gauge_rows)
+        if task.gauges
+        else None
+    )
 
     def take_rows(these: Sequence[Result], of_these: Sequence[GapRow]) -> None:
         results.extend(these)
         rows.extend(of_these)
 
-    def see_item(item: Frame | LostFrame, _: Result) -> None:
+    def see_item(item: Frame | LostFrame, result: Result) -> None:
+        if gauges is not None:
+            gauges.add(item, result.outcome)
         if not first and isinstance(item, Frame):
             # The decoder's memory may be used again for the next picture.
             first.append(replace(item, pixels=item.pixels.copy()))
 
-    stopped = measure_frames(source, how, series, take_rows, see_item, on_progress)
+    with ExitStack() as stack:
+        if gauges is not None:
+            stack.enter_context(gauges)
+        stopped = measure_frames(source, how, series, take_rows, see_item, on_progress)
     clock = clock_for(series, task)
     if isinstance(clock, ClockOffset):
         rows = [_with_drive(row, task, clock) for row in rows]
-    if not stopped:
-        refuse_undriven(task, series, clock, {row.input_mm is not None for row in rows}, "measured")
+    refusal = None if stopped else undriven(task, series, clock, {row.input_mm is not None for row in rows}, "measured")
+    summary = summary_of(how, task, series, clock, complete=not stopped)
+    if gauges is not None:
+        summary["gauges"] = gauges.in_words()
     return MeasuredInMemory(
         source,
         task,
@@ -105,9 +129,11 @@ def measure_in_memory(source: FrameSource, task: Task, on_progress: Progress | N
         tuple(results),
         series,
         clock,
-        summary_of(how, task, series, clock, complete=not stopped),
+        summary,
         first[0] if first else None,
         stopped,
+        refusal,
+        tuple(gauge_rows),
     )
 
 

@@ -15,7 +15,7 @@ from fingervision.measuring.clock.alignment import ClockOffset
 from fingervision.measuring.clock.common_clock import join_drive
 from fingervision.measuring.frame_loop import Progress, measure_frames, prepared
 from fingervision.measuring.gap_figure import draw_gap
-from fingervision.measuring.outcome import clock_drawn, clock_for, refuse_undriven, summary_of
+from fingervision.measuring.outcome import clock_drawn, clock_for, summary_of, undriven
 from fingervision.measuring.output_folder import OutputFolder, claimed, held
 from fingervision.measuring.overlay_video import OverlayVideo
 from fingervision.measuring.rows import Result
@@ -135,8 +135,8 @@ def _measured(source: FrameSource, task: Task, out: Path, on_progress: Progress 
     if gauges is not None:
         summary["gauges"] = gauges.in_words()
     write_summary(folder.summary, summary)
-    if not stopped:
-        refuse_undriven(task, series, clock, driven, f"in {folder.gaps}")
+    if not stopped and (refusal := undriven(task, series, clock, driven, f"in {folder.gaps}")) is not None:
+        raise refusal
     if task.steps_frame is not None and not folder.steps.exists() and not stopped:
         raise UsageError(
             f"--steps must be the number of a frame that can be read, 0 to {series.frames - 1}, "

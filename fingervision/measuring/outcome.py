@@ -4,7 +4,7 @@ from collections.abc import Set
 from dataclasses import replace
 from typing import Any
 
-from fingervision.domain.errors import FingervisionError
+from fingervision.domain.errors import DataError
 from fingervision.domain.status import Status
 from fingervision.measuring.clock.alignment import ClockOffset, NoClockOffset
 from fingervision.measuring.clock.common_clock import clock_of, refusal, sentence
@@ -37,8 +37,8 @@ def summary_of(how: Prepared, task: Task, series: GapSeries, clock: Clock, *, co
     return summarise(description, settings, task.scale, task.scale_file, series, complete=complete)
 
 
-def refuse_undriven(task: Task, series: GapSeries, clock: Clock, driven: Set[bool], where: str) -> None:
-    """Refuse a drive that gave no frame an input.
+def undriven(task: Task, series: GapSeries, clock: Clock, driven: Set[bool], where: str) -> DataError | None:
+    """Say why a drive gave no frame an input; None where it gave some, or there is none.
 
     Parameters
     ----------
@@ -53,16 +53,17 @@ def refuse_undriven(task: Task, series: GapSeries, clock: Clock, driven: Set[boo
     where : str
         Where the gaps are, for the sentence.
 
-    Raises
-    ------
-    FingervisionError
+    Returns
+    -------
+    DataError or None
         The offset was not found, or the one that was given leaves no frame within the drive's times.
     """
     if isinstance(clock, NoClockOffset) and series.counts[Status.OK]:
-        raise refusal(clock, where)
+        return refusal(clock, where)
     if task.drive is not None and task.drive_offset_s is not None and driven == {False}:
-        raise FingervisionError(
+        return DataError(
             f"No frame lies within the drive's times ({task.drive.time_s[0]:g} to {task.drive.time_s[-1]:g} s, shifted "
             f"by {task.drive_offset_s:g} s), so no row has an input; the gaps are {where}. Give another "
             "--drive-offset-s, or leave it out to have it found from the motion."
         )
+    return None

@@ -6,7 +6,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
-from fingervision.domain.errors import FingervisionError, UsageError
+from fingervision.domain.errors import OutputError, UsageError
 from fingervision.storage.folder_lock import FolderLock
 from fingervision.storage.gaps_csv import COLUMNS
 from fingervision.storage.out_folder import make_out_folder, out_folder
@@ -78,7 +78,7 @@ def claimed(path: Path, recording_files: tuple[Path, ...]) -> OutputFolder:
     with out_folder(path):
         present = [name for name in names if (path / name).exists()]
         if present and not _is_ours(path / GAPS):
-            raise FingervisionError(
+            raise OutputError(
                 f"{path} already holds {present[0]}, and no earlier measurement of fingervision wrote it: "
                 "name another folder with --out."
             )

@@ -9,7 +9,7 @@ import av
 import numpy as np
 from numpy.typing import NDArray
 
-from fingervision.domain.errors import FingervisionError
+from fingervision.domain.errors import FingervisionError, OutputError
 from fingervision.domain.frame import Frame, LostFrame
 from fingervision.domain.gap import GapMeasurement, NoGap
 from fingervision.frames.source import Description
@@ -98,7 +98,7 @@ class OverlayVideo:
 
     def _failed(self, error: Exception) -> FingervisionError:
         why = getattr(error, "strerror", None) or str(error)
-        return FingervisionError(
+        return OutputError(
             f"{self._path} could not be written ({why}): make room, name another --out, or leave out --overlay."
         )
 

@@ -9,9 +9,8 @@ from fingervision.domain.drive import DriveHistory
 from fingervision.domain.frame import Frame, LostFrame
 from fingervision.domain.gap import GapMeasurement, NoGap
 from fingervision.measuring.drive_at import drive_at
-from fingervision.measuring.response_budget import u_response_shift_mm
+from fingervision.measuring.gap_budget import gap_budget
 from fingervision.measuring.scale import Scale
-from fingervision.measuring.tip_bias import u_tip_bias_mm
 from fingervision.storage.gaps_csv import GapRow
 
 
@@ -84,10 +83,7 @@ class RowMaker:
                 across[chosen] = self.scale.positions_mm(points[chosen], axis, light_gap[chosen], self.frame_size_px)
         u_mm: list[float | None] = [None] * len(measured)
         if distances.u_mm is not None:
-            u_tip_mm = u_tip_bias_mm(measured, self.scale.edge_bias_px, self.scale.px_per_mm)
-            u_shift_mm = np.array([m.u_shift_px for m in measured]) / self.scale.px_per_mm
-            u_response_mm = u_response_shift_mm(measured, self.scale)
-            u_mm = np.sqrt(distances.u_mm**2 + u_tip_mm**2 + u_shift_mm**2 + u_response_mm**2).tolist()
+            u_mm = gap_budget(measured, self.scale).u_mm.tolist()
         return list(
             zip(
                 distances.value_mm.tolist(),

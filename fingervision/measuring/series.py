@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from calib.budget import Budget
 from fingervision.domain.gap import GapMeasurement
 from fingervision.domain.status import Status
 from fingervision.measuring.rows import Result
@@ -17,6 +18,8 @@ from fingervision.storage.gaps_csv import GapRow
 
 # Even and odd rows that see a finger farther apart than this (pixels) are fields; colour sensors leave smaller combs.
 COMB_PX = 0.2
+# Decimals of a part of the uncertainty, mm: the sum must not depend on how many frames came at once.
+PLACES = 9
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,6 +68,7 @@ class GapSeries:
     beside: Counter[str] = field(default_factory=Counter)
     votes: Counter[str] = field(default_factory=Counter)
     has_budget: bool = False
+    _squares: dict[tuple[str, str, str], float] = field(default_factory=dict)
     _frame: array[int] = field(default_factory=lambda: array("q"))
     _time_s: array[float] = field(default_factory=lambda: array("d"))
     _gap_mm: array[float] = field(default_factory=lambda: array("d"))
@@ -74,6 +78,23 @@ class GapSeries:
     _response_px: array[float] = field(default_factory=lambda: array("d"))
     _bad_frame: array[int] = field(default_factory=lambda: array("q"))
     _bad_time_s: array[float] = field(default_factory=lambda: array("d"))
+
+    def add_budget(self, budget: Budget) -> None:
+        """Take in where the uncertainty of a few more gaps comes from."""
+        for line in budget.lines:
+            kind = "shared" if line.shared else "random"
+            part = (line.source, kind, line.supplied)
+            self._squares[part] = self._squares.get(part, 0.0) + float(np.sum(line.u_mm**2))
+
+    @property
+    def budget(self) -> list[dict[str, str | float]]:
+        """Each part of the gaps' uncertainty, largest first: its source, kind, root mean square in mm, and origin."""
+        count = len(self._gap_mm)
+        rms_mm = {line: (square / count) ** 0.5 for line, square in self._squares.items() if count}
+        return [
+            {"source": source, "kind": kind, "rms_u_mm": round(u_mm, PLACES), "from": supplied}
+            for (source, kind, supplied), u_mm in sorted(rms_mm.items(), key=lambda each: -each[1])
+        ]
 
     def add(self, results: Sequence[Result], rows: Sequence[GapRow]) -> None:
         """Take in the rows of a few frames."""

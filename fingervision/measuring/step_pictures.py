@@ -6,7 +6,7 @@ from pathlib import Path
 
 import cv2
 
-from fingervision.domain.errors import FingervisionError
+from fingervision.domain.errors import OutputError
 from fingervision.domain.frame import Frame, Pixels
 from fingervision.vision.pipeline import Settings, steps
 
@@ -46,7 +46,7 @@ def write_steps(
             path.write_bytes(cv2.imencode(".png", stored)[1].tobytes())
             written.append(path)
     except OSError as error:
-        raise FingervisionError(
+        raise OutputError(
             f"The pictures of the steps could not be written to {folder} ({error.strerror}): "
             "make room or name another --out, and measure again."
         ) from error

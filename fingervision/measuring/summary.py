@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from calib.measured_scale import Calibration
 from fingervision import __version__
-from fingervision.domain.errors import FingervisionError
+from fingervision.domain.errors import InputFileError
 from fingervision.domain.status import Status
 from fingervision.frames.source import Description
 from fingervision.measuring.scale import Scale
@@ -43,6 +43,15 @@ BESIDE = {
     "progressive pictures.",
 }
 BYTES_AT_ONCE = 1 << 20
+LEAST_BITS_A_PIXEL = 0.05
+"""H.264 at 1 Mbit/s of 640x480 at 25 Hz has 0.13 and is measured (tests/benchmarks/accuracy.py); at 0.4 it has this."""
+HIDDEN_BY_COMPRESSION = (
+    Status.NO_FINGERS,
+    Status.ONE_FINGER,
+    Status.TIP_OUT_OF_VIEW,
+    Status.LOW_CONTRAST,
+    Status.BLURRED,
+)
 
 
 def summarise(
@@ -103,14 +112,31 @@ def summarise(
             for status, found in series.first_without.items()
         },
         "gap": _statistics(series),
-        "uncertainty": _uncertainty(scale, settings),
+        "uncertainty": {**_uncertainty(scale, settings), "parts": series.budget},
         "advice": [
+            *_about_unseen(description, series),
             *([LOSSLESS_ADVICE.format(codec=description.codec)] if description.lossy else []),
             *_about_fingers(series),
             *about_edges(series),
             *description.notes,
         ],
     }
+
+
+def _about_unseen(description: Description, series: GapSeries) -> list[str]:
+    """Say so where compression may be what hides the fingers, and light, region and focus are the wrong advice."""
+    count = sum(series.counts[status] for status in HIDDEN_BY_COMPRESSION)
+    pixels = series.frames * description.width_px * description.height_px
+    if not (description.lossy and count and pixels):
+        return []
+    bits = 8.0 * sum(file.stat().st_size for file in description.files if file.is_file()) / pixels
+    if not 0.0 < bits < LEAST_BITS_A_PIXEL:
+        return []
+    return [
+        f"In {count} of {series.frames} frames no fingers with straight edges were found, and the recording holds "
+        f"{bits:.2g} bit a pixel ({description.codec}): compression to less than {LEAST_BITS_A_PIXEL:g} smears edges "
+        "until they are none. Record at a higher bit rate, or losslessly, before you change light, focus or region."
+    ]
 
 
 def _about_fingers(series: GapSeries) -> list[str]:
@@ -239,5 +265,5 @@ def _hash_of(file: Path) -> str:
             while block := content.read(BYTES_AT_ONCE):
                 found.update(block)
     except OSError as error:
-        raise FingervisionError(f"{file} could not be read again ({error.strerror}).") from error
+        raise InputFileError(f"{file} could not be read again ({error.strerror}).") from error
     return found.hexdigest()

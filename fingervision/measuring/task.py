@@ -8,7 +8,7 @@ from typing import Any
 from calib.camera_response import CameraResponse
 from fingervision.domain.direction import Direction
 from fingervision.domain.drive import DriveHistory
-from fingervision.domain.errors import FingervisionError, UsageError
+from fingervision.domain.errors import DataError, UsageError
 from fingervision.domain.region import Region
 from fingervision.frames.source import Description
 from fingervision.gauges.gauge_file import Gauge, check_gauges
@@ -152,7 +152,7 @@ def check_task(task: Task, description: Description) -> None:
     try:
         task.scale.check_frame_size(width_px, height_px)
     except ValueError as error:
-        raise FingervisionError(str(error)) from error
+        raise DataError(str(error)) from error
 
 
 def in_words(task: Task, settings: Settings) -> dict[str, Any]:

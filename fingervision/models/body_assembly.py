@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_matrix, lil_matrix
 
-from fingervision.domain.errors import FingervisionError
+from fingervision.domain.errors import ModelError
 from fingervision.models.body_frames import Frame, face_frame, nodes_of, pieces_of, section_frame
 from fingervision.models.condensed_bodies import CondensedBody, condensed
 from fingervision.models.corotational_body import CorotationalBody, turned_axes
@@ -186,7 +186,7 @@ def assemble_bodies(
         nodes = np.flatnonzero(piece == body)
         if not own:
             x, y = plate.nodes_mm[:, nodes[0]]
-            raise FingervisionError(f"The body of {mechanism.name} at ({x:.4g}, {y:.4g}) mm is joined to nothing.")
+            raise ModelError(f"The body of {mechanism.name} at ({x:.4g}, {y:.4g}) mm is joined to nothing.")
         unknowns = np.concatenate([plate.x_dofs[nodes], plate.y_dofs[nodes]])
         bodies.append(condensed(plate, unknowns, [frames.found[i] for i in own], own))
     turning = [CorotationalBody(np.array([frames.found[i].at_mm for i in body.frames]), body.stiffness_n_mm)

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from scipy.sparse import coo_matrix, csr_matrix
 from scipy.sparse.csgraph import connected_components
 
-from fingervision.domain.errors import FingervisionError
+from fingervision.domain.errors import ModelError
 from fingervision.models.mechanism_faces import mean_weights
 from fingervision.models.plane_stress import PlaneStressPlate
 
@@ -77,7 +77,7 @@ def section_frame(plate: PlaneStressPlate, at_mm: Array, axis: Array, height_mm:
     on = (np.abs(axis @ apart) < near_mm) & (np.abs(normal @ apart) < 0.5 * height_mm + near_mm)
     edges = plate.outline_edges[:, np.all(on[plate.outline_edges], axis=0)]
     if edges.shape[1] == 0:
-        raise FingervisionError(f"A flexure must join a body at ({at_mm[0]:.5g}, {at_mm[1]:.5g}) mm, but does not.")
+        raise ModelError(f"A flexure must join a body at ({at_mm[0]:.5g}, {at_mm[1]:.5g}) mm, but does not.")
     points, weights = leggauss(4)
     s = 0.5 * (points + 1.0)
     shape = np.stack([(1 - s) * (1 - 2 * s), s * (2 * s - 1), 4 * s * (1 - s)])

@@ -15,7 +15,7 @@ from scipy.linalg import eigh
 from scipy.sparse import bmat
 from scipy.sparse.linalg import splu
 
-from fingervision.domain.errors import FingervisionError
+from fingervision.domain.errors import ModelError
 from fingervision.models.body_frames import Frame
 from fingervision.models.plane_stress import PlaneStressPlate
 
@@ -97,7 +97,7 @@ def condensed(
         solver = splu(whole)
     except RuntimeError as error:
         x, y = frames[0].at_mm
-        raise FingervisionError(
+        raise ModelError(
             f"The body at ({x:.5g}, {y:.5g}) mm must be held apart by its faces and flexures, but two of them hold the "
             "same nodes; check that no two faces or flexures lie on each other."
         ) from error

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_matrix, diags
 
-from fingervision.domain.errors import FingervisionError
+from fingervision.domain.errors import DataError
 from fingervision.models.mechanism import Contact, Mechanism
 from fingervision.models.mechanism_faces import nodes_on
 from fingervision.models.plane_stress import PlaneStressPlate
@@ -138,7 +138,7 @@ def contact_pair(plate: PlaneStressPlate, contact: Contact, mechanism: Mechanism
         outward = np.array([np.sum(y[edges[0]] - y[edges[1]]), np.sum(x[edges[1]] - x[edges[0]])])
         towards = np.array([wall[1, 1] - wall[1, 0], wall[0, 0] - wall[0, 1]])
         if outward @ towards <= 0.0:
-            raise FingervisionError(
+            raise DataError(
                 f"The wall of contact {contact.name} of {mechanism.name} must lie before its face, but lies "
                 "behind it, where the body is."
             )
@@ -147,7 +147,7 @@ def contact_pair(plate: PlaneStressPlate, contact: Contact, mechanism: Mechanism
         wanted = nodes_on(plate, contact.other or contact.face, mechanism, size_mm)
         edges = plate.outline_edges[:, np.all(np.isin(plate.outline_edges, wanted), axis=0)]
         if edges.shape[1] == 0 or np.intersect1d(nodes, wanted).size:
-            raise FingervisionError(
+            raise DataError(
                 f"contact {contact.name} of {mechanism.name} must be between two faces that share nothing, but they do."
             )
         # The body lies on the right of an edge that runs so that the void is on its left.
@@ -155,7 +155,7 @@ def contact_pair(plate: PlaneStressPlate, contact: Contact, mechanism: Mechanism
         pair = ContactPair(contact.name, nodes, segments, None)
     gap, _, _ = pair.gaps_mm(plate, np.zeros(plate.unknowns))
     if gap.min() < -_PENETRATES * size_mm:
-        raise FingervisionError(
+        raise DataError(
             f"The faces of contact {contact.name} of {mechanism.name} must be apart or touch at rest, but overlap by "
             f"{-gap.min():.4g} mm."
         )

@@ -9,7 +9,7 @@ from math import atan, cos, exp, log, pi, sinh
 import numpy as np
 from numpy.typing import NDArray
 
-from fingervision.domain.errors import FingervisionError
+from fingervision.domain.errors import ModelError
 
 Array = NDArray[np.float64]
 
@@ -101,7 +101,7 @@ class PaperDamping:
         reference_rad_s = float(rad_s.min()) if self.reference_rad_s is None else self.reference_rad_s
         relative = rad_s / reference_rad_s
         if np.any(relative < 1.0 - 1e-9):
-            raise FingervisionError(
+            raise ModelError(
                 f"Equation (4) damps negatively below its reference frequency, {reference_rad_s:g} rad/s, "
                 f"but the lowest mode is at {rad_s.min():g} rad/s; lower the reference to it."
             )
@@ -128,9 +128,7 @@ def checked(ratios: Array) -> Array:
     """
     if np.any(ratios <= 0.0) or np.any(ratios >= _MOST):
         worst = ratios[np.argmax(np.abs(ratios))]
-        raise FingervisionError(
-            f"Damping ratios must lie between 0 and {_MOST:g}, but one is {worst:.3g}; use fewer modes."
-        )
+        raise ModelError(f"Damping ratios must lie between 0 and {_MOST:g}, but one is {worst:.3g}; use fewer modes.")
     return ratios
 
 

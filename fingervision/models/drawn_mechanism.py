@@ -6,7 +6,7 @@ from typing import Protocol, runtime_checkable
 import numpy as np
 from numpy.typing import NDArray
 
-from fingervision.domain.errors import FingervisionError, UsageError
+from fingervision.domain.errors import DataError, UsageError
 from fingervision.domain.response import Response
 from fingervision.models.mechanism import Mechanism
 from fingervision.models.mechanism_chain import MechanismChain
@@ -49,7 +49,7 @@ class MechanismModelOfGap:
     def __init__(self, mechanism: Mechanism, kind: str) -> None:
         self.mechanism = mechanism
         if GAP not in mechanism.pairs:
-            raise FingervisionError(
+            raise DataError(
                 f"{mechanism.name} must have a pair of probes called {GAP} to be held against a measured gap, but has "
                 f'{", ".join(mechanism.pairs) or "none"}: add [[pair]] name = "{GAP}" with of = [two probes].'
             )

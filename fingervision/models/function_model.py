@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from fingervision.domain.effect import Array
-from fingervision.domain.errors import FingervisionError
+from fingervision.domain.errors import ModelError
 from fingervision.domain.response import Response
 from fingervision.models.table import TableModel
 
@@ -71,14 +71,14 @@ class FunctionModel:
             gap = answer.gap_mm[1:].reshape(-1, 3)
             reach = float(np.ptp(gap[:, 2]))
             if reach == 0.0:
-                raise FingervisionError(
+                raise ModelError(
                     f"The gap of {self.path} must depend on its input, but is {gap[0, 2]:g} mm from {low_mm:g} to "
                     f"{high_mm:g} mm: check its units and which variables are input and gap."
                 )
             if float(np.max(np.abs(gap[:, 2] - gap[:, 1]))) < SETTLED * reach:
                 break
         else:
-            raise FingervisionError(
+            raise ModelError(
                 f"The gap of {self.path} must come to rest at a held input, but still moves after {HOLDS_S[-1]:g} s: "
                 "give a model that is stable, or a table of its static answer."
             )
@@ -116,12 +116,12 @@ class FunctionModel:
                     command, capture_output=True, timeout=LONGEST_S, check=False, stdin=subprocess.DEVNULL
                 )
             except subprocess.TimeoutExpired:
-                raise FingervisionError(
+                raise ModelError(
                     f"{self.path} must answer within {LONGEST_S:g} s, but was still running and was ended: look for an "
                     "endless loop, or simulate a table with it."
                 ) from None
             if ended.returncode != 0 or not answered.is_file():
-                raise FingervisionError(self._failure(ended.returncode, ended.stderr))
+                raise ModelError(self._failure(ended.returncode, ended.stderr))
             with np.load(answered) as found:
                 return [_response(found, k) for k in range(len(runs))]
 

@@ -8,7 +8,7 @@ from math import atan2, cos, degrees, radians, sin
 
 import numpy as np
 
-from fingervision.domain.errors import FingervisionError
+from fingervision.domain.errors import DataError, FingervisionError
 from fingervision.domain.gripper import Gripper, Hinge, Lever, Links, PointMm
 from fingervision.models.planar_region import PlanarRegion
 from fingervision.models.plane_shapes import Ellipse, Polygon, Shape, bar, box
@@ -77,9 +77,9 @@ def check_outline(gripper: Gripper, origin: str = "the drawing") -> None:
     try:
         outer = sum(loop.area_mm2 > 0.0 for loop in region.loops)
     except FingervisionError as error:
-        raise FingervisionError(f"In {origin}: {error}") from error
+        raise DataError(f"In {origin}: {error}") from error
     if outer != 1:
-        raise FingervisionError(
+        raise DataError(
             f"The right half in {origin} must be one body, but the links and notches leave {outer} pieces; "
             "check that the links overlap and that no notch cuts through one of them."
         )
@@ -95,13 +95,13 @@ def _check_hinge(gripper: Gripper, number: int, origin: str) -> None:
     axis_deg = gripper.lever.hinge1_axis_deg if number == 1 else gripper.lever.hinge2_axis_deg
     askew_deg = abs((axis_deg - link_deg + 90.0) % 180.0 - 90.0)
     if askew_deg > _ASKEW_DEG:
-        raise FingervisionError(
+        raise DataError(
             f"lever.hinge{number}_axis_deg in {origin} must follow its link, which runs at {link_deg:.4g} degrees, "
             f"within {_ASKEW_DEG:g} degrees, but is {axis_deg:g}."
         )
     x, y = gripper.lever.hinge1_mm if number == 1 else gripper.lever.hinge2_mm
     if not region.holds(np.array([[x], [y]]))[0]:
-        raise FingervisionError(
+        raise DataError(
             f"lever.hinge{number}_mm in {origin} must lie inside its link, but there is no material at "
             f"({x:g}, {y:g}) mm; check its place and its axis."
         )
@@ -110,7 +110,7 @@ def _check_hinge(gripper: Gripper, number: int, origin: str) -> None:
         for loop in region.loops:
             ends = [curve.origin for curve in loop.curves if not curve.is_straight]
             if loop.area_mm2 < 0.0 and len(ends) == len(loop.curves) and np.allclose(ends, centre):
-                raise FingervisionError(
+                raise DataError(
                     f"The notches of hinge {number} in {origin} must open through the faces of its link, but the disc "
                     f"of hinge.radius_mm = {hinge.radius_mm:g} about ({centre[0]:.4g}, {centre[1]:.4g}) mm is a closed "
                     "hole inside it; make hinge.radius_mm larger or the link narrower."
@@ -126,7 +126,7 @@ def _check_hinge(gripper: Gripper, number: int, origin: str) -> None:
     parted = any(piece.holds(foot) and not piece.holds(tip) for piece in pieces)
     if len(pieces) != 2 or not parted:
         end = "clamp" if number == 1 else "drive"
-        raise FingervisionError(
+        raise DataError(
             f"Hinge {number} in {origin} must be all that joins the {end} to the tip, but beside the "
             f"neck of {hinge.thickness_mm:g} mm at ({x:g}, {y:g}) mm other material does; check "
             f"lever.hinge{number}_mm, lever.hinge{number}_axis_deg and hinge.radius_mm against the link that it cuts."
@@ -147,12 +147,12 @@ def _check_faces(gripper: Gripper, region: PlanarRegion, origin: str) -> None:
     ):
         beside = np.array([[x + apart * nx, x - apart * nx], [y + apart * ny, y - apart * ny]])
         if region.holds(beside).tolist() != [True, False]:
-            raise FingervisionError(
+            raise DataError(
                 f"The {name} in {origin} must be a free face of the body, but at ({x:.5g}, {y:.5g}) mm there is none; "
                 "check the links."
             )
     if not region.holds(np.array([[apart], [lever.drive_mm[1]]]))[0]:
-        raise FingervisionError(
+        raise DataError(
             f"lever.drive_mm in {origin} must lie in the drive block on the symmetry axis, but there is no material at "
             f"(0, {lever.drive_mm[1]:g}) mm; check links.drive_block_mm."
         )
@@ -170,7 +170,7 @@ def check_stated_size(gripper: Gripper, origin: str) -> None:
     for name, value in drawn.items():
         stated = getattr(body, name)
         if abs(stated - value) > _STATED * value:
-            raise FingervisionError(
+            raise DataError(
                 f"body.{name} in {origin} must be that of the drawn links, {value:.6g} mm within "
                 f"{100.0 * _STATED:g} %, but is {stated:g}; correct the one or the other."
             )

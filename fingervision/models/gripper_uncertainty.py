@@ -6,7 +6,7 @@ from operator import attrgetter
 import numpy as np
 from numpy.typing import NDArray
 
-from fingervision.domain.errors import FingervisionError
+from fingervision.domain.errors import FingervisionError, ModelError
 from fingervision.domain.gripper import Gripper
 from fingervision.domain.parameter import Estimate
 from fingervision.models.gripper_figures import gripper_figures
@@ -76,7 +76,7 @@ def check_uncertainties(gripper: Gripper) -> None:
                 drawn = _changed(gripper, {name: by})
                 check_outline(drawn, "the drawing so changed")
             except FingervisionError as error:
-                raise FingervisionError(
+                raise ModelError(
                     f"The uncertainty of {name} must leave a drawing that works, but at {estimate.value + by:g} (one "
                     f"standard uncertainty away) it does not: {error}"
                 ) from error
@@ -91,9 +91,9 @@ def _changed(gripper: Gripper, changes: Mapping[str, float]) -> Gripper:
     for name, by in changes.items():
         value = attrgetter(name)(gripper) + by
         if not name.endswith(_ANY_SIGN) and value <= 0.0:
-            raise FingervisionError(f"{name} must be positive, but would be {value:g}.")
+            raise ModelError(f"{name} must be positive, but would be {value:g}.")
         if name == "material.poisson_ratio" and value >= _MOST_POISSON:
-            raise FingervisionError(f"{name} must be below 0.5, but would be {value:g}.")
+            raise ModelError(f"{name} must be below 0.5, but would be {value:g}.")
     for name, by in changes.items():
         gripper = redrawn(gripper, name, by)
     return gripper

@@ -6,7 +6,7 @@ The lower face of the pillar is clamped, the symmetry axis cannot move across it
 import numpy as np
 from numpy.typing import NDArray
 
-from fingervision.domain.errors import FingervisionError
+from fingervision.domain.errors import DataError
 from fingervision.domain.gripper import Gripper
 from fingervision.models.driven_body import DrivenBody
 from fingervision.models.plane_stress import PlaneStressPlate
@@ -40,7 +40,7 @@ def half_plate(gripper: Gripper, plate: PlaneStressPlate) -> DrivenBody:
     driven = (np.abs(y - lever.drive_face_y_mm) < _ON_MM) & (x <= lever.drive_face_half_width_mm + _ON_MM)
     for name, nodes in (("lower face of the pillar", clamped), ("symmetry axis", axis), ("drive face", driven)):
         if not nodes.any():
-            raise FingervisionError(f"The body must reach the {name}, but has no material there; check the links.")
+            raise DataError(f"The body must reach the {name}, but has no material there; check the links.")
     held = np.concatenate([plate.x_dofs[clamped | axis], plate.y_dofs[clamped]])
     held_swaying = np.concatenate([plate.x_dofs[clamped], plate.y_dofs[clamped | axis]])
     moved = plate.y_dofs[driven]
@@ -72,7 +72,7 @@ def _inner_face(gripper: Gripper, plate: PlaneStressPlate) -> Indices:
     upright = np.all(np.abs(x[edges] - gripper.tip_corner_mm[0]) < _ON_MM, axis=0)
     on_face = upright & np.all(y[edges] >= gripper.tip_heel_mm[1] - _ON_MM, axis=0)
     if not on_face.any():
-        raise FingervisionError(
+        raise DataError(
             "The tip's inner face must be an upright edge of the outline, but other links cover it; check the links."
         )
     return edges[:, on_face]

@@ -14,7 +14,7 @@ from fingervision.models.answer_figures import ModelFigures
 from fingervision.models.hinge_correction import HingeTheory
 from fingervision.models.kind_names import GROUP, built_in_kinds
 from fingervision.models.physics import LINEAR, Physics
-from fingervision.plugins.faults import MisfitError
+from fingervision.plugins.faults import MisfitError, PluginShapeError
 from fingervision.plugins.origin import Origin
 from fingervision.plugins.registry import Registry
 
@@ -160,21 +160,21 @@ def _tried(
         raise
     except Exception as error:
         said = f"{type(error).__name__}: {error}".replace("\n", " ")[:200].rstrip(".")
-        raise FingervisionError(f"{who} must answer for every drawing, but raised {said}: {origin.remedy}.") from error
+        raise PluginShapeError(f"{who} must answer for every drawing, but raised {said}: {origin.remedy}.") from error
     if shapes != {asked.shape} or not np.all(np.isfinite(gap_mm)):
         words = f"{gap_mm.tolist()}" if shapes == {asked.shape} else f"shape {sorted(shapes)}"
-        raise FingervisionError(
+        raise PluginShapeError(
             f"{who} must answer three inputs with three finite gaps, but gave {words}: {origin.remedy}."
         )
     if not np.isclose(gap_mm[1], rest_mm, rtol=0.0, atol=1e-9 * max(1.0, abs(rest_mm))):
-        raise FingervisionError(
+        raise PluginShapeError(
             f"{who} must have its rest gap of {rest_mm:g} mm at input 0, but has {gap_mm[1]:g} mm: {origin.remedy}."
         )
     if not isinstance(figures, ModelFigures):
         given = type(figures).__name__
-        raise FingervisionError(f"{who} must give ModelFigures as its figures, but gave a {given}: {origin.remedy}.")
+        raise PluginShapeError(f"{who} must give ModelFigures as its figures, but gave a {given}: {origin.remedy}.")
     if figures.peak_stress is not None and not hasattr(model, "loaded"):
-        raise FingervisionError(
+        raise PluginShapeError(
             f"{who} must have loaded(inputs_mm) where it knows a stress, but has none: {origin.remedy}."
         )
     return model

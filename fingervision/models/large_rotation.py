@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from fingervision.domain.errors import FingervisionError
+from fingervision.domain.errors import ModelError
 from fingervision.models.driven_body import DrivenBody, Equilibrium, factorised
 
 _NEWTON_STEPS = 30
@@ -47,7 +47,7 @@ def large_equilibrium(body: DrivenBody, input_mm: float, start: Equilibrium, *, 
         if not contact or np.array_equal(wanted, touching):
             return Equilibrium(input_mm, moved, 2.0 * float(internal[body.driven].sum()), reaction)
         touching = wanted
-    raise FingervisionError(f"The touching part of the fingers did not settle at an input of {input_mm:g} mm.")
+    raise ModelError(f"The touching part of the fingers did not settle at an input of {input_mm:g} mm.")
 
 
 def _newton(
@@ -74,7 +74,7 @@ def _newton(
         else:
             step[free] = solver.solve(-internal[free])
         moved, before = moved + step, residual
-    raise FingervisionError(
+    raise ModelError(
         f"The large-rotation equilibrium at an input of {input_mm:g} mm was not found in {_NEWTON_STEPS} steps; "
         "use a smaller drive, or leave large rotation off."
     )
@@ -110,4 +110,4 @@ def first_touch(body: DrivenBody, guess_mm: float) -> Equilibrium:
             return state
         slope = float(body.unit_displacement_mm[body.face[place]])
         state = large_equilibrium(body, state.input_mm - float(gaps_mm[place]) / slope, state, contact=False)
-    raise FingervisionError(f"The input at which the fingers first touch was not found near {guess_mm:g} mm.")
+    raise ModelError(f"The input at which the fingers first touch was not found near {guess_mm:g} mm.")

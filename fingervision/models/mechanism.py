@@ -6,7 +6,7 @@ from typing import Literal
 
 import numpy as np
 
-from fingervision.domain.errors import FingervisionError
+from fingervision.domain.errors import DataError, FingervisionError
 from fingervision.domain.gripper import Material, PointMm
 from fingervision.models.flexure import Flexure
 from fingervision.models.planar_region import PlanarRegion
@@ -129,9 +129,9 @@ def check_mechanism(mechanism: Mechanism, region: PlanarRegion) -> None:
     try:
         outer = sum(loop.area_mm2 > 0.0 for loop in region.loops)
     except FingervisionError as error:
-        raise FingervisionError(f"In {name}: {error}") from error
+        raise DataError(f"In {name}: {error}") from error
     if outer != 1:
-        raise FingervisionError(
+        raise DataError(
             f"The bodies of {name} must be one piece, but are {outer}; let bodies and flexures overlap, and "
             "no cut part them."
         )
@@ -144,7 +144,7 @@ def check_mechanism(mechanism: Mechanism, region: PlanarRegion) -> None:
         # A flexure that is cut has had material beside its neck.
         cuts = flexure.kind == "leaf" or uncut.holds(beside).all()
         if not region.holds(inside).all() or region.holds(beside).any() or not cuts:
-            raise FingervisionError(
+            raise DataError(
                 f"flexure {flexure.name} of {name} must be a neck of {t:g} mm at ({flexure.at_mm[0]:g}, "
                 f"{flexure.at_mm[1]:g}) mm, but there the material is thinner, thicker or none; "
                 "check its place and axis."
@@ -155,19 +155,17 @@ def check_mechanism(mechanism: Mechanism, region: PlanarRegion) -> None:
         for other in mechanism.flexures[:place]:
             apart = hypot(flexure.at_mm[0] - other.at_mm[0], flexure.at_mm[1] - other.at_mm[1])
             if apart < 0.5 * (flexure.thickness_mm + other.thickness_mm):
-                raise FingervisionError(
+                raise DataError(
                     f"flexures {other.name} and {flexure.name} of {name} must be apart, but lie on each other; take "
                     "one away or move it."
                 )
     for probe, (x, y) in mechanism.probes.items():
         ring = np.array([[x + 1e-6 * size * dx, y + 1e-6 * size * dy] for dx in (-1, 0, 1) for dy in (-1, 0, 1)]).T
         if not region.holds(ring).any():
-            raise FingervisionError(
-                f"probe {probe} of {name} must lie on the body, but ({x:g}, {y:g}) mm is outside it."
-            )
+            raise DataError(f"probe {probe} of {name} must lie on the body, but ({x:g}, {y:g}) mm is outside it.")
     for face in (*mechanism.fixed, mechanism.drive.face):
         if hypot(*face.box_mm) > 1e6:
-            raise FingervisionError(f"face {face.name} of {name} must have a box of finite size.")
+            raise DataError(f"face {face.name} of {name} must have a box of finite size.")
 
 
 def _check_leaf(flexure: Flexure, region: PlanarRegion, uncut: PlanarRegion, name: str) -> None:
@@ -175,7 +173,7 @@ def _check_leaf(flexure: Flexure, region: PlanarRegion, uncut: PlanarRegion, nam
     t, reach = flexure.thickness_mm, flexure.half_length_mm
     beside = np.array([flexure.point_mm(x * t, s * 0.501 * t) for x in (-0.5, 0.5) for s in (-1.0, 1.0)]).T
     if region.holds(beside).any():
-        raise FingervisionError(
+        raise DataError(
             f"flexure {flexure.name} of {name} must be free for longer than its thickness of {t:g} mm, but is not; "
             "check its length and whether all lengths are millimetres."
         )
@@ -183,7 +181,7 @@ def _check_leaf(flexure: Flexure, region: PlanarRegion, uncut: PlanarRegion, nam
     inside = uncut.holds(ends)
     if not inside.all():
         x, y = ends[:, int(np.argmin(inside))]
-        raise FingervisionError(
+        raise DataError(
             f"flexure {flexure.name} of {name} must end inside a body at both ends, but at ({x:.5g}, {y:.5g}) mm it "
             "ends outside; check its half_length_mm."
         )

@@ -10,7 +10,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from fingervision.domain.errors import FingervisionError
+from fingervision.domain.errors import ModelError
 from fingervision.models.flexure_span import FlexureSpan, span_of
 from fingervision.models.flexure_stress import nominal_stress_mpa
 from fingervision.models.hinge_correction import HingeTheory
@@ -68,7 +68,7 @@ class MechanismChain:
         for number, loop in enumerate(self._bodies):
             if loop.holds((float(point[0]), float(point[1]))):
                 return number
-        raise FingervisionError(f"{what} of {self.mechanism.name} must lie on a body, but does not.")
+        raise ModelError(f"{what} of {self.mechanism.name} must lie on a body, but does not.")
 
     def _joined(self, span: FlexureSpan) -> tuple[int, int]:
         flexure, apart = span.flexure, _BESIDE * span.flexure.thickness_mm
@@ -89,7 +89,7 @@ class MechanismChain:
     def _only(self, face: Face) -> int:
         bodies = self._touching(face)
         if len(bodies) != 1:
-            raise FingervisionError(
+            raise ModelError(
                 f"face {face.name} of {self.mechanism.name} must lie on one body, but lies on {len(bodies)}."
             )
         return bodies.pop()
@@ -103,7 +103,7 @@ class MechanismChain:
         merged = [tuple(-1 if body in ground else body for body in join) for join in self._joins]
         bodies = {body for join in merged for body in join}
         if len(merged) != len(bodies) - 1 or any(first == last for first, last in merged):
-            raise FingervisionError(
+            raise ModelError(
                 f"The stiffness matrix is that of a chain, but the flexures of {name} form a loop; take --kind lumped "
                 "or finite_element."
             )
@@ -115,7 +115,7 @@ class MechanismChain:
                     if known in reached and other not in reached:
                         reached[other], grown = [*reached[known], place], True
             if not grown:
-                raise FingervisionError(
+                raise ModelError(
                     f"The stiffness matrix is that of a chain from a fixed face to the drive, but {name} has none; "
                     "take --kind lumped or finite_element."
                 )
@@ -130,7 +130,7 @@ class MechanismChain:
         faces = [(mechanism.drive.face, component) for component in driven_components(mechanism)]
         for face, component in mechanism.slides:
             if self._touching(face) != {driven}:
-                raise FingervisionError(
+                raise ModelError(
                     f"The stiffness matrix is that of a chain, but {mechanism.name} is held at {face.name} too; take "
                     "--kind lumped or finite_element."
                 )
@@ -202,7 +202,7 @@ class MechanismChain:
             Where large rotation or contact is asked for.
         """
         if large_rotation or contact:
-            raise FingervisionError(
+            raise ModelError(
                 "The stiffness matrix knows small displacements without contact alone; take --kind lumped or "
                 "finite_element."
             )
@@ -240,7 +240,7 @@ class MechanismChain:
                     if one in self._reached and other not in self._reached:
                         self._reached[other] = [*self._reached[one], place]
             if len(self._reached) == before:
-                raise FingervisionError(f"A probe of {self.mechanism.name} lies on a body that hangs on nothing.")
+                raise ModelError(f"A probe of {self.mechanism.name} lies on a body that hangs on nothing.")
         return self._reached[body]
 
     def _inward(self, point: tuple[float, float]) -> Array:

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_matrix, vstack
 from scipy.sparse.linalg import SuperLU
 
-from fingervision.domain.errors import FingervisionError
+from fingervision.domain.errors import ModelError
 from fingervision.models.driven_body import factorised
 from fingervision.models.signorini import contact_forces_n
 
@@ -101,7 +101,7 @@ class DrivenMechanism:
         except RuntimeError:  # exactly singular
             moved = np.full(self.by_input.size, np.inf)
         if not np.all(np.isfinite(moved)) or np.abs(moved).max() > _MOST_MOTION:
-            raise FingervisionError(f"{self.name} must be held by its fixed faces, but can move freely.")
+            raise ModelError(f"{self.name} must be held by its fixed faces, but can move freely.")
         return np.asarray(moved)
 
     @cached_property
@@ -185,7 +185,7 @@ class DrivenMechanism:
                 continue
             step *= 0.5
             if step < _LEAST_STEP:
-                raise FingervisionError(
+                raise ModelError(
                     f"The equilibrium of {self.name} was followed to an input of {reached * input_mm:.4g} mm and no "
                     f"farther, but {input_mm:g} mm are asked for; take a smaller input."
                 )

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from fingervision.domain.errors import FingervisionError
+from fingervision.domain.errors import DataError
 from fingervision.models.mechanism import Face, Mechanism
 from fingervision.models.plane_stress import PlaneStressPlate
 
@@ -34,7 +34,7 @@ def nodes_on(plate: PlaneStressPlate, face: Face, mechanism: Mechanism, size_mm:
     inside = (x >= x0 - near) & (x <= x1 + near) & (y >= y0 - near) & (y <= y1 + near)
     nodes = outline[inside[outline]]
     if nodes.size < 2:
-        raise FingervisionError(
+        raise DataError(
             f"face {face.name} of {mechanism.name} must hold a part of the outline, but its box "
             f"[{x0:g}, {x1:g}, {y0:g}, {y1:g}] mm holds none."
         )
@@ -101,7 +101,7 @@ def supports_of(plate: PlaneStressPlate, mechanism: Mechanism, size_mm: float) -
     slides = tuple((nodes_on(plate, face, mechanism, size_mm), held) for face, held in mechanism.slides)
     driven = nodes_on(plate, mechanism.drive.face, mechanism, size_mm)
     if not fixed and not slides:
-        raise FingervisionError(f"{mechanism.name} must have a [[fixed]] face, but has none.")
+        raise DataError(f"{mechanism.name} must have a [[fixed]] face, but has none.")
     moving = dict(zip("xy", mechanism.drive.direction, strict=True))
     held = {"x": list(fixed), "y": list(fixed)}
     for nodes, component in slides:
@@ -109,7 +109,7 @@ def supports_of(plate: PlaneStressPlate, mechanism: Mechanism, size_mm: float) -
     for component in driven_components(mechanism):
         both = any(np.intersect1d(nodes, driven).size for nodes in held[component])
         if both and moving[component] != 0.0:
-            raise FingervisionError(
+            raise DataError(
                 f"The drive of {mechanism.name} must be free to move, but its face {mechanism.drive.face.name} is "
                 "fixed too."
             )

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from scipy.linalg import eigh
 from scipy.sparse import coo_matrix, csr_matrix, identity
 
-from fingervision.domain.errors import FingervisionError
+from fingervision.domain.errors import ModelError
 from fingervision.models.body_assembly import assemble_bodies
 from fingervision.models.condensed_bodies import own_modes
 from fingervision.models.contact_pairs import contact_pair
@@ -70,7 +70,7 @@ class MechanismFrame:
         region = mechanism.region
         check_mechanism(mechanism, region)
         if not mechanism.flexures:
-            raise FingervisionError(
+            raise ModelError(
                 f"{mechanism.name} must have flexures to be a lumped model, but has none; take --kind finite_element."
             )
         self.spans = tuple(span_of(flexure, region) for flexure in mechanism.flexures)

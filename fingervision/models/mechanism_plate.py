@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_matrix, hstack, identity
 from scipy.sparse.linalg import LinearOperator, eigsh
 
-from fingervision.domain.errors import FingervisionError
+from fingervision.domain.errors import ModelError
 from fingervision.models.contact_pairs import contact_pair
 from fingervision.models.driven_body import factorised
 from fingervision.models.mechanism import Mechanism, check_mechanism
@@ -108,7 +108,7 @@ class MechanismPlate:
             Where a contact's faces are none, or nothing holds the mechanism.
         """
         if self._wanders():
-            raise FingervisionError(f"{self.mechanism.name} must be held by its fixed faces, but can move freely.")
+            raise ModelError(f"{self.mechanism.name} must be held by its fixed faces, but can move freely.")
         plate = self.plate
         pairs = [contact_pair(plate, contact, self.mechanism, self._size_mm) for contact in self.mechanism.contacts]
         return DrivenMechanism(

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fingervision.domain.drive import DriveHistory
-from fingervision.domain.errors import FingervisionError
+from fingervision.domain.errors import ModelError
 from fingervision.domain.response import Response
 from fingervision.models.damping import Damping, ModalDamping
 from fingervision.models.driven_body import DrivenBody
@@ -110,7 +110,7 @@ def gripper_motion(
         )
     travel = float(np.ptp(answer.gap_mm))
     if small.vibration_mm(GAP) > _FAST * travel:
-        raise FingervisionError(
+        raise ModelError(
             f"With large rotation or contact this drive must be shorter than {_MOST_STEPS * step_s:.3g} s (a frame of "
             f"bars, --kind lumped), or shake the gap by at most {_FAST:g} of its travel of {travel:.3g} mm, but it "
             f"takes {sum(spans_s):.3g} s and shakes it by {small.vibration_mm(GAP):.3g} mm; shorten it, slow it down "

@@ -6,7 +6,7 @@ from math import inf, sqrt
 import numpy as np
 from numpy.typing import NDArray
 
-from fingervision.domain.errors import FingervisionError
+from fingervision.domain.errors import DataError
 from fingervision.domain.gripper import Gripper, Material
 
 Array = NDArray[np.float64]
@@ -42,14 +42,14 @@ class Notch:
 
     def __post_init__(self) -> None:
         if not self.web_mm > self.thickness_mm:
-            raise FingervisionError(
+            raise DataError(
                 f"A notch must leave less than its bar's height of {self.web_mm:g} mm, but leaves "
                 f"{self.thickness_mm:g}."
             )
         for name in ("thickness_mm", "half_length_mm", "depth_mm", "plate_mm"):
             value = getattr(self, name)
             if not value > 0.0:
-                raise FingervisionError(f"A notch's {name} must be positive, but is {value:g}.")
+                raise DataError(f"A notch's {name} must be positive, but is {value:g}.")
 
     @property
     def is_circular(self) -> bool:

@@ -9,7 +9,7 @@ from operator import attrgetter
 import numpy as np
 from numpy.typing import NDArray
 
-from fingervision.domain.errors import FingervisionError, UsageError
+from fingervision.domain.errors import FingervisionError, ModelError, UsageError
 from fingervision.domain.gripper import Gripper
 from fingervision.models.drive_block_sweep import block_compliances
 from fingervision.models.gripper_outline import check_outline
@@ -175,7 +175,7 @@ def mechanism_sweep_answers(
             else:
                 rows.append({})
         except FingervisionError as error:
-            raise FingervisionError(f"The variant {_spelt(variations, values)} has no answer: {error}") from error
+            raise ModelError(f"The variant {_spelt(variations, values)} has no answer: {error}") from error
     found = rows[len(corners) :]
     columns = tuple(dict.fromkeys(name for row in found for name in row if not name.startswith("model_error")))
     return np.array(grid), columns, np.array([[row.get(name, np.inf) for name in columns] for row in found])

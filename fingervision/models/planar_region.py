@@ -11,7 +11,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from fingervision.domain.errors import FingervisionError
+from fingervision.domain.errors import DataError
 from fingervision.models.outline_curves import Curve, crossings
 from fingervision.models.plane_shapes import Point, Polygon, Shape
 
@@ -153,7 +153,7 @@ def _chained(pieces: list[Curve], same_mm: float) -> tuple[Loop, ...]:
         if near.size != 1:
             x, y = piece.end_mm
             what = "ends" if near.size == 0 else "touches itself in a point"
-            raise FingervisionError(
+            raise DataError(
                 f"The outline must close and part the body everywhere, but it {what} at ({x:.6g}, {y:.6g}) mm; "
                 "let the shapes overlap there, or stay apart."
             )

@@ -3,7 +3,7 @@
 from dataclasses import replace
 from typing import Any
 
-from fingervision.domain.errors import FingervisionError
+from fingervision.domain.errors import DataError
 from fingervision.domain.gripper import Gripper, Lever, Links, PointMm
 
 
@@ -30,7 +30,7 @@ def redrawn(gripper: Gripper, name: str, by: float) -> Gripper:
     record: Any = getattr(gripper, section, None)
     old = getattr(record, key, None)
     if not isinstance(old, float):
-        raise FingervisionError(f"A number of the drawing must be named as in gripper.toml, but is {name}.")
+        raise DataError(f"A number of the drawing must be named as in gripper.toml, but is {name}.")
     parts: dict[str, Any] = {section: replace(record, **{key: old + by})}
     changed = replace(gripper, **parts)
     lever, links = changed.lever, changed.links

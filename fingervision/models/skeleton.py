@@ -13,7 +13,7 @@ from math import cos, radians, sin
 import numpy as np
 from numpy.typing import NDArray
 
-from fingervision.domain.errors import FingervisionError
+from fingervision.domain.errors import DataError
 from fingervision.domain.gripper import Gripper, PointMm
 from fingervision.models.drive_block_root import drive_block_compliance
 from fingervision.models.hinge_compliance import bar_compliance, beam_compliance
@@ -157,7 +157,7 @@ def skeleton_of(
     pillar_x = lever.hinge1_mm[0]
     pillar_width = links.pillar_and_root_mm[1] - links.pillar_and_root_mm[0]
     if not lower1[1] > links.pillar_and_root_mm[2] or not cross_y > max(upper1[1], upper2[1]):
-        raise FingervisionError(
+        raise DataError(
             f"Bars and hinges can stand for the body only where both hinges lie between the clamp and the cross bar, "
             f"whose axis is at y = {cross_y:g} mm, but they reach from y = {lower1[1]:g} to "
             f"{max(upper1[1], upper2[1]):g} mm; take --kind finite_element."
@@ -185,7 +185,7 @@ def skeleton_of(
     box_mm = links.drive_block_mm
     entry = _at_x(shuttle, box_mm[1])
     if not lower2[0] > entry[0]:
-        raise FingervisionError(
+        raise DataError(
             f"Hinge 2 must end outside the drive block, at x > {entry[0]:g} mm, but ends at x = {lower2[0]:g} mm; "
             "make the block narrower or lever.l4_mm longer."
         )

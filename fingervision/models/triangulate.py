@@ -6,7 +6,7 @@ triangulated anew as they go, and end at the centres of their neighbours' circum
 al., Variational tetrahedral meshing, ACM Trans. Graphics 24 (2005) 617, in the plane). Midside nodes lie on the arcs.
 """
 
-from fingervision.domain.errors import FingervisionError
+from fingervision.domain.errors import ModelError
 from fingervision.models.mesh_size import size_field
 from fingervision.models.node_relaxation import MOST_NODES, relaxed_nodes, seeded_nodes
 from fingervision.models.outline_division import (
@@ -50,7 +50,7 @@ def triangulate(region: PlanarRegion, across: float, body_mm: float) -> PlaneMes
     for _ in range(_MENDING):
         inside = seeded_nodes(region, field, outline_points(sides))
         if inside.shape[1] + len(sides) > MOST_NODES:
-            raise FingervisionError(
+            raise ModelError(
                 f"The body must be meshed by at most {MOST_NODES} nodes, but {inside.shape[1] + len(sides)} are "
                 "needed: its thinnest part is too thin beside its length."
             )
@@ -62,4 +62,4 @@ def triangulate(region: PlanarRegion, across: float, body_mm: float) -> PlaneMes
         if not missing:
             return with_middles(corners, triangles, sides)
         sides = halved(sides, missing)
-    raise FingervisionError("The outline could not be meshed; check that its shapes do not nearly touch each other.")
+    raise ModelError("The outline could not be meshed; check that its shapes do not nearly touch each other.")

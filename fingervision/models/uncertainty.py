@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from scipy.special import ndtri
 from scipy.stats import qmc
 
-from fingervision.domain.errors import FingervisionError
+from fingervision.domain.errors import FingervisionError, ModelError
 from fingervision.domain.parameter import Estimate
 
 Array = NDArray[np.float64]
@@ -128,7 +128,7 @@ def _moved(evaluate: Evaluate, name: str, value: float, by: float) -> Mapping[st
     try:
         return evaluate({name: by})
     except FingervisionError as error:
-        raise FingervisionError(
+        raise ModelError(
             f"The uncertainty of {name} must leave a drawing that works, but at {value + by:g} (one standard "
             f"uncertainty away) it does not: {error}"
         ) from error
@@ -161,7 +161,7 @@ def _samples(
             else:
                 rows[figure].append(value)
     if refused > _MOST_REFUSED * count:
-        raise FingervisionError(
+        raise ModelError(
             f"The stated uncertainties must leave a drawing that works, but {refused} of {count} drawings within them "
             f"do not; state smaller ones. The last: {last}"
         )

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from math import isfinite
 
-from fingervision.domain.errors import FingervisionError
+from fingervision.domain.errors import DataError
 from fingervision.rendering.lens import RadialLens, Tilt, View
 from fingervision.rendering.outline import Outline
 
@@ -53,20 +53,20 @@ class Camera:
     def __post_init__(self) -> None:
         if not (isfinite(self.blur_px) and self.blur_px >= LEAST_BLUR_PX):
             msg = f"blur_px must be at least {LEAST_BLUR_PX}, but is {self.blur_px:g}."
-            raise FingervisionError(msg)
+            raise DataError(msg)
         for name, value in (("noise_grey", self.noise_grey), ("shot_grey", self.shot_grey)):
             if not (isfinite(value) and value >= 0.0):
                 msg = f"{name} must be 0 or more, but is {value:g}."
-                raise FingervisionError(msg)
+                raise DataError(msg)
         if not isfinite(self.bloom_px):
             msg = f"bloom_px must be a number of pixels, but is {self.bloom_px:g}."
-            raise FingervisionError(msg)
+            raise DataError(msg)
         if self.bits not in (8, 16):
             msg = f"bits must be 8 or 16, but is {self.bits}."
-            raise FingervisionError(msg)
+            raise DataError(msg)
         if self.tint is not None and (len(tuple(self.tint)) != 3 or min(self.tint) < 0.0):
             msg = f"tint must be three factors of 0 or more, for red, green and blue, but is {self.tint}."
-            raise FingervisionError(msg)
+            raise DataError(msg)
 
     def sees(self, outlines: tuple[Outline, ...], width_px: int, height_px: int) -> tuple[Outline, ...]:
         """Map outlines of the ideal picture into the camera's, through tilt and lens; without blooming and blur."""

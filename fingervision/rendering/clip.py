@@ -11,7 +11,7 @@ import numpy as np
 from av.container import OutputContainer
 from av.video.reformatter import ColorRange
 
-from fingervision.domain.errors import FingervisionError
+from fingervision.domain.errors import DataError, OutputError
 from fingervision.domain.frame import Frame, Pixels
 
 # MPEG's clock. MP4 and QuickTime keep it to the tick; Matroska rounds every time to 1 ms.
@@ -83,18 +83,18 @@ def write_clip(path: Path, frames: Iterable[Frame], codec: Codec) -> None:
     """
     if path.suffix not in CONTAINERS:
         msg = f"A clip's name must end in {', '.join(CONTAINERS)}, because these keep every time, but is {path.name}."
-        raise FingervisionError(msg)
+        raise OutputError(msg)
     source = iter(frames)
     first = next(source, None)
     if first is None:
         msg = f"A clip must have at least one frame, but {path.name} would have none."
-        raise FingervisionError(msg)
+        raise DataError(msg)
     try:
         with av.open(path, "w", options=CONTAINERS[path.suffix]) as container:
             _encode(container, first, source, codec)
     except OSError as error:
         msg = f"{path} must be a file that can be written, but it could not be: {error.strerror}."
-        raise FingervisionError(msg) from error
+        raise DataError(msg) from error
 
 
 def _encode(container: OutputContainer, first: Frame, others: Iterator[Frame], codec: Codec) -> None:
@@ -121,7 +121,7 @@ def _encode(container: OutputContainer, first: Frame, others: Iterator[Frame], c
                 f"All frames of a clip must be alike, but frame {frame.index} is {frame.pixels.shape} of "
                 f"{frame.pixels.dtype} and the first {first.pixels.shape} of {first.pixels.dtype}."
             )
-            raise FingervisionError(msg)
+            raise DataError(msg)
         picture = _picture(frame.pixels, pixel_format)
         picture.pts, picture.time_base = tick, Fraction(1, CLOCK_HZ)
         container.mux(stream.encode(picture))
@@ -133,14 +133,14 @@ def _tick(frame: Frame, last_tick: int) -> int:
     """Time of a frame on the clip's clock."""
     if frame.time_s is None:
         msg = f"A frame of a clip must have its time, but frame {frame.index} has none."
-        raise FingervisionError(msg)
+        raise DataError(msg)
     tick = round(frame.time_s * CLOCK_HZ)
     if tick <= last_tick:
         msg = (
             f"Times in a clip must start at 0 or later and increase, but frame {frame.index} is at "
             f"{frame.time_s:g} s, after {last_tick / CLOCK_HZ:g} s."
         )
-        raise FingervisionError(msg)
+        raise DataError(msg)
     return tick
 
 
@@ -151,18 +151,18 @@ def _pixel_format(pixels: Pixels, codec: Codec) -> str:
         if colour:
             if wide:
                 msg = "FFV1 clips hold colour with 8 bits, but the frames have 16: render grey frames or bits=8."
-                raise FingervisionError(msg)
+                raise DataError(msg)
             return "bgr0"
         return "gray16le" if wide else "gray"
     if wide:
         msg = f"{type(codec).__name__} holds 8 bits, but the frames have 16: render with bits=8 or write FFV1."
-        raise FingervisionError(msg)
+        raise DataError(msg)
     if pixels.shape[0] % 2 or pixels.shape[1] % 2:
         msg = (
             f"{type(codec).__name__} needs an even width and height, but the frames have "
             f"{pixels.shape[1]} x {pixels.shape[0]} pixels."
         )
-        raise FingervisionError(msg)
+        raise DataError(msg)
     return "yuvj420p" if isinstance(codec, Mjpeg) else "yuv420p"
 
 

@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from fingervision.domain.errors import FingervisionError
+from fingervision.domain.errors import DataError
 from fingervision.rendering.outline import Outline
 from fingervision.rendering.polygon import polygon
 
@@ -46,11 +46,11 @@ def deformed_outlines(edges: NDArray[np.int64], nodes_px: NDArray[np.float64]) -
             if end not in following:
                 x, y = nodes_px[:, end]
                 msg = f"The edges of an outline must close, but end at ({x:g}, {y:g}) px: give all of them."
-                raise FingervisionError(msg)
+                raise DataError(msg)
             place = following[end]
         if place != first:
             msg = "The edges of an outline must close without touching themselves, but do not."
-            raise FingervisionError(msg)
+            raise DataError(msg)
         loops.append(tuple(corners))
     areas = [_area_px2(loop) for loop in loops]
     solid = np.sign(max(areas, key=abs, default=1.0))

@@ -4,7 +4,7 @@ from math import radians
 
 import numpy as np
 
-from fingervision.domain.errors import FingervisionError
+from fingervision.domain.errors import DataError
 from fingervision.rendering.plane import Motion
 from fingervision.rendering.polygon import polygon
 from fingervision.rendering.scene import Patch
@@ -48,7 +48,7 @@ def dust(
     """
     if not (count >= 0 and 0.0 < size_px[0] <= size_px[1] and levels):
         msg = f"Grains must have a number, a size and a level, but these are {count}, {size_px} px and {levels}."
-        raise FingervisionError(msg)
+        raise DataError(msg)
     grains = []
     for _ in range(count):
         length = rng.uniform(*size_px)

@@ -6,7 +6,7 @@ from math import radians, tan
 import numpy as np
 
 from fingervision.domain.direction import Direction
-from fingervision.domain.errors import FingervisionError
+from fingervision.domain.errors import DataError
 from fingervision.rendering.biarc import biarcs
 from fingervision.rendering.line import Line
 from fingervision.rendering.outline import Outline, Piece
@@ -128,23 +128,23 @@ def finger_shape(width_px: float, length_px: float, tip: Tip, tilt_deg: float = 
     half = width_px / 2
     if not (width_px > 0.0 and length_px > 0.0):
         msg = f"A finger's width and length must be positive, but are {width_px:g} px and {length_px:g} px."
-        raise FingervisionError(msg)
+        raise DataError(msg)
     if not abs(tilt_deg) <= STEEPEST_DEG:
         msg = (
             f"A finger's tilt must be at most {STEEPEST_DEG:g} degrees, but is {tilt_deg:g}: choose another direction."
         )
-        raise FingervisionError(msg)
+        raise DataError(msg)
     if isinstance(tip, SquareTip):
         if not abs(tip.slant_deg) <= STEEPEST_DEG:
             msg = f"A tip's slant must be at most {STEEPEST_DEG:g} degrees, but is {tip.slant_deg:g}."
-            raise FingervisionError(msg)
+            raise DataError(msg)
         rise = half * tan(radians(tip.slant_deg))
         corners = ((half, length_px), (-half, length_px), (-half, rise), (half, -rise))
         shape = polygon(corners, (0.0, 0.0, tip.radius_px, tip.radius_px))
     else:
         if not 0.0 < tip.height_px < length_px:
             msg = f"An elliptic tip's height must lie between 0 and the finger's length, but is {tip.height_px:g} px."
-            raise FingervisionError(msg)
+            raise DataError(msg)
         sides: list[Piece] = [
             Line(half, tip.height_px, half, length_px),
             Line(half, length_px, -half, length_px),

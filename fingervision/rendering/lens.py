@@ -9,7 +9,7 @@ from math import cos, hypot, radians, sin
 
 import numpy as np
 
-from fingervision.domain.errors import FingervisionError
+from fingervision.domain.errors import DataError
 from fingervision.rendering.biarc import biarcs
 from fingervision.rendering.line import Line
 from fingervision.rendering.outline import Outline, Piece
@@ -48,7 +48,7 @@ class RadialLens:
                 f"A lens must not fold the picture, but k1 = {self.k1:g} with k2 = {self.k2:g} does within "
                 f"{DISTORTED_TO:g} half diagonals: choose coefficients nearer to 0."
             )
-            raise FingervisionError(msg)
+            raise DataError(msg)
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,7 +81,7 @@ class Tilt:
                 f"A tilt must be at most 45 degrees, seen from a positive distance, but is {self.about_x_deg:g} and "
                 f"{self.about_y_deg:g} degrees from {self.distance_px:g} px."
             )
-            raise FingervisionError(msg)
+            raise DataError(msg)
 
 
 @dataclass(frozen=True, slots=True)

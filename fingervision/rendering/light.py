@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import erf
 
-from fingervision.domain.errors import FingervisionError
+from fingervision.domain.errors import DataError
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,7 +66,7 @@ class Light:
                 "Light must not be negative: slopes lie between -2 and 2, factors are 0 or more, but slope_x is "
                 f"{self.slope_x:g}, slope_y {self.slope_y:g}, the step {factor:g} and the exposure {self.exposure:g}."
             )
-            raise FingervisionError(msg)
+            raise DataError(msg)
 
     def field(self, width_px: int, height_px: int, blur_px: float) -> NDArray[np.float64] | float:
         """Factor on each pixel's grey level; a plain number where the light is even."""

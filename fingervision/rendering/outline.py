@@ -9,7 +9,7 @@ from math import hypot, pi, sin, tan
 import numpy as np
 from numpy.typing import NDArray
 
-from fingervision.domain.errors import FingervisionError
+from fingervision.domain.errors import DataError
 from fingervision.rendering.arc import Arc
 from fingervision.rendering.line import Line
 from fingervision.rendering.plane import SAME_POINT_PX, Motion, Points
@@ -42,7 +42,7 @@ class Outline:
                     f"An outline must be closed, but a piece ends {hole_px:.3g} px away from the start of the next: "
                     "give the pieces in the order of travel."
                 )
-                raise FingervisionError(msg)
+                raise DataError(msg)
 
     @property
     def area_px2(self) -> float:
@@ -173,5 +173,5 @@ def disc(x_px: float, y_px: float, radius_px: float) -> Outline:
     """
     if not radius_px > 0.0:
         msg = f"radius_px of a disc must be positive, but is {radius_px:g}."
-        raise FingervisionError(msg)
+        raise DataError(msg)
     return Outline((Arc(x_px, y_px, radius_px, 0.0, 2 * pi),))

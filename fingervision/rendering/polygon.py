@@ -2,7 +2,7 @@
 
 from math import atan2, cos, hypot, pi, sin, tan
 
-from fingervision.domain.errors import FingervisionError
+from fingervision.domain.errors import DataError
 from fingervision.rendering.arc import Arc
 from fingervision.rendering.line import Line
 from fingervision.rendering.outline import Outline, Piece
@@ -32,15 +32,15 @@ def polygon(corners: tuple[tuple[float, float], ...], radii_px: tuple[float, ...
     """
     if len(corners) < 3:
         msg = f"A polygon must have at least 3 corners, but has {len(corners)}."
-        raise FingervisionError(msg)
+        raise DataError(msg)
     sides_px = [hypot(x - corners[i - 1][0], y - corners[i - 1][1]) for i, (x, y) in enumerate(corners)]
     if not min(sides_px) > SAME_POINT_PX:
         msg = f"A polygon's sides must have a length, but the shortest has {min(sides_px):.3g} px."
-        raise FingervisionError(msg)
+        raise DataError(msg)
     radii = (0.0,) * len(corners) if radii_px is None else radii_px
     if not min(radii) >= 0.0:
         msg = f"A corner's radius must be 0 or more, but is {min(radii):g} px."
-        raise FingervisionError(msg)
+        raise DataError(msg)
     pieces: list[Piece] = []
     entries: list[tuple[float, float]] = []
     arcs: list[Arc | None] = []
@@ -73,7 +73,7 @@ def polygon(corners: tuple[tuple[float, float], ...], radii_px: tuple[float, ...
                 f"The corners' radii must fit on the side between them, but overlap by {-along:.3g} px: "
                 "choose smaller radii (at most half the width)."
             )
-            raise FingervisionError(msg)
+            raise DataError(msg)
         if along > SAME_POINT_PX:
             pieces.append(Line(x0, y0, x1, y1))
     outline = Outline(tuple(pieces))

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from fingervision.domain.errors import FingervisionError
+from fingervision.domain.errors import DataError
 from fingervision.rendering.finger import Finger
 from fingervision.rendering.light import EVEN_LIGHT, Light
 from fingervision.rendering.outline import Outline
@@ -47,7 +47,7 @@ class Rim:
     def __post_init__(self) -> None:
         if not self.width_px > 0.0:
             msg = f"width_px of a rim must be positive, but is {self.width_px:g}."
-            raise FingervisionError(msg)
+            raise DataError(msg)
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,11 +86,11 @@ class Scene:
     def __post_init__(self) -> None:
         if self.width_px < 1 or self.height_px < 1:
             msg = f"A frame must have at least one pixel each way, but is {self.width_px} x {self.height_px}."
-            raise FingervisionError(msg)
+            raise DataError(msg)
         levels = [self.light.ground, self.light.fingers]
         levels += [patch.level for patch in self.behind + self.before]
         levels += [self.rim.level] if self.rim else []
         for level in levels:
             if not 0.0 <= level <= 255.0:
                 msg = f"A grey level must lie between 0 and 255, but is {level:g}."
-                raise FingervisionError(msg)
+                raise DataError(msg)

@@ -2,7 +2,7 @@
 
 from math import radians
 
-from fingervision.domain.errors import FingervisionError
+from fingervision.domain.errors import DataError
 from fingervision.rendering.outline import Outline, disc
 from fingervision.rendering.plane import Motion
 from fingervision.rendering.polygon import polygon
@@ -63,7 +63,7 @@ def slot(
             f"A slot must lie inside its plate, which ends {BEYOND_FRAME_PX:g} px beyond the frame, but reaches from "
             f"({least_x:g}, {least_y:g}) to ({greatest_x:g}, {greatest_y:g}): choose a shorter one."
         )
-        raise FingervisionError(msg)
+        raise DataError(msg)
     return polygon(((left, top), (right, top), (right, low), (left, low))), hole.backwards()
 
 
@@ -126,4 +126,4 @@ def _must_be_positive(**sizes: float) -> None:
     for name, size in sizes.items():
         if not size > 0.0:
             msg = f"{name} must be positive, but is {size:g}."
-            raise FingervisionError(msg)
+            raise DataError(msg)

@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import brentq, minimize_scalar
 
 from fingervision.domain.direction import Direction
-from fingervision.domain.errors import FingervisionError
+from fingervision.domain.errors import DataError
 from fingervision.domain.gap import NoGap
 from fingervision.domain.status import Status
 from fingervision.rendering.camera import Camera
@@ -83,7 +83,7 @@ def truth(scene: Scene, camera: Camera, below_tip_px: float) -> TrueGap | NoGap:
     if others or first.direction is not second.direction:
         ways = ", ".join(finger.direction for finger in scene.fingers)
         msg = f"The fingers of a scene must be two and point the same way, but point {ways}."
-        raise FingervisionError(msg)
+        raise DataError(msg)
     direction = first.direction
     shapes = list(camera.sees((first.outline, second.outline), scene.width_px, scene.height_px))
     ends = [_tip(shape, direction) for shape in shapes]
@@ -218,5 +218,5 @@ def measuring_point(shape: Outline, below_tip_px: float, side: int) -> tuple[flo
     crossings = _crossings(shape, Direction.UP, tip + below_tip_px)
     if not crossings:
         msg = f"below_tip_px must lie between 0 and the finger's length, but is {below_tip_px:g}."
-        raise FingervisionError(msg)
+        raise DataError(msg)
     return (max(crossings) if side < 0 else min(crossings)), tip

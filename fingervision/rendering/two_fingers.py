@@ -5,7 +5,7 @@ from math import sqrt
 import numpy as np
 
 from fingervision.domain.direction import Direction
-from fingervision.domain.errors import FingervisionError
+from fingervision.domain.errors import DataError
 from fingervision.rendering.finger import Finger, Highlight, SquareTip, Tip, axis_motion, finger_shape, highlight_shape
 from fingervision.rendering.light import EVEN_LIGHT, Light
 from fingervision.rendering.plane import Motion
@@ -85,7 +85,7 @@ def two_fingers(
         msg = (
             f"Every size and tilt of two fingers must be a number, but among {[float(x) for x in numbers]} one is not."
         )
-        raise FingervisionError(msg)
+        raise DataError(msg)
     axes = axis_motion(direction)
     across_size, along_size = frame if direction.is_vertical else frame[::-1]
     shape = tip if tip is not None else SquareTip(radius_px)
@@ -102,7 +102,7 @@ def two_fingers(
 
     if not abs(gap_px) >= abs(tip_step_px):
         msg = f"gap_px must be at least the step between the tips ({abs(tip_step_px):g} px), but is {gap_px:g}."
-        raise FingervisionError(msg)
+        raise DataError(msg)
     component = sqrt(gap_px**2 - tip_step_px**2) * (1.0 if gap_px >= 0.0 else -1.0)
     middle = (across_size - 1) / 2 + centre_px
     fingers = []

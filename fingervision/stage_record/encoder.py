@@ -39,6 +39,9 @@ PEAK_STEP = 0.2
 """Step of the frequencies that are tried, over the inverse of the range: a peak is one wide."""
 MOST_LINES = 400
 """Lines over the range at most: finer ones are no finer than the noise of other records."""
+MOST_EQUAL = 0.8
+"""Share of the changes that go equally many lines on, above which a steady motion looks like lines. Where it is an
+encoder after all, at a speed near a whole number of lines a row, only its jitter stays in the record."""
 FEWEST_SINGLE = 3
 """Single steps that tell an encoder from set points in round numbers."""
 
@@ -101,6 +104,8 @@ def on_lines(input_mm: Array, runs: tuple[slice, ...]) -> Array:
         return input_mm
     step, shift = 1.0 / around[best], float(np.angle(peak[best])) / (2.0 * np.pi)
     snapped = np.asarray((np.round(input_mm / step - shift) + shift) * step)
+    if _equal_steps(input_mm, snapped, runs, step):
+        return input_mm
     jitter = np.abs(values - (np.round(values / step - shift) + shift) * step) / step
     sigma = float(np.sqrt(-2.0 * np.log(np.abs(peak[best])))) / (2.0 * np.pi)
     between = 2.0 * float(norm.sf(BETWEEN / sigma))
@@ -108,6 +113,20 @@ def on_lines(input_mm: Array, runs: tuple[slice, ...]) -> Array:
     if np.mean(jitter < ON_LINE) > EXACT_SHARE or np.mean(jitter > BETWEEN) > 1.5 * between + 0.005:
         return input_mm
     return snapped
+
+
+def _equal_steps(input_mm: Array, snapped_mm: Array, runs: tuple[slice, ...], step_mm: float) -> bool:
+    """Whether the lines are the rows of a motion at one speed: it goes equally many lines on from each to the next.
+
+    About an encoder's lines most changes of the value are jitter and stay on their line, or the lines that are crossed
+    from row to row differ by one.
+    """
+    crossed = []
+    for run in runs:
+        changed = np.abs(np.diff(input_mm[run])) > RESOLVED_MM
+        crossed.append(np.round(np.abs(np.diff(snapped_mm[run]))[changed] / step_mm))
+    count = np.bincount(np.concatenate(crossed).astype(int))
+    return bool(count.size > 1 and count[1:].max() > MOST_EQUAL * count.sum())
 
 
 def _characteristic(values: Array, frequency: Array) -> NDArray[np.complex128]:

@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping
 from types import MappingProxyType
 from typing import Any
 
-from fingervision.domain.errors import FingervisionError
+from fingervision.domain.errors import DataError
 
 _BINARY: Mapping[type[ast.operator], Callable[[float, float], float]] = MappingProxyType(
     {ast.Add: operator.add, ast.Sub: operator.sub, ast.Mult: operator.mul, ast.Div: operator.truediv}
@@ -45,15 +45,13 @@ def number(raw: Any, names: Mapping[str, float], what: str) -> float:
         try:
             value = _evaluated(ast.parse(raw, mode="eval").body, names)
         except (SyntaxError, ValueError, ZeroDivisionError, OverflowError, RecursionError) as error:
-            raise FingervisionError(
-                f"{what} must be a number or arithmetic with names, but is {raw!r}: {error}."
-            ) from None
+            raise DataError(f"{what} must be a number or arithmetic with names, but is {raw!r}: {error}.") from None
     elif isinstance(raw, bool) or not isinstance(raw, int | float):
-        raise FingervisionError(f"{what} must be a number or arithmetic with names, but is {raw!r}.")
+        raise DataError(f"{what} must be a number or arithmetic with names, but is {raw!r}.")
     else:
         value = float(raw) if abs(raw) <= 10.0 * LARGEST else math.copysign(math.inf, raw)
     if not abs(value) <= LARGEST:
-        raise FingervisionError(f"{what} must be a number of at most {LARGEST:g}, but is {value:g}.")
+        raise DataError(f"{what} must be a number of at most {LARGEST:g}, but is {value:g}.")
     return value
 
 

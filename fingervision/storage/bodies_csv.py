@@ -6,13 +6,15 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from fingervision.domain.body_poses import OK, FramePoses, SeenPose
-from fingervision.domain.errors import FingervisionError
+from fingervision.domain.errors import DataError
 
 COLUMNS = (
     "frame", "time_s", "body", "status", "x_mm", "y_mm", "angle_mrad", "u_x_mm", "u_y_mm", "u_angle_mrad",
-    "cov_x_y_mm2", "cov_x_angle_mm_mrad", "cov_y_angle_mm_mrad",
+    "cov_x_y_mm2", "cov_x_angle_mm_mrad", "cov_y_angle_mm_mrad", "u_random_x_mm", "u_random_y_mm",
+    "u_random_angle_mrad",
 )  # fmt: skip
-"""A row a body or hinge and frame; a hinge has an angle alone. `u_` and `cov_` are those from frame to frame."""
+"""A row a body or hinge and frame; a hinge has an angle alone. `u_` and `cov_` hold everything that is known (where the
+drawing was laid, the calibration), `u_random_` the part that differs from frame to frame."""
 PARTS = ("x_mm", "y_mm", "angle_mrad")
 
 
@@ -35,7 +37,10 @@ def _cells(pose: SeenPose) -> list[str]:
         u = [float(pose.covariance[k, k]) ** 0.5 if values[k] is not None else None for k in range(3)]
         if pose.x_mm is not None:
             shared = [float(pose.covariance[a, b]) for a, b in ((0, 1), (0, 2), (1, 2))]
-    return ["" if value is None else f"{value:.9g}" for value in (*values, *u, *shared)]
+    random: list[float | None] = [None, None, None]
+    if pose.random is not None:
+        random = [float(pose.random[k, k]) ** 0.5 if values[k] is not None else None for k in range(3)]
+    return ["" if value is None else f"{value:.9g}" for value in (*values, *u, *shared, *random)]
 
 
 def add_channels(gaps: Path, poses: Sequence[FramePoses], names: Mapping[str, str]) -> None:
@@ -61,15 +66,16 @@ def add_channels(gaps: Path, poses: Sequence[FramePoses], names: Mapping[str, st
     at = header.index("frame")
     seen = {frame.frame: frame.poses for frame in poses}
     if missing := [row[at] for row in body if int(row[at]) not in seen]:
-        raise FingervisionError(f"{gaps} must be of the same recording, but its frame {missing[0]} was not followed.")
+        raise DataError(f"{gaps} must be of the same recording, but its frame {missing[0]} was not followed.")
     first = next(iter(seen.values()), {})
     wanted = [(name, part) for name in names for part in PARTS if name in first and _has(seen.values(), name, part)]
-    header = [*header, *(f"{prefix}{names[name]}.{part}" for prefix in ("", "u_") for name, part in wanted)]
+    prefixes = ("", "u_", "u_random_")
+    header = [*header, *(f"{prefix}{names[name]}.{part}" for prefix in prefixes for name, part in wanted)]
     lines = []
     for row in body:
         own = seen[int(row[at])]
         cells = {name: dict(zip(PARTS, _pairs(own[name]), strict=True)) for name in names if name in own}
-        lines.append([*row, *(cells[name][part][k] for k in (0, 1) for name, part in wanted)])
+        lines.append([*row, *(cells[name][part][k] for k in range(len(prefixes)) for name, part in wanted)])
     partial = gaps.with_suffix(".part")
     with partial.open("w", encoding="utf-8", newline="") as file:
         writer = csv.writer(file, lineterminator="\n")
@@ -78,9 +84,9 @@ def add_channels(gaps: Path, poses: Sequence[FramePoses], names: Mapping[str, st
     os.replace(partial, gaps)  # noqa: PTH105 - atomic on every system
 
 
-def _pairs(pose: SeenPose) -> list[tuple[str, str]]:
+def _pairs(pose: SeenPose) -> list[tuple[str, ...]]:
     cells = _cells(pose)
-    return [(cells[k] if pose.status == OK else "", cells[3 + k] if pose.status == OK else "") for k in range(3)]
+    return [tuple(cells[at + k] if pose.status == OK else "" for at in (0, 3, 9)) for k in range(3)]
 
 
 def _has(frames: object, name: str, part: str) -> bool:

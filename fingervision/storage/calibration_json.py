@@ -16,7 +16,7 @@ from calib.lens import Lens
 from calib.limits import Limits
 from calib.measured_scale import Calibration, Reference, Response, ScalePart
 from calib.plane import Plane
-from fingervision.domain.errors import FingervisionError
+from fingervision.domain.errors import DataError, InputFileError, OutputError
 from fingervision.storage.finite import is_number
 from fingervision.storage.plain_file import plain
 
@@ -79,7 +79,7 @@ def write_calibration(calibration: Calibration, path: Path) -> None:
         temporary.write_text(json.dumps(content, indent=2, allow_nan=False) + "\n", encoding="utf-8")
         temporary.replace(path)
     except OSError as error:
-        raise FingervisionError(
+        raise OutputError(
             f"The calibration could not be written to {path}: {error.strerror}; name another place with -o."
         ) from error
 
@@ -110,13 +110,11 @@ def read_calibration(path: Path) -> Calibration:
     try:
         content = json.loads(plain(path).read_text(encoding="utf-8-sig"), parse_constant=_no_constant)
     except FileNotFoundError:
-        raise FingervisionError(
-            f"There is no calibration file {path}; make one with `fingervision calibrate`."
-        ) from None
+        raise InputFileError(f"There is no calibration file {path}; make one with `fingervision calibrate`.") from None
     except OSError as error:
-        raise FingervisionError(f"The calibration file {path} could not be read: {error.strerror}.") from error
+        raise InputFileError(f"The calibration file {path} could not be read: {error.strerror}.") from error
     except (ValueError, RecursionError) as error:
-        raise FingervisionError(f"{path} is not a calibration file: it is not JSON ({error}).") from error
+        raise DataError(f"{path} is not a calibration file: it is not JSON ({error}).") from error
     return _Reader(path, content).calibration()
 
 
@@ -134,7 +132,7 @@ class _Reader:
         self._content: dict[str, Any] = content
 
     def _refuse(self, words: str) -> NoReturn:
-        raise FingervisionError(f"{self._path} is not a usable calibration: {words}.")
+        raise DataError(f"{self._path} is not a usable calibration: {words}.")
 
     def calibration(self) -> Calibration:
         schema = self._content["schema"]

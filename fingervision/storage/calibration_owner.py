@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from fingervision.domain.errors import FingervisionError
+from fingervision.domain.errors import OutputError
 
 
 def refuse_foreign(out: Path) -> None:
@@ -24,7 +24,7 @@ def refuse_foreign(out: Path) -> None:
     except (OSError, ValueError):
         content = None
     if not (isinstance(content, dict) and "px_per_mm" in content):
-        raise FingervisionError(f"{out} stands there already and is no calibration; name another file with -o.")
+        raise OutputError(f"{out} stands there already and is no calibration; name another file with -o.")
 
 
 def write_picture(out: Path, name: str, picture: NDArray[np.uint8]) -> None:
@@ -43,7 +43,7 @@ def write_picture(out: Path, name: str, picture: NDArray[np.uint8]) -> None:
         try:
             path.write_bytes(content.tobytes())
         except OSError as error:
-            raise FingervisionError(f"The picture {path} could not be written: {error.strerror}.") from error
+            raise OutputError(f"The picture {path} could not be written: {error.strerror}.") from error
 
 
 __all__ = ["refuse_foreign", "write_picture"]

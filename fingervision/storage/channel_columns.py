@@ -1,4 +1,4 @@
-"""Columns of a measured table that are channels of one's own: `name_mm`, `name_mrad` and their `u_`."""
+"""Columns of a measured table that are channels of one's own: `name_mm`, `name_mrad`, their `u_` and `u_random_`."""
 
 from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
@@ -11,6 +11,9 @@ from fingervision.storage.csv_columns import header_of, read_columns
 from fingervision.storage.number_columns import Numbers, numbers_in
 
 UNITS = ("_mm", "_mrad")
+U_PREFIXES = ("u_random_", "u_")
+"""Standard uncertainties of a channel's readings: what differs from row to row where the table says it, else all of it,
+as with `u_random_mm` and `u_gap_mm` of the gap."""
 NO_CHANNELS = ("held_mm", "target_mm", "encoder_mm", "u_force_n")
 """Columns of the project's own tables that end so and are no channel."""
 
@@ -22,7 +25,7 @@ def channel_names(names: Sequence[str], taken: Collection[str]) -> list[str]:
         for name in names
         if name.endswith(UNITS) and not name.startswith("u_") and name not in taken and name not in NO_CHANNELS
     ]
-    return [*found, *(f"u_{name}" for name in found if f"u_{name}" in names)]
+    return [*found, *(f"{u}{name}" for u in U_PREFIXES for name in found if f"{u}{name}" in names)]
 
 
 def read_channels(path: Path, taken: Collection[str]) -> tuple[dict[str, Numbers], list[str]]:
@@ -56,10 +59,11 @@ def channels_of(values: Mapping[str, Numbers], rows: np.ndarray[tuple[int], np.d
     for name, numbers in values.items():
         if name.startswith("u_") or not numbers.present[rows].any():
             continue
-        u = values.get(f"u_{name}")
         present = numbers.present[rows]
         stated = None
-        if u is not None and u.present[rows][present].all() and np.all(u.value[rows][present] >= 0.0):
-            stated = u.value[rows]
+        for u in (values[f"{prefix}{name}"] for prefix in U_PREFIXES if f"{prefix}{name}" in values):
+            if u.present[rows][present].all() and np.all(u.value[rows][present] >= 0.0):
+                stated = u.value[rows]
+                break
         found[name] = Channel(numbers.value[rows], present, stated)
     return found

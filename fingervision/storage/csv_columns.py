@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from fingervision.domain.errors import FingervisionError
+from fingervision.domain.errors import DataError, InputFileError, unreadable
 from fingervision.storage.number_block import number_block
 
 CHUNK_LINES = 1000
@@ -28,17 +28,17 @@ def read_columns(path: Path, required: tuple[str, ...], known: tuple[str, ...]) 
     lines = _reader(path, text)
     header = next(lines, None)
     if header is None:
-        raise FingervisionError(f"{path} must have a header line with {','.join(required)}, but is empty.")
+        raise DataError(f"{path} must have a header line with {','.join(required)}, but is empty.")
     names = [cell.strip() for cell in header[1]]
     for name in required:
         if name not in names:
             near = difflib.get_close_matches(name, [h for h in names if h not in (*required, *known)], n=1, cutoff=0.5)
             hint = f"rename {near[0]}, in the unit of the name" if near else "add it"
-            raise FingervisionError(f"{path} must have a column {name}, but has {','.join(names)}: {hint}.")
+            raise DataError(f"{path} must have a column {name}, but has {','.join(names)}: {hint}.")
     wanted = [name for name in (*required, *known) if name in names]
     for name in wanted:
         if names.count(name) > 1:
-            raise FingervisionError(f"{path} must have each column once, but {name} stands twice: remove one.")
+            raise DataError(f"{path} must have each column once, but {name} stands twice: remove one.")
     plain = _without_quotes(text, names, wanted)
     if plain is not None:
         return plain
@@ -47,7 +47,7 @@ def read_columns(path: Path, required: tuple[str, ...], known: tuple[str, ...]) 
     wide = len(names)
     for number, cells in lines:
         if len(cells) != wide:
-            raise FingervisionError(
+            raise DataError(
                 f"Line {number} of {path} must have {wide} cells like the header, but has {len(cells)}: mend it."
             )
         for place, add in adders:
@@ -111,15 +111,13 @@ def read_block(path: Path) -> dict[str, NDArray[np.float64]] | None:
 
 def _text(path: Path) -> str:
     if path.exists() and not path.is_file():
-        raise FingervisionError(
-            f"{path} must be a table in a file, but is a folder or a pipe: save it as a file first."
-        )
+        raise DataError(f"{path} must be a table in a file, but is a folder or a pipe: save it as a file first.")
     try:
         return path.read_text(encoding="utf-8-sig")
     except FileNotFoundError:
-        raise FingervisionError(f"There is no table {path}.") from None
+        raise InputFileError(f"There is no table {path}.") from None
     except (OSError, UnicodeDecodeError) as error:
-        raise FingervisionError(f"{path} must be a CSV table in UTF-8, but could not be read: {error}.") from error
+        raise unreadable(error)(f"{path} must be a CSV table in UTF-8, but could not be read: {error}.") from error
 
 
 def _cells(path: Path, text: str) -> Iterator[list[str]]:
@@ -127,7 +125,7 @@ def _cells(path: Path, text: str) -> Iterator[list[str]]:
     try:
         yield from reader
     except csv.Error as error:
-        raise FingervisionError(
+        raise DataError(
             f"{path} must be a CSV table, but its quotes cannot be read, by line {reader.line_num} ({error}): close or "
             "remove the quote."
         ) from error
@@ -142,7 +140,7 @@ def number(path: Path, name: str, row: int, cell: str) -> float | None:
     except ValueError:
         value = float("nan")
     if not isfinite(value):
-        raise FingervisionError(
+        raise DataError(
             f"{name} must be a finite number, but is {cell} in data row {row + 1} of {path}: leave it empty."
         )
     return value

@@ -9,7 +9,7 @@ import copy
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-from fingervision.domain.errors import FingervisionError
+from fingervision.domain.errors import DataError
 from fingervision.storage.finite import is_number
 
 Path = tuple[str | int, ...]
@@ -45,11 +45,11 @@ def bare_tables(tables: Mapping[str, Any], origin: str) -> tuple[dict[str, Any],
         if isinstance(raw, dict):
             u, value = raw["u"], raw["value"]
             if not is_number(u) or u < 0.0:
-                raise FingervisionError(
+                raise DataError(
                     f"The uncertainty of {name} in {origin} must be a number that is not negative, but is {u!r}."
                 )
             if isinstance(value, list | dict):
-                raise FingervisionError(
+                raise DataError(
                     f"The uncertainty of {name} in {origin} must belong to a single number, but its value is {value!r}."
                 )
             _put(bare, path, value)
@@ -83,7 +83,7 @@ def changed_tables(
     places = {name: (path, raw) for name, path, raw in _walk(changed)}
     for name, by in changes.items():
         if name not in places:
-            raise FingervisionError(
+            raise DataError(
                 f"{origin} has no number {name}; it has {', '.join(sorted(places)[:8])} and others like them."
             )
         path, raw = places[name]

@@ -4,14 +4,14 @@ import difflib
 from collections.abc import Mapping
 from typing import Any
 
-from fingervision.domain.errors import FingervisionError
+from fingervision.domain.errors import DataError
 from fingervision.storage.arithmetic import number
 
 
 def as_table(raw: Any, what: str) -> Mapping[str, Any]:
     """Take a table, or refuse what is none."""
     if not isinstance(raw, dict):
-        raise FingervisionError(f"{what} must be a table, but is {raw!r}.")
+        raise DataError(f"{what} must be a table, but is {raw!r}.")
     return raw
 
 
@@ -33,7 +33,7 @@ class DrawingReader:
         """Tables of one name, in order."""
         raw = tables.get(name, [])
         if not isinstance(raw, list) or len(raw) < least:
-            raise FingervisionError(f"{self.origin} must have [[{name}]] sections, at least {least}, but has {raw!r}.")
+            raise DataError(f"{self.origin} must have [[{name}]] sections, at least {least}, but has {raw!r}.")
         return [as_table(table, f"[[{name}]] in {self.origin}") for table in raw]
 
     def known(self, table: Mapping[str, Any], keys: tuple[str, ...], what: str) -> None:
@@ -41,13 +41,13 @@ class DrawingReader:
         for key in table:
             if key not in keys:
                 near = difflib.get_close_matches(key, keys, 1, cutoff=0.0)[0]
-                raise FingervisionError(f"{what} in {self.origin} has an unknown key, {key}; did you mean {near}?")
+                raise DataError(f"{what} in {self.origin} has an unknown key, {key}; did you mean {near}?")
 
     def value(self, table: Mapping[str, Any], key: str, what: str) -> float:
         """One number or arithmetic."""
         name = f"{what}.{key}" if what else key
         if key not in table:
-            raise FingervisionError(f"{self.origin} must state {name}, but does not.")
+            raise DataError(f"{self.origin} must state {name}, but does not.")
         return number(table[key], self.lengths, f"{name} in {self.origin}")
 
     def positive(self, table: Mapping[str, Any], key: str, what: str) -> float:
@@ -55,14 +55,14 @@ class DrawingReader:
         value = self.value(table, key, what)
         if value <= 0.0:
             name = f"{what}.{key}" if what else key
-            raise FingervisionError(f"{name} in {self.origin} must be positive, but is {value:g}.")
+            raise DataError(f"{name} in {self.origin} must be positive, but is {value:g}.")
         return value
 
     def numbers(self, table: Mapping[str, Any], key: str, count: int, what: str) -> tuple[float, ...]:
         """A list of so many numbers."""
         raw = table.get(key)
         if not isinstance(raw, list) or len(raw) != count:
-            raise FingervisionError(f"{what}.{key} in {self.origin} must be a list of {count} numbers, but is {raw!r}.")
+            raise DataError(f"{what}.{key} in {self.origin} must be a list of {count} numbers, but is {raw!r}.")
         return tuple(number(part, self.lengths, f"{what}.{key} in {self.origin}") for part in raw)
 
     def grown(self, values: tuple[float, ...], what: str, *, flat: bool = False) -> tuple[float, float, float, float]:
@@ -70,7 +70,7 @@ class DrawingReader:
         x0, x1, y0, y1 = values
         fine = x1 >= x0 and y1 >= y0 if flat else x1 > x0 and y1 > y0
         if not fine:
-            raise FingervisionError(
+            raise DataError(
                 f"{what} in {self.origin} must be x from, x to, y from, y to, both growing, but is "
                 f"[{x0:g}, {x1:g}, {y0:g}, {y1:g}]."
             )

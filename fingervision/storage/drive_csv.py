@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fingervision.domain.drive import DriveHistory
-from fingervision.domain.errors import FingervisionError
+from fingervision.domain.errors import DataError, FingervisionError, InputFileError
 from fingervision.storage.csv_columns import read_block
 
 COLUMNS = ("time_s", "input_mm", "force_n")
@@ -35,16 +35,16 @@ def read_drive(path: Path) -> DriveHistory:
         return drive_rows(path, kept, None, range(2, 2 + block["time_s"].size))
     lines = _lines(path)
     if not lines:
-        raise FingervisionError(f"{path} must have a header line time_s,input_mm[,run][,force_n], but is empty.")
+        raise DataError(f"{path} must have a header line time_s,input_mm[,run][,force_n], but is empty.")
     header = [cell.strip() for cell in lines[0][1]]
     for name in ("time_s", "input_mm"):
         if header.count(name) != 1:
-            raise FingervisionError(f"{path} must have one column {name}, but its header is {','.join(header)}.")
+            raise DataError(f"{path} must have one column {name}, but its header is {','.join(header)}.")
     if len(lines) == 1:
-        raise FingervisionError(f"{path} must have at least one row below its header, but has none.")
+        raise DataError(f"{path} must have at least one row below its header, but has none.")
     for line, cells in lines[1:]:
         if len(cells) != len(header):
-            raise FingervisionError(f"Line {line} of {path} must have {len(header)} cells, but has {len(cells)}.")
+            raise DataError(f"Line {line} of {path} must have {len(header)} cells, but has {len(cells)}.")
     numbers = [line for line, _ in lines[1:]]
     columns = list(zip(*(cells for _, cells in lines[1:]), strict=True))
     values = {name: _numbers(path, numbers, name, columns[header.index(name)]) for name in COLUMNS if name in header}
@@ -77,7 +77,7 @@ def drive_rows(
     back = np.flatnonzero(~(np.diff(times) > 0.0))
     if back.size:
         at = int(back[0]) + 1
-        raise FingervisionError(
+        raise DataError(
             f"time_s must increase from row to row, but in line {lines[at]} of {path} it is {times[at]:g} "
             f"after {times[at - 1]:g}: put all runs on the recording's clock, in order."
         )
@@ -86,7 +86,7 @@ def drive_rows(
         if runs is not None and runs[at] != runs[at - 1]:
             seen.add(runs[at - 1])
             if runs[at] in seen:
-                raise FingervisionError(
+                raise DataError(
                     f"The rows of a run must stand together, but run {runs[at]} comes back in line {lines[at]} of "
                     f"{path}."
                 )
@@ -96,17 +96,15 @@ def drive_rows(
 def _lines(path: Path) -> list[tuple[int, list[str]]]:
     """Rows with their line numbers; comments and empty lines left out."""
     if path.exists() and not path.is_file():
-        raise FingervisionError(
-            f"{path} must be a table in a file, but is a folder or a pipe: save it as a file first."
-        )
+        raise DataError(f"{path} must be a table in a file, but is a folder or a pipe: save it as a file first.")
     try:
         text = path.read_text(encoding="utf-8-sig")
     except FileNotFoundError:
-        raise FingervisionError(f"There is no drive table {path}.") from None
+        raise InputFileError(f"There is no drive table {path}.") from None
     except OSError as error:
-        raise FingervisionError(f"The drive table {path} could not be read ({error.strerror}).") from error
+        raise InputFileError(f"The drive table {path} could not be read ({error.strerror}).") from error
     except UnicodeDecodeError as error:
-        raise FingervisionError(f"{path} must be a CSV table in UTF-8, but is not: {error.reason}.") from error
+        raise DataError(f"{path} must be a CSV table in UTF-8, but is not: {error.reason}.") from error
     kept = [
         (number, line)
         for number, line in enumerate(text.splitlines(), start=1)
@@ -119,7 +117,7 @@ def _lines(path: Path) -> list[tuple[int, list[str]]]:
         try:
             rows.append((number, next(csv.reader([line], strict=True))))
         except csv.Error as error:
-            raise FingervisionError(
+            raise DataError(
                 f"Line {number} of {path} has a quote that cannot be read ({error}): close or remove it."
             ) from error
     return rows
@@ -141,5 +139,5 @@ def _number(path: Path, line: int, name: str, cell: str) -> float:
     except ValueError:
         value = float("nan")
     if not isfinite(value):
-        raise FingervisionError(f"{name} in line {line} of {path} must be a number, but is '{cell.strip()}'.")
+        raise DataError(f"{name} in line {line} of {path} must be a number, but is '{cell.strip()}'.")
     return value

@@ -5,7 +5,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
-from fingervision.domain.errors import FingervisionError
+from fingervision.domain.errors import OutputError
 
 LOCK = ".lock"
 fcntl: Any
@@ -35,7 +35,7 @@ class FolderLock:
             try:
                 self._file = os.open(self._path, os.O_RDWR | os.O_CREAT, 0o644)
             except OSError as error:
-                raise FingervisionError(
+                raise OutputError(
                     f"The folder {path} cannot be written ({error.strerror}): name another with --out."
                 ) from error
             try:
@@ -43,7 +43,7 @@ class FolderLock:
                     fcntl.flock(self._file, fcntl.LOCK_EX | fcntl.LOCK_NB)
             except OSError:
                 os.close(self._file)
-                raise FingervisionError(
+                raise OutputError(
                     f"The folder {path} is in use by another run: wait for its end, or name another with --out."
                 ) from None
             if self._is_there():

@@ -4,7 +4,7 @@ import csv
 from math import isfinite
 from pathlib import Path
 
-from fingervision.domain.errors import FingervisionError
+from fingervision.domain.errors import DataError, unreadable
 from fingervision.storage.plain_file import plain
 
 # Inputs nearer than this are one part (mm): stages return to a place no better.
@@ -30,12 +30,12 @@ def read_gap_readings(path: Path, by_input: bool) -> dict[float | None, list[flo
     try:
         lines = [line for line in plain(path).read_text(encoding="utf-8").splitlines() if not line.startswith("#")]
     except (OSError, UnicodeDecodeError) as error:
-        raise FingervisionError(f"The table {path} could not be read: {error}; give a gaps.csv.") from error
+        raise unreadable(error)(f"The table {path} could not be read: {error}; give a gaps.csv.") from error
     table = csv.DictReader(lines)
     needed = {"gap_mm"} | ({"input_mm"} if by_input else set())
     missing = needed - set(table.fieldnames or ())
     if missing:
-        raise FingervisionError(f"The table {path} must have a column {min(missing)}, but has none: give a gaps.csv.")
+        raise DataError(f"The table {path} must have a column {min(missing)}, but has none: give a gaps.csv.")
     for number, row in enumerate(table, start=2):
         if not row["gap_mm"] or (by_input and not row["input_mm"]):
             continue
@@ -45,10 +45,8 @@ def read_gap_readings(path: Path, by_input: bool) -> dict[float | None, list[flo
         except ValueError:
             gap_mm, part = float("nan"), None
         if not isfinite(gap_mm):
-            raise FingervisionError(
-                f"Row {number} of {path} must hold a number as gap_mm, but holds {row['gap_mm']!r}."
-            )
+            raise DataError(f"Row {number} of {path} must hold a number as gap_mm, but holds {row['gap_mm']!r}.")
         readings.setdefault(part, []).append(gap_mm)
     if not readings:
-        raise FingervisionError(f"The table {path} must hold at least one gap, but holds none.")
+        raise DataError(f"The table {path} must hold at least one gap, but holds none.")
     return readings

@@ -7,7 +7,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Protocol
 
-from fingervision.domain.errors import FingervisionError
+from fingervision.domain.errors import OutputError
 from fingervision.domain.status import Status
 from fingervision.storage.line_file import LineFile, cell, quoted
 
@@ -197,7 +197,7 @@ def with_drive(path: Path, state: Callable[[float], Driven | None], *, has_force
         part.replace(path)
     except OSError as error:
         part.unlink(missing_ok=True)
-        raise FingervisionError(
+        raise OutputError(
             f"{path} could not be written again with the drive's inputs ({error.strerror}); the gaps are in it: make "
             "room and measure again."
         ) from error

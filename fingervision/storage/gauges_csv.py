@@ -39,6 +39,17 @@ class GaugeRow:
     status: str
 
 
+class GaugeRows(list[GaugeRow]):
+    """Keeps the rows in memory, in the place of a file."""
+
+    def add(self, rows: Sequence[GaugeRow]) -> None:
+        """Add rows, in order."""
+        self.extend(rows)
+
+    def close(self) -> None:
+        """Nothing is to be written."""
+
+
 class GaugesCsv:
     """Writes gauges.csv row by row; whole rows reach the file at least every second.
 

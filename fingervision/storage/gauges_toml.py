@@ -9,7 +9,7 @@ from typing import Any
 import tomlkit
 from tomlkit.exceptions import TOMLKitError
 
-from fingervision.domain.errors import FingervisionError
+from fingervision.domain.errors import DataError, InputFileError, OutputError
 from fingervision.storage.plain_file import plain
 
 HEAD = "# For `fingervision measure RECORDING --gauges FILE`; `fingervision gauge RECORDING` draws them.\n"
@@ -30,9 +30,9 @@ def text_of(path: Path) -> str | None:
     except FileNotFoundError:
         return None
     except OSError as error:
-        raise FingervisionError(f"The gauge file {path} could not be read ({error.strerror}).") from error
+        raise InputFileError(f"The gauge file {path} could not be read ({error.strerror}).") from error
     except UnicodeDecodeError as error:
-        raise FingervisionError(f"{path} must be TOML in UTF-8, but is not: {error.reason}.") from error
+        raise DataError(f"{path} must be TOML in UTF-8, but is not: {error.reason}.") from error
 
 
 def gauges_text(tables: Tables, before: str | None, schema: int) -> str:
@@ -106,6 +106,6 @@ def write_gauges_text(path: Path, text: str) -> None:
     except OSError as error:
         with suppress(OSError):
             part.unlink(missing_ok=True)
-        raise FingervisionError(
+        raise OutputError(
             f"{path} could not be written ({error.strerror}); nothing is lost here: make room there, and save again."
         ) from error

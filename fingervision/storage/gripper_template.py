@@ -6,7 +6,7 @@ from operator import attrgetter
 from pathlib import Path
 from typing import Any
 
-from fingervision.domain.errors import FingervisionError
+from fingervision.domain.errors import DataError
 from fingervision.domain.gripper import Gripper
 from fingervision.models.gripper_mechanism import whole_mechanism
 from fingervision.models.gripper_outline import check_outline
@@ -40,7 +40,7 @@ def mechanism_from_gripper(tables: Mapping[str, Any], path: Path) -> Mechanism:
     reader.known(table, _TABLE, "[gripper]")
     file = table.get("file")
     if not isinstance(file, str):
-        raise FingervisionError(f"gripper.file in {origin} must name a gripper.toml beside it, but is {file!r}.")
+        raise DataError(f"gripper.file in {origin} must name a gripper.toml beside it, but is {file!r}.")
     gripper = read_gripper(path.parent / file)
     halves, hinges = [], {}
     for side in ("left", "right"):
@@ -52,7 +52,7 @@ def mechanism_from_gripper(tables: Mapping[str, Any], path: Path) -> Mechanism:
             section, _, name = key.partition(".")
             if section in _HINGES:
                 if name not in _OF_HINGE:
-                    raise FingervisionError(f"{what} in {origin} must be one of {' and '.join(_OF_HINGE)} of a hinge.")
+                    raise DataError(f"{what} in {origin} must be one of {' and '.join(_OF_HINGE)} of a hinge.")
                 hinges[f"{side} hinge {section[-1]}", name] = value
                 continue
             half = _changed(half, key, value, what, origin)
@@ -82,13 +82,13 @@ def _flat(table: Mapping[str, Any]) -> dict[str, Any]:
 
 def _changed(half: Gripper, key: str, value: float, what: str, origin: str) -> Gripper:
     if key.startswith(_SHARED):
-        raise FingervisionError(f"{what} in {origin} must be the same in both halves; change it in the gripper.toml.")
+        raise DataError(f"{what} in {origin} must be the same in both halves; change it in the gripper.toml.")
     try:
         now = attrgetter(key)(half)
     except AttributeError:
         now = None
     if not isinstance(now, float):
-        raise FingervisionError(
+        raise DataError(
             f"{what} in {origin} must name a number as gripper.toml does, such as lever.l2_mm or "
             "hinge1.thickness_mm, but does not."
         )

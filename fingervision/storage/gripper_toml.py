@@ -9,7 +9,7 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
-from fingervision.domain.errors import FingervisionError
+from fingervision.domain.errors import DataError, InputFileError
 from fingervision.domain.gripper import Body, Gripper, Hinge, Lever, Links, Material
 from fingervision.models.gripper_outline import check_outline, check_stated_size
 from fingervision.models.plane_shapes import crosses_itself
@@ -60,15 +60,15 @@ def read_gripper(path: Path) -> Gripper:
     try:
         text = plain(path).read_text(encoding="utf-8-sig")
     except FileNotFoundError:
-        raise FingervisionError(f"There is no gripper {path}.") from None
+        raise InputFileError(f"There is no gripper {path}.") from None
     except OSError as error:
-        raise FingervisionError(f"The gripper {path} could not be read ({error.strerror}).") from error
+        raise InputFileError(f"The gripper {path} could not be read ({error.strerror}).") from error
     except UnicodeDecodeError as error:
-        raise FingervisionError(f"{path} must be TOML in UTF-8, but is not: {error.reason}.") from error
+        raise DataError(f"{path} must be TOML in UTF-8, but is not: {error.reason}.") from error
     try:
         tables = tomllib.loads(text)
     except (ValueError, RecursionError) as error:  # also numbers of thousands of digits, and tables without end
-        raise FingervisionError(f"{path} must be TOML, but is not: {error}.") from error
+        raise DataError(f"{path} must be TOML, but is not: {error}.") from error
     return gripper_from_tables(tables, str(path))
 
 
@@ -91,7 +91,7 @@ def _read_sections(
     for section, record in sections.items():
         table = tables.get(section)
         if not isinstance(table, dict):
-            raise FingervisionError(f"{origin} must have a section [{section}], but has none.")
+            raise DataError(f"{origin} must have a section [{section}], but has none.")
         names = {field.name: field.default is not MISSING for field in fields(record)}
         _refuse_unknown(table, names, origin, f"key in [{section}]")
         values: dict[str, Any] = {}
@@ -99,7 +99,7 @@ def _read_sections(
             if name not in table and may_be_left_out:
                 continue
             if name not in table:
-                raise FingervisionError(f"{origin} must state {section}.{name}, but does not.")
+                raise DataError(f"{origin} must state {section}.{name}, but does not.")
             values[name] = _value(table[name], f"{section}.{name}", origin, uncertainties)
         parts[section] = record(**values)
     return parts
@@ -109,27 +109,27 @@ def _refuse_unknown(given: Mapping[str, Any], known: Mapping[str, Any], origin: 
     for name in given:
         if name not in known:
             near = difflib.get_close_matches(name, list(known), 1, cutoff=0.0)
-            raise FingervisionError(f"{origin} has an unknown {kind}, {name}; did you mean {near[0]}?")
+            raise DataError(f"{origin} has an unknown {kind}, {name}; did you mean {near[0]}?")
 
 
 def _value(raw: Any, name: str, origin: str, uncertainties: dict[str, float]) -> Any:
     if name == "material.name":
         if not isinstance(raw, str):
-            raise FingervisionError(f"{name} in {origin} must be a text, but is {raw!r}.")
+            raise DataError(f"{name} in {origin} must be a text, but is {raw!r}.")
         return raw
     if name == "material.sn_line":
         return read_sn_line(raw, name, origin)
     if isinstance(raw, dict):
         if set(raw) != {"value", "u"}:
-            raise FingervisionError(
+            raise DataError(
                 f"{name} in {origin} must be a number or {{value = ..., u = ...}}, but has the keys {', '.join(raw)}."
             )
         u = _number(raw["u"], f"The uncertainty of {name}", origin)
         if u < 0.0:
-            raise FingervisionError(f"The uncertainty of {name} in {origin} must not be negative, but is {u:g}.")
+            raise DataError(f"The uncertainty of {name} in {origin} must not be negative, but is {u:g}.")
         raw = raw["value"]
         if isinstance(raw, list):
-            raise FingervisionError(
+            raise DataError(
                 f"The uncertainty of {name} in {origin} must belong to a single number, but {name} is a list; "
                 "state it at lever.l1_mm to l4_mm, which move hinges and drive."
             )
@@ -137,30 +137,28 @@ def _value(raw: Any, name: str, origin: str, uncertainties: dict[str, float]) ->
     if name.startswith("links.") and not name.endswith("width_mm"):
         if name == "links.tip_polygon_mm":
             if not isinstance(raw, list) or len(raw) < 3:
-                raise FingervisionError(f"{name} in {origin} must be at least three points, but is {raw!r}.")
+                raise DataError(f"{name} in {origin} must be at least three points, but is {raw!r}.")
             return tuple(_numbers(point, 2, name, origin) for point in raw)
         return _numbers(raw, 2 if name.startswith("links.shuttle") else 4, name, origin)
     if name in ("lever.hinge1_mm", "lever.hinge2_mm", "lever.drive_mm"):
         return _numbers(raw, 2, name, origin)
     value = _number(raw, name, origin)
     if name not in _MAY_BE_ANY_SIGN and value <= 0.0:
-        raise FingervisionError(f"{name} in {origin} must be positive, but is {value:g}.")
+        raise DataError(f"{name} in {origin} must be positive, but is {value:g}.")
     return value
 
 
 def _number(raw: Any, name: str, origin: str) -> float:
     if not is_number(raw):
-        raise FingervisionError(f"{name} in {origin} must be a finite number, but is {raw!r}.")
+        raise DataError(f"{name} in {origin} must be a finite number, but is {raw!r}.")
     try:
         value = float(raw)
     except OverflowError:
-        raise FingervisionError(
-            f"{name} in {origin} must be a finite number, but has {len(str(raw))} digits."
-        ) from None
+        raise DataError(f"{name} in {origin} must be a finite number, but has {len(str(raw))} digits.") from None
     unit = next((unit for unit in _LIMITS if name.endswith(unit)), "")
     lowest, highest = _LIMITS.get(unit, (0.0, math.inf))
     if abs(value) > highest or 0.0 < value < lowest:
-        raise FingervisionError(
+        raise DataError(
             f"{name} in {origin} must lie between {lowest:g} and {highest:g} {_SPELT.get(unit, '')}, but is {value:g}; "
             "check its unit."
         )
@@ -169,7 +167,7 @@ def _number(raw: Any, name: str, origin: str) -> float:
 
 def _numbers(raw: Any, count: int, name: str, origin: str) -> tuple[float, ...]:
     if not isinstance(raw, list) or len(raw) != count:
-        raise FingervisionError(f"{name} in {origin} must be a list of {count} numbers, but is {raw!r}.")
+        raise DataError(f"{name} in {origin} must be a list of {count} numbers, but is {raw!r}.")
     return tuple(_number(part, name, origin) for part in raw)
 
 
@@ -182,12 +180,12 @@ def _check(gripper: Gripper, origin: str) -> None:
         gripper.links,
     )
     if body.height_mm < _METRES_BELOW_MM * hinge.thickness_mm or body.measured_below_tip_mm >= body.height_mm:
-        raise FingervisionError(
+        raise DataError(
             f"body.height_mm in {origin} must be larger than the hinges and the measuring height, "
             f"but is {body.height_mm:g}; are its lengths in metres?"
         )
     if hinge.thickness_mm >= hinge.web_mm:
-        raise FingervisionError(
+        raise DataError(
             f"hinge.thickness_mm in {origin} must be smaller than the web that the notches cut, {hinge.web_mm:g} mm, "
             f"but is {hinge.thickness_mm:g}; a hinge cannot be thicker than its web."
         )
@@ -199,7 +197,7 @@ def _check(gripper: Gripper, origin: str) -> None:
     _check_links(gripper, origin)
     inner_mm = gripper.tip_corner_mm[0]
     if abs(2.0 * inner_mm - body.rest_gap_mm) > _MEET_MM:
-        raise FingervisionError(
+        raise DataError(
             f"The tip's inner face in {origin} must lie at half of body.rest_gap_mm, {body.rest_gap_mm / 2.0:g} mm, "
             f"but lies at {inner_mm:g} mm."
         )
@@ -214,11 +212,9 @@ def read_material(tables: Mapping[str, Any], origin: str) -> Material:
 def check_material(material: Material, origin: str) -> None:
     """Refuse Poisson's ratios that no material has, and ask about a modulus that cannot be in MPa."""
     if material.poisson_ratio >= 0.5:
-        raise FingervisionError(
-            f"material.poisson_ratio in {origin} must be below 0.5, but is {material.poisson_ratio:g}."
-        )
+        raise DataError(f"material.poisson_ratio in {origin} must be below 0.5, but is {material.poisson_ratio:g}.")
     if not _LEAST_DENSITY <= material.density_kg_m3 <= _MOST_DENSITY:
-        raise FingervisionError(
+        raise DataError(
             f"material.density_kg_m3 in {origin} must lie between {_LEAST_DENSITY:g} and {_MOST_DENSITY:g}, but is "
             f"{material.density_kg_m3:g}; is it in g/cm3? Multiply it by 1000."
         )
@@ -227,7 +223,7 @@ def check_material(material: Material, origin: str) -> None:
     strain = material.yield_mpa / material.youngs_modulus_mpa
     if not _LEAST_YIELD_STRAIN <= strain <= _MOST_YIELD_STRAIN:
         guess = "GPa" if strain > _MOST_YIELD_STRAIN else "Pa"
-        raise FingervisionError(
+        raise DataError(
             f"material.yield_mpa over material.youngs_modulus_mpa in {origin} must lie between {_LEAST_YIELD_STRAIN:g} "
             f"and {_MOST_YIELD_STRAIN:g}, but is {material.yield_mpa:g} / {material.youngs_modulus_mpa:g} = "
             f"{strain:.3g}; is the modulus in {guess}? Both must be in MPa."
@@ -240,30 +236,28 @@ def _check_links(gripper: Gripper, origin: str) -> None:
     for name in ("pillar_and_root_mm", "drive_block_mm"):
         x0, x1, y0, y1 = getattr(links, name)
         if not (x1 > x0 and y1 > y0):
-            raise FingervisionError(
+            raise DataError(
                 f"links.{name} in {origin} must be x from, x to, y from, y to, both growing, "
                 f"but is [{x0:g}, {x1:g}, {y0:g}, {y1:g}]."
             )
     shuttle = (*links.shuttle_from_mm, *links.shuttle_to_mm)
     for name, (x0, y0, x1, y1) in (("shuttle_to_mm", shuttle), ("finger_mm", links.finger_mm)):
         if x0 == x1 or not y1 > y0:
-            raise FingervisionError(
+            raise DataError(
                 f"links.{name} in {origin} must end beside and above the bar's beginning at ({x0:g}, {y0:g}), "
                 f"but ends at ({x1:g}, {y1:g})."
             )
     if links.cross_bar_mm[0] == links.cross_bar_mm[2]:
-        raise FingervisionError(f"links.cross_bar_mm in {origin} must reach across, but begins and ends at one x.")
+        raise DataError(f"links.cross_bar_mm in {origin} must reach across, but begins and ends at one x.")
     if len(set(links.tip_polygon_mm)) < len(links.tip_polygon_mm):
-        raise FingervisionError(
-            f"links.tip_polygon_mm in {origin} must be different points, but one stands there twice."
-        )
+        raise DataError(f"links.tip_polygon_mm in {origin} must be different points, but one stands there twice.")
     if crosses_itself(links.tip_polygon_mm):
-        raise FingervisionError(
+        raise DataError(
             f"links.tip_polygon_mm in {origin} must go round the tip without crossing itself, but two of its sides "
             "cross; put its points in order."
         )
     if not gripper.tip_corner_mm[1] > gripper.tip_heel_mm[1]:
-        raise FingervisionError(
+        raise DataError(
             f"links.tip_polygon_mm in {origin} must have an upright inner face, but its smallest x, "
             f"{gripper.tip_corner_mm[0]:g} mm, is that of a single point."
         )
@@ -272,7 +266,7 @@ def _check_links(gripper: Gripper, origin: str) -> None:
 def _must_meet(name: str, at_mm: tuple[float, float], other: str, other_mm: tuple[float, float], origin: str) -> None:
     apart_mm = math.dist(at_mm, other_mm)
     if apart_mm > _MEET_MM:
-        raise FingervisionError(
+        raise DataError(
             f"{name} in {origin} must lie at {other} = ({other_mm[0]:g}, {other_mm[1]:g}), but lies at "
             f"({at_mm[0]:g}, {at_mm[1]:g}), {apart_mm:.3g} mm away: the links do not meet."
         )

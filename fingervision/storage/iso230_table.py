@@ -14,7 +14,7 @@ from pathlib import Path
 
 import numpy as np
 
-from fingervision.domain.errors import FingervisionError
+from fingervision.domain.errors import DataError
 from fingervision.storage.approach_path import PathRow, Reading, approach_path
 from fingervision.storage.csv_columns import number, read_columns
 from fingervision.storage.plain_file import plain
@@ -105,14 +105,14 @@ def iso230_rows(
     }
     kinds = sorted(set(quantities.values()))
     if len(kinds) != 1:
-        raise FingervisionError(
+        raise DataError(
             f"{path} must have its readings as one of {', '.join(QUANTITIES)}, but has "
             f"{' and '.join(kinds) or ','.join(header)}: name the column of the readings so, or one column a cycle "
             "up_1_deviation_um, down_1_deviation_um and so on."
         )
     sided = bool(blocks) and all(match["side"].lower() != UNSIDED for match in blocks.values())
     if not sided and "direction" not in header:
-        raise FingervisionError(
+        raise DataError(
             f"{path} must have a column direction (up or down: the side from which the target was approached), but "
             f"has {','.join(header)}: add it; or, where the rows stand in the order of travel, name the columns "
             "input_mm and gap_mm."
@@ -183,11 +183,11 @@ def _readings(
     for cell in listed:
         target = number(path, TARGET, cell.row, cells[TARGET][cell.row])
         if target is None:
-            raise FingervisionError(f"{TARGET} must be a number, but is empty in data row {cell.row + 1} of {path}.")
+            raise DataError(f"{TARGET} must be a number, but is empty in data row {cell.row + 1} of {path}.")
         word = cell.direction.strip().lower().replace(MINUS, "-")
         word = re.sub(r"^([+-]?1)\.0*$", r"\1", word)
         if word not in SIDES:
-            raise FingervisionError(
+            raise DataError(
                 f"direction must be up (from below) or down (from above), or a word for it such as + and -, +1 and -1, "
                 f"forward and backward, but is {cell.direction or 'empty'} in data row {cell.row + 1} of {path}: "
                 "rename it."
@@ -201,7 +201,7 @@ def _readings(
         if not cell.cycle:
             cycle = seen.get(key, 0)
         elif key in seen:
-            raise FingervisionError(
+            raise DataError(
                 f"A target must stand once a cycle and direction, but {target:g} mm, cycle {cell.cycle}, "
                 f"{cell.direction} stands twice in {path}: number the cycles, or name the runs in a column run."
             )
@@ -231,13 +231,13 @@ def _check_quantity(path: Path, readings: list[Reading], quantity: str) -> None:
     values = positions - targets if quantity.startswith("deviation") else positions
     share = float(np.ptp(values) / np.ptp(targets))
     if quantity.startswith("deviation") and share > LARGEST_DEVIATION:
-        raise FingervisionError(
+        raise DataError(
             f"{quantity} must be position minus target, but ranges over {np.ptp(values):g} mm while the targets range "
             f"over {np.ptp(targets):g} mm in {path}: these are positions; name the column "
             f"{quantity.replace('deviation', 'position')}."
         )
     if quantity.startswith("position") and share < SMALLEST_TRAVEL:
-        raise FingervisionError(
+        raise DataError(
             f"{quantity} must follow the target, but ranges over {np.ptp(values):g} mm while the targets range over "
             f"{np.ptp(targets):g} mm in {path}: if these are deviations, name the column "
             f"{quantity.replace('position', 'deviation')}."

@@ -6,7 +6,7 @@ from contextlib import suppress
 from pathlib import Path
 from time import monotonic
 
-from fingervision.domain.errors import FingervisionError
+from fingervision.domain.errors import OutputError
 
 # Lines wait for company so long, and in front of it once more as long; a second at most is lost when the program is
 # killed.
@@ -40,7 +40,7 @@ class LineFile:
             self._file = path.open("ab" if go_on else "wb", buffering=0)
             self._whole_bytes = path.stat().st_size
         except OSError as error:
-            raise FingervisionError(f"{path} could not be written ({error.strerror}): name another --out.") from error
+            raise OutputError(f"{path} could not be written ({error.strerror}): name another --out.") from error
         if not go_on:
             self._pending.append(header)
         self._write()
@@ -76,7 +76,7 @@ class LineFile:
             with suppress(OSError):  # a pipe cannot be cut back
                 os.ftruncate(self._file.fileno(), self._whole_bytes)
             self._file.close()
-            raise FingervisionError(
+            raise OutputError(
                 f"{self._path} could not be written any further ({error.strerror}); the rows until then are in it: "
                 "make room and measure again."
             ) from error

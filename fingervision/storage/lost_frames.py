@@ -8,7 +8,7 @@ import json
 from collections.abc import Sequence
 from pathlib import Path
 
-from fingervision.domain.errors import FingervisionError
+from fingervision.domain.errors import DataError, FingervisionError, OutputError
 from fingervision.domain.frame import LostFrame
 from fingervision.domain.status import Status
 from fingervision.storage.csv_columns import number, read_columns
@@ -57,7 +57,7 @@ class LostFrames:
             raise self._failed(error) from error
 
     def _failed(self, error: OSError) -> FingervisionError:
-        return FingervisionError(
+        return OutputError(
             f"{self._path} could not be written any further ({error.strerror}); what was recorded until then is valid: "
             "make room, or name another --out."
         )
@@ -92,7 +92,7 @@ def lost_frames(files: Sequence[Path]) -> tuple[LostFrame, ...]:
         return ()
     path = files[0].parent / LOST
     if not path.exists():
-        raise FingervisionError(
+        raise DataError(
             f"{path} must say which frames of {files[0].name} were damaged when they came, but is missing: put it "
             "back, or measure a copy of the video in another folder, where damaged frames may look whole."
         )
@@ -101,7 +101,7 @@ def lost_frames(files: Sequence[Path]) -> tuple[LostFrame, ...]:
     for row, (time, status, words) in enumerate(zip(*(columns[name] for name in HEADER.split(",")), strict=True)):
         time_s = number(path, "time_s", row, time)
         if time_s is None or status not in (Status.DAMAGED, Status.DUPLICATE):
-            raise FingervisionError(
+            raise DataError(
                 f"Row {row + 1} of {path} must have a time and `damaged` or `duplicate`, but has '{time}' and "
                 f"'{status}': copy the run again."
             )

@@ -7,7 +7,7 @@ from types import MappingProxyType
 import numpy as np
 from numpy.typing import NDArray
 
-from fingervision.domain.errors import FingervisionError
+from fingervision.domain.errors import DataError
 from fingervision.domain.measured_table import MeasuredTable, RecordedPath
 from fingervision.storage.channel_columns import channels_of, read_channels
 from fingervision.storage.csv_columns import read_block, read_columns
@@ -101,14 +101,14 @@ def measured_rows(
     if count_rows:
         notes += _left_out(total, kept.size, on_path.size - kept.size)
     if kept.size < FEWEST_ROWS:
-        raise FingervisionError(
+        raise DataError(
             f"{path} must have at least {FEWEST_ROWS} rows with an input and a gap, but has {kept.size}: measure more."
         )
     column = {name: each.value[kept] for name, each in values.items() if each.present[kept].all()}
     names = [run_cells[row] for row in kept.tolist()] if run_cells is not None else [""] * kept.size
     count = len(set(names))
     if count > MOST_RUNS:
-        raise FingervisionError(
+        raise DataError(
             f"{path} must have at most {MOST_RUNS} runs, but has {count} in {kept.size} rows: does the run column "
             "number the rows? Leave it out, or give fewer runs at once."
         )
@@ -131,7 +131,7 @@ def measured_rows(
     gap = column["right_mm"] - column["left_mm"] if edges else column["gap_mm"]
     for label, signal in (("input_mm", column["input_mm"]), ("gap_mm", gap)):
         if np.ptp(signal) == 0.0:
-            raise FingervisionError(
+            raise DataError(
                 f"{label} must change, but is {signal[0]:g} in every row of {path}: record a run that moves."
             )
     if len(runs) == 1:
@@ -172,7 +172,7 @@ def _check_times(time_s: NDArray[np.float64], name: str, path: Path) -> None:
     said += "in every row" if repeated.size == time_s.size - 1 else "twice"
     whole = bool(np.all(time_s == np.round(time_s)))
     cure = "write the times with more digits" if whole else "add a run column, or remove the repeated rows"
-    raise FingervisionError(f"{said} of run {name or '(unnamed)'} of {path}: {cure}.")
+    raise DataError(f"{said} of run {name or '(unnamed)'} of {path}: {cure}.")
 
 
 def _by_run(names: Sequence[str], key: NDArray[np.float64]) -> dict[str, NDArray[np.intp]]:

@@ -9,7 +9,7 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
-from fingervision.domain.errors import FingervisionError
+from fingervision.domain.errors import DataError, InputFileError, unreadable
 from fingervision.domain.parameter import Estimate
 from fingervision.models.flexure import Flexure
 from fingervision.models.mechanism import Contact, Drive, Face, Mechanism, check_mechanism
@@ -110,9 +110,9 @@ def read_drawing(path: Path) -> MechanismDrawing:
     try:
         tables = tomllib.loads(plain(path).read_text(encoding="utf-8-sig"))
     except FileNotFoundError:
-        raise FingervisionError(f"There is no mechanism {path}.") from None
+        raise InputFileError(f"There is no mechanism {path}.") from None
     except (OSError, ValueError, RecursionError) as error:
-        raise FingervisionError(f"{path} must be TOML in UTF-8, but is not: {error}.") from error
+        raise unreadable(error)(f"{path} must be TOML in UTF-8, but is not: {error}.") from error
     return MechanismDrawing(path, *bare_tables(tables, str(path)))
 
 
@@ -132,9 +132,9 @@ def mechanism_from_tables(tables: Mapping[str, Any], origin: str) -> Mechanism:
     for key in tables:
         if key not in _TOP:
             near = difflib.get_close_matches(key, _TOP, 1, cutoff=0.0)[0]
-            raise FingervisionError(f"{origin} has an unknown section or key, {key}; did you mean {near}?")
+            raise DataError(f"{origin} has an unknown section or key, {key}; did you mean {near}?")
     if tables.get("schema", 1) != 1:
-        raise FingervisionError(f"schema in {origin} must be 1, but is {tables['schema']!r}.")
+        raise DataError(f"schema in {origin} must be 1, but is {tables['schema']!r}.")
     lengths: dict[str, float] = {}
     for name, raw in as_table(tables.get("lengths", {}), f"[lengths] in {origin}").items():
         lengths[name] = number(raw, lengths, f"lengths.{name} in {origin}")
@@ -169,12 +169,12 @@ class _Reader(DrawingReader):
         self.known(table, ("name", "cut", "width_mm", "polygon_mm", *_SHAPES), what)
         given = [key for key in (*_SHAPES, "polygon_mm") if key in table]
         if len(given) != 1:
-            raise FingervisionError(
+            raise DataError(
                 f"{what} in {self.origin} must be one of {', '.join((*_SHAPES, 'polygon_mm'))}, but has "
                 f"{' and '.join(given) or 'none'}."
             )
         if not isinstance(table.get("cut", False), bool):
-            raise FingervisionError(f"{what}.cut in {self.origin} must be true or false, but is {table['cut']!r}.")
+            raise DataError(f"{what}.cut in {self.origin} must be true or false, but is {table['cut']!r}.")
         added = not table.get("cut", False)
         return [(added, self._shape(table, given[0], what))]
 
@@ -182,13 +182,11 @@ class _Reader(DrawingReader):
         if key == "polygon_mm":
             raw = table[key]
             if not isinstance(raw, list) or len(raw) < 3:
-                raise FingervisionError(
-                    f"{what}.polygon_mm in {self.origin} must be three points or more, but is {raw!r}."
-                )
+                raise DataError(f"{what}.polygon_mm in {self.origin} must be three points or more, but is {raw!r}.")
             points = [self.numbers({"polygon_mm": point}, "polygon_mm", 2, what) for point in raw]
             corners = tuple((x, y) for x, y in points)
             if len(set(corners)) < len(corners) or crosses_itself(corners):
-                raise FingervisionError(
+                raise DataError(
                     f"{what}.polygon_mm in {self.origin} must go round without crossing itself, but does; put its "
                     "points in order, each once."
                 )
@@ -197,13 +195,13 @@ class _Reader(DrawingReader):
         if key == "bar_mm":
             width_mm = self.positive(table, "width_mm", what)
             if hypot(values[2] - values[0], values[3] - values[1]) == 0.0:
-                raise FingervisionError(f"{what}.bar_mm in {self.origin} must have some length, but has none.")
+                raise DataError(f"{what}.bar_mm in {self.origin} must have some length, but has none.")
             return bar(values[0], values[1], values[2], values[3], width_mm)
         if key == "box_mm":
             return box(*self.grown(values, f"{what}.box_mm"))
         radii = (values[2], values[2]) if key == "disc_mm" else (values[2], values[3])
         if min(radii) <= 0.0:
-            raise FingervisionError(f"{what}.{key} in {self.origin} must have positive radii, but has {min(radii):g}.")
+            raise DataError(f"{what}.{key} in {self.origin} must have positive radii, but has {min(radii):g}.")
         return Ellipse((values[0], values[1]), radii, values[4] if key == "ellipse_mm" else 0.0)
 
     def flexure(self, table: Mapping[str, Any], place: int) -> Flexure:
@@ -211,16 +209,14 @@ class _Reader(DrawingReader):
         what = f"flexure {name}"
         kind = table.get("kind")
         if kind not in _FLEXURES:
-            raise FingervisionError(
-                f"{what}.kind in {self.origin} must be one of {', '.join(_FLEXURES)}, but is {kind!r}."
-            )
+            raise DataError(f"{what}.kind in {self.origin} must be one of {', '.join(_FLEXURES)}, but is {kind!r}.")
         self.known(table, ("name", "kind", "at_mm", "axis_deg", *_FLEXURES[kind]), what)
         at = self.numbers(table, "at_mm", 2, what)
         values = {key: self.positive(table, key, what) for key in _FLEXURES[kind]}
         if "radius_mm" in values:
             values["half_length_mm"] = values["depth_mm"] = values.pop("radius_mm")
         if values.get("fillet_mm", 0.0) > min(values["half_length_mm"], values.get("depth_mm", 0.0) or 1e300):
-            raise FingervisionError(
+            raise DataError(
                 f"{what}.fillet_mm in {self.origin} must be at most half_length_mm and depth_mm, but is "
                 f"{values['fillet_mm']:g}."
             )
@@ -232,9 +228,7 @@ class _Reader(DrawingReader):
 
     def slide(self, table: Mapping[str, Any], place: int) -> tuple[Face, str]:
         if table.get("holds") not in ("x", "y"):
-            raise FingervisionError(
-                f"slide {place}.holds in {self.origin} must be x or y, but is {table.get('holds')!r}."
-            )
+            raise DataError(f"slide {place}.holds in {self.origin} must be x or y, but is {table.get('holds')!r}.")
         return self.face(table, f"slide {place}"), table["holds"]
 
     def contact(self, table: Mapping[str, Any], place: int) -> Contact:
@@ -242,7 +236,7 @@ class _Reader(DrawingReader):
         what = f"contact {name}"
         self.known(table, ("name", "box_mm", "against_box_mm", "wall_mm"), what)
         if ("against_box_mm" in table) == ("wall_mm" in table):
-            raise FingervisionError(
+            raise DataError(
                 f"{what} in {self.origin} must be against one of against_box_mm, a face, and wall_mm, two points of a "
                 f"rigid wall, but has {'both' if 'wall_mm' in table else 'none'}."
             )
@@ -250,7 +244,7 @@ class _Reader(DrawingReader):
         if "wall_mm" in table:
             x0, y0, x1, y1 = self.numbers(table, "wall_mm", 4, what)
             if hypot(x1 - x0, y1 - y0) == 0.0:
-                raise FingervisionError(f"{what}.wall_mm in {self.origin} must be two points, but they are one.")
+                raise DataError(f"{what}.wall_mm in {self.origin} must be two points, but they are one.")
             return Contact(name, face, None, ((x0, y0), (x1, y1)))
         box_mm = self.grown(self.numbers(table, "against_box_mm", 4, what), f"{what}.against_box_mm", flat=True)
         return Contact(name, face, Face(f"{name}, other face", box_mm))
@@ -261,9 +255,9 @@ class _Reader(DrawingReader):
         x, y = self.numbers(table, "direction", 2, "drive")
         across = table.get("across", "held")
         if hypot(x, y) == 0.0:
-            raise FingervisionError(f"drive.direction in {self.origin} must point somewhere, but is [0, 0].")
+            raise DataError(f"drive.direction in {self.origin} must point somewhere, but is [0, 0].")
         if across not in ("held", "free") or (across == "free" and x * y != 0.0):
-            raise FingervisionError(
+            raise DataError(
                 f"drive.across in {self.origin} must be held, or free where drive.direction is along x or y, "
                 f"but is {across!r}."
             )
@@ -278,7 +272,7 @@ class _Reader(DrawingReader):
         name, of = str(table.get("name", "")), table.get("of")
         ends = [end for end in of if isinstance(end, str) and end in mechanism.probes] if isinstance(of, list) else []
         if len(ends) != 2 or ends != of or mechanism.probes[ends[0]] == mechanism.probes[ends[1]]:
-            raise FingervisionError(
+            raise DataError(
                 f"pair {name}.of in {self.origin} must be two of the probes {', '.join(mechanism.probes)} at different "
                 f"places, but is {of!r}."
             )

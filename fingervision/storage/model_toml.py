@@ -10,9 +10,9 @@ from pathlib import Path
 import numpy as np
 
 from fingervision.domain.effect import effect_key, split_key
-from fingervision.domain.errors import FingervisionError
+from fingervision.domain.errors import DataError, InputFileError, unreadable
 from fingervision.domain.parameter import Estimate
-from fingervision.effects import catalogue
+from fingervision.effects import catalogue, origin_of
 from fingervision.effects.position_error_map import curve_points, curve_values
 from fingervision.models.corrected import CorrectedModel
 from fingervision.models.drawn_mechanism import MechanismModelOfGap
@@ -20,6 +20,7 @@ from fingervision.models.function_model import SUFFIXES, FunctionModel
 from fingervision.models.kinds import kinds
 from fingervision.models.physical_gripper import PhysicalGripper
 from fingervision.models.table import TableModel
+from fingervision.plugins.origin import SESSION
 from fingervision.storage.gripper_toml import read_gripper
 from fingervision.storage.mechanism_toml import is_mechanism, read_mechanism
 from fingervision.storage.plain_file import plain
@@ -63,27 +64,28 @@ def read_model(
     try:
         document = tomllib.loads(plain(path).read_text(encoding="utf-8-sig"))
     except FileNotFoundError:
-        raise FingervisionError(f"There is no model {path}.") from None
+        raise InputFileError(f"There is no model {path}.") from None
     except (ValueError, RecursionError, OSError) as error:
-        raise FingervisionError(f"{path} must be a TOML file, but could not be read: {error}.") from error
+        raise unreadable(error)(f"{path} must be a TOML file, but could not be read: {error}.") from error
     if "base" not in document:
         return _gripper(path, kind)
     if document.get("schema", 1) != 1:
-        raise FingervisionError(
+        raise DataError(
             f"schema in {path} must be 1, but is {document['schema']}: a newer fingervision wrote it; use that one."
         )
     place = path.resolve()
     if place in inside:
-        raise FingervisionError(f"The base of {path} must be another model, but leads back to itself: mend `base`.")
+        raise DataError(f"The base of {path} must be another model, but leads back to itself: mend `base`.")
     kind = str(document.get("kind", kind))
     base = read_model(path.parent / str(document["base"]), kind, (*inside, place), table)
     names: dict[str, str] = {key: str(document[key]) for key in ("input", "gap") if key in document}
     if names and isinstance(base.base, FunctionModel):
         base = _function(base.base.path, names)
     effects: dict[str, Mapping[str, Estimate]] = dict(base.effects)
+    origins: dict[str, str] = {}
     entries = document.get("effect", [])
     if not isinstance(entries, list):
-        raise FingervisionError(f"The effects in {path} must be [[effect]] tables, but `effect` is {entries}: mend it.")
+        raise DataError(f"The effects in {path} must be [[effect]] tables, but `effect` is {entries}: mend it.")
     for entry in entries:
         try:
             parameters = dict(entry["parameters"])
@@ -94,15 +96,16 @@ def read_model(
             }
             curve = curve_values([at for at, _ in points], [error for _, error in points])
             key = effect_key(str(entry["name"]), str(entry.get("place", "")), str(entry.get("end", "")))
+            origins[key] = str(entry.get("from", ""))
             effects[key] = stated | {name: Estimate(value, None) for name, value in curve.items()}
         except (KeyError, TypeError, ValueError, AttributeError, OverflowError) as error:
-            raise FingervisionError(
+            raise DataError(
                 f"An effect in {path} must have a name and parameters like play_mm = {{ value = 0.01, u = 0.001 }}, "
                 f"but is {entry}: mend it."
             ) from error
     for key, values in effects.items():
         name = split_key(key)[0]
-        _check(name, values, path)
+        _check(name, values, path, origins.get(key, ""))
         _check_curve(name, values, path)
     return CorrectedModel(base.name, base.base, base.base_path, base.input_range_mm, effects, base.kind)
 
@@ -110,21 +113,26 @@ def read_model(
 def _function(path: Path, names: Mapping[str, str]) -> CorrectedModel:
     """Take an FMU or a Python file as a model, which covers whatever it answers."""
     if not path.is_file():
-        raise FingervisionError(f"There is no model {path}.")
+        raise InputFileError(f"There is no model {path}.")
     everywhere = (-float("inf"), float("inf"))
     return CorrectedModel(path.name, FunctionModel(path, names), str(path), everywhere, {})
 
 
-def _check(name: str, values: Mapping[str, Estimate], path: Path) -> None:
-    """Refuse what is no effect of the catalogue, or lacks one of its parameters."""
+def _check(name: str, values: Mapping[str, Estimate], path: Path, origin: str) -> None:
+    """Refuse what is no effect of the catalogue, or lacks one of its parameters; `origin` is where it came from."""
+    if name not in catalogue() and origin:
+        advice = f"add `--effects {origin}`" if origin.endswith(".py") else f"install {origin}"
+        if origin == str(SESSION):
+            advice = "register it with @fingervision.effect, or keep it in a file for --effects"
+        raise DataError(f"The effect {name} in {path} must be known here, but is not; it came from {origin}: {advice}.")
     if name not in catalogue():
         near = get_close_matches(name, catalogue(), n=1)
         hint = f"did you mean {near[0]}?" if near else "`fingervision effects` lists them."
-        raise FingervisionError(f"An effect in {path} must be one of the catalogue, but is {name}: {hint}")
+        raise DataError(f"An effect in {path} must be one of the catalogue, but is {name}: {hint}")
     wanted = [parameter.name for parameter in catalogue()[name].parameters]
     missing = [key for key in wanted if key not in values]
     if missing:
-        raise FingervisionError(
+        raise DataError(
             f"The effect {name} in {path} must state {', '.join(wanted)}, but {', '.join(missing)} is not there "
             f"(it states {', '.join(values) or 'nothing'}): add it."
         )
@@ -132,12 +140,12 @@ def _check(name: str, values: Mapping[str, Estimate], path: Path) -> None:
         estimate = values[parameter.name]
         slack = BOUND_SLACK * (parameter.upper - parameter.lower)
         if not parameter.lower - slack <= estimate.value <= parameter.upper + slack:
-            raise FingervisionError(
+            raise DataError(
                 f"{parameter.name} of the effect {name} in {path} must be {parameter.lower:g} to {parameter.upper:g}, "
                 f"but is {estimate.value:g}: mend it."
             )
         if estimate.u is not None and not 0.0 <= estimate.u < float("inf"):
-            raise FingervisionError(
+            raise DataError(
                 f"The u of {parameter.name} of the effect {name} in {path} must be a number from 0, but is "
                 f"{estimate.u:g}: mend it, or leave it out."
             )
@@ -152,7 +160,7 @@ def _check_curve(name: str, values: Mapping[str, Estimate], path: Path) -> None:
         and np.all(np.isfinite(errors))
         and np.all(np.diff(inputs) > 0.0)
     ):
-        raise FingervisionError(
+        raise DataError(
             f"{POINTS} of the effect {name} in {path} must be two or more pairs of finite numbers with rising inputs, "
             f"but the inputs are {inputs.tolist()}: mend them."
         )
@@ -161,9 +169,7 @@ def _check_curve(name: str, values: Mapping[str, Estimate], path: Path) -> None:
 def _gripper(path: Path, kind: str) -> CorrectedModel:
     """Build a gripper whose effects are its own physics."""
     if kind not in kinds():
-        raise FingervisionError(
-            f"The kind of model for {path} must be one of {', '.join(kinds())}, but is {kind}: choose one."
-        )
+        raise DataError(f"The kind of model for {path} must be one of {', '.join(kinds())}, but is {kind}: choose one.")
     if is_mechanism(path):
         drawn = MechanismModelOfGap(read_mechanism(path), kind)
         return CorrectedModel(f"{path.name} ({kind})", drawn, str(path), drawn.input_range_mm, {}, kind)
@@ -182,6 +188,9 @@ def write_model(
         lines += ["", "[[effect]]", f'name = "{effect}"']
         lines += [f"place = {json.dumps(place, ensure_ascii=False)}"] if place else []
         lines += [f"end = {json.dumps(end, ensure_ascii=False)}"] if end else []
+        # Whoever reads the file needs the effect too, where it is no built-in one.
+        origin = origin_of(effect) if effect in catalogue() else None
+        lines += [] if origin is None or origin.built_in else [f"from = {json.dumps(str(origin), ensure_ascii=False)}"]
         lines.append("[effect.parameters]")
         inputs, errors = curve_points({key: estimate.value for key, estimate in parameters.items()})
         if inputs.size:

@@ -4,7 +4,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from fingervision.domain.errors import FingervisionError
+from fingervision.domain.errors import OutputError
 
 
 @contextmanager
@@ -20,9 +20,11 @@ def out_folder(path: Path) -> Iterator[None]:
         path.mkdir(parents=True, exist_ok=True)
         yield
     except FileExistsError:
-        raise FingervisionError(f"--out must be a folder, but {path} is a file: name another.") from None
+        raise OutputError(f"--out must be a folder, but {path} is a file: name another.") from None
+    except OutputError:  # of a file in it, with its own sentence
+        raise
     except OSError as error:
-        raise FingervisionError(
+        raise OutputError(
             f"The folder {path} cannot be written ({error.strerror}): name another with --out."
         ) from error
 

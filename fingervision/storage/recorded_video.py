@@ -7,7 +7,7 @@ from typing import Any
 import av
 import numpy as np
 
-from fingervision.domain.errors import FingervisionError
+from fingervision.domain.errors import DataError, FingervisionError, OutputError
 from fingervision.domain.frame import Frame, LostFrame
 from fingervision.frames.received import OwnPacket
 from fingervision.vision.grey import to_grey
@@ -120,7 +120,7 @@ class RecordedVideo:
                 self._last_tick = tick
                 kept += 1
         if kept < frames:
-            raise FingervisionError(
+            raise DataError(
                 f"To resume the run, {self._path} must hold at least {frames} frames, but holds {kept}: start the run "
                 "anew in another folder."
             )
@@ -173,7 +173,7 @@ class RecordedVideo:
 
     def _failed(self, error: Exception) -> FingervisionError:
         why = getattr(error, "strerror", None) or str(error)
-        return FingervisionError(
+        return OutputError(
             f"{self._path} could not be written any further ({why}); what was recorded until then is in it: make room, "
             "or name another --out."
         )

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from calib.camera_response import CURVES, CameraResponse, standard_response
 from calib.errors import CalibrationError
-from fingervision.domain.errors import FingervisionError, UsageError
+from fingervision.domain.errors import DataError, OutputError, UsageError, unreadable
 from fingervision.storage.plain_file import plain
 
 COLUMNS = ("level", "light")
@@ -50,30 +50,28 @@ def read_response(path: Path) -> CameraResponse:
         with plain(path).open(newline="", encoding="utf-8-sig") as file:
             rows = list(csv.reader(line for line in file if not line.startswith("#")))
     except (OSError, UnicodeDecodeError) as error:
-        raise FingervisionError(f"The camera response {path} could not be read: {error}.") from error
+        raise unreadable(error)(f"The camera response {path} could not be read: {error}.") from error
     if not rows or tuple(cell.strip() for cell in rows[0]) != COLUMNS:
-        raise FingervisionError(f"{path} must begin with the line {','.join(COLUMNS)}, but does not.")
+        raise DataError(f"{path} must begin with the line {','.join(COLUMNS)}, but does not.")
     try:
         level, light = np.array([[float(cell) for cell in row] for row in rows[1:] if row]).reshape(-1, 2).T
     except ValueError as error:
-        raise FingervisionError(f"Every row of {path} must be two numbers, level and light ({error}).") from error
+        raise DataError(f"Every row of {path} must be two numbers, level and light ({error}).") from error
     top = level[-1] if level.size else 0.0
     if top not in TOP_LEVELS:
         depths = ", ".join(map(str, TOP_LEVELS))
-        raise FingervisionError(
-            f"The last level of {path} must be the full scale of a picture ({depths}), but is {top:g}."
-        )
+        raise DataError(f"The last level of {path} must be the full scale of a picture ({depths}), but is {top:g}.")
     return _response(path.name, level, light, int(top))
 
 
 def _response(name: str, level: NDArray[np.float64], light: NDArray[np.float64], top: int) -> CameraResponse:
     span = float(light[-1] - light[0])
     if not span > 0.0:
-        raise FingervisionError(f"The light of the camera response {name} must rise, but does not.")
+        raise DataError(f"The light of the camera response {name} must rise, but does not.")
     try:
         return CameraResponse(name, level / top, (light - light[0]) / span, top)
     except CalibrationError as error:
-        raise FingervisionError(str(error)) from error
+        raise DataError(str(error)) from error
 
 
 def write_response(response: CameraResponse, path: Path) -> None:
@@ -89,4 +87,4 @@ def write_response(response: CameraResponse, path: Path) -> None:
     try:
         path.write_text("\n".join((",".join(COLUMNS), *rows)) + "\n", encoding="utf-8")
     except OSError as error:
-        raise FingervisionError(f"The camera response could not be written to {path}: {error.strerror}.") from error
+        raise OutputError(f"The camera response could not be written to {path}: {error.strerror}.") from error

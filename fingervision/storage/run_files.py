@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from fingervision.domain.errors import FingervisionError
+from fingervision.domain.errors import FingervisionError, OutputError
 
 RUN, VIDEO, EVENTS, CALIBRATION = "run.json", "video.mp4", "events.jsonl", "calibration.json"
 SCHEMA = 1
@@ -66,7 +66,7 @@ class RunFiles:
 
     def failed(self, error: OSError) -> FingervisionError:
         """Say that the run could not be written."""
-        return FingervisionError(
+        return OutputError(
             f"The run {self.path} could not be written any further ({error.strerror}); what was recorded until then is "
             "in it: make room, or name another --out."
         )

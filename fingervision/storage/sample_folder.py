@@ -3,7 +3,7 @@
 from pathlib import Path
 
 import fingervision
-from fingervision.domain.errors import FingervisionError
+from fingervision.domain.errors import InstallationError
 
 NAME = "sample_frames"
 
@@ -20,7 +20,7 @@ def sample_folder() -> Path:
     for folder in (package / NAME, package.parent / NAME):
         if folder.is_dir():
             return folder
-    raise FingervisionError(
+    raise InstallationError(
         f"The samples must lie in {package / NAME}, but are not there: install fingervision again from its wheel."
     )
 

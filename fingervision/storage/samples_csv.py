@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from fingervision.domain.errors import FingervisionError
+from fingervision.domain.errors import DataError
 from fingervision.domain.status import Status
 from fingervision.storage.line_file import LineFile, cell, quoted
 from fingervision.storage.plain_file import plain
@@ -126,11 +126,11 @@ def read_samples(path: Path) -> list[SampleRow]:
     except FileNotFoundError:
         return []
     except (OSError, ValueError, IndexError) as error:
-        raise FingervisionError(
+        raise DataError(
             f"{path} must be the table of a run on the bed to go on with it, but is not ({error}): name another --out."
         ) from error
     if columns != COLUMNS:
-        raise FingervisionError(f"{path} must be the table of a run on the bed, but its header is another.")
+        raise DataError(f"{path} must be the table of a run on the bed, but its header is another.")
     return rows
 
 

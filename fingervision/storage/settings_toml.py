@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from fingervision.domain.direction import Direction
-from fingervision.domain.errors import FingervisionError
+from fingervision.domain.errors import OutputError
 from fingervision.storage.toml_section import Section, read_document
 
 SCHEMA = 1
@@ -103,4 +103,4 @@ def write_settings(path: Path, settings: Mapping[str, Any]) -> None:
         part.write_text("\n".join(lines) + "\n", encoding="utf-8")
         part.replace(path)
     except OSError as error:
-        raise FingervisionError(f"{path} could not be written ({error.strerror}): make room.") from error
+        raise OutputError(f"{path} could not be written ({error.strerror}): make room.") from error

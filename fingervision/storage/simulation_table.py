@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from fingervision.domain.errors import FingervisionError
+from fingervision.domain.errors import DataError
 from fingervision.models.table import TableModel
 from fingervision.storage.csv_columns import read_columns
 from fingervision.storage.number_columns import Numbers, numbers_in
@@ -41,20 +41,20 @@ def simulation_rows(path: Path, columns: Mapping[str, Numbers]) -> TableModel:
     """
     for name, each in columns.items():
         if not each.complete:
-            raise FingervisionError(
+            raise DataError(
                 f"{name} must have a number in every row of a simulation table, but data row "
                 f"{int(np.argmin(each.present)) + 1} of {path} is empty: fill it, or remove the row."
             )
     column = {name: each.value for name, each in columns.items()}
     inputs = column["input_mm"]
     if inputs.size < 2:
-        raise FingervisionError(f"{path} must have at least two rows, but has {inputs.size}: simulate more inputs.")
+        raise DataError(f"{path} must have at least two rows, but has {inputs.size}: simulate more inputs.")
     order = np.argsort(inputs)
     if np.any(np.diff(inputs[order]) == 0.0):
         twice = inputs[order][np.flatnonzero(np.diff(inputs[order]) == 0.0)[0]]
-        raise FingervisionError(f"input_mm must be unique, but {twice:g} stands twice in {path}: remove one row.")
+        raise DataError(f"input_mm must be unique, but {twice:g} stands twice in {path}: remove one row.")
     if np.ptp(column["gap_mm"]) == 0.0:
-        raise FingervisionError(
+        raise DataError(
             f"gap_mm must depend on the input, but is {column['gap_mm'][0]:g} in every row of {path}: "
             "check what the simulation exported."
         )

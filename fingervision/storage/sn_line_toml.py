@@ -5,7 +5,7 @@
 
 from typing import Any
 
-from fingervision.domain.errors import FingervisionError
+from fingervision.domain.errors import DataError
 from fingervision.domain.gripper import SNLine
 from fingervision.storage.finite import is_number
 
@@ -31,7 +31,7 @@ def read_sn_line(raw: Any, name: str, origin: str) -> SNLine:
     """
     what = f"{name} in {origin}"
     if not isinstance(raw, dict) or not {"cycles", "amplitude_mpa"} <= set(raw) <= set(_KEYS):
-        raise FingervisionError(
+        raise DataError(
             f"{what} must be {{ cycles = [first, last], amplitude_mpa = [at first, at last] }}, with stress_ratio "
             f"where that is not -1, but is {raw!r}."
         )
@@ -39,11 +39,11 @@ def read_sn_line(raw: Any, name: str, origin: str) -> SNLine:
     amplitude = _two(raw["amplitude_mpa"], f"{name}.amplitude_mpa in {origin}", _MOST_MPA)
     ratio = raw.get("stress_ratio", -1.0)
     if not is_number(ratio) or not -10.0 <= ratio < 1.0:
-        raise FingervisionError(
+        raise DataError(
             f"{name}.stress_ratio in {origin} must be the smallest over the largest stress, below 1, but is {ratio!r}."
         )
     if not (cycles[1] > cycles[0] >= 1.0 and amplitude[0] > amplitude[1] > 0.0):
-        raise FingervisionError(
+        raise DataError(
             f"{what} must fall from few cycles to many, but goes from {amplitude[0]:g} MPa at {cycles[0]:g} cycles to "
             f"{amplitude[1]:g} MPa at {cycles[1]:g}."
         )
@@ -54,7 +54,7 @@ def check_below_yield(line: SNLine, yield_mpa: float, origin: str) -> None:
     """Refuse a line whose cycles, with the mean stress that they were measured at, reach the yield stress."""
     mean = abs(line.amplitude_mpa[0] * (1.0 + line.stress_ratio) / (1.0 - line.stress_ratio))
     if mean + line.amplitude_mpa[0] > yield_mpa * (1.0 + 1e-9):
-        raise FingervisionError(
+        raise DataError(
             f"material.sn_line in {origin} must stay below the yield stress, {yield_mpa:g} MPa, but reaches "
             f"{mean + line.amplitude_mpa[0]:g} MPa at {line.cycles[0]:g} cycles; begin it at more cycles."
         )
@@ -62,5 +62,5 @@ def check_below_yield(line: SNLine, yield_mpa: float, origin: str) -> None:
 
 def _two(raw: Any, what: str, most: float) -> tuple[float, float]:
     if not isinstance(raw, list) or len(raw) != 2 or not all(is_number(x) and abs(x) <= most for x in raw):
-        raise FingervisionError(f"{what} must be two numbers of at most {most:g}, but is {raw!r}.")
+        raise DataError(f"{what} must be two numbers of at most {most:g}, but is {raw!r}.")
     return float(raw[0]), float(raw[1])

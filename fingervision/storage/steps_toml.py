@@ -22,7 +22,7 @@ deceleration_mm_s2 = 500.0
 from collections.abc import Mapping
 from pathlib import Path
 
-from fingervision.domain.errors import FingervisionError
+from fingervision.domain.errors import DataError, OutputError
 from fingervision.domain.step_data import MOST_STEPS, Coordinates, CycleTime, Operation, SpeedEntry, Step, StepData
 from fingervision.storage.toml_section import Section, read_document
 
@@ -49,7 +49,7 @@ def read_steps(path: Path) -> StepData:
         top.refuse("schema", f"must be {SCHEMA}, but is {schema}: this program is older than the file.")
     sections = top.tables("step")
     if not 1 <= len(sections) <= MOST_STEPS:
-        raise FingervisionError(
+        raise DataError(
             f"{path} must hold 1 to {MOST_STEPS} tables [[step]], which is what the controller keeps, "
             f"but holds {len(sections)}."
         )
@@ -126,7 +126,7 @@ def write_steps(path: Path, data: StepData) -> None:
     try:
         path.write_text("\n".join(lines) + "\n", encoding="utf-8")
     except OSError as error:
-        raise FingervisionError(f"The step data {path} could not be written ({error.strerror}).") from error
+        raise OutputError(f"The step data {path} could not be written ({error.strerror}).") from error
 
 
 def _text(words: str) -> str:

@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from fingervision.domain.errors import FingervisionError, UsageError
+from fingervision.domain.errors import OutputError, UsageError
 
 SUMMARY = "summary.json"
 GAPS = "gaps.csv"
@@ -34,7 +34,7 @@ def write_summary(path: Path, summary: Mapping[str, Any]) -> None:
         part.replace(path)
     except OSError as error:
         part.unlink(missing_ok=True)
-        raise FingervisionError(
+        raise OutputError(
             f"{path} could not be written ({error.strerror}): make room or name another --out, and measure again."
         ) from error
 

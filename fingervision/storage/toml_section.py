@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NoReturn
 
-from fingervision.domain.errors import FingervisionError
+from fingervision.domain.errors import DataError, InputFileError
 from fingervision.storage.finite import is_number
 from fingervision.storage.plain_file import plain
 
@@ -37,13 +37,13 @@ def read_document(path: Path, what: str) -> tuple[dict[str, Any], str]:
         text = plain(path).read_text(encoding="utf-8-sig")
         return tomllib.loads(text), text
     except FileNotFoundError:
-        raise FingervisionError(f"There is no {what} {path}.") from None
+        raise InputFileError(f"There is no {what} {path}.") from None
     except OSError as error:
-        raise FingervisionError(f"The {what} {path} could not be read ({error.strerror}).") from error
+        raise InputFileError(f"The {what} {path} could not be read ({error.strerror}).") from error
     except UnicodeDecodeError as error:
-        raise FingervisionError(f"{path} must be TOML in UTF-8, but is not: {error.reason}.") from error
+        raise DataError(f"{path} must be TOML in UTF-8, but is not: {error.reason}.") from error
     except (ValueError, RecursionError) as error:  # also numbers of thousands of digits, and tables without end
-        raise FingervisionError(f"{path} must be TOML, but is not: {error}.") from error
+        raise DataError(f"{path} must be TOML, but is not: {error}.") from error
 
 
 def line_of(text: str, header: str, place: int = 0, key: str | None = None) -> int:
@@ -98,9 +98,9 @@ class Section:
     def refuse(self, key: str | None, words: str) -> NoReturn:
         """Raise a sentence that begins with the key and says where it stands."""
         if key is None and not self.header:
-            raise FingervisionError(f"{self.path} {words}")
+            raise DataError(f"{self.path} {words}")
         name = key if key is not None else f"[{self.header}]"
-        raise FingervisionError(f"{name} in {self.at(key)} {words}")
+        raise DataError(f"{name} in {self.at(key)} {words}")
 
     def only(self, keys: Iterable[str]) -> None:
         """Refuse keys other than these, with the nearest."""

@@ -1,7 +1,7 @@
 """An account of a table: what it was understood as, for a person, for a program, and for columns.toml."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from fingervision.domain.errors import FingervisionError
 from fingervision.storage.number_columns import Numbers
+from fingervision.tables.body_channels import BodyChannels
 from fingervision.tables.column_choice import CANONICAL, NEEDED
 from fingervision.tables.column_names import column_name
 from fingervision.tables.formats import read_raw
@@ -52,6 +53,8 @@ class Account:
         Why it cannot be read yet.
     entry : Entry
         What columns.toml would say.
+    channels : BodyChannels
+        Channels of one's own.
     """
 
     path: Path
@@ -67,6 +70,7 @@ class Account:
     notes: tuple[str, ...]
     question: FingervisionError | None
     entry: Entry
+    channels: BodyChannels = field(default_factory=BodyChannels)
 
     def curve(self) -> tuple[str, NDArray[np.float64], str, NDArray[np.float64]] | None:
         """What to plot: the gap against the input, or the input over time; None where there is too little."""
@@ -104,6 +108,10 @@ class Account:
                     "missing": int(np.sum(~self.columns[each.role].present)) if each.role in self.columns else None,
                 }
                 for each in self.taken
+            ],
+            "channels": [
+                {"name": text, "read_as": name, "missing": int(np.sum(~self.channels.columns[name].present))}
+                for name, text in self.channels.names.items()
             ],
             "unused": list(self.unused),
             "left_out": list(self.left_out),
@@ -164,7 +172,7 @@ def _account(table: Understood, given: Entry, raw: RawTable) -> Account:
             drive_of(table, given)
     except FingervisionError as error:
         question = error
-    used = {each.name for each in table.taken}
+    used = {each.name for each in table.taken} | set(table.channels.names.values())
     return Account(
         raw.path,
         table.kind,
@@ -179,6 +187,7 @@ def _account(table: Understood, given: Entry, raw: RawTable) -> Account:
         notes=table.notes,
         question=question,
         entry=_entry(table.taken, given, raw),
+        channels=table.channels,
     )
 
 

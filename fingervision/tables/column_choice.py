@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
-from fingervision.domain.errors import FingervisionError
+from fingervision.domain.errors import DataError
 from fingervision.storage.number_columns import Numbers
 from fingervision.tables.column_names import ColumnName, column_name
 from fingervision.tables.mapping import Entry
@@ -54,7 +54,7 @@ def choose(raw: RawTable, names: Sequence[ColumnName], kind: str, given: Entry, 
     fixed = set(chosen.values())
     roles: dict[str, list[int]] = {}
     for place, name in enumerate(names):
-        role = _own_role(name) or name.role
+        role = name.role
         if place in fixed or role is None:
             continue
         # A target without a direction is a commanded position.
@@ -96,14 +96,6 @@ def choose(raw: RawTable, names: Sequence[ColumnName], kind: str, given: Entry, 
     return chosen
 
 
-def _own_role(name: ColumnName) -> str | None:
-    """Role of a column of the project's own tables in another unit, `u_random_um`."""
-    for role in ("u_random", "u_gap"):
-        if name.text.startswith(f"{role}_"):
-            return role
-    return None
-
-
 def _one_clock(
     raw: RawTable, names: Sequence[ColumnName], times: list[int], dates: list[int], about: Findings
 ) -> list[int]:
@@ -131,7 +123,7 @@ def _named_column(raw: RawTable, role: str, name: str, given: Entry) -> int:
             return found[0]
     if name.isdecimal() and 1 <= int(name) <= len(raw.columns):
         return int(name) - 1
-    raise FingervisionError(
+    raise DataError(
         f"columns.{role} of {given.source} must name a column of {raw.path} "
         f"({', '.join(column.name for column in raw.columns)}), but is {name}: mend it."
     )

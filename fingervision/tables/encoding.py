@@ -2,7 +2,7 @@
 
 import codecs
 
-from fingervision.domain.errors import FingervisionError
+from fingervision.domain.errors import DataError
 
 MARKS = (
     (codecs.BOM_UTF8, "utf-8-sig"),
@@ -43,7 +43,7 @@ def decode(content: bytes, given: str | None = None) -> tuple[str, str]:
         try:
             return content.decode(given).removeprefix("\ufeff"), given
         except (LookupError, UnicodeDecodeError) as error:
-            raise FingervisionError(
+            raise DataError(
                 f"encoding must be that of the table, but {given} does not fit ({error}): leave the key out, or name "
                 "another."
             ) from error

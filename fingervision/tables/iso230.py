@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fingervision.domain.errors import FingervisionError
+from fingervision.domain.errors import DataError
 from fingervision.storage.iso230_table import (
     LARGEST_DEVIATION,
     SIDES,
@@ -111,7 +111,7 @@ def _places(names: Sequence[ColumnName], role: str, given: Entry) -> list[int]:
     if stated is not None:
         found = [k for k, name in enumerate(names) if stated in (name.text, name.base, str(k + 1))]
         if len(found) != 1:
-            raise FingervisionError(
+            raise DataError(
                 f"columns.{role} of {given.source} must name a column ({', '.join(n.text for n in names)}), but is "
                 f"{stated}: mend it."
             )
@@ -218,7 +218,7 @@ def _plain(raw: RawTable, place: int) -> Numbers:
     values, odd = to_numbers(content, str(raw.settings.get("decimal", ".")))
     if odd.size:
         at = int(odd[0])
-        raise FingervisionError(
+        raise DataError(
             f"'{raw.columns[place].name}' of {raw.path} must hold numbers, but holds '{content[at][:40]}' in "
             f"{raw.place(at)}: mend the cell, or leave it empty."
         )

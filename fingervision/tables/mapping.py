@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from fingervision.domain.errors import FingervisionError
+from fingervision.domain.errors import DataError, OutputError
 from fingervision.storage.toml_section import Section, read_document
 
 NAME = "columns.toml"
@@ -148,7 +148,7 @@ def entry_of_settings(settings: Sequence[str], source: Path) -> Entry:
         key, equals, value = setting.partition("=")
         first, _, second = key.strip().partition(".")
         if not equals or not value.strip():
-            raise FingervisionError(f"--set must be KEY=VALUE, such as columns.gap=comsol_mm, but is {setting}.")
+            raise DataError(f"--set must be KEY=VALUE, such as columns.gap=comsol_mm, but is {setting}.")
         if second:
             document.setdefault(first, {})[second] = value.strip()
         elif first == "accept":
@@ -209,7 +209,7 @@ def write_entry(path: Path, table: str, kind: str | None, entry: Entry) -> bool:
         part_file.write_text(after, encoding="utf-8")
         part_file.replace(path)
     except OSError as error:
-        raise FingervisionError(
+        raise OutputError(
             f"{path} could not be written ({error.strerror}): name another file with --out, and give it to --columns."
         ) from error
     return True

@@ -4,7 +4,7 @@ import importlib
 from pathlib import Path
 from typing import Any
 
-from fingervision.domain.errors import FingervisionError
+from fingervision.domain.errors import MissingLibraryError
 
 
 def needed_library(name: str, path: Path, what: str) -> Any:
@@ -27,7 +27,5 @@ def needed_library(name: str, path: Path, what: str) -> Any:
     try:
         return importlib.import_module(name)
     except ImportError as error:
-        raise FingervisionError(
-            f"{path} is {what}, which needs the library {name.split('.')[0]}, but it is not installed: "
-            "pip install 'fingervision[formats]', or save the table as CSV."
-        ) from error
+        who = f"{path} is {what}, which"
+        raise MissingLibraryError(name.split(".")[0], "formats", who, "save the table as CSV") from error

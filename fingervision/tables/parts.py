@@ -3,7 +3,7 @@
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
-from fingervision.domain.errors import FingervisionError
+from fingervision.domain.errors import DataError
 from fingervision.tables.column_names import column_name
 from fingervision.tables.mapping import Entry
 from fingervision.tables.questions import OpenQuestionError, Question
@@ -33,7 +33,7 @@ def chosen_part(path: Path, names: Mapping[str, Sequence[str]], given: Entry, wh
     listed = ", ".join(f"'{name}'" for name in names)
     if (stated := given.words.get("part")) is not None:
         if stated not in names:
-            raise FingervisionError(f"part must be a {what} of {path} ({listed or 'it has none'}), but is '{stated}'.")
+            raise DataError(f"part must be a {what} of {path} ({listed or 'it has none'}), but is '{stated}'.")
         return stated
     if len(names) == 1:
         return next(iter(names))
@@ -42,8 +42,6 @@ def chosen_part(path: Path, names: Mapping[str, Sequence[str]], given: Entry, wh
     if len(fitting) == 1:
         return fitting[0]
     if not names:
-        raise FingervisionError(
-            f"{path} must hold a table, but has no {what} with columns of numbers: export it again."
-        )
+        raise DataError(f"{path} must hold a table, but has no {what} with columns of numbers: export it again.")
     example = (fitting or list(names))[0]
     raise OpenQuestionError(path, "table", [Question(f"which {what} is meant is open: {listed}", f"part={example}")])

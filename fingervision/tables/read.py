@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from fingervision.domain.drive import DriveHistory
-from fingervision.domain.errors import FingervisionError
+from fingervision.domain.errors import DataError
 from fingervision.domain.measured_table import MeasuredTable
 from fingervision.models.corrected import CorrectedModel
 from fingervision.models.table import TableModel
@@ -52,7 +52,7 @@ def read_measured_table(path: Path, columns: Path | None = None) -> MeasuredTabl
         left, right = values["left_mm"], values["right_mm"]
         both = left.present & right.present
         values["gap_mm"] = Numbers(np.where(both, right.value - left.value, 0.0), both)
-    return measured_table.measured_rows(path, values, table.runs, _said(table, given))
+    return measured_table.measured_rows(path, values, table.runs, _said(table, given), channels=table.channels.columns)
 
 
 def read_drive(path: Path, columns: Path | None = None) -> DriveHistory:
@@ -83,7 +83,7 @@ def drive_of(table: Understood, given: Entry) -> DriveHistory:
     path = table.path
     kept = np.flatnonzero(table.columns["time"].present & table.columns["input"].present)
     if not kept.size:
-        raise FingervisionError(f"{path} must have at least one row with a time and an input, but has none.")
+        raise DataError(f"{path} must have at least one row with a time and an input, but has none.")
     if "backward_time" in given.accept:
         kept = kept[np.argsort(table.columns["time"].value[kept], kind="stable")]
     steps = np.diff(table.columns["time"].value[kept])
@@ -172,7 +172,9 @@ def read_model(path: Path, kind: str = "lumped", columns: Path | None = None) ->
 
 def _said(table: Understood, given: Entry) -> list[str]:
     roles = ", ".join(f"{each.role} = '{each.name}'" + (f" [{each.unit}]" if each.unit else "") for each in table.taken)
-    return [*said(given, table.raw.what, table.notes, table.left_out), f"Columns: {roles}."]
+    beside = ", ".join(f"{name} = '{text}'" for name, text in table.channels.names.items())
+    channels = [f"Channels: {beside}."] if beside else []
+    return [*said(given, table.raw.what, table.notes, table.left_out), f"Columns: {roles}.", *channels]
 
 
 def said(given: Entry, what: str, notes: tuple[str, ...], left_out: tuple[str, ...]) -> list[str]:

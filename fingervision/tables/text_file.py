@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from fingervision.domain.errors import FingervisionError
+from fingervision.domain.errors import DataError, FingervisionError, InputFileError
 from fingervision.tables.encoding import decode
 
 MOST_BYTES = 1_000_000_000
@@ -32,19 +32,19 @@ def lines_of(path: Path, encoding: str | None) -> tuple[list[str], str]:
                 raise _too_long(path)
             size = path.stat().st_size
             if size > MOST_BYTES:
-                raise FingervisionError(
+                raise DataError(
                     f"{path} must have at most {MOST_BYTES / 1e9:g} GB to be read as text, but has {size / 1e9:.1f} "
                     "GB: split it, or save it as Parquet."
                 )
             content = head + file.read()
     except OSError as error:
-        raise FingervisionError(f"The table {path} could not be read ({error.strerror}).") from error
+        raise InputFileError(f"The table {path} could not be read ({error.strerror}).") from error
     text, name = decode(content, encoding)
     if "\x00" in text:
         # What a logger's disk held when its power went: zeros at the end.
         text = text.rstrip("\x00")
         if "\x00" in text:
-            raise FingervisionError(
+            raise DataError(
                 f"{path} must be a table as text, or of a format that is read (.xlsx, .mat, .parquet, .tdms, .lvm), "
                 f"but holds zero bytes (the first is character {text.index(chr(0))}): export it again."
             )
@@ -55,7 +55,7 @@ def lines_of(path: Path, encoding: str | None) -> tuple[list[str], str]:
 
 
 def _too_long(path: Path) -> FingervisionError:
-    return FingervisionError(
+    return DataError(
         f"{path} must be a table with a row a line, but has a line of more than {LONGEST_LINE} characters: export it "
         "with line ends."
     )

@@ -4,7 +4,7 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from fingervision.domain.errors import FingervisionError
+from fingervision.domain.errors import DataError
 from fingervision.tables.column_names import column_name
 from fingervision.tables.dialect import Dialect, is_comment, is_number, is_value, split
 from fingervision.tables.mapping import Entry
@@ -66,7 +66,7 @@ def find_header(lines: Sequence[str], first: int, dialect: Dialect, given: Entry
         at = given.header_line - 1
         names = names_in(lines[at], dialect) if at < len(lines) else None
         if names is None:
-            raise FingervisionError(
+            raise DataError(
                 f"header_line must name the line with {dialect.wide} names of columns, but line {at + 1} is "
                 f"'{lines[at][:80] if at < len(lines) else 'not there'}': mend it."
             )

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from fingervision.domain.errors import FingervisionError
+from fingervision.domain.errors import DataError
 from fingervision.storage.number_block import number_block
 from fingervision.storage.number_columns import Numbers
 from fingervision.tables.dialect import (
@@ -51,7 +51,7 @@ def table_of_lines(path: Path, lines: Sequence[str], given: Entry, encoding: str
     """
     dialect = find_dialect(lines, given.words.get("separator", ""), given.words.get("decimal", ""))
     if dialect is None:
-        raise FingervisionError(
+        raise DataError(
             f"{path} must hold rows of two numbers or more, but has none in its {len(lines)} lines: name another file, "
             "or export the table again."
         )
@@ -96,7 +96,7 @@ def _check_commas(path: Path, lines: Sequence[str], first: int, dialect: Dialect
     for line in lines[max(0, first - HEADER_LINES) : first]:
         names = split(line, ",")
         if 2 * len(names) == dialect.wide and not any(is_value(name, ".") for name in names):
-            raise FingervisionError(
+            raise DataError(
                 f"{path} has {len(names)} names and {dialect.wide} cells a row between commas: decimal commas and "
                 "commas between cells cannot be told apart. Export it with semicolons or tabs."
             )
@@ -173,7 +173,7 @@ class _Rows:
             else:
                 odd.append((line, len(cells)))
         if len(odd) > max(1.0, MOST_ODD * len(rows)):
-            raise FingervisionError(
+            raise DataError(
                 f"{self._path} must have {wide} cells in each row below line {self._first}, but {len(odd)} of "
                 f"{len(rows) + len(odd)} rows have not (line {odd[0][0]} has {odd[0][1]}): mend them, or state the "
                 "key separator in columns.toml."

@@ -1,13 +1,14 @@
 """A raw table understood: which column is what, in which unit, and what remains open."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fingervision.storage.number_columns import Numbers
+from fingervision.tables.body_channels import BodyChannels, channels_in
 from fingervision.tables.cells import to_numbers
 from fingervision.tables.column_choice import DIMENSION, NEEDED, Findings, choose
 from fingervision.tables.column_names import ColumnName, column_name
@@ -65,6 +66,8 @@ class Understood:
         What was left out, and why.
     questions : tuple of Question
         What is open.
+    channels : BodyChannels
+        Columns of a measured table that are channels of one's own.
     """
 
     raw: RawTable
@@ -75,6 +78,7 @@ class Understood:
     notes: tuple[str, ...] = ()
     left_out: tuple[str, ...] = ()
     questions: tuple[Question, ...] = ()
+    channels: BodyChannels = field(default_factory=BodyChannels)
 
     @property
     def path(self) -> Path:
@@ -147,9 +151,14 @@ def understand(raw: RawTable, kind: str, given: Entry) -> Understood:
         codes = None if run_cells is None else _codes(run_cells)
         by_date = any(each.role == "time" and each.unit == DATE for each in taken)
         about.questions += doubts(columns, given, kind, codes, dated=by_date)
+    channels = BodyChannels()
+    if kind == "measured":
+        channels = channels_in(raw, frozenset(chosen.values()), decimal)
+        about.notes += channels.notes
     return Understood(
-        raw, kind, tuple(taken), columns, run_cells, tuple(about.notes), tuple(about.left_out), tuple(about.questions)
-    )
+        raw, kind, tuple(taken), columns, run_cells, tuple(about.notes), tuple(about.left_out),
+        tuple(about.questions), channels,
+    )  # fmt: skip
 
 
 def _unit(column: RawColumn, name: ColumnName, role: str, kind: str, given: Entry, about: Findings) -> str | None:

@@ -3,7 +3,7 @@
 from functools import cache
 from typing import TYPE_CHECKING, Any
 
-from fingervision.domain.errors import FingervisionError
+from fingervision.domain.errors import InstallationError
 
 if TYPE_CHECKING:
     from pint import UnitRegistry
@@ -76,7 +76,7 @@ def factor(text: str, dimension: str) -> float | None:
     try:
         units = registry()
     except ImportError as error:
-        raise FingervisionError(
+        raise InstallationError(
             "Units of a foreign table need the library pint, which is not installed: pip install pint."
         ) from error
     words = spelled(text)

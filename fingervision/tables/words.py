@@ -80,8 +80,17 @@ def role_of(name: str) -> str | None:
     ('gap', 'input', 'left')
     >>> role_of("room temperature"), role_of("gap error")
     (None, None)
+
+    A standard uncertainty is a small u, or a capital among capitals: U is the expanded one.
+
+    >>> role_of("u_gap"), role_of("u(gap)"), role_of("U_RANDOM"), role_of("U_gap")
+    ('u_gap', 'u_gap', 'u_random', None)
     """
     words = tokens(name)
+    if (
+        standard := re.fullmatch(r"(?:u|U(?=[^a-z]*$))(?:_| ?\(|\s+)(gap|random|GAP|RANDOM)\)?", name.strip())
+    ) is not None:
+        return f"u_{standard[1].lower()}"
     if words in {("time", "stamp"), ("date", "time"), ("marca", "de", "tiempo")}:
         return "time"
     roles = [BY_TOKEN[word] for word in words if word in BY_TOKEN]

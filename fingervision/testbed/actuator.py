@@ -22,6 +22,10 @@ class StageLimits:
         It comes to a stand within +- this of where it was sent; its encoder says where.
     encoder_step_mm : float
         Positions are read in multiples of it; 0 where they are not.
+    repeatability_mm : float
+        Positions at rest stray by at most this from one reading to another, and the reference is found again within it.
+    settling_s : float
+        A motion takes at most so much longer than its way at the asked speed: ramps at both ends, and coming to rest.
     """
 
     lower_mm: float
@@ -30,6 +34,8 @@ class StageLimits:
     force_n: float
     accuracy_mm: float = 0.0
     encoder_step_mm: float = 0.0
+    repeatability_mm: float = 0.0
+    settling_s: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)

@@ -108,4 +108,4 @@ class _Guarded:
 
 def _say(who: str, what: str, error: Exception, origin: Origin) -> NoReturn:
     said = f"{type(error).__name__}{f': {error}' if str(error) else ''}".replace("\n", " ")[:200].rstrip(".")
-    raise FingervisionError(f"{who} must {what}, but raised {said}: {origin.remedy}.") from error
+    raise PluginShapeError(f"{who} must {what}, but raised {said}: {origin.remedy}.") from error

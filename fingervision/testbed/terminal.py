@@ -7,7 +7,7 @@ from queue import Empty, SimpleQueue
 from threading import Thread
 from typing import TextIO
 
-from fingervision.domain.errors import FingervisionError
+from fingervision.domain.errors import StateError
 
 LOOK_EVERY_S = 0.2
 
@@ -51,7 +51,7 @@ class Terminal:
             except Empty:
                 if self._ended():
                     self._asked = False
-                    raise FingervisionError("The question was not answered, because the run was stopped.") from None
+                    raise StateError("The question was not answered, because the run was stopped.") from None
 
     def say(self, words: str) -> None:
         """Write on the screen."""

@@ -13,6 +13,7 @@ failure is a sentence that says what the part must do and what it does::
 | part | class | what it is given |
 |---|---|---|
 | effect | `EffectContract` | `effect`: a `DriveEffect` or `PointEffect` |
+| effect, by a whole diagnosis | `HiddenEffectContract` | `effect`, and `values` where you know better |
 | model | `ModelContract` | `kind`: a module or object with `KIND` and `build(gripper, physics, theory)` |
 | frame source | `FrameSourceContract` | `kind`: with `accepts` and `open_frames`; `name`: what it opens |
 | actuator | `ActuatorContract` | `open_bed()`: a bed that has it |
@@ -28,7 +29,7 @@ from fingervision.testing.bed_contract import ActuatorContract, CameraContract, 
 from fingervision.testing.contract import ContractError, NotApplicable, checks_of, run
 from fingervision.testing.effect_contract import EffectContract
 from fingervision.testing.frame_source_contract import FrameSourceContract
-from fingervision.testing.hidden_effect import diagnosed
+from fingervision.testing.hidden_effect import HiddenEffectContract, diagnosed
 from fingervision.testing.model_contract import ModelContract
 
 __all__ = [
@@ -38,6 +39,7 @@ __all__ = [
     "EffectContract",
     "ForceSensorContract",
     "FrameSourceContract",
+    "HiddenEffectContract",
     "ModelContract",
     "NotApplicable",
     "bed_at",

@@ -15,10 +15,13 @@ from fingervision.testbed.reading import Reading
 from fingervision.testing.contract import NotApplicable, hold
 
 WAIT_S, PATIENCE_S = 0.01, 10.0
+"""Between two questions for a position; after so long a motion of a millimetre counts as endless."""
 SPEED_MM_S, SLOW_MM_S, FAR_MM = 2.0, 0.5, 5.0
 STOPS_WITHIN_S = 0.5
 """A motor that brakes from 0.5 mm/s stands in a tenth of it; an answer over a slow line takes the rest."""
 ROUNDING_MM = 1e-6
+"""A nanometre: what numbers lose on their way. What a real stage needs beyond, its limits declare: accuracy_mm,
+encoder_step_mm, repeatability_mm and settling_s."""
 
 
 def bed_at(path: str | Path) -> Bed:
@@ -56,6 +59,9 @@ class ActuatorContract(_BedContract):
     """Tests of an actuator; give `open_bed()`.
 
     The motor moves by up to a millimetre, and once towards 5 mm until it is stopped: see that nothing is in its way.
+    How exactly it must do so is what its `limits` declare. One that declares nothing must stand within a nanometre, and
+    take the time of its way within two readings (20 ms); see `StageLimits` for accuracy_mm, encoder_step_mm,
+    repeatability_mm (readings at rest, and the reference) and settling_s (ramps and coming to rest).
 
     `has_motor` is False for what moves otherwise than at the speed that it is told, such as a screw turned by hand.
     """
@@ -83,7 +89,7 @@ class ActuatorContract(_BedContract):
             speed_mm_s, to_mm = _speed_mm_s(bed, SPEED_MM_S), _place_mm(bed, 1.0)
             expected_s = abs(to_mm - before[0].value) / speed_mm_s
             bed.actuator.move(to_mm, speed_mm_s)
-            took_s = _moved_s(before + _until_rest(bed))
+            took_s = _moved_s(before + _until_rest(bed), _still_mm(bed))
             within_s = (2.0 * bed.actuator.limits.accuracy_mm + _known_mm(bed, speed_mm_s)) / speed_mm_s
             hold(
                 abs(took_s - expected_s) <= within_s,
@@ -98,8 +104,9 @@ class ActuatorContract(_BedContract):
             bed.actuator.home()
             at_mm = _until_rest(bed)[-1].value
             hold(
-                abs(at_mm) <= ROUNDING_MM,
-                f"{bed.actuator.name} must stand at 0 once homed, but stands at {at_mm:g} mm.",
+                abs(at_mm) <= _still_mm(bed),
+                f"{bed.actuator.name} must stand within {_still_mm(bed):.3g} mm of 0 once homed, but stands at "
+                f"{at_mm:g} mm: state its repeatability_mm.",
             )
 
     def test_a_jog_ends_with_a_stop(self) -> None:
@@ -116,11 +123,12 @@ class ActuatorContract(_BedContract):
             readings = before + _until_rest(bed)
             stopping_s = bed.clock.now_s() - asked_s
             name = bed.actuator.name
+            stops_within_s = STOPS_WITHIN_S + bed.actuator.limits.settling_s
             hold(
-                stopping_s < STOPS_WITHIN_S,
-                f"{name} must stand {STOPS_WITHIN_S:g} s after a stop, but moved on for {stopping_s:.2g} s.",
+                stopping_s < stops_within_s,
+                f"{name} must stand {stops_within_s:g} s after a stop, but moved on for {stopping_s:.2g} s.",
             )
-            went_mm, due_mm = readings[-1].value - before[0].value, speed_mm_s * _moved_s(readings)
+            went_mm, due_mm = readings[-1].value - before[0].value, speed_mm_s * _moved_s(readings, _still_mm(bed))
             hold(
                 abs(went_mm - due_mm) <= _known_mm(bed, speed_mm_s),
                 f"{bed.actuator.name} must go {due_mm:.3g} mm at {speed_mm_s:g} mm/s, but went {went_mm:.3g} mm.",
@@ -128,7 +136,7 @@ class ActuatorContract(_BedContract):
             _wait(bed, 0.5)
             later_mm = bed.actuator.readings()[-1].value
             hold(
-                later_mm == readings[-1].value,
+                abs(later_mm - readings[-1].value) <= _still_mm(bed),
                 f"{bed.actuator.name} must stand after a stop, but went on by {later_mm - readings[-1].value:.3g} mm.",
             )
 
@@ -153,7 +161,7 @@ class ActuatorContract(_BedContract):
             hold(not bed.actuator.busy, f"{bed.actuator.name} must stand after a refused motion, but moves.")
             after_mm = bed.actuator.readings()[-1].value
             hold(
-                after_mm == before_mm,
+                abs(after_mm - before_mm) <= _still_mm(bed),
                 f"{bed.actuator.name} must not move when it refuses, but went to {after_mm:g} mm.",
             )
 
@@ -239,12 +247,23 @@ def _speed_mm_s(bed: Bed, wanted_mm_s: float) -> float:
 
 
 def _near_mm(bed: Bed) -> float:
-    return bed.actuator.limits.accuracy_mm + 0.5 * bed.actuator.limits.encoder_step_mm + ROUNDING_MM
+    limits = bed.actuator.limits
+    return limits.accuracy_mm + 0.5 * limits.encoder_step_mm + limits.repeatability_mm + ROUNDING_MM
+
+
+def _still_mm(bed: Bed) -> float:
+    """How far two readings at rest may be apart: both stray, and each is rounded to the encoder's step."""
+    limits = bed.actuator.limits
+    return limits.encoder_step_mm + limits.repeatability_mm + ROUNDING_MM
 
 
 def _known_mm(bed: Bed, speed_mm_s: float) -> float:
-    """How well readings tell the way of a motion: by the encoder's steps, and the time between two readings."""
-    return bed.actuator.limits.encoder_step_mm + 2.0 * WAIT_S * speed_mm_s
+    """How well readings tell the way of a motion: by the encoder's steps, by what they stray, and by their times.
+
+    Two readings bound its beginning and its end; ramps and coming to rest add what the stage declares.
+    """
+    limits = bed.actuator.limits
+    return limits.encoder_step_mm + 2.0 * limits.repeatability_mm + (2.0 * WAIT_S + limits.settling_s) * speed_mm_s
 
 
 def _wait(bed: Bed, seconds: float) -> None:
@@ -274,11 +293,11 @@ def _watched(bed: Bed, seconds: float) -> tuple[Reading, ...]:
     return tuple(seen)
 
 
-def _moved_s(readings: tuple[Reading, ...]) -> float:
+def _moved_s(readings: tuple[Reading, ...], still_mm: float) -> float:
     """How long it moved, by the actuator's own clock: a busy machine looks late, but the readings bear their times."""
     first, last = readings[0].value, readings[-1].value
-    began_s = max(each.device_s for each in readings if abs(each.value - first) <= 1e-9)
-    ended_s = min(each.device_s for each in readings if abs(each.value - last) <= 1e-9)
+    began_s = max(each.device_s for each in readings if abs(each.value - first) <= still_mm)
+    ended_s = min(each.device_s for each in readings if abs(each.value - last) <= still_mm)
     return ended_s - began_s
 
 

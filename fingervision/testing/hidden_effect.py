@@ -6,14 +6,31 @@ import numpy as np
 
 from fingervision.diagnosis.diagnose import diagnose
 from fingervision.diagnosis.inference.measuring_chain import MeasuringChain
-from fingervision.domain.effect import History
+from fingervision.domain.effect import Effect, History
 from fingervision.domain.measured_table import MeasuredTable
+from fingervision.domain.parameter import Parameter
 from fingervision.domain.report import DiagnosisReport
+from fingervision.effects import catalogue
+from fingervision.interface.own_effect import added
 from fingervision.models.corrected import CorrectedModel
 from fingervision.models.table import TableModel
+from fingervision.testing.contract import NotApplicable, hold
 
 NOISE_MM = 5e-4
 """Random noise of an ordinary bench (0.02 px at 34 px/mm)."""
+SHARE_OF_SIZE, SHARE_OF_SHAPE = 0.3, 0.382
+"""Where a parameter is hidden between its bounds. A size stands well away from its neutral value; a shape stands off
+the middle (at the golden section), where the only value that is tried by default lies."""
+
+
+def made_up_history() -> History:
+    """Give the motion of the made-up data: two runs there and back, 400 samples in 16 s."""
+    up = np.linspace(-0.45, 1.45, 100)
+    run = np.concatenate([up, up[::-1]])
+    u = np.concatenate([run, run])
+    time_s = np.arange(u.size, dtype=np.float64) * np.float64(0.04)
+    runs = (slice(0, run.size), slice(run.size, u.size))
+    return History(u, time_s, runs, rest_gap_mm=4.0, opening_mm=11.2, closing_mm=3.5)
 
 
 def diagnosed(name: str, values: Mapping[str, float], *, seed: int = 1) -> DiagnosisReport:
@@ -32,13 +49,65 @@ def diagnosed(name: str, values: Mapping[str, float], *, seed: int = 1) -> Diagn
     gap_mm = 4.0 + 7.7 * input_mm
     model = TableModel("straight", input_mm, -0.5 * gap_mm, 0.5 * gap_mm)
     rng = np.random.default_rng(seed)
-    up = np.linspace(-0.45, 1.45, 100)
-    run = np.concatenate([up, up[::-1]])
-    u = np.concatenate([run, run])
-    runs = (slice(0, run.size), slice(run.size, u.size))
-    time_s = np.arange(u.size, dtype=np.float64) * np.float64(0.04)
-    history = History(u, time_s, runs, rest_gap_mm=4.0, opening_mm=11.2, closing_mm=3.5)
+    history = made_up_history()
+    u = history.input_mm
     seen = MeasuringChain(model, history, {}).respond({name: values})
     left_mm, right_mm = (edge + NOISE_MM * rng.standard_normal(u.size) for edge in (seen.left_mm, seen.right_mm))
-    table = MeasuredTable(u, right_mm - left_mm, np.asarray(0.5 * (left_mm + right_mm)), time_s, runs, ("1", "2"))
+    table = MeasuredTable(
+        u, right_mm - left_mm, np.asarray(0.5 * (left_mm + right_mm)), history.time_s, history.runs, ("1", "2")
+    )
     return diagnose(table, CorrectedModel("straight", model, "straight.csv", (-0.6, 1.6), {}), seed=seed).report
+
+
+def hidden_values(effect: Effect, history: History) -> dict[str, float]:
+    """Values under which the effect is hidden, away from where a search begins.
+
+    Raises
+    ------
+    NotApplicable
+        The effect cannot be looked for on this motion.
+    """
+    searched = effect.search(history)
+    if isinstance(searched, str):
+        raise NotApplicable(f"{effect.name} cannot be looked for on the motion of this test: {searched}")
+    return {each.name: _hidden(each) for each in searched if each.run is None}
+
+
+def _hidden(parameter: Parameter) -> float:
+    lower, upper = parameter.lower, parameter.upper
+    if parameter.neutral is not None:
+        to = upper if upper > parameter.neutral else lower
+        return float((1.0 - SHARE_OF_SIZE) * parameter.neutral + SHARE_OF_SIZE * to)
+    if lower > 0.0:
+        return float(lower * (upper / lower) ** SHARE_OF_SHAPE)
+    return lower + SHARE_OF_SHAPE * (upper - lower)
+
+
+class HiddenEffectContract:
+    """Test that the diagnosis finds an effect again; give it as `effect`, and where you know better, its `values`.
+
+    It takes some seconds: the whole diagnosis runs.
+    """
+
+    effect: Effect
+    values: Mapping[str, float] | None = None
+
+    def test_the_diagnosis_finds_it_again(self) -> None:
+        """Hidden in two runs with ordinary noise, it is the answer, or one of those that cannot be told apart."""
+        effect = self.effect
+        values = hidden_values(effect, made_up_history()) if self.values is None else dict(self.values)
+        with added([] if effect.name in catalogue() else [effect]):
+            report = diagnosed(effect.name, values)
+        named = [" + ".join(names) for names in report.alternatives]
+        shapes = [each.name for each in effect.parameters if each.neutral is None and each.starts == 1]
+        advice = (
+            f"give {' and '.join(shapes)} more starts, so that more than one value is tried between the bounds"
+            if shapes
+            else "look whether its bounds and its neutral value are those that are meant"
+        )
+        hold(
+            any(effect.name in names for names in report.alternatives),
+            f"The effect {effect.name} was hidden with "
+            f"{', '.join(f'{name} = {value:.4g}' for name, value in values.items())} and must be found again, but the "
+            f"diagnosis says {report.verdict}{': ' if named else ''}{' or '.join(named)}: {advice}.",
+        )

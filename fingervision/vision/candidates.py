@@ -9,6 +9,7 @@ from fingervision.domain.direction import Direction
 from fingervision.domain.gap import NoGap
 from fingervision.domain.status import Status
 from fingervision.vision.binarise import Binary, binarise_local
+from fingervision.vision.crossing import CROSSED, is_crossed
 from fingervision.vision.fingers import MORE_THAN_TWO, UNLIKE, CoarseFingers, find_fingers
 from fingervision.vision.grey import GreyImage
 from fingervision.vision.part_removal import is_likelier, looks_parted, without_part
@@ -58,7 +59,12 @@ def candidates(
                 )  # something may come in from the border in the other polarity
             else:
                 yield split, fingers, light_gap
-                clear = clear or fingers is UNLIKE or (fingers is MORE_THAN_TWO and split.separation > CLEAR_SEPARATION)
+                clear = (
+                    clear
+                    or fingers is UNLIKE
+                    or fingers is CROSSED
+                    or (fingers is MORE_THAN_TWO and split.separation > CLEAR_SEPARATION)
+                )
         yield from unsure
         if clear:
             break
@@ -75,15 +81,14 @@ def found(
     reach = below + max(REACH_BELOW_PX, REACH_BELOW_HEIGHTS * below)
     mask = split.dark if light_gap else split.light
     fingers = find_fingers(mask, directions, below, reach)
-    if not has_parts:
-        return fingers
-    if isinstance(fingers, NoGap):
-        return fingers if fingers is UNLIKE else without_part(mask, directions, below, reach) or fingers
-    if looks_parted(fingers, below, reach):
-        parted = without_part(mask, (fingers.orientation.direction,), below, reach)
-        if parted is not None and is_likelier(parted, below):
-            return parted
-    return fingers
+    if has_parts:
+        if isinstance(fingers, NoGap):
+            fingers = fingers if fingers is UNLIKE else without_part(mask, directions, below, reach) or fingers
+        elif looks_parted(fingers, below, reach):
+            parted = without_part(mask, (fingers.orientation.direction,), below, reach)
+            if parted is not None and is_likelier(parted, below):
+                fingers = parted
+    return CROSSED if isinstance(fingers, CoarseFingers) and is_crossed(mask, fingers, below) else fingers
 
 
 def has_edges(denoised: GreyImage, split: Binary, contrast: float) -> bool:

@@ -76,7 +76,8 @@ class EdgePoints:
     noise_flat : float
         Standard deviation of the light in the flat parts beside the edges; 0 where none is in view.
     beside : str
-        What stands beside the edges or has moved them, where anything is seen: wall, shadow, glare, motion, sharpening.
+        What stands beside the edges or has moved them, where anything is seen: wall, shadow, glare, motion, sharpening;
+        or a strip of a third tone, which is not measured.
     """
 
     lines: ProfileLines
@@ -95,9 +96,7 @@ class EdgePoints:
     beside: str = ""
 
 
-def fit_edges(
-    upright: GreyImage, lines: ProfileLines, light: Floats, top_level: int, is_shared_known: bool = False
-) -> EdgePoints:
+def fit_edges(upright: GreyImage, lines: ProfileLines, light: Floats, top_level: int) -> EdgePoints:
     """Sub-pixel position of the edge on every line of two fingers.
 
     Parameters
@@ -110,8 +109,6 @@ def fit_edges(
         Light of every grey level, on the levels' own scale.
     top_level : int
         End of the scale.
-    is_shared_known : bool
-        Whether a codec is known to share noise over many lines.
 
     Returns
     -------
@@ -125,7 +122,7 @@ def fit_edges(
     coarse = lines.coarse + lines.outward * np.floor(position).astype(np.intp)
     lines = ProfileLines(lines.fixed, coarse, lines.slope, lines.weight, lines.outward)
     levels = line_levels(upright, lines, light, filters.reach_px)
-    return _fit(upright, light, levels, lines, blur, filters, float(top_level), is_shared_known)
+    return _fit(upright, light, levels, lines, blur, filters, float(top_level))
 
 
 def _fit(
@@ -136,7 +133,6 @@ def _fit(
     blur_px: float,
     filters: EdgeFilters,
     top_level: float,
-    is_shared_known: bool,
 ) -> EdgePoints:
     """Gauss-Newton over every line's two levels and position, and the blur of flanks and tips."""
     pixels, real = levels.shape[-1], lines.weight.ravel() > 0
@@ -182,7 +178,7 @@ def _fit(
         filters.reach_px,
         marks,
         (_inside(levels[0], lines.weight[0]), _inside(levels[1], lines.weight[1])),
-        *flat_noise(upright, light, lines, filters, *filters.middle(blur[0]), is_shared_known),
+        *flat_noise(upright, light, lines, filters, *filters.middle(blur[0])),
     )
 
 

@@ -153,6 +153,8 @@ def _best_pair(
         for top in in_view:
             if top not in two and _is_third(top, best, below_tip_px):
                 return MORE_THAN_TWO
+        if _has_second_pair(in_view, two, best, below_tip_px):
+            return MORE_THAN_TWO
         if best.is_rooted or best.is_joined or len(_standing(in_view, below_tip_px)) != 1:
             return best
     if shallow:
@@ -182,6 +184,28 @@ def _is_third(top: Top, fingers: CoarseFingers, below_tip_px: float) -> bool:
         other = build(finger.top, finger.inner_sign, size)
         builds = (own, other) if top.across_px < finger.top.across_px else (other, own)
         if are_alike(*builds) and _end_alike(top, finger.top, below_tip_px, builds):
+            return True
+    return False
+
+
+def _has_second_pair(tops: list[Top], two: tuple[Top, Top], fingers: CoarseFingers, below_tip_px: float) -> bool:
+    """Whether two further things that come in from the border are as much like two fingers, of another breadth."""
+    lower = min(top.prominence_px for top in two)
+    others = [
+        top
+        for top in tops
+        if fingers.is_rooted
+        and top.is_rooted
+        and top not in two
+        and top.prominence_px > THIRD_SHARE * lower
+        and has_straight_flanks(top, below_tip_px)
+    ]
+    size = fingers.orientation.across_size
+    for first, second in combinations(others, 2):
+        left, right = sorted((first, second), key=lambda top: top.across_px)
+        builds = (build(left, 1, size), build(right, -1, size))
+        is_pair = are_alike(*builds) and _end_alike(left, right, below_tip_px, builds)
+        if is_pair and _stand_side_by_side(left, right, below_tip_px):
             return True
     return False
 

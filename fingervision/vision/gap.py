@@ -24,8 +24,16 @@ from fingervision.vision.measuring_point import MeasuringPoint, measuring_point,
 from fingervision.vision.median import middle
 from fingervision.vision.outline_points import OutlinePoints, finger_origin, outline_points
 from fingervision.vision.profile_lines import INNER, IS_INNER, IS_ROW
-from fingervision.vision.residuals import SHARED_POINTS, has_flanks, shape_holds, shared_points, spread
+from fingervision.vision.residuals import (
+    SHARED_POINTS,
+    has_flanks,
+    set_aside_variance,
+    shape_holds,
+    shared_points,
+    spread,
+)
 from fingervision.vision.roughness import roughness, shared_along, with_roughness
+from fingervision.vision.third_tone import THIRD_TONE
 
 Floats = NDArray[np.float64]
 
@@ -39,13 +47,20 @@ FEWEST_LINES = 2 * PARAMETERS
 CUT_OFF_LIMIT = 0.08
 # A tip has at least this share of the flanks' contrast.
 TIP_CONTRAST = 0.2
-# A gap that is less sure than this (pixels) is no measurement; beside a part, whose edges may be taken for a finger's.
-LEAST_SURE_PX = 5.0
-LEAST_SURE_BESIDE_PX = 0.5
+# Pixels that are counted in the binary picture are off by at most half a pixel an edge: a gap that is less sure than
+# this (pixels) is no measurement, but of what is no finger, or was not seen. A codec that shares errors over so many
+# points makes it less sure by the root of their number.
+LEAST_SURE_PX = 0.5
+# What may have moved both edges is stated up to here (pixels): more is a strip as broad as the window that was fitted.
+LEAST_SURE_SHIFT_PX = 5.0
 # Corners are cut off both fingers alike: their sides at the measuring height lean alike to this (slope).
 CUT_ALIKE = 0.35
 IS_TIP = ~IS_ROW
 BROKEN = "The outline near the measuring height is neither smooth nor straight: clean the fingers, or change the light."
+TOO_ROUGH = NoGap(Status.NO_FINGERS, "The outlines are too rough to say where a finger's tip and edge are.")
+SMEARED = "The fingers moved while the shutter was open"
+# Motion by so many pixels (a box as broad has the variance of its square over 12) smears a rounded tip beyond use.
+SMEARED_PX = 4.0
 # Below this ratio of contrast to noise nothing is measured.
 CONTRAST_TO_NOISE = 3.0
 
@@ -118,6 +133,7 @@ def measure_gap(
             if found.apex < p.x.min() - 1.0:
                 return NoGap(Status.TIP_OUT_OF_VIEW, "A finger's tip lies beyond the picture's border.")
             covariance = found.covariance * (spread(end) * shared if rough is None else 1.0)
+            covariance[1, 1] += set_aside_variance(p, end, found.edge, found.tip + below_tip_px)
             own = MeasuringPoint(found.tip, found.apex, found.edge, found.slope, covariance)
         if own is None:
             own = cornered_measuring_point(p, below_tip_px, shared)
@@ -127,9 +143,12 @@ def measure_gap(
         measured.append(own)
     if cornered and abs(measured[0].slope - measured[1].slope) > CUT_ALIKE:
         return NoGap(Status.NO_FINGERS, BROKEN)
-    outcome = _assemble(fingers, edges, measured, below_tip_px, light_gap)
+    outcome = _assemble(fingers, edges, measured, below_tip_px, light_gap, coding)
+    if outcome is TOO_ROUGH and (way_px := _way_px(edges)) > SMEARED_PX:
+        words = f"{SMEARED}, by about {way_px:.0f} px: expose shorter, or move slower while frames are taken."
+        outcome = NoGap(Status.BLURRED, words)
     has_part = any(finger.hidden.size for finger in (fingers.left, fingers.right))
-    if has_part and isinstance(outcome, GapMeasurement) and outcome.u_gap_px > LEAST_SURE_BESIDE_PX:
+    if has_part and outcome is TOO_ROUGH:
         return NoGap(
             Status.GRIPPING, "A part between the fingers leaves too little of their inner edges in view.", held
         )
@@ -159,6 +178,9 @@ def _refuse(edges: EdgePoints, full_scale: int, light_gap: bool) -> NoGap | None
         inner = real & IS_TIP
     if np.count_nonzero(inner) < FEWEST_ROWS:
         return NoGap(Status.NO_FINGERS, "The inner edges are too short to be measured.")
+    seen = np.count_nonzero(inner, axis=1)
+    if seen.min() == 0 and seen.max() >= FEWEST_ROWS:
+        return NoGap(Status.NO_FINGERS, "Only one of the two inner edges can be seen.")
     contrast = middle(edges.contrast[inner]) * (1.0 if light_gap else -1.0)
     if contrast < CONTRAST_TO_NOISE * edges.noise or contrast < 0.02 * full_scale:
         return NoGap(Status.LOW_CONTRAST, "The fingers hardly differ from their ground.")
@@ -174,6 +196,12 @@ def _refuse(edges: EdgePoints, full_scale: int, light_gap: bool) -> NoGap | None
     if blur > BLUR_LIMIT_PX:
         return NoGap(Status.BLURRED, f"The edges are spread over {blur:.1f} px (standard deviation).")
     return None
+
+
+def _way_px(edges: EdgePoints) -> float:
+    """How far the faster finger moved while the shutter was open: motion across the fingers spreads flanks alone."""
+    flanks, tips = (edges.blur_px[:, part] ** 2 for part in (0, 1))
+    return sqrt(12.0 * max(0.0, float((flanks - tips).max())))
 
 
 def _no_fingers(
@@ -210,6 +238,7 @@ def _assemble(
     measured: list[MeasuringPoint],
     below_tip_px: float,
     light_gap: bool,
+    coding: Coding,
 ) -> GapMeasurement | NoGap:
     """From the fingers' own axes back to the picture."""
     orientation = fingers.orientation
@@ -230,10 +259,12 @@ def _assemble(
         by_tip, by_edge = end * dy / gap, -dx / gap
         (tip_tip, tip_edge), (_, edge_edge) = m.covariance.tolist()
         variance += by_tip**2 * tip_tip + 2.0 * by_tip * by_edge * tip_edge + by_edge**2 * edge_edge
-    if not variance < LEAST_SURE_PX**2:
-        return NoGap(Status.NO_FINGERS, "The outlines are too rough to say where a finger's tip and edge are.")
+    if not variance < SHARED_POINTS[coding] * LEAST_SURE_PX**2:
+        return TOO_ROUGH
     # A rim or too much light does the same to both edges.
     u_shift = float(abs(sum(mark.shift_px for mark in edges.marks)))
+    if u_shift > LEAST_SURE_SHIFT_PX:
+        return THIRD_TONE
     return GapMeasurement(found[0], found[1], orientation.direction, sqrt(variance), light_gap, u_shift)
 
 

@@ -32,18 +32,21 @@ LOOP(local_outline_polynomial, "FFFBdddddf", "bdd") {
     }
     if (n < FEWEST_POINTS) goto done;
     for (int iteration = 0; iteration < 4; iteration++) {
-        double matrix[TERMS * TERMS] = {0.0};
+        /* The normal matrix of a polynomial holds nothing but the sums of the powers up to twice its degree. */
+        double matrix[TERMS * TERMS], sums[2 * TERMS - 1] = {0.0};
         for (int a = 0; a < TERMS; a++) right[a] = 0.0;
         for (int64_t i = 0; i < n; i++) {
-            double powers[TERMS] = {1.0};
-            for (int a = 1; a < TERMS; a++) powers[a] = powers[a - 1] * s[i];
-            for (int a = 0; a < TERMS; a++) {
-                right[a] += weight[i] * powers[a] * away[i];
-                for (int b = 0; b < TERMS; b++) matrix[a * TERMS + b] += weight[i] * powers[a] * powers[b];
+            double power = weight[i];
+            for (int a = 0; a < 2 * TERMS - 1; a++, power *= s[i]) {
+                sums[a] += power;
+                if (a < TERMS) right[a] += power * away[i];
             }
         }
         for (int a = 0; a < TERMS; a++)
-            for (int b = 0; b < TERMS; b++) inverse[a * TERMS + b] = a == b;
+            for (int b = 0; b < TERMS; b++) {
+                matrix[a * TERMS + b] = sums[a + b];
+                inverse[a * TERMS + b] = a == b;
+            }
         if (!solve(matrix, TERMS, inverse, TERMS)) goto done; /* too few places to tell the powers apart */
         for (int a = 0; a < TERMS; a++) {
             c[a] = 0.0;

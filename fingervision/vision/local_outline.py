@@ -7,6 +7,7 @@ a pixel changes nothing by a jump.
 """
 
 from dataclasses import dataclass
+from math import hypot, sqrt
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,6 +34,8 @@ ROUGHEST = 6.0
 LEAST_SPREAD = 0.7
 # An outline that is less sure than this (pixels) is not smooth; one that is flatter (across over along) has no edge.
 LEAST_SURE_PX, FLATTEST = 1.0, 3.0
+# The tip is looked for at these places about the last one (pixels across).
+TIP_GRID = np.linspace(-6.0, 6.0, 241)
 
 _fit = loop("local_outline_polynomial")
 
@@ -58,19 +61,9 @@ class LocalOutline:
     ny: float
 
 
-def _polynomial(
-    points: OutlinePoints, centre: tuple[float, float], normal: tuple[float, float], reach: float
-) -> tuple[Floats, float, float] | None:
-    """Coefficients of normal distance over tangent distance, the variance at the centre, and the spread."""
-    coefficients = np.empty(DEGREE + 1)
-    seen = (points.x, points.y, points.u, points.is_row)
-    is_found, variance, spread = _fit(*seen, *centre, *normal, reach, coefficients)
-    return (coefficients, variance, spread) if is_found else None
-
-
 def outline_near(
     points: OutlinePoints, centre: tuple[float, float], normal: tuple[float, float], blur_px: float
-) -> tuple[Floats, float] | None:
+) -> tuple[list[float], float] | None:
     """Polynomial (normal over tangent distance) near a point, corrected for blur, and its uncertainty at the point.
 
     Returns
@@ -78,24 +71,25 @@ def outline_near(
     (coefficients, u_normal) or None
         None where there are too few points.
     """
-    best: tuple[Floats, float] | None = None
+    best: tuple[list[float], float] | None = None
     first_spread = 0.0
+    seen = (points.x, points.y, points.u, points.is_row, *centre, *normal)
     for reach in REACHES_PX:
         if reach < SHORTEST_IN_BLURS * blur_px and reach != REACHES_PX[-1]:
             continue
-        fit = _polynomial(points, centre, normal, reach)
-        if fit is None:
+        found = np.empty(DEGREE + 1)
+        is_found, variance, spread = _fit(*seen, reach, found)
+        if not is_found:
             continue
-        coefficients, variance, spread = fit
         if best is not None and spread > SPREAD_LIMIT * first_spread:
             break
         if best is None and spread > ROUGHEST:
             return None
         first_spread = first_spread or max(spread, 0.2)
-        curvature = 2.0 * coefficients[2] / (1.0 + coefficients[1] ** 2) ** 1.5
-        corrected = coefficients.copy()
-        corrected[0] -= 0.5 * blur_px**2 * curvature
-        best = corrected, float(np.sqrt(variance)) * max(spread, 0.5)
+        c: list[float] = found.tolist()
+        curvature = 2.0 * c[2] / (1.0 + c[1] ** 2) ** 1.5
+        c[0] -= 0.5 * blur_px**2 * curvature
+        best = c, sqrt(variance) * max(spread, 0.5)
     return best
 
 
@@ -107,12 +101,13 @@ def local_tip(points: OutlinePoints, x: float, y: float, blur_px: float) -> Loca
             return None
         c, u = fit
         # s runs along +x for the normal (0, -1); the tip is where the normal distance is largest.
-        grid = np.linspace(-6.0, 6.0, 241)
-        height = np.polynomial.polynomial.polyval(grid, c)
-        best = int(np.argmax(height))
-        x += float(grid[best])
+        height = np.full(TIP_GRID.size, c[-1])
+        for coefficient in c[-2::-1]:
+            height = coefficient + height * TIP_GRID
+        best = int(height.argmax())
+        x += float(TIP_GRID[best])
         y -= float(height[best])
-        if abs(grid[best]) < 0.1:
+        if abs(TIP_GRID[best]) < 0.1:
             break
     return LocalOutline(x, y, u, 0.0, -1.0)
 
@@ -122,7 +117,7 @@ def local_edge(
 ) -> tuple[LocalOutline, float] | None:
     """Where a smooth inner edge crosses the height `y`, and its slope there, from a first guess."""
     for _step in range(3):
-        length = float(np.hypot(1.0, slope))
+        length = hypot(1.0, slope)
         nx, ny = 1.0 / length, -slope / length
         fit = outline_near(points, (x, y), (nx, ny), blur_px)
         if fit is None:
@@ -131,15 +126,22 @@ def local_edge(
         # The crossing of the curve n(s) with the horizontal through the centre, to second order.
         s = 0.0
         for _newton in range(4):
-            n = float(np.polynomial.polynomial.polyval(s, c))
-            dn = float(np.polynomial.polynomial.polyval(s, np.polynomial.polynomial.polyder(c)))
+            n, dn = _value_and_slope(c, s)
             # y offset of the curve's point: s * nx + n * ny (tangent is (-ny, nx))
             s -= (s * nx + n * ny) / (nx + dn * ny)
-        n = float(np.polynomial.polynomial.polyval(s, c))
-        dn = float(np.polynomial.polynomial.polyval(s, np.polynomial.polynomial.polyder(c)))
+        n, dn = _value_and_slope(c, s)
         x += -s * ny + n * nx
         slope = (-ny + dn * nx) / (nx + dn * ny)
     return LocalOutline(x, y, u, nx, ny), slope
+
+
+def _value_and_slope(c: list[float], s: float) -> tuple[float, float]:
+    """A polynomial and its derivative (Horner)."""
+    value, slope = c[-1], 0.0
+    for coefficient in c[-2::-1]:
+        slope = value + slope * s
+        value = coefficient + value * s
+    return value, slope
 
 
 def local_measuring_point(points: OutlinePoints, below_tip_px: float, shared: float) -> MeasuringPoint | None:

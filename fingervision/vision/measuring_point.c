@@ -54,6 +54,10 @@ LOOP(measuring_point_read_off, "FFdFddf", "dddd") {
     memcpy(wider, covariance, sizeof wider);
     for (int k = 0; k < 2; k++) {
         int a = k ? OUTER_R : INNER_R;
+        if (wider[a * m + a] > square(UNSEEN_PX)) {
+            for (int b = 0; b < m; b++) wider[a * m + b] = wider[b * m + a] = 0.0;
+            wider[a * m + a] = square(p[a] + UNSEEN_IN_BLURS * in[5].d);
+        }
         double hidden = larger(1.0 - p[a] / (HIDDEN_IN_BLURS * in[5].d), 0.0);
         wider[a * m + a] += 2.0 * square(U_CORNER_IN_BLURS * in[5].d * hidden);
     }

@@ -18,6 +18,9 @@ LEVEL_IN_SIGMAS, LEVEL_LIMIT_PX = 2.0, 0.5
 # A corner that is blurred out, or nearly so, has its radius to so many sigma (standard uncertainty); nothing of it is
 # hidden from so many sigma on.
 U_CORNER_IN_BLURS, HIDDEN_IN_BLURS = 0.8, 8.0
+# Where no point of the outline lies on a fillet, its covariance is that of the guess, beyond this radius (pixels). The
+# fillet is then no larger than was found, give or take so many sigma of blur: a larger one would reach the points.
+UNSEEN_PX, UNSEEN_IN_BLURS = 100.0, 2.0
 # Derivatives are taken over so much of each parameter to either side.
 STEP = 1e-3
 # For a radius that is its own uncertainty, up to so many pixels.

@@ -41,7 +41,6 @@ def flat_noise(
     filters: EdgeFilters,
     row: int,
     column: int,
-    is_shared_known: bool = False,
 ) -> tuple[float, float]:
     """Neighbouring lines that share their noise (1 where every line's noise is its own), and that noise.
 
@@ -57,8 +56,6 @@ def flat_noise(
         For the window that is used.
     row, column : int
         Which filter of the table an edge of this blur, in the middle of its window, uses.
-    is_shared_known : bool
-        Whether a codec shares noise over more lines than are looked at here, so that the noise alone is wanted.
 
     Returns
     -------
@@ -74,12 +71,12 @@ def flat_noise(
     weight = filters.shift[row, column]
     shared, quietest = 1.0, 0.0
     for side in (GROUND, FINGER):
-        covariance, pixels = _autocovariance(upright, light, corners, side, 0 if is_shared_known else NEAREST)
+        covariance, pixels = _autocovariance(upright, light, corners, side, NEAREST)
         variance = covariance[LAGS, LAGS] / max(pixels, 1.0)
         if variance <= 0.0:
             continue
         quietest = variance if quietest == 0.0 else min(quietest, variance)
-        if is_shared_known or not _is_any(covariance, NEAR_SIGNIFICANT * covariance[LAGS, LAGS] / np.sqrt(pixels)):
+        if not _is_any(covariance, NEAR_SIGNIFICANT * covariance[LAGS, LAGS] / np.sqrt(pixels)):
             continue
         covariance, pixels = _autocovariance(upright, light, corners, side, LAGS)
         correlation = covariance / covariance[LAGS, LAGS]

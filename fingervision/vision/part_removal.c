@@ -7,7 +7,7 @@ static int by_size(const void *a, const void *b) {
 /* Whether something stands out of the inner side of a finger's coarse outline: outline, sign of the inner side, first row. */
 LOOP(part_removal_has_step, "Oid", "b") {
     const int32_t *outline = POINTS(0);
-    int64_t crest = 0, count = 0, steps = 0;
+    int64_t crest = 0, count = 0, steps = 0, has_kink = 0;
     for (int64_t i = 1; i < in[0].shape[0]; i++)
         if (outline[2 * i + 1] < outline[2 * crest + 1]) crest = i;
     double *t = floats(3 * (crest + 1)), *v = t + crest + 1, *order = v + crest + 1;
@@ -25,8 +25,11 @@ LOOP(part_removal_has_step, "Oid", "b") {
         /* The finger's own edge is the innermost thing: a part only ever adds. */
         qsort(order, (size_t)count, sizeof(double), by_size);
         for (int64_t i = 0; i < count; i++) steps += v[i] - order[count / 4] > STEP_PX;
+        /* A round corner falls back towards the tip, ever more steeply; a step rises, or is followed by a flat side. */
+        for (int64_t i = STEP_ROWS; i + STEP_ROWS < count; i++)
+            has_kink |= v[i + STEP_ROWS] - v[i] > STEP_PX || v[i + STEP_ROWS] - 2.0 * v[i] + v[i - STEP_ROWS] > STEP_PX;
     }
-    out[0].i = count >= 4 * STEP_ROWS && steps >= STEP_ROWS;
+    out[0].i = count >= 4 * STEP_ROWS && steps >= STEP_ROWS && has_kink;
     free(t);
 }
 

@@ -3,24 +3,39 @@
 Inverse-compositional Gauss-Newton of the zero-normalised sum of squared differences over translation and rotation
 (Baker & Matthews, Int. J. Computer Vision 56(3), 2004, doi:10.1023/B:VISI.0000011205.11775.fd; Pan, Li & Tong,
 Experimental Mechanics 53(7), 2013, doi:10.1007/s11340-013-9717-6). A plane of light and a gain are taken off both
-pictures. The moved picture is interpolated by cubic B-splines (Unser, IEEE Signal Processing Magazine 16(6), 1999,
-doi:10.1109/79.799930). Many patches of one size are registered together.
+pictures. Both are smoothed alike and interpolated by cubic B-splines (`spline_interpolation`). Many patches of one size
+are registered together.
 """
 
 from dataclasses import dataclass
 from functools import cache
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import correlate1d
+
+from fingervision.vision.spline_interpolation import (
+    KERNEL_REACH,
+    SPLINE_REACH,
+    coefficients,
+    derivative_power,
+    gaussian,
+    levels_and_derivatives,
+    phase_power,
+    sampled,
+)
 
 Floats = NDArray[np.float32]
 Doubles = NDArray[np.float64]
 
-# Pixels beyond a patch that interpolation and gradients need; the prefilter's kernel z^|k|, z = sqrt(3) - 2, has fallen
-# to 4e-5 after eight pixels.
-PREFILTER_REACH, SPLINE_REACH = 8, 2
-MARGIN_PX = PREFILTER_REACH + SPLINE_REACH
+# Pixels beyond a patch that interpolation and gradients need.
+MARGIN_PX = KERNEL_REACH + SPLINE_REACH
+# Both pictures are smoothed. Near the highest frequency that pixels hold a picture shows what is folded down from
+# beyond (aliasing), which seems to move the other way; it would decide, because the finest texture has the largest
+# gradients. A Gaussian of 0.7 px leaves 9 % of that frequency and 55 % of half of it: photographs without any optics
+# are registered to some 0.01 px instead of 0.02 to 0.03 (`python -m tests.benchmarks.gauges --only photographs`).
+# 0.5 px takes off half as much of the error; with 1 px and more, patches of 21 px hold too little for some textures.
+SMOOTHING_PX = 0.7
 # Gauss-Newton ends after a step below this (pixels at the patch's rim); it converges faster than linearly, so less than
 # a thousandth of a pixel is left.
 SETTLED_PX, ITERATIONS = 0.01, 12
@@ -47,6 +62,10 @@ class PatchReference:
         Change of `levels` with x, y and angle (radians), what plane and gain explain taken off.
     hessian : ndarray, shape (3, 3)
         Gram matrix of the jacobian.
+    score : ndarray, shape (3, 3)
+        That of the jacobian smoothed once more: covariance of what smoothed noise of unit variance projects on it.
+    fine : float
+        Share of the gradients' power that the smoothing takes off, 0 to 1: most of texture too fine for the pixels.
     template : ndarray, shape (height, width)
         Light as it was seen, for coarse search.
     """
@@ -58,6 +77,8 @@ class PatchReference:
     levels: Floats
     jacobian: Floats
     hessian: Doubles
+    score: Doubles
+    fine: float
     template: Floats
 
     @property
@@ -94,52 +115,6 @@ class Registered:
 
 
 @cache
-def _prefilter() -> Floats:
-    """Interpolation's inverse filter, truncated: coefficients of the cubic B-spline."""
-    z = np.sqrt(3.0) - 2.0
-    k = np.arange(-PREFILTER_REACH, PREFILTER_REACH + 1)
-    kernel = z ** np.abs(k) * (-6.0 * z / (1.0 - z * z))
-    return np.asarray(kernel / kernel.sum(), dtype=np.float32)
-
-
-@cache
-def derivative_power() -> float:
-    """Variance of the spline's derivative at a pixel for unit noise of the pixels."""
-    kernel = np.convolve(_prefilter().astype(np.float64), [0.5, 0.0, -0.5])
-    return float(kernel @ kernel)
-
-
-@cache
-def _phase_power(steps: int = 64) -> Doubles:
-    """Variance of an interpolated level for unit noise, by the fraction of a pixel along one axis."""
-    fraction = np.arange(steps) / steps
-    weights = np.stack(_weights(fraction), axis=1)
-    kernel = _prefilter().astype(np.float64)
-    return np.array([np.sum(np.convolve(kernel, w) ** 2) for w in weights])
-
-
-def interpolated_power(place_px: float) -> float:
-    """Variance of a level interpolated at a place along one axis, for unit noise of the pixels."""
-    table = _phase_power()
-    return float(table[round((place_px % 1.0) * table.size) % table.size])
-
-
-def _weights(fraction: NDArray[np.floating]) -> tuple[NDArray[np.floating], ...]:
-    """Cubic B-spline's weights of the four pixels about a place."""
-    f, g = fraction, 1.0 - fraction
-    f2, g2 = f * f, g * g
-    first, last = g2 * g / 6.0, f2 * f / 6.0
-    second = 2.0 / 3.0 - f2 * (0.5 + 0.5 * g)
-    return first, second, 1.0 - first - second - last, last
-
-
-def coefficients(levels: Floats) -> Floats:
-    """Coefficients of the cubic B-spline through a picture's levels, borders reflected."""
-    kernel = _prefilter()
-    return np.asarray(cv2.sepFilter2D(levels, cv2.CV_32F, kernel, kernel, borderType=cv2.BORDER_REFLECT_101))
-
-
-@cache
 def _grid(half_width: int, half_height: int) -> tuple[Floats, Floats, Doubles]:
     """Columns and rows from the middle, and an orthonormal basis of planes, shape (3, n)."""
     y, x = np.mgrid[-half_height : half_height + 1, -half_width : half_width + 1]
@@ -170,53 +145,26 @@ def patch_reference(levels: Floats, column: int, row: int, half_width: int, half
     rows = slice(row - half_height - MARGIN_PX, row + half_height + MARGIN_PX + 1)
     columns = slice(column - half_width - MARGIN_PX, column + half_width + MARGIN_PX + 1)
     part = np.ascontiguousarray(levels[rows, columns], dtype=np.float32)
-    c = coefficients(part)
     inner = slice(MARGIN_PX, -MARGIN_PX)
-    # Derivatives of the spline at the pixels: (c[+1] - c[-1]) / 2 along, (c[-1] + 4 c[0] + c[+1]) / 6 across.
-    across_x = (np.roll(c, -1, 1) - np.roll(c, 1, 1)) * 0.5
-    across_y = (np.roll(c, -1, 0) - np.roll(c, 1, 0)) * 0.5
-    by_x = ((np.roll(across_x, 1, 0) + 4 * across_x + np.roll(across_x, -1, 0)) / 6.0)[inner, inner].ravel()
-    by_y = ((np.roll(across_y, 1, 1) + 4 * across_y + np.roll(across_y, -1, 1)) / 6.0)[inner, inner].ravel()
-    template = part[inner, inner].copy()
-    own = template.ravel().astype(np.float64)
+    level, by_x, by_y = (of[inner, inner].ravel() for of in levels_and_derivatives(coefficients(part, SMOOTHING_PX)))
+    _, sharp_x, sharp_y = (of[inner, inner].ravel() for of in levels_and_derivatives(coefficients(part)))
+    own = level.astype(np.float64)
     own = own - (basis @ own) @ basis
     jacobian = np.stack((by_x, by_y, dx * by_y - dy * by_x)).astype(np.float64)
     jacobian -= (jacobian @ basis.T) @ basis
     power = float(own @ own)
     if power > 0.0:
         jacobian -= np.outer(jacobian @ own / power, own)
+    images = jacobian.reshape(3, 2 * half_height + 1, 2 * half_width + 1)
+    for axis in (1, 2):
+        images = correlate1d(images, gaussian(SMOOTHING_PX), axis=axis, mode="constant")
+    smoothed = images.reshape(3, -1)
+    sharp = float(np.sum(sharp_x.astype(np.float64) ** 2 + sharp_y.astype(np.float64) ** 2))
+    fine = 1.0 - float(np.sum(by_x.astype(np.float64) ** 2 + by_y.astype(np.float64) ** 2)) / max(sharp, 1e-30)
     return PatchReference(
         float(column), float(row), half_width, half_height, own.astype(np.float32), jacobian.astype(np.float32),
-        jacobian @ jacobian.T, template,
+        jacobian @ jacobian.T, smoothed @ smoothed.T, fine, part[inner, inner].copy(),
     )  # fmt: skip
-
-
-def sampled(flat: Floats, start: NDArray[np.intp], stride: int, x: Floats, y: Floats) -> Floats:
-    """Spline's levels at places of several coefficient images that lie one after another in memory.
-
-    Parameters
-    ----------
-    flat : ndarray, shape (m,)
-        Coefficients.
-    start : ndarray of int, shape (k,)
-        Where each image begins.
-    stride : int
-        Columns of each image.
-    x, y : ndarray, shape (k, n)
-        Places in each image.
-    """
-    column, row = np.floor(x), np.floor(y)
-    across = _weights(x - column)
-    down = _weights(y - row)
-    first = (row.astype(np.intp) - 1) * stride + (column.astype(np.intp) - 1) + start[:, None]
-    total = np.zeros_like(x)
-    for j in range(4):
-        line = across[0] * flat.take(first)
-        for i in range(1, 4):
-            line += across[i] * flat.take(first + i)
-        total += down[j] * line
-        first += stride
-    return total
 
 
 def register(
@@ -251,7 +199,7 @@ def register(
     basis32 = basis.astype(np.float32)
     height, width = parts[0].shape
     count = len(references)
-    flat = np.concatenate([coefficients(part).ravel() for part in parts])
+    flat = np.concatenate([coefficients(part, SMOOTHING_PX).ravel() for part in parts])
     begin = np.arange(count, dtype=np.intp) * (height * width)
     own = np.stack([reference.levels for reference in references])
     jacobian = np.stack([reference.jacobian for reference in references])
@@ -300,12 +248,14 @@ def register(
         if not at.size:
             break
     settled &= inside
-    covariance, noise = _covariance(hessian, residual, gain, x, y, dx, dy, shared_pixels)
+    score = np.stack([reference.score for reference in references])
+    covariance, noise = _covariance(hessian, score, residual, gain, x, y, dx, dy, shared_pixels)
     return Registered(x + origins_px[:, 0], y + origins_px[:, 1], turn, covariance, correlation, noise, settled)
 
 
 def _covariance(
     hessian: Doubles,
+    score: Doubles,
     residual: Floats,
     gain: Doubles,
     x: Doubles,
@@ -316,33 +266,34 @@ def _covariance(
 ) -> tuple[Doubles, Doubles]:
     """Covariance of x, y and turn from what is left, and the noise of one picture.
 
-    Both pictures have noise. Interpolated levels have less of it than pixels, so the residuals show
-    `sigma^2 (1 + g^2 k)` with `k` below 1 by the phase; the estimate feels all of it, because the texture is coarser
-    than the pixels: `2 sigma^2`. The gradients of the reference hold noise as well, which adds to the Gram matrix and
-    is taken off it (errors in variables): covariance = sigma_r^2 H^-1 H_seen H^-1.
+    Both pictures have noise. Smoothed and interpolated levels have less of it than pixels, so the residuals show
+    `sigma^2 (k_0 + g^2 k)` with `k` by the phase; the estimate feels the noise of the pixels through the smoothing
+    alone, because the texture is coarser than the pixels: `2 sigma^2` times the Gram matrix of the gradients smoothed
+    once more. The gradients of the reference hold noise as well, which adds to their Gram matrix and is taken off it
+    (errors in variables): covariance = sigma_r^2 H^-1 S_seen H^-1.
     """
     count, n = residual.shape
-    table = _phase_power()
+    table = phase_power(SMOOTHING_PX)
     places = [np.floor((v - np.floor(v)) * table.size).astype(np.intp) % table.size for v in (x, y)]
     power = table[places[0]] * table[places[1]]
     squares = np.einsum("ij,ij->i", residual, residual).astype(np.float64) / max(n - 7, 1)
-    one = np.maximum(squares / (1.0 + gain**2 * power), ROUNDING)
+    one = np.maximum(squares / (table[0] ** 2 + gain**2 * power), ROUNDING)
     spread = one * (1.0 + gain**2) * shared_pixels
     noisy = np.zeros((count, 3, 3))
     turned = float((dx.astype(np.float64) ** 2 + dy.astype(np.float64) ** 2).sum())
-    noisy[:, 0, 0] = noisy[:, 1, 1] = one * n * derivative_power()
-    noisy[:, 2, 2] = one * turned * derivative_power()
-    return _propagated(hessian, noisy, spread), np.sqrt(one)
+    noisy[:, 0, 0] = noisy[:, 1, 1] = one * n * derivative_power(SMOOTHING_PX)
+    noisy[:, 2, 2] = one * turned * derivative_power(SMOOTHING_PX)
+    return _propagated(hessian, score, noisy, spread), np.sqrt(one)
 
 
-def _propagated(hessian: Doubles, noisy: Doubles, spread: Doubles) -> Doubles:
+def _propagated(hessian: Doubles, score: Doubles, noisy: Doubles, spread: Doubles) -> Doubles:
     """Covariances of k patches, shape (k, 3, 3); infinite where gradients are those of noise or of one direction."""
     true = hessian - noisy
     size = np.sqrt(np.maximum(np.einsum("kii->ki", hessian), 1e-30))
     least = np.linalg.eigvalsh(true / (size[:, :, None] * size[:, None, :]))[:, 0]
     is_sound = least > LEAST_INFORMATION
     own = np.linalg.inv(np.where(is_sound[:, None, None], true, np.eye(3)))
-    covariance = spread[:, None, None] * (own @ hessian @ own)
+    covariance = spread[:, None, None] * (own @ score @ own)
     return np.where(is_sound[:, None, None], covariance, np.diag([np.inf] * 3))
 
 
@@ -361,5 +312,7 @@ def reference_covariance(reference: PatchReference, noise: float) -> Doubles:
     dx, dy, _ = _grid(reference.half_width_px, reference.half_height_px)
     variance = max(noise**2, ROUNDING)
     turned = float((dx.astype(np.float64) ** 2 + dy.astype(np.float64) ** 2).sum())
-    noisy = variance * derivative_power() * np.diag([dx.size, dx.size, turned])
-    return np.asarray(_propagated(reference.hessian[None], noisy[None], np.array([2.0 * variance]))[0])
+    noisy = variance * derivative_power(SMOOTHING_PX) * np.diag([dx.size, dx.size, turned])
+    return np.asarray(
+        _propagated(reference.hessian[None], reference.score[None], noisy[None], np.array([2.0 * variance]))[0]
+    )

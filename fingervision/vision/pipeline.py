@@ -9,13 +9,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from calib.camera_response import CameraResponse
-from fingervision.domain.errors import FingervisionError
+from fingervision.domain.errors import DataError
 from fingervision.domain.frame import Coding, Frame, Pixels
 from fingervision.domain.gap import GapMeasurement, NoGap
+from fingervision.domain.quantiser import Quantiser
 from fingervision.domain.region import Region
 from fingervision.domain.status import Status
 from fingervision.vision.binarise import Binary, binarise, split_at
 from fingervision.vision.candidates import candidates, found, has_edges
+from fingervision.vision.coding_error import with_coding_error, with_shared_shift
 from fingervision.vision.denoise import denoise
 from fingervision.vision.edges import EdgePoints, fit_edges
 from fingervision.vision.fingers import CoarseFingers
@@ -25,11 +27,11 @@ from fingervision.vision.held_part import visible_lines
 from fingervision.vision.interlace import at_half_way
 from fingervision.vision.longer_flanks import is_surer, with_longer_flanks
 from fingervision.vision.overlay import draw_boundary, draw_edge_points, draw_overlay, in_eight_bits
-from fingervision.vision.profile_choice import with_profile
+from fingervision.vision.profile_choice import STRIP, with_profile
 from fingervision.vision.profile_lines import profile_lines
-from fingervision.vision.residuals import SHARED_POINTS
 from fingervision.vision.response_shift import gap_shift_px
 from fingervision.vision.settings import LINEAR, SRGB, Settings
+from fingervision.vision.shared_profile import shared_shift_px
 from fingervision.vision.stripes import with_stripes
 from fingervision.vision.third_tone import THIRD_TONE, other_threshold
 
@@ -44,8 +46,6 @@ SMALLEST_SIDE_PX = 16
 FINAL = (Status.SATURATED, Status.BLURRED, Status.GRIPPING)
 # Beside a shadow or a pad a gap that is less sure than this (pixels) may be that of something else.
 LEAST_SURE_AGAIN_PX = 0.3
-# A codec that shares noise over more lines than this leaves nothing to be learnt of it in one picture.
-FARTHEST_SHARED = 7.0
 UNIFORM = NoGap(Status.LOW_CONTRAST, "The picture is uniform: nothing in it differs from anything else.")
 
 
@@ -70,7 +70,7 @@ def measure_frame(frame: Frame, settings: Settings) -> GapMeasurement | NoGap:
     if cv2.getNumThreads() != 1:
         cv2.setNumThreads(1)
     grey = _part(to_grey(frame.pixels), settings.region)
-    return _shifted(_attempt(grey, settings, frame.coding).outcome, settings.region)
+    return _shifted(_attempt(grey, settings, _coded(frame, settings)).outcome, settings.region)
 
 
 def look_closely(
@@ -94,7 +94,7 @@ def look_closely(
     edges : EdgePoints or None
         Their sub-pixel outlines, likewise.
     """
-    attempt = _attempt(_part(to_grey(frame.pixels), settings.region), settings, frame.coding)
+    attempt = _attempt(_part(to_grey(frame.pixels), settings.region), settings, _coded(frame, settings))
     return _shifted(attempt.outcome, settings.region), attempt.fingers, attempt.edges
 
 
@@ -115,7 +115,7 @@ def steps(frame: Frame, settings: Settings) -> list[tuple[str, Pixels]]:
     """
     grey = _part(to_grey(frame.pixels), settings.region)
     denoised = denoise(grey)
-    attempt = _attempt(grey, settings, frame.coding)
+    attempt = _attempt(grey, settings, _coded(frame, settings))
     own = Frame(in_eight_bits(grey), frame.index)
     outcome = attempt.outcome
     words = f"gap {outcome.gap_px:.3f} px" if isinstance(outcome, GapMeasurement) else outcome.words
@@ -137,6 +137,22 @@ def _part(grey: GreyImage, region: Region | None) -> GreyImage:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class _Coded:
+    """What a codec has done to the part of the picture that is looked at."""
+
+    coding: Coding
+    quantiser: Quantiser | None
+
+
+def _coded(frame: Frame, settings: Settings) -> _Coded:
+    quantiser, region = frame.quantiser, settings.region
+    if quantiser is not None and region is not None:
+        quantiser = quantiser.seen_from(region.x_px, region.y_px)
+    # Where the quantiser is known, the codec's part is worked out from it and not guessed from the codec's kind.
+    return _Coded(frame.coding if quantiser is None else Coding.LOSSLESS, quantiser)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class _Attempt:
     """How far a frame was understood: the binary picture, the fingers in it, their edges, and what came out."""
 
@@ -146,7 +162,7 @@ class _Attempt:
     edges: EdgePoints | None = None
 
 
-def _attempt(grey: GreyImage, settings: Settings, coding: Coding) -> _Attempt:
+def _attempt(grey: GreyImage, settings: Settings, coded: _Coded) -> _Attempt:
     if min(grey.shape) < SMALLEST_SIDE_PX:
         return _Attempt(NoGap(Status.NO_FINGERS, "The picture is too small to hold two fingers."))
     scale = _scale(grey, settings)
@@ -165,8 +181,8 @@ def _attempt(grey: GreyImage, settings: Settings, coding: Coding) -> _Attempt:
                 fingers = NoGap(Status.NO_FINGERS, "Light passes into shade without an edge.")
             attempt = _Attempt(fingers, split)
         else:
-            attempt = _measured(grey, split, fingers, light_gap, settings, coding, scale)
-            attempt = _with_two_tones(attempt, grey, denoised, light_gap, settings, coding, scale)
+            attempt = _measured(grey, split, fingers, light_gap, settings, coded, scale)
+            attempt = _with_two_tones(attempt, grey, denoised, light_gap, settings, coded, scale)
         if isinstance(attempt.outcome, GapMeasurement) or attempt.outcome.status in FINAL:
             return attempt
         first = first or attempt
@@ -179,12 +195,12 @@ def _measured(
     fingers: CoarseFingers,
     light_gap: bool,
     settings: Settings,
-    coding: Coding,
+    coded: _Coded,
     scale: int,
 ) -> _Attempt:
     """Measure two fingers that were found; rough ones over longer flanks where that is surer."""
     upright = fingers.orientation.view(grey)
-    how = (settings, scale, light_gap, coding)
+    how = (settings, scale, light_gap, coded)
     edges, outcome = _edges_and_gap(upright, fingers, *how)
     if isinstance(outcome, GapMeasurement) and outcome.roughness_px:
         longer = _edges_and_gap(upright, with_longer_flanks(fingers, settings.below_tip_px), *how)
@@ -196,19 +212,25 @@ def _measured(
 
 
 def _edges_and_gap(
-    upright: GreyImage, fingers: CoarseFingers, settings: Settings, scale: int, light_gap: bool, coding: Coding
+    upright: GreyImage, fingers: CoarseFingers, settings: Settings, scale: int, light_gap: bool, coded: _Coded
 ) -> tuple[EdgePoints, GapMeasurement | NoGap]:
     """Edges of fingers that were found, and what they say."""
     light = _light(settings.response, scale, int(np.iinfo(upright.dtype).max) + 1)
     lines = visible_lines(profile_lines((fingers.left, fingers.right)), fingers)
-    is_shared_known = SHARED_POINTS[coding] > FARTHEST_SHARED
-    edges, apart_px = fit_edges(upright, lines, light, scale, is_shared_known), 0.0
+    edges, apart_px = fit_edges(upright, lines, light, scale), 0.0
     if fingers.orientation.direction.is_vertical:
         edges, apart_px = at_half_way(edges)
     with suppress(np.linalg.LinAlgError):  # what stands beside the edges is none of the models
         edges = with_profile(upright, edges, light, scale, settings.is_outline)
+    if edges.beside == STRIP:
+        return edges, THIRD_TONE
     edges = with_stripes(upright, edges, light)
-    outcome = measure_gap(fingers, edges, settings.below_tip_px, scale, light_gap, coding)
+    outcome = measure_gap(fingers, edges, settings.below_tip_px, scale, light_gap, coded.coding)
+    if isinstance(outcome, GapMeasurement):
+        if coded.quantiser is not None:
+            outcome = with_coding_error(outcome, coded.quantiser, edges.inside, light, scale)
+        elif coded.coding is not Coding.LOSSLESS:
+            outcome = with_shared_shift(outcome, shared_shift_px(upright, edges, light), coded.coding)
     if (apart_px or edges.beside) and isinstance(outcome, GapMeasurement):
         outcome = replace(outcome, fields_apart_px=apart_px, beside=edges.beside)
     return edges, outcome
@@ -220,7 +242,7 @@ def _with_two_tones(
     denoised: GreyImage,
     light_gap: bool,
     settings: Settings,
-    coding: Coding,
+    coded: _Coded,
     scale: int,
 ) -> _Attempt:
     """The same attempt, or one with another threshold where a shadow or pad was taken for the wrong class."""
@@ -233,7 +255,7 @@ def _with_two_tones(
     split = split_at(denoised, attempt.binary, round(threshold))
     fingers = found(split, light_gap, (attempt.fingers.orientation.direction,), settings)
     if isinstance(fingers, CoarseFingers):
-        again = _measured(grey, split, fingers, light_gap, settings, coding, scale)
+        again = _measured(grey, split, fingers, light_gap, settings, coded, scale)
         if isinstance(again.outcome, GapMeasurement) and again.edges is not None:
             is_sure = again.outcome.u_gap_px < LEAST_SURE_AGAIN_PX
             if is_sure and other_threshold(upright, again.edges) is None:
@@ -253,7 +275,7 @@ def _scale(grey: GreyImage, settings: Settings) -> int:
             f"The camera response {settings.response.name} was measured on levels up to {known}, but these pictures "
             f"have levels up to {found}: measure it on pictures of this depth."
         )
-        raise FingervisionError(msg)
+        raise DataError(msg)
     return found
 
 

@@ -15,17 +15,22 @@ from fingervision.vision.beside_edge import without_additions
 from fingervision.vision.edge_filters import PIXEL_VARIANCE
 from fingervision.vision.edge_profile import EdgeMark
 from fingervision.vision.edges import EdgePoints
+from fingervision.vision.first_guess import line
 from fingervision.vision.grey import GreyImage
+from fingervision.vision.median import median
 from fingervision.vision.profile_lines import INNER, IS_INNER, IS_ROW, ROWS
 from fingervision.vision.profile_models import GLARE, SHADOW, STARTS_PX, STEP, WALL, ProfileFit, fit_profile
 from fingervision.vision.sharpening import U_SHIFT, Profile, is_curved, sharpening
 
 Floats = NDArray[np.float64]
+Ints = NDArray[np.int_]
 
 # The flanks are looked at where a step leaves so many times the noise of the picture's flat parts.
 UNEXPLAINED = 1.2
 # The mean profile reaches so far to either side (pixels), in bins of this breadth with so many pixels each.
 REACH_PX, BIN_PX, FEWEST_IN_BIN = 16, 0.5, 4
+# Rows are left out on purpose where their neighbours lie so many times as far apart as usual.
+LEFT_OUT = 4.0
 # A flank is straight where its rows lie this near to a line (pixels, standard deviation), over so many of them.
 STRAIGHT_PX, FEWEST_ROWS = 0.3, 6
 # A model explains a profile that it leaves with so many times the noise, or with this part of what a step leaves; a
@@ -41,6 +46,13 @@ SHARES = (0.05, 0.85)
 CUT_OFF_SIGMAS = 2.0
 # The inner flank is wider than the outer one, or than the tip, where its variance is larger by this share.
 WIDER = 0.15
+# Motion and focus widen both flanks of a finger, a wall the inner flanks of both fingers: one inner flank alone, wider
+# than the finger's outer one by this share (of variance) and by so many pixels, has a strip of a third tone beside it,
+# as a shadow makes. One of breadth w spreads a step by w / 2 at most: this one is broader than two pixels, and its own
+# edge may be the one that was found.
+ONE_SIDED, ONE_SIDED_PX, STRIP = 0.5, 1.2, "strip"
+# A model that leaves so many times what one may leave is none, however long it is fitted.
+HOPELESS_TIMES = 2.0
 # A wall or glare narrower than so many blurs cannot be told from the blur itself.
 RESOLVED_BLURS = 1.6
 # What a step takes for blur is partly what stands beside it: the search begins at this share of it as well.
@@ -100,9 +112,11 @@ def with_profile(
         # A step explains both, whatever the others would: only how wide it is is still to be asked.
         fits = [[each[STEP]] * 4 for each in fits]
     else:
+        step = sum(each[STEP].squares for each in fits)
+        too_many = HOPELESS_TIMES * max(MODEL_LEAVES * bins, step / MODEL_TIMES)
         for k, profile in enumerate(inner):
             if profile:
-                fits[k] += [_best(kind, profile, weight, blur[k]) for kind in (WALL, SHADOW, GLARE)]
+                fits[k] += [_best(kind, profile, weight, blur[k], too_many=too_many) for kind in (WALL, SHADOW, GLARE)]
     left = np.array([[fit.squares for fit in each] for each in fits]).sum(axis=0)
     enough = max(MODEL_LEAVES * bins, left[STEP] / MODEL_TIMES)
     is_step = left[STEP] < max(0.5 * enough, STEP_TIMES * left.min())
@@ -132,6 +146,14 @@ def with_profile(
             moved = _moved(edges, shadow, U_SHADOW, all_around, "shadow")
             return without_additions(upright, moved, light, SHADOW, shadow)
     widths = [_best(STEP, profile, weight, blur[k]).blur for k, profile in enumerate(outer) if profile]
+    is_one_sided = [
+        each[STEP].blur ** 2 > width**2 + max(ONE_SIDED * width**2, ONE_SIDED_PX**2)
+        and each[STEP].squares > MODEL_LEAVES * profile.t.size
+        for each, width, profile in zip(fits, widths, inner, strict=True)
+        if profile
+    ]
+    if is_one_sided[0] != is_one_sided[1]:
+        return replace(edges, beside=STRIP)
     if all(each[STEP].blur ** 2 > (1.0 + WIDER) * width**2 for each, width in zip(fits, widths, strict=True)):
         narrow = [_best(WALL, p, weight, width, True) for p, width in zip(inner, widths, strict=True) if p]
         remains = sum(fit.squares for fit in narrow)
@@ -183,13 +205,20 @@ def _room(edges: EdgePoints) -> int:
     return int(min(REACH_PX, 0.5 * (real[1].min() - real[0].max())))
 
 
-def _best(kind: int, profile: _Profile, weight: float, blur: float, is_blur_known: bool = False) -> ProfileFit:
+def _best(
+    kind: int,
+    profile: _Profile,
+    weight: float,
+    blur: float,
+    is_blur_known: bool = False,
+    too_many: float = np.inf,
+) -> ProfileFit:
     """The best fit of a model from any of its starts."""
     weights = profile.count * weight
     blurs = (blur,) if is_blur_known or kind == STEP else (blur, OWN_BLUR * blur)
     return min(
         (
-            fit_profile(kind, profile.t, profile.light, weights, own, start, is_blur_known)
+            fit_profile(kind, profile.t, profile.light, weights, own, start, is_blur_known, too_many)
             for own in blurs
             for start in STARTS_PX[kind]
         ),
@@ -207,26 +236,37 @@ def _profile(upright: GreyImage, edges: EdgePoints, light: Floats, k: int, part:
     outward = int(edges.lines.outward[k, part][0])
     keep = np.ones(rows.size, dtype=bool)
     for _look in range(3):
-        slope, at = np.polyfit(fixed[keep], found[keep], 1)
+        at, slope = line(fixed[keep].astype(np.float64), found[keep])
         away = found - at - slope * fixed
-        spread = 1.4826 * float(np.median(np.abs(away[keep])))
+        spread = 1.4826 * median(np.abs(away[keep]))
         keep = np.abs(away) < 3.0 * spread + 1e-3
         if np.count_nonzero(keep) < FEWEST_ROWS:
             return None
     if spread > STRAIGHT_PX:
         return None
-    # Every row between the first and the last that were looked at, also where lines were thinned out.
-    fixed = np.arange(fixed[keep].min(), fixed[keep].max() + 1)
-    line = at + slope * fixed
-    columns = np.rint(line).astype(int)[:, None] + outward * np.arange(-REACH_PX, room + 1)
+    fixed = _rows_between(fixed[keep])
+    edge = at + slope * fixed
+    columns = np.rint(edge).astype(int)[:, None] + outward * np.arange(-REACH_PX, room + 1)
     is_in = (columns >= 0) & (columns < upright.shape[1])
     values = light[upright[np.broadcast_to(fixed[:, None], columns.shape)[is_in], columns[is_in]]]
-    t = (outward * (columns - line[:, None]) / np.hypot(1.0, slope))[is_in]
+    t = (outward * (columns - edge[:, None]) / np.hypot(1.0, slope))[is_in]
     place = np.floor(t / BIN_PX).astype(int) + int(2.0 * REACH_PX / BIN_PX)
     count = np.bincount(place)
     full = count >= FEWEST_IN_BIN
     total, middle = np.bincount(place, values), np.bincount(place, t)
     return _Profile(middle[full] / count[full], total[full] / count[full], count[full].astype(np.float64))
+
+
+def _rows_between(looked_at: Ints) -> Ints:
+    """Every row between the first and the last that were looked at, also where lines were thinned out.
+
+    Where many in succession were left out, a part hides the edge there.
+    """
+    looked_at = np.sort(looked_at)
+    rows = np.arange(looked_at[0], looked_at[-1] + 1)
+    after = np.searchsorted(looked_at, rows)
+    before = looked_at[np.maximum(np.searchsorted(looked_at, rows, side="right") - 1, 0)]
+    return rows[looked_at[after] - before <= LEFT_OUT * np.median(np.diff(looked_at))]
 
 
 def _across(edges: EdgePoints) -> Floats:

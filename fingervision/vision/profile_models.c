@@ -67,8 +67,8 @@ static double squares_of(const Seen *s, double *p, double *model) {
 }
 
 /* Fit one model to a mean profile (Levenberg and Marquardt over position, blur and breadth): kind, t, value, weight, blur,
-   start, whether the blur is known, limits of the breadth; whether it went, and the fit. */
-LOOP(profile_models_fit_profile, "iFFFddidd", "bdddddd") {
+   start, whether the blur is known, limits of the breadth, squares that are too many; whether it went, and the fit. */
+LOOP(profile_models_fit_profile, "iFFFddiddd", "bdddddd") {
     int64_t n = in[1].n, kind = in[0].i;
     int free_count = kind != STEP ? 3 : 2, is_blur_known = (int)in[6].i;
     double p[PARAMETERS] = {0.0}, matrix[9] = {0.0}, right[3] = {0.0}, damping = 1e-2;
@@ -133,7 +133,7 @@ LOOP(profile_models_fit_profile, "iFFFddidd", "bdddddd") {
             double squares = squares_of(&s, new, other);
             if (squares < 0.0) goto done;
             if (squares < best) {
-                has_moved = best - squares > SETTLED * best;
+                has_moved = best - squares > (squares > in[9].d ? SLOW : SETTLED) * best;
                 best = squares;
                 memcpy(p, new, sizeof p);
                 memcpy(base, other, (size_t)n * sizeof(double));

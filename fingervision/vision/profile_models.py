@@ -29,6 +29,8 @@ FARTHEST_PX = 7.0
 LINEAR, PARAMETERS = 4, 7
 POSITION, BLUR, BREADTH = 4, 5, 6
 ITERATIONS, SETTLED = 40, 1e-7
+# A fit that leaves too many squares to be chosen goes on only while every step takes this share of them away.
+SLOW = 0.01
 # Blur as the picture's other edges tell it (standard uncertainty, relative).
 U_BLUR = 0.1
 
@@ -69,7 +71,14 @@ def addition(kind: int, t: float, blur: float, breadth: float) -> float:
 
 
 def fit_profile(
-    kind: int, t: Floats, value: Floats, weight: Floats, blur: float, start: float, is_blur_known: bool = False
+    kind: int,
+    t: Floats,
+    value: Floats,
+    weight: Floats,
+    blur: float,
+    start: float,
+    is_blur_known: bool = False,
+    too_many: float = np.inf,
 ) -> ProfileFit:
     """Fit one model to a mean profile (Levenberg and Marquardt over position, blur and breadth).
 
@@ -85,6 +94,8 @@ def fit_profile(
         First guess of the blur and of the breadth (pixels).
     is_blur_known : bool
         Whether the blur is that of the guess.
+    too_many : float
+        Squares beyond which nobody asks how few they might become.
 
     Raises
     ------
@@ -92,7 +103,7 @@ def fit_profile(
         If the parts of the model cannot be told apart at these places.
     """
     limits = LIMITS_PX[kind]
-    is_fitted, *fit = _fit_profile(kind, t, value, weight, blur, start, bool(is_blur_known), *limits)
+    is_fitted, *fit = _fit_profile(kind, t, value, weight, blur, start, bool(is_blur_known), *limits, too_many)
     if not is_fitted:
         msg = "the parts of the profile's model cannot be told apart"
         raise np.linalg.LinAlgError(msg)

@@ -54,6 +54,26 @@ LOOP(residuals_rejected, "FFFddd", "d") {
     out[0].d = (double)rejected / (double)larger_int(near, 1);
 }
 
+/* How far points stray that the fit takes for dust, just above or just below the measuring point, where they are the most
+   of what is there: x, y, u, residuals, weights, edge, height. */
+LOOP(residuals_set_aside, "FFFFFdd", "d") {
+    out[0].d = 0.0;
+    for (int side = 0; side < 2; side++) {
+        int64_t beside = 0, rejected = 0;
+        double worst = 0.0;
+        for (int64_t i = 0; i < in[0].n; i++) {
+            double down = FLOATS(1)[i] - in[6].d;
+            if (!is_near(FLOATS(0)[i], FLOATS(1)[i], in[5].d, in[6].d) || (down > 0.0) != side) continue;
+            int is_rejected = FLOATS(4)[i] < LEAST_COUNTED;
+            if (is_rejected) worst = larger(worst, fabs(FLOATS(3)[i]) * FLOATS(2)[i]);
+            if (fabs(down) > BESIDE_PX) continue;
+            beside++;
+            rejected += is_rejected;
+        }
+        if (2 * rejected > beside) out[0].d = larger(out[0].d, worst);
+    }
+}
+
 /* Mean residual near the measuring point or near the tip, the larger, in units of its own uncertainty. */
 LOOP(residuals_systematic, "FFFFddd", "d") {
     const double *x = FLOATS(0), *y = FLOATS(1), *residual = FLOATS(2), *robust = FLOATS(3), tip = in[5].d;

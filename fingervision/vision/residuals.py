@@ -15,9 +15,11 @@ Floats = NDArray[np.float64]
 
 # Neighbouring points share what the model leaves unexplained, and a codec's blocks, over so many of them.
 LAGS = 8
-# Points over which a codec shares its errors: measured on clips of a moving gripper at 1 to 8 Mbit/s and on JPEG of
-# quality 70 to 95 (`tests/benchmarks/accuracy.py --only jpeg h264`).
-SHARED_POINTS = {Coding.LOSSLESS: 1.0, Coding.INTRAFRAME: 2.5, Coding.INTERFRAME: 12.0}
+# Points over which a codec shares its errors, beside what it does to a flank as a whole (`coding_error`): measured on
+# clips of a moving gripper at 1 to 8 Mbit/s and on JPEG of quality 70 to 95 (`tests/benchmarks/accuracy.py --only
+# jpeg`,
+# `python -m tests.benchmarks.compressed_video`).
+SHARED_POINTS = {Coding.LOSSLESS: 1.0, Coding.INTRAFRAME: 2.5, Coding.INTERFRAME: 4.0}
 # Mean of w r^2 over mean of w for normal residuals under the biweight: the weights shrink the spread by this.
 BIWEIGHT_SPREAD = 0.828
 # The three-sided shape holds where its mean residual near the two points that matter is below so many of its own sigma.
@@ -29,12 +31,16 @@ SHAPE_REACH_PX, FEWEST_NEAR = 8.0, 3.0
 # Dust covers less than this share of the outline near the measuring point: what is more is the finger's own shape. A
 # point counts that has at least this weight.
 MOST_REJECTED, LEAST_COUNTED = 0.5, 0.05
+# Where most of the points within so many pixels above or below the measuring point are rejected, they may be the
+# finger's own edge (a corner that is cut off, a bend) and not dust.
+BESIDE_PX = 4.0
 # A measuring point farther from every point of the outline would be extrapolated (pixels).
 FARTHEST_POINT_PX = 2.5
 
 _shared = loop("residuals_shared")
 _roughness = loop("residuals_roughness")
 _rejected = loop("residuals_rejected")
+_set_aside = loop("residuals_set_aside")
 _systematic = loop("residuals_systematic")
 _distance_in_spacings = loop("residuals_distance_in_spacings")
 
@@ -77,6 +83,15 @@ def shape_holds(
     limit = max(_roughness(end.residual, end.robust), 1.0) * np.sqrt(stray)
     systematic = _systematic(points.x, points.y, end.residual, end.robust, found.edge, found.tip, below_tip_px)
     return bool(systematic < SHAPE_LIMIT * limit and end.misfit < MISFIT_LIMIT * limit)
+
+
+def set_aside_variance(points: OutlinePoints, end: FingerEnd, edge: float, height: float) -> float:
+    """Variance of the edge for what the fit took for dust beside the measuring point (pixels squared).
+
+    The edge lies anywhere between the shape and the farthest of these points, a rectangular distribution, and both
+    fingers alike: twice the variance of either holds the sum of both (JCGM 100:2008, 4.3.7 and 5.2.2).
+    """
+    return float(2.0 / 3.0 * _set_aside(points.x, points.y, points.u, end.residual, end.robust, edge, height) ** 2)
 
 
 def has_flanks(points: OutlinePoints, end: FingerEnd, turn: float = 0.0) -> bool:

@@ -10,6 +10,7 @@ widens the covariance.
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from math import ceil
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -65,6 +66,43 @@ class Chunks:
         return replace(self, middles=middles, normals=turn @ self.normals)
 
 
+class FlatMap(Protocol):
+    """From the picture to the plane as seen squarely and without distortion, in pixels, and back."""
+
+    def to_flat(self, points: Array) -> Array:
+        """Take lens and perspective off points, shape (2, n)."""
+        ...
+
+    def to_picture(self, points: Array) -> Array:
+        """Put them on again."""
+        ...
+
+
+@dataclass(frozen=True, slots=True)
+class EdgeView:
+    """How edges of bodies show in a picture.
+
+    Parameters
+    ----------
+    flat : FlatMap or None
+        Lens and perspective; chunks and motions are then those of the flat plane. None where the picture is flat.
+    outward_px : float
+        How far outside of its body an edge is seen (edge bias), in pixels of the picture.
+    shared_pixels : float
+        So many pixels count as one: a codec shares its errors among them.
+    """
+
+    flat: FlatMap | None = None
+    outward_px: float = 0.0
+    shared_pixels: float = 1.0
+
+
+PLAIN = EdgeView()
+_GAUSS = np.array([-(0.6**0.5), 0.0, 0.6**0.5])
+_GAUSS_WEIGHTS = np.array([5.0, 8.0, 5.0]) / 18.0
+"""Gauss and Legendre's three points: the mean over a chunk of a curve of fifth order."""
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class RigidFit:
     """A rigid motion in a picture.
@@ -81,6 +119,9 @@ class RigidFit:
         Chunks that were fitted, that lie in the picture, and that there are.
     blur_px : float
         Standard deviation of the edges' blur.
+    by_outward, by_scale : ndarray of float, shape (3,)
+        What x, y and the angle are off where every edge is seen 1 px farther out, and where the body is larger than
+        drawn by its own size: errors that all frames share, which the covariance does not hold.
     """
 
     shift_px: Array
@@ -90,6 +131,8 @@ class RigidFit:
     in_view: int
     all: int
     blur_px: float
+    by_outward: Array
+    by_scale: Array
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -102,7 +145,12 @@ class _Edges:
 
 
 def fit_rigid(
-    grey: NDArray[np.float64], chunks: Chunks, about: Array, body_is_dark: bool, start: tuple[Array, float]
+    grey: NDArray[np.float64],
+    chunks: Chunks,
+    about: Array,
+    body_is_dark: bool,
+    start: tuple[Array, float],
+    view: EdgeView = PLAIN,
 ) -> RigidFit | None:
     """Fit a body's motion from near a start; None where too little of its outline is seen.
 
@@ -118,22 +166,24 @@ def fit_rigid(
         Whether the body is darker than its ground.
     start : (ndarray of float, float)
         Shift in pixels and angle in rad from which to look; the edges lie within some 3 px of there.
+    view : EdgeView
+        How edges show in this picture.
     """
     shift, angle = np.array(start[0], dtype=float), float(start[1])
     blur, found = 1.2, None
     for _ in range(STEPS):
         now = chunks.moved(shift, angle, about)
-        edges = _edges(grey, now, body_is_dark, blur)
+        edges = _edges(grey, now, body_is_dark, blur, view)
         if edges.used.sum() < max(FEWEST, LEAST_SHARE * edges.in_view.sum()):
             return None
         blur = float(np.clip(np.median(edges.blur[edges.used]), *BLURS_PX))
         step = _rigid(now, edges, about + shift)
         if step is None:
             return None
-        move, covariance = step
+        move, covariance, shared = step
         shift, angle = shift + move[:2], angle + float(move[2])
         found = RigidFit(shift, angle, covariance, int(edges.used.sum()), int(edges.in_view.sum()),
-                         edges.used.size, blur)  # fmt: skip
+                         edges.used.size, blur, shared[:, 0], shared[:, 1])  # fmt: skip
         reach = float(np.abs(chunks.middles - about[:, None]).max())
         if float(np.hypot(*move[:2])) + abs(float(move[2])) * reach < SETTLED_PX:
             break
@@ -147,6 +197,7 @@ def capture_rigid(
     about: Array,
     body_is_dark: bool,
     start: tuple[Array, float],
+    view: EdgeView = PLAIN,
 ) -> RigidFit | None:
     """Fit from farther away: in the picture halved again and again, the coarsest first.
 
@@ -156,7 +207,7 @@ def capture_rigid(
         The picture.
     pyramid : sequence of ndarray of float
         It halved once, twice and so on (`halved`).
-    chunks, about, body_is_dark, start
+    chunks, about, body_is_dark, start, view
         As `fit_rigid`.
     """
     shift, angle = start
@@ -165,10 +216,12 @@ def capture_rigid(
         # The middle of a pixel of the halved picture lies between those of two.
         offset = 0.5 * scale - 0.5
         small = Chunks(chunks.middles * scale + offset, chunks.normals, max(chunks.half_length * scale, 2.0))
-        rough = fit_rigid(pyramid[level - 1], small, about * scale + offset, body_is_dark, (shift * scale, angle))
+        coarse = replace(view, flat=None if view.flat is None else _Halved(view.flat, scale, offset), outward_px=0.0)
+        begin = (shift * scale, angle)
+        rough = fit_rigid(pyramid[level - 1], small, about * scale + offset, body_is_dark, begin, coarse)
         if rough is not None:
             shift, angle = rough.shift_px / scale, rough.angle_rad
-    return fit_rigid(grey, chunks, about, body_is_dark, (shift, angle))
+    return fit_rigid(grey, chunks, about, body_is_dark, (shift, angle), view)
 
 
 def halved(grey: NDArray[np.float64], times: int) -> list[NDArray[np.float64]]:
@@ -182,12 +235,57 @@ def halved(grey: NDArray[np.float64], times: int) -> list[NDArray[np.float64]]:
     return out
 
 
-def _edges(grey: NDArray[np.float64], chunks: Chunks, body_is_dark: bool, blur: float) -> _Edges:
-    """Fit a blurred step to the pixels about every chunk."""
+@dataclass(frozen=True, slots=True)
+class _Halved:
+    """A map of a picture that was halved."""
+
+    whole: FlatMap
+    scale: float
+    offset: float
+
+    def to_flat(self, points: Array) -> Array:
+        return self.whole.to_flat((points - self.offset) / self.scale) * self.scale + self.offset
+
+    def to_picture(self, points: Array) -> Array:
+        return self.whole.to_picture((points - self.offset) / self.scale) * self.scale + self.offset
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _InPicture:
+    """Chunks as the picture shows them, and how much longer a way across them is on the flat plane."""
+
+    middles: Array
+    normals: Array
+    half_lengths: Array
+    stretch: Array
+
+
+def _in_picture(chunks: Chunks, flat: FlatMap | None) -> _InPicture:
+    """Map chunks into the picture: each by its mean place and by its chord."""
+    count, half = chunks.middles.shape[1], chunks.half_length
+    if flat is None or not count:
+        return _InPicture(chunks.middles, chunks.normals, np.full(count, half), np.ones(count))
+    way = np.stack([-chunks.normals[1], chunks.normals[0]])
+    at = [chunks.middles + t * half * way for t in (*_GAUSS, -1.0, 1.0)]
+    seen = flat.to_picture(np.concatenate([*at, chunks.middles + chunks.normals], axis=1)).reshape(2, 6, count)
+    middles = np.tensordot(seen[:, :3], _GAUSS_WEIGHTS, axes=(1, 0))
+    chord = seen[:, 4] - seen[:, 3]
+    length = np.hypot(*chord)
+    normals = np.stack([chord[1], -chord[0]]) / length
+    normals *= np.sign(np.sum(normals * (seen[:, 5] - seen[:, 1]), axis=0))
+    out = flat.to_flat(np.concatenate([middles + normals, middles - normals], axis=1)).reshape(2, 2, count)
+    stretch = 0.5 * np.sum((out[:, 0] - out[:, 1]) * chunks.normals, axis=0)
+    return _InPicture(middles, normals, 0.5 * length, stretch)
+
+
+def _edges(grey: NDArray[np.float64], flat_chunks: Chunks, body_is_dark: bool, blur: float, view: EdgeView) -> _Edges:
+    """Fit a blurred step to the pixels about every chunk; offsets are those of the flat plane."""
+    chunks = _in_picture(flat_chunks, view.flat)
     count = chunks.middles.shape[1]
     height, width = grey.shape
-    half, reach = chunks.half_length, REACH_PX
-    box = ceil(np.hypot(half, reach)) + 1
+    reach = REACH_PX
+    longest = float(chunks.half_lengths.max(initial=0.0))
+    box = ceil(np.hypot(longest, reach)) + 1
     offset, variance, blurs = np.zeros(count), np.full(count, np.inf), np.full(count, blur)
     used, in_view = np.zeros(count, dtype=bool), np.zeros(count, dtype=bool)
     steps = np.arange(-box, box + 1)
@@ -199,6 +297,7 @@ def _edges(grey: NDArray[np.float64], chunks: Chunks, body_is_dark: bool, blur: 
         if not (0 <= column < width and 0 <= row < height):
             continue
         nx, ny = chunks.normals[:, k]
+        half = chunks.half_lengths[k]
         dx, dy = columns[None, :] + column - x, rows[:, None] + row - y
         s, t = dx * nx + dy * ny, -dx * ny + dy * nx
         inside = (np.abs(t) <= half) & (np.abs(s) <= reach)
@@ -211,7 +310,8 @@ def _edges(grey: NDArray[np.float64], chunks: Chunks, body_is_dark: bool, blur: 
         if fitted is not None:
             offset[k], variance[k], blurs[k] = fitted
             used[k] = True
-    return _Edges(offset, variance, blurs, used, in_view)
+    offset = chunks.stretch * (offset - view.outward_px)
+    return _Edges(offset, variance * view.shared_pixels * chunks.stretch**2, blurs, used, in_view)
 
 
 def _step(values: Array, s: Array, blur: float, body_is_dark: bool) -> tuple[float, float, float] | None:
@@ -246,8 +346,11 @@ def _step(values: Array, s: Array, blur: float, body_is_dark: bool) -> tuple[flo
     return d, variance, float(np.sqrt(max(sigma**2 - 1.0 / 12.0, BLURS_PX[0] ** 2)))
 
 
-def _rigid(chunks: Chunks, edges: _Edges, about: Array) -> tuple[Array, Array] | None:
-    """Small rigid motion by the chunks' offsets, and its covariance; None where they do not hold it."""
+def _rigid(chunks: Chunks, edges: _Edges, about: Array) -> tuple[Array, Array, Array] | None:
+    """Small rigid motion by the chunks' offsets, its covariance and what shared errors do to it, shape (3, 2).
+
+    None where the offsets do not hold it.
+    """
     used = edges.used
     arm = chunks.middles[:, used] - about[:, None]
     nx, ny = chunks.normals[:, used]
@@ -275,4 +378,7 @@ def _rigid(chunks: Chunks, edges: _Edges, about: Array) -> tuple[Array, Array] |
         return None
     degrees = float(weight.sum()) - 3.0
     spread = max(1.0, float(np.sum(weight * rest**2)) / max(degrees, 1.0))
-    return move, spread * np.linalg.inv(normal)
+    # An edge seen farther out is one offset of all chunks; a body that is larger than drawn moves each by its distance.
+    shared = np.stack([np.ones_like(nx), nx * arm[0] + ny * arm[1]], axis=1)
+    inverse = np.linalg.inv(normal)
+    return move, spread * inverse, inverse @ (columns.T @ (w[:, None] * shared))

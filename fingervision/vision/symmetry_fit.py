@@ -12,14 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from fingervision.vision.patch_registration import (
-    LEAST_INFORMATION,
-    MARGIN_PX,
-    ROUNDING,
-    coefficients,
-    interpolated_power,
-    sampled,
-)
+from fingervision.vision.patch_registration import LEAST_INFORMATION, MARGIN_PX, ROUNDING
+from fingervision.vision.spline_interpolation import coefficients, interpolated_power, sampled
 
 Floats = NDArray[np.float32]
 Doubles = NDArray[np.float64]

@@ -12,6 +12,7 @@ import io
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
+from tempfile import NamedTemporaryFile
 
 import av
 import cv2
@@ -20,6 +21,8 @@ import numpy as np
 from fingervision.domain.direction import Direction
 from fingervision.domain.frame import Coding, Frame, Pixels
 from fingervision.domain.gap import GapMeasurement
+from fingervision.domain.quantiser import Quantiser
+from fingervision.frames.video_file import VideoFile
 from fingervision.rendering import Camera, Light, Scene, SquareTip, render, truth, two_fingers
 from fingervision.vision.pipeline import Settings, measure_frame
 
@@ -34,6 +37,7 @@ class Case:
     pixels: Pixels
     gap_px: float
     coding: Coding = Coding.LOSSLESS
+    quantiser: Quantiser | None = None
 
 
 def gap_of(scene: Scene, camera: Camera) -> float:
@@ -165,11 +169,12 @@ def h264_clips(rng: np.random.Generator) -> Iterator[Case]:
                     stream.encode(av.VideoFrame.from_ndarray(pixels, format="gray").reformat(format="yuv420p"))
                 )
             container.mux(stream.encode(None))
-        buffer.seek(0)
-        for picture, gap in zip(av.open(buffer).decode(video=0), gaps, strict=True):
-            luma = picture.to_ndarray()[: picture.height, : picture.width]
-            if gap is not None:
-                yield Case(np.ascontiguousarray(luma), gap, Coding.INTERFRAME)
+        with NamedTemporaryFile(suffix=".mkv") as file:
+            file.write(buffer.getbuffer())
+            file.flush()
+            for frame, gap in zip(VideoFile(file.name), gaps, strict=True):
+                if gap is not None and isinstance(frame, Frame):
+                    yield Case(frame.pixels.copy(), gap, frame.coding, frame.quantiser)
 
 
 SINGLE: dict[str, Callable[[np.random.Generator], Case]] = {
@@ -196,7 +201,7 @@ def run(name: str, frames: int, seed: int) -> tuple[str, np.ndarray, np.ndarray]
         case = next(source)
         settings = Settings(BELOW_PX, None if name == "turned" else Direction.UP)
         start = time.perf_counter()
-        found = measure_frame(Frame(case.pixels, number, coding=case.coding), settings)
+        found = measure_frame(Frame(case.pixels, number, coding=case.coding, quantiser=case.quantiser), settings)
         seconds += time.perf_counter() - start
         if isinstance(found, GapMeasurement):
             errors.append(found.gap_px - case.gap_px)

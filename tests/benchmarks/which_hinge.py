@@ -45,12 +45,13 @@ NECK_MM = 0.01
 
 @dataclass(frozen=True)
 class Hidden:
-    """What is hidden: the effect, the places that name it rightly, and what each channel does by the input."""
+    """What is hidden: the effect, the places that name it, what 1 mm of input does to each channel, the size."""
 
     effect: str
     places: tuple[str, ...]
     words: str
     slopes: dict[str, float]
+    size: float
     slip: tuple[Array, Array, dict[str, Array], float] | None = None
 
 
@@ -192,29 +193,30 @@ def slip_at(load: Array, stiffness: Array, u: float, radius: float) -> Array:
 def hidden_things(seed: int) -> list[Hidden]:
     """Draw what is hidden: nothing, hinges 10 to 20 % off, links 1 to 1.5 % off, pivots with 20 um of play."""
     rng = np.random.default_rng(seed)
-    found = [Hidden("", (), "nothing", slopes_of(drawn()))]
+    found = [Hidden("", (), "nothing", slopes_of(drawn()), 0.0)]
     for number, hinge in enumerate(HINGES):
         # Bending stiffness of a notch goes with t^2.5 / sqrt(R): (1.10 to 1.20)^0.4.
         ratio = rng.uniform(0.10, 0.20) * (1.0 if number % 2 else -1.0)
         found.append(Hidden("hinge_stiffness_error", (hinge,), f"{hinge} {100 * ratio:+.0f} %",
-                            slopes_of(thicker(number, (1.0 + ratio) ** 0.4))))  # fmt: skip
+                            slopes_of(thicker(number, (1.0 + ratio) ** 0.4)), ratio))  # fmt: skip
     for number, (hinge, x) in enumerate(zip(HINGES, (-35.5, -17.68, 35.5, 17.68), strict=True)):
         side = hinge.split()[0]
         ratio = rng.uniform(0.010, 0.015) * (1.0 if number in (0, 3) else -1.0)
         out = np.sign(x) * (1.0 if hinge.endswith("1") else -1.0)
         place = f"{side}_finger, {side} hinge 1 to {side} hinge 2"
         found.append(Hidden("link_length_error", (place,), f"{place} {100 * ratio:+.1f} % at {hinge}",
-                            slopes_of(shifted(number, out * 17.82 * ratio, 0.0))))  # fmt: skip
+                            slopes_of(shifted(number, out * 17.82 * ratio, 0.0)), ratio))  # fmt: skip
     for number in (0, 2):
         side, ratio = HINGES[number].split()[0], rng.uniform(0.010, 0.015)
         place = f"{side}_pillar, {side} clamp to {side} hinge 1"
         found.append(Hidden("link_length_error", (place,), f"{place} {100 * ratio:+.1f} %",
-                            slopes_of(shifted(number, 0.0, 30.0 * ratio))))  # fmt: skip
+                            slopes_of(shifted(number, 0.0, 30.0 * ratio)), ratio))  # fmt: skip
     for number, hinge in enumerate(HINGES):
         load, stiffness, columns = slipping(number)
         slopes = {name: float(values[0]) for name, values in columns.items()}
         by_slip = {name: values[1:] for name, values in columns.items()}
-        found.append(Hidden("hinge_play", (hinge,), f"{hinge} 20 um of play", slopes, (load, stiffness, by_slip, 0.01)))
+        slip = (load, stiffness, by_slip, 0.01)
+        found.append(Hidden("hinge_play", (hinge,), f"{hinge} 20 um of play", slopes, 0.02, slip))
     return found
 
 
@@ -265,17 +267,58 @@ def gap_alone(table: MeasuredTable) -> MeasuredTable:
     return replace(table, channels=own)
 
 
-def judged(hidden: Hidden, answers: PlaceAnswers, table: MeasuredTable) -> tuple[str, int, str]:
-    """Say whether a table's answer holds the truth, how many places are in it, and what it is."""
+def judged(hidden: Hidden, answers: PlaceAnswers, table: MeasuredTable) -> tuple[str, int, str, float | None]:
+    """Say whether an answer holds the truth, how many places are in it, what it is, and the size's error in u."""
     evidence, _ = body_evidence(table, answers, table.input_mm, np.random.default_rng(1))
     if evidence is None:
-        return "nothing", 0, ""
+        return "nothing", 0, "", None
     findings = evidence.findings
     keys = list(dict.fromkeys(m.candidate.key for m in findings.members)) if not findings.structure else []
     if not keys:
-        return "nothing", 0, f"structure {findings.structure:.0f}" if findings.structure else ""
+        return "nothing", 0, f"structure {findings.structure:.0f}" if findings.structure else "", None
     right = any(key == f"{hidden.effect}@{place}" for key in keys for place in hidden.places)
-    return ("named" if len(keys) == 1 else "in the set") if right else "wrong", len(keys), " | ".join(keys)
+    told = [m for m in findings.members if m.candidate.key == f"{hidden.effect}@{hidden.places[0]}"] if right else []
+    off = (told[0].size - hidden.size) / told[0].u_stated if told else None
+    return ("named" if len(keys) == 1 else "in the set") if right else "wrong", len(keys), " | ".join(keys), off
+
+
+def together(one: Hidden, other: Hidden) -> Hidden:
+    """Hide two things at once: what each does to the slopes is added, which holds to their product, some 1e-4."""
+    plain = slopes_of_drawn()
+    slopes = {name: one.slopes[name] + other.slopes[name] - plain[name] for name in plain}
+    slips = [each for each in (one, other) if each.slip is not None]
+    words = f"{one.words} and {other.words}"
+    return Hidden("two", (), words, slopes, 0.0, slips[0].slip if slips else None)
+
+
+@cache
+def slopes_of_drawn() -> dict[str, float]:
+    """Answer the sample as drawn."""
+    return slopes_of(drawn())
+
+
+def two_causes(things: Sequence[Hidden], answers: PlaceAnswers, tables: int, rng: np.random.Generator) -> None:
+    """Print what tables with two things hidden come to: a wrong place is one that neither of them is in."""
+    counts: dict[str, int] = {"one of them, or both in a set": 0, "wrong place": 0, "unknown": 0, "nothing": 0}
+    for _ in range(tables):
+        first, second = (things[k] for k in rng.choice(np.arange(1, len(things)), 2, replace=False))
+        if first.slip is not None and second.slip is not None:
+            continue
+        table = table_of(together(first, second), rng)
+        evidence, _ = body_evidence(table, answers, table.input_mm, np.random.default_rng(1))
+        findings = None if evidence is None else evidence.findings
+        keys = [] if findings is None else [m.candidate.key for m in findings.members]
+        true = {f"{each.effect}@{place}" for each in (first, second) for place in each.places}
+        if findings is not None and findings.structure:
+            said = "unknown"
+        elif not keys:
+            said = "nothing"
+        else:
+            said = "one of them, or both in a set" if true & set(keys) else "wrong place"
+        counts[said] += 1
+        if said in ("wrong place", "nothing"):
+            print(f"  {first.words} and {second.words}: {said} {' | '.join(dict.fromkeys(keys))}", flush=True)
+    print("two causes: " + ", ".join(f"{name} {count}" for name, count in counts.items()))
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
@@ -283,6 +326,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--tables", type=int, default=60)
     parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--two", type=int, default=0, help="tables with two things hidden")
     parser.add_argument("--verbose", action="store_true")
     given = parser.parse_args(arguments)
     began = time.perf_counter()
@@ -290,28 +334,36 @@ def main(arguments: Sequence[str] | None = None) -> None:
     things = hidden_things(given.seed)
     print(f"{len(things)} hidden things by finite elements: {time.perf_counter() - began:.0f} s")
     counts: dict[str, dict[str, int]] = {}
+    offs: dict[str, list[float]] = {}
     sizes: dict[str, list[int]] = {"gap": [], "bodies": []}
     rng = np.random.default_rng(given.seed + 1000)
     for number in range(given.tables):
         # Every fourth table hides nothing.
         thing = things[0] if number % 4 == 0 else things[1 + (number - number // 4 - 1) % (len(things) - 1)]
         table = table_of(thing, rng)
-        verdict, size, words = judged(thing, answers, table)
+        verdict, size, words, off = judged(thing, answers, table)
+        if off is not None:
+            offs.setdefault(thing.effect, []).append(off)
         kind = thing.effect or "nothing"
         own = counts.setdefault(kind, {"named": 0, "in the set": 0, "wrong": 0, "nothing": 0})
         own[verdict] += 1
         if thing.effect:
-            other, plain, _ = judged(thing, answers, gap_alone(table))
+            other, plain, _, _ = judged(thing, answers, gap_alone(table))
             if verdict in ("named", "in the set") and other in ("named", "in the set"):
                 sizes["gap"].append(plain)
                 sizes["bodies"].append(size)
         if given.verbose or verdict == "wrong" or (verdict == "nothing") == bool(thing.effect):
             print(f"  {thing.words}: {verdict} {words}", flush=True)
+    two_causes(things, answers, given.two, rng)
     for kind, own in counts.items():
         print(f"{kind}: " + ", ".join(f"{name} {count}" for name, count in own.items()))
     planted = sum(sum(own.values()) for kind, own in counts.items() if kind != "nothing")
     found = sum(own["named"] + own["in the set"] for kind, own in counts.items() if kind != "nothing")
     wrong = sum(own["wrong"] for kind, own in counts.items() if kind != "nothing")
+    for effect, values in offs.items():
+        inside = 100.0 * np.mean(np.abs(values) < 1.96)
+        spread = np.sqrt(np.mean(np.square(values)))
+        print(f"{effect}: size within 1.96 u in {inside:.0f} % of {len(values)}, RMS of error / u {spread:.2f}")
     print(f"{given.tables} tables: {found} of {planted} at the right place or in the set, {wrong} wrong")
     null = counts.get("nothing", {"nothing": 0})
     print(f"claims where nothing is hidden: {sum(null.values()) - null['nothing']} of {sum(null.values())}")

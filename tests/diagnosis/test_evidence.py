@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from fingervision.diagnosis.inference.hypothesis_fit import Explanation, Problem, fit, scan
+from fingervision.diagnosis.inference.hypothesis import Explanation, Problem
+from fingervision.diagnosis.inference.hypothesis_fit import fit, scan
 from fingervision.diagnosis.inference.model_adequacy import imitated, shapes_of
 from fingervision.diagnosis.inference.null_bootstrap import QUANTILE, linear_thresholds
 from fingervision.diagnosis.inference.probe_basis import probes

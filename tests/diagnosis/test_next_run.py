@@ -10,7 +10,8 @@ from fingervision.diagnosis.design.expected_gain import expected_gain, surest
 from fingervision.diagnosis.design.experiment_design import NEEDED
 from fingervision.diagnosis.design.further_evidence import checks_between, further_evidence
 from fingervision.diagnosis.design.next_run import next_run
-from fingervision.diagnosis.inference.hypothesis_fit import Explanation, Problem, fit
+from fingervision.diagnosis.inference.hypothesis import Explanation, Problem
+from fingervision.diagnosis.inference.hypothesis_fit import fit
 from fingervision.diagnosis.inference.posterior import draws
 from fingervision.diagnosis.input.observations import Observations
 from fingervision.diagnosis.input.preparation import prepare

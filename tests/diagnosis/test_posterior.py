@@ -5,7 +5,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from fingervision.diagnosis.inference.hypothesis_fit import Explanation, Problem, fit
+from fingervision.diagnosis.inference.hypothesis import Explanation, Problem
+from fingervision.diagnosis.inference.hypothesis_fit import fit
 from fingervision.diagnosis.inference.posterior import settled
 from fingervision.diagnosis.input.preparation import prepare
 from fingervision.storage.measured_table import read_measured_table

@@ -6,11 +6,13 @@ import os
 import re
 import shlex
 import subprocess
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
 import click
 
+from fingervision import effects
 from fingervision.cli import cli
 from fingervision.domain.errors import FingervisionError
 
@@ -83,6 +85,17 @@ def blocks_of(path: Path, root: Path) -> list[Block]:
             )
         )
     return found
+
+
+@contextlib.contextmanager
+def python_session() -> Iterator[None]:
+    """Let the effects that Python blocks register with `@fv.effect` end with the page, as a reader's session does."""
+    before = set(effects.catalogue())
+    try:
+        yield
+    finally:
+        for name in set(effects.catalogue()) - before:
+            effects.withdraw(name)
 
 
 def commands_of(block: Block) -> list[str]:

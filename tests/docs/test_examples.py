@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.docs.examples import Block, agrees, blocks_of, check_options, commands_of, run_block
+from tests.docs.examples import Block, agrees, blocks_of, check_options, commands_of, python_session, run_block
 
 ROOT = Path(__file__).parents[2]
 PAGES = sorted(
@@ -45,13 +45,14 @@ def test_examples_run_and_print_what_the_page_shows(
     shutil.copytree(ROOT / "sample_frames", tmp_path / "sample_frames")
     monkeypatch.chdir(tmp_path)
     printed: dict[str, str] = {}
-    for path in (page, *(ROOT / name for name in TOGETHER.get(page.relative_to(ROOT).as_posix(), ()))):
-        names: dict[str, object] = {"__name__": "example"}
-        for block in examples(path):
-            if block.is_run:
-                said = run_block(block, names, printed)
-                is_as_shown = not block.shown or agrees(block.shown, said)
-                assert is_as_shown, f"{block.place} shows another text than\n{said}"
+    with python_session():
+        for path in (page, *(ROOT / name for name in TOGETHER.get(page.relative_to(ROOT).as_posix(), ()))):
+            names: dict[str, object] = {"__name__": "example"}
+            for block in examples(path):
+                if block.is_run:
+                    said = run_block(block, names, printed)
+                    is_as_shown = not block.shown or agrees(block.shown, said)
+                    assert is_as_shown, f"{block.place} shows another text than\n{said}"
 
 
 @pytest.mark.parametrize("page", [*PAGES, ROOT / "README.md"], ids=lambda page: page.relative_to(ROOT).as_posix())

@@ -2,14 +2,17 @@
 
 from collections.abc import Iterator
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 import fingervision as fv
 from fingervision.domain.errors import ArgumentError, ArgumentTypeError, UnknownNameError
-from fingervision.effects import catalogue, withdraw
+from fingervision.domain.parameter import Estimate
+from fingervision.effects import added_effects, catalogue, withdraw
 from fingervision.plugins.faults import PluginNameError
+from fingervision.storage.model_toml import write_model
 
 
 @pytest.fixture(autouse=True)
@@ -126,3 +129,30 @@ def test_looks_up_by_name_with_the_nearest() -> None:
     with pytest.raises(KeyError):
         fv.effects["backlahs"]
     assert replace(fv.effects["backlash"], order=1).order == 1
+
+
+def test_a_corrected_model_says_where_an_effect_of_ones_own_came_from(tmp_path: Path) -> None:
+    """Without the effect the file cannot be read, and the sentence says what it needs."""
+    mine = tmp_path / "mine.py"
+    mine.write_text(
+        "import fingervision as fv\n\n\n"
+        "@fv.effect('mechanism', fv.Parameter('height_mm', 'mm', -0.2, 0.2, 'height'))\n"
+        "def mid_bump(points, history, values):\n"
+        '    """The gap bulges."""\n'
+        "    return points.with_gap(points.gap_mm + values['height_mm'])\n"
+    )
+    (tmp_path / "simulation.csv").write_text("input_mm,gap_mm\n0,1\n1,2\n")
+    out = tmp_path / "model.toml"
+    with added_effects((mine,)):
+        write_model(out, tmp_path / "simulation.csv", {"mid_bump": {"height_mm": Estimate(0.01, 0.001)}})
+        assert fv.read_model(out).effects["mid_bump"]["height_mm"].value == 0.01
+    assert "mid_bump" not in catalogue()
+    with pytest.raises(fv.DataError, match=r"--effects .*mine\.py"):
+        fv.read_model(out)
+    bump()
+    write_model(out, tmp_path / "simulation.csv", {"mid_bump": {"height_mm": Estimate(0.01, 0.001)}})
+    withdraw("mid_bump")
+    with pytest.raises(fv.DataError, match="@fingervision"):
+        fv.read_model(out)
+    write_model(out, tmp_path / "simulation.csv", {"backlash": {"play_mm": Estimate(0.01, 0.001)}})
+    assert "from =" not in out.read_text()

@@ -1,6 +1,7 @@
 """An RTSP camera on loopback, for the system's Python, which has GStreamer's bindings.
 
-Arguments: PORT, a pattern of JPEGs, their count, the coder (jpeg or h264), and the share of packets that get lost.
+Arguments: PORT, a pattern of JPEGs, their count, the coder (jpeg, h264, or frames: H.264 that loses whole pictures
+before they are put into packets), and the share of packets that get lost.
 """
 
 import sys
@@ -15,14 +16,17 @@ PORT, PICTURES, COUNT, CODER, LOST = sys.argv[1:]
 # RTP's payload for JPEG knows no grey pictures: colour at half resolution it is.
 CODED = {
     "jpeg": "jpegenc quality=95 ! rtpjpegpay pt=26",
+    "frames": f"openh264enc gop-size=12 bitrate=4000000 ! h264parse ! identity drop-probability={LOST} "
+    "! rtph264pay pt=96 config-interval=-1",
     "h264": "openh264enc gop-size=12 bitrate=4000000 ! h264parse ! rtph264pay pt=96 config-interval=-1",
 }
 WHOLE = {name: f"{coded} name=pay0" for name, coded in CODED.items()}
 # What stands behind the payloader loses packets as a network does: their sequence numbers are missing.
 NETWORK = f"{CODED[CODER]} ! identity name=pay0 drop-probability={LOST}"
+PAYLOAD = NETWORK if float(LOST) and CODER != "frames" else WHOLE[CODER]
 PIPELINE = (
     f'( multifilesrc location="{PICTURES}" stop-index={int(COUNT) - 1} loop=true caps="image/jpeg,framerate=25/1" '
-    f"! jpegdec ! videoconvert ! video/x-raw,format=I420 ! {NETWORK if float(LOST) else WHOLE[CODER]} )"
+    f"! jpegdec ! videoconvert ! video/x-raw,format=I420 ! {PAYLOAD} )"
 )
 
 Gst.init(None)

@@ -104,6 +104,21 @@ def test_one_damaged_jpeg_of_a_stream_without_times_costs_one_frame(tmp_path: Pa
     assert [item.index for item in items if isinstance(item, LostFrame)] == [19]  # the first is used up by probing
 
 
+def test_times_behind_a_lost_header_stay(tmp_path: Path, film: list[np.ndarray]) -> None:
+    # A picture without its header has no time; the host's is of another clock.
+    stream = tmp_path / "clip.ts"
+    begins = coded(stream, film, "h264")
+    whole_s = {item.time_s for item in items_of(stream)}
+    content = bytearray(stream.read_bytes())
+    del content[begins[20] : begins[20] + 188]
+    stream.write_bytes(content)
+    items = items_of(stream)
+    assert {item.time_s for item in items if isinstance(item, Frame)} <= whole_s
+    times_s = [item.time_s for item in items if item.time_s is not None]
+    assert times_s == sorted(times_s)
+    assert times_s[-1] - times_s[0] < COUNT / RATE_HZ
+
+
 def items_of(stream: Path) -> list[Frame | LostFrame]:
     items: list[Frame | LostFrame] = []
     with pytest.raises(FingervisionError, match="cut off"):

@@ -5,12 +5,16 @@ import subprocess
 import time
 from collections.abc import Callable, Iterator
 from contextlib import suppress
-from itertools import pairwise
+from itertools import islice, pairwise
 from pathlib import Path
 from typing import Any
 
+import cv2
+import numpy as np
 import pytest
 
+from fingervision.domain.frame import Frame, LostFrame
+from fingervision.frames.network_stream import NetworkStream
 from tests.live.conftest import CYCLE, START_S, free_port, single_pictures
 
 SCALE = ("--px-per-mm", "34")
@@ -87,6 +91,23 @@ def test_an_rtsp_camera_keeps_its_clock_and_comes_back_after_a_cut(
     (run,) = view.runs()
     assert len(rows(run / "gaps.csv")) == len(lines)
     assert measured(run / "video.mp4", *SCALE) == (run / "gaps.csv").read_text()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("rtsp_camera", [("frames", 0.05)], indirect=True, ids=["frames"])
+def test_a_picture_that_the_camera_never_sent_makes_no_wrong_one(rtsp_camera: RtspCamera, pictures: Path) -> None:
+    # No sequence number is missing and no packet is incomplete: the numbers of the pictures alone tell.
+    drawn = [cv2.imdecode(np.frombuffer(one, np.uint8), cv2.IMREAD_GRAYSCALE) for one in single_pictures(pictures)]
+    items = list(islice(NetworkStream(rtsp_camera.address), 150))
+    assert any(isinstance(item, LostFrame) for item in items)
+    # Fingers move by ten pixels and more from picture to picture: what hangs on another one shows both.
+    rough = [
+        min(float(np.abs(item.pixels - one.astype(float)).max()) for one in drawn)
+        for item in items
+        if isinstance(item, Frame)
+    ]
+    assert len(rough) > 20
+    assert max(rough) < 40.0
 
 
 def has_lost(lines: list[dict[str, Any]]) -> bool:

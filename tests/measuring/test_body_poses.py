@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from calib.calibration import BareScale
 from fingervision.domain.body_poses import COVERED, DAMAGED, OK
 from fingervision.domain.errors import FingervisionError, UsageError
 from fingervision.domain.frame import Frame, LostFrame
@@ -54,7 +55,7 @@ def test_bodies_are_followed_through_deformed_pictures(plate: MechanismPlate, tm
     cover = Patch((polygon(((20.0, 300.0), (150.0, 300.0), (150.0, 480.0), (20.0, 480.0))),), 120.0)
     frames: list[Frame | LostFrame] = [frame(plate, u, k) for k, u in enumerate(inputs)]
     frames += [frame(plate, 0.9, 3, cover=(cover,)), LostFrame(4, 0.4, Status.DAMAGED, "cut off")]
-    tracker = BodyTracker(plate.mechanism, SCALE)
+    tracker = BodyTracker(plate.mechanism, BareScale(SCALE))
     seen = list(tracker.poses(frames))
     first = seen[0].poses
     for found, u in zip(seen[1:3], inputs[1:], strict=True):
@@ -67,7 +68,7 @@ def test_bodies_are_followed_through_deformed_pictures(plate: MechanismPlate, tm
             assert np.all(np.abs(moved - (pose.x_mm, pose.y_mm, pose.angle_mrad)) < 5.0 * sigma + [1e-3, 1e-3, 0.02])
         turned = found.poses["hinge 1"].angle_mrad - first["hinge 1"].angle_mrad
         assert turned == pytest.approx(-1e3 * u / 17.0, rel=0.02)
-    assert np.sqrt(first["finger"].covariance[2, 2]) < 0.05
+    assert np.sqrt(first["finger"].random[2, 2]) < 0.05
     assert seen[3].poses["shuttle"].status == COVERED
     assert seen[3].poses["hinge 2"].status == COVERED
     assert seen[3].poses["finger"].status == OK
@@ -99,7 +100,7 @@ def test_a_mirrored_picture_is_told_from_the_front(plate: MechanismPlate) -> Non
 def test_points_lay_the_drawing_where_half_of_it_is_out_of_view(plate: MechanismPlate) -> None:
     low = Placement(SCALE, np.array([24.3, 400.0]), 0.0, False)
     pictures = [frame(plate, u, k, low) for k, u in enumerate((0.0, 0.5))]
-    tracker = BodyTracker(plate.mechanism, SCALE, points(low, (31, 5), (39, 5), (10, 60)))
+    tracker = BodyTracker(plate.mechanism, BareScale(SCALE), points(low, (31, 5), (39, 5), (10, 60)))
     seen = list(tracker.poses(pictures))
     moved = seen[1].poses["finger"].angle_mrad - seen[0].poses["finger"].angle_mrad
     assert moved == pytest.approx(plate.state(0.5).bodies["finger"].angle_mrad, abs=0.3)
@@ -114,7 +115,7 @@ def test_a_drawing_that_is_not_in_the_picture_is_refused(plate: MechanismPlate) 
     with pytest.raises(FingervisionError, match="common"):
         by_silhouette(grey, plate.mechanism, 2.5)
     wrong = points(Placement(SCALE, np.array([90.0, 380.0]), 0.3, False), (31, 5), (39, 5), (10, 60))
-    tracker, pictures = BodyTracker(plate.mechanism, SCALE, wrong), [frame(plate, 0.0, 1)]
+    tracker, pictures = BodyTracker(plate.mechanism, BareScale(SCALE), wrong), [frame(plate, 0.0, 1)]
     with pytest.raises(FingervisionError, match="edges"):
         list(tracker.poses(pictures))
 

@@ -9,9 +9,19 @@ import numpy as np
 import pytest
 
 from fingervision.domain.effect import DriveEffect, Effect
+from fingervision.domain.parameter import Parameter
 from fingervision.effects import REGISTRY, catalogue, register
 from fingervision.testbed.bed import Bed
-from fingervision.testing import ActuatorContract, EffectContract, ModelContract, bed_at, checks_of, diagnosed, run
+from fingervision.testing import (
+    ActuatorContract,
+    EffectContract,
+    HiddenEffectContract,
+    ModelContract,
+    bed_at,
+    checks_of,
+    diagnosed,
+    run,
+)
 from tests.plugins.installed import effect_source
 from tests.plugins.test_devices_from_elsewhere import SPRING, STAGE
 from tests.plugins.test_devices_from_elsewhere import bed_at as bed_file
@@ -109,6 +119,30 @@ def test_the_diagnosis_names_an_effect_of_ones_own(tmp_path: Path) -> None:
         found = named.parameters["bend_per_mm2"]
         assert found.u is not None
         assert abs(found.value - 0.03) < 4.0 * found.u
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("starts", [1, 12])
+def test_a_period_with_one_start_is_found_out(starts: int) -> None:
+    """A wave over the input: with one start its period is never found, and another effect is named instead."""
+
+    def act(input_mm, history, values):
+        return input_mm + values["height_mm"] * np.sin(2.0 * np.pi * input_mm / values["period_mm"]) ** 3
+
+    effect = DriveEffect(
+        name="cubed_wave", stage="drive", order=36, words="the stage errs in cubed waves", formula="made up",
+        source="made up", residual="waves over the input", act=act,
+        parameters=(
+            Parameter("height_mm", "mm", 0.0, 0.05, "height of the waves"),
+            Parameter("period_mm", "mm", 0.1, 2.0, "period", neutral=None, starts=starts, reciprocal=True),
+        ),
+    )  # fmt: skip
+    failed = run(HiddenEffectContract, effect=effect)
+    assert "cubed_wave" not in catalogue()
+    if starts == 1:
+        assert "period_mm more starts" in failed["test_the_diagnosis_finds_it_again"]
+    else:
+        assert failed == {}
 
 
 @pytest.mark.slow

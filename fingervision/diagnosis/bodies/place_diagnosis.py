@@ -20,7 +20,7 @@ from fingervision.diagnosis.bodies.place_search import Fitted
 from fingervision.diagnosis.bodies.place_words import body_places, set_words
 from fingervision.diagnosis.inference.verdict import STANDING_SHARE
 from fingervision.domain.effect import DriveEffect, split_key
-from fingervision.domain.errors import FingervisionError
+from fingervision.domain.errors import DataError
 from fingervision.domain.measured_table import MeasuredTable
 from fingervision.domain.parameter import Estimate
 from fingervision.domain.report import DiagnosisReport, Disagreement, NamedEffect, Verdict
@@ -53,7 +53,7 @@ def without_places(table: MeasuredTable, model: CorrectedModel) -> tuple[Measure
     answers = drawing_of(model)
     added = None if answers is None else added_everywhere(answers, table.input_mm, placed)
     if answers is None or added is None:
-        raise FingervisionError(
+        raise DataError(
             f"The effects of the model must have places that {model.base_path} draws, but {' and '.join(placed)} "
             "have not: diagnose again, or leave them out."
         )
@@ -255,7 +255,7 @@ def _composed(
 
 def _named(best: Fitted) -> NamedEffect:
     candidate = best.candidate
-    estimates = {candidate.parameter.name: Estimate(best.size, best.u, candidate.parameter.unit)}
+    estimates = {candidate.parameter.name: Estimate(best.size, best.u_stated, candidate.parameter.unit)}
     for parameter in catalogue()[candidate.name].parameters:
         estimates.setdefault(parameter.name, Estimate(parameter.neutral or 0.0, None, parameter.unit))
     shown = {p.name: p.words for p in (*catalogue()[candidate.name].parameters, candidate.parameter)}

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from math import hypot
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,6 +38,10 @@ STRUCTURE = 1e-3
 """Significance beyond which what an explanation leaves is structure and no noise."""
 STRUCTURE_SHARE = 0.05
 """Of what was explained: less structure than this is the form of the explanation (`STANDING_SHARE` of the gap)."""
+FORM_ERROR = 0.02
+"""Relative standard uncertainty of a size by the form of its explanation: condensed bodies and lumped flexures beside
+finite elements of the changed outline, where plays are told up to 4 % and lengths up to 3 % wrong, RMS 2 and 1 %
+(`python -m tests.benchmarks.which_hinge` prints the coverage)."""
 PLAYS_MM = np.geomspace(0.002, 0.5, 25)
 STEPS = 4
 
@@ -50,7 +55,7 @@ class Fitted:
     candidate : Candidate
         What it is.
     size, u : float
-        Its parameter with its standard uncertainty.
+        Its parameter with its standard uncertainty by the noise and by what nobody knows.
     gain : float
         Fall of chi-square.
     signature : ndarray of float
@@ -62,6 +67,11 @@ class Fitted:
     u: float
     gain: float
     signature: Array
+
+    @property
+    def u_stated(self) -> float:
+        """Standard uncertainty of the size with that of the explanation's form."""
+        return hypot(self.u, FORM_ERROR * self.size)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -20,7 +20,7 @@ MOST = 6
 
 def fitted_words(fitted: Fitted) -> str:
     """Say what differs where: `right hinge 2: 14 +- 3 % too soft`."""
-    candidate, size, u = fitted.candidate, fitted.size, COVER * fitted.u
+    candidate, size, u = fitted.candidate, fitted.size, COVER * fitted.u_stated
     where = candidate.place or candidate.name
     if candidate.parameter.name == "play_mm":
         return f"{where}: {1e3 * size:.3g} +- {1e3 * u:.2g} um of play"

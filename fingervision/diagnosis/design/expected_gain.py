@@ -6,7 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from fingervision.diagnosis.design.augmented_dataset import REFITTED, AugmentedDataset
-from fingervision.diagnosis.inference.hypothesis_fit import Explanation, Point, Problem, fit
+from fingervision.diagnosis.inference.hypothesis import Explanation, Point, Problem
+from fingervision.diagnosis.inference.hypothesis_fit import fit
 from fingervision.diagnosis.input.observations import Observations
 from fingervision.diagnosis.noise.noise_posterior import problems_of_drawn_noise
 from fingervision.domain.effect import Array

@@ -18,7 +18,8 @@ from fingervision.diagnosis.design.protocols import (
 )
 from fingervision.diagnosis.design.static_checks import WORTH
 from fingervision.diagnosis.inference.ambiguity_set import surprise
-from fingervision.diagnosis.inference.hypothesis_fit import Explanation, Problem, fit
+from fingervision.diagnosis.inference.hypothesis import Explanation, Problem
+from fingervision.diagnosis.inference.hypothesis_fit import fit
 from fingervision.diagnosis.input.observations import Observations
 from fingervision.domain.effect import Array
 

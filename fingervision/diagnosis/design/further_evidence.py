@@ -3,7 +3,7 @@
 Each effect states which checks it shows in and which it stays out of; a check tells two apart where they differ.
 """
 
-from fingervision.diagnosis.inference.hypothesis_fit import Explanation
+from fingervision.diagnosis.inference.hypothesis import Explanation
 from fingervision.domain.further_check import FurtherCheck
 from fingervision.effects import catalogue
 

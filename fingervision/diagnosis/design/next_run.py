@@ -6,7 +6,7 @@ from fingervision.diagnosis.design.expected_gain import MODERATE, ExpectedGain, 
 from fingervision.diagnosis.design.experiment_design import RunChoice, RunPlan, open_set
 from fingervision.diagnosis.design.protocols import REZERO, measured_ends
 from fingervision.diagnosis.design.static_checks import WORTH, static_check
-from fingervision.diagnosis.inference.hypothesis_fit import Explanation, Point, Problem
+from fingervision.diagnosis.inference.hypothesis import Explanation, Point, Problem
 from fingervision.diagnosis.inference.posterior import draws
 from fingervision.diagnosis.input.observations import Observations
 from fingervision.domain.report import NextRun

@@ -3,7 +3,7 @@
 import numpy as np
 
 from fingervision.diagnosis.design.protocols import REZERO, Step, measured_ends, protocols
-from fingervision.diagnosis.inference.hypothesis_fit import Explanation, Problem
+from fingervision.diagnosis.inference.hypothesis import Explanation, Problem
 from fingervision.diagnosis.input.observations import Observations
 from fingervision.domain.effect import PointEffect
 from fingervision.domain.further_check import FurtherCheck

@@ -4,7 +4,8 @@ from math import comb
 
 import numpy as np
 
-from fingervision.diagnosis.inference.hypothesis_fit import MANY_STEPS, SMALL_SHARE, Explanation, Problem, fit
+from fingervision.diagnosis.inference.hypothesis import SMALL_SHARE, Explanation, Problem
+from fingervision.diagnosis.inference.hypothesis_fit import MANY_STEPS, fit
 from fingervision.diagnosis.inference.null_bootstrap import noise_doubt
 
 INDISTINGUISHABLE = 12.0

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from fingervision.diagnosis.inference.hypothesis_fit import Explanation, Problem
+from fingervision.diagnosis.inference.hypothesis import Explanation, Problem
 from fingervision.diagnosis.inference.signatures import Signatures
 
 SEEN_SIGMAS = 1.645

@@ -4,10 +4,12 @@ from collections.abc import Callable
 
 import numpy as np
 
-from fingervision.diagnosis.inference.hypothesis_fit import FORM_SHARE, Explanation, Problem, fit, scan
+from fingervision.diagnosis.inference.hypothesis import FORM_SHARE, Explanation, Problem
+from fingervision.diagnosis.inference.hypothesis_fit import fit, scan
 from fingervision.diagnosis.inference.null_bootstrap import LONG
 from fingervision.diagnosis.inference.signatures import Signatures, tangents
 from fingervision.diagnosis.input.input_uncertainty import below_the_input
+from fingervision.domain.effect import Array
 
 Progress = Callable[[float], None]
 SCANNED = 6
@@ -17,6 +19,8 @@ LEAST_GAIN = 4.0
 FEW_ROWS = 0.1
 """Share of the rows on which a stop or a contact acts that only the ends of strokes speak for; what acts on more is
 averaged over many roundings."""
+ALIKE = 12.0
+"""Squared whitened distance within which two predictions are one, as in the ambiguity set."""
 STEPS_HIDDEN = 1.0
 """Steps of the encoder within which an effect is not told from its roundings."""
 SWAPS_REFITTED = 24
@@ -76,7 +80,7 @@ def extended(
 
 
 def swapped(problem: Problem, atoms: Signatures, pairs: list[Explanation]) -> list[Explanation]:
-    """Try every other effect beside each half of the best pair, where the pair has put it.
+    """Try every other effect in the place of each of the best explanation's, the others where they were put.
 
     Alone it had stood elsewhere: fitted to what two effects do, it ends far out in a valley out of which no joint
     search finds its way.
@@ -84,12 +88,27 @@ def swapped(problem: Problem, atoms: Signatures, pairs: list[Explanation]) -> li
     if not pairs:
         return pairs
     best = pairs[0]
-    halves = [fit(problem, (name,), {name: best.values[name]}, iterations=0) for name in best.names]
+    rests = [{name: best.values[name] for name in best.names if name != dropped} for dropped in best.names]
+    halves = [fit(problem, tuple(rest), rest, iterations=0) for rest in rests]
     found = {pair.names: pair for pair in pairs}
     for pair in extended(problem, atoms, halves, SWAPS_REFITTED, lambda _: None):
         if pair.names not in found or pair.score < found[pair.names].score:
             found[pair.names] = pair
     return sorted(found.values(), key=lambda explanation: explanation.score)
+
+
+def different(problem: Problem, explanations: list[Explanation], most: int) -> list[Explanation]:
+    """Keep the best of those that predict the same: an offset of the input, of the gap and of an edge often do."""
+    found, predicted = list[Explanation](), list[Array]()
+    for explanation in explanations:
+        curve = problem.whitened(explanation.values)
+        metric = problem.offsets.metric(explanation.sigma_mm)
+        if all(problem.offsets.squared(curve - other, metric) > ALIKE for other in predicted):
+            found.append(explanation)
+            predicted.append(curve)
+        if len(found) == most:
+            break
+    return found
 
 
 def added_share(problem: Problem, smaller: Explanation, larger: Explanation) -> float:

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fingervision.diagnosis.inference.hypothesis_fit import Explanation, Problem
+from fingervision.diagnosis.inference.hypothesis import Explanation, Problem
 from fingervision.domain.effect import Array
 from fingervision.effects import catalogue
 

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from fingervision.diagnosis.inference.hypothesis_fit import Explanation, Problem
+from fingervision.diagnosis.inference.hypothesis import Explanation, Problem
 from fingervision.diagnosis.inference.position_map import NAME, PositionMap, map_columns
 from fingervision.diagnosis.inference.signatures import signatures
 from fingervision.domain.effect import Array, Flags

@@ -6,7 +6,9 @@ import numpy as np
 
 from fingervision.diagnosis.inference.ambiguity_set import choices
 from fingervision.diagnosis.inference.harmonics import harmonics
-from fingervision.diagnosis.inference.hypothesis_fit import MANY_STEPS, SMALL_SHARE, Explanation, Problem, fit
+from fingervision.diagnosis.inference.hypothesis import SMALL_SHARE, Explanation, Problem
+from fingervision.diagnosis.inference.hypothesis_fit import MANY_STEPS, fit
+from fingervision.diagnosis.inference.map_imitators import LINE_SHARE
 from fingervision.diagnosis.inference.null_bootstrap import FEWEST, jumps_astray, linear_thresholds, noise_alone, rare
 from fingervision.diagnosis.inference.probe_basis import Probes, probes
 from fingervision.diagnosis.inference.signatures import tangents
@@ -117,20 +119,46 @@ def imitated(problem: Problem, shapes: Probes, found: Explanation, fewer: list[E
 
 
 def _is_an_effect_itself(problem: Problem, found: Explanation, basis: _Basis) -> Flags:
-    """Mark probes that are the very shape that one of the effects has; shape (k,).
+    """Mark probes that are the very shape that one of the effects has, beside those that are lines; shape (k,).
 
     Of readings at rest a play is nothing but a difference between the directions: such a probe explains nothing else.
+    With an offset beside it a ramp over time is the shape of a warming, and beside a map of position errors every
+    function of the place is a line.
     """
-    whole = problem.whitened(found.values)
-    metric = problem.offsets.metric(found.sigma_mm)
+    metric, design = problem.offsets.metric(found.sigma_mm), problem.offsets.design
     norm = np.maximum(basis.beside_offsets(metric), 1e-12)
-    own = np.zeros(norm.size, dtype=bool)
-    for name in found.names:
-        others = {other: found.values[other] for other in found.names if other != name}
-        shape = whole - problem.whitened(others)
-        moved = shape - problem.offsets.design @ (metric @ (problem.offsets.design.T @ shape))
-        own |= (basis.columns.T @ moved) ** 2 > SAME_SHAPE**2 * norm * float(shape @ moved)
+    shapes = own_shapes(problem, found)
+    lines = np.stack([np.zeros(basis.columns.shape[0]), *(s for s in shapes if is_a_line(problem, s))], axis=1)
+    inverse = np.linalg.pinv(lines.T @ _beside(design, metric, lines))
+    cross = basis.columns.T @ _beside(design, metric, lines)
+    left = norm - np.einsum("ij,ij->i", cross @ inverse, cross)
+    own = left <= (1.0 - SAME_SHAPE**2) * norm
+    for shape in shapes:
+        moved = _beside(design, metric, shape - lines @ (inverse @ (lines.T @ _beside(design, metric, shape))))
+        if float(shape @ moved) > 0.0:
+            own |= (basis.columns.T @ moved) ** 2 > SAME_SHAPE**2 * left * float(shape @ moved)
     return own
+
+
+def _beside(design: Array, metric: Array, columns: Array) -> Array:
+    """Whitened columns with what the runs' offsets and other random effects take of them taken out."""
+    return np.asarray(columns - design @ (metric @ (design.T @ columns)), dtype=np.float64)
+
+
+def own_shapes(problem: Problem, explanation: Explanation) -> list[Array]:
+    """What each effect of an explanation changes in the whitened prediction beside the others; each of shape (m,)."""
+    whole, values = problem.whitened(explanation.values), explanation.values
+    others = [{other: values[other] for other in explanation.names if other != name} for name in explanation.names]
+    return [whole - problem.whitened(rest) for rest in others]
+
+
+def is_a_line(problem: Problem, shape: Array) -> bool:
+    """Whether a whitened shape is a straight line over the input, in every channel."""
+    input_mm = problem.chain.history.input_mm
+    line = np.stack([np.ones_like(input_mm), input_mm - input_mm.mean()], axis=1)
+    lines = problem.whitener.columns(np.kron(np.eye(shape.size // input_mm.size), line))[0]
+    left = shape - lines @ np.linalg.lstsq(lines, shape, rcond=None)[0]
+    return float(left @ left) < LINE_SHARE * float(shape @ shape)
 
 
 def _of_jumps_astray(problem: Problem, columns: Array, best: Explanation, rng: np.random.Generator) -> float:

@@ -6,7 +6,8 @@ from dataclasses import replace
 import numpy as np
 from scipy.signal import lfilter
 
-from fingervision.diagnosis.inference.hypothesis_fit import MANY_STEPS, Explanation, Problem, fit
+from fingervision.diagnosis.inference.hypothesis import Explanation, Problem
+from fingervision.diagnosis.inference.hypothesis_fit import MANY_STEPS, fit
 from fingervision.diagnosis.inference.signatures import Signatures, tangents
 from fingervision.domain.effect import Array
 

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fingervision.diagnosis.inference.hypothesis_fit import Problem
+from fingervision.diagnosis.inference.hypothesis import Problem
 from fingervision.diagnosis.input.observations import Observations
 from fingervision.diagnosis.noise.whitening import RunOffsets
 from fingervision.domain.effect import Array, DriveEffect

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from fingervision.diagnosis.inference.hypothesis_fit import FORM_SHARE, START_VARIANCE, Explanation, Point, Problem
+from fingervision.diagnosis.inference.hypothesis import FORM_SHARE, START_VARIANCE, Explanation, Point, Problem
 from fingervision.diagnosis.inference.null_bootstrap import noise_doubt
 from fingervision.diagnosis.noise.whitening import RunOffsets
 from fingervision.domain.effect import Array

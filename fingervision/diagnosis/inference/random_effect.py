@@ -6,7 +6,7 @@ doi:10.2307/2529876); they are integrated out of the likelihood and estimated af
 
 import numpy as np
 
-from fingervision.diagnosis.inference.hypothesis_fit import Explanation, Problem
+from fingervision.diagnosis.inference.hypothesis import Explanation, Problem
 from fingervision.domain.effect import Array
 
 LEAST_GAIN = 10.0

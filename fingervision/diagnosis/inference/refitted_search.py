@@ -7,7 +7,8 @@ import numpy as np
 from scipy.stats import t as student
 
 from fingervision.diagnosis.inference.explanation_candidates import Progress
-from fingervision.diagnosis.inference.hypothesis_fit import Explanation, Point, Problem, fit
+from fingervision.diagnosis.inference.hypothesis import Explanation, Point, Problem
+from fingervision.diagnosis.inference.hypothesis_fit import fit
 from fingervision.diagnosis.inference.map_imitators import imitating_effects, imitating_parts
 from fingervision.diagnosis.inference.position_map import (
     NAME,
@@ -20,7 +21,7 @@ from fingervision.diagnosis.inference.random_effect import LEAST_GAIN
 from fingervision.diagnosis.inference.reference_gauge import consistent_with_gauges
 from fingervision.diagnosis.inference.run_gains import FEWEST_RUNS, RunGains, likeliest_gains
 from fingervision.diagnosis.inference.search import Findings, search
-from fingervision.diagnosis.inference.verdict import standing_of, without_unneeded_effects
+from fingervision.diagnosis.inference.verdict import standing_of, with_simpler_parts, without_unneeded_effects
 from fingervision.diagnosis.input.intersample_interpolation import likelier_interpolation
 from fingervision.diagnosis.input.observations import Observations
 from fingervision.diagnosis.noise.whitening import RunOffsets
@@ -276,6 +277,7 @@ def _beside_drawing(state: _Searched, look: _Look) -> _Searched:
 def _settled(state: _Searched, rng: np.random.Generator) -> Refitted:
     """Drop effects that are not needed, estimate the map and the gains, and give every parameter its posterior."""
     data, found = state.data, without_unneeded_effects(state.data, state.found)
+    found = with_simpler_parts(data, found)
     best, posterior = settled(found.problem, found.best, rng)
     found = _with_best(found, best)
     if data.position_map is not None:

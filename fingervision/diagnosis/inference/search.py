@@ -11,6 +11,7 @@ from fingervision.diagnosis.inference.explanation_candidates import (
     LEAST_GAIN,
     Progress,
     added_share,
+    different,
     extended,
     likeliest,
     simplest,
@@ -18,7 +19,8 @@ from fingervision.diagnosis.inference.explanation_candidates import (
     swapped,
     within_a_step,
 )
-from fingervision.diagnosis.inference.hypothesis_fit import SMALL_SHARE, Explanation, Problem, fit
+from fingervision.diagnosis.inference.hypothesis import SMALL_SHARE, Explanation, Problem
+from fingervision.diagnosis.inference.hypothesis_fit import fit
 from fingervision.diagnosis.inference.model_adequacy import imitated, remaining_structure, shapes_of
 from fingervision.diagnosis.inference.probe_basis import Probes
 from fingervision.diagnosis.inference.signatures import Signatures, signatures
@@ -34,6 +36,11 @@ third of it, as RMS."""
 COMPLETE = 0.05
 """Share of what stands beyond the noise, in chi-square, that a complete explanation leaves: forms that only bend to
 what an effect's form leaves over take less of it."""
+NOISY = 2.0 * 2.0**0.5
+"""Square roots of the rows by which the chi-square of noise exceeds them now and then: two of its standard deviations,
+sqrt(2 n)."""
+PAIRS_EXTENDED = 6
+"""Pairs of different predictions to which a third effect is added: three of them may be one pair by three names."""
 BASES = 14
 """Single effects to which a second one is added."""
 SHORT = 100
@@ -58,12 +65,15 @@ class Findings:
 def _completes(state: "_State", smaller: Explanation, larger: Explanation) -> bool:
     """Whether the larger explanation takes nearly all that the smaller one left, as a true one does.
 
-    What the smaller one leaves must be plainly more than the noise, and more than its form may be off.
+    What the smaller one leaves must be plainly more than the noise, and more than its form may be off. An effect that
+    joins it bends to what its form leaves over, however much that is; others in its place that leave noise alone do not.
     """
     rows = state.values - int(state.problem.whitener.aside.sum())
     stands = smaller.score - rows
-    plain = max(float(rows), state.problem.form_share**2 * (state.nothing.score - smaller.score))
-    return stands > plain and larger.score - rows < COMPLETE * stands
+    joins = set(smaller.names) <= set(larger.names)
+    share = state.problem.form_share if joins else SMALL_SHARE
+    plain = max(float(rows), share**2 * (state.nothing.score - smaller.score))
+    return stands > plain and larger.score - rows < max(COMPLETE * stands, 0.0 if joins else NOISY * rows**0.5)
 
 
 def search(
@@ -206,7 +216,7 @@ def _three_effects(state: _State, progress: Progress) -> _State:
     if len(state.best.names) != 2:
         return state
     problem, pairs = state.problem, state.pairs
-    tried = extended(problem, state.atoms, pairs[:3], 24, progress)
+    tried = extended(problem, state.atoms, different(problem, pairs, PAIRS_EXTENDED), 24, progress)
     triples = [e for e in tried if not within_a_step(problem, e)]
     state = replace(state, triples=triples)
     if not triples:
@@ -218,7 +228,9 @@ def _three_effects(state: _State, progress: Progress) -> _State:
     if imitation is not None:
         # Where it changes little, what the third effect imitates is left over, and the gate will tell it.
         return replace(state, imitation=imitation) if large else state
-    return replace(state, best=likeliest(triples[:6], state.values), peers=triples)
+    triples.sort(key=lambda e: e.bic(state.values))
+    triples = [e for e in swapped(problem, state.atoms, triples) if not within_a_step(problem, e)]
+    return replace(state, triples=triples, best=likeliest(triples[:6], state.values), peers=triples)
 
 
 def _without_imitations(state: _State) -> _State:

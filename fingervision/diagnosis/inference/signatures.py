@@ -5,7 +5,7 @@ from itertools import product
 
 import numpy as np
 
-from fingervision.diagnosis.inference.hypothesis_fit import Explanation, Problem
+from fingervision.diagnosis.inference.hypothesis import Explanation, Problem
 from fingervision.diagnosis.noise.whitening import RunOffsets
 from fingervision.domain.effect import Array, History, start_key
 

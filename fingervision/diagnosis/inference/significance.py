@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fingervision.diagnosis.inference.hypothesis_fit import Explanation, Problem
+from fingervision.diagnosis.inference.hypothesis import Explanation, Problem
 from fingervision.diagnosis.inference.null_bootstrap import exceeds_noise, jumps_astray, linear_thresholds, price
 from fingervision.diagnosis.inference.signatures import Signatures
 

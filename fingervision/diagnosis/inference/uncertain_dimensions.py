@@ -10,7 +10,7 @@ from types import MappingProxyType
 
 import numpy as np
 
-from fingervision.diagnosis.inference.hypothesis_fit import Explanation, Problem
+from fingervision.diagnosis.inference.hypothesis import Explanation, Problem
 from fingervision.diagnosis.inference.measuring_chain import MeasuringChain
 from fingervision.domain.effect import Array
 from fingervision.domain.model import PhysicalModel

@@ -5,7 +5,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.stats import f as fisher
 
-from fingervision.diagnosis.inference.hypothesis_fit import Explanation, Problem, fit
+from fingervision.diagnosis.inference.hypothesis import Explanation, Problem
+from fingervision.diagnosis.inference.hypothesis_fit import fit
+from fingervision.diagnosis.inference.model_adequacy import is_a_line, own_shapes
 from fingervision.diagnosis.inference.search import Findings
 from fingervision.diagnosis.input.observations import Observations
 from fingervision.diagnosis.input.recorded_input import scatter_in_holds
@@ -23,6 +25,9 @@ TRUSTED = 10.0
 """Times the measurement's own random uncertainty that noise may have: more is structure that looks like noise."""
 NEEDED = 1.1
 """Times that dropping an effect may raise what stands, as RMS; an effect that lowers it by more is seen by eye."""
+AS_MUCH = 2.0**0.5
+"""Times what stands that a straight line may leave for a curve beside unknown structure, as RMS: twice its power, for
+that structure bends the richer form as it does the noise."""
 MANY_ASIDE = 0.1
 """Share of the rows that may be gross errors beside a model that agrees: of more, something is the cause."""
 LACK_OF_FIT = 1e-3
@@ -169,6 +174,44 @@ def without_unneeded_effects(data: Observations, found: Findings) -> Findings:
             break
         found = fewer
     return found
+
+
+def with_simpler_parts(data: Observations, found: Findings) -> Findings:
+    """Beside unknown structure, take a straight line for an effect where it leaves about as much standing.
+
+    The richer form gains by bending to what nothing explains: a warming of two seconds, where an offset and one odd
+    stretch of the record are all that there is.
+    """
+    most_mm = AS_MUCH * standing_of(data, found).after_mm if found.unknown is not None else 0.0
+    while found.unknown is not None:
+        simpler = [e for e in _with_a_line(found) if _stands(data, found, e) <= most_mm]
+        if not simpler:
+            break
+        best = min(simpler, key=lambda e: e.score)
+        found = replace(found, best=best, alternatives=(best,))
+    return found
+
+
+def _with_a_line(found: Findings) -> list[Explanation]:
+    """Explanations with one curved effect of the best exchanged for one that is a straight line over the input."""
+    best, problem = found.best, found.problem
+    curved = [n for n, s in zip(best.names, own_shapes(problem, best), strict=True) if not is_a_line(problem, s)]
+    out = []
+    for name in curved:
+        kept = {other: best.values[other] for other in best.names if other != name}
+        for other in set(problem.effects) - set(best.names):
+            listed = problem.parameters((other,))
+            if len(listed) != 1 or listed[0][1].starts != 1:
+                continue
+            fitted = fit(problem, (*kept, other), {**kept, other: {}}, iterations=20)
+            shapes = dict(zip(fitted.names, own_shapes(problem, fitted), strict=True))
+            if is_a_line(problem, shapes[other]):
+                out.append(fitted)
+    return out
+
+
+def _stands(data: Observations, found: Findings, explanation: Explanation) -> float:
+    return standing_of(data, replace(found, best=explanation, alternatives=(explanation,))).after_mm
 
 
 def _without(found: Findings, name: str) -> Explanation:

@@ -11,7 +11,7 @@ import numpy as np
 
 from fingervision.diagnosis.inference.measuring_chain import MeasuringChain, Settings
 from fingervision.domain.effect import Array, DriveEffect, History
-from fingervision.domain.errors import FingervisionError
+from fingervision.domain.errors import DataError
 from fingervision.domain.measured_table import MeasuredTable
 from fingervision.domain.response import Response
 from fingervision.models.corrected import CorrectedModel
@@ -32,7 +32,7 @@ def at_rest_beside(table: MeasuredTable, model: CorrectedModel) -> tuple[Correct
     if not isinstance(model.base, FunctionModel):
         return model, None
     if table.time_s is None:
-        raise FingervisionError(
+        raise DataError(
             f"{model.base_path} is driven in time, but the measured table has no time_s: add it, or give a table of "
             "the model's answer at rest."
         )

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from fingervision.diagnosis.inference.hypothesis_fit import Problem
+from fingervision.diagnosis.inference.hypothesis import Problem
 
 OF_ROUNDING, OF_NOISE = 0.5, 0.1
 """Shares of it that many samples do not average out: an encoder rounds alike what stands alike, noise is smoothed."""

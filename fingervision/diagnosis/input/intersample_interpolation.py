@@ -2,7 +2,8 @@
 
 from dataclasses import replace
 
-from fingervision.diagnosis.inference.hypothesis_fit import MANY_STEPS, Explanation, Point, Problem, fit
+from fingervision.diagnosis.inference.hypothesis import Explanation, Point, Problem
+from fingervision.diagnosis.inference.hypothesis_fit import MANY_STEPS, fit
 from fingervision.diagnosis.input.observations import Observations
 from fingervision.domain.effect import DriveEffect, Effect, PointEffect
 from fingervision.effects import catalogue

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from fingervision.diagnosis.inference.hypothesis_fit import SMALL_SHARE, Explanation, Problem
+from fingervision.diagnosis.inference.hypothesis import SMALL_SHARE, Explanation, Problem
 from fingervision.diagnosis.inference.measuring_chain import MeasuringChain
 from fingervision.diagnosis.inference.position_map import PositionMap
 from fingervision.diagnosis.inference.run_gains import RunGains

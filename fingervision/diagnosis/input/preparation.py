@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fingervision.diagnosis.inference.measuring_chain import MeasuringChain, admissible
 from fingervision.diagnosis.inference.signatures import start_patterns
@@ -16,11 +17,15 @@ from fingervision.diagnosis.input.recorded_input import AT_REST_SHARE, RecordedI
 from fingervision.diagnosis.input.row_screening import screened_rows
 from fingervision.diagnosis.noise.replicates import visits
 from fingervision.domain.effect import REZEROED, Array, History
-from fingervision.domain.errors import FingervisionError
+from fingervision.domain.errors import DataError
 from fingervision.domain.measured_table import MeasuredTable
 from fingervision.domain.model import PhysicalModel
 from fingervision.domain.response import Response
 from fingervision.models.corrected import CorrectedModel
+
+UNIT_SHARES = (0.1, 3.0)
+"""An input that covers such a share of the model's range once its unit is changed was given in that unit: runs cover a
+tenth of the range at least, and within one unit none covers three hundred times of it."""
 
 
 def prepare(table: MeasuredTable, model: CorrectedModel, without: frozenset[str] = frozenset()) -> Observations:
@@ -28,82 +33,24 @@ def prepare(table: MeasuredTable, model: CorrectedModel, without: frozenset[str]
 
     Raises
     ------
-    FingervisionError
+    DataError
         The model does not cover the inputs, or the inputs are in another unit.
     """
     model, function = at_rest_beside(table, model)
-    low, high = model.input_range_mm
-    u = table.input_mm
-    ratio = float(np.ptp(u)) / (high - low)
-    for factor, unit in ((1e3, "micrometres"), (1e-3, "metres")):
-        if 0.1 < ratio / factor < 3.0:
-            raise FingervisionError(
-                f"input_mm must be in millimetres within the model's {low:g} to {high:g}, but runs from {u.min():g} to "
-                f"{u.max():g}, as if in {unit}: convert the column."
-            )
-    slack = 1e-9 * (high - low)
-    if u.min() < low - slack or u.max() > high + slack:
-        raise FingervisionError(
-            f"input_mm must lie within the model's {low:g} to {high:g} mm, but runs from {u.min():g} to {u.max():g}: "
-            "simulate the missing inputs, or leave those rows out."
-        )
-    notes = list(table.notes)
+    _refuse_other_inputs(table.input_mm, model.input_range_mm)
     recorded = RecordedInput.of(table, model)
-    if table.midline_mm is None:
-        notes.append("only the gap was measured: what moves both fingers together cannot show.")
-    if recorded.is_motion:
-        notes.append("the input's unrest shows in the gap as well: it is real motion and was not smoothed.")
-    zero = model.base.respond(np.zeros(1)).gap_mm[0]
-    opening = model.base.respond(u).gap_mm - zero
-    bare_force = model.base.respond(np.zeros(1)).force_n
-    history = History(
-        input_mm=recorded.smooth_mm,
-        time_s=table.time_s,
-        runs=table.runs,
-        rest_gap_mm=float(zero),
-        opening_mm=float(np.max(np.abs(opening))),
-        closing_mm=float(max(0.0, -np.min(opening))),
-        shared_clock=table.shared_clock,
-        input_sigma_mm=recorded.sigma_mm,
-        input_step_mm=recorded.step_mm,
-        both_edges=table.midline_mm is not None,
-        force=table.force_n is not None and bare_force is not None,
-        rezeroed=_rezeroed(table),
-        dwell_s=dwell_s(table),
-        commanded=recorded.commanded,
-    )
+    history = _history(table, model, recorded)
     path = input_path(table, history, recorded.along_mm, commanded=recorded.commanded)
     fixed = {name: {key: e.value for key, e in values.items()} for name, values in model.effects.items()}
     chain = MeasuringChain(model.base, history, fixed, path=path)
     if function is not None:
         chain = with_dynamics(chain, function, {})
-    stacked = table.gap_mm
-    if table.midline_mm is not None:
-        bare: Response = chain.respond({})
-        stands_mm = float(np.median(table.midline_mm - bare.midline_mm))
-        seen_mm = float(np.median(bare.midline_mm)) + stands_mm
-        chain = replace(chain, midline_mm=stands_mm, seen_midline_mm=seen_mm)
-        stacked = np.concatenate([table.gap_mm, table.midline_mm])
-    if history.force and table.force_n is not None:
-        stacked = np.concatenate([stacked, table.force_n])
-    chain = _with_starts(chain, stacked)
+    chain, stacked = _seen(table, chain)
     able, excluded = admissible(chain.effects, history, without)
-    distrusted, reasons = screened_rows(table, model.base, float(zero))
-    notes += reasons
+    distrusted, screened = screened_rows(table, model.base, history.rest_gap_mm)
     refit = DrawingRefit(np.zeros((stacked.size, 0)), {})
     if isinstance(model.base, PhysicalModel) and model.base.uncertain:
         refit = tangent(chain, model.base, {})
-    repeats = None
-    if np.mean(readings_at_rest(table)) > AT_REST_SHARE:
-        rows = np.arange(u.size) if table.path is None else table.path.rows
-        along_mm, _, along_runs = recorded_rows(table)
-        repeats = visits(along_mm, along_runs, rows)
-    if table.u_clock_s > 0.0:
-        notes.append(
-            "the clocks of input and pictures were laid on each other by this motion itself "
-            f"(U = {2.0 * table.u_clock_s:.2g} s, k = 2): a lag that is the same at all times is part of that offset, "
-            "and one is named only beyond its uncertainty."
-        )
     return Observations(
         table,
         model,
@@ -113,11 +60,94 @@ def prepare(table: MeasuredTable, model: CorrectedModel, without: frozenset[str]
         able,
         excluded,
         distrusted,
-        tuple(notes),
+        (*table.notes, *_notes_on_input(table, recorded), *screened, *_notes_on_clock(table)),
         refit,
-        repeats,
+        _visits(table),
         clock=clock_columns(chain, table.u_clock_s),
         function=function,
+    )
+
+
+def _refuse_other_inputs(input_mm: Array, range_mm: tuple[float, float]) -> None:
+    """Refuse inputs in another unit, or outside what the model covers."""
+    (low, high), span = range_mm, float(np.ptp(input_mm))
+    for factor, unit in ((1e3, "micrometres"), (1e-3, "metres")):
+        if UNIT_SHARES[0] < span / (high - low) / factor < UNIT_SHARES[1]:
+            raise DataError(
+                f"input_mm must be in millimetres within the model's {low:g} to {high:g}, but runs from "
+                f"{input_mm.min():g} to {input_mm.max():g}, as if in {unit}: convert the column."
+            )
+    slack = 1e-9 * (high - low)
+    if input_mm.min() < low - slack or input_mm.max() > high + slack:
+        raise DataError(
+            f"input_mm must lie within the model's {low:g} to {high:g} mm, but runs from {input_mm.min():g} to "
+            f"{input_mm.max():g}: simulate the missing inputs, or leave those rows out."
+        )
+
+
+def _history(table: MeasuredTable, model: CorrectedModel, recorded: RecordedInput) -> History:
+    """State what the effects may know of the runs."""
+    rest = model.base.respond(np.zeros(1))
+    zero_mm = float(rest.gap_mm[0])
+    opening_mm = model.base.respond(table.input_mm).gap_mm - zero_mm
+    return History(
+        input_mm=recorded.smooth_mm,
+        time_s=table.time_s,
+        runs=table.runs,
+        rest_gap_mm=zero_mm,
+        opening_mm=float(np.max(np.abs(opening_mm))),
+        closing_mm=float(max(0.0, -np.min(opening_mm))),
+        shared_clock=table.shared_clock,
+        input_sigma_mm=recorded.sigma_mm,
+        input_step_mm=recorded.step_mm,
+        both_edges=table.midline_mm is not None,
+        force=table.force_n is not None and rest.force_n is not None,
+        rezeroed=_rezeroed(table),
+        dwell_s=dwell_s(table),
+        commanded=recorded.commanded,
+    )
+
+
+def _seen(table: MeasuredTable, chain: MeasuringChain) -> tuple[MeasuringChain, Array]:
+    """Put the chain where the camera sees the fingers, and stack what was measured: gap, midline, force."""
+    stacked = [table.gap_mm]
+    if table.midline_mm is not None:
+        bare: Response = chain.respond({})
+        stands_mm = float(np.median(table.midline_mm - bare.midline_mm))
+        seen_mm = float(np.median(bare.midline_mm)) + stands_mm
+        chain = replace(chain, midline_mm=stands_mm, seen_midline_mm=seen_mm)
+        stacked.append(table.midline_mm)
+    if chain.history.force and table.force_n is not None:
+        stacked.append(table.force_n)
+    measured = np.concatenate(stacked)
+    return _with_starts(chain, measured), measured
+
+
+def _visits(table: MeasuredTable) -> NDArray[np.intp] | None:
+    """Number the visits of the same places where most readings were taken at rest."""
+    if np.mean(readings_at_rest(table)) <= AT_REST_SHARE:
+        return None
+    rows = np.arange(table.input_mm.size) if table.path is None else table.path.rows
+    along_mm, _, along_runs = recorded_rows(table)
+    return visits(along_mm, along_runs, rows)
+
+
+def _notes_on_input(table: MeasuredTable, recorded: RecordedInput) -> tuple[str, ...]:
+    notes = []
+    if table.midline_mm is None:
+        notes.append("only the gap was measured: what moves both fingers together cannot show.")
+    if recorded.is_motion:
+        notes.append("the input's unrest shows in the gap as well: it is real motion and was not smoothed.")
+    return tuple(notes)
+
+
+def _notes_on_clock(table: MeasuredTable) -> tuple[str, ...]:
+    if table.u_clock_s <= 0.0:
+        return ()
+    return (
+        "the clocks of input and pictures were laid on each other by this motion itself "
+        f"(U = {2.0 * table.u_clock_s:.2g} s, k = 2): a lag that is the same at all times is part of that offset, "
+        "and one is named only beyond its uncertainty.",
     )
 
 

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from fingervision.diagnosis.inference.hypothesis_fit import Explanation, Problem
+from fingervision.diagnosis.inference.hypothesis import Explanation, Problem
 from fingervision.diagnosis.inference.null_bootstrap import noise_doubt
 from fingervision.diagnosis.input.observations import Observations
 from fingervision.diagnosis.noise.channel_noises import SHORT_RUN

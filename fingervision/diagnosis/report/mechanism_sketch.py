@@ -42,6 +42,9 @@ def sketch_html(evidence: BodyEvidence, answers: PlaceAnswers) -> str:
     size = float(np.hypot(*(high - low)))
     reach = {body.name: float(np.hypot(*(corners[body.name] - body.centroid_mm[:, None])).max()) for body in bodies}
     off = {body.name: _differences(body.name, evidence, parts) for body in bodies}
+    measured = [body.name for body in bodies if any(f"{body.name}.{part}" in evidence.names for part in PARTS)]
+    partly = [name for name in measured if any(f"{name}.{part}" not in evidence.names for part in PARTS)]
+    unseen = [body.name for body in bodies if not body.is_fixed and body.name not in measured]
     largest = max(
         (float(np.hypot(*rows[:2])) + 1e-3 * abs(float(rows[2])) * reach[name]
          for name, (means, _) in off.items() for rows in means), default=0.0,
@@ -58,8 +61,9 @@ def sketch_html(evidence: BodyEvidence, answers: PlaceAnswers) -> str:
             own = [slopes[k] * at if k >= 0 else 0.0 for k in places[3 * number : 3 * number + 3]]
             means, sigma = off[body.name]
             seen = [own[k] + magnified * float(means[step][k]) for k in range(3)]
-            shown.append({"predicted": own, "measured": seen, "colour": _colour(float(sigma[step])),
-                          "sigma": round(float(sigma[step]), 1)})  # fmt: skip
+            is_measured = body.name in measured
+            shown.append({"predicted": own, "measured": seen if is_measured else None,
+                          "colour": _colour(float(sigma[step])), "sigma": round(float(sigma[step]), 1)})  # fmt: skip
         frames.append({"input": round(at, 4), "bodies": shown})
     shapes = []
     for kind in ("drawn", "predicted", "measured"):
@@ -76,8 +80,12 @@ def sketch_html(evidence: BodyEvidence, answers: PlaceAnswers) -> str:
     said = (
         f"Grey: as drawn. Dashed: as predicted, to scale. Filled: as measured, its difference from the prediction "
         f"magnified {magnified:.3g} times. Colour: how far a body's mean is off, up to 3 standard deviations grey, up "
-        "to 6 yellow, beyond red."
+        "to 6 yellow, beyond red. Bodies that are held are not measured."
     )
+    if unseen:
+        said += f" Not measured: {', '.join(unseen)}."
+    if partly:
+        said += f" Measured in part, the rest as predicted: {', '.join(partly)}."
     return (
         f"<style>{_STYLE}</style>"
         f'<svg id="mechanism" viewBox="{box}" role="img" aria-label="The mechanism as predicted and as measured">'
@@ -134,6 +142,8 @@ _SCRIPT = """
     frame.bodies.forEach((body, k) => {
       place(document.getElementById(`predicted-${k}`), body.predicted, data.centres[k]);
       const shape = document.getElementById(`measured-${k}`);
+      shape.style.display = body.measured ? "" : "none";
+      if (!body.measured) return;
       place(shape, body.measured, data.centres[k]);
       shape.style.fill = shape.style.stroke = body.colour;
       if (body.sigma > 3) off.push(`${data.names[k]} ${body.sigma} \\u03c3`);

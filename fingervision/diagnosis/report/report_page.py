@@ -7,7 +7,7 @@ from html import escape
 import numpy as np
 
 from fingervision.diagnosis.bodies.body_evidence import drawing_of
-from fingervision.diagnosis.diagnose import Diagnosis, by_channel
+from fingervision.diagnosis.diagnose import Diagnosis
 from fingervision.diagnosis.report.chart_data import charts_of
 from fingervision.diagnosis.report.effect_figure import effect_figure
 from fingervision.diagnosis.report.gap_curves import GapCurves, gap_curves
@@ -24,6 +24,7 @@ from fingervision.diagnosis.report.html_parts import (
 from fingervision.diagnosis.report.mechanism_sketch import sketch_html
 from fingervision.diagnosis.report.positioning_of_data import positioning_html
 from fingervision.diagnosis.report.report_parts import added_sections
+from fingervision.diagnosis.report.residual_channels import by_channel
 from fingervision.diagnosis.report.residual_figure import residual_figure
 from fingervision.diagnosis.report.vector_figure import png_bytes
 from fingervision.domain.report import DiagnosisReport, Verdict

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from fingervision.diagnosis.inference.hypothesis_fit import Explanation, Problem
+from fingervision.diagnosis.inference.hypothesis import Explanation, Problem
 from fingervision.diagnosis.inference.verdict import Standing
 from fingervision.diagnosis.input.observations import Observations
 from fingervision.domain.effect import Array

@@ -92,7 +92,8 @@ class FollowedCircle:
             return Reading(status, zone=zone, words=words)
         self._known, self._times = found, 1.0
         self._at = (found.x_px, found.y_px, found.radius_px)
-        u_x, u_y, u_radius = (sqrt(float(found.covariance[i, i])) for i in range(3))
+        displaced = _displaced_px(picture, found)
+        u_x, u_y, u_radius = (hypot(sqrt(float(found.covariance[i, i])), displaced) for i in range(3))
         centre, radius = (found.x_px, found.y_px), found.radius_px
         ends = ((centre[0] - radius, centre[1]), (centre[0] + radius, centre[1]))
         quantities = (
@@ -115,7 +116,7 @@ class FollowedCircle:
         half = ceil(at_radius + reach_px(wide) + 2.0)
         levels, origin = picture.part(round(at_x) - half, round(at_y) - half, 2 * half + 1, 2 * half + 1)
         try:
-            found = fit_circle(levels, origin, (at_x, at_y, at_radius), wide, picture.shared_pixels)
+            found = fit_circle(levels, origin, (at_x, at_y, at_radius), wide, picture.edge_shared_pixels)
         except (NoCircleFitError, np.linalg.LinAlgError) as why:
             return GaugeStatus.NOT_FOUND, str(why)
         refused = self._refused(picture, found)
@@ -195,6 +196,14 @@ def _disc(radius: float) -> NDArray[np.float32]:
     y, x = np.mgrid[-half : half + 1, -half : half + 1]
     disc = np.clip(radius + 0.5 - np.hypot(x, y), 0.0, 1.0).astype(np.float32)
     return np.asarray(cv2.GaussianBlur(disc, (0, 0), 0.7), dtype=np.float32)
+
+
+def _displaced_px(picture: Picture, found: Circle) -> float:
+    """What the codec may have done to the centre and radius, where two sides of the outline err each by itself."""
+    half = found.radius_px + reach_px(found.blur_px)
+    # The fit's levels are not kept; an outline of this contrast in the middle of the scale stands for it.
+    inside = 0.5 * (picture.top - found.contrast)
+    return picture.displaced_px((found.x_px, found.y_px), (half, half), inside, found.contrast) / sqrt(2.0)
 
 
 def _u_response(picture: Picture, found: Circle) -> float:

@@ -2,7 +2,8 @@
 
 import numpy as np
 
-from fingervision.inspection.finding import Finding, weighed, without
+from fingervision.domain.status import Status
+from fingervision.inspection.finding import Finding, refusing, weighed, without
 from fingervision.inspection.noise_bound import GOOD_BLUR_PX
 from fingervision.inspection.sample import Look, Sample
 from fingervision.vision.profile_choice import MOTION_RADIUS_PX
@@ -16,6 +17,8 @@ FORMULA = (
 
 def find(sample: Sample) -> Finding | None:
     """Compare the flanks' spread to the tips': motion across the fingers spreads flanks alone."""
+    if sample.is_smeared and (refused := refusing(sample, "motion", (Status.BLURRED,), REMEDY)):
+        return refused
     if not sample.looks:
         return None
     way_px = sample.median(float(np.sqrt(12.0 * look.widened_px2.max())) for look in sample.looks)

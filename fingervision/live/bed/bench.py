@@ -11,7 +11,7 @@ from typing import Any
 
 import av
 
-from fingervision.domain.errors import FingervisionError
+from fingervision.domain.errors import FingervisionError, StateError
 from fingervision.domain.frame import Frame
 from fingervision.domain.recipe import Recipe
 from fingervision.frames.received import Driven, Received
@@ -89,7 +89,7 @@ class Bench:
                     return
                 continue
             if isinstance(following, str):
-                raise FingervisionError(following)
+                raise StateError(following)
             yield following
 
     def close(self) -> None:
@@ -132,14 +132,14 @@ class Bench:
 
     def _ask(self, task: Task) -> None:
         if self.doing:
-            raise FingervisionError(f"The bed is {self.doing}: wait for it, or stop it first.")
+            raise StateError(f"The bed is {self.doing}: wait for it, or stop it first.")
         if self._ending.is_set():
-            raise FingervisionError("The bed is closed: start the live view again.")
+            raise StateError("The bed is closed: start the live view again.")
         self._stop_asked = False
         try:
             self._asked.put_nowait(task)
         except Full:
-            raise FingervisionError("The bed was asked something already: wait for it, or stop it first.") from None
+            raise StateError("The bed was asked something already: wait for it, or stop it first.") from None
 
     # ---- the thread
     def _work(self) -> None:

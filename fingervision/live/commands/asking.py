@@ -4,7 +4,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from fingervision.domain.errors import FingervisionError, UsageError
+from fingervision.domain.errors import StateError, UsageError
 from fingervision.domain.region import Region
 from fingervision.live.frame_measurement import Seen
 from fingervision.live.view import View
@@ -47,7 +47,7 @@ def seen_of(view: View) -> Seen:
         There is none yet.
     """
     if view.seen is None:
-        raise FingervisionError("There is no picture yet: wait for the source.")
+        raise StateError("There is no picture yet: wait for the source.")
     return view.seen
 
 

@@ -4,7 +4,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
-from fingervision.domain.errors import FingervisionError, UsageError
+from fingervision.domain.errors import StateError, UsageError
 from fingervision.live.bed.bench import Bench
 from fingervision.live.commands.asking import Answer, Request, number, shown, words
 from fingervision.live.view import View
@@ -19,14 +19,14 @@ READ_ONLY = "This page may look at the bed and not move it: start the live view 
 def _bench(view: View) -> Bench:
     bench = view.features.get(BED)
     if not isinstance(bench, Bench):
-        raise FingervisionError("There is no bed here: start the live view with --bed.")
+        raise StateError("There is no bed here: start the live view with --bed.")
     return bench
 
 
 def _movable(view: View) -> Bench:
     bench = _bench(view)
     if not view.features.get(MOTION):
-        raise FingervisionError(READ_ONLY)
+        raise StateError(READ_ONLY)
     return bench
 
 

@@ -1,16 +1,18 @@
-"""Gauges of one's own on a recording: opened, added, changed, removed, loaded, saved."""
+"""Gauges of one's own on a recording or a live picture: opened, added, changed, removed, loaded, saved."""
 
 from collections.abc import Mapping
 from dataclasses import asdict
 from typing import Any
 
-from fingervision.domain.errors import FingervisionError, UsageError
+from fingervision.domain.errors import StateError, UsageError
 from fingervision.gauges.fields import fields_of
 from fingervision.gauges.kinds import kinds
 from fingervision.live.commands.asking import GREATEST, MOST_LETTERS, Answer, Request, shown, words
+from fingervision.live.live_gauges import put_live_gauges
 from fingervision.live.playback.gauge_board import USUAL_FILE, ChangedMeanwhileError, GaugeBoard
 from fingervision.live.playback.gauges_beside import GAUGES, GaugesBeside, put_gauges_beside
 from fingervision.live.playback.playback import Playback
+from fingervision.live.session import Session
 from fingervision.live.view import View
 
 MOST_KEYS = 50
@@ -20,8 +22,10 @@ def _beside(view: View) -> GaugesBeside:
     found = view.features.get(GAUGES)
     if isinstance(found, GaugesBeside):
         return found
+    if isinstance(view, Session):
+        return put_live_gauges(view, USUAL_FILE)
     if not isinstance(view, Playback):
-        raise FingervisionError("Gauges are drawn on a recording: record, and open the recording.")
+        raise StateError("Gauges are drawn on a recording or a camera's picture, but this is neither.")
     return put_gauges_beside(view, USUAL_FILE)
 
 
@@ -96,7 +100,7 @@ def section(view: View) -> dict[str, Any]:
     """The gauges, and what they say of the frame that is shown."""
     found = view.features.get(GAUGES)
     if not isinstance(found, GaugesBeside):
-        return {"gauges": {"is_open": False} if isinstance(view, Playback) else None}
+        return {"gauges": {"is_open": False} if isinstance(view, Playback | Session) else None}
     board, following, seen = found.board, found.following, view.seen
     version, tables = board.version, board.tables
     frame = None if seen is None else seen.frame.index
@@ -104,6 +108,7 @@ def section(view: View) -> dict[str, Any]:
         "gauges": {
             "is_open": True,
             "is_asked_for": found.is_asked_for,
+            "is_live": found.is_live,
             "file": str(board.path),
             "is_saved": board.is_saved,
             "changed_meanwhile": found.is_changed_meanwhile,

@@ -9,7 +9,7 @@ import cv2
 from calib.calibration import BareScale
 from fingervision import __version__
 from fingervision.domain.direction import Direction
-from fingervision.domain.errors import FingervisionError, UsageError
+from fingervision.domain.errors import FingervisionError, StateError, UsageError
 from fingervision.domain.gap import GapMeasurement
 from fingervision.live.commands.asking import Answer, Request, box, number, number_or_none, seen_of, shown
 from fingervision.live.picture_calibration import calibrated
@@ -48,7 +48,7 @@ def _height_at(view: View, request: Request) -> Answer:
     """Measure at the height of a place in the picture."""
     outcome, scale = seen_of(view).outcome, view.choices.scale
     if scale is None or not isinstance(outcome, GapMeasurement):
-        raise FingervisionError("The height is counted from the tips, which this frame does not show: mend the view.")
+        raise StateError("The height is counted from the tips, which this frame does not show: mend the view.")
     at_px = number(request, "y" if outcome.direction.is_vertical else "x")
     tips_px = 0.5 * (outcome.left.tip_px + outcome.right.tip_px)
     roots_are_after = outcome.direction in (Direction.UP, Direction.LEFT)
@@ -70,7 +70,7 @@ def _zero(view: View, request: Request) -> Answer:
         return Answer()
     row = seen_of(view).row
     if row is None or row.gap_mm is None:
-        raise FingervisionError("Zero needs a gap, but this frame has none: bring the fingers into view.")
+        raise StateError("Zero needs a gap, but this frame has none: bring the fingers into view.")
     view.choose(zero_mm=row.gap_mm)
     return Answer(f"Gaps are shown less {row.gap_mm:.4f} mm; files hold them whole.")
 
@@ -114,7 +114,7 @@ def _calibrate(view: View, request: Request) -> Answer:
 def _steps(view: View, request: Request) -> Answer:
     task, frame = view.choices.task, seen_of(view).frame
     if task is None:
-        raise FingervisionError("The steps need the scale, which is not known: give it first.")
+        raise StateError("The steps need the scale, which is not known: give it first.")
     return Answer(
         pictures=tuple(
             (name, _png(in_eight_bits(picture) if picture.ndim == 2 else picture[:, :, ::-1]))

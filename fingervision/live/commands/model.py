@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from fingervision.domain.errors import FingervisionError
+from fingervision.domain.errors import StateError
 from fingervision.frames.received import Driven
 from fingervision.live.commands.asking import Answer, Request, number_or_none
 from fingervision.live.comparison.comparison import Comparison
@@ -14,9 +14,9 @@ MODEL, TYPED = "model", "typed_input"
 
 def _input(view: View, request: Request) -> Answer:
     if not isinstance(view, Session):
-        raise FingervisionError("A recording's input is that of its drive: name it with --drive.")
+        raise StateError("A recording's input is that of its drive: name it with --drive.")
     if "bed" in view.features:
-        raise FingervisionError("The bed's own stage says where it is: nothing needs to be typed.")
+        raise StateError("The bed's own stage says where it is: nothing needs to be typed.")
     input_mm = number_or_none(request, "input_mm")
     view.features[TYPED] = input_mm
     if input_mm is None:

@@ -8,7 +8,7 @@ import numpy as np
 from calib.calibration import BareScale
 from calib.measured_scale import Calibration
 from fingervision.domain.direction import Direction
-from fingervision.domain.errors import FingervisionError, UsageError
+from fingervision.domain.errors import StateError, UsageError
 from fingervision.domain.gap import GapMeasurement
 from fingervision.domain.region import Region
 from fingervision.live.commands.asking import Answer, Request, shown, words
@@ -28,7 +28,7 @@ def _inspect(view: View, request: Request) -> Answer:
         view.play(on=True, speed=1.0)
     running = view.features.get(SET_UP)
     if isinstance(running, SetUp) and running.is_busy:
-        raise FingervisionError("The set-up is being looked at already: wait for it.")
+        raise StateError("The set-up is being looked at already: wait for it.")
     view.features[SET_UP] = SetUp(view)
     return Answer()
 

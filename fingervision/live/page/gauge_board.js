@@ -13,7 +13,8 @@ export function tables() {
   });
 }
 export const chosen = () => tables().find((table) => table.name === board.chosen) || null;
-export const isFirst = () => told() && told().frame === told().first;
+// On a camera's picture every frame is one to draw in.
+export const isFirst = () => told() && (told().is_live || told().frame === told().first);
 
 // Answers come in the order of the requests.
 let asked = [];

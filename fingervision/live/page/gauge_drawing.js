@@ -121,7 +121,7 @@ export function beginDrawing(kind) {
   drawing.kind = kind;
   at("gauge_draw").setAttribute("aria-pressed", "true");
   if (!isFirst()) ask({ do: "seek", frame: told().first });
-  at("hint").textContent = `Drag over the ${kind} in the first frame; Escape lets it be.`;
+  at("hint").textContent = `Drag over the ${kind} in the ${told().is_live ? "picture" : "first frame"}; Escape lets it be.`;
   draw();
 }
 export function stopDrawing() {

@@ -6,7 +6,7 @@ from pathlib import Path
 from threading import Lock
 from typing import Any, NoReturn
 
-from fingervision.domain.errors import FingervisionError
+from fingervision.domain.errors import DataError, FingervisionError, StateError
 from fingervision.gauges.gauge_file import MOST_GAUGES, SCHEMA, Gauge, check_gauges, gauge_of, gauges_in
 from fingervision.storage.gauges_toml import gauges_text, text_of, write_gauges_text
 from fingervision.storage.toml_section import Section, read_document
@@ -138,7 +138,7 @@ class GaugeBoard:
         """
         with self._lock:
             if not self._entries:
-                raise FingervisionError("A gauge file must hold at least one gauge, but there is none: add one.")
+                raise DataError("A gauge file must hold at least one gauge, but there is none: add one.")
             if not over and self._now() != self._before:
                 raise ChangedMeanwhileError(
                     f"{self.path} was changed by somebody else since it was read here: load it and lose what is not "
@@ -167,7 +167,7 @@ class GaugeBoard:
         """
         with self._lock:
             if len(self._entries) >= MOST_GAUGES:
-                raise FingervisionError(f"A file holds {MOST_GAUGES} gauges at most: remove one first.")
+                raise StateError(f"A file holds {MOST_GAUGES} gauges at most: remove one first.")
             self._entries += (self._entry(table, None, self._entries),)
             self.version += 1
 
@@ -212,7 +212,7 @@ class GaugeBoard:
         for at, entry in enumerate(self._entries):
             if entry.gauge.name == name:
                 return at
-        raise FingervisionError(f"There is no gauge {name!r} any more: load the page again.")
+        raise StateError(f"There is no gauge {name!r} any more: load the page again.")
 
     def _entry(self, table: Mapping[str, Any], place: int | None, others: tuple[_Entry, ...]) -> _Entry:
         section = _Typed(self.path, "", "The gauge", table)

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from threading import Event, Thread
 from typing import Any
 
-from fingervision.domain.errors import FingervisionError
+from fingervision.domain.errors import FingervisionError, StateError
 from fingervision.domain.frame import LostFrame
 from fingervision.domain.status import Status
 from fingervision.gauges.gauge_file import Gauge
@@ -131,17 +131,22 @@ class GaugeFollowing:
                 if row is not None:
                     return row.status
                 if playback.failure:
-                    raise FingervisionError(playback.failure)
+                    raise StateError(playback.failure)
             self._stopped.wait(LOOK_EVERY_S)
         return None
 
 
 def _packed(gauges: Sequence[Gauge], readings: Sequence[Reading], plane: PlaneScale) -> bytes:
     """Readings as the page shows them, in few bytes: a recording has many frames."""
-    told = []
+    return zlib.compress(json.dumps(told(gauges, readings, plane)).encode())
+
+
+def told(gauges: Sequence[Gauge], readings: Sequence[Reading], plane: PlaneScale) -> list[dict[str, Any]]:
+    """Readings of one frame as the page shows them."""
+    found: list[dict[str, Any]] = []
     for gauge, reading in zip(gauges, readings, strict=True):
         cells = cells_of(reading.quantities, plane)
-        told.append(
+        found.append(
             {
                 "name": gauge.name,
                 "status": reading.status.value,
@@ -151,7 +156,7 @@ def _packed(gauges: Sequence[Gauge], readings: Sequence[Reading], plane: PlaneSc
                 "marks": [_points(mark) for mark in reading.marks],
             }
         )
-    return zlib.compress(json.dumps(told).encode())
+    return found
 
 
 def _points(mark: Mark | None) -> list[tuple[float, float]]:

@@ -5,7 +5,7 @@ from pathlib import Path
 from threading import Thread
 from time import sleep
 
-from fingervision.domain.errors import FingervisionError
+from fingervision.domain.errors import StateError
 from fingervision.live.background import BackgroundCommand
 from fingervision.live.playback.gauges_beside import GAUGES, GaugesBeside
 from fingervision.live.playback.playback import Playback
@@ -32,12 +32,12 @@ class RangeMeasurement:
 
     def __init__(self, playback: Playback, frames: tuple[int, int] | None) -> None:
         if playback.choices.scale is None:
-            raise FingervisionError("The scale is not known: give it before measuring.")
+            raise StateError("The scale is not known: give it before measuring.")
         beside = playback.features.get(GAUGES)
         gauges: tuple[str, ...] = ()
         if isinstance(beside, GaugesBeside) and beside.board.gauges:
             if not beside.board.is_saved:
-                raise FingervisionError("The gauges have changes that are not saved: save them before measuring.")
+                raise StateError("The gauges have changes that are not saved: save them before measuring.")
             gauges = ("--gauges", str(beside.board.path))
         path = Path(playback.recorded.name)
         name = path.parent.resolve().name if path.name == "video.mp4" else path.stem

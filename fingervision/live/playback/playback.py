@@ -8,7 +8,7 @@ from threading import Condition, Thread
 from time import monotonic
 from typing import Any
 
-from fingervision.domain.errors import FingervisionError
+from fingervision.domain.errors import FingervisionError, LimitError
 from fingervision.domain.frame import LostFrame
 from fingervision.domain.status import Status
 from fingervision.frames.source import Description
@@ -103,7 +103,7 @@ class Playback:
             No recording is played so fast or slow.
         """
         if not SPEEDS[0] <= speed <= SPEEDS[1]:
-            raise FingervisionError(f"The speed must be {SPEEDS[0]:g} to {SPEEDS[1]:g}, but is {speed:g}.")
+            raise LimitError(f"The speed must be {SPEEDS[0]:g} to {SPEEDS[1]:g}, but is {speed:g}.")
         with self._changed:
             self.speed = speed
             if on and self.frame >= self.frame_count - 1:
@@ -124,7 +124,7 @@ class Playback:
             self.range = None
             return
         if not 0 <= first <= last < self.frame_count:
-            raise FingervisionError(
+            raise LimitError(
                 f"The range must lie within frames 0 to {self.frame_count - 1} and rise, but is {first} to {last}."
             )
         self.range = (first, last)

@@ -7,7 +7,7 @@ from typing import Any
 
 from calib.calibration import BareScale
 from fingervision.domain.direction import Direction
-from fingervision.domain.errors import FingervisionError
+from fingervision.domain.errors import DataError, FingervisionError
 from fingervision.domain.region import Region
 from fingervision.frames.source import FrameSource, Wish, open_source
 from fingervision.live.choices import Choices
@@ -72,7 +72,7 @@ def recorded(name: str, rate_hz: float | None, choices: Choices, drive: tuple[st
     video = about.get("video")
     if path.is_dir() and about:
         if not isinstance(video, str) or not (folder / video).is_file():
-            raise FingervisionError(f"{name} must be the folder of a run with its video, but has none: name a video.")
+            raise DataError(f"{name} must be the folder of a run with its video, but has none: name a video.")
         name = str(folder / video)
     is_of_run = isinstance(video, str) and (folder / video) == Path(name)
     if is_of_run and choices.scale is None:
@@ -106,5 +106,7 @@ def _as_in_run(folder: Path, about: dict[str, Any], choices: Choices) -> Choices
             direction=None if tips == "auto" else Direction(tips),
             region=None if box is None else Region(*(int(side) for side in box)),
         )
+    except FingervisionError:  # a calibration that is there and is none
+        raise
     except (KeyError, TypeError, ValueError, AttributeError):
         return choices

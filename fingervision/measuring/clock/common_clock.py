@@ -6,7 +6,7 @@ from types import MappingProxyType
 from typing import Any
 
 from fingervision.domain.drive import DriveHistory
-from fingervision.domain.errors import FingervisionError
+from fingervision.domain.errors import DataError
 from fingervision.measuring.clock.alignment import ClockOffset, NoClockOffset, find_clock_offset
 from fingervision.measuring.drive_at import DriveState, drive_at
 from fingervision.measuring.series import GapSeries
@@ -76,9 +76,9 @@ def sentence(clock: ClockOffset) -> str:
     )
 
 
-def refusal(found: NoClockOffset, where: str) -> FingervisionError:
+def refusal(found: NoClockOffset, where: str) -> DataError:
     """Say why the rows have no input; `where` says where the gaps are (`in measured/run/gaps.csv`)."""
-    return FingervisionError(
+    return DataError(
         f"The offset between the recording's clock and the drive's was not found: {found.words} The gaps are "
         f"{where}, without an input; --drive-offset-s S states the offset (0 where both share a clock)."
     )

@@ -1,8 +1,9 @@
 """Offset and rate of two clocks, play, start and scale fitted together: variable projection over the motion."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fingervision.domain.drive import DriveHistory
 from fingervision.domain.effect import Array
@@ -65,10 +66,19 @@ class Noise:
         Of an autoregression; empty for white noise.
     weights : ndarray of float, shape (n - p,)
         Of the whitened rows: below 1 where the input is known badly; empty where all weigh the same.
+    starts : ndarray of int, shape (g,)
+        First whitened row of each stretch in which the input is off by one and the same error; empty where none is.
+    unit : ndarray of float, shape (n - p,)
+        That error's course in the whitened rows, of length 1 within each stretch.
+    shrink : ndarray of float, shape (g,)
+        Share of a stretch's projection on it that is taken out, 1 - 1 / sqrt(1 + variance ratio).
     """
 
     terms: Array
     weights: Array
+    starts: NDArray[np.intp] = field(default_factory=lambda: np.empty(0, dtype=np.intp))
+    unit: Array = field(default_factory=lambda: np.empty(0))
+    shrink: Array = field(default_factory=lambda: np.empty(0))
 
 
 WHITE = Noise(np.empty(0), np.empty(0))
@@ -131,14 +141,24 @@ class Motion:
         return np.concatenate([np.stack([np.ones_like(z), z], axis=1), np.maximum(z[:, None] - knots, 0.0)], axis=1)
 
     def whitened(self, columns: Array) -> Array:
-        """Take the autoregression out along time; the first frames, which have no past, are left out."""
-        terms, weights = self.noise.terms, self.noise.weights
+        """Take the autoregression out along time, and the error that a stretch shares.
+
+        The first frames, which have no past, are left out. The shared error's variance is taken out by the symmetric
+        root of the inverse covariance, a matrix of rank one beside the unit matrix.
+        """
+        noise = self.noise
+        terms = noise.terms
         out = columns[terms.size :].copy()
         for k, share in enumerate(terms, start=1):
             out -= share * columns[terms.size - k : columns.shape[0] - k]
-        if not weights.size:
-            return np.asarray(out)
-        return np.asarray(out * (weights if out.ndim == 1 else weights[:, None]))
+        table = out if out.ndim == 2 else out[:, None]
+        if noise.weights.size:
+            table *= noise.weights[:, None]
+        if noise.starts.size:
+            counts = np.diff(np.append(noise.starts, table.shape[0]))
+            along = np.add.reduceat(table * noise.unit[:, None], noise.starts, axis=0) * noise.shrink[:, None]
+            table -= noise.unit[:, None] * np.repeat(along, counts, axis=0)
+        return np.asarray(table if out.ndim == 2 else table[:, 0])
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -25,8 +25,31 @@ SHARP = 5.0
 """Change of the step in an interval over that beside it, and over a row's uncertainty, from which on it is a corner."""
 CORNER_ROWS = 3
 """Rows on either side of a corner that its smoothing spoils."""
+LONG_ROWS = 4 * CORNER_ROWS
+"""Rows of a stretch whose ends may be left out of the look at its rounding errors."""
+AVERAGED = 0.5
+"""Leverage below which a row is the mean of several, and shares its error with its neighbours."""
 STANDS = 0.1
 """Step over its neighbour's below which the stage stands: noise of a log is seldom more."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SharedErrors:
+    """Stretches of the log that may be off by one and the same error each.
+
+    Parameters
+    ----------
+    begin_s : ndarray of float, shape (g - 1,)
+        Times at which the second stretch begins, and the further ones.
+    u_mm : ndarray of float, shape (g,)
+        Standard uncertainty of each one's error.
+    halts : ndarray of bool, shape (g,)
+        Whether it is a halt or a turn, whose place a play remembers.
+    """
+
+    begin_s: Array
+    u_mm: Array
+    halts: NDArray[np.bool_]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -39,10 +62,13 @@ class LogPath:
         Points so close that straight lines between them will do.
     u_mm : ndarray of float, shape (n,)
         Standard uncertainty at each of them of what lies between rows.
+    shared : SharedErrors
+        What neighbours are off by alike.
     """
 
     drive: DriveHistory
     u_mm: Array
+    shared: SharedErrors
 
     @classmethod
     def of(cls, log: DriveHistory) -> "LogPath":
@@ -61,11 +87,80 @@ class LogPath:
             smooth_mm, leverage = smoothed(snapped_mm, log.time_s, runs, sigma_mm, step_mm)
         u_mm = sigma_mm * np.sqrt(leverage)
         for run in runs:
-            smooth_mm[run] = _flattened(smooth_mm[run], sigma_mm)
+            smooth_mm[run] = _flattened(smooth_mm[run], sigma_mm, leverage[run])
+        still = _standing_step(smooth_mm, sigma_mm, leverage)
+        shared = SharedErrors(np.zeros(0), np.zeros(1), np.zeros(1, dtype=np.bool_))
+        if step_mm > 0.0:
+            shared, u_mm = _shared_errors(log.time_s, snapped_mm, smooth_mm, u_mm, leverage, still, step_mm)
         pieces = [_piece(log.time_s[run], smooth_mm[run], u_mm[run]) for run in runs]
         of_runs = tuple(names[run.start] for run, piece in zip(runs, pieces, strict=True) for _ in piece[0])
         time_s, input_mm, errors = (np.concatenate([piece[k] for piece in pieces]) for k in range(3))
-        return cls(DriveHistory(time_s, input_mm, None if log.run is None else of_runs), errors)
+        drive = DriveHistory(time_s, input_mm, None if log.run is None else of_runs)
+        return cls(drive, errors, shared)
+
+
+def _shared_errors(
+    time_s: Array, input_mm: Array, smooth_mm: Array, u_mm: Array, leverage: Array, still_mm: float, step_mm: float
+) -> tuple[SharedErrors, Array]:
+    """Split an encoder's rounding into what neighbours share and what scatters from row to row.
+
+    Rounding does not average as noise does: a stage that stands lies anywhere within a step, one that moves by whole
+    steps from row to row is rounded alike in each, and of one that is slower only the crossings of its lines count. The
+    path may be shifted as far as every row keeps within half a step of it; where the rounding errors spread over the
+    step nothing is left of that. Where a stroke begins or ends, the stage moves unseen within a step.
+
+    Returns
+    -------
+    shared, u_mm : SharedErrors, ndarray of float, shape (n,)
+        The second is what scatters, for the rows.
+    """
+    rounding_mm = step_mm / float(np.sqrt(12.0))
+    direction = np.where(np.abs(np.diff(smooth_mm)) <= still_mm, 0, np.sign(np.diff(smooth_mm))).astype(int)
+    ends = np.append(np.flatnonzero(np.diff(direction)) + 1, time_s.size - 1)
+    stretches: list[tuple[int, int]] = []
+    for begin, end in zip(np.insert(ends[:-1], 0, 0), ends, strict=True):
+        # A halt that smoothing broke into several is one: it has one place.
+        if stretches and np.ptp(input_mm[stretches[-1][0] : end + 1]) == 0.0:
+            stretches[-1] = (stretches[-1][0], int(end))
+        else:
+            stretches.append((int(begin), int(end)))
+    away = input_mm - smooth_mm
+    scatter_mm = np.where(leverage < AVERAGED, 0.0, u_mm)
+    moved_mm = [abs(float(smooth_mm[end] - smooth_mm[begin])) for begin, end in stretches]
+    # Rows beside the end of a stroke in which an encoder's line may pass unseen; none of a halt.
+    near = [
+        max(CORNER_ROWS, round(step_mm * (end - begin) / moved)) if moved > step_mm else 0
+        for (begin, end), moved in zip(stretches, moved_mm, strict=True)
+    ]
+    found: list[tuple[int, float, bool]] = []
+    unseen: list[tuple[int, int]] = []
+    for k, (begin, end) in enumerate(stretches):
+        inner = CORNER_ROWS if end - begin > LONG_ROWS else 0
+        middle = slice(begin + inner, end + 1 - inner)
+        left_mm = max(step_mm - float(np.ptp(away[middle])), 0.0) / float(np.sqrt(12.0))
+        scatter_mm[middle] *= float(np.sqrt(max(1.0 - (left_mm / rounding_mm) ** 2, 0.0)))
+        if not near[k]:
+            found.append((begin, left_mm, True))
+            continue
+        unseen += [(begin - near[k], begin + near[k]), (end - near[k], end + near[k])]
+        averaged = float(np.median(leverage[middle]))
+        error_mm = 0.0
+        if averaged < AVERAGED:
+            lines = moved_mm[k] / step_mm
+            error_mm = max(float(np.median(u_mm[middle])), rounding_mm * averaged * (end - begin) / lines)
+        error_mm = min(float(np.hypot(error_mm, left_mm)), rounding_mm)
+        first = begin + near[k] if k > 0 and near[k - 1] else begin
+        last = end - near[k] if k + 1 < len(stretches) and near[k + 1] else end
+        if last > first:
+            count = max(1, round((last - first) * averaged))
+            found += [(int(row), error_mm, False) for row in np.linspace(first, last, count + 1)[:-1]]
+        if last < end:  # a turn without a halt: its place is known to a step
+            found.append((max(last, first), rounding_mm, True))
+    for begin, end in unseen:
+        near_rows = slice(max(begin, 0), min(end, time_s.size - 1) + 1)
+        scatter_mm[near_rows] = np.maximum(scatter_mm[near_rows], rounding_mm)
+    rows, errors, halts = (np.array(part) for part in zip(*found, strict=True))
+    return SharedErrors(time_s[rows[1:]], errors, halts), scatter_mm
 
 
 def _piece(time_s: Array, input_mm: Array, u_mm: Array) -> tuple[Array, Array, Array]:
@@ -106,17 +201,27 @@ def _corners(time_s: Array, input_mm: Array, second: Array, u_mm: Array) -> tupl
     return found, time_s[found] + met_s[isolated], input_mm[found] + speed[found - 1] * met_s[isolated]
 
 
-def _flattened(input_mm: Array, sigma_mm: float) -> Array:
+def _standing_step(input_mm: Array, sigma_mm: float, leverage: Array) -> float:
+    """Step from row to row below which the stage stands; 0 where it never moves.
+
+    A smoothed record of k rows scatters from one to the next by the k-th part of its own scatter.
+    """
+    steps = np.abs(np.diff(input_mm))
+    scatter = sigma_mm * np.minimum(leverage[:-1], leverage[1:]) ** 1.5
+    moving = steps[steps > np.maximum(scatter, 1e-3 * float(np.ptp(input_mm)) / max(input_mm.size, 1))]
+    return STANDS * float(np.median(moving)) if moving.size else 0.0
+
+
+def _flattened(input_mm: Array, sigma_mm: float, leverage: Array) -> Array:
     """Where the stage stands, put it at one place, and keep what leads there from overshooting it.
 
     A smoothed corner overshoots by some standard deviations of a row, and a play remembers each overshoot.
     """
-    steps = np.abs(np.diff(input_mm))
-    moving = steps[steps > max(sigma_mm, 1e-3 * float(np.ptp(input_mm)) / max(input_mm.size, 1))]
-    if not moving.size:
+    still = _standing_step(input_mm, sigma_mm, leverage)
+    if still == 0.0:
         return input_mm
     out = input_mm.copy()
-    stands = np.flatnonzero(np.diff(np.r_[0, (steps < STANDS * np.median(moving)).astype(int), 0]))
+    stands = np.flatnonzero(np.diff(np.r_[0, (np.abs(np.diff(input_mm)) < still).astype(int), 0]))
     for begin, end in stands.reshape(-1, 2):  # rows begin to end inclusive
         inner = input_mm[begin : end + 1]
         if end - begin < 2 * CORNER_ROWS or np.ptp(inner[CORNER_ROWS:-CORNER_ROWS]) > 3.0 * sigma_mm:

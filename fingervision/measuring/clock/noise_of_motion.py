@@ -1,8 +1,10 @@
 """Noise of the gap beside a fitted motion: its correlation from frame to frame, and where the input is known badly."""
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fingervision.domain.effect import Array
+from fingervision.effects.play_operator import play
 from fingervision.measuring.clock.joint_fit import Fit, Motion, Noise
 
 MOST_ORDER = 4
@@ -49,43 +51,96 @@ def autoregression(residual_mm: Array) -> Array:
 
 MEDIAN_CHI_SQUARE = 0.4549
 """Median of chi-square with one degree of freedom."""
+TRIED = 60
+"""Variances that are tried, over five decades: a fifth apart, as well as a hundred frames tell it."""
+CLIPPED = 9.0
+"""Squares of normalised residuals count up to here: three standard deviations, beyond which a frame may be wrong."""
 
 
 def noise_of(motion: Motion, found: Fit) -> Noise:
     """Estimate the noise that a fit leaves.
 
     The variance of a frame is that of the vision's noise, the same in all frames, and the square of what the input's
-    uncertainty between two rows of the log makes of it. The first is where the median of squares fits.
+    uncertainty between two rows of the log makes of it. The first is the one that makes the residuals most likely.
     """
     log_s = motion.log_time_s(found.at)
     after = np.clip(np.searchsorted(motion.drive.time_s, log_s), 0, motion.path.u_mm.size - 1)
-    slope = found.scale / max(0.5 * float(np.ptp(motion.drive.input_mm)), 1e-12)
+    slope = abs(found.scale) / max(0.5 * float(np.ptp(motion.drive.input_mm)), 1e-12)
     input_mm2 = (slope * motion.path.u_mm[after]) ** 2
-    squares = (found.residual_mm - np.median(found.residual_mm)) ** 2
-    even_mm2 = _even_variance(squares, input_mm2)
-    shrunk = found.residual_mm * np.sqrt(even_mm2 / (even_mm2 + input_mm2))
+    stretch = _stretch_of(motion, found, log_s)
+    shared_mm = slope * motion.path.shared.u_mm[stretch]
+    residual_mm, taken = _without_shared(found.residual_mm - np.median(found.residual_mm), stretch, shared_mm)
+    even_mm2 = _even_variance(residual_mm**2, input_mm2) * taken
+    shrunk = residual_mm * np.sqrt(even_mm2 / (even_mm2 + input_mm2))
     terms = autoregression(np.clip(shrunk, -4.0 * np.sqrt(even_mm2), 4.0 * np.sqrt(even_mm2)))
     order = terms.size
     white_mm2 = even_mm2 * max(1.0 - _explained(terms, shrunk), 1e-3)
     extra = input_mm2[order:].copy()
     for k, share in enumerate(terms, start=1):
         extra += share**2 * input_mm2[order - k : input_mm2.size - k]
-    return Noise(terms, 1.0 / np.sqrt(1.0 + extra / white_mm2))
+    weights = 1.0 / np.sqrt(1.0 + extra / white_mm2)
+    if not shared_mm.any():
+        return Noise(terms, weights)
+    starts = np.flatnonzero(np.diff(stretch[order:], prepend=-1))
+    course = weights * (1.0 - float(terms.sum()))
+    lengths = np.sqrt(np.add.reduceat(course**2, starts))
+    counts = np.diff(np.append(starts, course.size))
+    ratio = (shared_mm[order:][starts] * lengths) ** 2 / white_mm2
+    return Noise(terms, weights, starts, course / np.repeat(lengths, counts), 1.0 - 1.0 / np.sqrt(1.0 + ratio))
+
+
+SEEN_SHARED = 0.5
+"""Of the residual's spread: a shared error that is smaller is lost in it, and taking means would whiten the noise."""
+
+
+def _stretch_of(motion: Motion, found: Fit, log_s: Array) -> NDArray[np.intp]:
+    """Stretch of the log whose error each frame has: while a play is crossed, that of the halt before.
+
+    Shape (n,), never falling.
+    """
+    shared, drive, at = motion.path.shared, motion.drive, found.at
+    own = np.searchsorted(shared.begin_s, log_s, side="right")
+    if at.play_mm == 0.0 or not shared.begin_s.size:
+        return own
+    states = play(drive.input_mm, at.play_mm, at.start)
+    changed = np.abs(np.diff(states, prepend=states[0])) > 0.0
+    last = np.maximum.accumulate(np.where(changed, np.arange(states.size), 0))
+    before = np.clip(np.searchsorted(drive.time_s, log_s, side="right") - 1, 0, states.size - 1)
+    inputs = np.interp(log_s, drive.time_s, drive.input_mm)
+    is_held = np.abs(inputs - states[before]) <= 0.5 * at.play_mm
+    since = np.searchsorted(shared.begin_s, drive.time_s[last[before]], side="right")
+    following = np.minimum(since + 1, shared.u_mm.size - 1)
+    since = np.where(~shared.halts[since] & shared.halts[following], following, since)
+    return np.asarray(np.maximum.accumulate(np.where(is_held & (since < own), since, own)))
+
+
+FEWEST_SHARED = 8
+"""Frames of a stretch whose mean may be taken out before the rest is noise: fewer would lose their scatter."""
+
+
+def _without_shared(residual_mm: Array, stretch: NDArray[np.intp], shared_mm: Array) -> tuple[Array, float]:
+    """Residual without the mean of each stretch that may be off as a whole, and what that takes from its variance."""
+    out = residual_mm.copy()
+    means = 0
+    spread_mm = 1.4826 * float(np.median(np.abs(residual_mm)))
+    starts = np.flatnonzero(np.diff(stretch, prepend=-1))
+    for begin, end in zip(starts, np.append(starts[1:], stretch.size), strict=True):
+        if shared_mm[begin] > SEEN_SHARED * spread_mm and end - begin >= FEWEST_SHARED:
+            out[begin:end] -= np.mean(out[begin:end])
+            means += 1
+    return out, out.size / max(out.size - means, 1)
 
 
 def _even_variance(squares: Array, input_mm2: Array) -> float:
-    """Find the variance beside `input_mm2` with which the median of the normalised squares is a normal one's."""
+    """Find the variance beside `input_mm2` that makes the residuals most likely, wrong frames clipped.
+
+    Frames whose input is known well tell it; a median over all would not see them where the others are more.
+    """
     high = max(float(np.median(squares)) / MEDIAN_CHI_SQUARE, 1e-18)
-    low = 1e-4 * high
-    if float(np.median(squares / (low + input_mm2))) < MEDIAN_CHI_SQUARE:
-        return low
-    for _ in range(30):
-        middle = float(np.sqrt(low * high))
-        if float(np.median(squares / (middle + input_mm2))) > MEDIAN_CHI_SQUARE:
-            low = middle
-        else:
-            high = middle
-    return high
+    tried = high * np.geomspace(1e-4, 4.0, TRIED)
+    whole = tried[:, None] + input_mm2
+    minus_twice_log = np.sum(np.log(whole) + np.minimum(squares / whole, CLIPPED), axis=1)
+    return float(tried[int(np.argmin(minus_twice_log))])
 
 
 def _explained(terms: Array, residual: Array) -> float:

@@ -44,18 +44,17 @@ class Posterior:
 
 
 def most_likely(motion: Motion, start: Alignment, plays: tuple[float, ...] = FIRST_PLAYS) -> Fit:
-    """Fit from several plays and keep the best; `plays` over the largest possible one."""
+    """Fit from several plays and keep the best; `plays` over the largest possible one.
+
+    Play and offset trade with each other along narrow valleys, in which a search at a fixed play halts beside the
+    lowest place: the best two of them, and where the search began, are followed with the play free.
+    """
     longest_mm = _longest_mm(motion)
-    best = None
-    for share in plays:
-        found = fit(motion, replace(start, play_mm=share * longest_mm), free_play=False)
-        if best is None or found.squares < best.squares:
-            best = found
-    if best is None:
-        message = "no play was given"
-        raise ValueError(message)
-    refined = fit(motion, best.at, free_play=True)
-    return refined if refined.squares < best.squares else best
+    held = [fit(motion, replace(start, play_mm=share * longest_mm), free_play=False) for share in plays]
+    held.sort(key=lambda one: one.squares)
+    begun = [start] if start.play_mm > 0.0 else []
+    free = [fit(motion, at, free_play=True) for at in (*begun, *(one.at for one in held[:2]))]
+    return min((*held, *free), key=lambda one: one.squares)
 
 
 def posterior(motion: Motion, best: Fit) -> Posterior:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from functools import cache, partial
 from pathlib import Path
 
-from fingervision.domain.errors import FingervisionError
+from fingervision.domain.errors import DataError, InputFileError
 from fingervision.tables.formats._apart import read_apart
 from fingervision.tables.mapping import Entry
 from fingervision.tables.raw_table import RawTable
@@ -62,16 +62,14 @@ def read_raw(path: Path, given: Entry) -> RawTable:
         The file cannot be read, or holds no table.
     """
     if path.exists() and not path.is_file():
-        raise FingervisionError(
-            f"{path} must be a table in a file, but is a folder or a pipe: save it as a file first."
-        )
+        raise DataError(f"{path} must be a table in a file, but is a folder or a pipe: save it as a file first.")
     try:
         with path.open("rb") as file:
             head = file.read(HEAD_BYTES)
     except FileNotFoundError:
-        raise FingervisionError(f"There is no table {path}.") from None
+        raise InputFileError(f"There is no table {path}.") from None
     except OSError as error:
-        raise FingervisionError(f"The table {path} could not be read ({error.strerror}).") from error
+        raise InputFileError(f"The table {path} could not be read ({error.strerror}).") from error
     if not head.strip(b"\x00 \t\r\n"):
-        raise FingervisionError(f"{path} must be a table, but is {'blank' if head else 'empty'}: export it again.")
+        raise DataError(f"{path} must be a table, but is {'blank' if head else 'empty'}: export it again.")
     return next(each for each in formats() if each.recognises(path, head)).read(path, given)

@@ -8,7 +8,7 @@ import subprocess
 import sys
 from pathlib import Path
 
-from fingervision.domain.errors import FingervisionError
+from fingervision.domain.errors import DataError, FingervisionError
 from fingervision.tables.mapping import Entry
 from fingervision.tables.questions import OpenQuestionError
 from fingervision.tables.raw_table import RawTable
@@ -47,14 +47,14 @@ def read_apart(name: str, path: Path, given: Entry) -> RawTable:
     if done.returncode != 0 or not done.stdout:
         said = done.stderr.decode(errors="replace").strip().splitlines()
         why = f"signal {-done.returncode}" if done.returncode < 0 else (said[-1][:SHOWN] if said else "no answer")
-        raise FingervisionError(
+        raise DataError(
             f"{path} is damaged: the program that reads it crashed on it ({why}). Save the table again, or as CSV."
         )
     kind, *answer = pickle.loads(done.stdout)
     if kind == "question":
         raise OpenQuestionError(*answer)
     if kind == "error":
-        raise FingervisionError(*answer)
+        raise DataError(*answer)
     table: RawTable = answer[0]
     return table
 

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from fingervision.domain.errors import FingervisionError
+from fingervision.domain.errors import DataError
 from fingervision.storage.number_columns import Numbers
 from fingervision.tables.cells import to_number, to_numbers
 from fingervision.tables.mapping import Entry
@@ -31,7 +31,7 @@ def read(path: Path, given: Entry) -> RawTable:
     lines, encoding = lines_of(path, given.words.get("encoding"))
     ends = [at for at, line in enumerate(lines) if line.strip().startswith(END)]
     if len(ends) < 2:
-        raise FingervisionError(
+        raise DataError(
             f"{path} must have {END} below the file's header and below each segment's, but has it {len(ends)} times: "
             "save it again."
         )
@@ -53,7 +53,7 @@ def read(path: Path, given: Entry) -> RawTable:
         segment, at, bad = _segment(lines, end + 2, stop, len(named), separator)
         names, units, taken, steps = _columns(named, keys, x_columns, decimal)
         if columns and [each.name for each in columns] != names:
-            raise FingervisionError(
+            raise DataError(
                 f"{path} must have the same channels in each segment, but line {end + 2} begins another "
                 f"({', '.join(names)}): save the segments in files of their own."
             )

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from fingervision.domain.errors import FingervisionError
+from fingervision.domain.errors import DataError, FingervisionError
 from fingervision.tables.mapping import Entry
 from fingervision.tables.needed_library import needed_library
 from fingervision.tables.parts import chosen_part
@@ -38,7 +38,7 @@ def read(path: Path, given: Entry) -> RawTable:
     with path.open("rb") as file:
         head = file.read(1024)
     if path.stat().st_size > MOST_BYTES:
-        raise FingervisionError(
+        raise DataError(
             f"{path} must have at most {MOST_BYTES / 1e9:g} GB, but has {path.stat().st_size / 1e9:.1f} GB: save the "
             "table's variables alone."
         )
@@ -48,7 +48,7 @@ def read(path: Path, given: Entry) -> RawTable:
     note = (f"Passed over, being no arrays of real numbers: {', '.join(sorted(passed))}.",) if passed else ()
     if not tables:
         held = f"only {', '.join(sorted(passed))}" if passed else "none"
-        raise FingervisionError(
+        raise DataError(
             f"{path} must hold vectors or a matrix of real numbers, but holds {held} (tables, timetables, cells and "
             "objects of MATLAB are no arrays): save its columns as vectors, save('run.mat', 'time', 'position', 'gap')."
         )
@@ -86,7 +86,7 @@ def _older(path: Path, passed: list[str]) -> dict[str, Any]:
     except FingervisionError:
         raise
     except Exception as error:
-        raise FingervisionError(
+        raise DataError(
             f"{path} must be a MATLAB file, but could not be read ({type(error).__name__}: {error}): save it again."
         ) from error
     return {name: _plain(content[name], name, passed) for name in wanted if name in content}
@@ -113,7 +113,7 @@ def _hdf5(path: Path, passed: list[str]) -> dict[str, Any]:
     except FingervisionError:
         raise
     except Exception as error:
-        raise FingervisionError(
+        raise DataError(
             f"{path} must be a MATLAB 7.3 file, but could not be read ({type(error).__name__}: {error}): save it again."
         ) from error
 
@@ -150,6 +150,6 @@ def _group(library: Any, group: Any, prefix: str, passed: list[str], deep: int) 
 def _check_size(path: Path | str, name: str, size: int) -> None:
     """Refuse a variable before its values are read."""
     if size > MOST_VALUES:
-        raise FingervisionError(
+        raise DataError(
             f"Variables of {path} must have at most {MOST_VALUES} values, but {name} has {size}: leave it out."
         )

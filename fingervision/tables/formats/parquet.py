@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from fingervision.domain.errors import FingervisionError
+from fingervision.domain.errors import DataError, FingervisionError
 from fingervision.storage.number_columns import Numbers
 from fingervision.tables.mapping import Entry
 from fingervision.tables.needed_library import needed_library
@@ -38,13 +38,13 @@ def read(path: Path, given: Entry) -> RawTable:
     except FingervisionError:
         raise
     except Exception as error:
-        raise FingervisionError(
+        raise DataError(
             f"{path} must be a Parquet file, but could not be read ({type(error).__name__}: {error}): save it again."
         ) from error
     kept = tuple(column for column in columns if column is not None)
     passed = [table.schema.field(k).name for k, column in enumerate(columns) if column is None]
     if not kept or not len(kept[0]):
-        raise FingervisionError(f"{path} must hold columns of numbers, but has none with a row.")
+        raise DataError(f"{path} must hold columns of numbers, but has none with a row.")
     notes = (f"Passed over, being no columns of numbers or texts: {', '.join(passed)}.",) if passed else ()
     return RawTable(path, "Parquet", kept, notes=notes)
 
@@ -52,7 +52,7 @@ def read(path: Path, given: Entry) -> RawTable:
 def _check_size(path: Path, rows: int, unpacked_bytes: int) -> None:
     """Refuse a table before its values are read."""
     if rows > MOST_ROWS or unpacked_bytes > MOST_UNPACKED_BYTES:
-        raise FingervisionError(
+        raise DataError(
             f"{path} must have at most {MOST_ROWS} rows and unpack to {MOST_UNPACKED_BYTES / 1e9:g} GB, but has {rows} "
             f"rows and {unpacked_bytes / 1e9:.1f} GB: save fewer."
         )

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from fingervision.domain.errors import FingervisionError
+from fingervision.domain.errors import DataError, FingervisionError
 from fingervision.storage.number_columns import Numbers
 from fingervision.tables.column_names import column_name
 from fingervision.tables.mapping import Entry
@@ -43,13 +43,13 @@ def read(path: Path, given: Entry) -> RawTable:
     except FingervisionError:
         raise
     except Exception as error:
-        raise FingervisionError(
+        raise DataError(
             f"{path} must be a TDMS file, but could not be read ({type(error).__name__}: {error}): save it again."
         ) from error
     lengths = {len(column) for column in columns}
     if len(lengths) != 1:
         listed = ", ".join(f"{column.name} {len(column)}" for column in columns) or "none"
-        raise FingervisionError(
+        raise DataError(
             f"The channels of group '{name}' of {path} must have the same number of values, but have: {listed}. Save "
             "those of one rate in a group of their own."
         )
@@ -79,7 +79,7 @@ def _warnings(into: list[str]) -> Iterator[None]:
 def _check_size(path: Path, values: int) -> None:
     """Refuse a file before its values are read."""
     if values > MOST_VALUES:
-        raise FingervisionError(f"{path} must have at most {MOST_VALUES} values, but has {values}: split it.")
+        raise DataError(f"{path} must have at most {MOST_VALUES} values, but has {values}: split it.")
 
 
 def _columns(channels: list[Any]) -> tuple[list[RawColumn], list[str]]:

@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from fingervision.domain.errors import FingervisionError
+from fingervision.domain.errors import DataError
 from fingervision.tables.mapping import Entry
 from fingervision.tables.raw_table import RawTable
 from fingervision.tables.text_file import lines_of
@@ -32,6 +32,6 @@ def read(path: Path, given: Entry) -> RawTable:
         head = file.read(16)
     for magic, words in OTHERS.items():
         if head.startswith(magic):
-            raise FingervisionError(f"{path} must be a table, but is {words}.")
+            raise DataError(f"{path} must be a table, but is {words}.")
     lines, encoding = lines_of(path, given.words.get("encoding"))
     return table_of_lines(path, lines, given, encoding)

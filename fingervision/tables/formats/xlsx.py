@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from fingervision.domain.errors import FingervisionError
+from fingervision.domain.errors import DataError, FingervisionError
 from fingervision.storage.number_columns import Numbers
 from fingervision.tables.column_names import column_name
 from fingervision.tables.mapping import Entry
@@ -59,7 +59,7 @@ def read(path: Path, given: Entry) -> RawTable:
     except FingervisionError:
         raise
     except Exception as error:
-        raise FingervisionError(
+        raise DataError(
             f"{path} must be an Excel workbook, but could not be read ({type(error).__name__}: {error}): save it again."
         ) from error
 
@@ -71,7 +71,7 @@ def _check_archive(path: Path) -> None:
         total = sum(info.file_size for info in infos)
         shared = sum(info.file_size for info in infos if "sharedStrings" in info.filename)
         if total > MOST_UNPACKED_BYTES or shared > MOST_SHARED_BYTES:
-            raise FingervisionError(
+            raise DataError(
                 f"{path} must unpack to at most {MOST_UNPACKED_BYTES / 1e6:.0f} MB ({MOST_SHARED_BYTES / 1e6:.0f} MB "
                 f"of it texts), but would unpack to {total / 1e6:.0f} MB ({shared / 1e6:.0f} MB): save the table as "
                 "CSV or Parquet."
@@ -80,7 +80,7 @@ def _check_archive(path: Path) -> None:
             if info.filename.endswith((".xml", ".rels")):
                 with archive.open(info) as part:
                     if b"<!DOCTYPE" in part.read(4096):
-                        raise FingervisionError(
+                        raise DataError(
                             f"{path} must be a workbook as Excel writes it, but {info.filename} in it defines XML "
                             "entities, which a workbook never needs: save it again with Excel or LibreOffice."
                         )
@@ -145,7 +145,7 @@ class _Sheet:
 def _table(path: Path, rows: Sequence[tuple[Any, ...]], title: str, given: Entry, sheet: _Sheet) -> RawTable:
     first = _first_row(rows) if given.header_line is None else given.header_line
     if first is None or first >= len(rows):
-        raise FingervisionError(f"{path} must hold rows of two numbers or more in sheet '{title}', but has none.")
+        raise DataError(f"{path} must hold rows of two numbers or more in sheet '{title}', but has none.")
     names, units, header_line = _header(rows, first, given)
     if units and first == header_line:
         first += 1
@@ -154,7 +154,7 @@ def _table(path: Path, rows: Sequence[tuple[Any, ...]], title: str, given: Entry
     )
     for r0, r1, c0, c1 in sheet.merged():
         if r1 > first and any(c0 - 1 <= k <= c1 - 1 for k in places) and (r1 > r0 or c1 > c0):
-            raise FingervisionError(
+            raise DataError(
                 f"Sheet '{title}' of {path} must have a cell a value, but rows {r0} to {r1}, columns {c0} to {c1} are "
                 "merged into one: take the merging apart, so that each row says its own."
             )
@@ -174,7 +174,7 @@ def _table(path: Path, rows: Sequence[tuple[Any, ...]], title: str, given: Entry
         cells = [row[at] for row in body]
         empty = [n for n, cell in enumerate(cells) if cell is None]
         if empty and sheet.formula(lines[empty[0]], k + 1):
-            raise FingervisionError(
+            raise DataError(
                 f"The cell in row {lines[empty[0]]}, column {k + 1} of sheet '{title}' of {path} holds a formula whose "
                 "value was never calculated: open the workbook in Excel or LibreOffice, save it, and read it again."
             )

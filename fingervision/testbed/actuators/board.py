@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from fingervision.domain.errors import FingervisionError
+from fingervision.domain.errors import DeviceError, LimitError, StateError
 from fingervision.domain.step_data import Coordinates, StepData
 from fingervision.storage.board_toml import read_board
 from fingervision.storage.steps_toml import read_steps
@@ -113,9 +113,7 @@ class BoardActuator:
         """Return to the reference, by its own code or an absolute step to 0; clears what stopped it before."""
         self._stand()
         if wire.Levels.ALARM in self._board.levels:
-            raise FingervisionError(
-                "The motor controller must have no alarm, but its alarm line is active: clear it there."
-            )
+            raise DeviceError("The motor controller must have no alarm, but its alarm line is active: clear it there.")
         self._motions.failure = None
         if self._codes.home is not None:
             self._motions.begin([Run(self._codes.home, self._waits.home_s, None)])
@@ -124,7 +122,7 @@ class BoardActuator:
             if step.coordinates is Coordinates.ABSOLUTE and step.target_mm == 0.0:
                 self._motions.begin([self._run_of(number, self._at_mm())])
                 return
-        raise FingervisionError(
+        raise DeviceError(
             "Homing must have a code of its own (home_code of the actuator) or an absolute step to 0 mm, but there is "
             "neither: add one."
         )
@@ -156,7 +154,7 @@ class BoardActuator:
         """Begin one of the step data blocks."""
         if number not in self._data.steps:
             there = ", ".join(str(each) for each in self._data.steps)
-            raise FingervisionError(f"The step must be one that the controller keeps ({there}), but is {number}.")
+            raise LimitError(f"The step must be one that the controller keeps ({there}), but is {number}.")
         self._ready()
         self._check_known(number)
         self._begin_steps((number,))
@@ -188,19 +186,19 @@ class BoardActuator:
         # First of all, so that a stop that comes while the motion is prepared is not forgotten.
         self._motions.forget_stop()
         if self.busy:
-            raise FingervisionError("The actuator must stand before it moves again, but is busy: stop it first.")
+            raise StateError("The actuator must stand before it moves again, but is busy: stop it first.")
 
     def _ready(self) -> None:
         self._stand()
         alarm = self.alarm
         if alarm is not None:
-            raise FingervisionError(
+            raise DeviceError(
                 f"The actuator must have no alarm, but has {alarm.code} ({alarm.words}): nothing was moved."
             )
 
     def _check_known(self, number: int) -> None:
         if not self._motions.known and self._data.steps[number].coordinates is Coordinates.RELATIVE:
-            raise FingervisionError(
+            raise StateError(
                 f"The position must be known before the relative step {number}, but is not since the start or the last "
                 "stop: home first (--home-first)."
             )

@@ -11,15 +11,17 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, TypeVar
 
-from fingervision.domain.errors import FingervisionError
+from fingervision.domain.errors import DeviceError, FingervisionError, LimitError, StateError
 from fingervision.storage.toml_section import Section
 from fingervision.testbed.actuator import Alarm, StageLimits
 from fingervision.testbed.build_context import BuildContext
 from fingervision.testbed.clocks.clock import Clock
 from fingervision.testbed.motion.move_limits import FreeMoves, check_move, check_speed
+from fingervision.testbed.motion.stated_limits import KEYS as LIMITS
+from fingervision.testbed.motion.stated_limits import stated_limits
 from fingervision.testbed.reading import Reading
 
-KEYS = ("port", "axis", "lower_mm", "upper_mm", "speed_mm_s", "force_n", "accuracy_mm", "encoder_step_mm")
+KEYS = ("port", "axis", *LIMITS)
 SIMULATED = False
 MILLIMETRE = "millimeter"
 """As pymeasure calls the unit that the axis must be set to (SN2)."""
@@ -57,7 +59,7 @@ class Esp300Stage:
         self._closed = False
         units = self._asked(lambda: axis.units)
         if units != MILLIMETRE:
-            raise FingervisionError(
+            raise DeviceError(
                 f"{self.name} must count in {MILLIMETRE}s, but counts in {units}: set it (1SN2) and home it."
             )
         self._do(axis.enable)
@@ -101,7 +103,7 @@ class Esp300Stage:
 
     def run_step(self, number: int) -> None:
         """Refuse: this controller keeps programs, no step data."""
-        raise FingervisionError(f"Step {number} must be kept by the controller, but an ESP300 has none: use move.")
+        raise LimitError(f"Step {number} must be kept by the controller, but an ESP300 has none: use move.")
 
     def stop(self) -> None:
         """Stop at once."""
@@ -128,7 +130,7 @@ class Esp300Stage:
 
     def _ready(self) -> None:
         if self.busy:
-            raise FingervisionError("The stage must stand before it moves again, but is busy: stop it first.")
+            raise StateError("The stage must stand before it moves again, but is busy: stop it first.")
 
     def _do(self, act: Callable[[], None]) -> None:
         """Give a command, and ask whether the controller took it."""
@@ -138,7 +140,7 @@ class Esp300Stage:
         if errors:
             words = "; ".join(str(getattr(one, "message", one)).lower() for one in errors)
             self._alarm = Alarm(str(getattr(errors[0], "error", "")), words)
-            raise FingervisionError(f"{self.name} must take the command, but refused it ({words}): nothing was moved.")
+            raise DeviceError(f"{self.name} must take the command, but refused it ({words}): nothing was moved.")
         self._alarm = None
 
     def _asked(self, act: Callable[[], T]) -> T:
@@ -149,24 +151,12 @@ class Esp300Stage:
             raise
         except Exception as error:  # serial lines, VISA and pymeasure each have classes of their own
             said = f"{type(error).__name__}: {error}".replace("\n", " ")[:200].rstrip(".")
-            raise FingervisionError(f"{self.name} must answer, but did not ({said}): check its cable.") from error
-
-
-def _limits(section: Section) -> StageLimits:
-    lower_mm = section.number("lower_mm")
-    return StageLimits(
-        lower_mm=lower_mm,
-        upper_mm=section.number("upper_mm", above=lower_mm),
-        speed_mm_s=section.number("speed_mm_s", above=0.0),
-        force_n=section.number("force_n", float("1e9"), above=0.0),
-        accuracy_mm=section.number("accuracy_mm", 0.0, low=0.0),
-        encoder_step_mm=section.number("encoder_step_mm", 0.0, low=0.0),
-    )
+            raise DeviceError(f"{self.name} must answer, but did not ({said}): check its cable.") from error
 
 
 def without_hardware(section: Section, folder: Path) -> FreeMoves:
     """What the stage can do, for a plan that is checked away from the bed."""
-    return FreeMoves(_limits(section))
+    return FreeMoves(stated_limits(section))
 
 
 def build(section: Section, context: BuildContext) -> Esp300Stage:
@@ -176,7 +166,7 @@ def build(section: Section, context: BuildContext) -> Esp300Stage:
         from pymeasure.instruments.newport.esp300 import Axis
     except ImportError as error:
         section.refuse("kind", f"needs pymeasure, which is not here ({error}): pip install 'fingervision[pymeasure]'.")
-    limits, port, number = _limits(section), section.word("port"), section.whole("axis", 1, low=1, high=3)
+    limits, port, number = stated_limits(section), section.word("port"), section.whole("axis", 1, low=1, high=3)
     try:
         with warnings.catch_warnings():
             # pymeasure asks its own maintainers whether this controller knows SCPI; nothing of that is used here.

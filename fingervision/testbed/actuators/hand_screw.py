@@ -3,7 +3,7 @@
 from math import isfinite
 from pathlib import Path
 
-from fingervision.domain.errors import FingervisionError
+from fingervision.domain.errors import LimitError, StateError
 from fingervision.storage.toml_section import Section
 from fingervision.testbed.actuator import Alarm, StageLimits
 from fingervision.testbed.build_context import BuildContext
@@ -64,15 +64,11 @@ class HandScrew:
 
     def jog(self, speed_mm_s: float) -> None:
         """Refuse: nobody can say when a hand shall stop."""
-        raise FingervisionError(
-            f"A hand screw must be moved to positions, but was to jog at {speed_mm_s:g} mm/s: use move."
-        )
+        raise LimitError(f"A hand screw must be moved to positions, but was to jog at {speed_mm_s:g} mm/s: use move.")
 
     def run_step(self, number: int) -> None:
         """Refuse: step data live in a motor controller."""
-        raise FingervisionError(
-            f"Step {number} must be kept by a motor controller, but a hand screw has none: use move."
-        )
+        raise LimitError(f"Step {number} must be kept by a motor controller, but a hand screw has none: use move.")
 
     def stop(self) -> None:
         """Nothing moves by itself."""
@@ -91,7 +87,7 @@ class HandScrew:
         for _ in range(ASK_AT_MOST):
             line = self._terminal.ask(f"{words} (Enter alone: {wanted_mm:.3f}): ")
             if line is None:
-                raise FingervisionError(
+                raise StateError(
                     "The hand screw must be turned by somebody, but nobody is at the terminal: run it from one."
                 )
             typed_mm = _number(line.strip().replace(",", "."), wanted_mm)
@@ -110,9 +106,7 @@ class HandScrew:
                     self._turned.append(Reading(at_s, at_s, at_s, mm))
                 self._at_mm = typed_mm
                 return
-        raise FingervisionError(
-            f"The reading must be typed in mm, but was not, {ASK_AT_MOST} times: the run ends here."
-        )
+        raise StateError(f"The reading must be typed in mm, but was not, {ASK_AT_MOST} times: the run ends here.")
 
 
 def _number(words: str, otherwise: float) -> float | None:

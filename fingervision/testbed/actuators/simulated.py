@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from fingervision.domain.errors import FingervisionError
+from fingervision.domain.errors import DeviceError, LimitError, StateError
 from fingervision.storage.toml_section import Section
 from fingervision.testbed.actuator import Alarm, StageLimits
 from fingervision.testbed.build_context import BuildContext
@@ -101,7 +101,7 @@ class SimulatedActuator:
 
     def run_step(self, number: int) -> None:
         """Refuse: step data live in a motor controller."""
-        raise FingervisionError(
+        raise LimitError(
             f"Step {number} must be kept by a motor controller, but the simulated actuator has none: use move."
         )
 
@@ -170,11 +170,11 @@ class SimulatedActuator:
 
     def _ready(self) -> None:
         if self._alarm is not None:
-            raise FingervisionError(
+            raise DeviceError(
                 f"The actuator must have no alarm, but has {self._alarm.code} ({self._alarm.words}): clear it."
             )
         if self.busy:
-            raise FingervisionError("The actuator must stand before it moves again, but is busy: stop it first.")
+            raise StateError("The actuator must stand before it moves again, but is busy: stop it first.")
 
 
 def _limits(section: Section) -> StageLimits:

@@ -8,7 +8,7 @@ from threading import Lock
 from typing import NoReturn
 
 from fingervision.domain.board_settings import BoardSettings, Role
-from fingervision.domain.errors import FingervisionError
+from fingervision.domain.errors import DeviceError, FingervisionError
 from fingervision.testbed.board import wire
 from fingervision.testbed.board.link import ASK_EVERY_S, BoardLink, BoardRefusalError
 from fingervision.testbed.board.port import opened_port
@@ -197,7 +197,7 @@ class Board:
             "stopped": f"The board must be cleared before it moves again, because {self.dropped or 'it was stopped'}: "
             "home it.",
         }
-        raise FingervisionError(
+        raise DeviceError(
             sentences.get(reason, f"{self.name} refused a command ({reason}): set it up anew by beginning again.")
         )
 
@@ -225,9 +225,9 @@ def opened(settings: BoardSettings, clock: Clock) -> Board:
 def _identified(link: BoardLink, port: str) -> wire.Identity:
     identity = link.command("I", STARTS_WITHIN_S)
     if not isinstance(identity, wire.Identity) or identity.name != wire.NAME:
-        raise FingervisionError(f"The board on {port} must run the sketch {wire.NAME}, but does not: upload it.")
+        raise DeviceError(f"The board on {port} must run the sketch {wire.NAME}, but does not: upload it.")
     if identity.protocol != wire.PROTOCOL:
-        raise FingervisionError(
+        raise DeviceError(
             f"The board on {port} must speak protocol {wire.PROTOCOL}, but its firmware {identity.version} speaks "
             f"{identity.protocol}: upload the sketch of this fingervision (fingervision/testbed/firmware)."
         )
@@ -249,5 +249,5 @@ def _wait_for_clock(board: Board, link: BoardLink, clock: Clock) -> None:
     until_s = clock.now_s() + JOINED_WITHIN_S
     while link.joined is None:
         if clock.now_s() > until_s:
-            raise FingervisionError(f"{board.name} must answer steadily, but most answers are damaged: mend its cable.")
+            raise DeviceError(f"{board.name} must answer steadily, but most answers are damaged: mend its cable.")
         board.wait(ASK_EVERY_S)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from threading import Event
 
 from fingervision.domain.board_settings import Role
-from fingervision.domain.errors import FingervisionError
+from fingervision.domain.errors import DeviceError
 from fingervision.testbed.board import wire
 from fingervision.testbed.board.board import Board
 from fingervision.testbed.clocks.clock import Clock
@@ -105,7 +105,7 @@ class Handshake:
                 return False
             if self.clock.now_s() > until_s:
                 self.board.stop()
-                raise FingervisionError(f"A motion was broken off, because {otherwise}: look at the wiring, and home.")
+                raise DeviceError(f"A motion was broken off, because {otherwise}: look at the wiring, and home.")
             self.board.wait(WAIT_S)
         return not self._ended()
 

@@ -11,7 +11,7 @@ from typing import Protocol
 
 import serial
 
-from fingervision.domain.errors import FingervisionError
+from fingervision.domain.errors import DeviceError, FingervisionError
 from fingervision.testbed.board import wire
 from fingervision.testbed.board.port import BAUD
 from fingervision.testbed.clocks.board_clock import ClockJoin, JoinedClock
@@ -108,7 +108,7 @@ class BoardLink:
     def check(self) -> None:
         """Raise a sentence if the connection is lost."""
         if self._failure is not None:
-            raise FingervisionError(self._failure)
+            raise DeviceError(self._failure)
 
     def wait(self, seconds: float) -> None:
         """Wait until something has come from the board, or for so long."""
@@ -138,7 +138,7 @@ class BoardLink:
                     raise BoardRefusalError(self._port.name, answer.reason)
                 if isinstance(answer, wire.Answer | wire.Identity):
                     return answer
-        raise FingervisionError(
+        raise DeviceError(
             f"The board on {self._port.name} must answer within {within_s:g} s, but did not, {TRIES} times: is it the "
             "right port, and is the sketch in fingervision/testbed/firmware uploaded?"
         )

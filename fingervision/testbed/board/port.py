@@ -7,7 +7,7 @@ from pathlib import Path
 import serial
 from serial.tools.list_ports import comports
 
-from fingervision.domain.errors import FingervisionError
+from fingervision.domain.errors import DeviceError
 
 BAUD = 115200
 PROGRAM = "fingervision"
@@ -60,9 +60,9 @@ def opened_port(name: str) -> serial.Serial:
     try:
         return serial.Serial(name, BAUD, timeout=READ_TIMEOUT_S, write_timeout=WRITE_TIMEOUT_S, exclusive=True)
     except ValueError as error:
-        raise FingervisionError(f"The board's port must be a serial port, but is {name!r} ({error}).") from error
+        raise DeviceError(f"The board's port must be a serial port, but is {name!r} ({error}).") from error
     except serial.SerialException as error:
-        raise FingervisionError(_why_closed(name, error)) from error
+        raise DeviceError(_why_closed(name, error)) from error
 
 
 def _why_closed(name: str, error: serial.SerialException) -> str:

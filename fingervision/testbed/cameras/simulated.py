@@ -6,7 +6,7 @@ from math import hypot
 import numpy as np
 
 from fingervision.domain.direction import Direction
-from fingervision.domain.errors import FingervisionError
+from fingervision.domain.errors import DataError
 from fingervision.domain.frame import Coding, Frame
 from fingervision.domain.response import Response
 from fingervision.frames.source import Description
@@ -173,7 +173,7 @@ class SimulatedCamera:
 def build(section: Section, context: BuildContext) -> SimulatedCamera:
     """Build it from its section of the configuration."""
     if context.gripper is None:
-        raise FingervisionError(
+        raise DataError(
             f"A simulated camera ({section.at('kind')}) must have a simulated gripper, but the bed has none: "
             "add a [gripper]."
         )

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 from threading import Condition, Thread
 from typing import cast
 
-from fingervision.domain.errors import FingervisionError
+from fingervision.domain.errors import DeviceError, FingervisionError
 from fingervision.domain.frame import Frame, LostFrame
 from fingervision.frames.received import LiveSource, Received
 from fingervision.frames.source import Wish, open_source
@@ -66,7 +66,7 @@ class SourceCamera:
             self._changed.wait_for(lambda: self._waiting or self._ended, self._patience_s)
             if not self._waiting:
                 why = self._ended or f"it gave no frame for {self._patience_s:g} s"
-                raise FingervisionError(
+                raise DeviceError(
                     f"The camera {self.description.name} must give frames while the bed works, but {why}: the motor "
                     "was stopped; check its cable."
                 )

@@ -5,7 +5,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from fingervision.domain.errors import FingervisionError
+from fingervision.domain.errors import DeviceError
 from fingervision.storage.toml_section import Section
 from fingervision.testbed.board.board import Board
 from fingervision.testbed.board.shared import KEY, board_of
@@ -65,7 +65,7 @@ class BoardForceSensor:
             self._board.wait(WAIT_S)
             samples = self._board.samples()
         if not samples:
-            raise FingervisionError(f"{self._board.name} must send force samples, but has sent none for a while.")
+            raise DeviceError(f"{self._board.name} must send force samples, but has sent none for a while.")
         clock = self._board.clock
         return tuple(
             Reading(sample.board_s, *clock.bounds_at(sample.board_s), self.force_n(sample.level)) for sample in samples

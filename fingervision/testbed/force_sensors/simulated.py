@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from fingervision.domain.errors import FingervisionError
+from fingervision.domain.errors import DataError
 from fingervision.storage.toml_section import Section
 from fingervision.testbed.build_context import BuildContext
 from fingervision.testbed.clocks.clock import Clock
@@ -82,7 +82,7 @@ class SimulatedForceSensor:
 def build(section: Section, context: BuildContext) -> SimulatedForceSensor:
     """Build it from its section of the configuration."""
     if context.gripper is None:
-        raise FingervisionError(
+        raise DataError(
             f"A simulated force sensor ({section.at('kind')}) must have a simulated gripper, but the bed has none: "
             "add a [gripper]."
         )

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from math import copysign, inf, isfinite
 from types import FrameType
 
-from fingervision.domain.errors import FingervisionError
+from fingervision.domain.errors import DeviceError, FingervisionError, LimitError, StateError
 from fingervision.testbed.bed import Bed
 
 LOOK_EVERY_S = 0.02
@@ -80,10 +80,10 @@ def move(bed: Bed, to_mm: float, speed_mm_s: float, looking: Looking | None = No
     """
     limits = bed.limits
     if not isfinite(to_mm):
-        raise FingervisionError(f"The target must be a finite number of mm, but is {to_mm:g}: nothing was moved.")
+        raise LimitError(f"The target must be a finite number of mm, but is {to_mm:g}: nothing was moved.")
     if not limits.lower_mm <= to_mm <= limits.upper_mm:
         beyond_mm = max(limits.lower_mm - to_mm, to_mm - limits.upper_mm)
-        raise FingervisionError(
+        raise LimitError(
             f"The target must lie within the bed's limits of {limits.lower_mm:g} to {limits.upper_mm:g} mm, but "
             f"{to_mm:g} mm is {beyond_mm:.4g} mm beyond: nothing was moved."
         )
@@ -111,7 +111,7 @@ def run_step(bed: Bed, number: int) -> float:
 
 def _check_speed(bed: Bed, speed_mm_s: float) -> None:
     if not 0.0 < speed_mm_s <= bed.limits.speed_mm_s:
-        raise FingervisionError(
+        raise LimitError(
             f"The speed must be positive and at most {bed.limits.speed_mm_s:g} mm/s, but is {speed_mm_s:g}: nothing "
             "was moved."
         )
@@ -137,7 +137,7 @@ def _watched(
             _check(bed, looking.force_n())
     except Interrupted:
         at_mm = looking.position_mm()
-        raise FingervisionError(f"Stopped: the motor stands near {at_mm:.3f} mm.") from None
+        raise StateError(f"Stopped: the motor stands near {at_mm:.3f} mm.") from None
     except FingervisionError:
         bed.actuator.stop()
         raise
@@ -147,8 +147,8 @@ def _watched(
 def _check(bed: Bed, force_n: float | None) -> None:
     alarm = bed.actuator.alarm
     if alarm is not None:
-        raise FingervisionError(f"The actuator has an alarm ({alarm.code}: {alarm.words}): the motor was stopped.")
+        raise DeviceError(f"The actuator has an alarm ({alarm.code}: {alarm.words}): the motor was stopped.")
     if force_n is not None and abs(force_n) > bed.limits.force_n:
-        raise FingervisionError(
+        raise LimitError(
             f"The force must stay below {bed.limits.force_n:g} N, but is {force_n:.3g} N: the motor was stopped."
         )

@@ -4,7 +4,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
-from fingervision.domain.errors import FingervisionError
+from fingervision.domain.errors import DataError
 from fingervision.domain.step_data import StepData
 from fingervision.storage.steps_toml import read_steps
 from fingervision.testbed.actuator import StageLimits
@@ -74,7 +74,7 @@ def _check_kept(data: StepData, bed_name: str) -> None:
     kept = read_steps(path)
     for number, step in data.steps.items():
         if kept.steps.get(number) != step:
-            raise FingervisionError(
+            raise DataError(
                 f"Step {number} must be the one that the motor controller keeps, but {path} has another: put these "
                 "steps into the controller with its maker's tool, and name them in the bed's configuration."
             )

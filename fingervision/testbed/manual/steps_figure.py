@@ -7,7 +7,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from fingervision.domain.errors import FingervisionError
+from fingervision.domain.errors import OutputError
 from fingervision.domain.step_data import Operation
 from fingervision.testbed.actuator import StageLimits
 from fingervision.testbed.motion.step_checks import PlannedMotion
@@ -52,7 +52,7 @@ def draw_steps(path: Path, name: str, motions: Sequence[PlannedMotion], limits: 
         part.replace(path)
     except OSError as error:
         part.unlink(missing_ok=True)
-        raise FingervisionError(f"The plot {path} could not be written ({error.strerror}).") from error
+        raise OutputError(f"The plot {path} could not be written ({error.strerror}).") from error
 
 
 def _draw_motion(upper: Axes, lower: Axes, planned: PlannedMotion, begin_s: float, standing_s: float) -> float:

@@ -4,7 +4,7 @@ import os
 import signal
 from time import monotonic, sleep
 
-from fingervision.domain.errors import FingervisionError
+from fingervision.domain.errors import DeviceError
 from fingervision.testbed.bed_factory import SIMULATED, open_bed, read_configuration
 from fingervision.testbed.device_kinds import kind_of
 
@@ -37,7 +37,7 @@ def stop_bed(name: str) -> str:
         until_s = monotonic() + LETS_GO_WITHIN_S
         while find_holder is not None and find_holder(section, top.path.parent) is not None:
             if monotonic() > until_s:
-                raise FingervisionError(
+                raise DeviceError(
                     f"Process {process} must let go of the bed within {LETS_GO_WITHIN_S:g} s, but does not: take the "
                     "motor's supply away."
                 )

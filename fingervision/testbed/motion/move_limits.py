@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from fingervision.domain.errors import FingervisionError
+from fingervision.domain.errors import LimitError
 from fingervision.testbed.actuator import StageLimits
 
 
@@ -15,12 +15,12 @@ def check_move(limits: StageLimits, to_mm: float, speed_mm_s: float) -> None:
         The sentence says the limit and what was asked for.
     """
     if not limits.lower_mm <= to_mm <= limits.upper_mm:
-        raise FingervisionError(
+        raise LimitError(
             f"The target must lie between {limits.lower_mm:g} and {limits.upper_mm:g} mm, but is {to_mm:g} mm: nothing "
             "was moved."
         )
     if speed_mm_s == 0.0:
-        raise FingervisionError("The speed must be positive, but is 0 mm/s: nothing was moved.")
+        raise LimitError("The speed must be positive, but is 0 mm/s: nothing was moved.")
     check_speed(limits, speed_mm_s)
 
 
@@ -33,7 +33,7 @@ def check_speed(limits: StageLimits, speed_mm_s: float) -> None:
         The sentence says the limit and what was asked for.
     """
     if not 0.0 <= speed_mm_s <= limits.speed_mm_s:
-        raise FingervisionError(
+        raise LimitError(
             f"The speed must be at most {limits.speed_mm_s:g} mm/s, but is {speed_mm_s:g} mm/s: nothing was moved."
         )
 

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from fingervision.domain.errors import FingervisionError
+from fingervision.domain.errors import LimitError
 from fingervision.domain.step_data import CycleTime, Step, StepData
 from fingervision.testbed.actuator import StageLimits
 from fingervision.testbed.motion.motion_profile import MotionProfile, profile, shortest_s
@@ -62,7 +62,7 @@ def planned(number: int, step: Step, from_mm: float, limits: StageLimits) -> Pla
     lower_mm, upper_mm = limits.lower_mm - ROUNDING, limits.upper_mm + ROUNDING
     if not lower_mm <= to_mm <= upper_mm:
         beyond_mm = max(limits.lower_mm - to_mm, to_mm - limits.upper_mm)
-        raise FingervisionError(
+        raise LimitError(
             f"Step {number} must end within the stroke of {limits.lower_mm:g} to {limits.upper_mm:g} mm, but from "
             f"{from_mm:g} mm it ends at {to_mm:g} mm, {beyond_mm:g} mm beyond: change its target_mm."
         )
@@ -70,14 +70,14 @@ def planned(number: int, step: Step, from_mm: float, limits: StageLimits) -> Pla
     motion = profile(to_mm - from_mm, step.entry, limits.speed_mm_s)
     accelerating_n = step.load_kg * max(motion.acceleration_mm_s2, motion.deceleration_mm_s2) / MM_PER_M
     if accelerating_n > limits.force_n * (1.0 + ROUNDING):
-        raise FingervisionError(
+        raise LimitError(
             f"Step {number} must need at most {limits.force_n:g} N, but {step.load_kg:g} kg at "
             f"{accelerating_n / step.load_kg:.3g} m/s2 need {accelerating_n:.3g} N: accelerate and decelerate by "
             f"at most {limits.force_n / step.load_kg * MM_PER_M:.0f} mm/s2."
         )
     pushing_n = step.pushing_force_n or 0.0
     if pushing_n > limits.force_n:
-        raise FingervisionError(
+        raise LimitError(
             f"Step {number} must push with at most {limits.force_n:g} N, but pushing_force_n is {pushing_n:g}."
         )
     return PlannedMotion(number, step, from_mm, to_mm, motion, max(accelerating_n, pushing_n))
@@ -88,13 +88,13 @@ def _check_speed(number: int, step: Step, way_mm: float, limits: StageLimits) ->
     if isinstance(entry, CycleTime):
         least_s = shortest_s(way_mm, limits.speed_mm_s, MM_PER_M * limits.force_n / step.load_kg)
         if entry.positioning_time_s < least_s * (1.0 - ROUNDING):
-            raise FingervisionError(
+            raise LimitError(
                 f"positioning_time_s of step {number} must be at least {_rounded_up(least_s):g} s for its "
                 f"{abs(way_mm):g} mm with {step.load_kg:g} kg (at most {limits.speed_mm_s:g} mm/s and "
                 f"{limits.force_n:g} N), but is {entry.positioning_time_s:g}."
             )
     elif entry.speed_mm_s > limits.speed_mm_s:
-        raise FingervisionError(
+        raise LimitError(
             f"speed_mm_s of step {number} must be at most {limits.speed_mm_s:g}, but is {entry.speed_mm_s:g}."
         )
 

@@ -6,7 +6,7 @@ A controller on parallel lines knows no other targets than those of its blocks.
 from collections.abc import Iterator, Mapping
 from math import copysign
 
-from fingervision.domain.errors import FingervisionError
+from fingervision.domain.errors import LimitError
 from fingervision.domain.step_data import Coordinates, CycleTime, Operation, Step
 from fingervision.testbed.motion.motion_profile import profile
 
@@ -57,14 +57,14 @@ def route(
         return max(slow_enough, key=lambda each: (-each[2], each[1], -len(each[0])))[0]
     if found:
         slowest = min(speed for _, speed, _ in found)
-        raise FingervisionError(
+        raise LimitError(
             f"The move to {to_mm:g} mm must not be faster than {speed_mm_s:g} mm/s, but the slowest step that leads "
             f"there goes at {slowest:.4g} mm/s: allow that, or give the controller a slower step."
         )
     targets = ", ".join(
         f"{each.target_mm:g}" for each in _moving(steps).values() if each.coordinates is Coordinates.ABSOLUTE
     )
-    raise FingervisionError(
+    raise LimitError(
         f"A step must lead to {to_mm:g} mm, but none does: the controller goes to {targets or 'no position'} mm, and "
         f"by its relative steps from there. Give it a step to {to_mm:g} mm, or change the move."
     )
@@ -114,7 +114,7 @@ def jog_step(steps: Mapping[int, Step], speed_mm_s: float, top_speed_mm_s: float
     fine = [number for number, speed in speeds.items() if speed <= abs(speed_mm_s) * (1.0 + SAME_SPEED)]
     if not fine:
         sign = "positive" if speed_mm_s > 0.0 else "negative"
-        raise FingervisionError(
+        raise LimitError(
             f"A jog at {speed_mm_s:g} mm/s must have a relative step with a {sign} target that is no faster, but the "
             "controller has none: give it one."
         )

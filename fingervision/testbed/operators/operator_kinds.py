@@ -2,7 +2,7 @@
 
 from dataclasses import replace
 
-from fingervision.domain.errors import FingervisionError
+from fingervision.domain.errors import StateError
 from fingervision.testbed.camera import BedCamera
 from fingervision.testbed.cameras.simulated import SHIFT_MM, SimulatedCamera
 from fingervision.testbed.operators.operator import Operator
@@ -30,7 +30,7 @@ class AtTheBed:
 
     def _ask(self, words: str) -> None:
         if TERMINAL.ask(f"{words} Press Enter when it is done: ") is None:
-            raise FingervisionError(
+            raise StateError(
                 f"The recipe asks the operator ({words.rstrip('.').lower()}), but nobody is at the terminal: run it "
                 "from one."
             )

@@ -7,7 +7,7 @@ import numpy as np
 
 from calib.errors import CalibrationError
 from calib.known_widths import KnownSize, find_widths
-from fingervision.domain.errors import FingervisionError
+from fingervision.domain.errors import DeviceError
 from fingervision.domain.frame import Frame
 from fingervision.measuring.scale import Scale
 from fingervision.vision.grey import to_grey
@@ -39,9 +39,9 @@ def measured_slot(frames: Sequence[Frame], size_mm: float, scale: Scale) -> dict
     try:
         widths = [find_widths([picture], px_per_mm=scale.px_per_mm)[0] for picture in pictures]
     except CalibrationError as error:
-        raise FingervisionError(f"The reference slot of {size_mm:g} mm must be seen, but: {error}") from error
+        raise DeviceError(f"The reference slot of {size_mm:g} mm must be seen, but: {error}") from error
     if not widths:
-        raise FingervisionError(f"The reference slot of {size_mm:g} mm must be seen, but the camera gave no frame.")
+        raise DeviceError(f"The reference slot of {size_mm:g} mm must be seen, but the camera gave no frame.")
     points = np.array([width.points_px for width in widths])
     u_px = np.array([width.u_width_px for width in widths])
     found = scale.distances(points, u_px, np.array([width.light for width in widths]))

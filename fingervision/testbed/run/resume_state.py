@@ -6,7 +6,7 @@ from datetime import datetime
 from pathlib import Path
 from typing import Any, NoReturn
 
-from fingervision.domain.errors import FingervisionError
+from fingervision.domain.errors import OutputError
 from fingervision.domain.recipe import Recipe
 from fingervision.storage.recorded_video import frames_in
 from fingervision.storage.run_files import EVENTS, RUN, VIDEO
@@ -41,7 +41,7 @@ def contents(path: Path) -> list[str]:
 
 def refuse_others(path: Path, held: str) -> NoReturn:
     """Say that a folder holds something that would be lost among what is to be written."""
-    raise FingervisionError(f"--out must be a new or empty folder, but {path} holds {held}: name another.")
+    raise OutputError(f"--out must be a new or empty folder, but {path} holds {held}: name another.")
 
 
 def remains(path: Path, recipe: Recipe[Section], digest: str) -> Remains | None:
@@ -61,20 +61,18 @@ def remains(path: Path, recipe: Recipe[Section], digest: str) -> Remains | None:
         refuse_others(path, held[0])
     about = _about(path)
     if about.get("complete"):
-        raise FingervisionError(
-            f"The run in {path} is finished already: name another folder with --out, or remove that one."
-        )
+        raise OutputError(f"The run in {path} is finished already: name another folder with --out, or remove that one.")
     if not read_samples(path / SAMPLES):
         # Nothing was recorded: there is nothing to go on with, and nothing to lose.
         (path / EVENTS).unlink(missing_ok=True)
         return None
     if about.get("recipe") != recipe.text:
-        raise FingervisionError(
+        raise OutputError(
             f"The run in {path} broke off, but was of another recipe ({about.get('name')}): go on with that one, or "
             "name another folder with --out."
         )
     if about.get("bed_digest") != digest:
-        raise FingervisionError(
+        raise OutputError(
             f"The run in {path} broke off, but was on another bed: go on with that one, or name another folder with "
             "--out."
         )
@@ -85,10 +83,11 @@ def remains(path: Path, recipe: Recipe[Section], digest: str) -> Remains | None:
 def _about(path: Path) -> dict[str, Any]:
     try:
         about: dict[str, Any] = json.loads((path / RUN).read_text(encoding="utf-8"))
-        if about.get("kind") != KIND:
-            refuse_others(path, "another run")
+        kind = about.get("kind")
     except (OSError, ValueError, AttributeError) as error:
-        raise FingervisionError(f"{path / RUN} could not be read ({error}): name another --out.") from error
+        raise OutputError(f"{path / RUN} could not be read ({error}): name another --out.") from error
+    if kind != KIND:
+        refuse_others(path, "another run")
     return about
 
 

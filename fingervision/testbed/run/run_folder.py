@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from calib.measured_scale import Calibration
-from fingervision.domain.errors import FingervisionError
+from fingervision.domain.errors import DataError, FingervisionError, OutputError
 from fingervision.domain.frame import Frame
 from fingervision.domain.recipe import Recipe
 from fingervision.storage.calibration_json import write_calibration
@@ -81,9 +81,12 @@ class BedRunFolder:
                     write_expected(path / SIMULATION, bed.model, bed.limits)
             self._samples = SamplesCsv(path / SAMPLES, go_on=bool(self.rows))
             self._video = RecordedVideo(path / VIDEO, None, keep=len(self.rows))
+        except FingervisionError:
+            self._lock.release()
+            raise
         except OSError as error:
             self._lock.release()
-            raise FingervisionError(
+            raise OutputError(
                 f"The folder {path} cannot be written ({error.strerror}): name another with --out."
             ) from error
         except BaseException:
@@ -98,7 +101,7 @@ class BedRunFolder:
         needed = int(frames * size_px[0] * size_px[1] * BYTES_PER_PX)
         free = shutil.disk_usage(self.path).free
         if needed > free:
-            raise FingervisionError(
+            raise OutputError(
                 f"The run needs up to {needed / 1e6:.0f} MB, but the disk of {self.path} has {free / 1e6:.0f} MB free: "
                 "make room, or name a folder on another disk. Nothing was moved."
             )
@@ -156,7 +159,7 @@ def rows_before(path: Path) -> list[SampleRow]:
     table = path / (JOINED if (path / JOINED).exists() else SAMPLES)
     rows = read_samples(table)
     if not rows:
-        raise FingervisionError(f"--after must be the folder of an earlier run on the bed, but {path} holds none.")
+        raise DataError(f"--after must be the folder of an earlier run on the bed, but {path} holds none.")
     return rows
 
 

@@ -4,7 +4,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from time import sleep
 
-from fingervision.domain.errors import FingervisionError
+from fingervision.domain.errors import DeviceError, FingervisionError, LimitError
 from fingervision.domain.frame import Frame
 from fingervision.domain.status import Status
 from fingervision.storage.gaps_csv import GapRow
@@ -75,10 +75,10 @@ class Watch:
         look = self.sight.look()
         alarm = self.bed.actuator.alarm
         if alarm is not None:
-            raise FingervisionError(f"The actuator has an alarm ({alarm.code}: {alarm.words}): the motor was stopped.")
+            raise DeviceError(f"The actuator has an alarm ({alarm.code}: {alarm.words}): the motor was stopped.")
         limit_n = min(self.below_force_n, self.bed.limits.force_n)
         if look.force_now_n is not None and abs(look.force_now_n) > limit_n and not self._closes:
-            raise FingervisionError(
+            raise LimitError(
                 f"The force must stay below {limit_n:g} N, but is {look.force_now_n:.3g} N at "
                 f"{self.sight.position.newest:.3f} mm: the motor was stopped."
             )
@@ -104,7 +104,7 @@ class Watch:
         self.record.write()
         gap_mm = measured.gap_mm
         if gap_mm is not None and gap_mm < self.bed.limits.gap_mm and not self._closes:
-            raise FingervisionError(
+            raise LimitError(
                 f"The gap must stay above {self.bed.limits.gap_mm:g} mm, but is {gap_mm:.4f} mm at "
                 f"{self.sight.position.newest:.3f} mm: the motor was stopped."
             )
@@ -117,7 +117,7 @@ class Watch:
             measured, words = self.sight.measure(self.look().shot.item())
             if measured.status is Status.OK:
                 return
-        raise FingervisionError(
+        raise DeviceError(
             f"The camera must see both fingers before anything moves, but does not: {words} Mend the view, and run the "
             "recipe again."
         )

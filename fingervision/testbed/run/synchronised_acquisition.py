@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fingervision.domain.errors import FingervisionError
+from fingervision.domain.errors import DataError
 from fingervision.domain.frame import Frame, LostFrame
 from fingervision.domain.gap import NoGap
 from fingervision.measuring.rows import Result, RowMaker
@@ -134,9 +134,9 @@ class Sight:
 
     def __init__(self, bed: Bed) -> None:
         if bed.camera is None:
-            raise FingervisionError("A run must be seen, but the bed has no camera: add a [camera].")
+            raise DataError("A run must be seen, but the bed has no camera: add a [camera].")
         if bed.scale is None:
-            raise FingervisionError(
+            raise DataError(
                 "A run must have a scale, but the bed has none: add a [scale] with px_per_mm or a calibration."
             )
         description = bed.camera.description

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from fingervision.domain.effect import Effect, History
-from fingervision.domain.errors import FingervisionError, UsageError
+from fingervision.domain.errors import DataError, UsageError
 from fingervision.effects import catalogue
 from fingervision.storage.toml_section import Section, read_document
 from fingervision.testbed.simulation.injected_effects import Hidden
@@ -96,7 +96,7 @@ def _sealed(path: Path) -> list[tuple[str, dict[str, float]]]:
         _inside(name, values)
         read.append((name, values))
     if not read:
-        raise FingervisionError(f"{path} must have at least one [[effect]], but has none.")
+        raise DataError(f"{path} must have at least one [[effect]], but has none.")
     return read
 
 

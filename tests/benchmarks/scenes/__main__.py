@@ -1,6 +1,6 @@
 """What the measuring makes of a lab's scenes, kind by kind.
 
-    python -m tests.benchmarks.scenes [gripped|whole|clutter|empty]... [--each 10] [--seed 1] [--only KIND...]
+    python -m tests.benchmarks.scenes [gripped|whole|clutter|things|empty]... [--each 10] [--seed 1] [--only KIND...]
         [--save FOLDER]
 
 Every frame is measured without options (any direction, dark or light fingers). Columns: frames; with a value; refused
@@ -22,6 +22,7 @@ import numpy as np
 from fingervision.domain.frame import Frame
 from fingervision.domain.gap import GapMeasurement
 from fingervision.vision.pipeline import Settings, measure_frame
+from tests.benchmarks.scenes.bench_things import THINGS
 from tests.benchmarks.scenes.canvas import Rng
 from tests.benchmarks.scenes.clutter import CLUTTER
 from tests.benchmarks.scenes.empty import EMPTY
@@ -33,6 +34,7 @@ SETS: dict[str, dict[str, Callable[[Rng], Shot]]] = {
     "gripped": GRIPPED,
     "whole": {"whole": whole},
     "clutter": CLUTTER,
+    "things": THINGS,
     "empty": EMPTY,
 }
 

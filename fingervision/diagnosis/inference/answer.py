@@ -1,0 +1,84 @@
+"""The answer of a search put beside the disagreement: how much of it stands."""
+
+from dataclasses import dataclass, replace
+
+from fingervision.diagnosis.inference.cross_validation import rms_mm
+from fingervision.diagnosis.inference.measuring_chain import Settings
+from fingervision.diagnosis.inference.position_map import NAME
+from fingervision.diagnosis.inference.search import Findings
+from fingervision.diagnosis.inference.verdict import Standing, standing
+from fingervision.diagnosis.input.observations import Observations
+from fingervision.diagnosis.noise.replicates import resolution
+from fingervision.domain.effect import Array
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Answer:
+    """What was found, and what stands with it.
+
+    Parameters
+    ----------
+    data : Observations
+        Measurement and model.
+    found : Findings
+        Of the search.
+    before_mm, after_mm : ndarray of float, shape (channels * n,)
+        Measured minus predicted, without and with the answer.
+    stands : Standing
+        How much of the disagreement the answer leaves.
+    """
+
+    data: Observations
+    found: Findings
+    before_mm: Array
+    after_mm: Array
+    stands: Standing
+
+    def values(self) -> Settings:
+        """Everything that was found: the effects, and the curve of a map."""
+        return _values(self.data, self.found)
+
+
+def judged(data: Observations, found: Findings) -> Answer:
+    """Put what was found beside the disagreement; names that leave it larger are taken back.
+
+    Parameters
+    ----------
+    data : Observations
+        Measurement and model.
+    found : Findings
+        Of the search.
+    """
+    before = data.stacked_mm - data.chain.stacked({})
+    after = data.stacked_mm - data.chain.stacked(_values(data, found))
+    stands = standing(data, found.problem, before, after)
+    digit = resolution(data.table.gap_mm) if data.recorded.commanded else 0.0
+    n, edges = data.chain.history.input_mm.size, data.chain.history.both_edges
+    is_larger = stands.after_mm > stands.before_mm or rms_mm(after, n, edges) > rms_mm(before, n, edges)
+    if is_larger or stands.before_mm < digit:
+        # What makes the disagreement larger, outliers included, explains nothing, and less than the digit of a reading
+        # that stands still is its rounding, the same in every hold.
+        data, found = without_names(data, found, None if stands.before_mm < digit else found.unknown)
+        after, stands = before, standing(data, found.problem, before, before)
+    return Answer(data, found, before, after, stands)
+
+
+def without_names(data: Observations, found: Findings, unknown: str | None) -> tuple[Observations, Findings]:
+    """Take every name back, the map's too.
+
+    Parameters
+    ----------
+    data, found
+        Measurement and what the search found.
+    unknown : str or None
+        Why no name is given.
+    """
+    nothing = replace(found, best=found.problem.nothing(), alternatives=(), unknown=unknown)
+    return replace(data, position_map=None, run_gains=None), nothing
+
+
+def _values(data: Observations, found: Findings) -> Settings:
+    """Everything that was found: the effects, and the curve of a map."""
+    if data.position_map is None:
+        return found.best.values
+    return {**found.best.values, NAME: data.position_map.values()}

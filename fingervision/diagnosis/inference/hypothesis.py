@@ -1,0 +1,132 @@
+"""A hypothesis: effects with parameters, and everything that it is judged by."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from fingervision.diagnosis.inference.measuring_chain import MeasuringChain
+from fingervision.diagnosis.noise.whitening import RunOffsets, Whitener
+from fingervision.domain.effect import Array, Effect
+from fingervision.domain.parameter import Parameter
+
+Point = dict[str, dict[str, float]]
+START_VARIANCE = 1.0 / 3.0
+"""Variance of a start state that may be anywhere between -1 and 1."""
+FORM_SHARE = 0.02
+"""By how much of what an effect changes the catalogue's form of it is typically off."""
+SMALL_SHARE = 0.05
+"""What the catalogue's form leaves over of the truth's is a few per cent of what was explained, no second name."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Explanation:
+    """Effects with their parameters, and how well they explain a target.
+
+    Parameters
+    ----------
+    names : tuple of str
+        Effects, in the order of the chain.
+    values : mapping of str to mapping of str to float
+        Estimates.
+    score : float
+        Chi-square with run offsets allowed for, plus the offsets' own penalty.
+    residual : ndarray of float, shape (m,)
+        Whitened target minus prediction.
+    covariance : ndarray of float, shape (p, p)
+        Of the parameters in their order; zero rows for those at a bound.
+    free : int
+        Parameters of the effects that are not at a bound.
+    sigma_mm : tuple of float
+        Spread of the run offsets under this explanation, one a channel.
+    starts_price : float
+        Price of the fitted start states: twice the logarithm of prior width over posterior width, summed.
+    """
+
+    names: tuple[str, ...]
+    values: Mapping[str, Mapping[str, float]]
+    score: float
+    residual: Array
+    covariance: Array
+    free: int
+    sigma_mm: tuple[float, ...]
+    starts_price: float = 0.0
+
+    def bic(self, samples: int) -> float:
+        """Schwarz's criterion: score plus the price of the free parameters and start states."""
+        return self.score + self.free * float(np.log(samples)) + self.starts_price
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Problem:
+    """Everything an explanation is judged by.
+
+    Parameters
+    ----------
+    chain : MeasuringChain
+        Model and history.
+    measured : ndarray of float, shape (m,)
+        Whitened measurement, channels stacked.
+    whitener, offsets
+        The observation model.
+    effects : mapping of str to Effect
+        Those that the data can show.
+    form_share : float
+        Share of what is explained that the form of an effect may leave over, as a ratio of amplitudes.
+    stalled : frozenset of str
+        Effects for which readings that stand at an end of the range speak.
+    mapped : float
+        Squared whitened length of what a map of position errors explains beside every explanation; 0 without one.
+    """
+
+    chain: MeasuringChain
+    measured: Array
+    whitener: Whitener
+    offsets: RunOffsets
+    effects: Mapping[str, Effect]
+    form_share: float = SMALL_SHARE
+    stalled: frozenset[str] = frozenset()
+    mapped: float = 0.0
+
+    def parameters(self, names: tuple[str, ...]) -> list[tuple[str, Parameter]]:
+        """List the parameters of some effects with the bounds that the data leave."""
+        found: list[tuple[str, Parameter]] = []
+        for name in names:
+            searched = self.effects[name].search(self.whitener.history)
+            found += [(name, parameter) for parameter in searched if not isinstance(parameter, str)]
+        return found
+
+    def only_run(self, column: Array, run: int | None) -> Array:
+        """Keep the rows of one run of a column of shape (m,) or all where `run` is None."""
+        if run is None or len(self.chain.history.runs) == 1:
+            return column
+        rows = self.chain.history.runs[run]
+        n = self.chain.history.input_mm.size
+        out = np.zeros_like(column)
+        for begin in range(0, column.size, n):
+            out[begin + rows.start : begin + rows.stop] = column[begin + rows.start : begin + rows.stop]
+        return out
+
+    def whitened(self, settings: Mapping[str, Mapping[str, float]]) -> Array:
+        """Predict and whiten; shape (m,)."""
+        return self.whitener.one(self.chain.stacked(settings))
+
+    def score(self, settings: Mapping[str, Mapping[str, float]]) -> float:
+        """Judge parameters as they are: chi-square with the best run offsets, plus those offsets' penalty."""
+        residual = self.measured - self.whitened(settings)
+        sigma, penalty = self.offsets.spread(residual)
+        return self.offsets.squared(residual, self.offsets.metric(sigma)) + penalty
+
+    def cost(self, settings: Mapping[str, Mapping[str, float]]) -> float:
+        """-2 log of the posterior, up to a constant: the score over all spreads of the runs instead of at the best."""
+        residual = self.measured - self.whitened(settings)
+        sigma, penalty = self.offsets.spread(residual)
+        metric = self.offsets.metric(sigma)
+        return self.offsets.squared(residual, metric) + penalty + self.offsets.doubt(residual)
+
+    def nothing(self) -> Explanation:
+        """Judge the model as it is."""
+        residual = self.measured - self.whitened({})
+        sigma, penalty = self.offsets.spread(residual)
+        score = self.offsets.squared(residual, self.offsets.metric(sigma)) + penalty
+        return Explanation((), {}, score, residual, np.zeros((0, 0)), 0, sigma)

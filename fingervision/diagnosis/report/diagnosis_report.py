@@ -1,0 +1,159 @@
+"""The report of a diagnosis, written from its answer."""
+
+import time
+
+import numpy as np
+
+from fingervision.diagnosis.design.further_evidence import further_evidence
+from fingervision.diagnosis.design.next_run import next_run
+from fingervision.diagnosis.inference.answer import Answer
+from fingervision.diagnosis.inference.cross_validation import left_out_rms_mm, rms_mm
+from fingervision.diagnosis.inference.hypothesis import Point
+from fingervision.diagnosis.inference.plausibility import Finding
+from fingervision.diagnosis.inference.position_map import NAME
+from fingervision.diagnosis.inference.search import Findings
+from fingervision.diagnosis.inference.verdict import verdict
+from fingervision.diagnosis.input.observations import Observations
+from fingervision.diagnosis.noise.replicates import PureError
+from fingervision.diagnosis.report.force_hint import force_hint
+from fingervision.diagnosis.report.residual_channels import by_channel, places
+from fingervision.diagnosis.report.sentences import answer, input_dominates, outliers, remaining, rows_beyond_model
+from fingervision.domain.parameter import Estimate
+from fingervision.domain.report import DiagnosisReport, Disagreement, NamedEffect
+from fingervision.effects import catalogue
+
+MEMBERS_SEPARATED = 5
+"""Explanations, best first, that the next run is designed to separate: the time it takes grows with their square."""
+
+RUNNERS_UP = 8
+"""Single effects, best first, that a report lists beside its answer; the rest explain next to nothing."""
+
+
+def diagnosis_report(
+    answered: Answer, posterior: tuple[Point, ...], mistake: Finding | None, rng: np.random.Generator, begin_s: float
+) -> DiagnosisReport:
+    """Write the answer down with its evidence and the next run.
+
+    Parameters
+    ----------
+    answered : Answer
+        What was found, and what stands.
+    posterior : tuple of dict
+        Draws of the best explanation's parameters, for what the next run will show.
+    mistake : Finding or None
+        What is wrong with the table itself.
+    rng : numpy.random.Generator
+        Of the bootstrap.
+    begin_s : float
+        When the diagnosis began, on the clock of `time.perf_counter`.
+    """
+    data, found, stands = answered.data, answered.found, answered.stands
+    best, mapped = found.best, data.position_map is not None
+    decided, unknown = verdict(found, mapped=mapped, stands=stands)
+    disagreement = _disagreement(answered)
+    effects = _named(data, found)
+    errors = data.measured_pure_errors(np.split(found.problem.whitener.aside, len(data.channels)))
+    members = tuple(e for e in found.alternatives if e.names)
+    alternatives = tuple(_with_map(e.names, mapped=mapped) for e in members) or (((NAME,),) if mapped else ())
+    proposal = next_run(data, found.problem, list(members[:MEMBERS_SEPARATED]), posterior, rng)
+    return DiagnosisReport(
+        verdict=decided,
+        sentence=answer(decided, unknown, effects, alternatives, disagreement),
+        effects=effects,
+        alternatives=alternatives,
+        where=places(data, found.problem, answered.before_mm, rng),
+        disagreement=disagreement,
+        explained_share=stands.explained_share,
+        standing_share=stands.share,
+        pure_error_mm=None if errors is None else errors[0].sd_mm,
+        smallest_seen=found.smallest,
+        unknown=unknown,
+        remaining=remaining(stands, found.left_over, best.sigma_mm),
+        next_run=proposal,
+        excluded=tuple({"name": name, "reason": reason} for name, reason in data.excluded.items()),
+        outliers=outliers(data, found.problem, answered.after_mm),
+        runners_up=tuple(
+            {
+                "effects": list(e.names),
+                "chi_square_more_than_best": e.score - best.score,
+                "distance": found.distances.get(e.names),
+            }
+            for e in found.singles[:RUNNERS_UP]
+            if e.names != best.names
+        ),
+        notes=(
+            *data.notes,
+            *data.refitted(),
+            *(() if mistake is None else (mistake.words,)),
+            *_trend(errors),
+            *force_hint(data, found.alternatives),
+            *further_evidence(found.alternatives),
+            *rows_beyond_model(data, best),
+            *input_dominates(data, found.problem),
+        ),
+        seconds=time.perf_counter() - begin_s,
+    )
+
+
+def _disagreement(answered: Answer) -> Disagreement:
+    """State the disagreement without and with the answer, in all and by channel."""
+    data, found = answered.data, answered.found
+    before, after = answered.before_mm, answered.after_mm
+    n, edges = data.chain.history.input_mm.size, data.chain.history.both_edges
+    channels = {
+        name: {
+            f"before_rms_{_unit(name)}": float(np.sqrt(np.mean(a**2))),
+            f"after_rms_{_unit(name)}": float(np.sqrt(np.mean(b**2))),
+        }
+        for (name, a), b in zip(by_channel(data, before).items(), by_channel(data, after).values(), strict=True)
+    }
+    noises = [noise.total_mm for noise in found.problem.whitener.noises]
+    noise_rms = float(np.sqrt(0.25 * noises[0] ** 2 + noises[1] ** 2)) if edges else noises[0]
+    unseen = left_out_rms_mm(data, found.problem, found.best)
+    return Disagreement(rms_mm(before, n, edges), rms_mm(after, n, edges), noise_rms, *unseen, channels)
+
+
+def _with_map(names: tuple[str, ...], *, mapped: bool) -> tuple[str, ...]:
+    return tuple(name for name in catalogue() if name in names or (mapped and name == NAME))
+
+
+def _trend(errors: list[PureError] | None) -> tuple[str, ...]:
+    """Say that repeats follow one another closer than they scatter: a drift, or a run-in."""
+    if errors is None or not errors[0].has_trend:
+        return ()
+    return (
+        "repeats of the same place drift or run in (neighbouring visits agree better than distant ones, by "
+        f"{errors[0].trend_sigmas:.1f} standard deviations): that was taken out of the pure error.",
+    )
+
+
+def _unit(channel: str) -> str:
+    return "n" if channel == "force" else "mm"
+
+
+def _named(data: Observations, found: Findings) -> tuple[NamedEffect, ...]:
+    listed = [entry for entry in found.problem.parameters(found.best.names) if entry[1].run is None]
+    root = np.sqrt(np.maximum(np.diag(found.best.covariance), 0.0))
+    out = {}
+    for name in found.best.names:
+        known = {
+            parameter.name: Estimate(
+                found.best.values[name][parameter.name], float(root[i]) if root[i] > 0.0 else None, parameter.unit
+            )
+            for i, (owner, parameter) in enumerate(listed)
+            if owner == name
+        }
+        effect = found.problem.effects[name]
+        # What these data cannot show stays at the value at which it does nothing.
+        still = {p.name: Estimate(p.neutral or 0.0, None, p.unit) for p in effect.parameters if p.name not in known}
+        ordered = {p.name: {**known, **still}[p.name] for p in effect.parameters}
+        shown = {p.name: p.words for p in (*effect.parameters, *(p for owner, p in listed if owner == name))}
+        out[name] = NamedEffect(name, str(effect.stage), {**ordered, **known}, shown=shown)
+    curve = data.position_map
+    if curve is not None:
+        described = {"rms_mm": curve.rms_mm, "length_mm": curve.length_mm}
+        points = tuple(zip(curve.nodes_mm.tolist(), curve.curve_mm.tolist(), strict=True))
+        entry = catalogue()[NAME]
+        shown = {p.name: p.words for p in entry.parameters}
+        out[NAME] = NamedEffect(NAME, str(entry.stage), described, points, shown=shown)
+    return tuple(out[name] for name in catalogue() if name in out)

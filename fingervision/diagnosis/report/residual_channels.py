@@ -1,0 +1,30 @@
+"""A residual split into its channels, and where in them it cannot be noise."""
+
+import numpy as np
+
+from fingervision.diagnosis.inference.hypothesis import Problem
+from fingervision.diagnosis.input.observations import Observations
+from fingervision.diagnosis.report.residual_localization import where
+from fingervision.domain.effect import Array
+from fingervision.domain.report import Place
+
+
+def by_channel(data: Observations, stacked: Array) -> dict[str, Array]:
+    """Split a stacked residual into gap and, where they were measured, left, right and midline."""
+    n = data.chain.history.input_mm.size
+    gap = stacked[:n]
+    out = {"gap": gap}
+    if data.chain.history.both_edges:
+        midline = stacked[n : 2 * n] - np.median(stacked[n : 2 * n])
+        out |= {"left": midline - 0.5 * gap, "right": midline + 0.5 * gap, "midline": midline}
+    if data.chain.history.force:
+        out["force"] = stacked[-n:]
+    return out
+
+
+def places(data: Observations, problem: Problem, residual: Array, rng: np.random.Generator) -> tuple[Place, ...]:
+    """Say where a residual cannot be noise."""
+    noises = dict(zip(data.channels, problem.whitener.noises, strict=True))
+    n = data.chain.history.input_mm.size
+    aside = problem.whitener.aside[:n]
+    return where(by_channel(data, residual), noises, data.chain.history, aside, rng)

@@ -1,0 +1,261 @@
+"""GenICam cameras (GigE Vision, USB3 Vision, CoaXPress) by their maker's GenTL producer; needs the extra `genicam`.
+
+A camera's name is `genicam:PRODUCER.cti`, or `genicam:PRODUCER.cti#SERIAL` where several cameras are there. The
+producer is the file that the camera's maker installs (GenICam GenTL Standard, EMVA, 2019); `harvesters` reads it.
+Tested against Viky, the simulated camera that comes with the GenICam reference implementation; not on hardware.
+"""
+
+from collections.abc import Iterator, Mapping
+from itertools import count
+from pathlib import Path
+from threading import Event
+from time import monotonic
+from typing import Any
+
+import av
+import numpy as np
+from numpy.typing import NDArray
+
+from fingervision.domain.errors import DeviceError, InputFileError, MissingLibraryError
+from fingervision.domain.frame import Coding, Frame, LostFrame, Pixels
+from fingervision.domain.status import Status
+from fingervision.frames.received import Received
+from fingervision.frames.source import Description, Wish
+
+START = "genicam:"
+MONO = ("Mono8", "Mono10", "Mono12", "Mono14", "Mono16")
+"""Grey levels of which each has one or two bytes of its own, as the PFNC names them (EMVA, Pixel Format Naming)."""
+NODES = {"exposure_ms": ("ExposureTime", 1e3), "gain": ("Gain", 1.0)}
+"""Feature of the Standard Features Naming Convention for what may be asked, and its units in ours."""
+SILENT_S, ASKED_EVERY_S = 2.0, 0.2
+"""A camera that sends nothing for so long is gone; so often it is looked whether the source was closed."""
+
+
+def accepts(name: str) -> bool:
+    """Whether this names a GenICam camera."""
+    return name.startswith(START)
+
+
+def open_frames(name: str, wish: Wish) -> "GenicamFrames":
+    """Open a camera.
+
+    Raises
+    ------
+    MissingLibraryError
+        harvesters is not installed.
+    InputFileError
+        The producer's file is not there.
+    DeviceError
+        There is no such camera, somebody else has it, or it gives no grey levels.
+    """
+    return GenicamFrames(name, wish)
+
+
+class GenicamFrames:
+    """A camera that is open. Times are the camera's own where it states them, else the host's on arrival.
+
+    Parameters
+    ----------
+    name : str
+        As the module says.
+    wish : Wish
+        Size, rate, exposure (ms) and gain that the camera is asked for.
+    """
+
+    template: av.VideoStream | None = None
+
+    def __init__(self, name: str, wish: Wish) -> None:
+        self.name = name
+        self._closed = Event()
+        self._harvester, self._camera = _connected(name)
+        nodes = self._camera.remote_device.node_map
+        notes = _ask(nodes, wish)
+        self._format = _value(nodes, "PixelFormat")
+        if self._format not in MONO:
+            self._release()
+            raise DeviceError(
+                f"The camera {name} must give grey levels ({', '.join(MONO)}), but has {self._format} alone: choose "
+                "another camera."
+            )
+        try:
+            self._camera.start()
+            first = self._camera.fetch(timeout=SILENT_S)
+        except Exception as error:  # a producer has classes of its own
+            self._release()
+            raise DeviceError(f"The camera {name} is open but gives no picture ({_said(error)}).") from error
+        self.has_own_clock = _own_time_s(first) is not None
+        picture = first.payload.components[0]
+        rate_hz = _value(nodes, "AcquisitionFrameRate")
+        self.description = Description(
+            name=name,
+            kind="camera (GenICam)",
+            codec=self._format,
+            coding=Coding.LOSSLESS,
+            width_px=int(picture.width),
+            height_px=int(picture.height),
+            rate_hz=float(rate_hz) if rate_hz else None,
+            has_times=True,
+            frame_count=None,
+            notes=notes,
+            camera=_settings(nodes),
+        )
+        first.queue()
+
+    def __iter__(self) -> Iterator[Frame | LostFrame]:
+        """Frames as they come."""
+        for received in self.received():
+            yield received.item
+
+    def received(self) -> Iterator[Received]:
+        """Frames as they come, until the camera is closed or gone.
+
+        Raises
+        ------
+        DeviceError
+            It sends nothing any more.
+        """
+        try:
+            for index in count():
+                buffer = self._next()
+                if buffer is None:
+                    return
+                arrived_s = monotonic()
+                try:
+                    item = self._item(buffer, index, arrived_s)
+                finally:
+                    buffer.queue()
+                yield Received(item, arrived_s)
+        finally:
+            self._release()
+
+    def close(self) -> None:
+        """End the iteration with the next frame."""
+        self._closed.set()
+
+    def _next(self) -> Any:
+        """The next buffer; None once the source is closed."""
+        silent_since_s = monotonic()
+        while not self._closed.is_set():
+            try:
+                buffer = self._camera.try_fetch(timeout=ASKED_EVERY_S)
+            except Exception as error:
+                raise DeviceError(f"The camera {self.name} cannot be read any more ({_said(error)}).") from error
+            if buffer is not None:
+                return buffer
+            if monotonic() - silent_since_s > SILENT_S:
+                raise DeviceError(f"The camera {self.name} sends nothing any more: is it plugged in?")
+        return None
+
+    def _item(self, buffer: Any, index: int, arrived_s: float) -> Frame | LostFrame:
+        own_s = _own_time_s(buffer) if self.has_own_clock else None
+        time_s = own_s if self.has_own_clock else arrived_s
+        parts = buffer.payload.components
+        size = self.description.height_px, self.description.width_px
+        if not parts or not buffer.module.is_complete or parts[0].data.size != size[0] * size[1]:
+            words = "The camera's picture arrived without all of its packets: check the network and its packet size."
+            return LostFrame(index, time_s, Status.DAMAGED, words)
+        return Frame(levels(parts[0].data, size), index, time_s, Coding.LOSSLESS)
+
+    def _release(self) -> None:
+        for act in (self._camera.stop, self._camera.destroy, self._harvester.reset):
+            try:
+                act()
+            except Exception:
+                continue
+
+
+def levels(data: NDArray[np.generic], size: tuple[int, int]) -> Pixels:
+    """Grey levels of a buffer, which the producer fills again: a copy of shape (height, width)."""
+    pixels: Pixels = np.array(data).reshape(size)
+    return pixels
+
+
+def _connected(name: str) -> tuple[Any, Any]:
+    """Open the producer and the camera."""
+    try:
+        from harvesters.core import Harvester
+    except ImportError as error:
+        raise MissingLibraryError("harvesters", "genicam", f"The camera {name}") from error
+    file, _, serial = name.removeprefix(START).partition("#")
+    if not Path(file).is_file():
+        raise InputFileError(
+            f"There is no GenTL producer {file}: name the .cti file that the camera's maker installs, as in "
+            f"{START}/opt/maker/lib/producer.cti."
+        )
+    harvester = Harvester()
+    try:
+        harvester.add_file(str(Path(file).resolve()))
+        harvester.update()
+        found = [str(each.serial_number) for each in harvester.device_info_list]
+    except Exception as error:
+        harvester.reset()
+        raise DeviceError(f"{file} must be a GenTL producer, but cannot be used as one ({_said(error)}).") from error
+    if not found or (serial and serial not in found):
+        harvester.reset()
+        which = f"with the serial number {serial} " if serial else ""
+        there = f"those found: {', '.join(found)}" if found else "none was found"
+        raise DeviceError(f"{file} must show a camera {which}but does not ({there}): is it plugged in?")
+    try:
+        return harvester, harvester.create({"serial_number": serial} if serial else 0)
+    except Exception as error:
+        harvester.reset()
+        raise DeviceError(
+            f"The camera {name} cannot be opened ({_said(error)}): close the other program that uses it."
+        ) from error
+
+
+def _ask(nodes: Any, wish: Wish) -> tuple[str, ...]:
+    """Ask for what is wished, and for grey levels; give a sentence for each thing that the camera does not take."""
+    asked: dict[str, Any] = {}
+    if _value(nodes, "PixelFormat") not in MONO:
+        asked["PixelFormat"] = next((each for each in MONO if each in _choices(nodes, "PixelFormat")), None)
+    if wish.size_px is not None:
+        asked["Width"], asked["Height"] = wish.size_px
+    if wish.rate_hz is not None:
+        asked["AcquisitionFrameRateEnable"], asked["AcquisitionFrameRate"] = True, float(wish.rate_hz)
+    for name, (node, factor) in NODES.items():
+        value = getattr(wish.camera, name)
+        if value is not None:
+            asked[node] = factor * value
+    notes = []
+    for node, value in asked.items():
+        try:
+            if value is not None:
+                getattr(nodes, node).value = value
+        except Exception as error:  # not there, not now, beyond its range: each producer has its own class
+            if node != "AcquisitionFrameRateEnable":  # many cameras have no such switch, and need none
+                notes.append(f"The camera was asked for {node} = {value:g}, and did not take it ({_said(error)}).")
+            continue
+    return tuple(notes)
+
+
+def _settings(nodes: Any) -> Mapping[str, str]:
+    units = {"AcquisitionFrameRate": "Hz", "ExposureTime": "us", "Gain": "dB", "PixelFormat": ""}
+    found = {node: _value(nodes, node) for node in units}
+    return {node: f"{value} {units[node]}".strip() for node, value in found.items() if value is not None}
+
+
+def _value(nodes: Any, node: str) -> Any:
+    try:
+        return getattr(nodes, node).value
+    except Exception:  # the camera has no such feature, or does not tell it now
+        return None
+
+
+def _choices(nodes: Any, node: str) -> tuple[str, ...]:
+    try:
+        return tuple(getattr(nodes, node).symbolics)
+    except Exception:
+        return ()
+
+
+def _own_time_s(buffer: Any) -> float | None:
+    """When the camera says that it took the picture, seconds of its own clock; None where it does not."""
+    try:
+        return 1e-9 * float(buffer.timestamp_ns)
+    except Exception:
+        return None
+
+
+def _said(error: Exception) -> str:
+    return f"{type(error).__name__}: {error}".replace("\n", " ")[:200].rstrip(". :")

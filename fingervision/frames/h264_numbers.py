@@ -1,0 +1,246 @@
+"""Numbers that H.264 writes before every picture, by which a picture that never came is noticed."""
+
+from dataclasses import dataclass
+
+# Kinds of NAL units (ITU-T H.264, table 7-1).
+PICTURE, KEY_PICTURE, SUPPLEMENT, SEQUENCE, PICTURE_SET = 1, 5, 6, 7, 8
+RECOVERY_POINT = 6
+# Profiles whose sequence parameters begin with the format of colours (7.3.2.1.1).
+HIGH_PROFILES = frozenset({44, 83, 86, 100, 110, 118, 122, 128, 134, 135, 138, 139, 244})
+# Headers are far shorter; what is longer is not looked at.
+HEADER_BYTES = 96
+MOST_ZEROS = 32
+INTRA_SLICES = frozenset({2, 7})
+
+
+@dataclass(frozen=True, slots=True)
+class CodedPicture:
+    """What a picture's first slice header says.
+
+    Parameters
+    ----------
+    is_key : bool
+        Whether decoding can begin with it (an instantaneous decoding refresh): numbers start again.
+    is_reference : bool
+        Whether other pictures may hang on it.
+    is_field : bool
+        Whether it is every second line of a picture.
+    is_intra : bool
+        Whether its first slice hangs on no other picture.
+    number : int
+        `frame_num`: one more than that of the reference picture before it, modulo `modulus`.
+    modulus : int
+        2 ** log2_max_frame_num.
+    may_leap : bool
+        Whether the stream allows numbers to be left out (temporal layers that were taken out).
+    recovers_after : int or None
+        Where it carries a recovery point: after so many reference pictures everything is as it should be, to the bit.
+    """
+
+    is_key: bool
+    is_reference: bool
+    is_field: bool
+    is_intra: bool
+    number: int
+    modulus: int
+    may_leap: bool
+    recovers_after: int | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class _Sequence:
+    number_bits: int
+    may_leap: bool
+    frames_only: bool
+    separate_colours: bool
+
+
+class H264Numbers:
+    """Reads slice headers (ITU-T H.264, 7.3.3); keeps the parameter sets that they refer to.
+
+    Parameters
+    ----------
+    extradata : bytes or None
+        Parameter sets of the container: `avcC` (ISO/IEC 14496-15, 5.3.3) or a byte stream (annex B).
+    """
+
+    def __init__(self, extradata: bytes | None) -> None:
+        self._sequences: dict[int, _Sequence] = {}
+        self._sequence_of: dict[int, int] = {}
+        self._length_bytes = 0  # in front of every unit; 0 where start codes part them
+        extradata = extradata or b""
+        if len(extradata) > 6 and extradata[0] == 1:
+            self._length_bytes = (extradata[4] & 3) + 1
+            for unit in _of_avcc(extradata):
+                self._learn(unit)
+        else:
+            for unit in _between_start_codes(extradata):
+                self._learn(unit)
+
+    def of(self, packet: bytes) -> CodedPicture | None:
+        """Read a packet; None where it holds no picture that can be read."""
+        recovers_after = None
+        try:
+            units = _after_lengths(packet, self._length_bytes) if self._length_bytes else _between_start_codes(packet)
+            for unit in units:
+                kind = unit[0] & 0x1F
+                if kind in (SEQUENCE, PICTURE_SET):
+                    self._learn(unit)
+                elif kind == SUPPLEMENT:
+                    recovers_after = _recovery(unit)
+                elif kind in (PICTURE, KEY_PICTURE):
+                    return self._picture(unit, recovers_after)
+        except (IndexError, KeyError, ValueError):
+            return None
+        return None
+
+    def _learn(self, unit: bytes) -> None:
+        bits = _Bits(unit)
+        try:
+            if unit[0] & 0x1F == SEQUENCE:
+                name, sequence = _sequence(bits)
+                self._sequences[name] = sequence
+            elif unit[0] & 0x1F == PICTURE_SET:
+                name = bits.golomb()
+                self._sequence_of[name] = bits.golomb()
+        except (IndexError, ValueError):
+            return
+
+    def _picture(self, unit: bytes, recovers_after: int | None) -> CodedPicture:
+        bits = _Bits(unit)
+        bits.golomb()  # first macroblock
+        is_intra = bits.golomb() in INTRA_SLICES
+        sequence = self._sequences[self._sequence_of[bits.golomb()]]
+        if sequence.separate_colours:
+            bits.take(2)
+        number = bits.take(sequence.number_bits)
+        is_field = not sequence.frames_only and bool(bits.take(1))
+        return CodedPicture(
+            is_key=unit[0] & 0x1F == KEY_PICTURE,
+            is_reference=bool(unit[0] & 0x60),
+            is_field=is_field,
+            is_intra=is_intra,
+            number=number,
+            modulus=1 << sequence.number_bits,
+            may_leap=sequence.may_leap,
+            recovers_after=recovers_after,
+        )
+
+
+class _Bits:
+    """Bits of a unit behind its first byte, without the bytes that keep start codes out (7.3.1)."""
+
+    def __init__(self, unit: bytes) -> None:
+        content = unit[1 : 1 + HEADER_BYTES].replace(b"\0\0\3", b"\0\0")
+        self._bits, self._left = int.from_bytes(content, "big"), 8 * len(content)
+
+    def take(self, count: int) -> int:
+        """Read an unsigned number of so many bits; IndexError behind the end."""
+        self._left -= count
+        if self._left < 0:
+            raise IndexError
+        return (self._bits >> self._left) & ((1 << count) - 1)
+
+    def golomb(self) -> int:
+        """Read an unsigned number of the Exp-Golomb code (9.1)."""
+        zeros = 0
+        while not self.take(1):
+            zeros += 1
+            if zeros > MOST_ZEROS:
+                raise ValueError
+        return (1 << zeros) - 1 + self.take(zeros)
+
+
+def _sequence(bits: _Bits) -> tuple[int, _Sequence]:
+    """Read sequence parameters (7.3.2.1.1) as far as the first that is needed here goes."""
+    profile = bits.take(8)
+    bits.take(16)
+    name = bits.golomb()
+    separate = False
+    if profile in HIGH_PROFILES:
+        colours = bits.golomb()
+        separate = colours == 3 and bool(bits.take(1))
+        bits.golomb()
+        bits.golomb()
+        bits.take(1)
+        if bits.take(1):
+            for k in range(12 if colours == 3 else 8):
+                if bits.take(1):
+                    _skip_scaling(bits, 16 if k < 6 else 64)
+    number_bits = bits.golomb() + 4
+    order = bits.golomb()
+    if order == 0:
+        bits.golomb()
+    elif order == 1:
+        bits.take(1)
+        bits.golomb()
+        bits.golomb()
+        for _ in range(bits.golomb()):
+            bits.golomb()
+    bits.golomb()
+    may_leap = bool(bits.take(1))
+    bits.golomb()
+    bits.golomb()
+    return name, _Sequence(number_bits, may_leap, bool(bits.take(1)), separate)
+
+
+def _skip_scaling(bits: _Bits, count: int) -> None:
+    last = following = 8
+    for _ in range(count):
+        if following:
+            code = bits.golomb()
+            following = (last + ((code + 1) // 2 if code % 2 else -code // 2)) % 256
+        last = following or last
+
+
+def _recovery(unit: bytes) -> int | None:
+    """Reference pictures until everything is right to the bit; None where no recovery point promises that (D.1.8)."""
+    content = unit.replace(b"\0\0\3", b"\0\0")
+    at = 1
+    while at + 2 < len(content):
+        kind = size = 0
+        while content[at] == 255:
+            kind, at = kind + 255, at + 1
+        kind, at = kind + content[at], at + 1
+        while content[at] == 255:
+            size, at = size + 255, at + 1
+        size, at = size + content[at], at + 1
+        if kind == RECOVERY_POINT:
+            bits = _Bits(b"\6" + content[at : at + size])
+            count, is_exact, is_broken = bits.golomb(), bits.take(1), bits.take(1)
+            return count if is_exact and not is_broken else None
+        at += size
+    return None
+
+
+def _between_start_codes(content: bytes) -> "list[bytes]":
+    units = content.split(b"\0\0\1")[1:]
+    return [unit for unit in units if unit]
+
+
+def _after_lengths(content: bytes, length_bytes: int) -> "list[bytes]":
+    units, at = [], 0
+    while at + length_bytes < len(content):
+        size = int.from_bytes(content[at : at + length_bytes], "big")
+        at += length_bytes
+        if not size or at + size > len(content):
+            raise ValueError
+        units.append(content[at : at + size])
+        at += size
+    return units
+
+
+def _of_avcc(record: bytes) -> "list[bytes]":
+    """Parameter sets of a decoder configuration record."""
+    units, at = [], 5
+    for mask in (0x1F, 0xFF):
+        if at >= len(record):
+            break
+        count, at = record[at] & mask, at + 1
+        for _ in range(count):
+            size = int.from_bytes(record[at : at + 2], "big")
+            unit = record[at + 2 : at + 2 + size]
+            if unit:
+                units.append(unit)
+            at += 2 + size
+    return units

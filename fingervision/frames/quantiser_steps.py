@@ -1,0 +1,73 @@
+"""The quantiser of every block of a decoded picture, as the decoder read it in the stream.
+
+FFmpeg gives it where it is asked (`export_side_data=venc_params`, libavutil/video_enc_params.h) for H.264, VP9 and the
+MPEG family to MPEG-4 part 2; for other codecs nothing is known.
+"""
+
+import struct
+from typing import Any
+
+import av
+import numpy as np
+from numpy.typing import NDArray
+
+from fingervision.domain.quantiser import BLOCK_PX, Quantiser
+
+# The decoder's option that brings them.
+EXPORTED = {"export_side_data": "venc_params"}
+SIDE_DATA = "VIDEO_ENC_PARAMS"
+# enum AVVideoEncParamsType.
+VP9, H264, MPEG = 0, 1, 2
+# ITU-T H.264 (2021), 8.5.9: the step is 1 at a parameter of 4 and doubles with every six, at 8 bits.
+H264_UNIT, H264_DOUBLES = 4.0, 6.0
+# libvpx, vp9_quant_common.c: steps begin at 4 and 8 for a transform of gain 8; they grow by 1, or by this where it is
+# more.
+VP9_LOSSLESS, VP9_FIRST, VP9_GROWTH, VP9_GAIN, VP9_COUNT = 4.0, 8, 1.01975, 8.0, 256
+# ISO/IEC 14496-2, 7.4.4: coefficients are multiples of twice the quantiser, which is what FFmpeg states.
+# What a coder leaves alone, as a share of its step against H.264's: the MPEG family rounds differences to zero below
+# 1.25 steps (H.263's quantiser) where H.264 does so below 0.6 to 0.8; VP9's coders round nearer, and filter the rest.
+# Measured with `python -m tests.benchmarks.compressed_video --only mpeg4-1-upright vp9-1-upright`.
+MPEG_LEAVES, VP9_LEAVES = 2.0, 0.5
+
+
+def _vp9_steps() -> NDArray[np.float64]:
+    found = [VP9_FIRST]
+    while len(found) < VP9_COUNT - 1:
+        found.append(max(int(found[-1] * VP9_GROWTH), found[-1] + 1))
+    return np.array([VP9_LOSSLESS, *found]) / VP9_GAIN
+
+
+VP9_STEPS = _vp9_steps()
+
+
+def quantiser_steps(picture: av.VideoFrame) -> Quantiser | None:
+    """Steps of a decoded picture as H.264 would have them; None where its codec says nothing of them.
+
+    Parameters
+    ----------
+    picture : av.VideoFrame
+        As decoded, with `EXPORTED` among the decoder's options.
+    """
+    carried: Any = picture.side_data  # PyAV's stubs call its items strings
+    found = next((each for each in carried if each.type.name == SIDE_DATA), None)
+    if found is None:
+        return None
+    data = bytes(found)
+    count, blocks_at, size, kind, base = struct.unpack_from("@IxxxxQQii", data)
+    shape = (-(-picture.height // BLOCK_PX), -(-picture.width // BLOCK_PX))
+    if kind == VP9 and not count:  # one for the whole picture, unless it has segments
+        step = VP9_LEAVES * VP9_STEPS[min(max(base, 0), VP9_COUNT - 1)]
+        return Quantiser(np.full(shape, step, dtype=np.float32))
+    if not count or kind not in (H264, MPEG):
+        return None
+    blocks: NDArray[np.int32] = np.frombuffer(data, np.int32, count * (size // 4), blocks_at).reshape(count, size // 4)
+    x, y, parameter = blocks[:, 0] // BLOCK_PX, blocks[:, 1] // BLOCK_PX, base + blocks[:, 4].astype(np.float32)
+    is_inside = (x >= 0) & (y >= 0) & (x < shape[1]) & (y < shape[0])
+    bits = picture.format.components[0].bits
+    if kind == H264:
+        steps = 2.0 ** ((parameter - H264_UNIT) / H264_DOUBLES) / 2.0 ** (bits - 8)
+    else:
+        steps = MPEG_LEAVES * parameter
+    step = np.full(shape, np.float32(np.max(steps, initial=0.0)), dtype=np.float32)
+    step[y[is_inside], x[is_inside]] = steps[is_inside]
+    return Quantiser(step)

@@ -1,0 +1,115 @@
+"""Whether a coded picture follows the one that it hangs on: a picture that never came leaves a hole in the numbers."""
+
+from collections import deque
+from enum import Enum
+from statistics import median
+
+import av
+
+from fingervision.frames.h264_numbers import CodedPicture, H264Numbers
+
+# Steps in time that tell the usual one.
+STEPS = 8
+# A step longer than this share of the usual one leaves a picture out; times may be rounded, or jitter on a network.
+LEAP_SHARE = 1.5
+
+
+class Link(Enum):
+    """What the numbers say of a picture: it follows, something that it may hang on is missing, or they say nothing."""
+
+    FOLLOWS = "follows"
+    BROKEN = "broken"
+    UNKNOWN = "unknown"
+
+
+class ReferenceChain:
+    """Follows the numbers of H.264 pictures in the order of decoding (ITU-T H.264, 7.4.3, `frame_num`).
+
+    A decoder that gets no picture conceals nothing and says nothing: it takes the differences of the next picture to
+    whatever came before. Pictures on which no other hangs (most of those between two others in time) may be missing
+    without any harm, and are told apart. HEVC needs no such rule: its pictures name those that they hang on, and FFmpeg
+    says which of them it has not. Other codecs write no numbers; there nothing is said.
+
+    Memory management that sets numbers back amid a stream (operation 5) is not looked for, since no camera is known to
+    use it; pictures behind it would be taken for broken until the next key frame.
+
+    Parameters
+    ----------
+    codec : str
+        FFmpeg's name.
+    extradata : bytes or None
+        The container's parameter sets.
+    """
+
+    def __init__(self, codec: str, extradata: bytes | None) -> None:
+        self._numbers = H264Numbers(extradata) if codec == "h264" else None
+        self._before: CodedPicture | None = None  # last reference picture
+        self._steps: deque[int] = deque(maxlen=STEPS)
+        self._tick: int | None = None
+        self._since_key, self._has_seen_key = 0, False
+        self._key_every: int | None = None
+        self._recovering: tuple[int, int] | None = None  # number at which all is right again, pictures since it began
+        self.recovered_over: int | None = None
+        """How many pictures ago the recovery began that the last picture completes; None where it completes none."""
+
+    def link(self, packet: "av.Packet[av.VideoStream]") -> Link:
+        """Look at the next packet."""
+        missing = self._missing(packet.dts)
+        self.recovered_over = None
+        picture = self._numbers.of(bytes(packet)) if self._numbers is not None else None
+        if picture is None:
+            return Link.UNKNOWN
+        link = self._judged(picture, missing)
+        self._since_key += 1 + missing
+        if picture.is_key:
+            if self._has_seen_key:
+                self._key_every = min(self._key_every or self._since_key, self._since_key)
+            self._since_key, self._has_seen_key = 0, True
+        self._follow_recovery(picture)
+        if picture.is_reference:
+            self._before = picture
+        return link
+
+    def _judged(self, picture: CodedPicture, missing: int) -> Link:
+        before = self._before
+        if picture.is_key:
+            return Link.FOLLOWS
+        if before is None:
+            return Link.UNKNOWN
+        step = (picture.number - before.number) % picture.modulus
+        if step == 0 and (picture.is_field or not picture.is_reference):
+            return Link.FOLLOWS
+        if step == 1:
+            return Link.BROKEN if self._may_hide_a_key(before, missing, picture.modulus) else Link.FOLLOWS
+        # Without others all pictures are whole; some cameras then do not count.
+        if step == 0 and picture.is_intra and before.is_intra:
+            return Link.UNKNOWN
+        # Numbers may be left out on purpose: pictures are missing only where time leaps too.
+        return Link.UNKNOWN if picture.may_leap and step and not missing else Link.BROKEN
+
+    def _may_hide_a_key(self, before: CodedPicture, missing: int, modulus: int) -> bool:
+        """Whether so many pictures may be missing that the numbers, set back or once around, come out the same."""
+        if missing >= modulus:
+            return True
+        is_due = self._key_every is None or self._since_key + 1 + missing >= self._key_every
+        return missing > before.number and is_due
+
+    def _missing(self, tick: int | None) -> int:
+        """Pictures that are missing before this one, as far as the times tell."""
+        step = None if self._tick is None or tick is None else tick - self._tick
+        self._tick = tick
+        if step is None or step <= 0:
+            return 0
+        usual = median(self._steps) if self._steps else step
+        self._steps.append(step)
+        return round(step / usual) - 1 if step > LEAP_SHARE * usual else 0
+
+    def _follow_recovery(self, picture: CodedPicture) -> None:
+        if self._recovering is not None:
+            self._recovering = self._recovering[0], self._recovering[1] + 1
+        if picture.recovers_after is not None:
+            # One that begins before the last is complete would end later: the last stays.
+            target = (picture.number + picture.recovers_after) % picture.modulus
+            self._recovering = self._recovering or (target, 0)
+        if self._recovering is not None and picture.is_reference and picture.number == self._recovering[0]:
+            self.recovered_over, self._recovering = self._recovering[1], None

@@ -1,0 +1,115 @@
+"""A measurement as somebody's table: pandas, xarray, or the measured table that `diagnose` takes."""
+
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from fingervision.domain.errors import MissingLibraryError, UsageError
+from fingervision.domain.measured_table import MeasuredTable
+from fingervision.domain.status import Status
+from fingervision.interface.column_tables import measured_from_columns
+from fingervision.measuring.clock.alignment import ClockOffset
+from fingervision.measuring.in_memory import MeasuredInMemory
+from fingervision.storage.gaps_csv import COLUMNS, FORCE_PLACES, MM_PLACES, TIME_PLACES, GapRow
+from fingervision.storage.line_file import cell
+from fingervision.storage.measured_table import NUMBERS
+
+if TYPE_CHECKING:
+    import pandas as pd
+    import xarray as xr
+
+TEXTS = ("status", "fingers", "run")
+
+
+def columns_of(found: MeasuredInMemory) -> tuple[str, ...]:
+    """Names of the columns of gaps.csv, in its order."""
+    return (*COLUMNS.split(","), *found.task.drive_columns)
+
+
+def measured_table(found: MeasuredInMemory) -> MeasuredTable:
+    """Give the frames that have a gap and an input as a measured table, with the digits that gaps.csv has.
+
+    Raises
+    ------
+    UsageError
+        The measurement has no drive.
+    DataError
+        The drive gave no frame an input, or there are too few such frames, or they do not move.
+    """
+    task, clock = found.task, found.clock
+    if task.drive is None:
+        raise UsageError("measured must have a drive, but was measured without: give fingervision.measure one.")
+    if found.refusal is not None:
+        raise found.refusal
+    known = columns_of(found)
+    columns: dict[str, list[Any]] = {
+        name: [
+            float(cell(value, _places(name))) if value is not None else None
+            for value in (_cell(row, name) for row in found.rows)
+        ]
+        for name in NUMBERS
+        if name in known
+    }
+    columns["run"] = [row.run for row in found.rows]
+    table = measured_from_columns(columns)
+    return replace(table, u_clock_s=clock.u_time_s) if isinstance(clock, ClockOffset) else table
+
+
+def dataframe(found: MeasuredInMemory) -> "pd.DataFrame":
+    """Give the rows as a pandas DataFrame with the columns of gaps.csv; what is missing is `pandas.NA`.
+
+    Raises
+    ------
+    MissingLibraryError
+        pandas is not installed.
+    """
+    try:
+        import pandas as pd
+    except ImportError as error:
+        raise MissingLibraryError("pandas", "dataframe", "to_dataframe") from error
+    kinds = {"frame": "Int64", **dict.fromkeys(TEXTS, "string")}
+    return pd.DataFrame(
+        {
+            name: pd.array([_cell(row, name) for row in found.rows], dtype=kinds.get(name, "Float64"))
+            for name in columns_of(found)
+        }
+    )
+
+
+def dataset(found: MeasuredInMemory) -> "xr.Dataset":
+    """Give the rows as an xarray Dataset over the dimension `frame`; NaN stands for a missing number.
+
+    Raises
+    ------
+    MissingLibraryError
+        xarray is not installed.
+    """
+    try:
+        import xarray as xr
+    except ImportError as error:
+        raise MissingLibraryError("xarray", "dataframe", "to_xarray") from error
+    variables: dict[str, Any] = {}
+    for name in columns_of(found)[1:]:
+        cells = [_cell(row, name) for row in found.rows]
+        if name in TEXTS:
+            variables[name] = (("frame",), np.array(cells, dtype=object), {})
+        else:
+            numbers = np.array([np.nan if each is None else each for each in cells], dtype=np.float64)
+            variables[name] = (("frame",), numbers, {"units": name.rpartition("_")[2]})
+    frames = np.array([row.frame for row in found.rows], dtype=np.int64)
+    made = xr.Dataset(variables, coords={"frame": frames}, attrs={"recording": found.summary["recording"]["name"]})
+    return made.set_coords("time_s")
+
+
+def _places(name: str) -> int:
+    """Decimal places of a column of gaps.csv."""
+    return {"time_s": TIME_PLACES, "force_n": FORCE_PLACES}.get(name, MM_PLACES)
+
+
+def _cell(row: GapRow, name: str) -> Any:
+    value = getattr(row, name)
+    return value.value if isinstance(value, Status) else value
+
+
+__all__ = ["columns_of", "dataframe", "dataset", "measured_table"]

@@ -1,0 +1,137 @@
+"""Gauges on a source that goes on: read in every frame as it is measured, followed from where they were drawn."""
+
+from collections import OrderedDict, deque
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from fingervision.domain.errors import FingervisionError
+from fingervision.domain.frame import Frame, LostFrame
+from fingervision.domain.status import Status
+from fingervision.gauges.kinds import measured_together
+from fingervision.gauges.picture import picture_of
+from fingervision.gauges.plane_scale import PlaneScale
+from fingervision.gauges.reading import Reading
+from fingervision.gauges.status import GaugeStatus
+from fingervision.live.playback.gauge_board import GaugeBoard
+from fingervision.live.playback.gauge_following import NO_SCALE, told
+from fingervision.live.playback.gauges_beside import GAUGES, GaugesBeside
+from fingervision.live.session import Session
+from fingervision.storage.gaps_csv import GapRow
+
+FRAMES_KEPT = 16
+"""A page is sent the newest picture: half a second of readings at 25 frames a second is more than it asks for."""
+FRAMES_COUNTED = 100
+"""Of so many of the newest frames the page is told how many were measured without gauges."""
+
+
+class LiveGauges:
+    """Reads a board's gauges in the measuring thread.
+
+    A gauge that is not changed goes on being followed where it is; one that is new or changed begins where it is drawn,
+    in the next frame. While measuring lags, frames are measured without gauges, and the page says how many.
+
+    Parameters
+    ----------
+    session : Session
+        What measures.
+    board : GaugeBoard
+        Its gauges.
+    """
+
+    def __init__(self, session: Session, board: GaugeBoard) -> None:
+        self._session, self._board = session, board
+        self._followers: dict[str, tuple[Mapping[str, Any], Any]] = {}
+        self._read: OrderedDict[int, tuple[int, list[dict[str, Any]]]] = OrderedDict()
+        self._scale: object = None
+        self._left_out: deque[bool] = deque(maxlen=FRAMES_COUNTED)
+        self._failure = ""
+        self.frames = 0
+
+    @property
+    def first(self) -> int | None:
+        """Every frame is as good as the first to draw in."""
+        seen = self._session.seen
+        return None if seen is None else seen.frame.index
+
+    @property
+    def trouble(self) -> str:
+        """Why there are no readings, or fewer than frames."""
+        if self._session.choices.task is None:
+            return NO_SCALE
+        if self._failure:
+            return self._failure
+        if left_out := sum(self._left_out):
+            return (
+                f"{left_out} of the last {len(self._left_out)} frames were measured without the gauges: measuring lags "
+                "behind the source."
+            )
+        return ""
+
+    def readings(self, frame: int, version: int) -> list[dict[str, Any]] | None:
+        """Give what the gauges of a version of the board said of a frame; None where that is not known."""
+        found = self._read.get(frame)
+        return found[1] if found is not None and found[0] == version else None
+
+    def see(self, item: Frame | LostFrame, row: GapRow | None) -> None:
+        """Read the gauges in the next frame; a fault of theirs ends no measurement."""
+        task = self._session.choices.task
+        if task is None or not self._board.gauges:
+            return
+        is_left_out = self._session.in_a_hurry
+        self._left_out.append(is_left_out)
+        if is_left_out:
+            return
+        try:
+            self._read_all(item, row)
+            self._failure = ""
+        except (FingervisionError, ValueError, ArithmeticError, IndexError) as error:
+            self._failure = f"The gauges cannot be read ({type(error).__name__}: {error})."
+
+    def _read_all(self, item: Frame | LostFrame, row: GapRow | None) -> None:
+        task = self._session.choices.task
+        assert task is not None  # noqa: S101 - asked before
+        version, gauges = self._board.snapshot()
+        tables = {table["name"]: dict(table) for table in self._board.tables}
+        if task.scale is not self._scale:
+            # A patch counts from its first frame: what was counted in another scale begins anew.
+            self._scale, self._followers = task.scale, {}
+        kept = self._followers
+        self._followers = {
+            gauge.name: kept[gauge.name]
+            if gauge.name in kept and kept[gauge.name][0] == tables.get(gauge.name)
+            else (tables.get(gauge.name, {}), gauge.spec.follower())
+            for gauge in gauges
+        }
+        status = row.status if row is not None else None
+        if isinstance(item, LostFrame):
+            readings = [Reading(GaugeStatus(item.status.value), words=item.words)] * len(gauges)
+        elif status in (Status.DAMAGED, Status.DUPLICATE):
+            readings = [Reading(GaugeStatus(status.value))] * len(gauges)
+        else:
+            settings, _ = task.settings_for(())
+            followers = [self._followers[gauge.name][1] for gauge in gauges]
+            readings = list(measured_together(followers, picture_of(item, settings)))
+        description = self._session.description
+        plane = PlaneScale(task.scale, (description.width_px, description.height_px))
+        self._read[item.index] = version, told(gauges, readings, plane)
+        self.frames += 1
+        while len(self._read) > FRAMES_KEPT:
+            self._read.popitem(last=False)
+
+
+def put_live_gauges(session: Session, path: Path, *, is_asked_for: bool = False) -> GaugesBeside:
+    """Put gauges beside a live measurement, and begin to read them.
+
+    Raises
+    ------
+    FingervisionError
+        The file exists and cannot be meant for these frames.
+    """
+    description = session.description
+    board = GaugeBoard(path, (description.width_px, description.height_px))
+    gauges = LiveGauges(session, board)
+    beside = GaugesBeside(board, gauges, is_asked_for=is_asked_for, is_live=True)
+    session.features[GAUGES] = beside
+    session.on_picture.append(gauges.see)
+    return beside

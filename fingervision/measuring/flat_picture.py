@@ -1,0 +1,47 @@
+"""A calibration's lens and plane as a map between the picture and the plane seen squarely."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from calib.measured_scale import Calibration
+from fingervision.measuring.scale import Scale
+from fingervision.vision.rigid_outline import FlatMap
+
+Array = NDArray[np.float64]
+
+FOLDED_PX = 0.5
+"""A point that does not come back to itself lies where the lens's polynomial folds over: it is in no picture."""
+NOWHERE_PX = -1e6
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FlatPicture:
+    """From pixels of the picture to pixels of the plane as a camera without distortion sees it squarely, and back.
+
+    Parameters
+    ----------
+    calibration : Calibration
+        With a lens, a plane or both.
+    """
+
+    calibration: Calibration
+
+    def to_flat(self, points: Array) -> Array:
+        """Take lens and perspective off points, shape (2, n)."""
+        return self.calibration.flatten(points.T).T
+
+    def to_picture(self, points: Array) -> Array:
+        """Put them on again; a point that the lens cannot show comes out far outside of the picture."""
+        seen = self.calibration.unflatten(points.T).T
+        with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
+            apart = np.hypot(*(self.to_flat(seen) - points))
+        return np.where(apart < FOLDED_PX, seen, NOWHERE_PX)
+
+
+def flat_map_of(scale: Scale) -> FlatMap | None:
+    """Return the map of a calibration; None where the picture is flat as it is."""
+    if isinstance(scale, Calibration) and (scale.lens is not None or scale.plane is not None):
+        return FlatPicture(scale)
+    return None

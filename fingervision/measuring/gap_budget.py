@@ -1,0 +1,57 @@
+"""Where the uncertainty of each gap comes from: the scale's budget, and what each picture adds to it."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from calib.budget import Budget, BudgetLine
+from calib.contributions import edge_noise_mm
+from calib.measured_scale import Calibration
+from fingervision.domain.gap import GapMeasurement
+from fingervision.measuring.response_budget import u_response_shift_mm
+from fingervision.measuring.scale import Scale
+from fingervision.measuring.tip_bias import u_tip_bias_mm
+
+TIPS = "edge bias at rounded tips"
+PICTURE = "seen beside or at the edges"
+RESPONSE = "assumed camera response"
+
+
+def gap_budget(measured: Sequence[GapMeasurement], scale: Scale) -> Budget:
+    """Every part of the standard uncertainty of each gap; its `u_mm` is `u_gap_mm` of gaps.csv.
+
+    Independent parts add in square (JCGM 100:2008, equation 10). With a bare scale, which has no uncertainty, only the
+    parts that the pictures themselves show are there, and their sum is not that of the gap.
+
+    Parameters
+    ----------
+    measured : sequence of GapMeasurement
+        n of them, at least one.
+    scale : Scale
+        From pixels to millimetres.
+
+    Returns
+    -------
+    Budget
+        With parts of shape (n,), in millimetres; those that change from frame to frame are not `shared`.
+    """
+    u_random_px = np.array([m.u_gap_px for m in measured], dtype=float)
+    u_shift_mm = np.array([m.u_shift_px for m in measured], dtype=float) / scale.px_per_mm
+    seen = BudgetLine(PICTURE, u_shift_mm, "the picture: rims, walls, shadows, glare, sharpening, clipped light")
+    if not isinstance(scale, Calibration):
+        noise = BudgetLine(
+            "edge noise", edge_noise_mm(u_random_px, scale.px_per_mm), "the fit of each frame's edges", shared=False
+        )
+        return Budget((noise, seen))
+    points = np.array([((m.left.x_px, m.left.y_px), (m.right.x_px, m.right.y_px)) for m in measured], dtype=float)
+    light_gap = np.array([m.light_gap for m in measured], dtype=bool)
+    of_scale = scale.budget(points, u_random_px, light_gap)
+    u_tip_mm = u_tip_bias_mm(measured, scale.edge_bias_px, scale.px_per_mm)
+    return Budget(
+        (
+            *of_scale.lines,
+            BudgetLine(TIPS, u_tip_mm, "the calibration's edge bias and the slope of each edge"),
+            seen,
+            BudgetLine(RESPONSE, u_response_shift_mm(measured, scale), "what another usual response would change"),
+        )
+    )

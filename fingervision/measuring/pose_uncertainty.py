@@ -1,0 +1,108 @@
+"""Uncertainty of a body's pose: its own edges in a frame, and what all frames share.
+
+Shared are where the drawing was laid (a fit too), the scale, the edge bias, lens and plane. A pose counts from the
+drawing, so that an error of the scale grows with the distance from what the drawing was laid by.
+"""
+
+from dataclasses import dataclass
+from math import hypot, pi
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fingervision.gauges.plane_scale import PlaneScale
+from fingervision.measuring.body_outlines import Placement
+from fingervision.vision.rigid_outline import RigidFit
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SharedErrors:
+    """What all frames share of the uncertainty of poses.
+
+    Parameters
+    ----------
+    laid : RigidFit or None
+        The fit by which the drawing was laid; None where it was laid exactly.
+    about_px : ndarray of float, shape (2,)
+        The point about which it was fitted, on the flat plane.
+    plane : PlaneScale or None
+        The calibration with its budget; None where nothing is known of it.
+    u_response_px : float
+        What an unknown camera response leaves open of where an edge is seen.
+    """
+
+    laid: RigidFit | None
+    about_px: Array
+    plane: PlaneScale | None
+    u_response_px: float = 0.0
+
+    def of_pose(self, fit: RigidFit, about_px: Array, in_picture: Array) -> "SharedPose":
+        """Work out what the shared errors do to one pose.
+
+        Parameters
+        ----------
+        fit : RigidFit
+            The body's motion.
+        about_px : ndarray of float, shape (2,)
+            Its reference point where it is drawn, on the flat plane.
+        in_picture : ndarray of float, shape (2,)
+            The same point as the picture shows it now.
+        """
+        arm = about_px + fit.shift_px - self.about_px
+        # A drawing that was laid off by a shift and a turn puts the body's reference point off by both.
+        carried = np.array([[1.0, 0.0, -arm[1]], [0.0, 1.0, arm[0]], [0.0, 0.0, 1.0]])
+        placed = np.zeros((3, 3))
+        outward, scale = fit.by_outward, fit.by_scale + np.array([arm[0], arm[1], 0.0])
+        if self.laid is not None:
+            placed = carried @ self.laid.covariance @ carried.T
+            outward = outward - carried @ self.laid.by_outward
+            scale = scale - carried @ self.laid.by_scale
+        if self.plane is None:
+            return SharedPose(placed, np.zeros(3), np.zeros(3), 0.0)
+        at = (float(in_picture[0]), float(in_picture[1]))
+        relative = max(self.plane.relative_u(at, 0.0), self.plane.relative_u(at, 0.5 * pi))
+        u_edge_px = self.plane.u_edge_px(self.u_response_px)
+        return SharedPose(placed, u_edge_px * outward, relative * scale, self.plane.u_angle_rad)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SharedPose:
+    """What the shared errors do to one pose, in pixels and rad.
+
+    Parameters
+    ----------
+    placed : ndarray of float, shape (3, 3)
+        Covariance by where the drawing was laid.
+    by_bias, by_scale : ndarray of float, shape (3,)
+        What one standard uncertainty of the edges' bias and of the scale does.
+    u_angle_rad : float
+        What tilt and lens leave open of an angle.
+    """
+
+    placed: Array
+    by_bias: Array
+    by_scale: Array
+    u_angle_rad: float
+
+    @property
+    def covariance(self) -> Array:
+        """All of it, shape (3, 3)."""
+        own = self.placed + np.outer(self.by_bias, self.by_bias) + np.outer(self.by_scale, self.by_scale)
+        own[2, 2] += self.u_angle_rad**2
+        return own
+
+    def u_turn_against(self, other: "SharedPose") -> float:
+        """Standard uncertainty, shared by all frames, of the angle between two bodies: the drawing's place cancels."""
+        bias = float(self.by_bias[2] - other.by_bias[2])
+        scale = float(self.by_scale[2] - other.by_scale[2])
+        return hypot(bias, scale, max(self.u_angle_rad, other.u_angle_rad))
+
+
+def in_drawing(place: Placement) -> Array:
+    """Matrix that takes (x px, y px, rad) of the flat plane into (x mm, y mm, mrad) of the drawing's axes."""
+    into = np.zeros((3, 3))
+    into[:2, :2] = place.axes.T / place.px_per_mm
+    into[2, 2] = 1e3 * place.turn_sign
+    return into

@@ -1,0 +1,124 @@
+"""Channels of one's own in a foreign table: places and angles of bodies, `link 2.x [µm]`, with their `u_`."""
+
+from collections.abc import Collection
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from fingervision.storage.channel_columns import NO_CHANNELS
+from fingervision.storage.number_columns import Numbers
+from fingervision.tables.cells import to_numbers
+from fingervision.tables.column_names import BESIDE, BRACKETS, column_name
+from fingervision.tables.raw_table import RawColumn, RawTable
+from fingervision.tables.units import factor, known_unit, spelled
+
+MRAD = {
+    **dict.fromkeys(("mrad", "milliradian", "milliradians"), 1.0),
+    **dict.fromkeys(("rad", "radian", "radians"), 1e3),
+    **dict.fromkeys(("urad", "µrad", "microradian", "microradians"), 1e-3),
+    **dict.fromkeys(("deg", "°", "degree", "degrees", "degré", "degrés"), 1e3 * float(np.pi) / 180.0),
+    **dict.fromkeys(("mdeg", "millidegree", "millidegrees"), float(np.pi) / 180.0),
+    **dict.fromkeys(("arcsec", "″"), 1e3 * float(np.pi) / 648_000.0),
+}
+"""Units of angle as tables write them, in mrad. Not `grad`: German degrees and surveyors' gons are both called so."""
+BARE = frozenset({"mm", "um", "nm", "mrad", "urad", "µrad", "rad", "deg", "mdeg"})
+"""Units that may end a name without brackets: `in`, `m` and the like are parts of words there."""
+
+
+@dataclass(frozen=True, slots=True)
+class BodyChannels:
+    """Channels that a table holds beside its gap.
+
+    Parameters
+    ----------
+    columns : dict of str to Numbers
+        In mm and mrad, named `name_mm` and `name_mrad`, with `u_` before that for a standard uncertainty.
+    names : dict of str to str
+        What the file calls each of them.
+    notes : list of str
+        Which columns could not be channels, and why.
+    """
+
+    columns: dict[str, Numbers] = field(default_factory=dict)
+    names: dict[str, str] = field(default_factory=dict)
+    notes: list[str] = field(default_factory=list)
+
+
+def channels_in(raw: RawTable, used: Collection[int], decimal: str) -> BodyChannels:
+    """Take the columns that have a unit of length or angle, and no role, for channels.
+
+    Parameters
+    ----------
+    raw : RawTable
+        The table.
+    used : collection of int
+        Places of the columns that have a role.
+    decimal : str
+        Its decimal mark.
+    """
+    found = BodyChannels()
+    places: dict[str, list[int]] = {}
+    sizes: dict[int, float] = {}
+    for place, column in enumerate(raw.columns):
+        if place not in used and (taken := _channel(column)) is not None:
+            sizes[place] = taken[1]
+            places.setdefault(taken[0], []).append(place)
+    for name, of_name in places.items():
+        if name.startswith("u_") and name.removeprefix("u_") not in places:
+            continue
+        column = raw.columns[of_name[0]]
+        if len(of_name) > 1:
+            listed = " and ".join(f"'{raw.columns[k].name}'" for k in of_name)
+            found.notes.append(f"the channel {name} was left out: {listed} would both be it.")
+            continue
+        values, unread = _numbers(column, decimal)
+        if unread:
+            found.notes.append(f"the column {column.name} was left out: {unread} of its cells are no numbers.")
+            continue
+        size = sizes[of_name[0]]
+        found.columns[name] = values if size == 1.0 else Numbers(values.value * size, values.present)
+        found.names[name] = column.name
+    return found
+
+
+def _numbers(column: RawColumn, decimal: str) -> tuple[Numbers, int]:
+    if isinstance(column.content, Numbers):
+        return column.content, 0
+    values, odd = to_numbers(column.content, decimal)
+    return values, int(odd.size)
+
+
+def _channel(column: RawColumn) -> tuple[str, float] | None:
+    """Name of the channel that a column is, and the factor to its unit; None where it is none."""
+    text = column.name.strip().strip('"').strip()
+    if text in NO_CHANNELS or column.since:
+        return None
+    base, unit = _apart(text)
+    stated = spelled(column.unit) or unit
+    own = spelled(column.unit) and unit
+    if not base or not stated or (own and _size(own) != _size(stated)):
+        return None
+    size = _size(stated)
+    bare = base[2:] if base.startswith("u_") else base
+    if size is None or column_name(bare).role is not None:
+        return None
+    plain = "_".join(bare.split())
+    return f"{'u_' if bare != base else ''}{plain}_{size[0]}", size[1]
+
+
+def _apart(text: str) -> tuple[str, str]:
+    """Take a name and its unit apart."""
+    if (match := BRACKETS.match(text)) is not None:
+        unit = next(part for part in match.group("a", "b", "c", "d") if part is not None)
+        return match["base"].strip(), spelled(unit)
+    if (match := BESIDE.match(text)) is not None and (known_unit(match["unit"]) or match["unit"].lower()) in BARE:
+        return match["base"].strip(" _-/,.:"), spelled(match["unit"])
+    return text, ""
+
+
+def _size(unit: str) -> tuple[str, float] | None:
+    """`mm` or `mrad`, and the factor to it."""
+    if (angle := MRAD.get(unit.lower())) is not None and unit != "Mrad":
+        return "mrad", angle
+    length = factor(unit, "length") if known_unit(unit) else None
+    return None if length is None else ("mm", length)

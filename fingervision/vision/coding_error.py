@@ -1,0 +1,98 @@
+"""How far a codec may have displaced an edge as a whole, from the step of its quantiser.
+
+An edge that runs along a codec's blocks gets one error in all its rows, which the scatter of the rows about a line does
+not show; a block that is copied from an earlier picture is displaced as a whole, and nothing in the picture shows that
+either. What bounds the error is the quantiser: a coder corrects what is more than a part of its step. For an edge of
+contrast A the coefficients change by some A per pixel of displacement, so that the displacement is a fixed share of
+`step / A`.
+"""
+
+from dataclasses import replace
+from math import hypot
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fingervision.domain.frame import Coding
+from fingervision.domain.gap import GapMeasurement
+from fingervision.domain.quantiser import Quantiser
+
+Floats = NDArray[np.float64]
+
+# Standard uncertainty of one edge's place in units of step over contrast. Measured on drawn recordings, upright and
+# leaning, 0.5 to 8 Mbit/s (`python -m tests.benchmarks.compressed_video`).
+DISPLACED = 0.42
+# The blocks this far across (standard deviations of the blur, and pixels more) and along the finger from the measuring
+# point carry the edge.
+ACROSS_SIGMAS, ACROSS_PX, ALONG_PX = 3.0, 2.0, 40.0
+# Where the stream does not state its quantiser: the same in units of what the rows of a flank share. A picture that is
+# coded by itself is displaced by less than one that is copied from its neighbours.
+SHARED_SHIFTS = {Coding.LOSSLESS: 0.0, Coding.INTRAFRAME: 0.5, Coding.INTERFRAME: 1.5}
+# Quantisers are stated for 8 bits.
+EIGHT_BITS = 255.0
+
+
+def displaced_px(step: float, contrast: float) -> float:
+    """Standard uncertainty of an edge's place for what a codec does to all of it alike (pixels).
+
+    Parameters
+    ----------
+    step : float
+        Of the quantiser, in grey levels of 8 bits.
+    contrast : float
+        Of the edge, likewise.
+    """
+    return DISPLACED * step / max(abs(contrast), 1.0)
+
+
+def with_coding_error(
+    found: GapMeasurement, quantiser: Quantiser, inside: tuple[float, float], light: Floats, top_level: int
+) -> GapMeasurement:
+    """The same measurement, less sure by what the codec may have done to either edge.
+
+    Parameters
+    ----------
+    found : GapMeasurement
+        In the picture's pixels.
+    quantiser : Quantiser
+        Of the picture.
+    inside : (float, float)
+        Light of either finger beside its edge.
+    light : ndarray of float, shape (levels,)
+        Light of every stored level.
+    top_level : int
+        End of the scale.
+    """
+    displaced = []
+    for edge, level in zip((found.left, found.right), inside, strict=True):
+        stored = np.interp([level, level + edge.contrast], light[: top_level + 1], np.arange(top_level + 1.0))
+        across, along = ACROSS_SIGMAS * edge.blur_px + ACROSS_PX, ALONG_PX
+        if not found.direction.is_vertical:
+            across, along = along, across
+        step = quantiser.near(edge.x_px, edge.y_px, across, along)
+        displaced.append(displaced_px(step, float(np.ptp(stored)) * EIGHT_BITS / top_level))
+    return _less_sure(found, displaced[0], displaced[1])
+
+
+def with_shared_shift(found: GapMeasurement, shared_px: float, coding: Coding) -> GapMeasurement:
+    """The same for a codec whose quantiser is not known.
+
+    Parameters
+    ----------
+    found : GapMeasurement
+        What was measured.
+    shared_px : float
+        What the rows of a flank share (`shared_profile.shared_shift_px`).
+    coding : Coding
+        How the picture is coded.
+    """
+    return _less_sure(found, SHARED_SHIFTS[coding] * shared_px, SHARED_SHIFTS[coding] * shared_px)
+
+
+def _less_sure(found: GapMeasurement, left_px: float, right_px: float) -> GapMeasurement:
+    left, right = (
+        replace(edge, u_across_px=hypot(edge.u_across_px, u))
+        for edge, u in ((found.left, left_px), (found.right, right_px))
+    )
+    u_coding = hypot(left_px, right_px)
+    return replace(found, left=left, right=right, u_gap_px=hypot(found.u_gap_px, u_coding), u_coding_px=u_coding)

@@ -1,0 +1,49 @@
+"""Something that lies across the fingers, a cable or a strap, and cuts their ends off in the binary picture.
+
+What then looks like a tip is the edge of the thing that crosses. Beyond a tip there is ground, or something else; a
+piece of the same breadth that goes on in the same two lines is the finger itself.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fingervision.domain.gap import NoGap
+from fingervision.domain.loops import loop
+from fingervision.domain.status import Status
+from fingervision.vision.coarse_fingers import CoarseFinger, CoarseFingers
+
+# A piece of the finger is looked for up to so many pixels, or times the measuring height, beyond its tip.
+BEYOND_PX, BEYOND_HEIGHTS = 40, 8.0
+# It is there where so many rows are set in this share of the finger's breadth, and not set so many pixels to its sides.
+FEWEST_ROWS, FILLED_SHARE, SIDE_PX = 5, 0.9, 5
+# The finger's two sides are lines between these heights below the tip (in units of the measuring height).
+FROM_HEIGHTS, TO_HEIGHTS = 1.0, 4.0
+
+CROSSED = NoGap(
+    Status.NO_FINGERS,
+    "Something lies across the fingers and hides their tips: take it away, or give the region that it is not in.",
+)
+
+_rows_beyond = loop("crossing_rows_beyond")
+
+
+def is_crossed(mask: NDArray[np.uint8], fingers: CoarseFingers, below_tip_px: float) -> bool:
+    """Whether either finger goes on beyond what was taken for its tip.
+
+    Parameters
+    ----------
+    mask : ndarray of uint8, shape (height, width)
+        Non-zero where the fingers may be.
+    fingers : CoarseFingers
+        As they were found there.
+    below_tip_px : float
+        Height of measuring below the tips.
+    """
+    upright = fingers.orientation.view(mask)
+    return any(_goes_on(upright, finger, below_tip_px) for finger in (fingers.left, fingers.right))
+
+
+def _goes_on(upright: NDArray[np.uint8], finger: CoarseFinger, below_tip_px: float) -> bool:
+    top, reach = finger.top_along_px, int(max(BEYOND_PX, BEYOND_HEIGHTS * below_tip_px))
+    heights = (FROM_HEIGHTS * below_tip_px, TO_HEIGHTS * below_tip_px)
+    return bool(_rows_beyond(upright, finger.outline, top, *heights, reach) >= FEWEST_ROWS)

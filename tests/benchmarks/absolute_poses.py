@@ -1,0 +1,207 @@
+"""How often a body's pose lies within its stated uncertainty, where it was laid, scale, bias, lens and plane included.
+
+    PYTHONPATH=. python -m tests.benchmarks.absolute_poses --cases 60
+
+The scenes share nothing with the product: a body is boxes, a box seen through a Gaussian blur is the product of two
+differences of error functions in its own axes, exactly; a pixel is the mean of 4 x 4 points of it. Every case draws
+where the mechanism lies (mirrored in every fourth), how each body moved, blur, noise, and with `calibrated` the true
+scale and edge bias out of the calibration's own uncertainty, with `lens` a distortion and a perspective that the
+calibration knows. With `lossy` the pictures are JPEG of quality 85.
+"""
+
+import argparse
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import ndtr
+
+from calib.calibration import BareScale
+from calib.lens import Lens
+from calib.limits import Limits
+from calib.measured_scale import Calibration, ScalePart
+from calib.plane import Plane
+from fingervision.domain.frame import Coding, Frame
+from fingervision.measuring.body_poses import BodyTracker
+from fingervision.measuring.drawing_placement import GivenPoint
+from fingervision.measuring.scale import Scale
+from fingervision.storage.mechanism_toml import mechanism_from_tables
+from fingervision.vision.pipeline import Settings
+from tests.diagnosis.lever_drawing import TABLES
+
+Array = NDArray[np.float64]
+
+WIDTH, HEIGHT = 330, 560
+SCALE = 5.4
+BOXES = {
+    "pillar": ((31, 39, 0, 31),),
+    "shuttle": ((14, 22, 10, 31),),
+    "finger": ((10, 39, 40, 50), (10, 18, 50, 90), (31, 39, 37, 40), (14, 22, 37, 40)),
+}
+"""The lever of `tests/diagnosis/lever_drawing.py` between its notches, x and y in mm."""
+NECKS = ((34.6, 35.4, 31, 37), (17.6, 18.4, 31, 37))
+KNOWN_LIGHT = Settings(below_tip_px=1.0, other_response=None)
+"""The pictures' levels are light, and that is known."""
+MIDDLE_MM = np.array([24.5, 45.0])
+SUB = (np.arange(4) + 0.5) / 4.0 - 0.5
+
+
+@dataclass(frozen=True)
+class Truth:
+    """Where the drawing lies and how the bodies moved in it: angle in rad, x and y in mm about the body's centroid."""
+
+    scale: float
+    angle: float
+    shift_px: Array
+    is_mirrored: bool
+    moves: dict[str, tuple[float, float, float]]
+    grown_mm: float
+
+
+def picture(truth: Truth, centroids: dict[str, Array], seen: "Scale", blur_px: float, dark: bool) -> Array:
+    """Draw the scene, without noise."""
+    total = np.zeros((HEIGHT, WIDTH))
+    for sub_y in SUB:
+        for sub_x in SUB:
+            x, y = np.meshgrid(np.arange(WIDTH) + sub_x, np.arange(HEIGHT) + sub_y)
+            points = np.stack([x.ravel(), y.ravel()], axis=1)
+            flat = seen.flatten(points) if isinstance(seen, Calibration) else points
+            away = (flat - truth.shift_px).T / truth.scale
+            c, s = np.cos(truth.angle), np.sin(truth.angle)
+            side = 1.0 if truth.is_mirrored else -1.0
+            drawn = np.stack([c * away[0] + s * away[1], side * (-s * away[0] + c * away[1])]) + MIDDLE_MM[:, None]
+            sigma = blur_px / truth.scale
+            covered = np.zeros(points.shape[0])
+            parts = [(name, box) for name, boxes in BOXES.items() for box in boxes]
+            parts += [("finger", box) for box in NECKS]
+            for name, (x0, x1, y0, y1) in parts:
+                mx, my, turn = truth.moves[name]
+                cc, ss = np.cos(turn), np.sin(turn)
+                arm = drawn - (centroids[name] + (mx, my))[:, None]
+                own_x = cc * arm[0] + ss * arm[1] + centroids[name][0]
+                own_y = -ss * arm[0] + cc * arm[1] + centroids[name][1]
+                g = truth.grown_mm
+                # Boxes of a body that abut are grown on their outer sides alone; necks are no edges.
+                gx0, gx1, gy0, gy1 = (0, 0, 0, 0) if (x0, x1, y0, y1) in NECKS else _outer(name, (x0, x1, y0, y1), g)
+                across = ndtr((x1 + gx1 - own_x) / sigma) - ndtr((x0 - gx0 - own_x) / sigma)
+                along = ndtr((y1 + gy1 - own_y) / sigma) - ndtr((y0 - gy0 - own_y) / sigma)
+                covered += across * along
+            total += covered.reshape(HEIGHT, WIDTH) / SUB.size**2
+    ground, body = (205.0, 55.0) if dark else (55.0, 205.0)
+    return ground + (body - ground) * np.clip(total, 0.0, 1.0)
+
+
+def _outer(name: str, box: tuple[float, ...], grown: float) -> tuple[float, float, float, float]:
+    y0, y1 = box[2:]
+    if name != "finger":
+        return grown, grown, grown, grown
+    if (y0, y1) == (40, 50):
+        return grown, grown, grown, grown
+    return grown, grown, (0.0 if y0 == 50 else grown), (0.0 if y1 == 40 else grown)
+
+
+def centroid(name: str) -> Array:
+    """Middle of the area of the product's own body."""
+    return next(o.body.centroid_mm for o in BodyTracker(mechanism_of(), BareScale(SCALE)).outlines
+                if o.body.name == name)  # fmt: skip
+
+
+def mechanism_of():  # type: ignore[no-untyped-def]
+    """Read the drawing."""
+    return mechanism_from_tables(TABLES, "lever")
+
+
+def scale_of(kind: str, rng: np.random.Generator) -> tuple[Scale, float, float]:
+    """Return the scale that is stated, the true one, and the true edge bias in px."""
+    if kind in ("bare", "lossy"):
+        return BareScale(SCALE), SCALE, 0.0
+    u_scale, u_bias, bias = 2e-4 * SCALE, 0.05, 0.12
+    none = Limits(estimator_px=0.0, plane_mm=0.0, tilt_deg=0.0, lens_relative=0.0, temperature_k=0.0)
+    lens, plane = None, None
+    if kind == "lens":
+        lens = Lens(np.array([620.0, 620.0, 165.0, 280.0, -0.18, 0.05, 5e-4, -3e-4, 0.0]), np.zeros((9, 9)))
+        tilt = np.array([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [4e-5, -3e-5, 1.0]])
+        to = np.array([[1.0, 0.0, -164.5], [0.0, 1.0, -279.5], [0.0, 0.0, 1.0]])
+        plane = Plane(np.linalg.inv(to) @ tilt @ to)
+        u_scale, u_bias = 1e-9, 1e-9
+    part = ScalePart("reference", np.diag([u_scale**2, u_bias**2]))
+    made = Calibration(SCALE, bias, (part,), (WIDTH, HEIGHT), limits=none, lens=lens, plane=plane)
+    return made, float(rng.normal(SCALE, u_scale)), float(rng.normal(bias, u_bias))
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Print the coverage of every kind."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--cases", type=int, default=60)
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--kinds", nargs="+", default=["bare", "calibrated", "lens", "lossy"])
+    given = parser.parse_args(arguments)
+    centroids = {name: centroid(name) for name in BOXES}
+    for kind in given.kinds:
+        rng = np.random.default_rng([given.seed, len(kind)])
+        scores: dict[str, list[float]] = {"x": [], "y": [], "angle": [], "hinge": []}
+        own: dict[str, list[float]] = {"x": [], "y": [], "angle": [], "hinge": []}
+        silent = 0
+        for case in range(given.cases):
+            scale, s_true, bias = scale_of(kind, rng)
+            dark = bool(rng.random() < 0.7)
+            truth = Truth(
+                s_true, rng.uniform(-0.06, 0.06),
+                np.array([0.5 * WIDTH, 0.5 * HEIGHT]) + rng.uniform(-4.0, 4.0, 2), case % 4 == 3,
+                {name: (0.0, 0.0, 0.0) if name == "pillar" else
+                 (*rng.uniform(-0.8, 0.8, 2), rng.uniform(-0.012, 0.012)) for name in BOXES},
+                (0.5 if dark else -0.5) * bias / s_true,
+            )  # fmt: skip
+            blur, noise = rng.uniform(0.7, 1.6), rng.uniform(1.0, 4.0)
+            clean = picture(truth, centroids, scale, blur, dark)
+            grey = np.clip(np.round(clean + rng.normal(0.0, noise, clean.shape)), 0, 255).astype(np.uint8)
+            coding = Coding.LOSSLESS
+            if kind == "lossy":
+                grey = cv2.imdecode(cv2.imencode(".jpg", grey, [cv2.IMWRITE_JPEG_QUALITY, 85])[1], cv2.IMREAD_GRAYSCALE)
+                coding = Coding.INTRAFRAME
+            points = tuple(given_point(truth, scale, at, rng) for at in ((31.0, 0.0), (39.0, 0.0), (35.0, 20.0)))
+            seen = next(
+                BodyTracker(mechanism_of(), scale, points, KNOWN_LIGHT).poses([Frame(grey, 0, 0.0, coding)])
+            ).poses
+            for name in ("finger", "shuttle"):
+                pose = seen[name]
+                if pose.x_mm is None or pose.y_mm is None or pose.angle_mrad is None or pose.covariance is None:
+                    silent += 1
+                    continue
+                x, y, turn = truth.moves[name]
+                error = np.array([pose.x_mm - x, pose.y_mm - y, pose.angle_mrad - 1e3 * turn])
+                for k, part in enumerate(("x", "y", "angle")):
+                    scores[part].append(error[k] / pose.covariance[k, k] ** 0.5)
+                    own[part].append(error[k] / pose.random[k, k] ** 0.5)
+            for name, first, last in (("hinge 1", "pillar", "finger"), ("hinge 2", "shuttle", "finger")):
+                pose = seen[name]
+                if pose.angle_mrad is None:
+                    continue
+                # The flexure's axis says which body is the far one.
+                turn = 1e3 * (truth.moves[last][2] - truth.moves[first][2])
+                scores["hinge"].append((pose.angle_mrad - turn) / pose.covariance[2, 2] ** 0.5)
+                own["hinge"].append((pose.angle_mrad - turn) / pose.random[2, 2] ** 0.5)
+        print(f"{kind}: {given.cases} cases, {silent} without a pose")
+        for part, values in scores.items():
+            z, r = np.array(values), np.array(own[part])
+            print(f"  {part}: {100 * np.mean(np.abs(z) < 1.96):.1f} % of {z.size} within 1.96 u (RMS of error / u "
+                  f"{np.sqrt(np.mean(z**2)):.2f}, largest {np.abs(z).max():.1f}); by the frame's own part alone "
+                  f"{100 * np.mean(np.abs(r) < 1.96):.1f} %", flush=True)  # fmt: skip
+
+
+def given_point(truth: Truth, scale: Scale, at: tuple[float, float], rng: np.random.Generator) -> GivenPoint:
+    side = 1.0 if truth.is_mirrored else -1.0
+    away = np.array(at) - MIDDLE_MM
+    c, s = np.cos(truth.angle), np.sin(truth.angle)
+    turned = np.array([c * away[0] - side * s * away[1], s * away[0] + side * c * away[1]])
+    px = (turned * truth.scale + truth.shift_px)[None, :]
+    if isinstance(scale, Calibration):
+        px = scale.unflatten(px)
+    x, y = px[0] + rng.uniform(-1.0, 1.0, 2)
+    return GivenPoint(float(x), float(y), *at)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,75 @@
+"""What all frames share of a pose's uncertainty: the drawing's place, scale and bias, lens and plane."""
+
+import numpy as np
+import pytest
+
+from calib.lens import Lens
+from calib.measured_scale import Calibration, ScalePart
+from calib.plane import Plane
+from fingervision.domain.frame import Frame
+from fingervision.gauges.plane_scale import PlaneScale
+from fingervision.measuring.body_poses import BodyTracker
+from fingervision.measuring.flat_picture import NOWHERE_PX, FlatPicture
+from fingervision.measuring.pose_uncertainty import SharedErrors
+from fingervision.vision.rigid_outline import RigidFit
+from tests.benchmarks import absolute_poses as scene
+
+ABOUT = np.array([100.0, 50.0])
+ZERO = np.zeros(3)
+
+
+def fit(covariance: np.ndarray, shift: tuple[float, float] = (0.0, 0.0)) -> RigidFit:
+    return RigidFit(np.array(shift), 0.0, covariance, 10, 10, 10, 1.0, ZERO, ZERO)
+
+
+def test_a_turn_of_the_laid_drawing_puts_a_far_body_off_by_its_distance() -> None:
+    laid = fit(np.diag([1e-4, 1e-4, 1e-8]))
+    shared = SharedErrors(laid, ABOUT, None).of_pose(fit(np.eye(3)), np.add(ABOUT, (0.0, 300.0)), ABOUT)
+    assert np.sqrt(shared.covariance[0, 0]) == pytest.approx(np.hypot(1e-2, 300.0 * 1e-4))
+    assert np.sqrt(shared.covariance[1, 1]) == pytest.approx(1e-2)
+    assert np.sqrt(shared.covariance[2, 2]) == pytest.approx(1e-4)
+
+
+def test_an_error_of_the_scale_grows_from_where_the_drawing_was_laid() -> None:
+    u_scale = 1e-3
+    made = Calibration(10.0, 0.0, (ScalePart("reference", np.diag([(10.0 * u_scale) ** 2, 0.0])),), (640, 480))
+    shared = SharedErrors(fit(np.zeros((3, 3))), ABOUT, PlaneScale(made, (640, 480)))
+    near, far = (shared.of_pose(fit(np.eye(3)), np.add(ABOUT, (reach, 0.0)), ABOUT).by_scale for reach in (0.0, 200.0))
+    assert near[0] == pytest.approx(0.0)
+    assert 200.0 * u_scale <= far[0] < 2.0 * 200.0 * np.hypot(u_scale, 0.01)
+    assert far[1] == pytest.approx(0.0)
+
+
+def test_two_bodies_share_the_drawings_place_and_their_angle_does_not() -> None:
+    shared = SharedErrors(fit(np.diag([0.0, 0.0, 1e-4])), ABOUT, None)
+    one, two = (shared.of_pose(fit(np.eye(3)), np.add(ABOUT, (reach, 0.0)), ABOUT) for reach in (50.0, 300.0))
+    assert one.u_turn_against(two) == 0.0
+
+
+def test_lens_and_plane_come_off_and_on_again_and_what_folds_is_nowhere() -> None:
+    lens = Lens(np.array([600.0, 600.0, 320.0, 240.0, -0.3, 0.05, 1e-3, -5e-4, 0.0]), np.zeros((9, 9)))
+    plane = Plane(np.array([[1.0, 0.02, -3.0], [0.01, 1.0, 2.0], [3e-5, -2e-5, 1.0]]))
+    flat = FlatPicture(Calibration(20.0, 0.0, (), (640, 480), lens=lens, plane=plane))
+    points = np.random.default_rng(1).uniform((0.0, 0.0), (640.0, 480.0), (50, 2)).T
+    assert np.allclose(flat.to_picture(flat.to_flat(points)), points, atol=1e-6)
+    assert np.all(flat.to_picture(np.array([[6000.0], [5000.0]])) == NOWHERE_PX)
+
+
+@pytest.mark.slow
+def test_poses_through_a_lens_and_a_tilted_plane_are_those_of_the_drawing() -> None:
+    rng = np.random.default_rng(3)
+    scale, s_true, _ = scene.scale_of("lens", rng)
+    moves = {"pillar": (0.0, 0.0, 0.0), "shuttle": (0.3, -0.5, 0.004), "finger": (-0.6, 0.2, -0.008)}
+    middle = np.array([0.5 * scene.WIDTH, 0.5 * scene.HEIGHT])
+    truth = scene.Truth(s_true, 0.03, middle, False, moves, 0.0)
+    centroids = {name: scene.centroid(name) for name in scene.BOXES}
+    clean = scene.picture(truth, centroids, scale, 1.0, True)
+    grey = np.clip(np.round(clean + rng.normal(0.0, 2.0, clean.shape)), 0, 255).astype(np.uint8)
+    points = tuple(scene.given_point(truth, scale, at, rng) for at in ((31.0, 0.0), (39.0, 0.0), (35.0, 20.0)))
+    seen = next(BodyTracker(scene.mechanism_of(), scale, points).poses([Frame(grey, 0, 0.0)])).poses
+    for name in ("shuttle", "finger"):
+        pose, (x, y, turn) = seen[name], moves[name]
+        error = np.array([pose.x_mm - x, pose.y_mm - y, pose.angle_mrad - 1e3 * turn])
+        assert np.all(np.abs(error) < 4.0 * np.sqrt(np.diag(pose.covariance)))
+        # The distortion moves edges by up to 20 px, 4 mm: left on, it would be seen at once.
+        assert np.all(np.abs(error) < (0.1, 0.1, 1.0))
