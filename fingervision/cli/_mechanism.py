@@ -1,6 +1,8 @@
 """`fingervision model mechanism.toml`: any planar mechanism, by finite elements and by lumped flexures."""
 
 import json
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import click
@@ -12,7 +14,7 @@ from fingervision.cli._body_picture import draw_body, extent_mm, framed
 from fingervision.cli._model_motion import MotionAsked, move_mechanism
 from fingervision.cli._model_sweep import sweep_mechanism
 from fingervision.cli._model_uncertainty import write_uncertainty
-from fingervision.domain.errors import FingervisionError, OutputError, UsageError
+from fingervision.domain.errors import ArgumentError, FingervisionError, InstallationError, OutputError, UsageError
 from fingervision.models.gripper_figures import unit_of
 from fingervision.models.mechanism import Mechanism
 from fingervision.models.mechanism_chain import MechanismChain
@@ -55,7 +57,8 @@ def predict(
     if vary:
         sweep_mechanism(drawing, vary, out, as_json=as_json)
         return
-    mechanism = drawing.mechanism()
+    with _naming(path):
+        mechanism = drawing.mechanism()
     if contact and not mechanism.contacts:
         raise UsageError(f"--contact needs a [[contact]] section that says which faces may touch, but {path} has none.")
     if kind not in (*_KINDS, "stiffness_matrix", "all"):
@@ -66,8 +69,9 @@ def predict(
     table: dict[str, dict[str, float]] = {}
     for name in wanted:
         try:
-            model = _built(name, mechanism)
-            table[name] = mechanism_figures(model)
+            with _naming(path):
+                model = _built(name, mechanism)
+                table[name] = mechanism_figures(model)
         except FingervisionError as error:
             # One kind's failure leaves the others their results.
             if kind != "all":
@@ -118,6 +122,17 @@ def predict(
     elif asked.moves:
         click.echo("Motion is answered by the finite elements: add --kind finite_element.", err=True)
     _warn(mechanism, models[chief], states[chief], table, contact=contact)
+
+
+@contextmanager
+def _naming(path: Path) -> Iterator[None]:
+    """Let a refusal of a drawing name its file."""
+    try:
+        yield
+    except FingervisionError as error:
+        if str(path) in str(error) or isinstance(error, ArgumentError | InstallationError):
+            raise
+        raise type(error)(f"In {path}: {error}") from error
 
 
 def _inputs_mm(inputs: NDArray[np.float64]) -> NDArray[np.float64]:
