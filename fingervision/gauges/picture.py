@@ -1,4 +1,4 @@
-"""What gauges see of a frame: its light, where it is asked for."""
+"""A frame as gauges see it: levels of light, computed where they are needed."""
 
 from dataclasses import dataclass
 
