@@ -68,7 +68,7 @@ def _chunks(head: bytes) -> Iterator[tuple[bytes, bytes]]:
 
 
 def _of_jpeg(head: bytes) -> str | None:
-    """Read the colour space of the camera's Exif record: 1 is sRGB. A JPEG without one says nothing of its camera."""
+    """Read the colour space of the camera's Exif record: 1 is sRGB; None where a JPEG has no such record."""
     start = head.find(EXIF_START)
     if start < 0:
         return None
