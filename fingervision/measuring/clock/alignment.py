@@ -33,6 +33,9 @@ OUTLIER_SIGMAS = 6.0
 SYSTEMATIC = 0.004
 """Share of the time between two frames and two rows that is known no better: what a curve between two rows is off at a
 turn, found by `python -m tests.benchmarks.clock` as the scatter that many frames do not average out."""
+MOST_PLAY_SHARE = 0.5
+"""Of the stroke: where more is lost in play, an error of the log's turns shifts the whole motion, and the fit of
+`python -m tests.benchmarks.clock --seed 404` was off by a frame."""
 ONE_PEAK = 0.25
 """Frames: offsets closer than that are the same peak."""
 REFINEMENTS = 3
@@ -120,7 +123,8 @@ def find_clock_offset(time_s: Array, gap_mm: Array, drive: DriveHistory) -> Cloc
     found = candidates(time_s, gap_mm, drive)
     if not found:
         return NoClockOffset(
-            "at no offset do the recording and the drive share half of their motion: record and log the same moves."
+            "at no offset do the recording and the drive share half of their time and motion: record and log the same "
+            "moves, or state --drive-offset-s."
         )
     path = LogPath.of(drive)
     frame_s = float(np.median(np.diff(time_s)))
@@ -286,6 +290,12 @@ def _stated(motion: Motion, at: Posterior, best: Fit, frame_s: float) -> ClockOf
         return NoClockOffset(
             f"the motion leaves it open by +-{2.0 * u_time_s:.3g} s (k = 2): a move at one speed, or one that is "
             "over between two frames, looks the same at every offset near. Record a run that starts, stops or turns."
+        )
+    stroke_mm = float(np.ptp(motion.drive.input_mm))
+    if at.play_mm > MOST_PLAY_SHARE * stroke_mm:
+        return NoClockOffset(
+            f"a play of {1e3 * at.play_mm:.3g} µm takes up most of the stroke of {1e3 * stroke_mm:.3g} µm, and what is "
+            "left of the motion does not tell the offset. Record a run with a longer stroke."
         )
     if abs(rate) > LARGEST_RATE:
         return NoClockOffset(

@@ -15,6 +15,9 @@ LARGEST_RATE = 1.5e-3
 """Relative difference of the clocks that is looked for: a clock is seldom off by 0.1 %, crystals by a tenth of that."""
 LEAST_SHARE = 0.5
 """Share of the motion of either record that must lie in the overlap: less than half is no common motion."""
+LEAST_OVERLAP = 0.5
+"""Share of the shorter record's time that must lie in the overlap. A play almost as wide as the stroke leaves a motion
+so unlike the log that a short stretch at the records' ends fits better than the truth."""
 MOST_CANDIDATES = 12
 """Peaks of the correlation that are fitted: of a periodic motion the neighbours of the highest stand among them."""
 NEAR_BEST = 0.5
@@ -131,6 +134,7 @@ def _overlap_correlation(gap: Array, seen: Array, inputs: Array, known: Array) -
     square_input = shared(seen_f, input2_f) - sum_input**2 / n
     cross = shared(gap_f, input_f) - sum_gap * sum_input / n
     enough = (square_gap > LEAST_SHARE * motion_gap) | (square_input > LEAST_SHARE * motion_input)
+    enough &= n >= LEAST_OVERLAP * min(weight_gap, weight_input)
     enough &= (n > 4.5) & (square_gap > 1e-9 * motion_gap) & (square_input > 1e-9 * motion_input)
     root = np.sqrt(np.where(enough, square_gap * square_input, 1.0))
     return np.clip(np.where(enough, cross / root, 0.0), -1.0, 1.0)

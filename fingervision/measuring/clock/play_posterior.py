@@ -11,6 +11,8 @@ PLAY_PRIOR_MM = 0.1
 """Scale of the half-Cauchy prior of the play: that of worn or geared stages; ten times as much stays possible."""
 MOST_PLAY_MM = 0.5
 """Largest play, as in the catalogue of effects."""
+MOST_OF_STROKE = 0.9
+"""Largest play over the stroke: of a wider one nearly nothing moves."""
 FIRST_PLAYS = (0.0, 0.004, 0.008, 0.016, 0.03, 0.06, 0.12, 0.25, 0.5, 1.0)
 """Plays that are tried first, over the largest: a factor of two apart, each within the reach of the next."""
 OUT_OF_REACH = 14.0
@@ -126,4 +128,4 @@ def posterior(motion: Motion, best: Fit) -> Posterior:
 
 
 def _longest_mm(motion: Motion) -> float:
-    return min(MOST_PLAY_MM, 0.5 * float(np.ptp(motion.drive.input_mm)))
+    return min(MOST_PLAY_MM, MOST_OF_STROKE * float(np.ptp(motion.drive.input_mm)))
