@@ -60,6 +60,17 @@ def test_idle_connections_lock_nobody_out(page: server.Page, monkeypatch: pytest
         each.close()
 
 
+def test_every_answer_keeps_the_page_to_itself(page: server.Page) -> None:
+    with urlopen(page.address, timeout=OPENED_WITHIN_S) as answer:
+        headers = answer.headers
+    assert "default-src 'none'; script-src 'self'" in headers["Content-Security-Policy"]
+    assert "unsafe" not in headers["Content-Security-Policy"]
+    assert headers["Referrer-Policy"] == "no-referrer"
+    assert headers["X-Frame-Options"] == "DENY"
+    assert headers["X-Content-Type-Options"] == "nosniff"
+    assert headers["Cache-Control"] == "no-store"
+
+
 def test_who_never_asks_is_let_go(page: server.Page, monkeypatch: pytest.MonkeyPatch) -> None:
     assert status(page.address) == 200
     monkeypatch.setattr(half_open, "ASKS_WITHIN_S", 0.1)
