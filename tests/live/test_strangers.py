@@ -4,6 +4,7 @@ import socket
 from collections.abc import Iterator
 from pathlib import Path
 from threading import Event, Thread
+from types import SimpleNamespace
 from urllib.error import HTTPError
 from urllib.request import urlopen
 
@@ -17,9 +18,12 @@ from fingervision.live import half_open, server
 from fingervision.live.choices import Choices
 from fingervision.live.commands import obey
 from fingervision.live.opening import opened
+from fingervision.live.page_socket import known_by
+from fingervision.live.preview import Known
 from fingervision.live.session import Session
 
-IDLE, OPENED_WITHIN_S = 70, 10.0
+# More than the server takes connections at once.
+IDLE, OPENED_WITHIN_S = server.CONNECTIONS_AT_ONCE + 12, 10.0
 
 
 @pytest.fixture
@@ -56,6 +60,17 @@ def test_idle_connections_lock_nobody_out(page: server.Page, monkeypatch: pytest
         each.close()
 
 
+def test_every_answer_keeps_the_page_to_itself(page: server.Page) -> None:
+    with urlopen(page.address, timeout=OPENED_WITHIN_S) as answer:
+        headers = answer.headers
+    assert "default-src 'none'; script-src 'self'" in headers["Content-Security-Policy"]
+    assert "unsafe" not in headers["Content-Security-Policy"]
+    assert headers["Referrer-Policy"] == "no-referrer"
+    assert headers["X-Frame-Options"] == "DENY"
+    assert headers["X-Content-Type-Options"] == "nosniff"
+    assert headers["Cache-Control"] == "no-store"
+
+
 def test_who_never_asks_is_let_go(page: server.Page, monkeypatch: pytest.MonkeyPatch) -> None:
     assert status(page.address) == 200
     monkeypatch.setattr(half_open, "ASKS_WITHIN_S", 0.1)
@@ -74,6 +89,12 @@ def test_a_number_without_end_is_refused_and_no_fault(page: server.Page, session
             obey(session, {"do": "region", "box": [0, 0, 10, number]})
         with pytest.raises(UsageError):
             obey(session, {"do": number})
+
+
+def test_a_page_that_comes_back_with_a_number_without_end_is_a_new_one() -> None:
+    for number in ("9" * 5000, "-1", "1e3", "\u0663"):
+        page = SimpleNamespace(query_params={"view": "one", "rows": number, "messages": "1"})
+        assert known_by(page) == Known()  # type: ignore[arg-type]
 
 
 def test_the_browser_is_opened_without_the_token_on_its_command_line(page: server.Page, tmp_path: Path) -> None:
