@@ -53,7 +53,7 @@ def at_rate(drive: DriveHistory, rate_hz: float | None) -> DriveHistory:
 
 @dataclass(frozen=True, slots=True)
 class MotionAsked:
-    """What `model` was asked for in motion, read and checked before anything is computed."""
+    """Options of `model` for motion in time and frequency, checked before anything is computed."""
 
     drive: DriveHistory | None
     modes: ModesWanted | None
