@@ -96,8 +96,8 @@ class DrivenBody:
         return self.tangent(displacement)[1] if self.nodal_force is None else self.nodal_force(displacement)
 
     @cached_property
-    def paths(self) -> dict[tuple[float, float, bool], list[Equilibrium]]:
-        """Equilibria in the deformed shape that were followed already, by first and last input and contact."""
+    def paths(self) -> dict[tuple[float, float, bool, int], list[Equilibrium]]:
+        """Equilibria in the deformed shape followed already, by first and last input, contact and least steps."""
         return {}
 
     @cached_property

@@ -81,15 +81,18 @@ def _newton(
 
 
 def large_path(
-    body: DrivenBody, last_mm: float, *, start: Equilibrium | None = None, contact: bool = False
+    body: DrivenBody, last_mm: float, *, start: Equilibrium | None = None, contact: bool = False, least: int = 3
 ) -> list[Equilibrium]:
-    """Follow the equilibria from a first one, or from rest, to an input in steps of at most half a millimetre."""
+    """Follow the equilibria from a first one, or from rest, to an input in steps of at most half a millimetre.
+
+    At least three of them make a curve; one is enough where the last equilibrium alone is wanted (`least`).
+    """
     path = [start or body.at_rest()]
     first_mm = path[0].input_mm
-    key = (first_mm, last_mm, contact)
+    key = (first_mm, last_mm, contact, least)
     if key in body.paths:
         return body.paths[key]
-    steps = max(3, int(np.ceil(abs(last_mm - first_mm) / _STEP_MM)))
+    steps = max(least, int(np.ceil(abs(last_mm - first_mm) / _STEP_MM)))
     for step in range(1, steps + 1):
         input_mm = last_mm if step == steps else first_mm + (last_mm - first_mm) * step / steps
         path.append(large_equilibrium(body, input_mm, path[-1], contact=contact))

@@ -54,7 +54,7 @@ def equilibria(body: DrivenBody, physics: Physics, inputs_mm: Sequence[float]) -
             if contact and state.input_mm > (touch_mm or 0.0):
                 first = first_touch(body, touch_mm or 0.0)
                 state = first if value < first.input_mm else state
-            state = large_path(body, value, start=state, contact=contact)[-1]
+            state = large_path(body, value, start=state, contact=contact, least=1)[-1]
             found[value] = state
     return [found[value] for value in inputs_mm]
 
