@@ -46,6 +46,9 @@ from fingervision.vision.rigid_outline import (
 
 Array = NDArray[np.float64]
 
+LEAST_SIZE_ERROR, MOST_SIZE_ERROR, SURE = 1e-3, 0.01, 4.0
+"""Relative: printed parts are off by 0.2 % (mechanics.md, section 5), and a scale by no more; beyond 1 % it is another
+scale or drawing. And standard uncertainties at which an error of the size is none of the noise."""
 BODIES, GAPS = "bodies.csv", "gaps.csv"
 LAID_BY_ALL = (
     "no fixed body is in view: the drawing was laid by all bodies together, so that poses count from their mean place "
@@ -112,10 +115,9 @@ class BodyTracker:
                 continue
             picture = picture_of(item, self.settings)
             grey = np.asarray(picture.grey if picture.light is None else picture.light[picture.grey], dtype=np.float64)
-            view = self._view(picture)
             if self.placed is None:
-                self._place(grey, item.index, view, picture)
-            yield FramePoses(item.index, item.time_s, self._seen(grey, view))
+                self._place(grey, item.index, self._view(picture), picture)
+            yield FramePoses(item.index, item.time_s, self._seen(grey, self._view(picture)))
 
     def _names(self) -> list[str]:
         bodies = [outline.body.name for outline in self.outlines]
@@ -125,7 +127,9 @@ class BodyTracker:
         """How edges show: half of the edge bias widens what is dark on each of its sides."""
         dark = self.placed is None or self.placed.body_is_dark
         outward_px = (0.5 if dark else -0.5) * self.scale.edge_bias_px
-        return EdgeView(flat_map_of(self.scale), outward_px, picture.shared_pixels)
+        if self.placed is None:
+            return EdgeView(flat_map_of(self.scale), outward_px, picture.shared_pixels)
+        return EdgeView(flat_map_of(self.scale), outward_px, picture.shared_pixels, *self._levels)
 
     def _place(self, grey: Array, index: int, view: EdgeView, picture: Picture) -> None:
         height, width = grey.shape
@@ -140,6 +144,8 @@ class BodyTracker:
             inside, ground = levels_of(grey, self.mechanism, placed.place)
         if not placed.body_is_dark:
             view = replace(view, outward_px=-view.outward_px)
+        self._levels = inside, ground - inside
+        view = replace(view, body_level=inside, contrast=ground - inside)
         laid = refined(grey, self.outlines, placed.place, placed.body_is_dark, view)
         if laid is None:
             raise DataError(
@@ -157,6 +163,29 @@ class BodyTracker:
         self._chunks = [outline.chunks(laid.place) for outline in self.outlines]
         self._about = [outline.about_px(laid.place) for outline in self.outlines]
         self._last: list[tuple[Array, float]] = [(np.zeros(2), 0.0)] * len(self.outlines)
+        self._check_size(grey, index, self._view(picture))
+
+    def _check_size(self, grey: Array, index: int, view: EdgeView) -> None:
+        """Hold the sizes of the bodies against the drawing: what is off is a wrong scale, or another mechanism."""
+        fits = [self._fit(grey, [], number, view) for number in range(len(self.outlines))]
+        told = [(fit.size_error, fit.u_size_error) for fit in fits if fit is not None]
+        weight = sum(u**-2 for _, u in told)
+        if self.placed is None or weight == 0.0:
+            return
+        error, u = sum(size * u**-2 for size, u in told) / weight, weight**-0.5
+        if abs(error) < SURE * u or abs(error) < LEAST_SIZE_ERROR:
+            return
+        words = (
+            f"the bodies of {self.mechanism.name} are seen {100.0 * abs(error):.2g} +- {200.0 * u:.1g} % (95 %) "
+            f"{'larger' if error > 0.0 else 'smaller'} than drawn at {self.scale.px_per_mm:.5g} px/mm"
+        )
+        if abs(error) > MOST_SIZE_ERROR:
+            raise DataError(
+                f"The drawing must have the size of what is seen, but on frame {index} {words}: check the scale and "
+                "the lengths of the drawing."
+            )
+        self._shared = replace(self._shared, size_error=abs(error))
+        self.placed = replace(self.placed, notes=(*self.placed.notes, f"{words}; u of the poses holds it."))
 
     def _fit(self, grey: Array, pyramid: list[Array], number: int, view: EdgeView) -> RigidFit | None:
         """Fit near where it was last; else from farther away."""

@@ -30,6 +30,9 @@ that lie half a point of the grid apart have that much in common."""
 APART_RAD = 0.35
 LEVELS = 4
 """Times that the picture is halved for the first fit: edges are then found from up to 50 px away."""
+LEAST_LAID = 0.6
+"""Of the chunks in view of what the drawing is laid by: with less, something covers it, or edges of a shadow are taken
+for its own, and all poses would count from there."""
 OTHER_SCALE = 0.1
 """Relative: a given point is set to a few pixels in some hundred."""
 
@@ -215,7 +218,7 @@ def refined(
     chunks = together(fixed or cut)
     about = chunks.middles.mean(axis=1)
     found = capture_rigid(grey, halved(grey, LEVELS), chunks, about, body_is_dark, (np.zeros(2), 0.0), view)
-    if found is None:
+    if found is None or found.seen < LEAST_LAID * found.in_view:
         return None
     angle = place.angle_rad + found.angle_rad
     turn = np.array([[np.cos(found.angle_rad), -np.sin(found.angle_rad)],

@@ -31,12 +31,15 @@ class SharedErrors:
         The calibration with its budget; None where nothing is known of it.
     u_response_px : float
         What an unknown camera response leaves open of where an edge is seen.
+    size_error : float
+        By how much bodies are seen larger or smaller than drawn: an error of the scale, or of the drawing.
     """
 
     laid: RigidFit | None
     about_px: Array
     plane: PlaneScale | None
     u_response_px: float = 0.0
+    size_error: float = 0.0
 
     def of_pose(self, fit: RigidFit, about_px: Array, in_picture: Array) -> "SharedPose":
         """Work out what the shared errors do to one pose.
@@ -60,9 +63,9 @@ class SharedErrors:
             outward = outward - carried @ self.laid.by_outward
             scale = scale - carried @ self.laid.by_scale
         if self.plane is None:
-            return SharedPose(placed, np.zeros(3), np.zeros(3), 0.0)
+            return SharedPose(placed, np.zeros(3), self.size_error * scale, 0.0)
         at = (float(in_picture[0]), float(in_picture[1]))
-        relative = max(self.plane.relative_u(at, 0.0), self.plane.relative_u(at, 0.5 * pi))
+        relative = max(self.plane.relative_u(at, 0.0), self.plane.relative_u(at, 0.5 * pi), self.size_error)
         u_edge_px = self.plane.u_edge_px(self.u_response_px)
         return SharedPose(placed, u_edge_px * outward, relative * scale, self.plane.u_angle_rad)
 

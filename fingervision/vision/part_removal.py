@@ -63,7 +63,7 @@ def without_part(
     best: CoarseFingers | None = None
     for direction in directions:
         orientation = Orientation(direction, *mask.shape)
-        upright: Mask = np.ascontiguousarray(orientation.view(mask), dtype=np.uint8)
+        upright = orientation.upright(mask)
         channel = find_channel(upright, below_tip_px)
         if channel is None:
             continue

@@ -263,10 +263,13 @@ def _rows_between(looked_at: Ints) -> Ints:
     Where many in succession were left out, a part hides the edge there.
     """
     looked_at = np.sort(looked_at)
-    rows = np.arange(looked_at[0], looked_at[-1] + 1)
+    rows, steps = np.arange(looked_at[0], looked_at[-1] + 1), np.diff(looked_at).astype(np.float64)
+    most = LEFT_OUT * median(steps)
+    if steps.max() <= most:
+        return rows
     after = np.searchsorted(looked_at, rows)
     before = looked_at[np.maximum(np.searchsorted(looked_at, rows, side="right") - 1, 0)]
-    return rows[looked_at[after] - before <= LEFT_OUT * np.median(np.diff(looked_at))]
+    return np.asarray(rows[looked_at[after] - before <= most])
 
 
 def _across(edges: EdgePoints) -> Floats:

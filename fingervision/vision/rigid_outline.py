@@ -36,6 +36,10 @@ FEWEST = 6
 LEAST_SHARE = 0.4
 """Of the chunks in view that must be seen: less is a body that something covers."""
 LEAST_IN_VIEW = 0.4
+OTHER_LEVEL, OTHER_CONTRAST, OTHER_BLUR, OTHER_BLUR_PX, OTHER_NOISE = 0.3, (0.4, 2.5), 1.25, 0.2, 4.0
+"""What a chunk may differ in from its body's others: level of the body in contrasts, contrast (medians), blur (a factor
+and pixels), noise (a factor; quartiles). Beyond, its edge is that of a shadow, or two edges are fitted as one: a cast
+shadow's edge has another level inside, and one of 3 px twice the blur. Texture of a sixth of the contrast stays."""
 LEAST_WINDOW = 0.7
 """Of a chunk's window that must lie in the picture: an edge in its middle then has ground and body on its sides."""
 
@@ -90,11 +94,15 @@ class EdgeView:
         How far outside of its body an edge is seen (edge bias), in pixels of the picture.
     shared_pixels : float
         So many pixels count as one: a codec shares its errors among them.
+    body_level, contrast : float or None
+        Level of the bodies, and how much lighter or darker the ground is; None where they are not known.
     """
 
     flat: FlatMap | None = None
     outward_px: float = 0.0
     shared_pixels: float = 1.0
+    body_level: float | None = None
+    contrast: float = 0.0
 
 
 PLAIN = EdgeView()
@@ -122,6 +130,9 @@ class RigidFit:
     by_outward, by_scale : ndarray of float, shape (3,)
         What x, y and the angle are off where every edge is seen 1 px farther out, and where the body is larger than
         drawn by its own size: errors that all frames share, which the covariance does not hold.
+    size_error, u_size_error : float
+        How much larger the body is seen than drawn, relative, whatever widens or narrows all of its edges alike taken
+        off; and its standard uncertainty, infinite where its edges do not tell.
     """
 
     shift_px: Array
@@ -133,6 +144,8 @@ class RigidFit:
     blur_px: float
     by_outward: Array
     by_scale: Array
+    size_error: float = 0.0
+    u_size_error: float = float("inf")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -180,10 +193,10 @@ def fit_rigid(
         step = _rigid(now, edges, about + shift)
         if step is None:
             return None
-        move, covariance, shared = step
+        move, covariance, shared, size = step
         shift, angle = shift + move[:2], angle + float(move[2])
         found = RigidFit(shift, angle, covariance, int(edges.used.sum()), int(edges.in_view.sum()),
-                         edges.used.size, blur, shared[:, 0], shared[:, 1])  # fmt: skip
+                         edges.used.size, blur, shared[:, 0], shared[:, 1], *size)  # fmt: skip
         reach = float(np.abs(chunks.middles - about[:, None]).max())
         if float(np.hypot(*move[:2])) + abs(float(move[2])) * reach < SETTLED_PX:
             break
@@ -287,6 +300,7 @@ def _edges(grey: NDArray[np.float64], flat_chunks: Chunks, body_is_dark: bool, b
     longest = float(chunks.half_lengths.max(initial=0.0))
     box = ceil(np.hypot(longest, reach)) + 1
     offset, variance, blurs = np.zeros(count), np.full(count, np.inf), np.full(count, blur)
+    level, contrast, noise = np.zeros(count), np.ones(count), np.ones(count)
     used, in_view = np.zeros(count, dtype=bool), np.zeros(count, dtype=bool)
     steps = np.arange(-box, box + 1)
     for k in range(count):
@@ -308,14 +322,39 @@ def _edges(grey: NDArray[np.float64], flat_chunks: Chunks, body_is_dark: bool, b
         values = window[inside]
         fitted = _step(values, s[inside], blur, body_is_dark)
         if fitted is not None:
-            offset[k], variance[k], blurs[k] = fitted
+            offset[k], variance[k], blurs[k], level[k], contrast[k], noise[k] = fitted
             used[k] = True
+    if view.body_level is not None:
+        used &= np.abs(level - view.body_level) <= OTHER_LEVEL * abs(view.contrast)
+    if used.any():
+        used &= _like_the_others(blurs, level, contrast, noise, used)
     offset = chunks.stretch * (offset - view.outward_px)
     return _Edges(offset, variance * view.shared_pixels * chunks.stretch**2, blurs, used, in_view)
 
 
-def _step(values: Array, s: Array, blur: float, body_is_dark: bool) -> tuple[float, float, float] | None:
-    """Offset of a blurred step, its variance and its blur, by Gauss and Newton's iteration; None where there is none.
+def _like_the_others(
+    blurs: Array, level: Array, contrast: Array, noise: Array, used: NDArray[np.bool_]
+) -> NDArray[np.bool_]:
+    """Whether a chunk shows the body's own edge, by the median of all chunks that show one."""
+    usual = float(np.median(contrast[used]))
+    # A shadow falls on up to half of a body's sides: the better half tells what an edge of its own looks like.
+    sharp, quiet = float(np.quantile(blurs[used], 0.25)), float(np.quantile(noise[used], 0.25))
+    low, high = OTHER_CONTRAST
+    return np.asarray(
+        (np.abs(level - np.median(level[used])) <= OTHER_LEVEL * abs(usual))
+        & (contrast / usual >= low)
+        & (contrast / usual <= high)
+        & (blurs <= OTHER_BLUR * sharp + OTHER_BLUR_PX)
+        & (noise <= OTHER_NOISE * quiet)
+    )
+
+
+def _step(
+    values: Array, s: Array, blur: float, body_is_dark: bool
+) -> tuple[float, float, float, float, float, float] | None:
+    """Fit a blurred step by Gauss and Newton's iteration; None where there is none.
+
+    Offset, its variance, blur, level of the body, its difference from the ground, standard deviation of the noise.
 
     Pixels are squares: their own width adds 1/12 to the square of the blur (measuring.md).
     """
@@ -343,11 +382,12 @@ def _step(values: Array, s: Array, blur: float, body_is_dark: bool) -> tuple[flo
     if abs(d) > FARTHEST_PX:
         return None
     variance = noise2 * float(inverse[2, 2]) / float(b) ** 2
-    return d, variance, float(np.sqrt(max(sigma**2 - 1.0 / 12.0, BLURS_PX[0] ** 2)))
+    of_optics = float(np.sqrt(max(sigma**2 - 1.0 / 12.0, BLURS_PX[0] ** 2)))
+    return d, variance, of_optics, float(a + b), float(b), float(np.sqrt(noise2))
 
 
-def _rigid(chunks: Chunks, edges: _Edges, about: Array) -> tuple[Array, Array, Array] | None:
-    """Small rigid motion by the chunks' offsets, its covariance and what shared errors do to it, shape (3, 2).
+def _rigid(chunks: Chunks, edges: _Edges, about: Array) -> tuple[Array, Array, Array, tuple[float, float]] | None:
+    """Small rigid motion by the chunks' offsets, its covariance, what shared errors do to it, and the size's error.
 
     None where the offsets do not hold it.
     """
@@ -381,4 +421,21 @@ def _rigid(chunks: Chunks, edges: _Edges, about: Array) -> tuple[Array, Array, A
     # An edge seen farther out is one offset of all chunks; a body that is larger than drawn moves each by its distance.
     shared = np.stack([np.ones_like(nx), nx * arm[0] + ny * arm[1]], axis=1)
     inverse = np.linalg.inv(normal)
-    return move, spread * inverse, inverse @ (columns.T @ (w[:, None] * shared))
+    size = _size_error(np.hstack([columns, shared]), offset, sd)
+    return move, spread * inverse, inverse @ (columns.T @ (w[:, None] * shared)), size
+
+
+def _size_error(columns: Array, offset: Array, sd: Array) -> tuple[float, float]:
+    """Relative error of the body's size beside a rigid motion and edges that are all seen farther out, and its u."""
+    whitened, wanted = columns / sd[:, None], offset / sd
+    scale = np.linalg.norm(whitened, axis=0)
+    if offset.size < FEWEST + columns.shape[1] or scale.min() <= 0.0:
+        return 0.0, float("inf")
+    whitened = whitened / scale
+    normal = whitened.T @ whitened
+    if np.linalg.cond(normal) > SINGULAR:
+        return 0.0, float("inf")
+    inverse = np.linalg.inv(normal)
+    found = inverse @ (whitened.T @ wanted)
+    spread = max(1.0, float(np.sum((wanted - whitened @ found) ** 2)) / (offset.size - columns.shape[1]))
+    return float(found[-1] / scale[-1]), float(np.sqrt(spread * inverse[-1, -1]) / scale[-1])

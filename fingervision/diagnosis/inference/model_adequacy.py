@@ -132,7 +132,7 @@ def _is_an_effect_itself(problem: Problem, found: Explanation, basis: _Basis) ->
     inverse = np.linalg.pinv(lines.T @ _beside(design, metric, lines))
     cross = basis.columns.T @ _beside(design, metric, lines)
     left = norm - np.einsum("ij,ij->i", cross @ inverse, cross)
-    own = left <= (1.0 - SAME_SHAPE**2) * norm
+    own: Flags = np.asarray(left <= (1.0 - SAME_SHAPE**2) * norm)
     for shape in shapes:
         moved = _beside(design, metric, shape - lines @ (inverse @ (lines.T @ _beside(design, metric, shape))))
         if float(shape @ moved) > 0.0:

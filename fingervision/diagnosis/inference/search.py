@@ -66,7 +66,8 @@ def _completes(state: "_State", smaller: Explanation, larger: Explanation) -> bo
     """Whether the larger explanation takes nearly all that the smaller one left, as a true one does.
 
     What the smaller one leaves must be plainly more than the noise, and more than its form may be off. An effect that
-    joins it bends to what its form leaves over, however much that is; others in its place that leave noise alone do not.
+    joins it bends to what its form leaves over, however much that is; others in its place that leave noise alone owe
+    it less.
     """
     rows = state.values - int(state.problem.whitener.aside.sum())
     stands = smaller.score - rows
