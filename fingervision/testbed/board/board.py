@@ -76,7 +76,7 @@ class Board:
 
     @property
     def dropped_code(self) -> str:
-        """Code of the board for why it dropped the motion."""
+        """Code of the board for why the drive line was dropped."""
         return self._cause
 
     @property
