@@ -111,7 +111,7 @@ def with_roughness(points: OutlinePoints, found: Roughness) -> OutlinePoints:
 def shared_along(
     points: OutlinePoints, end: FingerEnd, u_prior: Floats, bare: OutlinePoints, found: Roughness
 ) -> FingerEnd:
-    """The fitted end with the covariance that points have which stray together.
+    """The fitted end, with the covariance of points whose deviations are correlated along the edge.
 
     Parameters
     ----------

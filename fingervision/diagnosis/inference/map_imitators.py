@@ -52,7 +52,7 @@ def imitating_effects(problem: Problem, position_map: PositionMap) -> dict[str, 
 def imitating_parts(problem: Problem, position_map: PositionMap, explanation: Explanation) -> dict[str, str]:
     """Find effects of an explanation that act like a map with the parameters that they have there.
 
-    A cyclic error whose period is half the range is one: its curve is smooth enough to be the map's.
+    A cyclic error with a period of half the range is one: a map can follow so smooth a curve.
 
     Parameters
     ----------

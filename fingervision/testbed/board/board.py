@@ -64,7 +64,7 @@ class Board:
 
     @property
     def levels(self) -> wire.Levels:
-        """Lines that say yes, as last heard."""
+        """Output lines of the controller that are active, as last reported."""
         self._link.check()
         return self._levels
 
@@ -76,7 +76,7 @@ class Board:
 
     @property
     def dropped_code(self) -> str:
-        """The board's own letter for it."""
+        """Code of the board for why the drive line was dropped."""
         return self._cause
 
     @property
