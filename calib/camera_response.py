@@ -134,12 +134,37 @@ def _bt709(level: Floats) -> Floats:
     return np.where(level < 4.5 * beta, level / 4.5, ((level + alpha - 1.0) / alpha) ** (1.0 / 0.45))
 
 
-CURVES: dict[str, Callable[[Floats], Floats]] = {"linear": lambda level: level, "srgb": _srgb, "bt709": _bt709}
+def _hlg(level: Floats) -> Floats:
+    """ITU-R BT.2100-2, table 5: from the hybrid log-gamma signal to the light of the scene."""
+    a = 0.17883277
+    b, c = 1.0 - 4.0 * a, 0.5 - a * np.log(4.0 * a)
+    light = np.where(level <= 0.5, level**2 / 3.0, (np.exp((np.maximum(level, 0.5) - c) / a) + b) / 12.0)
+    # The standard's constants are rounded: white would be 1 - 1e-8.
+    return np.asarray(light / light.max())
+
+
+def _pq(level: Floats) -> Floats:
+    """ITU-R BT.2100-2, table 4: from the perceptual quantiser to the light of the scene by its reference OOTF."""
+    m1, m2, c1, c2, c3 = 2610 / 16384, 2523 / 4096 * 128, 3424 / 4096, 2413 / 4096 * 32, 2392 / 4096 * 32
+    root = level ** (1.0 / m2)
+    display_cd_m2 = 10_000.0 * (np.maximum(root - c1, 0.0) / (c2 - c3 * root)) ** (1.0 / m1)
+    # The OOTF is the curve of BT.709, continued to 59.5208 times its white, and the display's exponent of 2.4.
+    light = _bt709((display_cd_m2 / 100.0) ** (1.0 / 2.4))
+    return np.asarray(light / light.max())
+
+
+CURVES: dict[str, Callable[[Floats], Floats]] = {
+    "linear": lambda level: level,
+    "srgb": _srgb,
+    "bt709": _bt709,
+    "hlg": _hlg,
+    "pq": _pq,
+}
 
 
 @cache
 def standard_response(name: str) -> CameraResponse:
-    """One of the curves of the standards: linear, srgb or bt709."""
+    """One of the curves of the standards: linear, srgb, bt709, or one of high dynamic range, hlg or pq."""
     if name not in CURVES:
         raise CalibrationError(f"A standard camera response must be one of {', '.join(CURVES)}, but is {name}.")
     level = np.linspace(0.0, 1.0, 4097)

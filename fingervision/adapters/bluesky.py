@@ -1,28 +1,23 @@
-"""A bed for bluesky: stage, force sensor and camera as devices of its RunEngine, and an agent around the next run.
+"""A bed for bluesky: stage, force sensor and camera as devices of its RunEngine.
 
 The stage is movable, readable, stoppable and flyable; the force sensor readable; the camera, with its frames measured,
-readable and flyable: one event a frame, with stage and force at the frame's exposure. `NextRunAgent` takes measured
-rows (`ingest`, or as a subscriber of the RunEngine) and suggests the run that tells most of what is open (`suggest`).
+readable and flyable: one event a frame, with stage and force at the frame's exposure. `bluesky_agent` suggests the next
+run.
 
 Tested with a real RunEngine of bluesky 1.15 on the simulated bed (tests/adapters/test_bluesky.py); on hardware only as
 far as the bed's own devices are. A simulated bed must be opened with `pace=1`: time then passes for every device alike.
 Protocols: bluesky.protocols, https://blueskyproject.io/bluesky/main/hardware.html. Needs the extra `bluesky`.
 """
 
-import csv
 import threading
 import time
 from collections import deque
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator
 from dataclasses import replace
-from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Any, NamedTuple
 
-from fingervision.diagnosis.diagnose import Diagnosis, diagnose
-from fingervision.domain.errors import DataError, DeviceError, LimitError, StateError
-from fingervision.models.corrected import CorrectedModel
-from fingervision.tables.read import read_measured_table
+from fingervision.adapters.thread_status import ThreadStatus
+from fingervision.domain.errors import DeviceError, LimitError, StateError
 from fingervision.testbed.bed import Bed
 from fingervision.testbed.reading import Reading
 from fingervision.testbed.run.synchronised_acquisition import Sight
@@ -32,59 +27,6 @@ FRAMES_TO_JOIN = 5
 """Frames after the last motion that are waited for: the stage's place is known between readings on either side."""
 JOINED_WITHIN_S = 5.0
 """Twenty answers of a slow line; until then nothing tells which reading belongs to which frame."""
-ROW = ("run", "time_s", "input_mm", "gap_mm", "left_mm", "right_mm", "force_n")
-
-
-class ThreadStatus:
-    """Status of something that a thread waits for; done when the thread has ended.
-
-    Parameters
-    ----------
-    work : callable
-        Returns when it is done; an exception is the status's.
-    """
-
-    def __init__(self, work: Callable[[], None]) -> None:
-        self._ended, self._lock = threading.Event(), threading.Lock()
-        self._callbacks: list[Callable[[ThreadStatus], None]] = []
-        self._error: BaseException | None = None
-
-        def run() -> None:
-            try:
-                work()
-            except BaseException as error:
-                self._error = error
-            with self._lock:
-                self._ended.set()
-                callbacks = list(self._callbacks)
-            for callback in callbacks:
-                callback(self)
-
-        threading.Thread(target=run, name="fingervision-bluesky", daemon=True).start()
-
-    @property
-    def done(self) -> bool:
-        """Whether it has ended."""
-        return self._ended.is_set()
-
-    @property
-    def success(self) -> bool:
-        """Whether it has ended as it should."""
-        return self.done and self._error is None
-
-    def exception(self, timeout: float | None = 0.0) -> BaseException | None:
-        """Wait for its end and give what it raised; TimeoutError where it goes on."""
-        if not self._ended.wait(timeout):
-            raise TimeoutError
-        return self._error
-
-    def add_callback(self, callback: Callable[["ThreadStatus"], None]) -> None:
-        """Call when done; at once where it is."""
-        with self._lock:
-            if not self._ended.is_set():
-                self._callbacks.append(callback)
-                return
-        callback(self)
 
 
 class _Shared:
@@ -136,7 +78,7 @@ class StageDevice:
 
     @property
     def hints(self) -> dict[str, list[str]]:
-        """What plots show by themselves."""
+        """Fields that bluesky plots by default."""
         return {"fields": [self.name]}
 
     def set(self, value: float) -> ThreadStatus:
@@ -382,102 +324,3 @@ def devices(bed: Bed, *, prefix: str = "") -> Devices:
         None if bed.force_sensor is None else ForceDevice(f"{prefix}force", bed, lock, unix_s),
         None if bed.camera is None else GapDevice(f"{prefix}gap", bed, shared, lock, unix_s),
     )
-
-
-class NextRunAgent:
-    """Diagnoses what was measured, and suggests the run that separates what is left open.
-
-    Parameters
-    ----------
-    model : CorrectedModel
-        What the measurement is held against (`fingervision.tables.read.read_model`).
-    gap : str
-        Name of the `GapDevice` whose events it takes as a subscriber (`RE.subscribe(agent)`).
-    seed : int
-        Of the diagnosis.
-    """
-
-    def __init__(self, model: CorrectedModel, gap: str = "gap", *, seed: int = 1) -> None:
-        self._model, self._gap, self._seed = model, gap, seed
-        self._rows: list[dict[str, Any]] = []
-        self._run = 0
-        self._answer: Diagnosis | None = None
-
-    def ingest(self, rows: Sequence[Mapping[str, Any]]) -> None:
-        """Take rows with `input_mm` and any of `gap_mm`, `run`, `time_s`, `left_mm`, `right_mm`, `force_n`."""
-        for row in rows:
-            if row.get("input_mm") is None:
-                raise DataError(f"Every row must have input_mm, but one has {sorted(row)}: add it.")
-            self._rows.append({"run": str(self._run), **{key: row.get(key) for key in ROW if row.get(key) is not None}})
-        self._answer = None
-
-    def __call__(self, name: str, document: Mapping[str, Any]) -> None:
-        """Take the documents of a RunEngine: each of its runs is a run of the table."""
-        if name == "start":
-            self._run += 1
-        if name == "event":
-            self._ingest_event(document["time"], document["data"])
-        if name == "event_page":
-            for k, at_s in enumerate(document["time"]):
-                self._ingest_event(at_s, {key: values[k] for key, values in document["data"].items()})
-
-    def report(self) -> Diagnosis:
-        """Diagnose everything that was taken so far."""
-        if self._answer is None:
-            with TemporaryDirectory(prefix="fingervision-") as folder:
-                path = Path(folder) / "measured.csv"
-                keys = [key for key in ROW if any(row.get(key) is not None for row in self._rows)]
-                with path.open("w", encoding="utf-8", newline="") as file:
-                    writer = csv.writer(file, lineterminator="\n")
-                    writer.writerow(keys)
-                    writer.writerows([["" if row.get(key) is None else row[key] for key in keys] for row in self._rows])
-                self._answer = diagnose(read_measured_table(path), self._model, seed=self._seed)
-        return self._answer
-
-    def suggest(self, batch_size: int = 1) -> list[dict[str, Any]]:
-        """Suggest the next run: `name`, `steps` as in a recipe, `separates`; empty where nothing is open."""
-        proposed = self.report().report.next_run
-        if proposed is None or batch_size < 1:
-            return []
-        steps = [dict(step) for step in proposed.steps]
-        return [{"name": proposed.name, "steps": steps, "separates": list(proposed.separates)}]
-
-    def _ingest_event(self, at_s: float, data: Mapping[str, Any]) -> None:
-        prefix = f"{self._gap}_"
-        own = {key.removeprefix(prefix): value for key, value in data.items() if key.startswith(prefix)}
-        if own.get("input_mm") is not None:
-            self.ingest([{**own, "run": str(self._run), "time_s": at_s}])
-
-
-def run_steps(steps: Sequence[Mapping[str, Any]], stage: StageDevice, gap: GapDevice) -> Iterator[Any]:
-    """Give a bluesky plan for the steps of a recipe: one run, the gap flown while the stage moves.
-
-    Kinds: triangle, move and hold; others need the bed's own runner (`fingervision bed run`).
-    """
-    import bluesky.plan_stubs as bps
-    import bluesky.preprocessors as bpp
-
-    def moves() -> Iterator[Any]:
-        for step in steps:
-            kind, speed_mm_s = step.get("kind"), float(step.get("speed_mm_s", stage.speed_mm_s))
-            if kind in ("triangle", "move"):
-                ends = [step["from_mm"], *[step["to_mm"], step["from_mm"]] * int(step.get("cycles", 1))]
-                for to_mm in ends if kind == "triangle" else [step["to_mm"]]:
-                    yield from bps.prepare(stage, (float(to_mm), speed_mm_s), wait=True)
-                    yield from bps.kickoff(stage, wait=True)
-                    yield from bps.complete(stage, wait=True)
-            elif kind == "hold":
-                yield from bps.mv(stage, float(step["at_mm"]))
-                yield from bps.sleep(float(step["seconds"]))
-            else:
-                raise DataError(
-                    f"A step must be a triangle, move or hold here, but is {kind!r}: `fingervision bed run` runs it."
-                )
-
-    def flown() -> Iterator[Any]:
-        yield from bps.kickoff(gap, wait=True)
-        yield from moves()
-        yield from bps.complete(gap, wait=True)
-        yield from bps.collect(gap)
-
-    yield from bpp.run_wrapper(flown())  # type: ignore[no-untyped-call]  # it carries no types

@@ -1,4 +1,4 @@
-"""What the overview keeps of one result: a line of a table and a small picture."""
+"""Digest of one result for the overview: a row of a table and a small picture."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""Whether an input is still what it was: a stamp that is quick to take, and the hash of its content."""
+"""Detect a changed input: by size and time of change first, then by the hash of its content."""
 
 import hashlib
 from pathlib import Path

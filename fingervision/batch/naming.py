@@ -1,4 +1,4 @@
-"""How result folders are called: by the full file name, with as much of the path as tells two of them apart."""
+"""Names of result folders: the file name, with as much of the path as makes it unique."""
 
 import hashlib
 from collections import Counter

@@ -72,7 +72,7 @@ class Plan:
 
 @dataclass(frozen=True, slots=True)
 class Batch:
-    """What became of a job.
+    """Result of a batch.
 
     Parameters
     ----------
@@ -116,7 +116,7 @@ Progress = Callable[[int, int], None]
 def planned(job: Job) -> Plan:
     """Find the inputs, and which of them have their result.
 
-    An input keeps the folder that it has; others get the shortest name that is free.
+    An input keeps its folder from an earlier call; a new one gets the shortest unused name.
 
     Raises
     ------

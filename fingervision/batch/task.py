@@ -1,4 +1,4 @@
-"""What one worker is asked for, and what it answers; both travel between processes and machines."""
+"""Task and outcome of a worker, as sent between processes and machines."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -59,7 +59,7 @@ Perform = Callable[[str, tuple[str, ...]], Ended]
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
-    """What became of one input.
+    """Result for one input.
 
     Parameters
     ----------

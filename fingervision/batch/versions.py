@@ -1,4 +1,4 @@
-"""What a worker runs: the versions on which its numbers depend, and a hash of our own source."""
+"""Versions of the software of a worker, and a hash of the source of this package."""
 
 import hashlib
 import platform

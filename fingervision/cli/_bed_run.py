@@ -53,7 +53,7 @@ def command(
 ) -> None:
     """Run a recipe on the bed and measure every picture.
 
-    The whole recipe is held against the bed's limits before anything moves.
+    The whole recipe is checked against the limits of the bed before anything moves.
     """
     import json
     import sys

@@ -1,4 +1,4 @@
-"""Options of the live view as what the user chose for it."""
+"""Translate options of `live` to the settings of the live view."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING

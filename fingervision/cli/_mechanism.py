@@ -1,20 +1,20 @@
 """`fingervision model mechanism.toml`: any planar mechanism, by finite elements and by lumped flexures."""
 
 import json
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
 
 import click
 import numpy as np
-from matplotlib.figure import Figure
-from matplotlib.tri import Triangulation
 from numpy.typing import NDArray
 from scipy.interpolate import PchipInterpolator
 
+from fingervision.cli._body_picture import draw_body, extent_mm, framed
 from fingervision.cli._model_motion import MotionAsked, move_mechanism
 from fingervision.cli._model_sweep import sweep_mechanism
 from fingervision.cli._model_uncertainty import write_uncertainty
-from fingervision.domain.errors import FingervisionError, OutputError, UsageError
+from fingervision.domain.errors import ArgumentError, FingervisionError, InstallationError, OutputError, UsageError
 from fingervision.models.gripper_figures import unit_of
 from fingervision.models.mechanism import Mechanism
 from fingervision.models.mechanism_chain import MechanismChain
@@ -57,7 +57,8 @@ def predict(
     if vary:
         sweep_mechanism(drawing, vary, out, as_json=as_json)
         return
-    mechanism = drawing.mechanism()
+    with _naming(path):
+        mechanism = drawing.mechanism()
     if contact and not mechanism.contacts:
         raise UsageError(f"--contact needs a [[contact]] section that says which faces may touch, but {path} has none.")
     if kind not in (*_KINDS, "stiffness_matrix", "all"):
@@ -68,8 +69,9 @@ def predict(
     table: dict[str, dict[str, float]] = {}
     for name in wanted:
         try:
-            model = _built(name, mechanism)
-            table[name] = mechanism_figures(model)
+            with _naming(path):
+                model = _built(name, mechanism)
+                table[name] = mechanism_figures(model)
         except FingervisionError as error:
             # One kind's failure leaves the others their results.
             if kind != "all":
@@ -87,6 +89,10 @@ def predict(
         inputs = np.linspace(-_OF_YIELD, _OF_YIELD, _ROWS) * at_yield_mm
     else:
         inputs = _inputs_mm(np.unique(read_drive(drive, columns).input_mm))
+        if large_rotation or contact:
+            # A table is read as straight between its rows, and these answers bend.
+            touches = [at for at in models[chief].touch_input_mm().values() if contact and inputs[0] < at < inputs[-1]]
+            inputs = np.union1d(inputs, np.concatenate([np.linspace(inputs[0], inputs[-1], _ROWS), touches]))
     states = {name: [model.state(float(value), large_rotation=large_rotation, contact=contact) for value in inputs]
               for name, model in models.items()}  # fmt: skip
     try:
@@ -116,6 +122,17 @@ def predict(
     elif asked.moves:
         click.echo("Motion is answered by the finite elements: add --kind finite_element.", err=True)
     _warn(mechanism, models[chief], states[chief], table, contact=contact)
+
+
+@contextmanager
+def _naming(path: Path) -> Iterator[None]:
+    """Let a refusal of a drawing name its file."""
+    try:
+        yield
+    except FingervisionError as error:
+        if str(path) in str(error) or isinstance(error, ArgumentError | InstallationError):
+            raise
+        raise type(error)(f"In {path}: {error}") from error
 
 
 def _inputs_mm(inputs: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -219,23 +236,14 @@ def _table(columns: dict[str, list[float]], path: Path) -> None:
 
 def _draw(model: MechanismPlate, state: MechanismState, path: Path, *, large: bool) -> None:
     plate = model.plate
-    corners: Any = plate.corner_triangles
     moved: NDArray[np.float64] = state.displacement_mm
     stress = plate.at_corners(plate.von_mises_mpa(moved, large=large))
-    count = stress.size
-    x, y = plate.nodes_mm[:, :count]
-    figure = Figure(figsize=(8.0, 7.0), layout="constrained")
-    axes = figure.add_subplot()
-    axes.triplot(Triangulation(x, y, corners.T), color="0.9", linewidth=0.2)
-    shape = Triangulation(x + moved[plate.x_dofs[:count]], y + moved[plate.y_dofs[:count]], corners.T)
-    top = max(state.stress_mpa, 1e-9)
-    colours = axes.tripcolor(shape, stress, shading="gouraud", cmap="viridis", vmin=0.0, vmax=top)
-    axes.set_aspect("equal")
-    axes.set_xlabel("x / mm")
-    axes.set_ylabel("y / mm")
+    figure, axes = framed(*extent_mm(plate, moved))
+    colours = draw_body(axes, plate, moved, stress, max(state.stress_mpa, 1e-9))
     axes.set_title(
         f"{model.mechanism.name}: input {state.input_mm:.3g} mm, to scale, force {state.force_n:.3g} N\n"
-        f"largest stress in a flexure {state.stress_mpa:.3g} MPa (yield {model.mechanism.material.yield_mpa:g} MPa)"
+        f"largest stress in a flexure {state.stress_mpa:.3g} MPa (yield {model.mechanism.material.yield_mpa:g} MPa)",
+        fontsize="medium",
     )
     figure.colorbar(colours, ax=axes, label="von Mises stress / MPa", shrink=0.8)
     figure.savefig(path, dpi=130)

@@ -9,6 +9,7 @@ from matplotlib.figure import Figure
 from matplotlib.tri import Triangulation
 from numpy.typing import NDArray
 
+from fingervision.cli._body_picture import draw_body, extent_mm, framed
 from fingervision.domain.response import Response
 from fingervision.models import published_table
 from fingervision.models.finite_element import FiniteElementGripper
@@ -36,23 +37,10 @@ def draw_deformed(model: FiniteElementGripper, input_mm: float, name: str, path:
     moved = model.equilibria([input_mm])[0].displacement_mm
     state = model.loaded([input_mm])[0]
     plate = model.plate
-    corners = plate.corner_triangles
     stress = plate.at_corners(plate.von_mises_mpa(moved, large=model.physics.large_rotation))
-    count = stress.size
-    x, y = plate.nodes_mm[:, :count]
-    deformed = x + moved[plate.x_dofs[:count]], y + moved[plate.y_dofs[:count]]
-    figure = Figure(figsize=(7.0, 7.6), layout="constrained")
-    axes = figure.add_subplot()
-    colours = None
+    figure, axes = framed(*extent_mm(plate, moved, mirrored=True))
     for side in (1.0, -1.0):
-        axes.triplot(Triangulation(side * x, y, corners.T), color="0.9", linewidth=0.2)
-    for side in (1.0, -1.0):
-        shape = Triangulation(side * deformed[0], deformed[1], corners.T)
-        top = max(state.stress_mpa, 1e-9)
-        colours = axes.tripcolor(shape, stress, shading="gouraud", cmap="viridis", vmin=0.0, vmax=top)
-    axes.set_aspect("equal")
-    axes.set_xlabel("x / mm")
-    axes.set_ylabel("y / mm")
+        colours = draw_body(axes, plate, moved, stress, max(state.stress_mpa, 1e-9), side=side)
     limit_mpa = model.gripper.material.yield_mpa
     touch = " (first touch: no contact beyond)" if beyond else ""
     grip = f", grip {state.grip_n:.3g} N a finger" if state.grip_n > 0.0 else ""
@@ -60,19 +48,14 @@ def draw_deformed(model: FiniteElementGripper, input_mm: float, name: str, path:
         f"{name}: input {input_mm:.3g} mm{touch}, to scale{grip}\nlargest stress on a notch {state.stress_mpa:.3g} MPa "
         f"at x = {state.place_mm[0]:.3g}, y = {state.place_mm[1]:.3g} mm (yield {limit_mpa:g} MPa)"
     )
-    if colours is not None:
-        figure.colorbar(colours, ax=axes, label="von Mises stress / MPa", shrink=0.8)
+    figure.colorbar(colours, ax=axes, label="von Mises stress / MPa", shrink=0.8)
     figure.savefig(path, dpi=130)
 
 
 def draw_mesh(mesh: PlaneMesh, name: str, path: Path) -> None:
     """Draw the triangles, and say how many and how good they are."""
-    figure = Figure(figsize=(7.0, 8.0), layout="constrained")
-    axes = figure.add_subplot()
+    figure, axes = framed(mesh.nodes_mm.min(axis=1), mesh.nodes_mm.max(axis=1))
     axes.triplot(Triangulation(mesh.nodes_mm[0], mesh.nodes_mm[1], mesh.triangles[:3].T), color="0.3", linewidth=0.25)
-    axes.set_aspect("equal")
-    axes.set_xlabel("x / mm")
-    axes.set_ylabel("y / mm")
     quality = mesh.quality()
     axes.set_title(
         f"{name}: {mesh.triangles.shape[1]} quadratic triangles, {2 * mesh.nodes_mm.shape[1]} unknowns\n"

@@ -47,9 +47,12 @@ def part_asked(width_mm: float | None, stiffness_n_mm: float | None, rest_gap_mm
 
 def write_grip(
     gripper: Gripper, models: Mapping[str, Any], part: Part, inputs: NDArray[np.float64] | None, name: str, out: Path,
-    *, as_json: bool,
+    *, errors: Mapping[str, float], as_json: bool,
 ) -> None:  # fmt: skip
-    """Write grip.csv and grip.png of every kind, and say what holds the part; small displacements."""
+    """Write grip.csv and grip.png of every kind, and say what holds the part; small displacements.
+
+    `errors` are the kinds' relative model errors of the grip.
+    """
     rows: dict[str, NDArray[np.float64]] = {}
     said = []
     for kind, model in models.items():
@@ -59,9 +62,12 @@ def write_grip(
         touch = first_grip_mm(model.half, part) if isinstance(getattr(model, "half", None), DrivenBody) else None
         limit = _closing_limit_mm(gripper, model, touch)
         at = np.linspace(limit, 0.3 * abs(limit) + (touch or 0.0), _ROWS) if inputs is None else np.sort(inputs)
+        if touch is not None and at.min() < touch < at.max():
+            # The line bends there.
+            at = np.union1d(at, [touch])
         rows[kind] = np.array([_row(model, float(value), part) for value in at])
         if touch is not None:
-            said.append(_words(gripper, kind, model, part, touch))
+            said.append(_words(gripper, kind, model, part, touch, errors[kind]))
     with (out / "grip.csv").open("w", encoding="utf-8", newline="") as file:
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(_COLUMNS)
@@ -90,7 +96,7 @@ def _row(model: Any, input_mm: float, part: Part) -> tuple[float, ...]:
     return input_mm, loaded.gap_mm, held, loaded.grip_n, loaded.force_n, loaded.stress_mpa
 
 
-def _words(gripper: Gripper, kind: str, model: Any, part: Part, touch_mm: float) -> str:
+def _words(gripper: Gripper, kind: str, model: Any, part: Part, touch_mm: float, error: float) -> str:
     """Say when a part is touched, how fast the grip rises, and where the hinges would yield."""
     limit = gripper.material.yield_mpa
     step = 0.2 * abs(model.half.first_touch_mm() or touch_mm)
@@ -108,7 +114,8 @@ def _words(gripper: Gripper, kind: str, model: Any, part: Part, touch_mm: float)
     return (
         f"{kind}: a part of {part.width_mm:g} mm ({stiff}) is touched at {touch_mm:.4g} mm of input; each finger grips "
         f"it by {per_input:.4g} N per mm beyond, at most {grip:.3g} N at {where:.4g} mm, where the hinges yield "
-        f"(the drive then pulls {abs(before.force_n + share * (most.force_n - before.force_n)):.3g} N)."
+        f"(the drive then pulls {abs(before.force_n + share * (most.force_n - before.force_n)):.3g} N). Model error of "
+        f"the grip: {100.0 * error:.2g} %."
     )
 
 

@@ -53,7 +53,7 @@ def write_modes(found: Mapping[str, Sequence[ModeShape]], name: str, out: Path, 
     if not drawn:
         click.echo("No mode lies in what --modes asks for: nothing is drawn.", err=True)
         return
-    title = f"{name}: natural modes in the plane, without the actuator's mass"
+    title = f"{name}: natural modes in the plane, without the actuator's mass, amplitudes at will"
     figure, _ = _panels(drawn, title)
     figure.savefig(out / "modes.png", dpi=110)
     if film:

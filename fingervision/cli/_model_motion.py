@@ -53,7 +53,7 @@ def at_rate(drive: DriveHistory, rate_hz: float | None) -> DriveHistory:
 
 @dataclass(frozen=True, slots=True)
 class MotionAsked:
-    """What `model` was asked for in motion, read and checked before anything is computed."""
+    """Options of `model` for motion in time and frequency, checked before anything is computed."""
 
     drive: DriveHistory | None
     modes: ModesWanted | None
@@ -161,14 +161,21 @@ def words_of(motion: Motion, column: str) -> str:
     )
 
 
+_SEEN_ROWS = 60
+"""Fewer rows are drawn as points."""
+
+
 def draw_motion(motions: Mapping[str, Motion], column: str, title: str, path: Path) -> None:
     """Draw input, one length, its difference from the static answer, and the force over time."""
     figure = Figure(figsize=(8.0, 9.0), layout="constrained")
     panels = figure.subplots(4, 1, sharex=True)
     label = column.removesuffix("_mm").replace("_", " ")
     for place, (kind, motion) in enumerate(motions.items()):
-        style = {"linestyle": _STYLES[place % 3], "color": f"C{place}", "linewidth": 1.0}
+        style: dict[str, object] = {"linestyle": _STYLES[place % 3], "color": f"C{place}", "linewidth": 1.0}
         time_s = motion.drive.time_s
+        if time_s.size <= _SEEN_ROWS:
+            # Between few rows a line is a guess: points say what was answered.
+            style |= {"marker": "o", "markersize": 4, "linestyle": ":"}
         if place == 0:
             panels[0].plot(time_s, motion.drive.input_mm, color="0.3", linewidth=1.0)
         panels[1].plot(time_s, motion.observed_mm[column], label=kind, **style)

@@ -1,4 +1,4 @@
-"""The options that say which model a measurement is held against."""
+"""Options that choose the model with which a measurement is compared."""
 
 from pathlib import Path
 
@@ -10,7 +10,7 @@ HELP = "Simulation .csv, gripper.toml, model.toml, .fmu, or .py with simulate(ti
 
 
 def _single(context: click.Context, parameter: click.Parameter, value: tuple[Path, ...]) -> Path:
-    """Take one model; of several, none may be left out in silence."""
+    """Return the only model; several are refused, so that none is ignored."""
     if len(value) > 1:
         raise click.BadParameter(
             f"one model is diagnosed at a time, but {len(value)} were given: `fingervision compare` takes several.",

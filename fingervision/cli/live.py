@@ -133,7 +133,7 @@ def command(
     if bed_name is None and (hide or allow_motion):
         raise UsageError("--hide and --allow-motion are for a bed, but there is none: name it with --bed.")
     if bed_name is not None and (no_page or drive is not None):
-        raise UsageError("--bed is for the page, and its stage says its own input: leave out --no-page and --drive.")
+        raise UsageError("--bed needs the page, and its stage gives the input: leave out --no-page and --drive.")
     if gauges is not None and no_page:
         raise UsageError("--gauges are shown in the page: leave out --no-page, or use `fingervision measure --gauges`.")
     if drive_offset_s is not None and drive is None:

@@ -19,6 +19,8 @@ if TYPE_CHECKING:
     from fingervision.models.answer_figures import ModelFigures
 
 _METRES_BELOW_OF_HEIGHT = 1e-4
+_ROWS_BETWEEN = 61
+"""Over the range of a drive, in the deformed shape: straight lines between them are within 1 um for the sample."""
 _MOST_ROWS = 401
 _SWEPT = ("vary.csv", "vary.png")
 _PREDICTED = (
@@ -148,7 +150,11 @@ def command(
         try:
             model = build_model(name, gripper, own, HingeTheory(hinge))
             figures[name] = model.figures()
-            given = _inputs_until_touch(figures[name]) if inputs is None else inputs
+            given = inputs
+            if given is None:
+                given = _inputs_until_touch(figures[name])
+            elif physics != LINEAR and not models:
+                given = _with_rows_between(given, figures[name])
             answers[name] = model.respond(given)
             row = gripper_figures(gripper, model, given, figures[name])
         except FingervisionError as error:
@@ -182,7 +188,8 @@ def command(
     move(models, asked, gripper_toml.stem, folders, out, as_json=as_json)
     if part is not None:
         given_inputs = None if drive is None else inputs
-        write_grip(gripper, models, part, given_inputs, gripper_toml.stem, out, as_json=as_json)
+        errors = {name: figures[name].grip_error for name in models}
+        write_grip(gripper, models, part, given_inputs, gripper_toml.stem, out, errors=errors, as_json=as_json)
     finish_in(
         out,
         gripper_toml,
@@ -224,6 +231,16 @@ def _inputs_mm(drive: Path, columns: Path | None, gripper: "Gripper") -> "NDArra
     if inputs.size < 2:
         raise UsageError(f"The drive {drive} must hold at least two different inputs, but holds {inputs.size}.")
     return inputs if inputs.size <= _MOST_ROWS else np.linspace(inputs[0], inputs[-1], _MOST_ROWS)
+
+
+def _with_rows_between(inputs: "NDArray[np.float64]", figures: "ModelFigures") -> "NDArray[np.float64]":
+    """Add rows between a drive's inputs, and the first touch: a table is read as straight between its rows."""
+    import numpy as np
+
+    low, high = float(inputs.min()), float(inputs.max())
+    touch = figures.contact_input_mm
+    bends = [touch] if touch is not None and low < touch < high else []
+    return np.union1d(inputs, np.concatenate([np.linspace(low, high, _ROWS_BETWEEN), bends]))
 
 
 def _inputs_until_touch(figures: "ModelFigures") -> "NDArray[np.float64]":

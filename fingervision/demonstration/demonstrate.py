@@ -125,7 +125,7 @@ def demonstrate(hidden: Hidden, seed: int, out: Path, say: Say) -> Shown:
             done = run_recipe(asked, bed, folder, hidden, before=rows)
         finally:
             bed.close()
-        say(f"{done.counts.with_gap} gaps in {done.counts.recorded} pictures. They are held against the simulation.")
+        say(f"{done.counts.with_gap} gaps in {done.counts.recorded} pictures. They are compared with the simulation.")
         table = folder / (SAMPLES if before is None else JOINED)
         answer, page = _answer(table, folder / SIMULATION, out / f"diagnosis-{number}", seed)
         say(f"{answer.report.verdict}: {answer.report.sentence}")

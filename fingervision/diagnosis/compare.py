@@ -1,4 +1,4 @@
-"""Where a measured table and a model disagree, without a word about why."""
+"""Compare a measured table with a model: where they disagree beyond the noise, without naming a cause."""
 
 from dataclasses import dataclass, replace
 from itertools import pairwise

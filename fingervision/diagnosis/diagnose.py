@@ -1,4 +1,4 @@
-"""The whole loop: where they disagree, which effect is missing, how much it explains, what remains."""
+"""The whole diagnosis: locate the disagreement, name the missing effects, and judge the residual."""
 
 import time
 from dataclasses import dataclass, replace

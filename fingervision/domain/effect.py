@@ -111,7 +111,7 @@ class History:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class InputPath:
-    """The way of the input between and besides the measured rows: what effects with memory follow.
+    """Path of the input, including points between and outside the measured rows, for effects with memory.
 
     Parameters
     ----------

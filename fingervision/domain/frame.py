@@ -13,7 +13,7 @@ Pixels = NDArray[np.uint8] | NDArray[np.uint16]
 
 
 class Coding(StrEnum):
-    """What stood between the sensor and the pixels, by how far its errors are shared.
+    """Compression between sensor and pixels: which pixels share its errors.
 
     A lossy codec that treats every picture by itself (JPEG) leaves errors that are shared over a few pixels; one that
     predicts a picture from its neighbours (H.264) moves whole blocks.

@@ -31,7 +31,7 @@ class FurtherCheck(Enum):
 
 @dataclass(frozen=True, slots=True)
 class PictureForm:
-    """What an effect of the camera does to the picture itself, where that is more than to move the two points.
+    """Change of the picture itself by a camera effect, beyond moving the two measuring points.
 
     Parameters
     ----------

@@ -93,8 +93,9 @@ class GapMeasurement:
     light_gap : bool
         True for dark fingers on a light ground; False for light fingers on a dark one.
     u_shift_px : float
-        Standard uncertainty of `gap_px` for what may have moved the edges in every frame alike: a bright rim, or light
-        just beyond the end of the scale. Zero where the edges show neither.
+        Standard uncertainty of `gap_px` for what may have moved the edges in every frame alike: a bright rim, light
+        just beyond the end of the scale, or what all rows of an edge share of their residuals although nobody says that
+        the picture was compressed. Zero where the edges show none of these.
     response_shift_px : float
         How much larger `gap_px` is than it would be if the other camera response that is possible were the true one;
         zero where the response is known.

@@ -1,8 +1,8 @@
 """How the loops in C are built: one source from all .c files of the package, one library from that.
 
-A .c file takes the constants of the .py file beside it, so that each stands in one place, with its reason; and those of
-the files that it names in a line `/* after NAME */`, whose functions it uses. Nothing but the standard library is used
-here: an installation builds before anything else is there.
+A .c file gets its constants from the .py file of the same name, where each is stated once with its reason, and from
+the files that it names in a line `/* after NAME */`. Nothing but the standard library is used here: an installation
+builds before anything else is there.
 """
 
 import ast

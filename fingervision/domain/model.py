@@ -1,4 +1,4 @@
-"""The seam between a gripper's model and whatever asks it."""
+"""Protocol of a gripper model."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field

@@ -1,4 +1,4 @@
-"""What the test bed is to do, as it is written down."""
+"""A recipe: the motions and measurements that the test bed shall execute."""
 
 from dataclasses import dataclass
 from typing import Generic, TypeVar

@@ -1,4 +1,4 @@
-"""What a diagnosis found: the noun that report.json and report.html are written from."""
+"""Report of a diagnosis: the record from which report.json and report.html are written."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field

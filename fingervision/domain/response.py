@@ -1,4 +1,4 @@
-"""Where the two measuring points are: the answer of a gripper, or of a measuring chain, to an input history."""
+"""Positions of the two measuring points: the answer of a gripper or measuring chain to an input history."""
 
 from dataclasses import dataclass, replace
 

@@ -6,7 +6,7 @@ from fingervision.domain.effect import History, PointEffect, Stage, Values
 from fingervision.domain.further_check import FurtherCheck, PictureForm
 from fingervision.domain.parameter import Parameter
 from fingervision.domain.response import Response
-from fingervision.effects.late import delay_that_shows, late
+from fingervision.effects.time_delay import delay_that_shows, late
 
 
 def act(response: Response, history: History, values: Values) -> Response:

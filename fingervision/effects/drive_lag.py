@@ -3,7 +3,7 @@
 from fingervision.domain.effect import Array, DriveEffect, History, Stage, Values
 from fingervision.domain.further_check import FurtherCheck
 from fingervision.domain.parameter import Parameter
-from fingervision.effects.late import delay_that_shows, late
+from fingervision.effects.time_delay import delay_that_shows, late
 
 
 def act(input_mm: Array, history: History, values: Values) -> Array:

@@ -1,4 +1,4 @@
-"""The play operator: what lags behind by up to half a width, in either direction (Prandtl; Visintin 1994, III.2)."""
+"""The play operator: the output follows the input with a dead band of one width (Visintin 1994, III.2)."""
 
 from fingervision.domain.effect import Array
 from fingervision.domain.loops import filled, loop

@@ -1,4 +1,4 @@
-"""What an object must be to stand in the catalogue: an effect that answers on a few samples as an effect does."""
+"""Check that an object is a valid effect, by its fields and by its answer on a few samples."""
 
 from dataclasses import replace
 from functools import partial

@@ -1,4 +1,4 @@
-"""What a camera is asked for and what it says it does, without a camera: OpenCV's properties and their quirks.
+"""Requested and actual settings of a camera, in OpenCV's properties and their peculiarities.
 
 The properties mean something else behind each of OpenCV's backends (modules/videoio/src/cap_v4l.cpp, cap_msmf.cpp and
 cap_avfoundation_mac.mm of OpenCV 4 and 5):

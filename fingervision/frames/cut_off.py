@@ -1,4 +1,4 @@
-"""Whether a video file ends before the end that it states."""
+"""Detect a video file that is truncated: shorter than its headers state."""
 
 import av
 

@@ -104,7 +104,7 @@ class _Read:
 
 
 def _read(container: av.container.InputContainer, stream: av.VideoStream, path: Path, heard: Heard) -> Iterator[_Read]:
-    """Packets, one behind the one that is read: a hole is noticed by what comes behind it."""
+    """Read packets one ahead, since a gap in the stream shows in the packet after it."""
     demuxed = container.demux(stream)
     places = AviPlaces(path, stream.index, len(container.streams)) if container.format.name == "avi" else None
     clusters = ClusterTimes(path, stream.index) if "matroska" in container.format.name else None

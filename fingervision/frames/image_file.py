@@ -1,4 +1,4 @@
-"""One image file: PNG, JPEG, BMP or TIFF, 8 or 16 bits, grey or colour, whole or not at all."""
+"""Read one image file: PNG, JPEG, BMP or TIFF, 8 or 16 bits, grey or colour; a truncated one is refused."""
 
 import struct
 import zlib

@@ -1,4 +1,4 @@
-"""What a live source hands over: a frame, and the camera's own packets that it came in."""
+"""A frame of a live source, with the coded packets in which the camera sent it."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass

@@ -70,7 +70,7 @@ class Description:
 
 
 class FrameSource(Protocol):
-    """A recording or a camera: its frames in order, once, each as it is or as lost."""
+    """A recording or a camera: its frames in order, each read once, as a picture or marked as lost."""
 
     @property
     def description(self) -> Description:

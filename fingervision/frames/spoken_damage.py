@@ -1,4 +1,4 @@
-"""What FFmpeg says of damage in its log alone: heard, kept off the screen, and told apart by who says it."""
+"""Damage that FFmpeg reports in its log only: collected by decoder, and kept off the screen."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager

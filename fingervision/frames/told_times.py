@@ -1,4 +1,4 @@
-"""What times tell of damage: they run backwards, leap out of an even row and back into it, or leave frames out."""
+"""Damage seen in time stamps: times that run backwards, isolated jumps, missing frames."""
 
 from collections import Counter, deque
 from collections.abc import Iterable, Iterator

@@ -9,7 +9,7 @@ import av
 from fingervision.frames.image_file import JPEG_START, PNG_SIGNATURE
 
 # Transfer characteristics of ITU-T H.273, table 3, by what `calib.camera_response` calls them.
-VIDEO_TAGS = {1: "bt709", 6: "bt709", 8: "linear", 13: "srgb", 14: "bt709", 15: "bt709"}
+VIDEO_TAGS = {1: "bt709", 6: "bt709", 8: "linear", 13: "srgb", 14: "bt709", 15: "bt709", 16: "pq", 18: "hlg"}
 # PNG stores 100000 / gamma of the file (PNG specification, 11.3.3.2).
 PNG_GAMMAS = {45455: "srgb", 100000: "linear"}
 EXIF_START, EXIF_IFD, COLOUR_SPACE = b"Exif\x00\x00", 0x8769, 0xA001
@@ -68,7 +68,7 @@ def _chunks(head: bytes) -> Iterator[tuple[bytes, bytes]]:
 
 
 def _of_jpeg(head: bytes) -> str | None:
-    """Read the colour space of the camera's Exif record: 1 is sRGB. A JPEG without one says nothing of its camera."""
+    """Read the colour space of the camera's Exif record: 1 is sRGB; None where a JPEG has no such record."""
     start = head.find(EXIF_START)
     if start < 0:
         return None

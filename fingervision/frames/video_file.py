@@ -7,6 +7,7 @@ from pathlib import Path
 
 import av
 import numpy as np
+from av.stream import Disposition
 
 from fingervision.domain.errors import DataError, FingervisionError, InputFileError, UsageError
 from fingervision.domain.frame import Coding, Frame, LostFrame, Pixels
@@ -25,6 +26,15 @@ from fingervision.frames.told_times import believable
 # the stream does not say.
 INTRA_PROPERTY, LOSSY_PROPERTY = 1, 2
 QUARTER_DEG = 90
+RAW_CAMERA_FILES = {
+    ".mraw": "holds a Photron camera's bare pixels, without their size and rate: export it from Photron FASTCAM Viewer "
+    "as 16-bit TIFF images or uncompressed AVI, and measure those.",
+    ".cihx": "describes a Photron recording and holds no pictures: export the recording from Photron FASTCAM Viewer as "
+    "16-bit TIFF images or uncompressed AVI, and measure those.",
+    ".cine": "must be a Phantom camera's recording, but cannot be read as one (FFmpeg reads uncompressed 8- and 16-bit "
+    "ones): export it from PCC as 16-bit TIFF images or uncompressed AVI, and measure those.",
+}
+"""What to do with high-speed cameras' own files that cannot be read."""
 
 
 def _coding(properties: int) -> Coding:
@@ -88,6 +98,11 @@ class VideoFile:
                 if ratio in (None, 0, 1)
                 else (f"The file states pixels that are not square ({ratio}): one scale cannot hold along both axes.",)
             )
+            if (tracks := len(_tracks(container))) > 1:
+                notes += (
+                    f"The file holds {tracks} videos; the first ({codec.width}x{codec.height}) is measured. `ffmpeg -i "
+                    f"{Path(self.name).name} -map 0:v:1 -c copy second.mkv` takes out the second.",
+                )
             size_px = (codec.width, codec.height)
             turned = _rotation_deg(container, stream)
             if turned % QUARTER_DEG:
@@ -152,15 +167,21 @@ class VideoFile:
 
 def _stream(container: av.container.InputContainer, name: str) -> av.VideoStream:
     """Find the first video stream, and its decoder."""
-    if not container.streams.video:
+    tracks = _tracks(container)
+    if not tracks:
         raise DataError(f"{name} must hold a video, but has no video stream: give another file.")
-    stream = container.streams.video[0]
+    stream = tracks[0]
     if stream.codec_context is None:
         raise DataError(
             f"{name} is stored with a codec that cannot be decoded here: convert it losslessly, for instance with "
             "`ffmpeg -i IN -c:v ffv1 OUT.mkv`."
         )
     return stream
+
+
+def _tracks(container: av.container.InputContainer) -> list[av.VideoStream]:
+    """Tracks that are videos: a cover picture, which stands among them, is none."""
+    return [one for one in container.streams.video if not one.disposition & Disposition.attached_pic]
 
 
 def _rotation_deg(container: av.container.InputContainer, stream: av.VideoStream) -> int:
@@ -201,6 +222,8 @@ def _not_a_video(name: str, error: Exception) -> FingervisionError:
         return InputFileError(f"There is no file {name}.")
     if isinstance(error, PermissionError):
         return InputFileError(f"{name} may not be read: change its permissions.")
+    if path.suffix.lower() in RAW_CAMERA_FILES:
+        return DataError(f"{name} {RAW_CAMERA_FILES[path.suffix.lower()]}")
     if path.is_file() and path.stat().st_size == 0:
         return DataError(f"{name} must be a video, but the file is empty: record or copy it again.")
     return DataError(

@@ -1,4 +1,4 @@
-"""What one gauge says of one frame."""
+"""Reading of one gauge in one frame."""
 
 from dataclasses import dataclass, field
 

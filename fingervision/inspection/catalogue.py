@@ -23,7 +23,7 @@ def inspect(sample: Sample) -> list[Finding]:
 
 
 def to_mend(findings: list[Finding]) -> list[Finding]:
-    """Those that are surely there and worth mending, the worst first."""
+    """Findings that are significant and worth correcting, the largest cost first."""
     return [finding for finding in findings if finding.severity is not Severity.GOOD and not finding.is_doubt]
 
 

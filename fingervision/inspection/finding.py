@@ -1,4 +1,4 @@
-"""What one look at a set-up says of one limit."""
+"""Finding about one limit of a set-up."""
 
 from dataclasses import dataclass
 from enum import StrEnum

@@ -85,7 +85,7 @@ def response_evidence(
 
 
 def _agreed(odds: list[float]) -> float:
-    """What both flanks say together; nothing where one is missing, or where they plainly contradict each other."""
+    """Combine the estimates of both flanks; None where one is missing or they contradict each other."""
     if len(odds) < 2 or (odds[0] * odds[1] < 0.0 and min(map(abs, odds)) > CONTRADICTING):
         return 0.0
     return sum(odds)

@@ -128,7 +128,7 @@ class Look:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Sample:
-    """All that findings are made from.
+    """Frames of a recording and their measurements, from which all findings are computed.
 
     Parameters
     ----------
@@ -250,7 +250,7 @@ class Sample:
 
     @property
     def shows_surroundings(self) -> bool:
-        """Whether noise is low enough to see what stands beside an edge; above, noise itself looks like something."""
+        """Whether the noise is low enough to detect disturbances beside an edge."""
         return self.median(look.noise for look in self.looks) <= SEEING_NOISE
 
     def median(self, values: Iterable[float]) -> float:

@@ -1,4 +1,4 @@
-"""Errors in the words of whoever asked: an argument's name in Python, an option of the command line in a command."""
+"""Name an argument in an error as its caller does: `below_tip_mm` in Python, `--below-tip-mm` in a command."""
 
 import re
 from collections.abc import Callable, Iterator

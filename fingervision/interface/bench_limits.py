@@ -1,4 +1,4 @@
-"""What is stated of a bench, with the defaults of what is not."""
+"""Stated limits of a bench (plane, tilt, temperature), with defaults for those not stated."""
 
 from collections.abc import Mapping
 

@@ -1,4 +1,4 @@
-"""The calibration of each kind of reference: pictures read, calib called, what was found kept."""
+"""Calibrate on each kind of reference: read its pictures, call calib, keep the result."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace

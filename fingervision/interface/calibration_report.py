@@ -1,4 +1,4 @@
-"""What a calibration says to its user."""
+"""The report of a calibration, in lines of text."""
 
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any

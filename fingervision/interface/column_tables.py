@@ -1,4 +1,4 @@
-"""Tables that are in memory: a pandas DataFrame, a mapping of columns, or the rows of a measurement."""
+"""Read tables in memory: a pandas DataFrame, a mapping of columns, or the rows of a measurement."""
 
 from collections.abc import Mapping
 from dataclasses import replace

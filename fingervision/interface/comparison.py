@@ -1,4 +1,4 @@
-"""`fingervision.compare`: where a measured table and one or more models disagree beyond the noise."""
+"""`fingervision.compare`: where a measured table and a model disagree beyond the noise."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field

@@ -161,7 +161,7 @@ def diagnose(
     measured : path, Measurement, MeasuredTable, DataFrame or mapping of columns
         `input_mm,gap_mm[,run,time_s,left_mm,right_mm,u_random_mm,force_n]`; a measurement needs a drive.
     model : path, CorrectedModel, Diagnosis, or a simulation as DataFrame or mapping of columns
-        What is held against it.
+        The model to be diagnosed.
     with_effects, without_effects : iterable of str
         Effects that are insisted on, or ruled out.
     effects : iterable of Effect

@@ -1,4 +1,4 @@
-"""Whatever holds pictures as a recording: a name, a camera's number, an array, or a frame source."""
+"""Open pictures as a recording: a file name, the number of a camera, an array, or a frame source."""
 
 import os
 from collections.abc import Callable, Sequence
@@ -30,7 +30,7 @@ def recording_of(
     frames: int | None = None,
     coding: str = "lossless",
 ) -> Opener:
-    """Give what opens a recording, as often as it is asked; a camera is read now, and its frames are kept.
+    """Return a function that opens the recording anew at each call; frames of a camera are read once and kept.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""What shall be measured, from the options of the command or the arguments of the function."""
+"""Build the settings of a measurement from the options of a command or the arguments of a function."""
 
 import os
 from collections.abc import Sequence

@@ -1,4 +1,4 @@
-"""The camera response of calibration pictures: which one they are read with, and what another would do to them."""
+"""The camera response of calibration pictures, and how far another one would move their edges."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace

@@ -1,5 +1,6 @@
 """How the page is reached: by which tokens, with which password beyond this machine, and over TLS where it can be."""
 
+import ssl
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -65,12 +66,26 @@ def access(host: str, port: int, password_file: Path | None, certificate: Path |
     for file in (certificate, key):
         if file is not None and not file.is_file():
             raise InputFileError(f"There is no file {file}: name the certificate and its key.")
+    if certificate is not None and key is not None:
+        _check_pair(certificate, key)
     if password_file is None and host not in LOOPBACK_NAMES:
         raise UsageError(
             f"--host {host} lets other machines in, which needs a password: write one of at least {LEAST_LETTERS} "
             "letters into a file and name it with --password-file."
         )
     return Access(host, port, "" if password_file is None else _password(password_file), certificate, key)
+
+
+def _check_pair(certificate: Path, key: Path) -> None:
+    """Refuse a pair that the server could not use: it would ask for the key's password, or end without a sentence."""
+    try:
+        ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER).load_cert_chain(certificate, key, password=lambda: "")
+    except (ssl.SSLError, OSError, ValueError) as error:
+        why = getattr(error, "reason", None) or getattr(error, "strerror", None) or str(error)
+        raise InputFileError(
+            f"The certificate {certificate} and the key {key} must be PEM files that belong together, the key without "
+            f"a password, but cannot be used ({str(why).lower().replace('_', ' ')}): make a new pair."
+        ) from error
 
 
 def _password(file: Path) -> str:

@@ -13,8 +13,8 @@ HALF_OPEN_AT_ONCE, ASKS_WITHIN_S = 16, 5.0
 class PatientProtocol(H11Protocol):
     """Uvicorn's HTTP, which lets go of who connects and then does not ask.
 
-    Whoever holds connections open without asking would use up the places of those who do. Of more than a few from one
-    address the oldest is closed, so that the newest is heard, whoever it is.
+    Whoever holds connections open without asking would use up the places of those who do. If one address holds too
+    many open connections, the oldest is closed in favour of the newest.
     """
 
     half_open: ClassVar[defaultdict[str, dict["PatientProtocol", asyncio.TimerHandle]]] = defaultdict(dict)

@@ -19,7 +19,7 @@ DISK_EVERY_S = 1.0
 
 
 class Recorder:
-    """Hands frames to a run folder.
+    """Writes frames to a run folder, in a thread of its own.
 
     Parameters
     ----------

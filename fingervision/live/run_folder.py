@@ -24,7 +24,7 @@ GAPS = "gaps.csv"
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RecordedFrame:
-    """What the recording takes of one frame: its picture, its packets, and the row as it was measured."""
+    """One frame of a recording: its picture, its coded packets, and its measured row."""
 
     item: Frame | LostFrame
     packets: tuple[OwnPacket, ...]

@@ -1,1 +1,1 @@
-"""A recording goes in; the gap over time, its uncertainty and its pictures come out."""
+"""Measure recordings: the gap over time, its uncertainty, and pictures of the measurement."""

@@ -1,4 +1,4 @@
-"""Ctrl-C and SIGTERM as a question between two frames: neither a row nor compiled code is broken off."""
+"""Handle Ctrl-C and SIGTERM between two frames, so that no row is cut off."""
 
 import signal
 import threading

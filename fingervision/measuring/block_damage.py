@@ -1,9 +1,8 @@
-"""Squares of a coded picture that do not belong to it: what a decoder draws where a stream is damaged unnoticed.
+"""Detect blocks with wrong content in a decoded picture, where damage of the stream went unnoticed.
 
 JPEG and H.264 code squares of 8 or 16 pixels. Damage puts wrong levels, or the right ones at a wrong place, into whole
 squares; the picture then has steps along the grid of the squares that end at its corners, where the picture before has
-none. What moves or changes in front of the camera has no reason to keep to this grid, and lenses let no edge change
-from one pixel to the next alone.
+none. Motion in front of the camera does not follow this grid, and optics never change an edge within a single pixel.
 
 Method: steps across the borders of blocks against steps inside of them, as in measures of blocking (Z. Wang, H. R.
 Sheikh, A. C. Bovik, "No-reference perceptual quality assessment of JPEG compressed images", Proc. ICIP 2002,

@@ -62,7 +62,7 @@ class Placement:
         return flat if self.flat is None else self.flat.to_picture(flat)
 
     def to_mm(self, points_px: Array) -> Array:
-        """Take points of the picture back into the drawing, shape (2, n)."""
+        """Transform points of the picture, shape (2, n), to the coordinates of the drawing."""
         flat = points_px if self.flat is None else self.flat.to_flat(points_px)
         return np.asarray(self.axes.T @ (flat - self.origin_px[:, None]) / self.px_per_mm)
 
@@ -117,7 +117,7 @@ class BodyOutline:
 
 
 def outlines_of(mechanism: Mechanism) -> tuple[BodyOutline, ...]:
-    """Take the straight stretches of every body's outline that are the drawing's own, and no cut through a flexure."""
+    """Select the straight edges of every body that the drawing states, without cuts through flexures."""
     region = mechanism.region
     beside = BESIDE * region.size_mm
     found = []

@@ -9,7 +9,7 @@ from fingervision.domain.drive import DriveHistory
 
 @dataclass(frozen=True, slots=True)
 class DriveState:
-    """Where the drive was at one instant.
+    """Recorded input, run and force at one instant.
 
     Parameters
     ----------

@@ -36,7 +36,7 @@ SeeItem = Callable[[Frame | LostFrame, Result], None]
 
 @dataclass(frozen=True, slots=True)
 class Prepared:
-    """A recording and how it is measured, with what either knows of the other.
+    """A recording with the settings of its measurement, after both were completed from each other.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""A recording measured without a file: every row and result kept in memory."""
+"""Measure a recording in memory: every row and result is kept, and no file is written."""
 
 from collections.abc import Sequence
 from contextlib import ExitStack

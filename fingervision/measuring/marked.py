@@ -1,4 +1,4 @@
-"""A recording with what was lost when it was made: such frames stay lost when it is measured."""
+"""Frames that were lost while recording are marked as lost when the recording is measured."""
 
 from collections import deque
 from collections.abc import Iterable, Iterator, Sequence

@@ -1,4 +1,4 @@
-"""A recording goes in; the gap over time, its summary and its figure come out."""
+"""Measure a recording: write the gap over time, a summary and a figure."""
 
 from collections.abc import Sequence
 from contextlib import ExitStack
@@ -28,7 +28,7 @@ from fingervision.storage.summary_json import write_summary
 
 @dataclass(frozen=True, slots=True)
 class Measured:
-    """What a measurement left behind.
+    """Result of a measurement that was written to files.
 
     Parameters
     ----------

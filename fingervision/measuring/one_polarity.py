@@ -1,4 +1,4 @@
-"""One answer for a whole recording to what the fingers are: darker or lighter than their ground.
+"""Decide once per recording whether the fingers are darker or lighter than the background.
 
 Where nobody has said, the first frames vote. A finger does not change its tone within a recording; a frame in which the
 sky left and right of something dark looks like two light fingers is no measurement of them.

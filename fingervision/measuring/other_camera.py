@@ -1,4 +1,4 @@
-"""Whether the camera that is measured with is set as the one that was calibrated."""
+"""Check that the camera has the settings with which it was calibrated."""
 
 from collections.abc import Mapping
 

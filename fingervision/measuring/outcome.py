@@ -1,4 +1,4 @@
-"""What is said of a recording once its last frame is measured: the drive's clock, the summary, what has no input."""
+"""After the last frame: join the clock of the drive, write the summary, and say which frames have no input."""
 
 from collections.abc import Set
 from dataclasses import replace

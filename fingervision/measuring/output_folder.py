@@ -1,4 +1,4 @@
-"""The folder that results are written to: made, and never at the cost of somebody else's files."""
+"""The folder for results: it is created, and files of other programs in it are never replaced."""
 
 import shutil
 from collections.abc import Iterator

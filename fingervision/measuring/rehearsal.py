@@ -1,4 +1,4 @@
-"""Drawn frames measured before the first real one: what is made once is then there, and no frame waits for it."""
+"""Warm-up: measure rendered frames first, so that no real frame waits for one-time initialisation."""
 
 import numpy as np
 

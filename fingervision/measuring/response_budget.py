@@ -1,4 +1,4 @@
-"""The camera response: which one a recording is read with, and what it costs where it is assumed."""
+"""The camera response of a recording, and the uncertainty where it is assumed and not measured."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -31,7 +31,7 @@ def u_response_shift_mm(measured: Sequence[GapMeasurement], scale: Scale) -> NDA
 def choose_response(
     stated: CameraResponse | None, scale: Scale, files: tuple[Path, ...]
 ) -> tuple[CameraResponse, CameraResponse | None, str]:
-    """Response that a recording is read with, what it may be as well, and a sentence where the user should know.
+    """Choose the response of a recording, an alternative that is possible as well, and a warning if needed.
 
     What the user states goes first, then what the calibration knows, then the recording's own tag; a recording without
     any is taken as linear.

@@ -1,4 +1,4 @@
-"""What is kept of every frame until the end: a few numbers, so that an hour of video fits into a few megabytes."""
+"""The gap over time with a few numbers per frame, so that an hour of video needs a few megabytes."""
 
 from __future__ import annotations
 
@@ -168,7 +168,7 @@ class GapSeries:
 
 
 def _beside(outcome: object) -> list[str]:
-    """What one measurement says of its edges."""
+    """Name the disturbances that a measurement found beside its edges."""
     if not isinstance(outcome, GapMeasurement):
         return []
     seen = [outcome.beside] if outcome.beside else []

@@ -1,8 +1,8 @@
-"""Whether a measured jump is motion, or a picture of a coded recording that was damaged without the decoder's notice.
+"""Distinguish a real jump of the fingers from a damaged picture that the decoder did not report.
 
-A jump alone is no fault: stages step. A picture alone is none either: its squares show in coarse coding. What jumps
-against the motion so far, and where squares of the codec's grid appear that neither the picture before nor that picture
-moved with the fingers has, is damaged; so is all that is coded as a difference to it.
+A jump alone is no damage, since stages make steps. Visible blocks alone are no damage either, since coarse coding
+shows them. What jumps against the motion so far, and where squares of the codec's grid appear that neither the
+picture before nor that picture moved with the fingers has, is damaged; so is all that is coded as a difference to it.
 """
 
 from dataclasses import dataclass
@@ -123,7 +123,7 @@ def _is_foreign(frame: Frame, outcome: GapMeasurement | NoGap, last: _Sound) -> 
 
 
 def _part(outcome: GapMeasurement, frame: Frame) -> tuple[slice, slice]:
-    """What takes part in a measurement, in whole squares of the codec's grid."""
+    """Region of a measurement in whole blocks of the codec's grid."""
     sides = (outcome.left, outcome.right)
     vertical = outcome.direction.is_vertical
     across = [side.x_px if vertical else side.y_px for side in sides]

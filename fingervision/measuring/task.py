@@ -1,4 +1,4 @@
-"""What shall be measured in a recording or live view, and how."""
+"""Settings of a measurement of a recording or live view."""
 
 from dataclasses import dataclass
 from math import isfinite
@@ -19,7 +19,7 @@ from fingervision.vision.pipeline import Settings
 
 @dataclass(frozen=True, slots=True)
 class Task:
-    """What shall be measured, and how.
+    """Settings of a measurement.
 
     Parameters
     ----------

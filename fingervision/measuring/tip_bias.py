@@ -1,9 +1,9 @@
-"""What an edge bias does to a gap below round tips: less than to the straight edges that it was calibrated on.
+"""Effect of the edge bias on a gap below round tips: smaller than on the straight edges of the calibration.
 
 Light that blooms over an outline moves all of it inwards by half of the edge bias b, the tip as well. The measuring
-point is counted from the tip and goes down with it: at an edge of slope m (movement into the gap per pixel to the root)
-it moves by (b / 2) (sqrt(1 + m^2) - m) and not by b / 2. The value stays what the calibration's formula gives; what the
-formula takes too much belongs to its uncertainty.
+point is counted from the tip and goes down with it: at an edge of slope m (movement into the gap per pixel to the
+root) it moves by (b / 2) (sqrt(1 + m^2) - m) and not by b / 2. The value is that of the calibration's formula; the
+difference is added to its uncertainty.
 """
 
 from collections.abc import Sequence

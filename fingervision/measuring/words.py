@@ -1,4 +1,4 @@
-"""What a measurement found, in sentences: as the command prints them, and in one line."""
+"""The result of a measurement in sentences, as the command prints them, and in one line."""
 
 from collections.abc import Mapping
 from typing import Any

@@ -65,9 +65,10 @@ class ModelFigures:
         First antisymmetric in-plane modes, the drive free to go sideways; first modes out of the plane, drive held.
     sag_out_of_plane_mm : float or None
         Sag of the measuring point of a horizontal plate by its own weight, drive held.
-    slope_error, force_error, mode_error, out_of_plane_error, sag_error : float
+    slope_error, force_error, mode_error, out_of_plane_error, sag_error, grip_error : float
         Relative model errors, as known for the kind: of the gap per input, of the force, of the frequencies in the
-        plane and out of it, of the sag out of it. Each is a bound that held for the grippers that the kind was checked on.
+        plane and out of it, of the sag out of it, of the force on a part or on the other finger. Each is a bound that
+        held for the grippers that the kind was checked on.
     """
 
     gap_per_input: float
@@ -84,3 +85,4 @@ class ModelFigures:
     mode_error: float = 0.0
     out_of_plane_error: float = 0.0
     sag_error: float = 0.0
+    grip_error: float = 0.0

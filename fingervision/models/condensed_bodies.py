@@ -28,7 +28,7 @@ _ITERATIONS = 8
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CondensedBody:
-    """One body by its frames.
+    """One body, reduced to the displacements of its frames (static condensation).
 
     Parameters
     ----------
@@ -50,7 +50,7 @@ class CondensedBody:
 
     @property
     def unknowns(self) -> Indices:
-        """Motions of its frames among those of all frames, three each."""
+        """Indices of the three motions (x, y, rotation) of each of its frames among those of all frames."""
         return np.asarray((3 * np.array(self.frames)[:, None] + np.arange(3)).ravel())
 
 

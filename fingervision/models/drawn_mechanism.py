@@ -50,7 +50,7 @@ class MechanismModelOfGap:
         self.mechanism = mechanism
         if GAP not in mechanism.pairs:
             raise DataError(
-                f"{mechanism.name} must have a pair of probes called {GAP} to be held against a measured gap, but has "
+                f"{mechanism.name} must have a pair of probes called {GAP} to be compared with a measured gap, but has "
                 f'{", ".join(mechanism.pairs) or "none"}: add [[pair]] name = "{GAP}" with of = [two probes].'
             )
         model: MechanismModel

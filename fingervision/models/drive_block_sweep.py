@@ -1,4 +1,4 @@
-"""How the drive block yields over a grid of drawings: computed at a few of them, interpolated between.
+"""Compliance of the drive block over a range of drawings: computed at a few, interpolated between them.
 
 The block is meshed, which costs more than all the rest of a lumped model, and hardly changes from one drawing of a grid
 to the next. Along every number that changes it Chebyshev's points are computed and a polynomial is laid through them.

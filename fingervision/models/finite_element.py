@@ -156,6 +156,7 @@ class FiniteElementGripper:
             mode_error=_MODE_ERROR + force_uncertainty(self.gripper.material),
             out_of_plane_error=MODE_ERROR,
             sag_error=SAG_ERROR,
+            grip_error=_FORCE_ERROR + 2.0 * force_uncertainty(self.gripper.material),
         )
 
 

@@ -1,13 +1,13 @@
 """Poses of the gripper's bodies by every kind of model of a `gripper.toml`: both fingers and the drive."""
 
 from collections.abc import Callable, Mapping
-from functools import lru_cache, partial
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import PchipInterpolator
 
-from fingervision.domain.gripper import Gripper
+from fingervision.domain.gripper import Gripper, Hinge, Lever, Links
 from fingervision.models.driven_body import DrivenBody
 from fingervision.models.gripper_mechanism import half_mechanism
 from fingervision.models.mechanism_bodies import LinkBody, bodies_of, plate_poses
@@ -28,10 +28,19 @@ _ON_AXIS = np.array([0.0, 1.0, 0.0])
 """A body that both halves share moves along the axis alone; its half also bends aside, against the other half."""
 
 
-@lru_cache(maxsize=8)
+_KEPT: dict[tuple[Hinge, Lever, Links], tuple[LinkBody, ...]] = {}
+_MOST_KEPT = 8
+"""Drawings whose bodies are kept: every kind of model of a drawing has the same, and cuts them in half a second."""
+
+
 def gripper_bodies(gripper: Gripper) -> tuple[LinkBody, ...]:
-    """Cut the right half into its bodies; every kind of model of one drawing has the same."""
-    return bodies_of(half_mechanism(gripper))
+    """Cut the right half into its bodies."""
+    outline = (gripper.hinge, gripper.lever, gripper.links)
+    if outline not in _KEPT:
+        while len(_KEPT) >= _MOST_KEPT:
+            _KEPT.pop(next(iter(_KEPT)))
+        _KEPT[outline] = bodies_of(half_mechanism(gripper))
+    return _KEPT[outline]
 
 
 def poses_of_plate(plate: PlaneStressPlate, gripper: Gripper, *, large: bool) -> Poses:

@@ -96,6 +96,7 @@ def gripper_figures(
         "model_error_out_of_plane_percent": 100.0 * figures.out_of_plane_error
         if figures.out_of_plane_modes_hz
         else None,
+        "model_error_grip_percent": None if peak is None else 100.0 * figures.grip_error,
         "model_error_sag_percent": None if figures.sag_out_of_plane_mm is None else 100.0 * figures.sag_error,
     }
     return row

@@ -132,8 +132,8 @@ def _by_t_over_r() -> tuple[PchipInterpolator, PchipInterpolator, PchipInterpola
     table = np.array(_BRICKS_OVER_BEAM)
     shares = (1.0 - table / table[:, :1, :]) / _POISSON**2
     mixed = np.where(np.isin(np.arange(6), (_X, _Y, _ABOUT_Z)), shares, np.log(table))
-    bricks, plane, blocks = (PchipInterpolator(np.log(_T_OVER_R), rows, axis=0)
-                             for rows in (mixed, np.array(_PLANES_OVER_BEAM), np.array(_BLOCKS_OVER_PLANES)))  # fmt: skip
+    tables = (mixed, np.array(_PLANES_OVER_BEAM), np.array(_BLOCKS_OVER_PLANES))
+    bricks, plane, blocks = (PchipInterpolator(np.log(_T_OVER_R), rows, axis=0) for rows in tables)
     return bricks, plane, blocks
 
 

@@ -106,7 +106,7 @@ def trust(kind: str) -> int:
 
 
 def why_trusted(kind: str) -> str:
-    """Say why a kind is trusted before those with less of the outline; empty where it does not say."""
+    """Reason why this kind of model is more accurate than simpler ones; empty if it states none."""
     return str(getattr(REGISTRY.get(kind).value, "WHY_TRUSTED", "")) if kind in kinds() else ""
 
 

@@ -34,8 +34,13 @@ TRUST, WHY_TRUSTED = 2, "both take the body for bars, and it has more of them"
 
 _SEGMENTS = 10
 _MODES = 3
-_SLOPE_ERROR, _FORCE_ERROR, _MODE_ERROR = 0.01, 0.03, 0.07
+_SLOPE_ERROR, _FORCE_ERROR = 0.01, 0.03
 """Of bars joined at points, beside finite elements of other grippers (`tests/benchmarks/models_held_out.py`)."""
+_MODE_ERROR, _GRIP_ERROR = 0.07, 0.1
+_NARROW, _MODE_ERROR_OF_NARROW, _GRIP_ERROR_OF_NARROW = 0.8, 0.2, 0.35
+"""Where the finger is pushed back, bars bend up to where their axes meet and the body does not: the force on a part is
+1 to 9 % off for the sample's proportions, and 31 % (its first mode 18 %) where the cross bar is 5 mm wide between bars
+of 9 mm (`python -m tests.benchmarks.models_grip`). Narrow is less than 0.8 of the widest bar that it carries."""
 
 
 class LumpedGripper:
@@ -122,6 +127,15 @@ class LumpedGripper:
         rad_s, _ = self.half.swaying_modes(count=count)
         return tuple((rad_s / (2.0 * np.pi)).tolist())
 
+    @property
+    def _joint_errors(self) -> tuple[float, float]:
+        """Relative model errors of the modes and of the grip: of the joint of cross bar, shuttle and finger."""
+        links = self.gripper.links
+        widest_mm = max(links.shuttle_width_mm, links.finger_width_mm)
+        if links.cross_bar_width_mm < _NARROW * widest_mm:
+            return _MODE_ERROR_OF_NARROW, _GRIP_ERROR_OF_NARROW
+        return _MODE_ERROR, _GRIP_ERROR
+
     def figures(self) -> ModelFigures:
         """Compute the model's row of the comparison."""
         return ModelFigures(
@@ -134,7 +148,8 @@ class LumpedGripper:
             self.swaying_modes_hz(),
             slope_error=_SLOPE_ERROR,
             force_error=_FORCE_ERROR,
-            mode_error=_MODE_ERROR,
+            mode_error=self._joint_errors[0],
+            grip_error=self._joint_errors[1],
         )
 
 

@@ -59,7 +59,7 @@ class SizeField:
 
     @cached_property
     def _classes(self) -> list[tuple[cKDTree, Array]]:
-        """Points of nearly the same edge length, so that the nearest of each class is the one that counts."""
+        """Group points by edge length, so that within a group only the nearest one limits the mesh size."""
         rank = np.floor(np.log(self.edge_mm / self.edge_mm.min()) / np.log(_CLASS)).astype(int)
         return [(cKDTree(self.points_mm[rank == r]), self.edge_mm[rank == r]) for r in np.unique(rank)]
 

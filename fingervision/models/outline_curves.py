@@ -112,7 +112,7 @@ def crossings(curve: Curve, other: Curve) -> list[float]:
 
 
 def other_holds(curve: Curve, other: Curve, t: float) -> bool:
-    """Whether the point of a curve at t lies between the ends of another."""
+    """Whether the point at parameter t of one curve lies between the ends of another curve."""
     return other.holds(curve.at(np.array([t]))[:, 0])
 
 

@@ -42,8 +42,9 @@ _X, _Y, _Z, _ABOUT_X, _ABOUT_Y, _ABOUT_Z = range(6)
 _ALL = (_X, _Y, _Z, _ABOUT_X, _ABOUT_Y, _ABOUT_Z)
 _SLOPE_ERROR, _FORCE_ERROR = 0.01, 0.03
 """Of bars joined at points, as of `lumped`."""
-_OUT_OF_PLANE_ERROR, _SAG_ERROR = 0.2, 0.3
-"""Bricks give 62 Hz where this has 72; a stiff variant is 17 % too high."""
+_OUT_OF_PLANE_ERROR, _SAG_ERROR = 0.4, 0.5
+"""Of bars joined at points, beside CalculiX (`tests/benchmarks/models_three_dimensions.py`): frequencies from 34 % too
+low for a hinge 20 times as wide as thick to 17 % too high for a stiff variant."""
 
 
 class StiffnessMatrixGripper:

@@ -1,4 +1,4 @@
-"""What may be wrong with a plug-in, each a class with a sentence that names the plug-in and what to do."""
+"""Error classes of plug-ins; each message names the plug-in and what to do."""
 
 from fingervision.domain.errors import FingervisionError, UsageError
 

@@ -49,9 +49,13 @@ def number(raw: Any, names: Mapping[str, float], what: str) -> float:
     elif isinstance(raw, bool) or not isinstance(raw, int | float):
         raise DataError(f"{what} must be a number or arithmetic with names, but is {raw!r}.")
     else:
-        value = float(raw) if abs(raw) <= 10.0 * LARGEST else math.copysign(math.inf, raw)
+        # A whole number may have more digits than a float holds.
+        value = float(raw) if not abs(raw) > 10.0 * LARGEST else math.copysign(math.inf, 1 if raw > 0 else -1)
     if not abs(value) <= LARGEST:
-        raise DataError(f"{what} must be a number of at most {LARGEST:g}, but is {value:g}.")
+        said = f"{raw:g}" if isinstance(raw, float) else f"{value:g}"
+        if isinstance(raw, int) and math.isinf(value):
+            said = f"a whole number of {len(str(abs(raw)))} digits"
+        raise DataError(f"{what} must be a number of at most {LARGEST:g}, but is {said}.")
     return value
 
 

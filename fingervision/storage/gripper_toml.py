@@ -148,6 +148,10 @@ def _value(raw: Any, name: str, origin: str, uncertainties: dict[str, float]) ->
     return value
 
 
+def _spelt(unit: str) -> str:
+    return f" {_SPELT[unit]}" if _SPELT.get(unit) else ""
+
+
 def _number(raw: Any, name: str, origin: str) -> float:
     if not is_number(raw):
         raise DataError(f"{name} in {origin} must be a finite number, but is {raw!r}.")
@@ -159,7 +163,7 @@ def _number(raw: Any, name: str, origin: str) -> float:
     lowest, highest = _LIMITS.get(unit, (0.0, math.inf))
     if abs(value) > highest or 0.0 < value < lowest:
         raise DataError(
-            f"{name} in {origin} must lie between {lowest:g} and {highest:g} {_SPELT.get(unit, '')}, but is {value:g}; "
+            f"{name} in {origin} must lie between {lowest:g} and {highest:g}{_spelt(unit)}, but is {value:g}; "
             "check its unit."
         )
     return value

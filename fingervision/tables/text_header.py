@@ -16,6 +16,13 @@ HEADER_LINES = 6
 LAST_REMARK = frozenset({"", "comment", "comments", "kommentar", "bemerkung", "commentaire", "comentario", "commento"})
 """Names of a last column that rows may leave out."""
 
+LABEL_NAMES = frozenset({"long name", "long names"})
+LABEL_UNITS = frozenset({"unit", "units", "einheit", "einheiten"})
+LABEL_REMARKS = frozenset({"comment", "comments", "kommentar", "kommentare", "f(x)", "f(x)=", "sampling interval"})
+"""What stands in the first column of a worksheet's header rows, above an empty column (OriginLab's ASCII export)."""
+ONE_A_LINE = re.compile(r"\W*NAME(\d+)\s*=\s*(.*\S)\s*")
+"""A column's name in a line of its own (the data recorders of Physik Instrumente write `# NAME0 = ...`)."""
+
 
 @dataclass(frozen=True, slots=True)
 class Header:
@@ -44,6 +51,7 @@ def first_row(lines: Sequence[str], dialect: Dialect, given: Entry) -> int:
     """Line of the first row of numbers, from 0."""
     start = 0 if given.header_line is None else min(given.header_line, len(lines))
     named = given.header_line is None
+    poor: int | None = None
     for at in range(start, len(lines)):
         if is_comment(lines[at]) or not lines[at].strip():
             continue
@@ -54,8 +62,11 @@ def first_row(lines: Sequence[str], dialect: Dialect, given: Entry) -> int:
         values = sum(is_value(cell, dialect.decimal) for cell in cells)
         words = sum(role_of(column_name(cell).base) is not None for cell in cells)
         if not named or values > words:
-            return at
-    return len(lines)
+            # `rate, 0.5, mm/s` above the table is as wide as a row of three, and holds a number as well.
+            if not named or 2 * values >= dialect.wide:
+                return at
+            poor = at if poor is None else poor
+    return len(lines) if poor is None else poor
 
 
 def find_header(lines: Sequence[str], first: int, dialect: Dialect, given: Entry) -> Header:
@@ -72,12 +83,22 @@ def find_header(lines: Sequence[str], first: int, dialect: Dialect, given: Entry
             )
         units = names_in(lines[at + 1], dialect) if at + 1 < first else None
         return Header(names, units if units is not None and _all_units(units) else (), at)
+    if (listed := _one_a_line(lines[:first], dialect.wide)) is not None:
+        return listed
     found: list[tuple[int, int, tuple[str, ...]]] = []
     units, units_at = None, -1
     blanks = 0
     for at in range(first - 1, max(-1, first - 1 - HEADER_LINES), -1):
         if not lines[at].strip():
             blanks += 1
+            continue
+        label, labelled = _labelled(lines[at], dialect)
+        if label in LABEL_NAMES:
+            return Header(labelled, units or (), at)
+        if label in LABEL_REMARKS and not found:
+            continue
+        if label in LABEL_UNITS and not found and all(is_unit(cell) for cell in labelled):
+            units, units_at = labelled, at
             continue
         names = names_in(lines[at], dialect)
         if names is None:
@@ -99,6 +120,23 @@ def find_header(lines: Sequence[str], first: int, dialect: Dialect, given: Entry
     return Header(names, units or (), at)
 
 
+def _labelled(line: str, dialect: Dialect) -> tuple[str, tuple[str, ...]]:
+    """Label in the first column of a worksheet's header row, in small letters, and what it gives to each column."""
+    label, *cells = [cell.strip() for cell in line.split("\t")]
+    if len(cells) == dialect.wide - 1:
+        cells = ["", *cells]
+    return (label.lower().rstrip(":"), tuple(cells)) if len(cells) == dialect.wide else ("", ())
+
+
+def _one_a_line(lines: Sequence[str], wide: int) -> Header | None:
+    """Names that stand in a line each, numbered from 0; None where not every column has one."""
+    matches = [(at, ONE_A_LINE.fullmatch(line)) for at, line in enumerate(lines)]
+    found = {int(match[1]): (match[2], at) for at, match in matches if match is not None}
+    if sorted(found) != list(range(wide)):
+        return None
+    return Header(tuple(found[k][0] for k in range(wide)), (), found[wide - 1][1])
+
+
 def _all_units(cells: Sequence[str]) -> bool:
     """Whether a line holds nothing but units, and some."""
     # `t` is a name and a tonne, `s` a second: a word of a role is a name only beside others that are.
@@ -116,8 +154,8 @@ def names_in(line: str, dialect: Dialect) -> tuple[str, ...] | None:
             cells = cells[:-1]
         if len(cells) != wide:
             continue
-        if all(is_value(cell, dialect.decimal) for cell in cells):
-            return None
+        if "=" in cells or all(is_value(cell, dialect.decimal) for cell in cells):
+            return None  # a key and its value, or numbers
         return tuple(cells)
     return None
 

@@ -57,7 +57,8 @@ def table_of_lines(path: Path, lines: Sequence[str], given: Entry, encoding: str
         )
     first = first_row(lines, dialect, given)
     header = find_header(lines, first, dialect, given)
-    _check_commas(path, lines, first, dialect)
+    if not header.names:
+        _check_commas(path, lines, first, dialect)
     if dialect.either_way:
         example = _marked(lines, dialect)
         mark, name = (",", "comma") if "," in example else (".", "point")

@@ -1,23 +1,26 @@
-"""What columns are called in English, German, French, Spanish and Italian, and which role each word stands for."""
+"""What columns are called in seven European languages, and which role each word stands for."""
 
 import re
 import unicodedata
 
 ROLES = {
     "time": "time t zeit zeitachse temps tempo tiempo uhrzeit timestamp timestamps zeitstempel horodatage elapsed "
-    "clock hora heure ora orario zeitpunkt instant",
+    "clock tijd tijdstip hora heure ora orario zeitpunkt instant",
     "date": "date datum fecha data datetime",
     "input": "input inputs eingang eingabe entree entrees entrada ingresso uin xin x position positions pos stage "
     "displacement displacements encoder drive travel stroke weg stellweg wege hub verschiebung verfahrweg antrieb "
     "vorschub lage istposition istweg deplacement deplacements course actionneur codeur posicion desplazamiento "
-    "desplazamientos carrera actuador posizione spostamento spostamenti corsa attuatore u_in actuator",
+    "desplazamientos carrera actuador posizione spostamento spostamenti corsa attuatore u_in actuator "
+    "positie posities verplaatsing slag aandrijving posicao posicoes deslocamento deslocamentos",
     "gap": "gap gaps opening openings abstand abstande oeffnung offnung offnungsweite oeffnungsweite spalt spaltweite "
     "greiferoffnung greiferoeffnung greifweite fingerabstand backenabstand aperture clearance separation ouverture "
-    "ecartement espacement apertura abertura hueco separacion separazione fessura luce",
-    "left": "left links linke linker linkes gauche izquierda izquierdo sinistra sinistro",
-    "right": "right rechts rechte rechter rechtes droite droit derecha derecho destra destro",
-    "force": "force forces kraft krafte kraefte stellkraft f load effort fuerza fuerzas forza forze carga",
-    "run": "run runs lauf versuch essai ensayo corrida prova messreihe serie series trial",
+    "ecartement espacement apertura abertura hueco separacion separazione fessura luce "
+    "spleet spleetbreedte vingerafstand afstand abertura aberturas separacao",
+    "left": "left links linke linker linkes gauche izquierda izquierdo sinistra sinistro esquerda esquerdo",
+    "right": "right rechts rechte rechter rechtes droite droit derecha derecho destra destro direita direito",
+    "force": "force forces kraft krafte kraefte stellkraft f load effort fuerza fuerzas forza forze carga "
+    "kracht forca forcas",
+    "run": "run runs lauf versuch essai ensayo corrida prova messreihe serie series trial meting ensaio",
     "target": "target targets soll sollposition sollwert sollweg nominal nominale cible objetivo obiettivo consigne "
     "zielposition ziel",
     "direction": "direction richtung sens direccion direzione anfahrrichtung approach side",

@@ -49,7 +49,7 @@ class BedCamera(Protocol):
 
     @property
     def description(self) -> Description:
-        """What is known of its frames."""
+        """Description of its frames: size, rate, coding."""
         ...
 
     @property

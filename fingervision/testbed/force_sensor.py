@@ -13,12 +13,12 @@ class ForceSensor(Protocol):
 
     @property
     def name(self) -> str:
-        """What it is, for run.json."""
+        """Kind and name of the sensor, as run.json records it."""
         ...
 
     @property
     def full_scale_n(self) -> float:
-        """Largest force that it can tell."""
+        """Largest force that it can measure."""
         ...
 
     def readings(self) -> tuple[Reading, ...]:

@@ -12,7 +12,7 @@ from fingervision.testbed.reading import Reading
 
 
 def guarded(build: Callable[[], Any], protocol: type, who: str, origin: Origin) -> Any:
-    """Build a device and hold it against its protocol.
+    """Build a device and check that it follows its protocol.
 
     Parameters
     ----------
@@ -75,7 +75,7 @@ def _check_readings(readings: Any, who: str, origin: Origin) -> None:
 
 
 class _Guarded:
-    """The device itself, but for what it raises."""
+    """A proxy of a device that turns its exceptions into errors that name it."""
 
     def __init__(self, device: Any, who: str, origin: Origin) -> None:
         self._device, self._who, self._origin = device, who, origin

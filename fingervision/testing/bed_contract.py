@@ -1,4 +1,4 @@
-"""What holds for every actuator, force sensor and camera, looked at through a bed that it belongs to."""
+"""Contract tests of actuators, force sensors and cameras, run through a bed that has them."""
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -128,7 +128,10 @@ class ActuatorContract(_BedContract):
                 stopping_s < stops_within_s,
                 f"{name} must stand {stops_within_s:g} s after a stop, but moved on for {stopping_s:.2g} s.",
             )
-            went_mm, due_mm = readings[-1].value - before[0].value, speed_mm_s * _moved_s(readings, _still_mm(bed))
+            went_mm, due_mm = (
+                readings[-1].value - before[0].value,
+                speed_mm_s * _moved_s(readings, _still_mm(bed)),
+            )
             hold(
                 abs(went_mm - due_mm) <= _known_mm(bed, speed_mm_s),
                 f"{bed.actuator.name} must go {due_mm:.3g} mm at {speed_mm_s:g} mm/s, but went {went_mm:.3g} mm.",
@@ -252,9 +255,8 @@ def _near_mm(bed: Bed) -> float:
 
 
 def _still_mm(bed: Bed) -> float:
-    """How far two readings at rest may be apart: both stray, and each is rounded to the encoder's step."""
-    limits = bed.actuator.limits
-    return limits.encoder_step_mm + limits.repeatability_mm + ROUNDING_MM
+    """How far two readings at rest may be apart, and a reading at the reference from 0."""
+    return bed.actuator.limits.repeatability_mm + ROUNDING_MM
 
 
 def _known_mm(bed: Bed, speed_mm_s: float) -> float:

@@ -1,4 +1,4 @@
-"""What the contracts share: a failure is a sentence, and a test that does not concern a part says so."""
+"""Common parts of the contracts: a failure is a sentence; a test that does not apply to a part says so."""
 
 from typing import Any
 from unittest import SkipTest

@@ -1,4 +1,4 @@
-"""What holds for every effect there is: nothing at zero, rest at the start, mirror, stated needs, finite answers."""
+"""Contract tests of effects: neutral at zero, at rest at the start, symmetric, with stated needs and finite answers."""
 
 from dataclasses import replace
 

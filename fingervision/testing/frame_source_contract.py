@@ -1,4 +1,4 @@
-"""What holds for every frame source."""
+"""Contract tests of frame sources."""
 
 from itertools import islice, pairwise
 

@@ -1,4 +1,4 @@
-"""Hide an effect in made-up data and diagnose them: the least that an effect of the catalogue must stand."""
+"""Simulate data with an effect and diagnose them: every effect must be found again."""
 
 from collections.abc import Mapping
 

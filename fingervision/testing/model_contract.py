@@ -1,4 +1,4 @@
-"""What holds for every kind of model of a drawn gripper."""
+"""Contract tests of models of a drawn gripper."""
 
 import numpy as np
 

@@ -1,4 +1,4 @@
-"""The edges once more, without what stands beside them: each line's share of a shadow or of glare is taken off first.
+"""Fit the edges again after subtracting a shadow or glare beside them from each line.
 
 What the mean profile of the flanks has told (breadth, size, blur) holds all around a finger, at the same distance from
 its edge. On a slanted line it is stretched as the edge is. Taking it off and fitting the step again leaves no line with

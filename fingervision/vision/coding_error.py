@@ -28,6 +28,9 @@ ACROSS_SIGMAS, ACROSS_PX, ALONG_PX = 3.0, 2.0, 40.0
 # Where the stream does not state its quantiser: the same in units of what the rows of a flank share. A picture that is
 # coded by itself is displaced by less than one that is copied from its neighbours.
 SHARED_SHIFTS = {Coding.LOSSLESS: 0.0, Coding.INTRAFRAME: 0.5, Coding.INTERFRAME: 1.5}
+# The same for a picture that claims to be as the sensor saw it (saved again, enlarged, interpolated from colours): its
+# rows are looked at as well, and what they share is in every frame alike, as far as anybody knows.
+EVEN_SHIFTS = 2.0
 # Quantisers are stated for 8 bits.
 EIGHT_BITS = 255.0
 

@@ -39,7 +39,7 @@ def is_crossed(mask: NDArray[np.uint8], fingers: CoarseFingers, below_tip_px: fl
     below_tip_px : float
         Height of measuring below the tips.
     """
-    upright = fingers.orientation.view(mask)
+    upright = np.asarray(fingers.orientation.view(mask), dtype=np.uint8)
     return any(_goes_on(upright, finger, below_tip_px) for finger in (fingers.left, fingers.right))
 
 

@@ -1,4 +1,4 @@
-"""What the flanks of a finger show that a blurred step does not: a rim, or a flank cut off at the end of the scale.
+"""Deviations of a finger's flank from a blurred step: a bright rim, or clipped levels.
 
 Either moves the edge that is fitted, the same way in every row, and leaves its own mark in what the fit does not
 explain. The mark says how far the edge may have moved, which goes into the uncertainty; the edge itself stays, because

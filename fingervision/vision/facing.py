@@ -1,4 +1,4 @@
-"""Edges that face each other so near that the window along one line holds both."""
+"""Pairs of edges so close that one search window contains both."""
 
 import numpy as np
 from numpy.typing import NDArray

@@ -112,18 +112,19 @@ def _best_pair(
     best: CoarseFingers | None = None
     two: tuple[Top, Top] | None = None
     shallow = unlike = False
-    for first, second in combinations(in_view, 2):
-        left, right = sorted((first, second), key=lambda top: top.across_px)
+    across = [top.across_px for top in in_view]
+    for i, j in combinations(range(len(in_view)), 2):
+        left, right = (in_view[i], in_view[j]) if across[i] <= across[j] else (in_view[j], in_view[i])
         prominence = min(left.prominence_px, right.prominence_px)
         is_rooted = left.is_rooted or right.is_rooted
+        score = prominence * (ROOTED_BONUS if is_rooted else 1.0)
+        if best is not None and score <= best.score:
+            continue
         if left.is_rooted != right.is_rooted and left.outline is not right.outline:
             continue  # one comes in from the border and one lies in view: a finger and a thing
         if not is_rooted and prominence < LYING_HEIGHTS * below_tip_px:
             continue
         if not is_rooted and _has_company(left.outline, outlines):
-            continue
-        score = prominence * (ROOTED_BONUS if is_rooted else 1.0)
-        if best is not None and score <= best.score:
             continue
         if prominence < below_tip_px + 1.0:
             deeper = max(left.prominence_px, right.prominence_px)
@@ -236,7 +237,7 @@ def _why_none(tops: list[Top], below_tip_px: float) -> NoGap:
 
 def _end_alike(first: Top, second: Top, below_tip_px: float, builds: tuple[Build, Build] | None = None) -> bool:
     """Whether two tips are about equally high."""
-    left, right = sorted((first, second), key=lambda top: top.across_px)
+    left, right = (first, second) if first.across_px <= second.across_px else (second, first)
     step_px, apart_px = right.along_px - left.along_px, right.across_px - left.across_px
     return end_alike(step_px, apart_px, below_tip_px, builds)
 

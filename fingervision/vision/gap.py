@@ -19,7 +19,7 @@ from fingervision.vision.first_guess import first_guess
 from fingervision.vision.flanks import STEEPEST, has_straight_flanks
 from fingervision.vision.held_part import held_part
 from fingervision.vision.likeness import FARTHEST_TURNED, common_turn
-from fingervision.vision.local_outline import local_measuring_point
+from fingervision.vision.local_outline import FLATTEST, local_measuring_point
 from fingervision.vision.measuring_point import MeasuringPoint, measuring_point, squared
 from fingervision.vision.median import middle
 from fingervision.vision.outline_points import OutlinePoints, finger_origin, outline_points
@@ -147,6 +147,12 @@ def measure_gap(
     if outcome is TOO_ROUGH and (way_px := _way_px(edges)) > SMEARED_PX:
         words = f"{SMEARED}, by about {way_px:.0f} px: expose shorter, or move slower while frames are taken."
         outcome = NoGap(Status.BLURRED, words)
+    elif outcome is TOO_ROUGH and max(abs(m.slope) for m in measured) > FLATTEST:
+        outcome = NoGap(
+            Status.NO_FINGERS,
+            "The measuring height crosses the top of a finger and not its inner side: turn the camera until the tips "
+            "are level, or measure farther below them (--below-tip-mm).",
+        )
     has_part = any(finger.hidden.size for finger in (fingers.left, fingers.right))
     if has_part and outcome is TOO_ROUGH:
         return NoGap(

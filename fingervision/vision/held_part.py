@@ -1,4 +1,4 @@
-"""What a held part leaves of the lines along which edges are looked for, and how wide it is."""
+"""Search lines that a held part leaves visible, and the width of the part."""
 
 import numpy as np
 

@@ -1,4 +1,4 @@
-"""Whether two things can be the two fingers of one gripper: about equally high, equally wide, and parallel.
+"""Test whether two objects can be the fingers of one gripper: similar height and width, parallel.
 
 A camera that is turned against the gripper shows its tips at different heights, and both fingers lean by as much; a
 finger beside a wire, a housing or the edge of a table is unlike it in width.

@@ -1,4 +1,4 @@
-"""Rough flanks are followed farther down: what strays over many pixels is averaged over many more of them.
+"""Measure rough flanks over a longer stretch, so that long-wave roughness averages out.
 
 A finger's flank is straight near its tip; farther down it may bend or end. So the longer flank counts only where it
 says the same, surely enough, as the near part (Hausman, Econometrica 46, 1978, 1251: the difference of a surer and a

@@ -7,6 +7,10 @@ that is turned or mirrored gives the same numbers.
 
 from dataclasses import dataclass
 
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
 from fingervision.domain.direction import Direction
 from fingervision.vision.grey import GreyImage
 
@@ -46,6 +50,11 @@ class Orientation:
         """The picture as if the tips pointed up: rows run along the fingers, columns across them."""
         upright = image if self.direction.is_vertical else image.T
         return upright[::-1] if self.is_flipped else upright
+
+    def upright(self, mask: NDArray[np.uint8]) -> NDArray[np.uint8]:
+        """The same of a mask, row after row in memory: faster than NumPy's copy of a transposed view."""
+        turned = mask if self.direction.is_vertical else cv2.transpose(mask)
+        return np.ascontiguousarray(cv2.flip(turned, 0) if self.is_flipped else turned, dtype=np.uint8)
 
     def to_pixels(self, across: float, along: float) -> tuple[float, float]:
         """(across, along) to pixel coordinates (x, y)."""

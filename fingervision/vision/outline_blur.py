@@ -1,4 +1,4 @@
-"""How much more than its half-level a fit along a slanted line feels a curved outline."""
+"""Bias of an edge fitted along a slanted line on a curved, blurred outline."""
 
 import numpy as np
 from numpy.typing import NDArray

@@ -1,4 +1,4 @@
-"""What was measured, drawn into the frame."""
+"""Draw the measurement into a frame."""
 
 import cv2
 import numpy as np

@@ -1,4 +1,4 @@
-"""A part between the fingers is taken out of the binary picture, and what it hides of the fingers is remembered.
+"""Remove a held part from the binary picture, and record which stretches of the fingers it hides.
 
 Where the room between the fingers is bounded by two straight lines, whatever else lies between these lines is a part:
 held by both fingers, stuck to one of them, or free. Without it the two fingers are found as ever, and the rows in which
@@ -63,7 +63,7 @@ def without_part(
     best: CoarseFingers | None = None
     for direction in directions:
         orientation = Orientation(direction, *mask.shape)
-        upright: Mask = np.ascontiguousarray(orientation.view(mask), dtype=np.uint8)
+        upright = orientation.upright(mask)
         channel = find_channel(upright, below_tip_px)
         if channel is None:
             continue

@@ -2,9 +2,9 @@
 
 Inverse-compositional Gauss-Newton of the zero-normalised sum of squared differences over translation and rotation
 (Baker & Matthews, Int. J. Computer Vision 56(3), 2004, doi:10.1023/B:VISI.0000011205.11775.fd; Pan, Li & Tong,
-Experimental Mechanics 53(7), 2013, doi:10.1007/s11340-013-9717-6). A plane of light and a gain are taken off both
-pictures. Both are smoothed alike and interpolated by cubic B-splines (`spline_interpolation`). Many patches of one size
-are registered together.
+Experimental Mechanics 53(7), 2013, doi:10.1007/s11340-013-9717-6). A linear gradient of light and a gain are removed
+from both pictures. Both are smoothed alike and interpolated by cubic B-splines (`spline_interpolation`). Many patches
+of one size are registered together.
 """
 
 from dataclasses import dataclass

@@ -3,6 +3,7 @@
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import lru_cache
+from math import hypot, sqrt
 
 import cv2
 import numpy as np
@@ -17,7 +18,7 @@ from fingervision.domain.region import Region
 from fingervision.domain.status import Status
 from fingervision.vision.binarise import Binary, binarise, split_at
 from fingervision.vision.candidates import candidates, found, has_edges
-from fingervision.vision.coding_error import with_coding_error, with_shared_shift
+from fingervision.vision.coding_error import EVEN_SHIFTS, with_coding_error, with_shared_shift
 from fingervision.vision.denoise import denoise
 from fingervision.vision.edges import EdgePoints, fit_edges
 from fingervision.vision.fingers import CoarseFingers
@@ -31,7 +32,7 @@ from fingervision.vision.profile_choice import STRIP, with_profile
 from fingervision.vision.profile_lines import profile_lines
 from fingervision.vision.response_shift import gap_shift_px
 from fingervision.vision.settings import LINEAR, SRGB, Settings
-from fingervision.vision.shared_profile import shared_shift_px
+from fingervision.vision.shared_profile import even_shift_px, flanks, shared_shift_px
 from fingervision.vision.stripes import with_stripes
 from fingervision.vision.third_tone import THIRD_TONE, other_threshold
 
@@ -230,7 +231,10 @@ def _edges_and_gap(
         if coded.quantiser is not None:
             outcome = with_coding_error(outcome, coded.quantiser, edges.inside, light, scale)
         elif coded.coding is not Coding.LOSSLESS:
-            outcome = with_shared_shift(outcome, shared_shift_px(upright, edges, light), coded.coding)
+            outcome = with_shared_shift(outcome, shared_shift_px(flanks(upright, edges, light)), coded.coding)
+        elif not edges.beside:  # what stands beside an edge has its own price
+            u_alike = sqrt(2.0) * EVEN_SHIFTS * even_shift_px(flanks(upright, edges, light))
+            outcome = replace(outcome, u_shift_px=hypot(outcome.u_shift_px, u_alike))
     if (apart_px or edges.beside) and isinstance(outcome, GapMeasurement):
         outcome = replace(outcome, fields_apart_px=apart_px, beside=edges.beside)
     return edges, outcome

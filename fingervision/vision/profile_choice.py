@@ -1,4 +1,4 @@
-"""What stands beside a finger's edge, by the evidence of all rows together, and where the finger's own edge then is.
+"""Select the model of the mean profile across a flank, and from it the position of the finger's edge.
 
 A shadow, a wall and a line of glare each leave their own mean profile. Some of them cannot be told apart on one flank
 alone: a wall half as light as the ground looks like motion during the exposure, and glare like a wall on the other side
@@ -263,10 +263,13 @@ def _rows_between(looked_at: Ints) -> Ints:
     Where many in succession were left out, a part hides the edge there.
     """
     looked_at = np.sort(looked_at)
-    rows = np.arange(looked_at[0], looked_at[-1] + 1)
+    rows, steps = np.arange(looked_at[0], looked_at[-1] + 1), np.diff(looked_at).astype(np.float64)
+    most = LEFT_OUT * median(steps)
+    if steps.max() <= most:
+        return rows
     after = np.searchsorted(looked_at, rows)
     before = looked_at[np.maximum(np.searchsorted(looked_at, rows, side="right") - 1, 0)]
-    return rows[looked_at[after] - before <= LEFT_OUT * np.median(np.diff(looked_at))]
+    return np.asarray(rows[looked_at[after] - before <= most])
 
 
 def _across(edges: EdgePoints) -> Floats:

@@ -1,4 +1,4 @@
-"""What the mean profile across a flank may be, and the least-squares fit of each.
+"""Models of the mean profile across a flank, each fitted by least squares.
 
 A finger's edge is a step of light that the optics spread. Beside it there may be a second step (the side wall of a
 thick part, between the finger's face and the ground), a ramp (a soft shadow on the ground) or a bright line (glare

@@ -1,4 +1,4 @@
-"""What the shape of a finger's end leaves unexplained: how far it can be trusted, and whether it holds at all."""
+"""Residuals of the fitted shape of a finger's end: its uncertainty, and whether the shape is rejected."""
 
 import numpy as np
 from numpy.typing import NDArray

@@ -1,4 +1,4 @@
-"""How far another camera response would move a fitted edge: the price of an assumption that nobody has measured."""
+"""Shift of a fitted edge under another camera response: the uncertainty of an assumed response."""
 
 from functools import lru_cache
 from math import hypot

@@ -1,4 +1,4 @@
-"""What the user chose of a measurement."""
+"""Settings of a measurement as vision needs them."""
 
 from dataclasses import dataclass
 

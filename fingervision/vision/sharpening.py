@@ -39,7 +39,7 @@ _soften = loop("sharpening_softened")
 
 @dataclass(frozen=True, slots=True)
 class Sharpening:
-    """What a camera's mask has done.
+    """Sharpening found in a picture.
 
     Parameters
     ----------

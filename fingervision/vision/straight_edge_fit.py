@@ -81,7 +81,7 @@ class EdgeStart:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class StraightEdges:
-    """Edges that were fitted together; arrays over the k edges.
+    """k edges fitted jointly; arrays of shape (k,).
 
     Parameters
     ----------
@@ -333,7 +333,7 @@ class _State:
         variance: float,
         wanted: slice,
     ) -> None:
-        """Add what the flanks alone would say otherwise, where that is more than noise."""
+        """Add the misfit of the flanks to the uncertainty where it exceeds the noise."""
         width = CORE_SIGMAS * float(np.hypot(self.blur_px, ROUNDING**0.5)) + 0.5
         weight = np.zeros(t.size)
         for k in range(self.position.size):
@@ -408,7 +408,7 @@ def _lagged(grid: Floats, down: int, right: int) -> tuple[Floats, Floats]:
 
 
 def _lost(design: Floats, residual: Floats, variance: float, contrast: float, cut_off: int) -> tuple[float, float]:
-    """How much of the first step is cut off, from the bend that this gives its profile."""
+    """Estimate the share of the first edge that clipping removed, from the bend of its profile."""
     step = design[2] if contrast * cut_off > 0.0 else 1.0 - design[2]
     bend = cut_off * (np.minimum((1.0 + CUT) * step, 1.0) - step)
     scaled = design / np.maximum(np.sqrt(np.einsum("ij,ij->i", design, design)), 1e-12)[:, None]

@@ -1,4 +1,4 @@
-"""The ground between two near edges: a stripe narrower than the blur never reaches the ground's own level.
+"""Fit a gap narrower than the blur, in which the light never reaches the level of the background.
 
 Its contrast cannot be told from its width in the row itself, so the contrast is taken from the tips, where the same
 ground lies open, and both edges of a row are fitted together.

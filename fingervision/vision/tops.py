@@ -1,4 +1,4 @@
-"""Where something begins, seen from the tips' side: the local tops of the outlines and how far each goes down."""
+"""Candidates of finger tips: local maxima of the outlines, and the depth of each."""
 
 from dataclasses import dataclass
 

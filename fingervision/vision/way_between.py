@@ -1,4 +1,4 @@
-"""The way from one finger to the other at the measuring height: nothing but ground, and dust."""
+"""Check that only background and dust lie between the fingers at the measuring height."""
 
 import numpy as np
 from numpy.typing import NDArray

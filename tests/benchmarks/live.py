@@ -1,9 +1,11 @@
 """Live measuring of a network camera on loopback: frames lost, lateness, processor, memory.
 
-    python tests/benchmarks/live.py [--seconds 600] [--size 640x480] [--rate-hz 25] [--record] [--page] [--viewers 4]
+    python -m tests.benchmarks.live [--seconds 600] [--size 640x480] [--rate-hz 25] [--record] [--page] [--viewers 4]
+        [--rtsp] [--busy 2] [--json]
 
-ffmpeg serves MJPEG over HTTP; capture and measuring run in this process, as `fingervision live` runs them. It ends by
-itself. Each line is a figure, with its bar where it has one.
+ffmpeg serves MJPEG over HTTP, or with --rtsp GStreamer H.264 over RTSP; with --busy so many other processes reckon
+without end; with --json the figures are printed for programs. Capture and measuring run in this process, as
+`fingervision live` runs them. It ends by itself. Each line is a figure, with its bar where it has one.
 
 * lost: frames that arrived and were not measured, and frames that are missing between two that arrived;
 * expected: frames that ffmpeg's pace gives in the time between the first and the last;
@@ -16,6 +18,7 @@ many look on by the other address, and one more that sleeps (its process is stop
 """
 
 import argparse
+import json
 import os
 import signal
 import socket
@@ -42,6 +45,11 @@ from fingervision.storage.gaps_csv import GapRow
 ASLEEP_AFTER_S = 5.0
 CYCLE, PX_PER_MM = 50, 34.0
 MOST_CORE, MOST_GROWN = 0.25, 1.05
+JPEG_BEGINS = b"\xff\xd8\xff"
+SERVER = Path(__file__).parents[1] / "live" / "rtsp_server.py"
+# GStreamer's bindings are the system's.
+SYSTEM_PYTHON = "/usr/bin/python3"
+BUSY = "while True: pass"
 # What a page does: take each message and acknowledge it.
 LOOKS = """
 import sys
@@ -64,6 +72,9 @@ def main() -> None:
     parser.add_argument("--record", action="store_true")
     parser.add_argument("--page", action="store_true")
     parser.add_argument("--viewers", type=int, default=0)
+    parser.add_argument("--rtsp", action="store_true")
+    parser.add_argument("--busy", type=int, default=0)
+    parser.add_argument("--json", action="store_true")
     wanted = parser.parse_args()
     width_px, height_px = (int(part) for part in wanted.size.split("x"))
     with tempfile.TemporaryDirectory() as folder:
@@ -71,15 +82,32 @@ def main() -> None:
         draw(pictures, width_px, height_px)
         with socket.socket() as free:
             free.bind(("127.0.0.1", 0))
-            address = f"http://127.0.0.1:{free.getsockname()[1]}/feed.mjpg"
-        serving = f"ffmpeg -loglevel quiet -re -stream_loop -1 -framerate {wanted.rate_hz} -i {pictures}"
-        camera = subprocess.Popen([*serving.split(), *f"-c copy -f mpjpeg -listen 1 {address}".split()])
+            port = free.getsockname()[1]
+        address = f"rtsp://127.0.0.1:{port}/camera" if wanted.rtsp else f"http://127.0.0.1:{port}/feed.mjpg"
+        serving = rtsp(pictures, port) if wanted.rtsp else mjpeg(pictures, wanted.rate_hz, address)
+        others = [subprocess.Popen([sys.executable, "-c", BUSY]) for _ in range(wanted.busy)]
+        camera = subprocess.Popen(serving, stderr=subprocess.DEVNULL)
         try:
-            time.sleep(1.0)
+            time.sleep(3.0 if wanted.rtsp else 1.0)
             run(address, Path(folder), wanted)
         finally:
-            camera.kill()
-            camera.wait()
+            for each in (camera, *others):
+                each.kill()
+                each.wait()
+
+
+def mjpeg(pictures: Path, rate_hz: int, address: str) -> list[str]:
+    """Command of a camera that sends each picture by itself over HTTP."""
+    serving = f"ffmpeg -loglevel quiet -re -stream_loop -1 -framerate {rate_hz} -i {pictures}"
+    return [*serving.split(), *f"-c copy -f mpjpeg -listen 1 {address}".split()]
+
+
+def rtsp(pictures: Path, port: int) -> list[str]:
+    """Command of a camera that sends H.264 over RTSP, 25 pictures a second."""
+    for index, part in enumerate(pictures.read_bytes().split(JPEG_BEGINS)[1:]):
+        (pictures.parent / f"{index:03d}.jpg").write_bytes(JPEG_BEGINS + part)
+    pattern = str(pictures.parent / "%03d.jpg")
+    return [SYSTEM_PYTHON, str(SERVER), str(port), pattern, str(CYCLE), "h264", "0"]
 
 
 def run(address: str, folder: Path, wanted: argparse.Namespace) -> None:
@@ -121,6 +149,11 @@ def run(address: str, folder: Path, wanted: argparse.Namespace) -> None:
     period_ms = 1e3 / wanted.rate_hz
     late_ms = 1e3 * np.array(late_s[first : last + 1])
     p50_ms, p99_ms = np.percentile(late_ms, (50, 99))
+    if wanted.json:
+        figures = {"measured": last - first, "expected": expected, "lost": lost, "late_p99_ms": float(p99_ms)}
+        figures |= {"late_worst_ms": float(late_ms.max()), "core": core, "early_mb": early_bytes / 1e6}
+        print(json.dumps(figures | {"late_mb": late_bytes / 1e6, "period_ms": period_ms, "load": load}))
+        return
     looked = f", page open, {wanted.viewers} viewers" if wanted.page else ""
     recorded = ", recording" if wanted.record else ""
     print(f"{wanted.size} at {wanted.rate_hz} frames/s for {arrived[last] - arrived[first]:.1f} s{recorded}{looked}")

@@ -87,8 +87,8 @@ def main() -> None:
     if shutil.which("ccx") is None:
         sys.exit("CalculiX (ccx, Debian package calculix-ccx) must be installed, but is not.")
     print("drawing | largest motion of a probe: finite_element, lumped | force: same | mode in the plane, drive held: "
-          "same | out of the plane: finite_element, stiffness_matrix | processor s of CalculiX's frequencies alone")  # fmt: skip
-    for place, (name, mechanism, gripper) in enumerate(cases()):
+          "same | out of the plane: finite_element, stiffness_matrix | s of CalculiX")  # fmt: skip
+    for place, (title, mechanism, gripper) in enumerate(cases()):
         if asked.only and place not in asked.only:
             continue
         region = mechanism.region
@@ -99,18 +99,21 @@ def main() -> None:
         seconds = time.perf_counter() - began
         flat = next((value for value, out in solid.modes if not out), None)
         lifted = next((value for value, out in solid.modes if out), None)
-        cells = [[], [], []]
+        cells: list[list[str]] = [[], [], []]
+        far, way = max(
+            ((name, axis) for name in solid.probes_mm for axis in (0, 1)),
+            key=lambda one, moved=solid.probes_mm: abs(moved[one[0]][one[1]]),
+        )
         for kind in (MechanismPlate, MechanismFrame):
             model = kind(mechanism)
             unit = model.state(1.0)
-            far, way = max(((n, i) for n in solid.probes_mm for i in (0, 1)), key=lambda p: abs(solid.probes_mm[p[0]][p[1]]))
             cells[0].append(_percent(unit.probes_mm[far][way], solid.probes_mm[far][way]))
             cells[1].append(_percent(unit.force_n, solid.force_n))
             cells[2].append(_percent(model.modes_hz(drive_held=True, count=1)[0], flat))
         across = [_percent(out_of_plane(mechanism).modes_hz[0], lifted)]
         if gripper is not None:
             across.append(_percent(StiffnessMatrixGripper(gripper).out_of_plane_modes_hz()[0], lifted))
-        print(f"{place:2d} {name:44s} | {' | '.join(' '.join(part) for part in (*cells, across))} | {seconds:.0f} s",
+        print(f"{place:2d} {title:44s} | {' | '.join(' '.join(part) for part in (*cells, across))} | {seconds:.0f} s",
               flush=True)  # fmt: skip
 
 

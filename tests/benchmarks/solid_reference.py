@@ -60,10 +60,11 @@ class Wedges:
         levels = 0.5 * plate_mm * np.sin(0.5 * np.pi * np.linspace(-1.0, 1.0, layers + 1))
         levels = np.sort(np.concatenate([levels, 0.5 * (levels[1:] + levels[:-1])]))
         number = np.zeros((2 * layers + 1, count), dtype=np.int64)
-        places, planes = [], []
+        places: list[Array] = []
+        planes: list[Indices] = []
         for level, z in enumerate(levels):
             nodes = np.arange(count) if level % 2 == 0 else corners
-            number[level, nodes] = 1 + sum(map(len, places)) + np.arange(nodes.size)
+            number[level, nodes] = 1 + sum(part.shape[0] for part in places) + np.arange(nodes.size)
             places.append(np.vstack([mesh.nodes_mm[:, nodes], np.full(nodes.size, z)]).T)
             planes.append(nodes)
         self.nodes_mm: Array = np.vstack(places)

@@ -105,7 +105,7 @@ BAD = [
     (("bar", "x.png=5mm"), "must be IMAGE=SIZE_MM with a positive size"),
     (("bar", "none.png=5"), "There is no picture none.png"),
     (("bar", BARS[0], BARS[0]), "Every picture may be named once"),
-    (("bar", BARS[0], "--roi", "1,2,3"), "--roi must be X,Y,W,H in whole pixels, but is '1,2,3'"),
+    (("bar", BARS[0], "--roi", "1,2,3"), "--roi must be four whole numbers X,Y,W,H in pixels, but is '1,2,3'"),
     (("bar", BARS[0], "--roi", "600,0,100,100"), "must lie within the picture of 640x480 pixels, but is 600,0,100,100"),
     (("bar", BARS[0], "--u-size-mm", "-1"), "must be zero or more, but is -1.0 mm"),
     (("bar", BARS[0], "--plane-mm", "-1"), "The limit plane_mm must be a number of zero or more, but is -1.0"),

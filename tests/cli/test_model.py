@@ -12,6 +12,7 @@ from fingervision.domain.errors import FingervisionError, UsageError
 from fingervision.models.grip import Part, first_grip_mm
 from fingervision.models.kinds import kinds
 from fingervision.models.lumped import LumpedGripper
+from fingervision.models.physics import Physics
 from fingervision.storage.gripper_toml import read_gripper
 
 NOTCH = 0.02
@@ -110,6 +111,17 @@ def test_contact_reaches_stress_warning_and_table(tmp_path: Path) -> None:
     assert "must stay below the yield" not in free
     assert "the fingers touch at an input of -0.516" in free
     assert "add --contact" in free
+
+
+def test_a_sparse_drive_leaves_no_straight_line_through_the_first_touch(tmp_path: Path) -> None:
+    """A simulation is read as straight between its rows: halfway from rest to -2 mm the fingers have long touched."""
+    given = drive(tmp_path / "drive.csv", [-2.0, 0.0])
+    run(GRIPPER, "--kind", "lumped", "--contact", "--drive", given, "--out", tmp_path)
+    rows = np.genfromtxt(tmp_path / "simulation.csv", delimiter=",", names=True)
+    model = LumpedGripper(read_gripper(GRIPPER), Physics(contact=True))
+    between = np.array([-1.37, -0.53, -0.5, -0.23])
+    expected = model.respond(between).gap_mm
+    assert np.interp(between, rows["input_mm"], rows["gap_mm"]) == pytest.approx(expected, abs=1e-3)
 
 
 def test_large_rotation_reaches_stress_and_onset(tmp_path: Path) -> None:

@@ -76,3 +76,22 @@ def test_few_repeats_tell_nothing() -> None:
 def test_the_digits_of_a_reading_are_found_and_noise_has_none() -> None:
     assert resolution(np.round(np.random.default_rng(1).normal(size=200), 3)) == pytest.approx(0.001)
     assert resolution(np.random.default_rng(1).normal(size=200)) == 0.0
+
+
+def test_a_drift_that_few_visits_hide_shows_in_readings_that_follow_one_another() -> None:
+    # Five cycles over ten places: within a place five readings say little, a hundred in a row say much.
+    label = np.tile(np.r_[np.arange(10), 19 - np.arange(10)], 5)
+    row, told = np.arange(100), {"drift": 0, "wandering": 0}
+    for seed in range(40):
+        noise = np.random.default_rng(seed).normal(0.0, 1.0, 100)
+        warmed = pure_error(noise + 3.0 * (1.0 - np.exp(-row / 40.0)), 30.0 * row, label, np.zeros(100, bool))
+        slow = noise.copy()
+        for k in range(1, 100):
+            slow[k] = 0.6 * slow[k - 1] + 0.8 * slow[k]
+        wandered = pure_error(slow, 30.0 * row, label, np.zeros(100, bool))
+        assert warmed is not None
+        assert wandered is not None
+        told["drift"] += warmed.has_trend and warmed.correlation == 0.0
+        told["wandering"] += wandered.correlation > 0.0
+    assert told["drift"] >= 36
+    assert told["wandering"] >= 36

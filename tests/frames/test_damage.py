@@ -231,6 +231,22 @@ def test_a_picture_that_calls_itself_a_key_frame_by_a_flipped_bit_heals_nothing(
     assert whole >= 30
 
 
+@pytest.mark.parametrize("bit", [3, 12], ids=["out of the row", "far away"])
+def test_a_frame_whose_time_is_damaged_is_no_frame_of_another_time(tmp_path: Path, bit: int) -> None:
+    path = tmp_path / "clip.mkv"
+    content = coded(path, "ffv1", g="1", **FFV1)
+    frame = packets(path)[20]
+
+    def spoil(changed: bytearray) -> None:
+        # Before a frame stand its time in the cluster, two bytes, and one of flags.
+        begin = content.index(frame) - 3
+        changed[begin + (0 if bit > 7 else 1)] ^= 1 << bit % 8
+
+    found, whole = nothing_wrong(path, spoil)
+    assert whole >= COUNT - 3
+    assert any(isinstance(item, LostFrame) for item in found)
+
+
 @pytest.mark.parametrize("frame", [24, 38, 39, 40, 41])
 def test_packets_lost_from_a_transport_stream_lose_frames_until_a_key_frame(tmp_path: Path, frame: int) -> None:
     path = tmp_path / "clip.ts"

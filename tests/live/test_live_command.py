@@ -63,7 +63,7 @@ def refused(*arguments: str | Path) -> FingervisionError:
         (("simulated", "--hide", "backlash"), "--hide and --allow-motion are for a bed"),
         (("simulated", "--allow-motion"), "--hide and --allow-motion are for a bed"),
         (("0", "--bed", "simulated"), "With --bed the bed's own camera is the source, but 0 is named too"),
-        (("--bed", "simulated", "--no-page"), "--bed is for the page"),
+        (("--bed", "simulated", "--no-page"), "--bed needs the page"),
         (("--bed", "missing.toml"), "missing.toml"),
         (("simulated", "--drive-offset-s", "1"), "--drive-offset-s needs a --drive."),
         (("simulated", "--drive", "missing.csv"), "missing.csv"),

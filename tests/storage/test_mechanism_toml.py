@@ -21,7 +21,9 @@ STAGE = (DRAWN / "parallel_leaf_stage.toml").read_text()
 WRONG = [
     ("plate = 0.5", "plate = -0.5", "plate_mm"),
     ("plate = 0.5", "plate = nan", "lengths.plate"),
-    ("plate = 0.5", "plate = 1e300", "lengths.plate"),
+    ("plate = 0.5", "plate = 1e300", "is 1e+300"),
+    ("plate = 0.5", "plate = nan", "is nan"),
+    ("plate = 0.5", f"plate = {10**400}", "is a whole number of 401 digits"),
     ("leaf = 40.0", 'leaf = "apart * 2"', "there is no apart in [lengths] above it"),
     ("leaf = 40.0", 'leaf = "1 / 0"', "lengths.leaf"),
     ("leaf = 40.0", "leaf = \"__import__('os')\"", "lengths.leaf"),

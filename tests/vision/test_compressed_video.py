@@ -9,6 +9,7 @@ from fingervision.domain.direction import Direction
 from fingervision.domain.frame import Coding, Frame
 from fingervision.domain.gap import GapMeasurement
 from fingervision.domain.quantiser import Quantiser
+from fingervision.domain.region import Region
 from fingervision.vision.coding_error import displaced_px
 from fingervision.vision.pipeline import Settings, measure_frame
 from tests.benchmarks.compressed_video import Shot, shots
@@ -56,6 +57,25 @@ def test_each_edge_has_its_share_of_step_over_contrast(one: Shot) -> None:
     found = measured(one, replace(one.frame, quantiser=flat))
     expected = [displaced_px(8.0, edge.contrast) for edge in (found.left, found.right)]
     assert found.u_coding_px == pytest.approx(float(np.hypot(*expected)), rel=0.02)
+
+
+def test_a_region_and_a_turned_camera_see_the_same_quantiser(one: Shot) -> None:
+    assert one.frame.quantiser is not None
+    found = measured(one, one.frame)
+    settings = Settings(one.below_px, Direction.UP, other_response=None)
+    region = Region(37, 21, 580, 440)
+    part = measure_frame(one.frame, replace(settings, region=region))
+    assert isinstance(part, GapMeasurement)
+    assert part.u_coding_px == pytest.approx(found.u_coding_px, rel=1e-3)
+    turned = replace(
+        one.frame,
+        pixels=np.ascontiguousarray(np.rot90(one.frame.pixels)),
+        quantiser=one.frame.quantiser.turned(1, one.frame.width_px, one.frame.height_px),
+    )
+    left = measure_frame(turned, replace(settings, direction=Direction.LEFT))
+    assert isinstance(left, GapMeasurement)
+    assert left.gap_px == pytest.approx(found.gap_px, abs=1e-6)
+    assert left.u_coding_px == pytest.approx(found.u_coding_px, rel=1e-3)
 
 
 def test_where_the_stream_says_nothing_the_rows_own_residuals_do(one: Shot) -> None:

@@ -1,1 +1,1 @@
-"""Which body and which hinge: poses of a mechanism's bodies beside its drawing."""
+"""Diagnose a mechanism from the poses of its bodies: which body or hinge differs from the drawing."""

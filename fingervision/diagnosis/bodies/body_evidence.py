@@ -1,4 +1,4 @@
-"""A measured table's channels beside the drawing of a mechanism: which place explains them."""
+"""Measured poses, gap and force as channels of one problem, with what the drawing predicts for each."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass

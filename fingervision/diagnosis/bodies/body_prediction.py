@@ -1,4 +1,4 @@
-"""What a drawing foretells of every channel of a measured table, with one of its places changed or none."""
+"""Predict every channel of a measured table from the drawing, as drawn or with one hinge or link changed."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -60,7 +60,7 @@ class BodyPrediction:
         return np.outer(self.input_mm, self.linear().by_input[self._places])
 
     def changed(self, changes: PlaceChanges) -> Array:
-        """What changed places add to it, shape (n, channels)."""
+        """Change of the prediction by changed hinges and links, shape (n, channels)."""
         return np.outer(self.input_mm, (self.linear(changes).by_input - self.linear().by_input)[self._places])
 
     @cached_property
@@ -107,7 +107,7 @@ class BodyPrediction:
         return found.get(f"{nearest.name}.angle_mrad", 0.0)
 
     def slipped(self, flexure: int, play_mm: float) -> Array:
-        """What a pivot's play adds, shape (n, channels): see `slip_mm`."""
+        """Change of the prediction by the play of a pivot, shape (n, channels); see `slip_mm`."""
         slip = slip_mm(self.linear(), flexure, self.input_mm, play_mm)
         return np.asarray(slip @ self.linear().by_slip[flexure][self._places].T)
 

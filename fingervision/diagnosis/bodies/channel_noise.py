@@ -21,7 +21,7 @@ _RANK = 1e-9
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ChannelNoise:
-    """What makes the noise of all channels white, of unit variance and independent.
+    """Whitening of all channels: noise of unit variance, independent from channel to channel.
 
     Parameters
     ----------

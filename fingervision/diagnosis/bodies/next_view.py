@@ -1,4 +1,4 @@
-"""The next view: which body to film or where to put a marker, so that places that look alike are told apart."""
+"""Propose the next view: which body to film, or where to put a marker, to resolve an ambiguity set."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""Explanations that have a place: this hinge, this link, this pivot; and those that have none but look alike."""
+"""Candidate explanations: a hinge, link or pivot of the mechanism, and effects of stage or camera that look alike."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""The diagnosis of a table with poses of bodies: the place first, then what the gap says beside it."""
+"""Diagnose a table with poses of bodies: first the faulty hinge or link, then the effects that the gap shows."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import replace
@@ -212,7 +212,7 @@ def _measured_bodies(done: "Diagnosis", evidence: BodyEvidence) -> "Diagnosis":
 def _composed(
     first: "Diagnosis", second: "Diagnosis", evidence: BodyEvidence, answers: PlaceAnswers, notes: tuple[str, ...]
 ) -> "Diagnosis":
-    """Put the place and what the gap says beside it together."""
+    """Combine the diagnosis of the poses and that of the gap into one report."""
     members, rest = evidence.findings.members, second.report
     best = members[0]
     keys = list(dict.fromkeys(member.candidate.key for member in members))

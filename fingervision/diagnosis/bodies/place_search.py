@@ -1,4 +1,4 @@
-"""Which place explains what poses and gap show, and the set of places that these data cannot tell apart."""
+"""Search the hinge, link or pivot that explains poses and gap, and its ambiguity set."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

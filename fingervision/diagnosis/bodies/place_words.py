@@ -1,4 +1,4 @@
-"""Places in words: what differs where, by how much, and which body and hinge a disagreement shows in."""
+"""Sentences about hinges, links and pivots: what differs, by how much, and in which body it shows."""
 
 from collections.abc import Sequence
 

@@ -1,1 +1,1 @@
-"""Design of the next run: which experiment would separate what these data leave open."""
+"""Design of the next run: the experiment that best separates the explanations still possible."""

@@ -1,4 +1,4 @@
-"""A run that might follow the data: both together as one problem, with what the run would show put behind the data."""
+"""The measured data with a simulated further run appended, as one estimation problem."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace

@@ -1,4 +1,4 @@
-"""What a run will be worth: the chi-square that it puts between two explanations, whichever of them is true."""
+"""Expected discrimination of a run: the chi-square by which it will separate two explanations."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

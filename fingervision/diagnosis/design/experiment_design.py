@@ -1,4 +1,4 @@
-"""Choose the next run: every protocol is judged by the open questions that it settles, per minute of rig time."""
+"""Choose the next run: the protocol that separates most pairs of explanations per minute of bench time."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -95,13 +95,13 @@ class RunPlan:
         return float(min(self.gains[j, k], back))
 
     def pairs(self) -> list[tuple[int, int]]:
-        """Pairs that are told apart, those that are told apart least first."""
+        """Pairs of explanations that the run separates, in ascending order of their separation."""
         truths, members = self.gains.shape
         found = [(j, k) for j in range(truths) for k in range(j + 1, members) if self.apart(j, k) >= WORTH]
         return sorted(found, key=lambda pair: self.apart(*pair))
 
     def worst(self, floor: float) -> float:
-        """Least gain of the pairs that gain so much at all; nothing where none does."""
+        """Smallest separation among the pairs that the run separates; None if it separates none."""
         settled = self.gains[(self.gains >= floor) & np.isfinite(self.gains)]
         return float(settled.min()) if settled.size else 0.0
 

@@ -1,4 +1,4 @@
-"""The next run: the protocol that separates what is open, by expected distance per minute (Atkinson & Fedorov 1975)."""
+"""Propose the next run by the expected noncentrality per minute (T-optimality, Atkinson & Fedorov 1975)."""
 
 import numpy as np
 

@@ -1,4 +1,4 @@
-"""Sets: every minimal explanation that these data cannot tell apart from the best."""
+"""Ambiguity set: all minimal explanations that the data cannot distinguish from the best one."""
 
 from math import comb
 

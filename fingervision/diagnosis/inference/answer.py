@@ -1,4 +1,4 @@
-"""The answer of a search put beside the disagreement: how much of it stands."""
+"""Judge the answer of a search by the share of the disagreement that it explains."""
 
 from dataclasses import dataclass, replace
 

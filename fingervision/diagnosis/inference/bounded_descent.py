@@ -37,7 +37,7 @@ Weighted = TypeVar("Weighted", bound=LeastSquares)
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Descent(Generic[Weighted]):
-    """Where a search came to rest.
+    """Result of a bounded least-squares search.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Disagreement on runs that the fit did not see, and on those that it saw."""
+"""Cross-validation: residual on the run left out of a fit, and on the runs that were fitted."""
 
 from dataclasses import replace
 

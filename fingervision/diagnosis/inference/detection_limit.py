@@ -1,4 +1,4 @@
-"""What these data would have shown: the smallest size of each effect."""
+"""Detection limit of each effect: the smallest size that these data would have revealed."""
 
 from collections.abc import Mapping
 

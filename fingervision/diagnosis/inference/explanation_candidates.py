@@ -1,4 +1,4 @@
-"""Explanations of one, two and three effects: formed from signatures, then refitted jointly in the chain."""
+"""Candidate explanations of one to three effects: ranked by linear signatures, then refitted jointly."""
 
 from collections.abc import Callable
 

@@ -16,7 +16,7 @@ LARGEST = 0.25
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Harmonics:
-    """What the named screw's own harmonics may take from what is left.
+    """Harmonics of a named cyclic error, and what they explain of the residual.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""A hypothesis: effects with parameters, and everything that it is judged by."""
+"""A hypothesis: a set of effects with fitted parameters, and the statistics by which it is judged."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass

@@ -145,7 +145,7 @@ def fit(
 
 
 def _scanned(found: Descent[_JointSquares], lower: Array, upper: Array, *, thorough: bool) -> Descent[_JointSquares]:
-    """Try values about those that were found where the prediction jumps with a parameter, and derivatives mislead."""
+    """Scan around the fitted values of parameters in which the prediction is discontinuous."""
     x, residual, cost = found.x, found.residual, found.cost
     for i, (_, parameter) in enumerate(found.squares.listed):
         for width, count in SCANS[not thorough :] if parameter.rugged else ():

@@ -1,6 +1,7 @@
 """Effects that a map of position errors can stand for: functions of the place alone, beyond a straight line.
 
-Beside a map nothing tells them from it, whatever their size. Reversal, memory and time do tell.
+Where a map is fitted as well, no data can distinguish them from it, whatever their size. Effects with reversal,
+memory or time can be distinguished.
 """
 
 from dataclasses import replace

@@ -1,4 +1,4 @@
-"""The gate of *unknown*: structure that the best explanation leaves, found by generic probes."""
+"""Model adequacy: a test for structure in the residual of the best explanation, which makes it *unknown*."""
 
 from dataclasses import dataclass
 
@@ -41,7 +41,7 @@ class _Basis:
 
     @classmethod
     def of(cls, problem: Problem, columns: Array) -> "_Basis":
-        """Work out once what every look at the columns needs."""
+        """Precompute what every evaluation of the probes needs."""
         return cls(columns, np.einsum("ij,ij->j", columns, columns), problem.offsets.design.T @ columns)
 
     def beside_offsets(self, metric: Array) -> Array:
@@ -132,7 +132,7 @@ def _is_an_effect_itself(problem: Problem, found: Explanation, basis: _Basis) ->
     inverse = np.linalg.pinv(lines.T @ _beside(design, metric, lines))
     cross = basis.columns.T @ _beside(design, metric, lines)
     left = norm - np.einsum("ij,ij->i", cross @ inverse, cross)
-    own = left <= (1.0 - SAME_SHAPE**2) * norm
+    own: Flags = np.asarray(left <= (1.0 - SAME_SHAPE**2) * norm)
     for shape in shapes:
         moved = _beside(design, metric, shape - lines @ (inverse @ (lines.T @ _beside(design, metric, shape))))
         if float(shape @ moved) > 0.0:
@@ -162,7 +162,7 @@ def is_a_line(problem: Problem, shape: Array) -> bool:
 
 
 def _of_jumps_astray(problem: Problem, columns: Array, best: Explanation, rng: np.random.Generator) -> float:
-    """Give the largest gain of a probe where the recorded input's errors alone move the jumps."""
+    """Largest gain of a probe that errors of the recorded input alone produce at jumps."""
     most, basis = [], _Basis.of(problem, columns)
     for _ in range(FEWEST):
         shaken, target = noise_alone(problem, best, rng)

@@ -1,4 +1,4 @@
-"""How much one more effect gains from noise alone: draws of the null, refitted as the data are."""
+"""Null bootstrap: the distribution of the gain of one more effect when only noise is present."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace

@@ -1,4 +1,4 @@
-"""Mistakes in a table that no physical effect makes: a mirrored or rescaled column, directions that are swapped."""
+"""Plausibility checks for mistakes in a table: a mirrored or rescaled column, swapped directions."""
 
 from dataclasses import dataclass
 

@@ -1,4 +1,4 @@
-"""What the data leave open about an explanation's parameters: draws from their posterior within the bounds."""
+"""Draw the parameters of an explanation from their posterior distribution within the bounds."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -29,7 +29,7 @@ JUMPS = 0.01
 
 @dataclass(frozen=True, slots=True)
 class _Coordinates:
-    """Where the walk goes: reciprocals of reaches and periods, logarithms of times, else the parameters themselves.
+    """Coordinates of the sampler: reciprocals of reaches and periods, logarithms of times, else the parameters.
 
     In these a likelihood that is long and bent in the parameters is nearly a parabola.
     """

@@ -1,4 +1,4 @@
-"""Random effects beside an explanation: what the gains of runs and a map of position errors are estimated by.
+"""Random effects of an explanation, by which gains of runs and maps of position errors are estimated.
 
 A random effect is a set of columns whose coefficients are independent standard normal numbers (Laird & Ware 1982,
 doi:10.2307/2529876); they are integrated out of the likelihood and estimated afterwards.

@@ -1,4 +1,4 @@
-"""Reference slots beside the run: what the camera adds to a gap it adds to a slot, the gripper adds nothing.
+"""Reference slots measured beside a run: a camera error acts on slot and gap, a gripper error on the gap alone.
 
 A gap alone cannot tell a wrong scale from a wrong lever ratio, nor a threshold's bias from a wrong rest gap; a width
 that is known can.

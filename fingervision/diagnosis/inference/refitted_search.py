@@ -1,4 +1,4 @@
-"""The search beside a drawing: what is missing and the drawing's uncertain numbers are found in turn."""
+"""Search effects and refit the uncertain dimensions of the drawing, in turn until both agree."""
 
 from dataclasses import dataclass, replace
 from functools import partial
@@ -37,7 +37,7 @@ MOST_SEARCHES = 3
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Refitted:
-    """What was found, with the measurement beside the refitted gripper.
+    """Result of the search, with the measurement compared to the refitted gripper.
 
     Parameters
     ----------

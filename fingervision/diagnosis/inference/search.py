@@ -1,4 +1,4 @@
-"""Which effects: singles, pairs and triples, refitted in the chain; thresholds from a bootstrap of the null."""
+"""Search over single effects, pairs and triples, with significance thresholds from the null bootstrap."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
@@ -49,7 +49,7 @@ SHORT = 100
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Findings:
-    """What the search found; explanations sorted best first."""
+    """Result of a search, explanations in descending order of their score."""
 
     best: Explanation
     alternatives: tuple[Explanation, ...]
@@ -66,7 +66,8 @@ def _completes(state: "_State", smaller: Explanation, larger: Explanation) -> bo
     """Whether the larger explanation takes nearly all that the smaller one left, as a true one does.
 
     What the smaller one leaves must be plainly more than the noise, and more than its form may be off. An effect that
-    joins it bends to what its form leaves over, however much that is; others in its place that leave noise alone do not.
+    joins it bends to what its form leaves over, however much that is; others in its place that leave noise alone owe
+    it less.
     """
     rows = state.values - int(state.problem.whitener.aside.sum())
     stands = smaller.score - rows

@@ -1,4 +1,4 @@
-"""Signatures: what each effect, at each of its starting values, would add to the prediction of the real chain."""
+"""Signatures: the change of the prediction by each effect at each of its starting values."""
 
 from dataclasses import dataclass
 from itertools import product

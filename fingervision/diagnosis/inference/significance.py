@@ -1,4 +1,4 @@
-"""Whether a gain is evidence for more effects, or what noise gives them."""
+"""Significance of a gain: whether noise alone would give one more effect as much."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass

@@ -1,7 +1,7 @@
-"""Numbers of the drawing that have an uncertainty, refitted within it beside whatever explains the measurement.
+"""Uncertain dimensions of the drawing, refitted within their uncertainties together with the effects.
 
 They enter as random effects (Henderson 1950): y = M(theta) + J (theta - theta_0), with theta - theta_0 normal about
-zero with the stated uncertainty. J is taken where the last estimate lies, the prior stays about the drawn number.
+zero with the stated uncertainty. J is evaluated at the last estimate; the prior stays centred on the drawn value.
 """
 
 from collections.abc import Mapping

@@ -1,4 +1,4 @@
-"""The verdict from what stands: a name is given only where little of the disagreement is left beside it."""
+"""Decide the verdict: effects are named only where they explain nearly all of the disagreement."""
 
 from dataclasses import dataclass, replace
 
@@ -36,7 +36,7 @@ LACK_OF_FIT = 1e-3
 
 @dataclass(frozen=True, slots=True)
 class Standing:
-    """How much of the disagreement an explanation leaves.
+    """Share of the disagreement that an explanation leaves unexplained.
 
     All as RMS over left and right where both exist, else over the gap; the midline's constant, the runs' departure
     from their common mean and outliers taken out.
@@ -140,7 +140,7 @@ def short_scatter(residual_mm: Array, runs: tuple[slice, ...]) -> float:
 
 
 def _without_scatter(values: Array, runs: tuple[slice, ...]) -> Array:
-    """Take out by how much each run departs from the mean of all: a constant that all share stays."""
+    """Subtract each run's deviation from the mean of all runs; a common constant remains."""
     means = np.array([values[run].mean() for run in runs])
     out = values.copy()
     for run, mean in zip(runs, means, strict=True):

@@ -1,8 +1,8 @@
-"""A model that is a function of time, laid along a measured table: its static answer, and what it adds in time.
+"""A dynamic model along a measured path: its static answer, and the dynamic remainder.
 
-The chain of effects runs thousands of times and a function of time costs seconds. It is therefore split: its answer at
-rest is a table, which every effect before it moves, and beside it stands the remainder that the same function gives
-over the path that was driven. The remainder is taken again along the path behind the effects that were found.
+The chain of effects runs thousands of times and a function of time costs seconds. It is therefore split into its
+static answer, a table that drive effects act on, and a dynamic remainder computed once along the driven path. The
+remainder is computed again along the path that the effects found have changed.
 """
 
 from dataclasses import replace

@@ -1,4 +1,4 @@
-"""The recorded input's own error: a change below a part of it is not told from it, for it is not all random noise."""
+"""Systematic error of the recorded input: changes of the path below it are not significant."""
 
 import numpy as np
 

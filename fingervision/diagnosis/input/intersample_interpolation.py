@@ -1,4 +1,4 @@
-"""The path between two samples: nobody recorded it, and a delay shows it."""
+"""Interpolate the input between two samples, which a delay makes visible."""
 
 from dataclasses import replace
 

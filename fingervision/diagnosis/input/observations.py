@@ -1,4 +1,4 @@
-"""The measurement made ready to be explained: smoothed input, outliers set aside, noise known, whitened."""
+"""Prepare the measurement: smooth the input, set outliers aside, estimate the noise, whiten."""
 
 from dataclasses import dataclass, replace
 

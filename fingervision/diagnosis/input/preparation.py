@@ -1,4 +1,4 @@
-"""A measured table put beside a model: input smoothed, path known, effects told that the data can show."""
+"""Prepare a diagnosis: smooth the input, derive its path, and list the effects that the data can show."""
 
 from dataclasses import replace
 

@@ -1,4 +1,4 @@
-"""The recorded input: smoothed as far as its error is random, and what the rest of that error does to the gap."""
+"""Smooth the random error of the recorded input, and propagate its remaining error to the gap."""
 
 from dataclasses import dataclass
 from itertools import pairwise
@@ -135,7 +135,7 @@ def scatter_in_holds(history: History, residual_mm: Array) -> float:
 
 
 def _within(input_mm: Array, runs: tuple[slice, ...], samples: int, reach_mm: float) -> Flags:
-    """Where the input stays within a reach over so many samples; nowhere where the reach is 0."""
+    """Mark the samples about which the input stays within a reach for a number of samples; none if the reach is 0."""
     out = np.zeros(input_mm.size, dtype=bool)
     for run in runs:
         if reach_mm > 0.0 and run.stop - run.start > samples:

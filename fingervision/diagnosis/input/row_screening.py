@@ -1,4 +1,4 @@
-"""Rows that say nothing about the gripper: a zero that was set, not measured; a simulation off its own line."""
+"""Screen rows that carry no information: a zero that was set and not measured, a simulated value off its line."""
 
 import numpy as np
 from numpy.typing import NDArray

@@ -1,4 +1,4 @@
-"""Noise of every channel, from what repeats, from holds, or from the spectrum of what an explanation leaves."""
+"""Noise of every channel, estimated from replicates, from holds, or from the spectrum of the residual."""
 
 import numpy as np
 
@@ -18,7 +18,7 @@ SHORT_RUN = 60
 def channel_noises(
     history: History, parts: list[Array], aside: list[Flags], floors: list[float], degrees: int, *, explained: bool
 ) -> tuple[Noise, ...]:
-    """Estimate every channel's noise; what was fitted leaves gap and midline the noise of the same pictures.
+    """Estimate every channel's noise; gap and midline share the noise of the same pictures.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Noise of one channel, white plus a first-order autoregression, and the outliers that are no part of it."""
+"""Noise model of one channel: white noise plus a first-order autoregression, and outliers."""
 
 from dataclasses import dataclass, replace
 

@@ -1,4 +1,4 @@
-"""The noise is estimated, and may be another: draws of what it is, for predictions that depend on it."""
+"""Draw the noise parameters from their posterior, for predictions that depend on them."""
 
 from collections.abc import Iterator
 from dataclasses import replace
@@ -20,7 +20,7 @@ def problems_of_drawn_noise(
     """Yield the problem with so many draws of its noise.
 
     Short runs know neither level nor correlation well: both are drawn from their posterior, given what an explanation
-    leaves over. Of long ones the power is drawn, where it is slow.
+    leaves over. For long records the power of the slow part is drawn.
 
     Parameters
     ----------

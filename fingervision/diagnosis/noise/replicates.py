@@ -119,8 +119,34 @@ def pure_error(values: Array, time_s: Array, label: NDArray[np.intp], aside: Fla
     pooled = float(rest @ rest) / degrees
     trend = _trend_sigmas([values[group] for group in groups], pooled)
     rows = np.concatenate(groups)
+    straight = _without_trend(rest, groups, time_s)
+    if trend <= TREND_SIGMAS and degrees - TREND_DEGREE >= FEWEST_DEGREES:
+        trend = max(trend, _drift_sigmas(rest, straight, rows))
     if trend <= TREND_SIGMAS or degrees - TREND_DEGREE < FEWEST_DEGREES:
         return PureError(_without_gross_errors(rest, degrees), degrees, trend, _wandering(rest, rows))
+    sd_mm = _without_gross_errors(straight, degrees - TREND_DEGREE)
+    return PureError(sd_mm, degrees - TREND_DEGREE, trend, _wandering(straight, rows))
+
+
+def _drift_sigmas(rest: Array, straight: Array, rows: NDArray[np.intp]) -> float:
+    """Standard deviations by which readings that follow one another are alike, where that is a drift; else 0.
+
+    A smooth curve in time and a reading noise that wanders both make neighbours alike, wherever they were taken. The
+    likelier one is the reason, each at the price of its parameters (Schwarz 1978): the logarithm of what is left by
+    the curve, or by predicting each reading from the one before.
+    """
+    share, sigmas = _follows_sigmas(rest, rows)
+    if sigmas <= TREND_SIGMAS:
+        return 0.0
+    pairs, parameter = int(np.sum(np.diff(np.sort(rows)) == 1)), float(np.log(rest.size))
+    wanders = pairs * float(np.log1p(-(min(share, MOST_WANDERING) ** 2))) + parameter
+    power, left = float(np.sum(rest**2)), float(np.sum(straight**2))
+    drifts = rest.size * float(np.log(max(left, 1e-12 * power) / power)) + TREND_DEGREE * parameter
+    return sigmas if drifts < wanders else 0.0
+
+
+def _without_trend(rest: Array, groups: list[NDArray[np.intp]], time_s: Array) -> Array:
+    """Take a polynomial in time out of what repeats leave, which all groups share."""
     at = np.concatenate([time_s[group] for group in groups])
     powers = np.vander((at - at.mean()) / max(float(np.ptp(at)), 1e-300), TREND_DEGREE + 1)[:, :-1]
     begin = 0
@@ -128,13 +154,17 @@ def pure_error(values: Array, time_s: Array, label: NDArray[np.intp], aside: Fla
         own = slice(begin, begin + group.size)
         powers[own] -= powers[own].mean(axis=0)
         begin += group.size
-    rest = rest - powers @ np.linalg.lstsq(powers, rest, rcond=None)[0]
-    sd_mm = _without_gross_errors(rest, degrees - TREND_DEGREE)
-    return PureError(sd_mm, degrees - TREND_DEGREE, trend, _wandering(rest, rows))
+    return np.asarray(rest - powers @ np.linalg.lstsq(powers, rest, rcond=None)[0], dtype=np.float64)
 
 
 def _wandering(rest: Array, rows: NDArray[np.intp]) -> float:
-    """Correlation of what repeats leave in consecutive rows; 0 where independent readings would show as much.
+    """Correlation of what repeats leave in consecutive rows; 0 where independent readings would show as much."""
+    share, sigmas = _follows_sigmas(rest, rows)
+    return min(share, MOST_WANDERING) if sigmas > TREND_SIGMAS else 0.0
+
+
+def _follows_sigmas(rest: Array, rows: NDArray[np.intp]) -> tuple[float, float]:
+    """Correlation of what repeats leave in consecutive rows, and how many standard deviations that is.
 
     Of k independent pairs it has a standard deviation of 1 / sqrt(k) (Bartlett 1946, doi:10.2307/2983611).
     """
@@ -143,9 +173,9 @@ def _wandering(rest: Array, rows: NDArray[np.intp]) -> float:
     pairs = int(follows.sum())
     power = float(np.mean(rest**2))
     if pairs == 0 or power == 0.0:
-        return 0.0
+        return 0.0, 0.0
     share = float(np.mean((ordered[:-1] * ordered[1:])[follows])) / power
-    return min(share, MOST_WANDERING) if share * np.sqrt(pairs) > TREND_SIGMAS else 0.0
+    return share, share * float(np.sqrt(pairs))
 
 
 def _without_gross_errors(rest: Array, degrees: int) -> float:
@@ -169,7 +199,7 @@ def _trend_sigmas(groups: list[Array], pooled: float) -> float:
 def resolution(values: Array) -> float:
     """Smallest difference of values that all lie on one grid, as a reading of few digits gives them; 0 without one.
 
-    Of a few different values nobody can tell a grid: then the reading is taken for one of 12 bits over their range.
+    From few distinct values no step can be estimated: a 12-bit reading over their range is assumed.
     """
     steps = np.diff(np.unique(np.round(values, 10)))
     steps = steps[steps > 1e-9]

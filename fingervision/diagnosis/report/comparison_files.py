@@ -1,4 +1,4 @@
-"""The files of a comparison: one page, one table and one figure for all models that were held against a measurement."""
+"""The files of a comparison: one page, one table and one figure for all models compared."""
 
 import json
 from collections.abc import Mapping

@@ -1,4 +1,4 @@
-"""What a force column would tell apart: a drawn gripper knows the force of every explanation of a gap."""
+"""Advise to measure the force, where it would separate explanations that the gap cannot."""
 
 from dataclasses import replace
 

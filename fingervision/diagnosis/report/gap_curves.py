@@ -1,4 +1,4 @@
-"""Measured and predicted gaps side by side: what the figures of a report are drawn from."""
+"""Measured and predicted gaps for the figures of a report."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass

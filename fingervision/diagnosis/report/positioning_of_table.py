@@ -31,7 +31,7 @@ def positioning_of_table(
     """Positioning figures where the table has repeated targets.
 
     Where the model's gap follows the input one to one, as on a stage, deviations are measured gap minus recorded
-    input, so that the figures are those of an ISO 230-2 report, and what the model says of them is one of the shares.
+    input, as in an ISO 230-2 report; the share that the model predicts is reported beside those of the effects.
     Anywhere else they are measured minus simulated gap. A constant between the two (a rest gap) changes no figure.
 
     Parameters

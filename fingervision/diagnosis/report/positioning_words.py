@@ -1,4 +1,4 @@
-"""Positioning figures as they are written: section of report.json, table and sentences of report.html."""
+"""Positioning accuracy in report.json, and as table and sentences in report.html."""
 
 from fingervision.diagnosis.report.positioning_figures import Figure, Visits
 from fingervision.diagnosis.report.positioning_report import PositioningReport
@@ -90,7 +90,7 @@ def positioning_notes(report: PositioningReport) -> tuple[str, ...]:
 
 
 def positioning_words(report: PositioningReport) -> tuple[str, ...]:
-    """Sentences for a person: each main figure, which effect makes how much of it, what remains."""
+    """Describe each main figure in a sentence: its value, the share of each effect, and the residual."""
     out = []
     for plain in SENTENCES:
         symbols = [plain]
@@ -126,7 +126,7 @@ def _sentence(report: PositioningReport, symbol: str, value: float) -> str:
 
 
 def _side_words(figure: Figure, slope_sign: int) -> str:
-    """On which side the readings are smaller, and whether that is what play makes; nothing within the uncertainty."""
+    """Say which approach gives smaller readings and whether play explains it; empty within the uncertainty."""
     value, interval = figure.value_mm or 0.0, figure.interval_mm
     if not value or (interval is not None and abs(value) <= interval):
         return ""

@@ -140,7 +140,7 @@ def _mechanisms(report: DiagnosisReport) -> str:
 
 
 def _apart(alternatives: Sequence[Sequence[str]]) -> str:
-    """The explanations that stand beside each other; one alone is told apart from all others."""
+    """List the explanations of the ambiguity set."""
     if len(alternatives) < 2:
         return "<p>Nothing: no other explanation of the catalogue comes near.</p>"
     return bullets([" + ".join(names) for names in alternatives])

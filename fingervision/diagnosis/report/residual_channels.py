@@ -23,7 +23,7 @@ def by_channel(data: Observations, stacked: Array) -> dict[str, Array]:
 
 
 def places(data: Observations, problem: Problem, residual: Array, rng: np.random.Generator) -> tuple[Place, ...]:
-    """Say where a residual cannot be noise."""
+    """Regions of the input in which the residual exceeds the noise."""
     noises = dict(zip(data.channels, problem.whitener.noises, strict=True))
     n = data.chain.history.input_mm.size
     aside = problem.whitener.aside[:n]

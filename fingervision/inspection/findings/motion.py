@@ -3,7 +3,7 @@
 import numpy as np
 
 from fingervision.domain.status import Status
-from fingervision.inspection.finding import Finding, refusing, weighed, without
+from fingervision.inspection.finding import MOSTLY_REFUSED, Finding, refusing, weighed, without
 from fingervision.inspection.noise_bound import GOOD_BLUR_PX
 from fingervision.inspection.sample import Look, Sample
 from fingervision.vision.profile_choice import MOTION_RADIUS_PX
@@ -17,10 +17,9 @@ FORMULA = (
 
 def find(sample: Sample) -> Finding | None:
     """Compare the flanks' spread to the tips': motion across the fingers spreads flanks alone."""
-    if sample.is_smeared and (refused := refusing(sample, "motion", (Status.BLURRED,), REMEDY)):
+    refused = refusing(sample, "motion", (Status.BLURRED,), REMEDY) if sample.is_smeared else None
+    if not sample.looks or (refused is not None and refused.share_refused > MOSTLY_REFUSED):
         return refused
-    if not sample.looks:
-        return None
     way_px = sample.median(float(np.sqrt(12.0 * look.widened_px2.max())) for look in sample.looks)
     cost_px = sample.median(_cost_px(look) for look in sample.looks)
     gap_px = sample.track[:, 2] - sample.track[:, 1]

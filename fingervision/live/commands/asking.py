@@ -100,6 +100,8 @@ def words(request: Request, name: str) -> str:
 
 def shown(value: Any) -> str:
     """What was asked, in as few characters as tell; a number may have more digits than can be written."""
+    if value is None or value == "":
+        return "empty"
     if isinstance(value, int) and not isinstance(value, bool) and abs(value) > GREATEST:
         return "too large"
     return repr(str(value)[:40])

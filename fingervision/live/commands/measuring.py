@@ -2,6 +2,8 @@
 
 from dataclasses import replace
 from datetime import UTC, datetime
+from itertools import count
+from pathlib import Path
 from typing import Any
 
 import cv2
@@ -9,7 +11,7 @@ import cv2
 from calib.calibration import BareScale
 from fingervision import __version__
 from fingervision.domain.direction import Direction
-from fingervision.domain.errors import FingervisionError, StateError, UsageError
+from fingervision.domain.errors import FingervisionError, OutputError, StateError, UsageError
 from fingervision.domain.gap import GapMeasurement
 from fingervision.live.commands.asking import Answer, Request, box, number, number_or_none, seen_of, shown
 from fingervision.live.picture_calibration import calibrated
@@ -99,8 +101,7 @@ def _calibrate(view: View, request: Request) -> Answer:
     camera = dict(view.description.camera)
     found = replace(found, camera=camera, made_at=made_at, software=f"fingervision {__version__}")
     make_out_folder(view.out)
-    # A name of its own: a calibration that lies there is somebody's.
-    path = view.out / f"calibration_{made_at.replace(':', '-').removesuffix('+00-00')}Z.json"
+    path = _free_name(view.out, f"calibration_{made_at.replace(':', '-').removesuffix('+00-00')}Z")
     write_calibration(found, path)
     try:
         view.choose(scale=found, scale_file=path)
@@ -109,6 +110,22 @@ def _calibrate(view: View, request: Request) -> Answer:
         raise
     u = found.covariance[0, 0] ** 0.5
     return Answer(f"Calibrated: {found.px_per_mm:.4f} px/mm, u {u:.4f} px/mm; written to {path}.")
+
+
+def _free_name(folder: Path, stem: str) -> Path:
+    """Take a name of its own: a calibration that lies there is somebody's, also one of this second."""
+    for again in count(1):
+        path = folder / (f"{stem}.json" if again == 1 else f"{stem}-{again}.json")
+        try:
+            path.touch(exist_ok=False)
+        except FileExistsError:
+            continue
+        except OSError as error:
+            raise OutputError(
+                f"The folder {folder} cannot be written ({error.strerror}): name another with --out."
+            ) from error
+        return path
+    raise AssertionError("names do not end")
 
 
 def _steps(view: View, request: Request) -> Answer:

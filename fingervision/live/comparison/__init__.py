@@ -1,1 +1,1 @@
-"""The measurement held against a model while it is made: prediction, residual, and a first verdict."""
+"""Compare the live measurement with a model: prediction, residual, and a first verdict."""

@@ -8,6 +8,7 @@ import "/page/export_files.js";
 import "/page/dragging.js";
 import "/page/actions.js";
 import "/page/keys.js";
+import "/page/dropped_files.js";
 import "/page/viewers.js";
 import "/page/socket.js";
 tell("start");

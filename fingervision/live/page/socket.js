@@ -2,7 +2,7 @@
 import { at, page, listen, say, sendBy, tell, token } from "/page/bus.js";
 
 const AGAIN_AFTER_MS = 500, SILENT_MS = 1000;
-let socket = null, lastAt = 0, view = "", rows = 0, said = 0, goneAt = 0, fresh = true;
+let socket = null, lastAt = 0, view = "", rows = 0, said = 0, goneAt = 0, fresh = true, drawing = false;
 
 function connect() {
   const scheme = location.protocol === "https:" ? "wss" : "ws";
@@ -58,8 +58,11 @@ async function take(buffer) {
   for (const [name_number, name, words] of head.messages) { said = name_number; tell("message", words, name); }
   tell("state", head.state);
   if (!page.paused) {
-    // The value is that of the picture beside it.
+    // The value is that of the picture beside it, or of a newer frame where only now and then one is sent.
+    drawing = true;
     if (buffer.byteLength > 4 + length) await draw(new Uint8Array(buffer, 4 + length));
+    drawing = false;
+    lastAt = performance.now();
     if (!page.paused) tell("now", head.now);
   }
   if (socket.readyState === WebSocket.OPEN) socket.send('{"do":"ack"}');
@@ -88,6 +91,7 @@ function answer(reply) {
 }
 
 setInterval(() => {
+  if (drawing) return; // it is this browser that is slow, and the server waits for it
   if (!lastAt || !socket || socket.readyState !== WebSocket.OPEN) return;
   if (performance.now() - lastAt > SILENT_MS) {
     say("connection", "The live view does not answer.", "bad");

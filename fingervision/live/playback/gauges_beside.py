@@ -1,4 +1,4 @@
-"""Gauges beside what the page shows: the board that it works on, and what reads it."""
+"""Gauges of the recording on the page: the list that is edited, and the thread that reads them."""
 
 from pathlib import Path
 from typing import Any, Protocol

@@ -182,7 +182,7 @@ class Playback:
     oldest_row = shown_from = 0
 
     def rows(self, first: int, last: int) -> Iterator[GapRow]:
-        """Rows from one number on, before another."""
+        """Rows from frame `first` up to, and without, frame `last`."""
         track = self._track
         return iter(() if track is None else track.rows[first:last])
 
@@ -293,7 +293,7 @@ class Playback:
             self.say("failed", self.trouble)
 
     def _own_time(self, frame: int, row: GapRow | None) -> float | None:
-        """A frame's time, where it has a picture and no neighbour has the same."""
+        """Time of a frame, or None where it has no picture or a neighbour has the same time."""
         if row is None or row.time_s is None or row.status in (Status.DAMAGED, Status.DUPLICATE):
             return None
         neighbours = [self._row(frame - 1) if frame else None, self._row(frame + 1)]

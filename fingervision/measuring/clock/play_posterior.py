@@ -44,7 +44,7 @@ class Posterior:
 
 
 def most_likely(motion: Motion, start: Alignment, plays: tuple[float, ...] = FIRST_PLAYS) -> Fit:
-    """Fit from several plays and keep the best; `plays` over the largest possible one.
+    """Fit from several starting values of the play and keep the best; `plays` are shares of the largest one.
 
     Play and offset trade with each other along narrow valleys, in which a search at a fixed play halts beside the
     lowest place: the best two of them, and where the search began, are followed with the play free.

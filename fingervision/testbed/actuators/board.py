@@ -50,7 +50,7 @@ class Routes:
     has_steps: bool = True
 
     def check(self, from_mm: float, to_mm: float, speed_mm_s: float) -> None:
-        """Refuse what is beyond the limits, and where no steps lead."""
+        """Refuse targets beyond the limits, and targets that no sequence of steps reaches."""
         check_move(self.limits, to_mm, speed_mm_s)
         route(self.data.steps, from_mm, to_mm, speed_mm_s, self.limits.speed_mm_s)
 
@@ -128,7 +128,7 @@ class BoardActuator:
         )
 
     def check(self, from_mm: float, to_mm: float, speed_mm_s: float) -> None:
-        """Refuse what is beyond the limits, and where no steps lead."""
+        """Refuse targets beyond the limits, and targets that no sequence of steps reaches."""
         Routes(self._data, self.limits).check(from_mm, to_mm, speed_mm_s)
 
     def move(self, to_mm: float, speed_mm_s: float) -> None:

@@ -12,7 +12,7 @@ HOME_WITHIN_S, BUSY_WITHIN_S, ENABLE_S, LONGEST_S = 10.0, 0.5, 0.5, 60.0
 
 @dataclass(frozen=True, slots=True)
 class Codes:
-    """How the select lines name the steps.
+    """Codes by which the select lines of the controller name its steps.
 
     Parameters
     ----------

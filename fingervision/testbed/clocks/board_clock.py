@@ -2,7 +2,8 @@
 
 The board stamps the moment at which it has a command; that moment lies between the sending of the command and the
 coming of its answer (Cristian, "Probabilistic clock synchronization", Distributed Computing 3, 1989). Many exchanges
-narrow it: the rate is fitted to their middles, and the offset is the middle of what they allow together.
+narrow the interval: the rate is fitted to their midpoints, and the offset is the midpoint of the intersection of
+their intervals.
 """
 
 from collections import deque

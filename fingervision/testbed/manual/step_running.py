@@ -23,7 +23,7 @@ def step_limits(bed_name: str) -> StageLimits:
 
 
 def run_sequence(data: StepData, bed_name: str, say: Callable[[str], Any]) -> None:
-    """Home, then run the sequence; the whole of it is held against the bed's limits before anything moves.
+    """Home, then run the sequence, after all of it was checked against the limits of the bed.
 
     An actuator that keeps no step data goes to each target at the step's peak speed.
 

@@ -1,10 +1,10 @@
 """Position of a stage between the steps of its encoder, from the times of its edges.
 
-An encoder says only in which cell of its step the stage is, but when it enters another, it stands on the border between
-the two, as exactly as the time of that is known. Between two borders a stage moves evenly, and where it stops follows
-from its speed until the controller says that the motion is over. A step of 30 um by itself leaves 9 um (30 / sqrt 12),
-67 um of gap, and a play would keep that through a whole hold; edges stamped to 4 us leave nanometres, and readings 200
-times a second at 0.5 mm/s leave 1 um.
+An encoder resolves the position to one step; at the moment of a transition the stage is exactly on the border of two
+steps. Between two borders a stage moves evenly, and where it stops follows from its speed until the controller says
+that the motion is over. A step of 30 um by itself leaves 9 um (30 / sqrt 12), 67 um of gap, and a play would keep
+that through a whole hold; edges stamped to 4 us leave nanometres, and readings 200 times a second at 0.5 mm/s leave 1
+um.
 """
 
 from bisect import bisect_right

@@ -19,7 +19,7 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True)
 class MotionProfile:
-    """One motion from stand to stand.
+    """One motion from rest to rest.
 
     Parameters
     ----------

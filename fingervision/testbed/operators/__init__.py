@@ -1,1 +1,1 @@
-"""The person at the bed, who does what no motor does, and the terminal through which she is asked."""
+"""The operator, who does the manual steps of a recipe, and the terminal through which she is asked."""

@@ -1,4 +1,4 @@
-"""Protocol of the operator, who does at the bed what no motor does."""
+"""Protocol of the operator, the person who does the manual steps of a recipe."""
 
 from typing import Protocol
 

@@ -92,7 +92,7 @@ class Leg:
 
     @property
     def words(self) -> str:
-        """What is done, for people."""
+        """Description of the segment in words."""
         match self.act:
             case Go(to_mm, speed, _):
                 return f"to {to_mm:g} mm at {speed:g} mm/s"

@@ -50,7 +50,7 @@ class Timed:
 def plan(
     recipe: Recipe[Section], limits: SoftLimits, model: Model | None, start_mm: float, rate_hz: float, view_mm: float
 ) -> Plan:
-    """Read all steps and hold them against the limits.
+    """Read all steps and check them against the limits.
 
     Parameters
     ----------

@@ -28,7 +28,7 @@ class Runner:
     """Runs a plan from where the record's rows end.
 
     A bed that replays is taken through the whole plan again; what is in the folder already is not drawn, measured or
-    written a second time. On any other bed the run goes on with the leg in which it broke off, as a run of its own.
+    written a second time. On any other bed the interrupted motion segment is repeated, as a run of its own.
 
     Parameters
     ----------

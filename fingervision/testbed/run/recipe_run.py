@@ -52,7 +52,7 @@ def run_recipe(
     on_plan: Callable[[Plan], None] = lambda planned: None,
     on_row: OnRow = lambda row, picture: None,
 ) -> RunDone:
-    """Run a recipe; nothing moves before all of it was held against the limits and the fingers were seen.
+    """Run a recipe; nothing moves before all of it is checked against the limits and the fingers are seen.
 
     Parameters
     ----------

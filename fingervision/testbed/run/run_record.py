@@ -24,7 +24,7 @@ OnRow = Callable[[SampleRow, Frame], None]
 
 @dataclass(frozen=True, slots=True)
 class Counts:
-    """What became of a run's frames."""
+    """Numbers of frames of a run by their status."""
 
     recorded: int
     with_gap: int

@@ -31,7 +31,7 @@ class OwnClock:
         return OwnClock(float(began_s), float(1.0 + rng.uniform(-LARGEST_RATE_ERROR, LARGEST_RATE_ERROR)))
 
     def shows_s(self, bed_s: float) -> float:
-        """What it shows at a time of the bed."""
+        """Reading of this clock at a time of the bed's clock."""
         return (bed_s - self.began_s) * self.rate
 
     def bed_s(self, shown_s: float) -> float:

@@ -49,7 +49,7 @@ class SimulatedStage:
         return self._pieces[1][0] if len(self._pieces) > 1 else float("inf")
 
     def lands_at_mm(self, target_mm: float) -> float:
-        """Where it comes to a stand when it is sent somewhere."""
+        """Position at which the stage stops when it is sent to a target."""
         waves = sum(
             share * np.sin(2.0 * np.pi * target_mm / period_mm + phase)
             for period_mm, share, phase in zip(LEAD_PERIODS_MM, LEAD_SHARES, self._phases, strict=True)

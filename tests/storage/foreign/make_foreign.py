@@ -97,8 +97,45 @@ def cases() -> list[Case]:
         plain("semicolon_comments", "time [s];position [mm];gap [mm]", ";", ("s", "mm", "mm"), before="# bench 3\n# operator: kh; stage: 2\n\n"),
         plain("no_separator_but_tabs_and_blanks", "time_s   input_um \tgap_um", " \t ", ("s", "um", "um"), (3, 1, 1)),
     ]  # fmt: skip
-    made += simulations() + drives() + dates() + rows_left_out() + questions() + iso230()
+    made += simulations() + drives() + dates() + rows_left_out() + questions() + iso230() + instruments()
     return made
+
+
+def instruments() -> list[Case]:
+    """Exports of measuring programs and controllers, each with what it writes above the numbers."""
+    unit, fine = ("s", "mm", "mm"), ("ms", "mm", "mm")
+    gcs = ["# REM PI GCS data array", "# VERSION = 1", "# SEPARATOR = 32", "# DIM = 3", "# SAMPLE_TIME = 0.1"]
+    gcs += ["# NAME0 = Time (s)", "# NAME1 = Actual Position of Axis 1 (mm)", "# NAME2 = Gap (mm)", "# END_HEADER"]
+    number = iter(range(1, ROWS + 1))
+    numbered = plain("keyence_index", "No.,Time[ms],Position[mm],Gap[mm]", ",", fine, (0, 4, 4), rate=10.0)
+    head, *body = numbered.text.splitlines()
+    numbered.text = "LK-G5000,Ver 1.0\nDate,2024/05/03\nSampling,100 ms\n\n" + "\n".join(
+        [head, *(f"{next(number)},{line}" for line in body)]
+    )
+    labels = "Long Name\tTime\tPosition\tGap\nUnits\ts\tmm\tmm\nComments\t\tstage\tcamera"
+    origin = plain("origin_labels", "Time\tPosition\tGap", "\t", unit)
+    origin.text = "\n".join([labels, *(f"\t{line}" for line in origin.text.splitlines()[1:])]) + "\n"
+    bars = plain("markdown", "time (s) | position (mm) | gap (mm)", " | ", unit)
+    head, *body = [f"| {line} |" for line in bars.text.splitlines()]
+    bars.text = "\n".join([head, "|---|---|---|", *body]) + "\n"
+    return [
+        plain("pi_data_recorder", "\n".join(gcs), " ", unit),
+        numbered,
+        origin,
+        bars,
+        plain("catman", "Zeit [s]\tWeg [mm]\tAbstand [mm]\n1/10 Hz\t\t", "\t", unit, mark=",", before="HBM_CATMAN\nT0 = 03.05.2024 10:11:12\n\n", encoding="cp1252"),
+        plain("instron", '"Time","Displacement","Gap"\n"(s)","(mm)","(mm)"', ",", unit, before='"Specimen","1"\n"Rate","0.5","mm/s"\n\n', edit=lambda c: f'"{c}"'),
+        plain("laser_interferometer", "Time (s)\tPosition (mm)\tGap (mm)", "\t", unit, before="Agilent 5529A Dynamic Calibrator\nDate: 05/03/2024 Time: 10:11:12\nUnits: mm\n\n"),
+        plain("excel_separator_line", "Time (s);Position (mm);Gap (mm)", ";", unit, before="sep=;\n"),
+        plain("key_value_head", "t [s], x [mm], gap [mm]", ", ", unit, before="operator: kh\nrate: 10 Hz\n---\n"),
+        plain("utf16_big_endian", "Time (s);Position (mm);Gap (mm)", ";", unit, encoding="utf-16-be"),
+        plain("colon_units", "Time: s;Position: mm;Gap: mm", ";", unit, after=""),
+        plain("metres_in_exponents", "Zeit/s\tWeg/m\tAbstand/m", "\t", ("s", "m", "m"), (3, 7, 7), mark=",", edit=lambda c: c + "E+00"),
+        plain("dutch", "Tijd (s);Positie (mm);Afstand (mm)", ";", unit, mark=","),
+        plain("portuguese", "Tempo (s);Deslocamento (mm);Abertura (mm)", ";", unit, mark=",", encoding="latin-1"),
+        plain("slot_names", "Time (s),Dev1/ai0 position (mm),Dev1/ai1 gap (mm)", ",", unit, asks="columns.input",
+              states=("columns.input=2", "columns.gap=3")),
+    ]  # fmt: skip
 
 
 def simulations() -> list[Case]:

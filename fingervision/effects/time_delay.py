@@ -1,4 +1,4 @@
-"""A signal some time ago."""
+"""Delay of a signal by a time, along straight lines or a curve between its samples."""
 
 from dataclasses import replace
 

@@ -1,0 +1,118 @@
+"""An agent for bluesky that suggests the next run, and a plan that drives the steps of a recipe.
+
+`NextRunAgent` takes measured rows (`ingest`, or as a subscriber of the RunEngine), diagnoses them, and suggests the run
+that best separates the explanations still possible (`suggest`). Needs the extra `bluesky`.
+"""
+
+import csv
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+from fingervision.adapters.bluesky import GapDevice, StageDevice
+from fingervision.diagnosis.diagnose import Diagnosis, diagnose
+from fingervision.domain.errors import DataError
+from fingervision.models.corrected import CorrectedModel
+from fingervision.tables.read import read_measured_table
+
+ROW = ("run", "time_s", "input_mm", "gap_mm", "left_mm", "right_mm", "force_n")
+
+
+class NextRunAgent:
+    """Diagnoses what was measured, and suggests the run that separates what is left open.
+
+    Parameters
+    ----------
+    model : CorrectedModel
+        Model that is compared with the measurement (`fingervision.tables.read.read_model`).
+    gap : str
+        Name of the `GapDevice` whose events it takes as a subscriber (`RE.subscribe(agent)`).
+    seed : int
+        Of the diagnosis.
+    """
+
+    def __init__(self, model: CorrectedModel, gap: str = "gap", *, seed: int = 1) -> None:
+        self._model, self._gap, self._seed = model, gap, seed
+        self._rows: list[dict[str, Any]] = []
+        self._run = 0
+        self._answer: Diagnosis | None = None
+
+    def ingest(self, rows: Sequence[Mapping[str, Any]]) -> None:
+        """Take rows with `input_mm` and any of `gap_mm`, `run`, `time_s`, `left_mm`, `right_mm`, `force_n`."""
+        for row in rows:
+            if row.get("input_mm") is None:
+                raise DataError(f"Every row must have input_mm, but one has {sorted(row)}: add it.")
+            self._rows.append({"run": str(self._run), **{key: row.get(key) for key in ROW if row.get(key) is not None}})
+        self._answer = None
+
+    def __call__(self, name: str, document: Mapping[str, Any]) -> None:
+        """Take the documents of a RunEngine: each of its runs is a run of the table."""
+        if name == "start":
+            self._run += 1
+        if name == "event":
+            self._ingest_event(document["time"], document["data"])
+        if name == "event_page":
+            for k, at_s in enumerate(document["time"]):
+                self._ingest_event(at_s, {key: values[k] for key, values in document["data"].items()})
+
+    def report(self) -> Diagnosis:
+        """Diagnose everything that was taken so far."""
+        if self._answer is None:
+            with TemporaryDirectory(prefix="fingervision-") as folder:
+                path = Path(folder) / "measured.csv"
+                keys = [key for key in ROW if any(row.get(key) is not None for row in self._rows)]
+                with path.open("w", encoding="utf-8", newline="") as file:
+                    writer = csv.writer(file, lineterminator="\n")
+                    writer.writerow(keys)
+                    writer.writerows([["" if row.get(key) is None else row[key] for key in keys] for row in self._rows])
+                self._answer = diagnose(read_measured_table(path), self._model, seed=self._seed)
+        return self._answer
+
+    def suggest(self, batch_size: int = 1) -> list[dict[str, Any]]:
+        """Suggest the next run: `name`, `steps` as in a recipe, `separates`; empty where nothing is open."""
+        proposed = self.report().report.next_run
+        if proposed is None or batch_size < 1:
+            return []
+        steps = [dict(step) for step in proposed.steps]
+        return [{"name": proposed.name, "steps": steps, "separates": list(proposed.separates)}]
+
+    def _ingest_event(self, at_s: float, data: Mapping[str, Any]) -> None:
+        prefix = f"{self._gap}_"
+        own = {key.removeprefix(prefix): value for key, value in data.items() if key.startswith(prefix)}
+        if own.get("input_mm") is not None:
+            self.ingest([{**own, "run": str(self._run), "time_s": at_s}])
+
+
+def run_steps(steps: Sequence[Mapping[str, Any]], stage: StageDevice, gap: GapDevice) -> Iterator[Any]:
+    """Give a bluesky plan for the steps of a recipe: one run, the gap flown while the stage moves.
+
+    Kinds: triangle, move and hold; others need the bed's own runner (`fingervision bed run`).
+    """
+    import bluesky.plan_stubs as bps
+    import bluesky.preprocessors as bpp
+
+    def moves() -> Iterator[Any]:
+        for step in steps:
+            kind, speed_mm_s = step.get("kind"), float(step.get("speed_mm_s", stage.speed_mm_s))
+            if kind in ("triangle", "move"):
+                ends = [step["from_mm"], *[step["to_mm"], step["from_mm"]] * int(step.get("cycles", 1))]
+                for to_mm in ends if kind == "triangle" else [step["to_mm"]]:
+                    yield from bps.prepare(stage, (float(to_mm), speed_mm_s), wait=True)
+                    yield from bps.kickoff(stage, wait=True)
+                    yield from bps.complete(stage, wait=True)
+            elif kind == "hold":
+                yield from bps.mv(stage, float(step["at_mm"]))
+                yield from bps.sleep(float(step["seconds"]))
+            else:
+                raise DataError(
+                    f"A step must be a triangle, move or hold here, but is {kind!r}: `fingervision bed run` runs it."
+                )
+
+    def flown() -> Iterator[Any]:
+        yield from bps.kickoff(gap, wait=True)
+        yield from moves()
+        yield from bps.complete(gap, wait=True)
+        yield from bps.collect(gap)
+
+    yield from bpp.run_wrapper(flown())  # type: ignore[no-untyped-call]  # it carries no types

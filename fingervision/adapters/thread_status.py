@@ -1,0 +1,56 @@
+"""Status of work in a thread, as bluesky.protocols.Status asks for it: done, callbacks, exception."""
+
+import threading
+from collections.abc import Callable
+
+
+class ThreadStatus:
+    """Status of something that a thread waits for; done when the thread has ended.
+
+    Parameters
+    ----------
+    work : callable
+        Returns when it is done; an exception is the status's.
+    """
+
+    def __init__(self, work: Callable[[], None]) -> None:
+        self._ended, self._lock = threading.Event(), threading.Lock()
+        self._callbacks: list[Callable[[ThreadStatus], None]] = []
+        self._error: BaseException | None = None
+
+        def run() -> None:
+            try:
+                work()
+            except BaseException as error:
+                self._error = error
+            with self._lock:
+                self._ended.set()
+                callbacks = list(self._callbacks)
+            for callback in callbacks:
+                callback(self)
+
+        threading.Thread(target=run, name="fingervision-bluesky", daemon=True).start()
+
+    @property
+    def done(self) -> bool:
+        """Whether it has ended."""
+        return self._ended.is_set()
+
+    @property
+    def success(self) -> bool:
+        """Whether it has ended as it should."""
+        return self.done and self._error is None
+
+    def exception(self, timeout: float | None = 0.0) -> BaseException | None:
+        """Wait for its end and give what it raised; TimeoutError where it goes on."""
+        if not self._ended.wait(timeout):
+            raise TimeoutError
+        return self._error
+
+    def add_callback(self, callback: Callable[["ThreadStatus"], None]) -> None:
+        """Call when done; at once where it is."""
+        with self._lock:
+            if not self._ended.is_set():
+                self._callbacks.append(callback)
+                return
+        callback(self)

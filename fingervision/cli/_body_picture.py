@@ -1,0 +1,81 @@
+"""A deformed body on paper: a frame that fits it, its outline at rest, and its stress."""
+
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.tri import Triangulation
+from numpy.typing import NDArray
+
+from fingervision.models.plane_stress import PlaneStressPlate
+
+Array = NDArray[np.float64]
+
+_LEAST_INCHES, _MOST_INCHES = 5.0, 9.0
+_TITLE_INCHES, _BESIDE_INCHES = 1.2, 1.8
+"""What title and axis need above and below, axis and colour bar to the left and right."""
+_LEAST_WIDE_INCHES = 7.5
+"""Two lines of a title in words need that."""
+_COLOURS = "YlOrRd"
+"""Pale where there is no stress, so that the body is seen as a body."""
+
+
+def framed(low: Array, high: Array) -> tuple[Figure, Axes]:
+    """Make a figure whose proportions are those of what it holds.
+
+    Parameters
+    ----------
+    low, high : ndarray of float, shape (2,)
+        Corners of the box round it, in mm.
+    """
+    wide, tall = (high - low).tolist()
+    scale = min((_MOST_INCHES - _BESIDE_INCHES) / wide, (_MOST_INCHES - _TITLE_INCHES) / tall)
+    size = (max(scale * wide + _BESIDE_INCHES, _LEAST_WIDE_INCHES), max(scale * tall + _TITLE_INCHES, _LEAST_INCHES))
+    figure = Figure(figsize=size, layout="constrained")
+    axes = figure.add_subplot()
+    axes.set_aspect("equal")
+    axes.set_xlabel("x / mm")
+    axes.set_ylabel("y / mm")
+    return figure, axes
+
+
+def draw_body(
+    axes: Axes, plate: PlaneStressPlate, moved: Array, stress: Array, top_mpa: float, *, side: float = 1.0
+) -> Any:
+    """Draw a body at rest by its outline and deformed by its stress; return what a colour bar needs.
+
+    Parameters
+    ----------
+    axes : Axes
+        To draw on.
+    plate : PlaneStressPlate
+        The meshed body.
+    moved : ndarray of float, shape (unknowns,)
+        Displacements in mm, drawn to scale.
+    stress : ndarray of float, shape (corners,)
+        Von Mises stress at the corners, in MPa.
+    top_mpa : float
+        At the end of the colours.
+    side : float
+        -1 draws the mirror image in the y axis.
+    """
+    x, y = plate.nodes_mm
+    u, v = moved[plate.x_dofs], moved[plate.y_dofs]
+    ends = plate.outline_edges[[0, 2, 1]]
+    count = stress.size
+    axes.plot(side * x[ends], y[ends], color="0.6", linewidth=0.6, zorder=1)
+    shape = Triangulation(side * (x + u)[:count], (y + v)[:count], np.asarray(plate.corner_triangles).T)
+    colours = axes.tripcolor(shape, stress, shading="gouraud", cmap=_COLOURS, vmin=0.0, vmax=top_mpa, zorder=2)
+    axes.plot(side * (x + u)[ends], (y + v)[ends], color="0.2", linewidth=0.6, zorder=3)
+    return colours
+
+
+def extent_mm(plate: PlaneStressPlate, moved: Array, *, mirrored: bool = False) -> tuple[Array, Array]:
+    """Box round a body at rest and deformed."""
+    at_rest = plate.nodes_mm
+    there = at_rest + np.stack([moved[plate.x_dofs], moved[plate.y_dofs]])
+    both = np.hstack([at_rest, there])
+    if mirrored:
+        both = np.hstack([both, both * np.array([[-1.0], [1.0]])])
+    return both.min(axis=1), both.max(axis=1)

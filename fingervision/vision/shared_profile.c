@@ -1,0 +1,39 @@
+/* after normal_distribution */
+/* Mean residual of a flank's rows: levels (rows, pixels), offset of the edge from the window's middle, contrast, weight,
+   slope, sigma; mean (pixels). Gives the rows that count, their mean square residual, mean offset and mean contrast. */
+LOOP(shared_profile_mean, "FFFFFdf", "iddd") {
+    int64_t rows = in[0].shape[0], pixels = in[0].shape[1], used = 0;
+    double sigma = in[5].d, total = 0.0, offsets = 0.0, contrasts = 0.0, *mean = FLOATS(6), *own = floats(pixels);
+    memset(mean, 0, (size_t)pixels * sizeof(double));
+    for (int64_t i = 0; i < rows; i++) {
+        if (!(FLOATS(3)[i] > 0.0) || fabs(FLOATS(4)[i]) > STEEPEST) continue;
+        const double *level = FLOATS(0) + i * pixels;
+        double density, border = -0.5 * (double)pixels - FLOATS(1)[i], share = normal(border / sigma, &density);
+        double before = border * share + sigma * density, of_levels = 0.0, of_steps = 0.0;
+        for (int64_t j = 0; j < pixels; j++) {
+            border += 1.0;
+            share = normal(border / sigma, &density);
+            double after = border * share + sigma * density;
+            own[j] = after - before;
+            before = after;
+            of_steps += own[j];
+            of_levels += level[j];
+        }
+        double contrast = FLOATS(2)[i], rest = (of_levels - contrast * of_steps) / (double)pixels;
+        for (int64_t j = 0; j < pixels; j++) {
+            double residual = level[j] - contrast * own[j] - rest;
+            mean[j] += residual;
+            total += residual * residual;
+        }
+        offsets += FLOATS(1)[i];
+        contrasts += contrast;
+        used++;
+    }
+    double count = (double)larger_int(used, 1);
+    for (int64_t j = 0; j < pixels; j++) mean[j] /= count;
+    out[0].i = used;
+    out[1].d = total / (count * (double)pixels);
+    out[2].d = offsets / count;
+    out[3].d = contrasts / count;
+    free(own);
+}

@@ -1,0 +1,49 @@
+"""Print how the lumped gripper's grip on a part and first mode stand beside finite elements, for unlike joints."""
+
+from dataclasses import replace
+from pathlib import Path
+
+from fingervision.domain.gripper import Gripper
+from fingervision.models.finite_element import FiniteElementGripper
+from fingervision.models.grip import Part, first_grip_mm, grip_equilibrium
+from fingervision.models.lumped import LumpedGripper
+from fingervision.storage.gripper_toml import read_gripper
+from tests.benchmarks.models_held_out import HELD_OUT, drawn
+
+ROOT = Path(__file__).parents[2]
+PART = Part(width_mm=2.0, stiffness_n_mm=50.0)
+BEYOND_MM = 0.2
+"""Of input beyond the first touch of the part."""
+JOINTS = (("finger_width_mm", 6.0), ("cross_bar_width_mm", 5.0), ("shuttle_width_mm", 7.0))
+
+
+def cases(sample: Gripper) -> list[tuple[str, Gripper]]:
+    """Give the held-out drawings, and the sample with other joints."""
+    found = [(f"{row[0].name}, t {row[1]:g}, R {row[2]:g}, plate {row[3]:g}", drawn(sample, row)) for row in HELD_OUT]
+    return found + [
+        (f"sample, {name} = {value:g}", replace(sample, links=replace(sample.links, **{name: value})))
+        for name, value in JOINTS
+    ]
+
+
+def main() -> None:
+    """Print one line per drawing, in %."""
+    print("drawing | grip | first mode, drive held | stated: grip, mode")
+    for name, gripper in cases(read_gripper(ROOT / "sample_frames" / "paper" / "gripper.toml")):
+        grips, modes = [], []
+        lumped = LumpedGripper(gripper)
+        for model in (lumped, FiniteElementGripper(gripper)):
+            first = first_grip_mm(model.half, PART) or 0.0
+            grips.append(float(grip_equilibrium(model.half, first - BEYOND_MM, PART).contact_n.sum()))
+            modes.append(model.modes_hz(drive_held=True, count=1)[0])
+        apart = [100.0 * (one / other - 1.0) for one, other in (grips, modes)]
+        stated = lumped.figures()
+        print(
+            f"{name:44s} | {apart[0]:+6.2f} | {apart[1]:+6.2f} | {100.0 * stated.grip_error:.0f} "
+            f"{100.0 * stated.mode_error:.0f}",
+            flush=True,
+        )
+
+
+if __name__ == "__main__":
+    main()

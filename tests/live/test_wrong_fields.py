@@ -1,0 +1,160 @@
+"""What is typed wrong, dropped, or asked by two at once: a sentence, nothing lost, and what is measured stays."""
+
+import json
+from collections.abc import Callable, Iterator
+from contextlib import suppress
+from pathlib import Path
+from threading import Thread
+from typing import Any
+
+import numpy as np
+import pytest
+
+from calib.calibration import BareScale
+from calib.measured_scale import Calibration
+from fingervision.domain.errors import FingervisionError
+from fingervision.domain.frame import Coding, Frame
+from fingervision.domain.gap import NoGap
+from fingervision.domain.status import Status
+from fingervision.frames.source import Wish
+from fingervision.live.choices import Choices
+from fingervision.live.commands import obey
+from fingervision.live.frame_measurement import Seen
+from fingervision.live.opening import opened as opened_source
+from fingervision.live.session import Session
+from fingervision.storage.calibration_json import read_calibration
+from tests.live.browser import browser, needs_chromium, opened, says, shown
+
+__all__ = ["browser", "opened"]
+WRONG: list[dict[str, Any]] = [
+    {"do": "region", "box": [0, 0, 0, 0]},
+    {"do": "region", "box": [-1, 0, 10, 10]},
+    {"do": "region", "box": [0, 0, 10_000, 10]},
+    {"do": "region", "box": [0.5, 0, 10, 10]},
+    {"do": "region", "box": "0,0,10,10"},
+    {"do": "region", "box": [0, 0, 10**30, 10]},
+    {"do": "height", "below_tip_mm": 0},
+    {"do": "height", "below_tip_mm": -0.3},
+    {"do": "height", "below_tip_mm": None},
+    {"do": "height", "below_tip_mm": "0.3"},
+    {"do": "height", "below_tip_mm": float("nan")},
+    {"do": "tips", "tips": "upwards"},
+    {"do": "fingers", "fingers": "grey"},
+    {"do": "limits", "least": 2.0, "greatest": 1.0},
+    {"do": "limits", "least": "one", "greatest": None},
+    {"do": "scale", "px_per_mm": 0},
+    {"do": "scale", "px_per_mm": -34},
+    {"do": "scale", "px_per_mm": True},
+    {"do": "scale", "px_per_mm": float("inf")},
+    {"do": "calibrate", "kind": "ring", "box": [0, 0, 10, 10], "size_mm": 1.0, "u_size_mm": 0.001},
+    {"do": "calibrate", "kind": "bar", "box": [0, 0, 3, 3], "size_mm": 1.0, "u_size_mm": 0.001},
+    {"do": "calibrate", "kind": "bar", "box": [0, 0, 640, 480], "size_mm": 0.0, "u_size_mm": 0.001},
+    {"do": "calibrate", "kind": "bar", "box": [0, 0, 640, 480], "size_mm": 1.0, "u_size_mm": -1.0},
+    {"do": "load_settings", "path": "/etc/passwd"},
+    {"do": "load_settings", "path": "../../nothing.toml"},
+    {"do": "load_settings", "path": ""},
+    {"do": "load_settings", "path": "a" * 2000},
+    {"do": "load_settings", "path": "a\0b"},
+    {"do": "input", "input_mm": "far"},
+    {"do": "bed_move", "to_mm": 1.0, "speed_mm_s": 1.0},
+    {"do": "record", "on": True, "path": "<script>"},
+    {"do": "nothing of the kind"},
+    {"do": ["zero"]},
+    {},
+]
+
+
+@pytest.fixture
+def session(tmp_path: Path) -> Iterator[Session]:
+    found = Session(opened_source("simulated", Wish()), Choices(scale=BareScale(34.0)), tmp_path / "out")
+    pixels = np.full((480, 640), 200, np.uint8)
+    pixels[60:420, 250:350] = 40
+    found.seen = Seen(Frame(pixels, 0, 0.0, Coding.LOSSLESS), NoGap(Status.NO_FINGERS, ""), None)
+    yield found
+    found.capture.stop()
+
+
+@pytest.mark.parametrize("request_", WRONG[:-6], ids=lambda each: json.dumps(each)[:60])
+def test_what_is_typed_wrong_is_a_sentence_and_changes_nothing(session: Session, request_: dict[str, Any]) -> None:
+    before = session.choices
+    with pytest.raises(FingervisionError) as refused:
+        obey(session, request_)
+    words = str(refused.value)
+    assert words.endswith(".")
+    assert len(words) < 400
+    assert "\n" not in words
+    assert "None" not in words
+    assert session.choices == before
+    assert not list(session.out.glob("calibration_*"))
+
+
+@pytest.mark.parametrize("request_", WRONG[-6:], ids=lambda each: json.dumps(each)[:60])
+def test_what_cannot_be_asked_here_ends_nothing(session: Session, request_: dict[str, Any]) -> None:
+    before = session.choices
+    with suppress(FingervisionError):
+        obey(session, request_)
+    if session.recording is not None:
+        session.stop_recording()
+    assert session.choices == before
+
+
+def test_two_who_calibrate_in_the_same_second_keep_a_file_each(session: Session) -> None:
+    answers: list[str] = []
+
+    def calibrate(size_mm: float) -> None:
+        asked = {"do": "calibrate", "kind": "bar", "box": [200, 100, 240, 280], "size_mm": size_mm, "u_size_mm": 0.001}
+        answers.append(obey(session, asked).words)
+
+    threads = [Thread(target=calibrate, args=(size_mm,)) for size_mm in (2.0, 3.0)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert len(answers) == 2
+    files = sorted((session.out).glob("calibration_*.json"))
+    assert len(files) == 2
+    scales = {round(read_calibration(file).px_per_mm, 1) for file in files}
+    assert scales == {50.0, 33.3}
+    # What is in force is one of the two, with its own file.
+    chosen = session.choices
+    assert isinstance(chosen.scale, Calibration)
+    assert chosen.scale_file is not None
+    assert read_calibration(chosen.scale_file).px_per_mm == pytest.approx(chosen.scale.px_per_mm)
+
+
+DROP = """name => {
+  const data = new DataTransfer();
+  data.items.add(new File(["x"], name, {type: ""}));
+  const event = new DragEvent("drop", {dataTransfer: data, bubbles: true, cancelable: true});
+  document.querySelector("#picture").dispatchEvent(event);
+  return event.defaultPrevented;
+}"""
+
+
+@needs_chromium
+@pytest.mark.slow
+def test_a_dropped_file_leaves_the_page_where_it_is_and_a_second_page_is_told_who_writes(
+    live: Callable[..., Any], opened: Callable[..., Any]
+) -> None:
+    view = live("simulated", "--port", "0")
+    page = opened(view.address)
+    shown(page, "Number(document.querySelector('#picture').dataset.shown) > 3")
+    for name, words in (
+        ("run 1.mp4", 'fingervision live "run 1.mp4"'),
+        ("<img src=x>.docx", "<img src=x>.docx is neither a video nor a picture"),
+        ("settings.toml", "settings.toml: type its path under Set-up"),
+    ):
+        assert page.evaluate(DROP, name) is True
+        says(page, words)
+    other = opened(view.address)
+    shown(other, "Number(document.querySelector('#picture').dataset.shown) > 3")
+    for each in (page, other):
+        each.evaluate("for (const one of document.querySelectorAll('#panels details')) one.open = true")
+    page.fill("#size_mm", "2")
+    page.press("#size_mm", "Enter")
+    # Its fields are shut while the first works the view, until it takes over.
+    shown(other, "document.querySelector('#size_mm').disabled && document.querySelector('#looks_on').offsetParent")
+    other.click("#take_over")
+    shown(page, "document.querySelector('#size_mm').disabled")
+    shown(other, "!document.querySelector('#size_mm').disabled")
+    shown(page, "Number(document.querySelector('#gap_mm').textContent) > 0")
