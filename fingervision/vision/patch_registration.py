@@ -42,6 +42,9 @@ SETTLED_PX, ITERATIONS = 0.01, 12
 # A Gram matrix whose smallest normalised eigenvalue is below this is that of noise, or of an edge that slides along
 # itself.
 LEAST_INFORMATION = 0.02
+# Noise's own part of the Gram matrix scatters: smoothed, 31 px square hold some 150 independent gradients, and three
+# standard deviations of their power are a third of it. What is no more than this is that of noise.
+NOISE_MARGIN = 1.4
 # Variance of rounding to whole grey levels: no noise is smaller.
 ROUNDING = 1.0 / 12.0
 
@@ -290,7 +293,8 @@ def _propagated(hessian: Doubles, score: Doubles, noisy: Doubles, spread: Double
     """Covariances of k patches, shape (k, 3, 3); infinite where gradients are those of noise or of one direction."""
     true = hessian - noisy
     size = np.sqrt(np.maximum(np.einsum("kii->ki", hessian), 1e-30))
-    least = np.linalg.eigvalsh(true / (size[:, :, None] * size[:, None, :]))[:, 0]
+    surely = hessian - NOISE_MARGIN * noisy
+    least = np.linalg.eigvalsh(surely / (size[:, :, None] * size[:, None, :]))[:, 0]
     is_sound = least > LEAST_INFORMATION
     own = np.linalg.inv(np.where(is_sound[:, None, None], true, np.eye(3)))
     covariance = spread[:, None, None] * (own @ score @ own)

@@ -309,12 +309,14 @@ def two_causes(things: Sequence[Hidden], answers: PlaceAnswers, tables: int, rng
         findings = None if evidence is None else evidence.findings
         keys = [] if findings is None else [m.candidate.key for m in findings.members]
         true = {f"{each.effect}@{place}" for each in (first, second) for place in each.places}
+        # Two links that mirror each other are one explanation: the pair, named by one of them.
+        pairs = {key for key in keys for each in (first, second) for place in each.places if f"@{place} and its" in key}
         if findings is not None and findings.structure:
             said = "unknown"
         elif not keys:
             said = "nothing"
         else:
-            said = "one of them, or both in a set" if true & set(keys) else "wrong place"
+            said = "one of them, or both in a set" if true & set(keys) or pairs else "wrong place"
         counts[said] += 1
         if said in ("wrong place", "nothing"):
             print(f"  {first.words} and {second.words}: {said} {' | '.join(dict.fromkeys(keys))}", flush=True)
