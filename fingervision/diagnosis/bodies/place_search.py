@@ -38,10 +38,10 @@ STRUCTURE = 1e-3
 """Significance beyond which what an explanation leaves is structure and no noise."""
 STRUCTURE_SHARE = 0.05
 """Of what was explained: less structure than this is the form of the explanation (`STANDING_SHARE` of the gap)."""
-FORM_ERROR = 0.02
+FORM_ERROR = 0.03
 """Relative standard uncertainty of a size by the form of its explanation: condensed bodies and lumped flexures beside
-finite elements of the changed outline, where plays are told up to 4 % and lengths up to 3 % wrong, RMS 2 and 1 %
-(`python -m tests.benchmarks.which_hinge` prints the coverage)."""
+finite elements of the changed outline, where plays are told up to 4 % and lengths up to 3 % wrong; 2 % covered 84 % of
+56 plays (`python -m tests.benchmarks.which_hinge` prints the coverage)."""
 PLAYS_MM = np.geomspace(0.002, 0.5, 25)
 STEPS = 4
 
