@@ -9,13 +9,16 @@ from fingervision.measuring.asked_to_stop import asked_to_stop
 
 
 def test_the_first_is_noted_and_the_second_raised() -> None:
-    before = signal.getsignal(signal.SIGINT)
-    with asked_to_stop() as asked:
-        signal.raise_signal(signal.SIGINT)
-        assert asked.is_set()
-        with pytest.raises(KeyboardInterrupt):
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    try:
+        with asked_to_stop() as asked:
             signal.raise_signal(signal.SIGINT)
-    assert signal.getsignal(signal.SIGINT) is before
+            assert asked.is_set()
+            with pytest.raises(KeyboardInterrupt):
+                signal.raise_signal(signal.SIGINT)
+        assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+    finally:
+        signal.signal(signal.SIGINT, before)
 
 
 def test_a_worker_that_leaves_it_to_its_parent_notes_nothing() -> None:
