@@ -37,8 +37,9 @@ Number = TypeVar("Number", np.float64, np.bool_)
 # moved a blur by more than so much it was held back by its largest step (tips that stay sharp beside flanks that motion
 # spreads): then more follow. A last pass leaves the blur as it is.
 BLUR_PASSES, MORE_PASSES, SETTLED_PX = 2, 8, 0.2
-# Flanks and tips are told apart where, on average, lines see less than this of the other axis in all.
-MOST_OF_OTHER = 0.7
+# Blur across and along are told apart where the lines' variances differ by this share, more than noise makes of them,
+# and where, on average, lines see less than so much of the other axis in all.
+UNLIKE, MOST_OF_OTHER = 0.15, 0.7
 # Lines of each finger's flanks and of its tip share their blur: the number of that blur, for every line.
 BLUR_OF_LINE = np.concatenate((np.where(IS_ROW, 0, 1), np.where(IS_ROW, 2, 3)))
 # Variance of rounding to whole grey levels: no noise is smaller.
@@ -199,17 +200,18 @@ def _along_axes(blur: Floats, lines: ProfileLines) -> Floats:
     A line that meets the edge at a slant m sees some of the other axis' blur: a share of m^2 / (1 + m^2). Where the
     fingers moved across during the exposure, a round tip looks blurred along them, though it is not.
     """
-    steep = lines.slope**2
-    of_other = lines.weight * steep / (1.0 + steep)
     out = blur.copy()
     for k in range(2):
-        parts = BLUR_OF_LINE[:PLACES]
-        total, other = (np.bincount(parts, a[k], minlength=2) for a in (lines.weight, of_other))
+        seen = blur[k] ** 2
+        if np.ptp(seen) < UNLIKE * seen.max():
+            continue
+        of_other = lines.weight[k] * lines.slope[k] ** 2 / (1.0 + lines.slope[k] ** 2)
+        total, other = (np.bincount(BLUR_OF_LINE[:PLACES], a, minlength=2) for a in (lines.weight[k], of_other))
         share = other / np.maximum(total, 1e-9)
         if share.sum() > MOST_OF_OTHER:
             continue
         mixed = np.array([[1.0 - share[0], share[0]], [share[1], 1.0 - share[1]]])
-        apart = np.linalg.solve(mixed, blur[k] ** 2)
+        apart = np.linalg.solve(mixed, seen)
         out[k] = np.sqrt(np.maximum(apart, SMALLEST_BLUR_PX**2))
     return out
 
