@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from fingervision.domain.loops import loop
 from fingervision.vision.edge_filters import (
+    SMALLEST_BLUR_PX,
     EdgeFilters,
     Lines,
     edge_filters,
@@ -32,8 +33,13 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int_]
 Number = TypeVar("Number", np.float64, np.bool_)
 
-# The passes of Gauss-Newton, and whether each also refines the blur. It converges quadratically from the first look.
-BLUR_PASSES = (True, True, False)
+# Passes of Gauss-Newton that also refine the blur; it converges quadratically from the first look. Where a pass still
+# moved a blur by more than so much it was held back by its largest step (tips that stay sharp beside flanks that motion
+# spreads): then more follow. A last pass leaves the blur as it is.
+BLUR_PASSES, MORE_PASSES, SETTLED_PX = 2, 8, 0.2
+# Blur across and along are told apart where the lines' variances differ by this share, more than noise makes of them,
+# and where, on average, lines see less than so much of the other axis in all.
+UNLIKE, MOST_OF_OTHER = 0.15, 0.7
 # Lines of each finger's flanks and of its tip share their blur: the number of that blur, for every line.
 BLUR_OF_LINE = np.concatenate((np.where(IS_ROW, 0, 1), np.where(IS_ROW, 2, 3)))
 # Variance of rounding to whole grey levels: no noise is smaller.
@@ -139,9 +145,15 @@ def _fit(
     shared = Lines(lines.slope.ravel(), lines.weight.ravel(), BLUR_OF_LINE)
     facing = facing_lines(lines, filters.reach_px)
     blur, position, seen = np.full(4, blur_px), first_position(levels).ravel(), levels
-    for is_blur_free in BLUR_PASSES:
+    passes, is_settled, is_last = 0, False, False
+    while not is_last:
+        is_last, passes = is_settled, passes + 1
         look = filters.look(seen.reshape(-1, pixels), shared, blur, position)
-        position, blur = look.position, look.blur if is_blur_free else blur
+        position = look.position
+        if not is_last:
+            moved_px = float(np.abs(look.blur - blur).max())
+            is_settled = passes >= BLUR_PASSES and (moved_px < SETTLED_PX or passes >= BLUR_PASSES + MORE_PASSES)
+            blur = look.blur
         if facing is not None:
             where, contrast, sigma = (_shaped(a) for a in (position, look.contrast, look.sigma))
             seen = without_the_other(levels, lines, facing, where, contrast, sigma)
@@ -171,7 +183,7 @@ def _fit(
         lines.coarse + lines.outward * _shaped(position),
         _shaped(u_position),
         _shaped(look.contrast),
-        blur.reshape(2, 2),
+        _along_axes(blur.reshape(2, 2), lines),
         noise,
         curvature_gain(lines.slope, filters.reach_px / _shaped(look.sigma)),
         _shaped(is_clipped),
@@ -180,6 +192,28 @@ def _fit(
         (_inside(levels[0], lines.weight[0]), _inside(levels[1], lines.weight[1])),
         *flat_noise(upright, light, lines, filters, *filters.middle(blur[0])),
     )
+
+
+def _along_axes(blur: Floats, lines: ProfileLines) -> Floats:
+    """Blur across the fingers and along them, from what lines over flanks and tips see of both.
+
+    A line that meets the edge at a slant m sees some of the other axis' blur: a share of m^2 / (1 + m^2). Where the
+    fingers moved across during the exposure, a round tip looks blurred along them, though it is not.
+    """
+    out = blur.copy()
+    for k in range(2):
+        seen = blur[k] ** 2
+        if np.ptp(seen) < UNLIKE * seen.max():
+            continue
+        of_other = lines.weight[k] * lines.slope[k] ** 2 / (1.0 + lines.slope[k] ** 2)
+        total, other = (np.bincount(BLUR_OF_LINE[:PLACES], a, minlength=2) for a in (lines.weight[k], of_other))
+        share = other / np.maximum(total, 1e-9)
+        if share.sum() > MOST_OF_OTHER:
+            continue
+        mixed = np.array([[1.0 - share[0], share[0]], [share[1], 1.0 - share[1]]])
+        apart = np.linalg.solve(mixed, seen)
+        out[k] = np.sqrt(np.maximum(apart, SMALLEST_BLUR_PX**2))
+    return out
 
 
 def _shaped(a: NDArray[Number]) -> NDArray[Number]:
