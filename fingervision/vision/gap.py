@@ -51,6 +51,8 @@ TIP_CONTRAST = 0.2
 # this (pixels) is no measurement, but of what is no finger, or was not seen. A codec that shares errors over so many
 # points makes it less sure by the root of their number.
 LEAST_SURE_PX = 0.5
+# Rough flanks are measured again over a longer stretch before that is asked of them; until then so much will do.
+LEAST_SURE_AT_FIRST_PX = 5.0
 # What may have moved both edges is stated up to here (pixels): more is a strip as broad as the window that was fitted.
 LEAST_SURE_SHIFT_PX = 5.0
 # Corners are cut off both fingers alike: their sides at the measuring height lean alike to this (slope).
@@ -143,7 +145,9 @@ def measure_gap(
         measured.append(own)
     if cornered and abs(measured[0].slope - measured[1].slope) > CUT_ALIKE:
         return NoGap(Status.NO_FINGERS, BROKEN)
-    outcome = _assemble(fingers, edges, measured, below_tip_px, light_gap, coding)
+    has_part = any(finger.hidden.size for finger in (fingers.left, fingers.right))
+    least_px = LEAST_SURE_PX if rough is None or has_part else LEAST_SURE_AT_FIRST_PX
+    outcome = _assemble(fingers, edges, measured, below_tip_px, light_gap, least_px**2 * SHARED_POINTS[coding])
     if outcome is TOO_ROUGH and (way_px := _way_px(edges)) > SMEARED_PX:
         words = f"{SMEARED}, by about {way_px:.0f} px: expose shorter, or move slower while frames are taken."
         outcome = NoGap(Status.BLURRED, words)
@@ -153,7 +157,6 @@ def measure_gap(
             "The measuring height crosses the top of a finger and not its inner side: turn the camera until the tips "
             "are level, or measure farther below them (--below-tip-mm).",
         )
-    has_part = any(finger.hidden.size for finger in (fingers.left, fingers.right))
     if has_part and outcome is TOO_ROUGH:
         return NoGap(
             Status.GRIPPING, "A part between the fingers leaves too little of their inner edges in view.", held
@@ -244,9 +247,9 @@ def _assemble(
     measured: list[MeasuringPoint],
     below_tip_px: float,
     light_gap: bool,
-    coding: Coding,
+    largest_variance: float,
 ) -> GapMeasurement | NoGap:
-    """From the fingers' own axes back to the picture."""
+    """From the fingers' own axes back to the picture; what is less sure than that is none."""
     orientation = fingers.orientation
     across, along, found = [], [], []
     for k, (finger, m) in enumerate(zip((fingers.left, fingers.right), measured, strict=True)):
@@ -265,7 +268,7 @@ def _assemble(
         by_tip, by_edge = end * dy / gap, -dx / gap
         (tip_tip, tip_edge), (_, edge_edge) = m.covariance.tolist()
         variance += by_tip**2 * tip_tip + 2.0 * by_tip * by_edge * tip_edge + by_edge**2 * edge_edge
-    if not variance < SHARED_POINTS[coding] * LEAST_SURE_PX**2:
+    if not variance < largest_variance:
         return TOO_ROUGH
     # A rim or too much light does the same to both edges.
     u_shift = float(abs(sum(mark.shift_px for mark in edges.marks)))

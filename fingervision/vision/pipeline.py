@@ -22,7 +22,7 @@ from fingervision.vision.coding_error import EVEN_SHIFTS, with_coding_error, wit
 from fingervision.vision.denoise import denoise
 from fingervision.vision.edges import EdgePoints, fit_edges
 from fingervision.vision.fingers import CoarseFingers
-from fingervision.vision.gap import measure_gap
+from fingervision.vision.gap import LEAST_SURE_PX, TOO_ROUGH, measure_gap
 from fingervision.vision.grey import GreyImage, to_grey, top_level
 from fingervision.vision.held_part import visible_lines
 from fingervision.vision.interlace import at_half_way
@@ -30,6 +30,7 @@ from fingervision.vision.longer_flanks import is_surer, with_longer_flanks
 from fingervision.vision.overlay import draw_boundary, draw_edge_points, draw_overlay, in_eight_bits
 from fingervision.vision.profile_choice import STRIP, with_profile
 from fingervision.vision.profile_lines import profile_lines
+from fingervision.vision.residuals import SHARED_POINTS
 from fingervision.vision.response_shift import gap_shift_px
 from fingervision.vision.settings import LINEAR, SRGB, Settings
 from fingervision.vision.shared_profile import even_shift_px, flanks, shared_shift_px
@@ -206,6 +207,8 @@ def _measured(
     if isinstance(outcome, GapMeasurement) and outcome.roughness_px:
         longer = _edges_and_gap(upright, with_longer_flanks(fingers, settings.below_tip_px), *how)
         edges, outcome = longer if is_surer(longer[1], outcome) else (edges, outcome)
+        if isinstance(outcome, GapMeasurement) and outcome.u_gap_px > LEAST_SURE_PX * sqrt(SHARED_POINTS[coded.coding]):
+            outcome = replace(TOO_ROUGH, held=outcome.held)
     if settings.other_response is not None and isinstance(outcome, GapMeasurement):
         shift = gap_shift_px(outcome, edges, settings.response, settings.other_response, scale)
         outcome = replace(outcome, response_shift_px=shift)
