@@ -12,7 +12,7 @@ panel("gauges", 'Gauges <span id="gauge_file" class="quiet"></span>', `
     <button id="gauge_add_here">Add</button>
   </form>
   <div class="row">
-    <button id="gauge_first" type="button">First frame</button>
+    <button id="gauge_first" type="button" hidden>First frame</button>
     <button id="gauge_save" type="button">Save gauges</button>
     <button id="gauge_over" type="button" hidden>Save over it</button>
     <button id="gauge_load" type="button">Load file</button>
@@ -64,7 +64,7 @@ function list() {
   [...at("gauge_list").children].forEach((line, i) => {
     const [button, words] = line.children, reading = readings && readings[i];
     button.setAttribute("aria-pressed", String(all[i].name === board.chosen));
-    const text = reading ? sentence(reading) : state.trouble ? "" : state.is_live ? (state.trouble ? "" : "not read in this frame") : `followed to frame ${Math.max(0, state.frames - 1)}`;
+    const text = reading ? sentence(reading) : state.trouble ? "" : state.is_live ? "not read in this frame" : `followed to frame ${Math.max(0, state.frames - 1)}`;
     if (words.textContent !== text) words.textContent = text;
     words.className = reading ? (reading.status === "ok" ? "good" : "bad") : "quiet";
   });
@@ -180,7 +180,7 @@ listen("state", (state) => {
   say("gauge_file", now.file);
   say("gauge_saved", now.is_saved ? (now.tables.length ? "saved" : "") : "not saved");
   at("gauge_over").hidden = !now.changed_meanwhile;
-  at("gauge_first").hidden = isFirst();
+  at("gauge_first").hidden = !told() || isFirst();
   const hint = now.tables.length === 0 ? `Choose a kind and draw it in the ${now.is_live ? "picture" : "first frame"}, or add it and type its numbers.` : now.is_live ? "What is changed is looked for where it is drawn, and followed from there." : isFirst() ? "" : "Numbers and drags place a gauge in the first frame; here it is shown where it was found.";
   say("gauge_hint", now.trouble || hint);
   for (const id of ["gauge_draw", "gauge_add_here", "gauge_remove", "gauge_save", "gauge_over", "gauge_load", "gauge_kind", "gauge_new_name"]) at(id).disabled = !works();

@@ -22,6 +22,8 @@ LEAST_SHARE = 0.5
 """Share of the gap's variance that the log must explain for it to be this recording's log."""
 FOLLOWED = 0.95
 """Share below which something else moves the gap as well, and is said."""
+CHANCE_SIGMAS = 3.0
+"""Standard deviations that a rival's chi-square may be larger by the log's own noise: one rival in 700 is then lost."""
 UNREFUTED = 25.0
 """Chi-square by which another offset must be worse, over the frames that both explain, to be refuted: 5 sigma."""
 SHARED = 0.5
@@ -141,7 +143,7 @@ def find_clock_offset(time_s: Array, gap_mm: Array, drive: DriveHistory) -> Cloc
     refused = _unlike(motion, whole)
     if refused is not None:
         return refused
-    rivals = _unrefuted(motion, whole, [one for one, _, _ in fits if one is not best], frame_s)
+    rivals = _unrefuted(motion, drive, whole, [one for one, _, _ in fits if one is not best], frame_s)
     if rivals:
         return _ambiguous([whole.at.offset_s, *rivals])
     at = posterior(motion, whole)
@@ -225,9 +227,10 @@ def _explained(motion: Motion, found: Fit) -> float:
     return 1.0 - float(np.var(found.residual_mm) / np.var(motion.gap_mm))
 
 
-def _unrefuted(motion: Motion, best: Fit, others: list[Candidate], frame_s: float) -> list[float]:
+def _unrefuted(motion: Motion, drive: DriveHistory, best: Fit, others: list[Candidate], frame_s: float) -> list[float]:
     """Offsets that explain the frames which they share with the best one as well as that does."""
     found = []
+    by_chance = _by_chance(motion, drive, best)
     for candidate in others:
         shared, first = _fitted(motion.time_s, motion.gap_mm, motion.path, candidate, QUICK_PLAYS)
         if shared.time_s.size < FEWEST_FRAMES or abs(first.at.offset_s - best.at.offset_s) < ONE_PEAK * frame_s:
@@ -238,9 +241,22 @@ def _unrefuted(motion: Motion, best: Fit, others: list[Candidate], frame_s: floa
         ours, rival = most_likely(own, best.at, QUICK_PLAYS), most_likely(own, first.at, QUICK_PLAYS)
         if not _shares_motion(motion, rival.at):
             continue
-        if rival.scale > 0.0 and (rival.squares - ours.squares) / ours.variance_mm2 < UNREFUTED:
+        if rival.scale > 0.0 and (rival.squares - ours.squares) / ours.variance_mm2 < UNREFUTED + by_chance:
             found.append(rival.at.offset_s)
     return found
+
+
+def _by_chance(motion: Motion, drive: DriveHistory, best: Fit) -> float:
+    """By how much another part of the log may fit worse for its own noise alone, in chi-square.
+
+    The frames' noise is the same under every offset, the log's is another: two sums of n squares of it differ by a
+    standard deviation of 2 n^(1/2). What smoothing takes off the log is not counted: rather one candidate too many.
+    """
+    # Second differences of white noise have six times its variance; turns of the motion are few.
+    log_mm2 = (1.4826 * float(np.median(np.abs(np.diff(drive.input_mm, 2))))) ** 2 / 6.0
+    gain = float(np.ptp(motion.gap_mm) / np.ptp(drive.input_mm))
+    share = min(1.0, gain**2 * log_mm2 / max(best.variance_mm2, 1e-30))
+    return CHANCE_SIGMAS * share * 2.0 * float(np.sqrt(motion.time_s.size))
 
 
 def _shares_motion(motion: Motion, at: Alignment) -> bool:
