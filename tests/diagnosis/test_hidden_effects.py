@@ -118,9 +118,9 @@ def test_the_same_seed_gives_the_same_files(tmp_path: Path) -> None:
         assert (tmp_path / "a" / name).read_bytes() == (tmp_path / "b" / name).read_bytes()
 
 
-# Poor runs are left to the benchmark: there the answer is a set whose edge moves with the noise.
-QUESTIONS = [("null", 1), ("null", 2), ("single_3", 1), ("single_3", 2), ("outside", 1),
-             ("outside", 2), ("pair_3", 1)]  # fmt: skip
+# Poor runs are left to the benchmark: there the answer is a set whose edge moves with the noise; and most outside
+# effects, whose many stand-ins take a minute a table.
+QUESTIONS = [("null", 1), ("null", 2), ("single_3", 1), ("single_3", 2), ("outside", 1), ("pair_3", 1)]
 
 
 @pytest.mark.slow

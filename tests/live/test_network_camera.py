@@ -1,4 +1,4 @@
-"""A network camera on loopback: every frame measured, cut and restored, for a minute."""
+"""A network camera on loopback: every frame measured, cut and restored."""
 
 import time
 from collections.abc import Callable
@@ -12,15 +12,15 @@ import pytest
 from tests.live.conftest import single_pictures
 
 SCALE = ("--px-per-mm", "34")
-MINUTE_S = 60.0
+WATCHED_S = 20.0
 CUT_S = 3.0
-PROMPT_AMONG = 500
+PROMPT_AMONG = 200
 # MPEG's clock has 90 000 ticks a second; each end of a step is rounded to microseconds too.
 CLOCK_TICK_S = 1.5e-5
 
 
 @pytest.mark.slow
-def test_every_frame_of_a_minute_is_measured_and_a_cut_is_a_gap(
+def test_every_frame_is_measured_and_a_cut_is_a_gap(
     live: Callable[..., Any],
     camera: Any,
     measured: Callable[..., str],
@@ -29,7 +29,7 @@ def test_every_frame_of_a_minute_is_measured_and_a_cut_is_a_gap(
     view = live(camera.address, *SCALE, "--no-page", "--json")
     view.until(lambda seen: len(seen.lines()) > 10)
     began_s = time.monotonic()
-    view.until(lambda seen: time.monotonic() - began_s > MINUTE_S, within_s=2 * MINUTE_S)
+    view.until(lambda seen: time.monotonic() - began_s > WATCHED_S, within_s=6 * WATCHED_S)
     camera.stop()
     before = len(view.lines())
     view.until(lambda seen: "cut off" in seen.text())
