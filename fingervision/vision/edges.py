@@ -64,7 +64,8 @@ class EdgePoints:
     contrast : ndarray of float
         Outside level minus inside level.
     blur_px : ndarray of float, shape (2, 2)
-        Gaussian sigma of the optics at each finger's flanks and tip, without the pixel.
+        Gaussian sigma of each finger's edges across the fingers (as its flanks show it) and along them (as its tip
+        does), without the pixel; they differ where a finger moved during the exposure.
     noise : float
         Standard deviation of the grey levels about the model.
     curvature_gain : ndarray of float

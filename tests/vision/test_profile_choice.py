@@ -11,8 +11,10 @@ from fingervision.domain.frame import Frame
 from fingervision.domain.gap import GapMeasurement
 from fingervision.vision.pipeline import Settings, measure_frame
 from fingervision.vision.profile_models import GLARE, SHADOW, STARTS_PX, STEP, WALL, fit_profile
-from tests.benchmarks.camera_artefacts.classes import BELOW_PX, Shot, glare, motion, plain, shadow, wall
-from tests.benchmarks.camera_artefacts.optics import Surface
+from tests.benchmarks.camera_artefacts.classes import BELOW_PX, SIZE_PX, Shot, glare, motion, plain, shadow, wall
+from tests.benchmarks.camera_artefacts.electronics import stored
+from tests.benchmarks.camera_artefacts.optics import Surface, light_on_sensor
+from tests.benchmarks.camera_artefacts.scene import Finger, true_gap
 
 KNOWN = Settings(BELOW_PX, Direction.UP, other_response=None)
 # Largest error a picture may have without saying so, and RMS over the few pictures of a test: three times what
@@ -45,6 +47,16 @@ def test_what_stands_beside_the_edge(name: str) -> None:
         errors.append(found.gap_px - shot.gap_px)
         assert abs(errors[-1]) < max(UNSAID_PX, 2.0 * np.hypot(found.u_gap_px, found.u_shift_px))
     assert np.sqrt(np.mean(np.square(errors))) < rms_px
+
+
+def test_motion_across_is_no_blur_of_round_tips() -> None:
+    """A fillet corrected for the flanks' spread as if it were focus would be moved by this, twice what is allowed."""
+    way_px, radius_px = 8.0, 27.0
+    left, right = Finger(90.3, 98.2, 100.0, radius_px), Finger(340.7, 99.1, 100.0, radius_px)
+    light = light_on_sensor((left, right), Surface(motion_px=(way_px, way_px)), 1.0, SIZE_PX, np.random.default_rng(1))
+    found = measured(Shot(stored(light), true_gap(left, right, BELOW_PX)))
+    taken_for_focus_px = way_px**2 / 12.0 / radius_px
+    assert abs(found.gap_px - true_gap(left, right, BELOW_PX)) < 0.5 * taken_for_focus_px
 
 
 def test_a_clean_edge_is_left_alone() -> None:

@@ -128,6 +128,7 @@ CLASSES: dict[str, Callable[[Rng], Shot]] = {
     "glare-1.5px": partial(glare, inside_px=1.5),
     "glare-4px": partial(glare, inside_px=4.0),
     "motion-6px": partial(motion, way_px=6.0),
+    "motion-10px": partial(motion, way_px=10.0),
     "interlaced-1px": interlaced,
     "zoom-1.5": partial(zoom, times=1.5),
     "zoom-2": partial(zoom, times=2.0),
