@@ -120,7 +120,8 @@ def test_the_same_seed_gives_the_same_files(tmp_path: Path) -> None:
 
 # Poor runs are left to the benchmark: there the answer is a set whose edge moves with the noise; and most outside
 # effects, whose many stand-ins take a minute a table.
-QUESTIONS = [("null", 1), ("null", 2), ("single_3", 1), ("single_3", 2), ("outside", 1), ("pair_3", 1)]
+QUESTIONS = [("null", 1), ("null", 2), ("single_3", 1), ("single_3", 2), ("outside", 1),
+             pytest.param("pair_3", 1, marks=pytest.mark.long)]  # fmt: skip
 
 
 @pytest.mark.slow

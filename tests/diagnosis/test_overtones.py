@@ -47,6 +47,7 @@ def test_a_small_harmonic_is_no_second_name(tmp_path: Path, harmonic: float) -> 
 
 
 @pytest.mark.slow
+@pytest.mark.long
 def test_a_large_harmonic_is_told(tmp_path: Path) -> None:
     report = screwed(tmp_path, 0.6)
     assert report.verdict is Verdict.UNKNOWN

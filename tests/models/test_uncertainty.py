@@ -96,6 +96,7 @@ def test_linear_propagation_against_monte_carlo_of_the_frame(gripper: Gripper) -
 
 
 @pytest.mark.slow
+@pytest.mark.long
 def test_sampled_propagation_against_monte_carlo_of_the_frame(gripper: Gripper) -> None:
     """A printed hinge of 1.0 +- 0.1 mm: the compliance goes with t^-2.5 and is far from linear."""
     u = MappingProxyType({"hinge.thickness_mm": 0.1})

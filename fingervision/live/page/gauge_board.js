@@ -1,7 +1,7 @@
 // The gauges as this page has them: the server's, with what is being dragged here before the server has answered.
 import { ask, listen, page } from "/page/bus.js";
 
-export const board = { kinds: null, chosen: null, local: null };
+export const board = { kinds: null, chosen: null, renamed: null, local: null };
 export const told = () => (page.state && page.state.gauges) || null;
 export const works = () => page.state && !page.state.viewer && page.state.holds_pen !== false;
 export function tables() {
@@ -37,10 +37,13 @@ export function show(name, changes) {
 }
 // Give a gauge other values (null takes a key away); `answered(words, key)` is told of a refusal, or that there is none.
 export function change(name, changes, answered) {
+  // The state may bring the new name before the answer does: the gauge stays the chosen one.
+  if ("name" in changes && board.chosen === name) board.renamed = changes.name;
   if (!("name" in changes)) { show(name, changes); board.local.pending += 1; }
   request({ do: "gauge_change", name, changes }, (reply) => {
     const { local } = board;
     if (local && local.name === name && !("name" in changes)) local.pending -= 1;
+    if (board.renamed === changes.name) board.renamed = null;
     if (reply.refused) { board.local = null; answered(reply.refused, reply.field); return; }
     // The server's word is in the next state; what was asked since then stays until its own answer.
     if (local && local.pending === 0) local.version = reply.version;
@@ -69,5 +72,6 @@ listen("state", (state) => {
   if (state.gauges && !board.kinds && !asked.length) request({ do: "gauge_kinds" }, (reply) => { board.kinds = reply.kinds || null; });
   const { local } = board;
   if (local && local.version !== null && state.gauges && state.gauges.version >= local.version) board.local = null;
-  if (state.gauges && state.gauges.is_open && !tables().some((table) => table.name === board.chosen)) board.chosen = tables().length ? tables()[0].name : null;
+  const has = (name) => tables().some((table) => table.name === name);
+  if (state.gauges && state.gauges.is_open && !has(board.chosen)) board.chosen = has(board.renamed) ? board.renamed : tables().length ? tables()[0].name : null;
 });
