@@ -10,8 +10,8 @@ from fingervision.vision.profile_choice import MOTION_RADIUS_PX
 
 REMEDY = "Expose shorter (with more light, or flashes), or move slower while frames are taken."
 FORMULA = (
-    "sqrt(c^2 + n^2); c = sum over both fingers of (sigma_flank^2 - sigma_tip^2) / (2 R), R = 15 px, the half-level's "
-    "way on a fillet; n = sqrt(u^2 - u'^2), u' the random uncertainty with flanks of a lens in focus"
+    "sqrt(c^2 + n^2); c = sum over both fingers of (sigma_flank^2 - sigma_tip^2) / (2 R sqrt(3)), R = 15 px, what is "
+    "stated for the half-level's way on a fillet; n = sqrt(u^2 - u'^2), u' the random uncertainty with a lens in focus"
 )
 
 
@@ -35,5 +35,7 @@ def _cost_px(look: Look) -> float:
     more = look.widened_px2
     if not more.any():
         return 0.0
-    bias = float(more.sum()) / (2.0 * MOTION_RADIUS_PX)
-    return float(np.hypot(bias, without(look.u_camera_px, look.u_with(blur_px=min(look.focus_blur_px, GOOD_BLUR_PX)))))
+    # Motion across is allowed for where the tip shows it; up to this nobody can tell, and it is stated (u_shift_px).
+    stated = float(more.sum()) / (2.0 * MOTION_RADIUS_PX * np.sqrt(3.0))
+    in_focus = look.u_with(blur_px=min(look.focus_blur_px, GOOD_BLUR_PX))
+    return float(np.hypot(stated, without(look.u_camera_px, in_focus)))
