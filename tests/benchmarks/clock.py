@@ -11,7 +11,8 @@ from time import monotonic, process_time
 import numpy as np
 
 from fingervision.domain.drive import DriveHistory
-from fingervision.measuring.clock.alignment import NoClockOffset, find_clock_offset
+from fingervision.measuring.clock.alignment import find_clock_offset
+from fingervision.measuring.clock.clock_offset import NoClockOffset
 
 FINE_HZ = 2000.0
 KINDS = ("triangles", "staircase", "strokes", "sine", "wander")

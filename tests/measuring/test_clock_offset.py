@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from fingervision.domain.drive import DriveHistory
-from fingervision.measuring.clock.alignment import ClockOffset, NoClockOffset, find_clock_offset
+from fingervision.measuring.clock.alignment import find_clock_offset
+from fingervision.measuring.clock.clock_offset import ClockOffset, NoClockOffset
 from fingervision.storage.summary_json import u_clock_beside
 
 SIGMAS = 3.5
