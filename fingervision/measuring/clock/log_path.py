@@ -71,6 +71,8 @@ class LogPath:
         Input with all turns pushed out by their uncertainty.
     rows : DriveHistory
         The log as it is.
+    step_mm : float
+        Its encoder's step; 0 where none is seen.
     """
 
     drive: DriveHistory
@@ -78,6 +80,7 @@ class LogPath:
     shared: SharedErrors
     turned_mm: Array
     rows: DriveHistory
+    step_mm: float
 
     @classmethod
     def of(cls, log: DriveHistory) -> "LogPath":
@@ -106,7 +109,7 @@ class LogPath:
         time_s, input_mm, errors = (np.concatenate([piece[k] for piece in pieces]) for k in range(3))
         drive = DriveHistory(time_s, input_mm, None if log.run is None else of_runs)
         least_mm = max(2.0 * step_mm, TURN_SIGMAS * sigma_mm, LEAST_TURN * float(np.ptp(input_mm)))
-        return cls(drive, errors, shared, turned(input_mm, errors, least_mm), log)
+        return cls(drive, errors, shared, turned(input_mm, errors, least_mm), log, step_mm)
 
 
 def _shared_errors(

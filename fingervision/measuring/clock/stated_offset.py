@@ -5,7 +5,7 @@ import numpy as np
 from fingervision.measuring.clock.clock_offset import ClockOffset, NoClockOffset
 from fingervision.measuring.clock.correlation import LARGEST_RATE
 from fingervision.measuring.clock.joint_fit import Fit, inflation, shift_by_turns
-from fingervision.measuring.clock.log_path import FINER
+from fingervision.measuring.clock.log_path import FINER, LogPath
 from fingervision.measuring.clock.motion_model import Motion
 from fingervision.measuring.clock.play_posterior import Posterior
 from fingervision.measuring.clock.refusals import explained
@@ -23,6 +23,16 @@ SURE_RATE, ORDINARY_RATE = 3.0, 1e-4
 """Standard uncertainties, and relative rate, from which on a clock is said to run fast or slow: crystals differ by up
 to 100 parts in a million, and compressed pictures bend a motion by as much."""
 
+COARSE = 2.0
+"""Frames that an encoder's step takes, from which on an offset off by a frame is less than half a step off."""
+
+
+def crossed_in_s(path: LogPath) -> float:
+    """Time that the moving stage takes from one encoder's line to the next; 0 without lines."""
+    steps_mm, steps_s = np.abs(np.diff(path.drive.input_mm)), np.diff(path.drive.time_s)
+    moving = steps_mm > 0.1 * float(steps_mm.max())
+    return float(path.step_mm * np.median(steps_s[moving] / steps_mm[moving]))
+
 
 def stated(motion: Motion, at: Posterior, best: Fit, frame_s: float) -> ClockOffset | NoClockOffset:
     """Put the fit into the terms of the log's clock, at the log's first row."""
@@ -37,6 +47,10 @@ def stated(motion: Motion, at: Posterior, best: Fit, frame_s: float) -> ClockOff
     variance = covariance[0, 0] + 2.0 * away_s * covariance[0, 1] + away_s**2 * covariance[1, 1]
     row_s = float(np.median(np.diff(motion.path.drive.time_s))) * FINER
     variance += (SYSTEMATIC * np.hypot(frame_s, row_s)) ** 2
+    # The frames see at what time within its interval the stage jumped, and the log does not. A programme that drives
+    # and logs by one cycle jumps at the same place in each, so that many jumps do not average.
+    jumps = gap_arrives(motion, best) is not None
+    variance += row_s**2 / 12.0 if jumps else 0.0
     u_time_s = float(np.sqrt(np.mean(variance[:-1])))
     u_offset_s, u_rate = float(np.sqrt(variance[-1])), float(np.sqrt(covariance[1, 1]))
     if not np.isfinite(u_time_s) or u_time_s > 0.1 * float(np.ptp(motion.time_s)):
@@ -57,7 +71,7 @@ def stated(motion: Motion, at: Posterior, best: Fit, frame_s: float) -> ClockOff
         )
     notes = []
     share = explained(motion, best)
-    if gap_arrives(motion, best) is not None:
+    if jumps:
         notes.append(
             "The drive's rows jump from one place to the next: if they are set-points, and no positions, the time that "
             "the stage takes to follow is part of the offset."
@@ -67,6 +81,13 @@ def stated(motion: Motion, at: Posterior, best: Fit, frame_s: float) -> ClockOff
         notes.append(
             f"The recording's clock runs {runs} against the drive's by {1e2 * abs(rate):.3f} % "
             f"(U = {2e2 * u_rate:.3f} %, k = 2): allowed for."
+        )
+    crossing_s = crossed_in_s(motion.path)
+    if crossing_s > COARSE * frame_s:
+        notes.append(
+            f"The drive's encoder has steps of {1e3 * motion.path.step_mm:.3g} µm, and the stage takes "
+            f"{crossing_s:.2g} s from one to the next: where it stood and turned within a step decides on the offset, "
+            "which may be off by more than a frame."
         )
     if u_time_s > 0.5 * frame_s:
         notes.append(
