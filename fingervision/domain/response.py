@@ -1,6 +1,6 @@
 """Positions of the two measuring points: the answer of a gripper or measuring chain to an input history."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,7 +35,7 @@ class Response:
     def with_gap(self, gap_mm: NDArray[np.float64]) -> "Response":
         """Return the same midline with another gap: both fingers move equally, in opposite directions."""
         half_mm = 0.5 * (gap_mm - self.gap_mm)
-        return replace(self, left_mm=self.left_mm - half_mm, right_mm=self.right_mm + half_mm)
+        return Response(self.left_mm - half_mm, self.right_mm + half_mm, self.force_n)
 
     def plus(self, more: "Response") -> "Response":
         """Add what moves each point, and the force where both have one."""
@@ -45,7 +45,7 @@ class Response:
 
     def shifted(self, by_mm: NDArray[np.float64] | float) -> "Response":
         """Both points moved together, to the right where `by_mm` is positive."""
-        return replace(self, left_mm=self.left_mm + by_mm, right_mm=self.right_mm + by_mm)
+        return Response(self.left_mm + by_mm, self.right_mm + by_mm, self.force_n)
 
     def at(self, rows: NDArray[np.intp]) -> "Response":
         """Pick samples; `rows` of shape (k,)."""
