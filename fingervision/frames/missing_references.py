@@ -21,7 +21,7 @@ from bisect import bisect_right
 from collections import Counter
 from itertools import pairwise
 from pathlib import Path
-from statistics import fmean
+from statistics import fmean, median
 
 import av
 
@@ -37,8 +37,11 @@ TIMED_CONTAINERS = ("mov", "matroska", "flv", "asf", "ogg")
 EVEN_STEPS, EVEN_SHARE = 8, 0.98
 # Containers round a time to their tick, and a step has two ends.
 TICKS = 1.01
-# With more holes than one in ten steps pictures are left out by habit: still scenes are not coded, or light was short.
-MOST_HOLES = 0.1
+# With more holes than one in five steps pictures are left out by habit: programs do not code what does not change. A
+# network or disk that loses so much is noticed.
+MOST_HOLES = 0.2
+# A step is a hole beside so many on each side; cameras that are short of light go on at half the rate.
+BESIDE = 4
 # A bit that turns by chance does so in half of the pictures: nineteen in twenty, of ten at least, are no chance.
 FEWEST_TURNS, TURNING_SHARE = 10, 0.95
 
@@ -142,7 +145,7 @@ def _by_time(packets: list[CodedTime], unturned: dict[int, str]) -> dict[int, st
     usual = _usual(steps)
     if usual is None:
         return {}
-    holes = [(at, step) for at, step in zip(shown, steps, strict=False) if step > usual + TICKS]
+    holes = [(shown[k], step) for k, step in enumerate(steps) if step > usual + TICKS and _sticks_out(steps, k)]
     if len(holes) > MOST_HOLES * len(steps):
         return {}
     needed = sorted((each.tick, k) for k, each in enumerate(packets) if each.is_needed and each.tick is not None)
@@ -177,6 +180,12 @@ def _key_is_due(keys: list[int], at: int, missing_ticks: float) -> bool:
     before = bisect_right(keys, at)
     every = min((b - a for a, b in pairwise(keys)), default=None)
     return every is None or before == 0 or at + missing_ticks + TICKS >= keys[before - 1] + every
+
+
+def _sticks_out(steps: list[int], k: int) -> bool:
+    """Whether a step is longer than is usual before it, and than is usual behind it: a new rate is no hole."""
+    before, behind = steps[max(0, k - BESIDE) : k], steps[k + 1 : k + 1 + BESIDE]
+    return all(steps[k] > median(some) + TICKS for some in (before, behind) if some)
 
 
 def _is_whole(step: int, usual: float) -> bool:

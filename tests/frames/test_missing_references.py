@@ -97,7 +97,7 @@ def variable_rates() -> dict[str, "np.ndarray"]:
         "some late": 40.0 * kept + np.where(rng.random(kept.size) < 0.05, 6.0, 0.0),
         "low light": np.cumsum(np.where(k // 100 % 2, 6000.0, 3000.0)),
         "exposure": np.cumsum(np.where(k // 150 % 2, 3750.0, 3000.0)),
-        "still scenes left out": 40.0 * k[rng.random(900) > 0.3],
+        "still scenes left out": 40.0 * k[rng.random(900) > 0.5],
         "pause": 33.333 * k + np.where(k > 450, 3217.0, 0.0),
         "29.97 Hz": k * 1001.0 / 30.0,
         "240 Hz": k * 1000.0 / 240.0,
