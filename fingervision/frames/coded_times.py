@@ -4,6 +4,7 @@ from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import av
 
@@ -41,7 +42,7 @@ class CodedTime:
     modulus: int | None = None
 
 
-def is_shown(packet: "av.Packet[av.VideoStream]", codec: str) -> bool:
+def is_shown(packet: "av.Packet[Any]", codec: str) -> bool:
     """Whether a packet gives a picture: a bit of the first byte of VP8 says whether it does (RFC 6386, 9.1)."""
     return codec != "vp8" or bool(bytes(packet)[0] & 0x10)
 
