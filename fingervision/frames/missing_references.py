@@ -27,10 +27,11 @@ import av
 
 from fingervision.frames.coded_times import CodedTime, coded_times
 
-UNCOUNTED_CODECS = frozenset(
-    {"mpeg4", "vp8", "vp9", "av1", "h263", "flv1", "msmpeg4v1", "msmpeg4v2", "msmpeg4v3", "wmv1", "wmv2", "theora"}
-)
-"""Codecs, by FFmpeg's names, whose pictures hang on others and are not counted in a way that is followed elsewhere."""
+COUNTED_CODECS = frozenset({"h264", "hevc", "vvc", "mpeg1video", "mpeg2video"})
+"""Codecs, by FFmpeg's names, whose pictures tell by themselves, or are followed elsewhere."""
+ADAPTING_CODECS = frozenset({"ffv1"})
+"""Codecs of whole pictures, of which all but key frames are read with the statistics of those before them."""
+INTRA_PROPERTY = 1  # FFmpeg's AV_CODEC_PROP_INTRA_ONLY
 TIMED_CONTAINERS = ("mov", "matroska", "flv", "asf", "ogg")
 # An even row: so many single steps at least, and nearly all steps a whole number of the usual one. A camera's own times
 # scatter by far more than a tick in far more than a fiftieth of the steps; a few false times are damage of the file.
@@ -51,9 +52,9 @@ BIT_NOT_TURNED = (
 )
 SHOWN_TOO_LATE = "A picture that it hangs on is missing: it should be shown between two, and only one came."
 TIME_LEFT_OUT = (
-    "It is coded as a difference to a picture that is missing: the recording's times, otherwise an even row, leave out "
-    "{count} before it. If the camera itself skipped there, convert the file with `ffmpeg -i IN -c:v ffv1 OUT.mkv` and "
-    "measure that."
+    "It is coded with the help of a picture that is missing: the recording's times, otherwise an even row, leave out "
+    "{count} before it. If the camera itself skipped there, convert the file with "
+    "`ffmpeg -i IN -c:v ffv1 -g 1 OUT.mkv` and measure that."
 )
 
 
@@ -74,7 +75,9 @@ def missing_references(path: Path, stream: av.VideoStream, container_format: str
     dict of int to str
         By the number of the packet in the order of decoding, from 0: why what follows, until a key frame, is damaged.
     """
-    if stream.codec.canonical_name not in UNCOUNTED_CODECS:
+    codec = stream.codec
+    is_whole = codec.properties & INTRA_PROPERTY and codec.canonical_name not in ADAPTING_CODECS
+    if is_whole or codec.canonical_name in COUNTED_CODECS:
         return {}
     return judged(coded_times(path, stream), are_timed=any(name in container_format for name in TIMED_CONTAINERS))
 

@@ -21,6 +21,7 @@ KINDS: dict[str, tuple[str, str, dict[str, str]]] = {
         ".mp4",
         {"g": "20", "deadline": "realtime", "cpu-used": "8", "error-resilient": "1"},
     ),
+    "ffv1": ("ffv1", ".mkv", {"g": "20", "level": "3", "slicecrc": "1"}),
     "av1": ("libsvtav1", ".mp4", {"g": "20", "preset": "10"}),
     "av1 in order": ("libsvtav1", ".mkv", {"g": "20", "preset": "10", "svtav1-params": "pred-struct=1"}),
 }
