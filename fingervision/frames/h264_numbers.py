@@ -1,4 +1,4 @@
-"""Numbers that H.264 writes before every picture, by which a picture that never came is noticed."""
+"""Numbers that H.264 writes before every picture, which reveal a picture that was lost."""
 
 from dataclasses import dataclass
 
@@ -15,7 +15,7 @@ INTRA_SLICES = frozenset({2, 7})
 
 @dataclass(frozen=True, slots=True)
 class CodedPicture:
-    """What a picture's first slice header says.
+    """Content of a picture's first slice header.
 
     Parameters
     ----------
@@ -78,7 +78,7 @@ class H264Numbers:
                 self._learn(unit)
 
     def of(self, packet: bytes) -> CodedPicture | None:
-        """Read a packet; None where it holds no picture that can be read."""
+        """Read the slice header in a packet; None where the packet holds no readable picture."""
         recovers_after = None
         try:
             units = _after_lengths(packet, self._length_bytes) if self._length_bytes else _between_start_codes(packet)
@@ -128,14 +128,14 @@ class H264Numbers:
 
 
 class _Bits:
-    """Bits of a unit behind its first byte, without the bytes that keep start codes out (7.3.1)."""
+    """The bits of a NAL unit after its first byte, without the emulation prevention bytes (7.3.1)."""
 
     def __init__(self, unit: bytes) -> None:
         content = unit[1 : 1 + HEADER_BYTES].replace(b"\0\0\3", b"\0\0")
         self._bits, self._left = int.from_bytes(content, "big"), 8 * len(content)
 
     def take(self, count: int) -> int:
-        """Read an unsigned number of so many bits; IndexError behind the end."""
+        """Read an unsigned number of `count` bits; IndexError after the end."""
         self._left -= count
         if self._left < 0:
             raise IndexError
@@ -152,7 +152,7 @@ class _Bits:
 
 
 def _sequence(bits: _Bits) -> tuple[int, _Sequence]:
-    """Read sequence parameters (7.3.2.1.1) as far as the first that is needed here goes."""
+    """Read the sequence parameters (7.3.2.1.1) up to the last one that is needed here."""
     profile = bits.take(8)
     bits.take(16)
     name = bits.golomb()
@@ -194,7 +194,7 @@ def _skip_scaling(bits: _Bits, count: int) -> None:
 
 
 def _recovery(unit: bytes) -> int | None:
-    """Reference pictures until everything is right to the bit; None where no recovery point promises that (D.1.8)."""
+    """Number of frames until the picture is exact after a recovery point; None where there is none (D.1.8)."""
     content = unit.replace(b"\0\0\3", b"\0\0")
     at = 1
     while at + 2 < len(content):

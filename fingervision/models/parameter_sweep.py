@@ -1,4 +1,4 @@
-"""A grid over numbers of a drawing, each variant answered by the lumped model."""
+"""A grid over dimensions of a drawing, with each variant computed by the lumped model."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -39,7 +39,7 @@ _MOST_MECHANISMS = 400
 
 @dataclass(frozen=True, slots=True)
 class Variation:
-    """Values that one number of a drawing takes.
+    """Values of one dimension of a drawing.
 
     Parameters
     ----------
@@ -76,7 +76,7 @@ def parse_variation(text: str) -> Variation:
 
 
 def varied(gripper: Gripper, variations: Sequence[Variation], values: Sequence[float]) -> Gripper:
-    """Redraw a gripper with some numbers at given values, and all that hangs on them."""
+    """Return a gripper with some dimensions at given values, and all dependent ones adapted."""
     for variation, value in zip(variations, values, strict=True):
         try:
             now = attrgetter(variation.name)(gripper)
@@ -92,7 +92,7 @@ def varied(gripper: Gripper, variations: Sequence[Variation], values: Sequence[f
 
 
 def sweep_answers(gripper: Gripper, variations: Sequence[Variation], theory: HingeTheory) -> tuple[Array, Array]:
-    """Answer every combination of the values.
+    """Compute the responses for every combination of the values.
 
     Parameters
     ----------
@@ -137,7 +137,7 @@ def sweep_answers(gripper: Gripper, variations: Sequence[Variation], theory: Hin
 def mechanism_sweep_answers(
     redrawn_to: Callable[[Mapping[str, float]], Mechanism], variations: Sequence[Variation]
 ) -> tuple[Array, tuple[str, ...], Array]:
-    """Answer every combination of the values for a mechanism drawn by bodies.
+    """Compute the responses for every combination of the values, for a mechanism drawn by bodies.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""A simulation table as a model: linear between its rows."""
+"""A simulation table as a model, linear between its rows."""
 
 from dataclasses import dataclass
 
@@ -10,7 +10,7 @@ from fingervision.domain.response import Response
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TableModel:
-    """Comsol, MATLAB, Ansys or anything else that gave the gap at some inputs.
+    """A table from Comsol, MATLAB, Ansys or any other source that gives the gap at some inputs.
 
     Parameters
     ----------
@@ -36,7 +36,10 @@ class TableModel:
         return float(self.input_mm[0]), float(self.input_mm[-1])
 
     def respond(self, input_mm: NDArray[np.float64]) -> Response:
-        """Interpolate; beyond an end follow the straight line through the last quarter of the rows there."""
+        """Interpolate linearly.
+
+        Beyond an end, extrapolate the straight line through the last quarter of the rows there.
+        """
         force = None if self.force_n is None else self._interpolate(input_mm, self.force_n)
         return Response(self._interpolate(input_mm, self.left_mm), self._interpolate(input_mm, self.right_mm), force)
 

@@ -1,4 +1,4 @@
-"""Where steps of light may be along a direction: the mean profile of a zone and the lobes of its derivative."""
+"""Find candidate edges along a direction: lobes of the derivative of a zone's mean profile."""
 
 from dataclasses import dataclass
 from functools import lru_cache
@@ -21,7 +21,7 @@ LOBE_SHARE = 0.15
 
 @dataclass(frozen=True, slots=True)
 class StepCandidate:
-    """A step along the zone's direction.
+    """A candidate edge along the zone's direction.
 
     Parameters
     ----------
@@ -145,7 +145,7 @@ def profile(
 
 
 def candidates(found: Profile) -> list[StepCandidate]:
-    """Steps in a profile, in order of position."""
+    """Candidate edges in a profile, in order of position."""
     level, half = found.level, found.half
     if level.size < 5:
         return []

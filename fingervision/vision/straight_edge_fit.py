@@ -42,7 +42,7 @@ LAGS = ((0, 1), (1, 0), (1, 1), (1, -1), (0, 2), (2, 0))
 
 @dataclass(frozen=True, slots=True)
 class Band:
-    """Where the edges are looked for: axes turned by `direction_rad`, counted from a middle.
+    """Band in which the edges are searched: axes turned by `direction_rad`, counted from a centre.
 
     Parameters
     ----------
@@ -62,7 +62,7 @@ class Band:
 
 @dataclass(frozen=True, slots=True)
 class EdgeStart:
-    """First guess of one edge.
+    """Initial estimate of one edge.
 
     Parameters
     ----------
@@ -134,7 +134,7 @@ def reach_px(blur_px: float) -> float:
 
 
 def blurred_box_step(away: Floats, sigma: float, width: float) -> tuple[Floats, Floats, Floats]:
-    """Blurred unit step averaged over a box, and its derivatives by distance and by sigma.
+    """Blurred unit step averaged over a box, and its derivatives with respect to distance and sigma.
 
     Parameters
     ----------
@@ -230,7 +230,7 @@ def _near(t: Floats, s: Floats, position: Floats, slope: Floats, reach: float) -
 
 
 class _State:
-    """Parameters of a fit on their way to the best ones."""
+    """Parameters of a fit during the iteration."""
 
     def __init__(self, position: Floats, slope: Floats, blur_px: float) -> None:
         self.position, self.slope = position.astype(np.float64), slope.astype(np.float64)
@@ -256,13 +256,13 @@ class _State:
         return linear, by_position, by_sigma
 
     def design(self, t: Floats, s: Floats, band: Band, contrast: Floats) -> Floats:
-        """All columns: linear ones, then positions, slopes and blur for these contrasts."""
+        """All columns of the design matrix: linear ones, then positions, slopes and blur for these contrasts."""
         linear, by_position, by_sigma = self.columns(t, s, band)
         moved = contrast[:, None] * by_position
         return np.concatenate((linear, moved, moved * s, (contrast @ by_sigma)[None]))
 
     def step(self, t: Floats, s: Floats, seen: Floats, band: Band) -> float:
-        """One Gauss-Newton step; says how far the farthest edge was moved."""
+        """Make one Gauss-Newton step, and return how far the edge that moved most was moved."""
         count = self.position.size
         if self.contrast is None:
             linear, _, _ = self.columns(t, s, band)
@@ -293,7 +293,7 @@ class _State:
         shared_pixels: float,
         cut_off: int,
     ) -> StraightEdges:
-        """What was found, and how surely; from the design of the last step, which moved next to nothing."""
+        """Result and covariance, from the design matrix of the last step, which moved next to nothing."""
         count = self.position.size
         if self.last is None or self.contrast is None:
             raise NoEdgeFitError("nothing was fitted")
@@ -372,7 +372,7 @@ Correlations = tuple[tuple[int, int, float], ...]
 
 
 def _correlations(residual: Floats, place: Place) -> Correlations:
-    """Lags at which neighbouring pixels' residuals are surely correlated, and how strongly."""
+    """Lags at which neighbouring pixels' residuals are significantly correlated, and their correlations."""
     rows, columns, shape = place
     grid = np.zeros(shape)
     grid[rows, columns] = residual
@@ -387,7 +387,7 @@ def _correlations(residual: Floats, place: Place) -> Correlations:
 
 
 def _shared(correlations: Correlations, effect: Floats, place: Place) -> float:
-    """Variance of a sum weighted by `effect` over what it would be if every pixel's noise were its own."""
+    """Ratio of the variance of a sum weighted by `effect` to its value for independent pixels."""
     if not correlations:
         return 1.0
     rows, columns, shape = place
@@ -420,7 +420,7 @@ def _lost(design: Floats, residual: Floats, variance: float, contrast: float, cu
 
 
 def _rough(residual: Floats, design: Floats, s: Floats, variance: float, count: int) -> float:
-    """How much more the pieces of an edge scatter than their noise; 1 where that may be chance."""
+    """How much more the pieces of an edge scatter than their noise explains; 1 where chance would explain it."""
     half = float(np.abs(s).max()) + 1e-9
     piece = np.minimum(((s / half + 1.0) * 0.5 * PIECES).astype(np.intp), PIECES - 1)
     worst = 1.0
@@ -435,7 +435,7 @@ def _rough(residual: Floats, design: Floats, s: Floats, variance: float, count: 
 
 
 def _pieces(design: Floats, residual: Floats, s: Floats, contrast: Floats, count: int) -> tuple[float, float]:
-    """Bend of the first edge, and the least contrast among its pieces as a share of the whole's."""
+    """Bend of the first edge, and the least contrast among its pieces as a fraction of the edge's contrast."""
     half = float(np.abs(s).max()) + 1e-9
     piece = np.minimum(((s / half + 1.0) * 0.5 * PIECES).astype(np.intp), PIECES - 1)
     by_position = design[2 + 2 * count]
