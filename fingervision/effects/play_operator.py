@@ -7,9 +7,9 @@ _play, _sliders = loop("play_operator_play"), loop("play_operator_sliders")
 
 
 def play(input_mm: Array, width_mm: float, start: float) -> Array:
-    """Follow one run's input with a play of full width `width_mm`; shape (n,).
+    """Output of a play of full width `width_mm` for one run's input; shape (n,).
 
-    The state begins `start` half widths above the first input: -1 and 1 are the two ends of the play.
+    Initially the output lies `start` half widths above the first input; -1 and 1 are the two ends of the play.
     """
     return filled(_play, input_mm, width_mm, start)
 

@@ -1,4 +1,4 @@
-"""The figures of a gripper with the uncertainty that its drawing's stated numbers give them."""
+"""Uncertainty of a gripper's figures from the stated uncertainties of its dimensions."""
 
 from collections.abc import Mapping, Sequence
 from operator import attrgetter
@@ -68,7 +68,7 @@ def gripper_uncertainty(
 
 
 def check_uncertainties(gripper: Gripper) -> None:
-    """Refuse stated uncertainties by which the drawing cannot be redrawn.
+    """Refuse stated uncertainties for which no changed drawing exists.
 
     Raises
     ------
@@ -92,7 +92,7 @@ def _numbers(gripper: Gripper) -> dict[str, Estimate]:
 
 
 def _changed(gripper: Gripper, changes: Mapping[str, float]) -> Gripper:
-    """Redraw a gripper, and refuse numbers that no gripper has."""
+    """Return a gripper with changed dimensions; refuse dimensions that no gripper can have."""
     for name, by in changes.items():
         value = attrgetter(name)(gripper) + by
         if not name.endswith(_ANY_SIGN) and value <= 0.0:

@@ -1,4 +1,4 @@
-"""One half of the gripper as a frame: the tree's members become elements, their masses go to the nodes."""
+"""One half of the gripper as a frame: the members of the tree become elements, their masses are lumped at the nodes."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,7 +20,7 @@ _STIFF_JOINT = 1e-3
 
 
 def frame_of(gripper: Gripper, skeleton: Skeleton) -> CorotationalFrame:
-    """Make the elements of a tree of members."""
+    """Convert a tree of members to elements."""
     members = skeleton.members
     nodes = np.array([members[0].start_mm, *(member.end_mm for member in members)])
     ends = np.array([(member.parent + 1, place + 1) for place, member in enumerate(members)])
@@ -42,7 +42,7 @@ def half_frame(
 ) -> DrivenBody:
     """Support and drive the right half's frame.
 
-    The clamp is held, the drive point moves by the input along the axis, and can neither move across it nor turn.
+    The clamp is fixed, the drive point moves by the input along the axis, and can neither move across it nor rotate.
 
     Parameters
     ----------

@@ -40,7 +40,7 @@ _MOST_MECHANISMS = 400
 
 @dataclass(frozen=True, slots=True)
 class Variation:
-    """Values that one number of a drawing takes.
+    """Values of one dimension of a drawing.
 
     Parameters
     ----------
@@ -77,7 +77,7 @@ def parse_variation(text: str) -> Variation:
 
 
 def varied(gripper: Gripper, variations: Sequence[Variation], values: Sequence[float]) -> Gripper:
-    """Redraw a gripper with some numbers at given values, and all that hangs on them."""
+    """Return a gripper with some dimensions at given values, and all dependent ones adapted."""
     for variation, value in zip(variations, values, strict=True):
         try:
             now = attrgetter(variation.name)(gripper)
@@ -93,7 +93,7 @@ def varied(gripper: Gripper, variations: Sequence[Variation], values: Sequence[f
 
 
 def sweep_answers(gripper: Gripper, variations: Sequence[Variation], theory: HingeTheory) -> tuple[Array, Array]:
-    """Answer every combination of the values.
+    """Compute the responses for every combination of the values.
 
     Parameters
     ----------
@@ -146,7 +146,7 @@ def _figures(model: LumpedGripper) -> dict[str, float]:
 def mechanism_sweep_answers(
     redrawn_to: Callable[[Mapping[str, float]], Mechanism], variations: Sequence[Variation]
 ) -> tuple[Array, tuple[str, ...], Array]:
-    """Answer every combination of the values for a mechanism drawn by bodies.
+    """Compute the responses for every combination of the values, for a mechanism drawn by bodies.
 
     Parameters
     ----------

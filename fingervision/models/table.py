@@ -1,4 +1,4 @@
-"""A simulation table as a model: linear between its rows."""
+"""A simulation table as a model, linear between its rows."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -11,7 +11,7 @@ from fingervision.domain.response import Response
 
 @dataclass(frozen=True, eq=False)
 class TableModel:
-    """Comsol, MATLAB, Ansys or anything else that gave the gap at some inputs.
+    """A table from Comsol, MATLAB, Ansys or any other source that gives the gap at some inputs.
 
     Parameters
     ----------
