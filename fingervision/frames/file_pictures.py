@@ -1,4 +1,4 @@
-"""Pictures of an open video file, in order; what is broken, missing, or hangs on that, is said instead."""
+"""Pictures of an open video file, in order, with lost frames in place of broken or missing pictures."""
 
 from collections.abc import Iterator
 from contextlib import suppress
@@ -80,7 +80,7 @@ def pictures(container: av.container.InputContainer, stream: av.VideoStream, pat
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Read:
-    """A packet, and what is known of its place once the next one is read.
+    """A packet, with what the next packet shows about its place.
 
     Parameters
     ----------
@@ -110,7 +110,7 @@ class _Read:
 
 
 def _read(container: av.container.InputContainer, stream: av.VideoStream, path: Path, heard: Heard) -> Iterator[_Read]:
-    """Read packets one ahead, since a gap in the stream shows in the packet after it."""
+    """Read packets one ahead, because a gap in the stream shows only in the packet after it."""
     demuxed = container.demux(stream)
     places = AviPlaces(path, stream.index, len(container.streams)) if container.format.name == "avi" else None
     clusters = ClusterTimes(path, stream.index) if "matroska" in container.format.name else None
@@ -151,7 +151,7 @@ def _read(container: av.container.InputContainer, stream: av.VideoStream, path: 
 
 
 def _before(read: _Read, trail: DamageTrail) -> Iterator[Picture]:
-    """Say what is missing before a packet."""
+    """Record what is missing before a packet."""
     if read.loses_time:
         if read.is_placed:
             trail.hole(f"{MISSING} before it.")

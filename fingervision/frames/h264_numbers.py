@@ -1,4 +1,4 @@
-"""Numbers that H.264 writes before every picture, by which a picture that never came is noticed."""
+"""Numbers that H.264 writes before every picture, which reveal a picture that was lost."""
 
 from dataclasses import dataclass
 
@@ -16,7 +16,7 @@ INTRA_SLICES = frozenset({2, 7})
 
 @dataclass(frozen=True, slots=True)
 class CodedPicture:
-    """What a picture's first slice header says.
+    """Content of a picture's first slice header.
 
     Parameters
     ----------
@@ -79,7 +79,7 @@ class H264Numbers:
                 self._learn(unit)
 
     def of(self, packet: bytes) -> CodedPicture | None:
-        """Read a packet; None where it holds no picture that can be read."""
+        """Read the slice header in a packet; None where the packet holds no readable picture."""
         recovers_after = None
         try:
             units = _after_lengths(packet, self._length_bytes) if self._length_bytes else _between_start_codes(packet)
@@ -176,7 +176,7 @@ def _skip_scaling(bits: BitReader, count: int) -> None:
 
 
 def _recovery(unit: bytes) -> int | None:
-    """Reference pictures until everything is right to the bit; None where no recovery point promises that (D.1.8)."""
+    """Number of frames until the picture is exact after a recovery point; None where there is none (D.1.8)."""
     content = unit.replace(b"\0\0\3", b"\0\0")
     at = 1
     while at + 2 < len(content):

@@ -1,4 +1,4 @@
-"""One picture for each step of vision, numbered in their order."""
+"""One picture for each processing step, numbered in order."""
 
 import re
 from collections.abc import Sequence

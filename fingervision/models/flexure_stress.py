@@ -1,4 +1,4 @@
-"""Nominal stress in a lumped flexure: bending and tension of the section, with the factors of a notch."""
+"""Nominal stress in a lumped flexure: bending and tension of the section, times the factors of a notch."""
 
 import numpy as np
 from numpy.typing import NDArray

@@ -1,4 +1,4 @@
-"""Equilibrium in the deformed shape: Newton's method on the total Lagrangian equations, with contact where asked."""
+"""Equilibrium in the deformed shape: Newton's method on the total Lagrangian equations, with contact if requested."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,8 +19,8 @@ _SLOW = 0.1
 def large_equilibrium(body: DrivenBody, input_mm: float, start: Equilibrium, *, contact: bool) -> Equilibrium:
     """Find the equilibrium at one input.
 
-    With contact, nodes that would pass the symmetry plane are held on it, and nodes that it would have to pull are let
-    go, until neither remains: gap >= 0, force >= 0, and one of them zero.
+    With contact, nodes that would cross the symmetry plane are held on it, and nodes under tension are released, until
+    no node changes: gap >= 0, force >= 0, and one of them zero.
 
     Parameters
     ----------
@@ -83,9 +83,9 @@ def _newton(
 def large_path(
     body: DrivenBody, last_mm: float, *, start: Equilibrium | None = None, contact: bool = False, least: int = 3
 ) -> list[Equilibrium]:
-    """Follow the equilibria from a first one, or from rest, to an input in steps of at most half a millimetre.
+    """Follow the equilibria from a first one, or from rest, to an input, in steps of at most half a millimetre.
 
-    At least three of them make a curve; one is enough where the last equilibrium alone is wanted (`least`).
+    A curve needs at least three steps; one is enough where only the last equilibrium is needed (`least`).
     """
     path = [start or body.at_rest()]
     first_mm = path[0].input_mm
@@ -101,7 +101,7 @@ def large_path(
 
 
 def first_touch(body: DrivenBody, guess_mm: float) -> Equilibrium:
-    """Find the input at which the first point of the inner face meets the symmetry plane, by Newton's rule."""
+    """Find the input at which the first point of the inner face meets the symmetry plane, by Newton's method."""
     if guess_mm in body.touches:
         return body.touches[guess_mm]
     state = large_equilibrium(body, guess_mm, body.at_rest(), contact=False)

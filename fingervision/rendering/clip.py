@@ -1,4 +1,4 @@
-"""Clips: frames with their own times, through a camera's codec into a video file."""
+"""Video clips: frames with their own times, coded by a camera's codec into a video file."""
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
@@ -62,9 +62,9 @@ Codec = H264 | Mjpeg | Ffv1
 
 
 def write_clip(path: Path, frames: Iterable[Frame], codec: Codec) -> None:
-    """Write frames with their presentation times, at any rate, also a changing one.
+    """Write frames with their presentation times, at a constant or variable rate.
 
-    Grey levels become the luma as they are (full range), so that the luma plane of the clip is the frame.
+    Grey levels are stored unchanged as full-range luma, so that the clip's luma plane is the frame.
 
     Parameters
     ----------
@@ -130,7 +130,7 @@ def _encode(container: OutputContainer, first: Frame, others: Iterator[Frame], c
 
 
 def _tick(frame: Frame, last_tick: int) -> int:
-    """Time of a frame on the clip's clock."""
+    """Time of a frame in ticks of the clip's clock."""
     if frame.time_s is None:
         msg = f"A frame of a clip must have its time, but frame {frame.index} has none."
         raise DataError(msg)
@@ -145,7 +145,7 @@ def _tick(frame: Frame, last_tick: int) -> int:
 
 
 def _pixel_format(pixels: Pixels, codec: Codec) -> str:
-    """FFmpeg's name of the layout that a codec stores such frames in."""
+    """FFmpeg's name of the pixel format in which a codec stores such frames."""
     wide, colour = pixels.dtype == np.uint16, pixels.ndim == 3
     if isinstance(codec, Ffv1):
         if colour:

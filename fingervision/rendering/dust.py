@@ -21,7 +21,7 @@ def dust(
     size_px: tuple[float, float] = (1.0, 6.0),
     levels: tuple[float, ...] = (20.0, 230.0),
 ) -> tuple[Patch, ...]:
-    """Strew grains over the frame.
+    """Scatter grains over the frame.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""The scene that everybody needs: two fingers with a given gap at the measuring height."""
+"""The standard scene: two fingers with a given gap at the measuring height."""
 
 from math import sqrt
 

@@ -1,4 +1,4 @@
-"""Search effects and refit the uncertain dimensions of the drawing, in turn until both agree."""
+"""Search for effects and refit the uncertain dimensions of the drawing alternately, until both agree."""
 
 from dataclasses import dataclass, replace
 from functools import partial
@@ -10,6 +10,7 @@ from fingervision.diagnosis.inference.explanation_candidates import Progress
 from fingervision.diagnosis.inference.hypothesis import Explanation, Point, Problem
 from fingervision.diagnosis.inference.hypothesis_fit import fit
 from fingervision.diagnosis.inference.map_imitators import imitating_effects, imitating_parts
+from fingervision.diagnosis.inference.map_repeatability import foretells_other_passes
 from fingervision.diagnosis.inference.position_map import (
     NAME,
     PositionMap,
@@ -67,7 +68,7 @@ def refitted_search(
     without: frozenset[str],
     progress: Progress,
 ) -> Refitted:
-    """Search, stage by stage: between samples, beside a map of position errors, beside a redrawn gripper.
+    """Search in stages: interpolation between samples, a map of position errors, run gains, a redrawn gripper.
 
     Parameters
     ----------
@@ -95,7 +96,7 @@ def refitted_search(
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Searched:
-    """A search that was made: measurement and model, what was found, and what slots of known width said."""
+    """A finished search: measurement and model, its findings, and what reference slots showed."""
 
     data: Observations
     found: Findings
@@ -104,21 +105,21 @@ class _Searched:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Look:
-    """How searches are made."""
+    """Settings of a search."""
 
     rng: np.random.Generator
     forced: frozenset[str]
     progress: Progress
 
     def again(self, data: Observations, known: Explanation | None = None) -> _Searched:
-        """Search once more, the noise estimated beside what is known already."""
+        """Search again, with the noise re-estimated with the known effects removed."""
         found = search(partial(_problem_of, data), self.rng, self.forced, self.progress, known)
         found, said = consistent_with_gauges(data, found)
         return _Searched(data, found, said)
 
 
 def _over_the_ends(state: _Searched, look: _Look) -> _Searched:
-    """Search along a path with overshoots, and keep it where an effect with memory then explains the data better."""
+    """Search along a path with overshoots, and keep the result where an effect with memory then fits better."""
     data = state.data.with_overshoots()
     if data is state.data:
         return state
@@ -133,9 +134,10 @@ def _over_the_ends(state: _Searched, look: _Look) -> _Searched:
 
 
 def _beside_gains(state: _Searched, look: _Look) -> _Searched:
-    """Search beside gains that differ from run to run, and keep what is found where it is the far likelier one.
+    """Search with gains that differ from run to run, and keep the result where it is far more probable.
 
-    Such gains are a nuisance beside an effect that does more than they do; alone they are structure with no name.
+    Such gains are nuisance parameters if a named effect does more than they do; without one they are structure with no
+    name.
     """
     found = state.found
     explained = found.unknown is None and standing_of(state.data, found).is_little
@@ -169,10 +171,10 @@ def _does_more(beside: _Searched) -> bool:
 
 
 def _beside_map(state: _Searched, look: _Look) -> _Searched:
-    """Search beside a map of position errors, and keep what is found where it is the far likelier explanation.
+    """Search with a map of position errors, and keep the result where it is far more probable.
 
-    The map competes only where something remains that the other effects do not explain, and at the price of its
-    freedom; where an effect with a few numbers does as well, it stays.
+    The map is considered only where the other effects leave a residual, and its freedom is penalised; an effect with a
+    few parameters that does as well is kept.
     """
     history, found = state.data.chain.history, state.found
     reason = why_no_map(history, state.data.chain.path)
@@ -200,7 +202,10 @@ def _beside_map(state: _Searched, look: _Look) -> _Searched:
         first, _ = likeliest_map(plain, rest)
         beside = look.again(_excluding(replace(beside.data, position_map=first), parts))
         plain = _without(beside.found.problem, first)
-    second, _ = likeliest_map(plain, _left(plain, beside.found.best))
+    rest = _left(plain, beside.found.best)
+    second, _ = likeliest_map(plain, rest)
+    if not (asked or foretells_other_passes(plain, rest, second)):
+        return state
     if first.is_like(second):
         second = first
     else:
@@ -209,13 +214,13 @@ def _beside_map(state: _Searched, look: _Look) -> _Searched:
 
 
 def _excluding(data: Observations, reasons: dict[str, str]) -> Observations:
-    """Leave effects out of the search, each for its reason."""
+    """Exclude effects from the search, each with its reason."""
     kept = {name: effect for name, effect in data.effects.items() if name not in reasons}
     return replace(data, effects=kept, excluded={**data.excluded, **reasons})
 
 
 def _gained(state: _Searched, beside: _Searched, effect: RunGains | PositionMap) -> float:
-    """By how much -2 log of the likelihood falls by a random effect and what was found beside it, the price paid."""
+    """Decrease of -2 log likelihood by a random effect and the findings with it, minus its penalty."""
     best = state.found.best
     plain = replace(_without(beside.found.problem, effect), effects=state.found.problem.effects)
     rows = max(2, int(plain.measured.size - plain.whitener.aside.sum()))
@@ -224,10 +229,10 @@ def _gained(state: _Searched, beside: _Searched, effect: RunGains | PositionMap)
 
 
 def _common_offset(state: _Searched, look: _Look) -> _Searched:
-    """Search once more for a constant that the runs share, where their offsets had taken it.
+    """Search again for a constant common to all runs, which run offsets had absorbed.
 
-    Runs that are off by nearly the same amount share a cause and no accident: they may then be offset against each
-    other by no more than they depart from their mean.
+    Runs with nearly the same offset share a cause; the spread of their offsets is then limited to their departure from
+    the mean.
     """
     runs = len(state.data.chain.history.runs)
     found = state.found
@@ -246,20 +251,20 @@ def _common_offset(state: _Searched, look: _Look) -> _Searched:
 
 
 def _left(problem: Problem, explanation: Explanation) -> Explanation:
-    """Judge an explanation as it stands by another observation model."""
+    """Judge a fixed explanation under another model of the observations."""
     residual = problem.measured - problem.whitened(explanation.values)
     return replace(explanation, residual=residual, sigma_mm=problem.offsets.spread(residual)[0])
 
 
 def _without(problem: Problem, effect: RunGains | PositionMap) -> Problem:
-    """The same problem without a random effect's columns, which are the first ones where it was added last."""
+    """Return the problem without a random effect's columns, which are the first ones if it was added last."""
     count, drawing = effect.coefficients.size, problem.whitener.drawing
     kept = None if drawing is None or drawing.shape[1] == count else drawing[:, count:]
     return replace(problem, offsets=RunOffsets.of(replace(problem.whitener, drawing=kept)))
 
 
 def _beside_drawing(state: _Searched, look: _Look) -> _Searched:
-    """Redraw a gripper whose numbers are uncertain, and search again until neither changes the other."""
+    """Refit the uncertain dimensions of the drawing, and search again, until neither changes the other."""
     if not state.data.refit.moved:
         return state
     for _ in range(MOST_SEARCHES - 1):
@@ -275,7 +280,7 @@ def _beside_drawing(state: _Searched, look: _Look) -> _Searched:
 
 
 def _settled(state: _Searched, rng: np.random.Generator) -> Refitted:
-    """Drop effects that are not needed, estimate the map and the gains, and give every parameter its posterior."""
+    """Drop unneeded effects, estimate the map and the gains, and compute every parameter's posterior."""
     data, found = state.data, without_unneeded_effects(state.data, state.found)
     found = with_simpler_parts(data, found)
     best, posterior = settled(found.problem, found.best, rng)
