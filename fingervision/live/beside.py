@@ -1,4 +1,4 @@
-"""What stands beside a live measurement: a bed, its input, a model."""
+"""Additions to a live measurement: a bed, its input, a model."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,7 +17,7 @@ from fingervision.testbed.run.run_metadata import SIMULATION, write_expected
 
 @dataclass(frozen=True, slots=True)
 class Beside:
-    """What stands beside the measurement.
+    """Options for what is added to the measurement.
 
     Parameters
     ----------
@@ -44,7 +44,7 @@ class Beside:
 
 
 def stand_beside(session: Session, beside: Beside) -> None:
-    """Put bed, input and model beside a session.
+    """Add bed, input and model to a session.
 
     Raises
     ------

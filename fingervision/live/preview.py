@@ -1,4 +1,4 @@
-"""One message to the page: what is new since the last, and the newest picture with what was measured drawn in."""
+"""One message to the page: everything new since the last one, and the newest picture with the measured edges."""
 
 import json
 import struct
@@ -25,7 +25,7 @@ _NOTHING = NoGap(Status.NO_FINGERS, "The scale is not known: nothing is measured
 
 @dataclass(frozen=True, slots=True)
 class Known:
-    """What a page has: of which count, and how many rows and messages of it.
+    """What a page has received: version, and numbers of rows and messages.
 
     Parameters
     ----------
@@ -42,14 +42,14 @@ class Known:
 
 @dataclass(frozen=True, slots=True)
 class Next:
-    """A message, and what the page then has."""
+    """A message, and what the page has after receiving it."""
 
     content: bytes
     known: Known
 
 
 def message(view: View, known: Known, seen: Seen | None, about: Mapping[str, Any] | None = None) -> Next:
-    """Put together the next message.
+    """Compose the next message.
 
     Parameters
     ----------
@@ -91,7 +91,7 @@ def message(view: View, known: Known, seen: Seen | None, about: Mapping[str, Any
 
 
 def points(view: View, rows: list[GapRow]) -> list[list[Any]]:
-    """Rows for the chart: time, gap, its standard uncertainty, frame, why there is none, and the model's gap."""
+    """Rows for the chart: time, gap, its standard uncertainty, frame, reason for a missing gap, and the model's gap."""
     model = view.features.get("model")
     predicted = [None] * len(rows) if model is None else model.predicted_mm(rows)
     return [
@@ -112,7 +112,7 @@ def _u_mm(row: GapRow) -> float | None:
 
 
 def _now(view: View, seen: Seen | None) -> dict[str, Any] | None:
-    """A picture's row in figures."""
+    """Values of the picture's row."""
     choices = view.choices
     if seen is None or seen.row is None:
         return None
@@ -144,7 +144,7 @@ def _picture(seen: Seen, zero_mm: float) -> bytes:
 
 
 class _Pictures:
-    """The newest picture, drawn once however many pages look."""
+    """The newest picture, drawn only once for all pages."""
 
     def __init__(self) -> None:
         self._lock = Lock()

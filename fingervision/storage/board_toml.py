@@ -1,4 +1,4 @@
-"""board.toml: port, wiring and times of a board.
+"""The file board.toml: port, wiring and time limits of a board.
 
 schema = 1
 port = "/dev/ttyACM0"

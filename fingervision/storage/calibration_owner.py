@@ -1,4 +1,4 @@
-"""A calibration's file and the pictures beside it: an older calibration is replaced, anything else is not."""
+"""Ownership of a calibration's file and pictures: an older calibration is replaced, any other file is not."""
 
 import json
 from pathlib import Path
@@ -10,7 +10,7 @@ from fingervision.domain.errors import OutputError
 
 
 def refuse_foreign(out: Path) -> None:
-    """Let a calibration be overwritten, never anything else.
+    """Refuse to overwrite a file that is not a calibration.
 
     Raises
     ------

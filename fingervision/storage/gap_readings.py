@@ -1,4 +1,4 @@
-"""Gaps of a gaps.csv as repeated readings of parts, for a gauge study."""
+"""Gaps in a gaps.csv as repeated readings of parts, for a gauge study (repeatability and reproducibility)."""
 
 import csv
 from math import isfinite
@@ -12,7 +12,7 @@ SAME_INPUT_PLACES = 3
 
 
 def read_gap_readings(path: Path, by_input: bool) -> dict[float | None, list[float]]:
-    """Read the gaps of all frames that gave one.
+    """Read the gaps of all frames that have one.
 
     Parameters
     ----------

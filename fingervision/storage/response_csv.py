@@ -1,4 +1,4 @@
-"""A camera's response as a file: `level,light`, one row a level, from 0 to the depth's full scale."""
+"""A camera's response as a file: `level,light`, one row per level, from 0 to the full scale."""
 
 import csv
 from pathlib import Path
@@ -17,7 +17,7 @@ TOP_LEVELS = (255, 1023, 4095, 16383, 65535)
 
 
 def response_named(name: str) -> CameraResponse | None:
-    """What --response names: a standard curve or a file; None for auto.
+    """Response named by --response: a standard curve or a file; None for auto.
 
     Raises
     ------

@@ -25,7 +25,7 @@ def read_simulation_table(path: Path) -> TableModel:
 
 
 def simulation_rows(path: Path, columns: Mapping[str, Numbers]) -> TableModel:
-    """Take the columns of a simulation table as a model.
+    """Convert the columns of a simulation table to a model.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""The front door: any table as a measured table, a drive or a simulation."""
+"""Entry points for reading any table as a measured table, a drive or a simulation."""
 
 from collections.abc import Callable
 from functools import partial
@@ -79,7 +79,7 @@ def read_drive(path: Path, columns: Path | None = None) -> DriveHistory:
 
 
 def drive_of(table: Understood, given: Entry) -> DriveHistory:
-    """Take a table that is understood as a drive."""
+    """Interpret a table as a drive."""
     path = table.path
     kept = np.flatnonzero(table.columns["time"].present & table.columns["input"].present)
     if not kept.size:
@@ -178,6 +178,6 @@ def _said(table: Understood, given: Entry) -> list[str]:
 
 
 def said(given: Entry, what: str, notes: tuple[str, ...], left_out: tuple[str, ...]) -> list[str]:
-    """Say how a foreign table was read."""
+    """Sentence on how a foreign table was read."""
     how = f" with {given.source}" if given.source is not None else ""
     return [f"Read as {what}{how}.", *notes, *(f"Left out: {words}." for words in left_out)]

@@ -1,4 +1,4 @@
-"""Lines of a text file, of a size that memory holds."""
+"""Lines of a text file, with a limit on its size."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""Measure a reference slot of known width in the gripper's place, to check the scale."""
+"""Measure a reference slot of known width in place of the gripper, to check the scale."""
 
 from collections.abc import Sequence
 from math import sqrt
