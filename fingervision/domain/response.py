@@ -1,6 +1,6 @@
 """Positions of the two measuring points: the response of a gripper or a measuring chain to an input history."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,7 +35,7 @@ class Response:
     def with_gap(self, gap_mm: NDArray[np.float64]) -> "Response":
         """Return the response with another gap and the same midline: both fingers move equally and oppositely."""
         half_mm = 0.5 * (gap_mm - self.gap_mm)
-        return replace(self, left_mm=self.left_mm - half_mm, right_mm=self.right_mm + half_mm)
+        return Response(self.left_mm - half_mm, self.right_mm + half_mm, self.force_n)
 
     def plus(self, more: "Response") -> "Response":
         """Add the displacements of `more` to the measuring points, and its force where both have one."""
@@ -44,8 +44,8 @@ class Response:
         return Response(self.left_mm + more.left_mm, self.right_mm + more.right_mm, force_n)
 
     def shifted(self, by_mm: NDArray[np.float64] | float) -> "Response":
-        """Move both points by `by_mm`, to the right where it is positive."""
-        return replace(self, left_mm=self.left_mm + by_mm, right_mm=self.right_mm + by_mm)
+        """Both points moved together, to the right where `by_mm` is positive."""
+        return Response(self.left_mm + by_mm, self.right_mm + by_mm, self.force_n)
 
     def at(self, rows: NDArray[np.intp]) -> "Response":
         """Select samples; `rows` of shape (k,)."""

@@ -3,7 +3,7 @@
 from fingervision.domain.effect import Array
 from fingervision.domain.loops import filled, loop
 
-_play = loop("play_operator_play")
+_play, _sliders = loop("play_operator_play"), loop("play_operator_sliders")
 
 
 def play(input_mm: Array, width_mm: float, start: float) -> Array:
@@ -12,3 +12,11 @@ def play(input_mm: Array, width_mm: float, start: float) -> Array:
     Initially the output lies `start` half widths above the first input; -1 and 1 are the two ends of the play.
     """
     return filled(_play, input_mm, width_mm, start)
+
+
+def drawn_sliders(input_mm: Array, reach_mm: float, count: int, start: float) -> Array:
+    """Sum how far elastic sliders with reaches of k / count of `reach_mm` are drawn along one run's input; (n,).
+
+    Slider k is drawn by what a play of twice its reach withholds. `start` is the same share of its reach for all.
+    """
+    return filled(_sliders, input_mm, reach_mm, count, start)

@@ -35,15 +35,15 @@ class DamageTrail:
         """Set up a decoder, before its first packet, to pass the numbers of packets on to their pictures."""
         codec.copy_opaque = True
 
-    def enters(self, packet: av.Packet[av.VideoStream]) -> None:
-        """Record a packet that enters the decoder."""
+    def enters(self, packet: av.Packet[av.VideoStream], *, is_shown: bool = True) -> None:
+        """Note a packet that goes into the decoder, and whether a picture is awaited for it."""
         self._last = next(self._numbers)
         packet.opaque = self._last
         if packet.is_keyframe and self._broken:
             self._stated_keys.add(self._last)
         if packet.is_corrupt:
             self.breaks("It is incomplete in the file.")
-        if packet.pts is not None and not packet.is_discard:
+        if packet.pts is not None and not packet.is_discard and is_shown:
             heapq.heappush(self._entered, (packet.pts, self._last))
 
     def breaks(self, why: str) -> None:

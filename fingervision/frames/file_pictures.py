@@ -8,9 +8,11 @@ from pathlib import Path
 import av
 
 from fingervision.frames.avi_places import AviPlaces
+from fingervision.frames.coded_times import is_shown
 from fingervision.frames.cut_off import cut_off
 from fingervision.frames.damage import DamageTrail, Picture
 from fingervision.frames.matroska_times import ClusterTimes
+from fingervision.frames.missing_references import missing_references
 from fingervision.frames.sound_jpeg import SoundJpeg
 from fingervision.frames.spoken_damage import Heard, listening
 from fingervision.frames.stream_losses import StreamLosses
@@ -41,17 +43,21 @@ def pictures(container: av.container.InputContainer, stream: av.VideoStream, pat
     trail = DamageTrail()
     packets, last_end_s, at_end = 0, None, ""
     losses = StreamLosses(container.format.name, stream)
-    with listening(stream.codec_context.name) as heard:
-        jpegs = SoundJpeg(stream.codec_context.name)
+    codec = stream.codec_context.name
+    unfollowed = missing_references(path, stream, container.format.name)
+    with listening(codec) as heard:
+        jpegs = SoundJpeg(codec)
         jpegs.learn(_first_packets(path, stream))
         for read in _read(container, stream, path, heard):
             packet = read.packet
             yield from _before(read, trail)
             if packet.size:
+                if packets in unfollowed:
+                    trail.missing(unfollowed[packets])
                 packets += 1
                 if leap := losses.before(packet, trail):
                     yield None, leap
-                trail.enters(packet)
+                trail.enters(packet, is_shown=is_shown(packet, codec))
                 losses.behind(packet, trail)
                 if packet.pts is not None and packet.time_base is not None:
                     last_end_s = max(last_end_s or 0.0, float((packet.pts + (packet.duration or 0)) * packet.time_base))

@@ -30,7 +30,8 @@ class Exposure:
         sparse: Any = np.ascontiguousarray(frame.pixels[::STEP_PX, ::STEP_PX])
         grey = to_grey(sparse)
         scale = full_scale(grey)
-        ground = float(np.percentile(grey, BRIGHTEST_PERCENT)) / scale
+        brightest = int((grey.size - 1) * BRIGHTEST_PERCENT / 100.0)
+        ground = float(np.partition(grey, brightest, axis=None)[brightest]) / scale
         self._ground.append(ground)
         if np.count_nonzero(grey == scale) > WHITE_SHARE * grey.size:
             self.words = "The picture is saturated: lower the exposure or the light."

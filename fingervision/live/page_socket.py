@@ -17,13 +17,14 @@ from fingervision.live.commands import Answer, harmless, obey
 from fingervision.live.frame_measurement import Seen
 from fingervision.live.guard import POLICY_VIOLATION, WRITER
 from fingervision.live.pen import Pen
-from fingervision.live.preview import Known, message
+from fingervision.live.picture_watch import PictureWatch
+from fingervision.live.preview import Known, is_short, message, state_has_changed
 from fingervision.live.view import View
 
 MESSAGES_A_SECOND, MOST_DIGITS = 120, 12
 TRY_AGAIN_LATER = 1013
 # The preview is as fast as a screen needs it; without a new picture the page hears of the state so often.
-PREVIEW_EVERY_S, STATE_EVERY_S, LOOK_EVERY_S = 0.03, 0.2, 0.01
+PREVIEW_EVERY_S, STATE_EVERY_S = 0.03, 0.2
 # When measuring or the disk lags, a picture now and then must do.
 PREVIEW_IN_A_HURRY_EVERY_S = 0.5
 # A page that does not acknowledge is gone.
@@ -41,14 +42,18 @@ class PageSocket:
         Not yet accepted.
     view : View
         What is shown.
+    watch : PictureWatch
+        Says when there is a new picture.
     pen : Pen
         Who may change what.
     steps : list
         Takes in the pictures of the steps that were asked for.
     """
 
-    def __init__(self, page: WebSocket, view: View, pen: Pen, steps: list[tuple[str, bytes]]) -> None:
-        self._page, self._view, self._pen, self._steps = page, view, pen, steps
+    def __init__(
+        self, page: WebSocket, view: View, watch: PictureWatch, pen: Pen, steps: list[tuple[str, bytes]]
+    ) -> None:
+        self._page, self._view, self._watch, self._pen, self._steps = page, view, watch, pen, steps
         self._is_viewer = page.scope.get("role") != WRITER
         self._acknowledged = asyncio.Event()
         self.ending = False
@@ -87,14 +92,15 @@ class PageSocket:
         pictured_s = float("-inf")
         while not self.ending:
             asked_s = monotonic()
-            while monotonic() - asked_s < STATE_EVERY_S and view.seen is shown:
-                await asyncio.sleep(LOOK_EVERY_S)
+            await self._watch.other_than(shown, STATE_EVERY_S)
             seen = view.seen
             every_s = PREVIEW_IN_A_HURRY_EVERY_S if view.in_a_hurry else 0.0
             picture = seen if seen is not shown and monotonic() - pictured_s >= every_s else None
             if picture is not None:
                 pictured_s = monotonic()
-            following = await asyncio.to_thread(message, view, known, picture, self._about())
+            what = (view, known, picture, self._about())
+            # To go to another thread and back takes longer than a short message.
+            following = message(*what) if is_short(view, known) else await asyncio.to_thread(message, *what)
             known = following.known
             shown = seen
             self._acknowledged.clear()
@@ -136,6 +142,8 @@ class PageSocket:
             answer: Answer = await asyncio.to_thread(obey, self._view, request)
         except FingervisionError as error:
             return {"refused": str(error), "do": str(name)[:40], "field": getattr(error, "field", None)}
+        finally:
+            state_has_changed()
         if answer.pictures:
             self._steps[:] = answer.pictures
         steps = [title for title, _ in answer.pictures]

@@ -24,6 +24,7 @@ from fingervision.live.page_files import PAGE, files, index
 from fingervision.live.page_socket import TRY_AGAIN_LATER, PageSocket
 from fingervision.live.page_token import VIEWER_FILE, kept_token
 from fingervision.live.pen import Pen
+from fingervision.live.picture_watch import PictureWatch
 from fingervision.live.promptness import be_prompt
 from fingervision.live.save_gaps import save_gaps
 from fingervision.live.view import View
@@ -82,7 +83,7 @@ class Page:
         modules()
         self._view, self._listening = view, listening
         self._sockets: set[PageSocket] = set()
-        self._pen = Pen()
+        self._pen, self._watch = Pen(), PictureWatch(view)
         self._steps: list[tuple[str, bytes]] = []
         port = listening.getsockname()[1]
         tokens = {kept_token(view.out): WRITER, kept_token(view.out, VIEWER_FILE): VIEWER}
@@ -169,7 +170,7 @@ class Page:
         if len(self._sockets) >= PAGES_AT_ONCE:
             await page.close(TRY_AGAIN_LATER, f"At most {PAGES_AT_ONCE} pages may look at once: close one.")
             return
-        socket_of_page = PageSocket(page, self._view, self._pen, self._steps)
+        socket_of_page = PageSocket(page, self._view, self._watch, self._pen, self._steps)
         self._sockets.add(socket_of_page)
         try:
             await socket_of_page.serve()

@@ -62,8 +62,9 @@ def _outstanding(change: Levels, picture: Levels, before: Levels, least_step: fl
         right = np.maximum(step[:, at + 1], step[:, at + 2])
         # A wrong level is quiet on both sides, a wrong wave on the side of the sound picture alone.
         beside = np.maximum(left, right) if steps is _levelled else np.minimum(left, right)
-        is_new = steps(picture)[:, at] > steps(before)[:, at]
-        stands_out |= (here > least) & (here > OUTSTANDING * beside) & is_new
+        alone = (here > least) & (here > OUTSTANDING * beside)
+        if alone.any():  # hardly ever in sound pictures
+            stands_out |= alone & (steps(picture)[:, at] > steps(before)[:, at])
     return stands_out
 
 

@@ -26,6 +26,8 @@ _PLANAR = np.ix_([0, 1, 5], [0, 1, 5])
 _SEGMENTS, _SEGMENTS_OF_LEAF = 10, 20
 """Of a notch, whose bending is at its neck, and of what bends all along: a chord is shorter than its arc by 1 / n^2."""
 _SAMPLES = 401
+_ROUNDS, _BETWEEN = 5, 65
+"""Each round narrows the end of the free length 64 times: to 1e-11 of the half length."""
 _BESIDE = 1e-4
 """Of the thickness: how far beside a flexure's surface material and void are looked for."""
 _SAINT_VENANT = 1.5
@@ -130,9 +132,11 @@ def span_of(flexure: Flexure, region: PlanarRegion) -> FlexureSpan:
         alone = _alone(flexure, region, side * stations)
         last = len(stations) - 1 if alone.all() else int(np.argmin(alone)) - 1
         low, high = stations[max(last, 0)], stations[min(last + 1, len(stations) - 1)]
-        for _ in range(40):
-            middle = 0.5 * (low + high)
-            low, high = (middle, high) if _alone(flexure, region, np.array([side * middle]))[0] else (low, middle)
+        for _ in range(_ROUNDS):
+            between = np.linspace(low, high, _BETWEEN)
+            alone = _alone(flexure, region, side * between[1:])
+            last = between.size - 1 if alone.all() else int(np.argmin(alone))
+            low, high = between[last], between[min(last + 1, between.size - 1)]
         cut, height = _cut(flexure, region, side, float(low))
         free.append(side * float(low))
         cuts.append(side * cut)

@@ -2,12 +2,14 @@
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import csr_matrix, diags
+from scipy.sparse import coo_matrix, csr_matrix, diags
 
 from fingervision.domain.gripper import Gripper
 from fingervision.models.corotational_frame import CorotationalFrame
 from fingervision.models.driven_body import DrivenBody
+from fingervision.models.finger_body import finger_body, is_of_finger
 from fingervision.models.hinge_compliance import bar_compliance
+from fingervision.models.joined_frame import JoinedFrame
 from fingervision.models.skeleton import Skeleton
 
 Array = NDArray[np.float64]
@@ -27,8 +29,18 @@ def frame_of(gripper: Gripper, skeleton: Skeleton) -> CorotationalFrame:
     return CorotationalFrame(nodes, ends, compliance)
 
 
-def half_frame(gripper: Gripper, skeleton: Skeleton, frame: CorotationalFrame | None = None) -> DrivenBody:
-    """Support and drive the frame of the right half.
+def joined_frame_of(gripper: Gripper, skeleton: Skeleton) -> JoinedFrame:
+    """Make the elements of a tree of members, but for the finger, which is one body."""
+    body, bars = finger_body(gripper, skeleton), frame_of(gripper, skeleton)
+    places = np.array([place for place, member in enumerate(skeleton.members) if not is_of_finger(member.name)])
+    elements = CorotationalFrame(bars.nodes_mm, bars.ends[places], bars.end_compliance[places])
+    return JoinedFrame(bars.nodes_mm, bars.ends, places, elements, body)
+
+
+def half_frame(
+    gripper: Gripper, skeleton: Skeleton, frame: CorotationalFrame | JoinedFrame | None = None
+) -> DrivenBody:
+    """Support and drive the right half's frame.
 
     The clamp is fixed, the drive point moves by the input along the axis, and can neither move across it nor rotate.
 
@@ -49,7 +61,7 @@ def half_frame(gripper: Gripper, skeleton: Skeleton, frame: CorotationalFrame | 
     face = np.array([3 * (skeleton.corner + 1), 3 * (skeleton.heel + 1)])
     return DrivenBody(
         stiffness_n_mm=frame.stiffness_n_mm(),
-        assemble_mass=lambda: _mass_t(nodes, ends, skeleton),
+        assemble_mass=lambda: _mass_t(nodes, ends, skeleton, frame),
         tangent=frame.internal_force_n,
         driven=driven,
         free=np.setdiff1d(np.arange(frame.unknowns), [*held, *driven]),
@@ -72,16 +84,27 @@ def _end_compliance(gripper: Gripper, axis_mm: Array, place: int, skeleton: Skel
     return _STIFF_JOINT * bar_compliance(length, length, gripper.body.plate_mm, gripper.material)[_PLANAR]
 
 
-def _mass_t(nodes: Array, ends: NDArray[np.int64], skeleton: Skeleton) -> csr_matrix:
-    """Half of each member's mass at each end, with the correction to a uniform bar's rotational inertia.
+def _mass_t(
+    nodes: Array, ends: NDArray[np.int64], skeleton: Skeleton, frame: CorotationalFrame | JoinedFrame
+) -> csr_matrix:
+    """Half of each member's mass at each end, with the rotational inertia that a uniform bar then lacks or exceeds.
 
-    The paper's mass matrix (2), m and I_z, node by node: I_z of a bar about its middle is m (l^2 + w^2) / 12.
+    The paper's mass matrix (2), m and I_z, node by node: I_z of a bar about its middle is m (l^2 + w^2) / 12. A body
+    that stands for members has its own.
     """
     mass, inertia = np.zeros(len(nodes)), np.zeros(len(nodes))
+    body = frame.body if isinstance(frame, JoinedFrame) else None
     for member, (a, b) in zip(skeleton.members, ends.tolist(), strict=True):
+        if body is not None and is_of_finger(member.name):
+            continue
         length2 = float(np.sum((nodes[b] - nodes[a]) ** 2))
         for node in (a, b):
             mass[node] += 0.5 * member.mass_t
             inertia[node] += 0.5 * member.mass_t * (length2 + member.width_mm**2) / 12.0
     columns = np.stack([mass, mass, inertia], axis=1)
-    return csr_matrix(diags(columns.ravel()))
+    whole = csr_matrix(diags(columns.ravel()))
+    if body is None:
+        return whole
+    dofs = body.unknowns
+    entries = (body.mass_t.ravel(), (np.repeat(dofs, dofs.size), np.tile(dofs, dofs.size)))
+    return csr_matrix(whole + coo_matrix(entries, shape=whole.shape))

@@ -14,6 +14,7 @@ from fingervision.domain.gripper import Gripper
 from fingervision.models.answer_figures import PeakStress
 from fingervision.models.corotational_frame import CorotationalFrame
 from fingervision.models.hinge_correction import HingeTheory, plane_strain_share
+from fingervision.models.joined_frame import JoinedFrame
 from fingervision.models.notch import Notch, notches_of
 from fingervision.models.skeleton import Member, Skeleton
 
@@ -61,7 +62,11 @@ def peak_hinge_stress(
 
 
 def peak_in_deformed_shape(
-    gripper: Gripper, skeleton: Skeleton, frame: CorotationalFrame, displacement: Array, theory: HingeTheory
+    gripper: Gripper,
+    skeleton: Skeleton,
+    frame: CorotationalFrame | JoinedFrame,
+    displacement: Array,
+    theory: HingeTheory,
 ) -> PeakStress:
     """The same in the deformed shape, with the loads in axes that rotate with the material."""
     return _peak(gripper, skeleton, frame.end_loads(displacement) * np.array([1.0, -1.0, 1.0]), theory)

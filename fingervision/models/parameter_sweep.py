@@ -1,4 +1,4 @@
-"""A grid over dimensions of a drawing, with each variant computed by the lumped model."""
+"""A grid over numbers of a drawing: the lumped model, changed in the ratio in which its bars alone change."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from fingervision.domain.errors import FingervisionError, ModelError, UsageError
 from fingervision.domain.gripper import Gripper
+from fingervision.models.changed_drawings import ratios, scaled
 from fingervision.models.drive_block_sweep import block_compliances
 from fingervision.models.gripper_outline import check_outline
 from fingervision.models.hinge_correction import HingeTheory
@@ -123,15 +124,23 @@ def sweep_answers(gripper: Gripper, variations: Sequence[Variation], theory: Hin
     rows = []
     corrected = theory is HingeTheory.CORRECTED
     blocks = block_compliances(partial(varied, gripper, variations), [v.values for v in variations])
+    by = ratios(_figures(LumpedGripper(gripper, theory=theory)),
+                _figures(LumpedGripper(gripper, theory=theory, bars_alone=True)))  # fmt: skip
     for values in grid:
         drawn = varied(gripper, variations, values)
-        model = LumpedGripper(drawn, theory=theory, block=blocks(values) if corrected else None)
-        stress, touch = model.peak_stress().mpa_per_mm, model.half.first_touch_mm()
-        force = model.half.equilibrium(1.0).force_n
-        at_yield = drawn.material.yield_mpa / stress
-        mode = model.modes_hz(drive_held=False, count=1)[0]
-        rows.append((gap_per_input(model.half), force, stress, at_yield, -np.inf if touch is None else touch, mode))
-    return np.array(grid), np.array(rows)
+        block = blocks(values) if corrected else None
+        rows.append(scaled(_figures(LumpedGripper(drawn, theory=theory, block=block, bars_alone=True)), by))
+    return np.array(grid), np.array([list(row.values()) for row in rows], dtype=float)
+
+
+def _figures(model: LumpedGripper) -> dict[str, float]:
+    """Figures of a drawing by the names of `COLUMNS`."""
+    stress, touch = model.peak_stress().mpa_per_mm, model.half.first_touch_mm()
+    at_yield = model.gripper.material.yield_mpa / stress
+    mode = model.modes_hz(drive_held=False, count=1)[0]
+    row = (gap_per_input(model.half), model.half.equilibrium(1.0).force_n, stress, at_yield,
+           -np.inf if touch is None else touch, mode)  # fmt: skip
+    return dict(zip(COLUMNS, row, strict=True))
 
 
 def mechanism_sweep_answers(

@@ -102,8 +102,12 @@ class _Tree:
         return parent
 
     def hinge(self, parent: int, start: PointMm, end: PointMm, name: str, theory: HingeTheory, segments: int) -> int:
+        """Cut a notch into segments; one that ends before its reach, at another body, has them so much closer there."""
         material, notch = self.gripper.material, notches_of(self.gripper)[0 if name == "hinge 1" else 1]
+        centre = self.gripper.lever.hinge1_mm if name == "hinge 1" else self.gripper.lever.hinge2_mm
         edges = notch.stations_mm(max(segments, 1))
+        for side, stop in ((edges < 0.0, start), (edges > 0.0, end)):
+            edges[side] *= float(np.hypot(*np.subtract(stop, centre))) / notch.reach_mm
         masses = masses_t(notch, material, edges)
         if segments == 0:
             whole = hinge_compliance(notch, material, theory)
@@ -124,7 +128,13 @@ class _Tree:
 
 
 def skeleton_of(
-    gripper: Gripper, theory: HingeTheory, segments: int, *, rigid_links: bool = False, block: Array | None = None
+    gripper: Gripper,
+    theory: HingeTheory,
+    segments: int,
+    *,
+    rigid_links: bool = False,
+    block: Array | None = None,
+    ends_mm: tuple[float, float] | None = None,
 ) -> Skeleton:
     """Reduce a drawing to its tree of members.
 
@@ -141,6 +151,8 @@ def skeleton_of(
         Whether only the hinges yield, as in the paper's equations.
     block : ndarray of float, shape (3, 3), or None
         `drive_block_root.unit_compliance`, where known already.
+    ends_mm : (float, float) or None
+        Ways from the middle of either hinge to where the finger begins, where that is no more than the notch's reach.
 
     Raises
     ------
@@ -150,8 +162,10 @@ def skeleton_of(
     links, lever = gripper.links, gripper.lever
     first, second = notches_of(gripper)
     tree = _Tree(gripper)
-    lower1, upper1 = _hinge_ends(lever.hinge1_mm, lever.hinge1_axis_deg, first.reach_mm)
-    lower2, upper2 = _hinge_ends(lever.hinge2_mm, lever.hinge2_axis_deg, second.reach_mm)
+    reaches = first.reach_mm, second.reach_mm
+    ends = reaches if ends_mm is None else (min(reaches[0], ends_mm[0]), min(reaches[1], ends_mm[1]))
+    lower1, upper1 = _hinge_ends(lever.hinge1_mm, lever.hinge1_axis_deg, reaches[0], ends[0])
+    lower2, upper2 = _hinge_ends(lever.hinge2_mm, lever.hinge2_axis_deg, reaches[1], ends[1])
     cross_y = links.cross_bar_mm[1]
     beam_low = cross_y - links.cross_bar_width_mm / 2.0
     pillar_x = lever.hinge1_mm[0]
@@ -236,9 +250,9 @@ def _yielding(member: Member, at_start: Array) -> Member:
     return replace(member, compliance=compliance)
 
 
-def _hinge_ends(centre: PointMm, axis_deg: float, reach: float) -> tuple[PointMm, PointMm]:
-    dx, dy = reach * cos(radians(axis_deg)), reach * sin(radians(axis_deg))
-    return (centre[0] - dx, centre[1] - dy), (centre[0] + dx, centre[1] + dy)
+def _hinge_ends(centre: PointMm, axis_deg: float, back: float, ahead: float) -> tuple[PointMm, PointMm]:
+    c, s = cos(radians(axis_deg)), sin(radians(axis_deg))
+    return (centre[0] - back * c, centre[1] - back * s), (centre[0] + ahead * c, centre[1] + ahead * s)
 
 
 def _at_height(bar: tuple[float, float, float, float], y_mm: float) -> PointMm:

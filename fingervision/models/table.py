@@ -1,6 +1,7 @@
 """A simulation table as a model, linear between its rows."""
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -8,7 +9,7 @@ from numpy.typing import NDArray
 from fingervision.domain.response import Response
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class TableModel:
     """A table from Comsol, MATLAB, Ansys or any other source that gives the gap at some inputs.
 
@@ -36,20 +37,30 @@ class TableModel:
         return float(self.input_mm[0]), float(self.input_mm[-1])
 
     def respond(self, input_mm: NDArray[np.float64]) -> Response:
-        """Interpolate linearly.
-
-        Beyond an end, extrapolate the straight line through the last quarter of the rows there.
-        """
-        force = None if self.force_n is None else self._interpolate(input_mm, self.force_n)
-        return Response(self._interpolate(input_mm, self.left_mm), self._interpolate(input_mm, self.right_mm), force)
-
-    def _interpolate(self, input_mm: NDArray[np.float64], column: NDArray[np.float64]) -> NDArray[np.float64]:
-        inside = np.interp(input_mm, self.input_mm, column)
+        """Interpolate; beyond an end follow the straight line through the last quarter of the rows there."""
         lowest, highest = self.input_range_mm
-        if input_mm.min() >= lowest and input_mm.max() <= highest:
-            return inside
-        rows = max(2, -(-len(column) // 4))
-        low = np.polyfit(self.input_mm[:rows], column[:rows], 1)[0]
-        high = np.polyfit(self.input_mm[-rows:], column[-rows:], 1)[0]
-        below, above = np.minimum(input_mm - lowest, 0.0), np.maximum(input_mm - highest, 0.0)
-        return np.asarray(inside + low * below + high * above, dtype=np.float64)
+        inside = input_mm.min() >= lowest and input_mm.max() <= highest
+        beyond = None if inside else (np.minimum(input_mm - lowest, 0.0), np.maximum(input_mm - highest, 0.0))
+        columns = {"left": self.left_mm, "right": self.right_mm} | (
+            {} if self.force_n is None else {"force": self.force_n}
+        )
+        found = {name: np.interp(input_mm, self.input_mm, column) for name, column in columns.items()}
+        if beyond is not None:
+            for name, (low, high) in self._end_slopes.items():
+                found[name] = np.asarray(found[name] + low * beyond[0] + high * beyond[1], dtype=np.float64)
+        return Response(found["left"], found["right"], found.get("force"))
+
+    @cached_property
+    def _end_slopes(self) -> dict[str, tuple[float, float]]:
+        """Slope of each column at the lower and the upper end; a diagnosis asks for them ten thousand times."""
+        columns = {"left": self.left_mm, "right": self.right_mm, "force": self.force_n}
+        rows = max(2, -(-self.input_mm.size // 4))
+
+        def slope(column: NDArray[np.float64], end: slice) -> float:
+            return float(np.polyfit(self.input_mm[end], column[end], 1)[0])
+
+        return {
+            name: (slope(column, slice(rows)), slope(column, slice(-rows, None)))
+            for name, column in columns.items()
+            if column is not None
+        }

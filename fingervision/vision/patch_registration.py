@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import correlate1d
 
+from fingervision.domain.loops import loop
 from fingervision.vision.spline_interpolation import (
     KERNEL_REACH,
     SPLINE_REACH,
@@ -22,7 +23,6 @@ from fingervision.vision.spline_interpolation import (
     gaussian,
     levels_and_derivatives,
     phase_power,
-    sampled,
 )
 
 Floats = NDArray[np.float32]
@@ -47,6 +47,8 @@ LEAST_INFORMATION = 0.02
 NOISE_MARGIN = 1.4
 # Variance of rounding to whole grey levels: no noise is smaller.
 ROUNDING = 1.0 / 12.0
+
+_settled = loop("patch_registration_settled")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -127,6 +129,13 @@ def _grid(half_width: int, half_height: int) -> tuple[Floats, Floats, Doubles]:
     return dx.astype(np.float32), dy.astype(np.float32), basis
 
 
+@cache
+def _extent(half_width: int, half_height: int) -> tuple[int, float]:
+    """Pixels of a patch, and the sum of their squared distances from its middle."""
+    dx, dy, _ = _grid(half_width, half_height)
+    return dx.size, float((dx.astype(np.float64) ** 2 + dy.astype(np.float64) ** 2).sum())
+
+
 def patch_reference(levels: Floats, column: int, row: int, half_width: int, half_height: int) -> PatchReference:
     """Prepare a patch of a picture.
 
@@ -198,73 +207,34 @@ def register(
         In the order of the references.
     """
     first = references[0]
-    dx, dy, basis = _grid(first.half_width_px, first.half_height_px)
-    basis32 = basis.astype(np.float32)
-    height, width = parts[0].shape
-    count = len(references)
-    flat = np.concatenate([coefficients(part, SMOOTHING_PX).ravel() for part in parts])
-    begin = np.arange(count, dtype=np.intp) * (height * width)
-    own = np.stack([reference.levels for reference in references])
-    jacobian = np.stack([reference.jacobian for reference in references])
     hessian = np.stack([reference.hessian for reference in references])
     hessian += 1e-6 * np.trace(hessian, axis1=1, axis2=2)[:, None, None] * np.eye(3) + 1e-12 * np.eye(3)
     inverse = np.linalg.inv(hessian)
-    rim = max(first.half_width_px, first.half_height_px)
-    x, y, turn = (start[:, i] - (origins_px[:, i] if i < 2 else 0.0) for i in range(3))
-    settled, inside = np.zeros(count, dtype=bool), np.ones(count, dtype=bool)
-    residual, gain = np.zeros_like(own), np.ones(count, dtype=np.float64)
-    correlation = np.zeros(count)
-    at = np.arange(count)
-    for _iteration in range(ITERATIONS):
-        cosine, sine = np.cos(turn[at]), np.sin(turn[at])
-        c32, s32 = cosine.astype(np.float32)[:, None], sine.astype(np.float32)[:, None]
-        px = c32 * dx - s32 * dy + x[at].astype(np.float32)[:, None]
-        py = s32 * dx + c32 * dy + y[at].astype(np.float32)[:, None]
-        fits = (px.min(1) >= 1) & (py.min(1) >= 1) & (px.max(1) < width - 2) & (py.max(1) < height - 2)
-        inside[at[~fits]] = False
-        at, px, py, cosine, sine = at[fits], px[fits], py[fits], cosine[fits], sine[fits]
-        if not at.size:
-            break
-        seen = sampled(flat, begin[at], width, px, py)
-        seen -= (seen @ basis32.T) @ basis32
-        power = np.einsum("ij,ij->i", seen, seen).astype(np.float64)
-        common = np.einsum("ij,ij->i", seen, own[at]).astype(np.float64)
-        gain[at] = common / np.maximum(power, 1e-12)
-        own_power = np.einsum("ij,ij->i", own[at], own[at]).astype(np.float64)
-        correlation[at] = common / np.sqrt(np.maximum(power * own_power, 1e-12))
-        left = gain[at].astype(np.float32)[:, None] * seen - own[at]
-        residual[at] = left
-        score = np.einsum("kij,kj->ki", jacobian[at], left).astype(np.float64)
-        step = np.einsum("kij,kj->ki", inverse[at], score)
-        size = np.hypot(step[:, 0], step[:, 1])
-        limit = np.minimum(1.0, 1.0 / np.maximum(np.maximum(size, rim * np.abs(step[:, 2])), 1e-12))
-        step *= limit[:, None]
-        # The warp is composed with the inverse of the step: x -> R (R_s^T (x - t_s)) + t.
-        new_turn = turn[at] - step[:, 2]
-        cosine, sine = np.cos(new_turn), np.sin(new_turn)
-        x[at] -= cosine * step[:, 0] - sine * step[:, 1]
-        y[at] -= sine * step[:, 0] + cosine * step[:, 1]
-        turn[at] = new_turn
-        done = np.maximum(size, rim * np.abs(step[:, 2])) < SETTLED_PX
-        settled[at[done]] = True
-        at = at[~done]
-        if not at.size:
-            break
-    settled &= inside
+    found = [
+        _settled(
+            coefficients(part, SMOOTHING_PX), reference.levels, reference.jacobian, own,
+            first.half_width_px, first.half_height_px, x - left, y - top, turn,
+        )
+        for reference, part, own, (left, top), (x, y, turn) in zip(
+            references, parts, inverse, origins_px.tolist(), start.tolist(), strict=True
+        )
+    ]  # fmt: skip
+    x, y, turn, gain, correlation, squares = np.array([of[:6] for of in found]).T
+    settled = np.array([of[6] for of in found], dtype=bool)
     score = np.stack([reference.score for reference in references])
-    covariance, noise = _covariance(hessian, score, residual, gain, x, y, dx, dy, shared_pixels)
+    size = (first.half_width_px, first.half_height_px)
+    covariance, noise = _covariance(hessian, score, squares, gain, x, y, size, shared_pixels)
     return Registered(x + origins_px[:, 0], y + origins_px[:, 1], turn, covariance, correlation, noise, settled)
 
 
 def _covariance(
     hessian: Doubles,
     score: Doubles,
-    residual: Floats,
+    squares: Doubles,
     gain: Doubles,
     x: Doubles,
     y: Doubles,
-    dx: Floats,
-    dy: Floats,
+    half_size: tuple[int, int],
     shared_pixels: float,
 ) -> tuple[Doubles, Doubles]:
     """Covariance of x, y and rotation from the residuals, and the noise of one picture.
@@ -275,15 +245,13 @@ def _covariance(
     matrix of the gradients smoothed once more. The noise in the gradients of the reference increases their Gram matrix
     and is subtracted from it (errors in variables): covariance = sigma_r^2 H^-1 S_seen H^-1.
     """
-    count, n = residual.shape
+    count, (n, turned) = squares.size, _extent(*half_size)
     table = phase_power(SMOOTHING_PX)
     places = [np.floor((v - np.floor(v)) * table.size).astype(np.intp) % table.size for v in (x, y)]
     power = table[places[0]] * table[places[1]]
-    squares = np.einsum("ij,ij->i", residual, residual).astype(np.float64) / max(n - 7, 1)
-    one = np.maximum(squares / (table[0] ** 2 + gain**2 * power), ROUNDING)
+    one = np.maximum(squares / max(n - 7, 1) / (table[0] ** 2 + gain**2 * power), ROUNDING)
     spread = one * (1.0 + gain**2) * shared_pixels
     noisy = np.zeros((count, 3, 3))
-    turned = float((dx.astype(np.float64) ** 2 + dy.astype(np.float64) ** 2).sum())
     noisy[:, 0, 0] = noisy[:, 1, 1] = one * n * derivative_power(SMOOTHING_PX)
     noisy[:, 2, 2] = one * turned * derivative_power(SMOOTHING_PX)
     return _propagated(hessian, score, noisy, spread), np.sqrt(one)
@@ -313,10 +281,9 @@ def reference_covariance(reference: PatchReference, noise: float) -> Doubles:
     noise : float
         Standard deviation of the noise of one picture.
     """
-    dx, dy, _ = _grid(reference.half_width_px, reference.half_height_px)
     variance = max(noise**2, ROUNDING)
-    turned = float((dx.astype(np.float64) ** 2 + dy.astype(np.float64) ** 2).sum())
-    noisy = variance * derivative_power(SMOOTHING_PX) * np.diag([dx.size, dx.size, turned])
+    pixels, turned = _extent(reference.half_width_px, reference.half_height_px)
+    noisy = variance * derivative_power(SMOOTHING_PX) * np.diag([pixels, pixels, turned])
     return np.asarray(
         _propagated(reference.hessian[None], reference.score[None], noisy[None], np.array([2.0 * variance]))[0]
     )

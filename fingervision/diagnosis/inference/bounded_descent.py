@@ -134,7 +134,9 @@ def bounded_step(matrix: Array, pull: Array, bounds: tuple[Array, Array]) -> Arr
     ndarray of float, shape (p,)
         The step.
     """
-    step, held = np.zeros(pull.size), np.zeros(pull.size, dtype=bool)
+    step, held = np.linalg.lstsq(matrix, pull, rcond=1e-12)[0], np.zeros(pull.size, dtype=bool)
+    if not np.any((step < bounds[0]) | (step > bounds[1])):
+        return step
     for _ in range(pull.size):
         loose = ~held
         rest = pull[loose] - matrix[np.ix_(loose, held)] @ step[held]
@@ -161,5 +163,6 @@ def _in_own_units(normal: Array, free: NDArray[np.bool_]) -> tuple[Array, Array]
 
     Without scaling, a time constant in hours beside micrometres would make the matrix singular.
     """
-    scale = 1.0 / np.sqrt(np.maximum(np.diag(normal)[free], 1e-300))
-    return scale[:, None] * normal[np.ix_(free, free)] * scale, scale
+    part = normal if free.all() else normal[np.ix_(free, free)]
+    scale = 1.0 / np.sqrt(np.maximum(np.diag(part), 1e-300))
+    return scale[:, None] * part * scale, scale

@@ -88,7 +88,7 @@ class MeasuringChain:
                 response = effect.act(response, history, acting[effect.name])
 
         def seen(midline_mm: float) -> Response:
-            picture = response.shifted(midline_mm)
+            picture = response.shifted(midline_mm) if midline_mm else response
             for effect in cameras:
                 picture = effect.act(picture, history, acting[effect.name])
             return picture if self.path is None else picture.at(self.path.rows)

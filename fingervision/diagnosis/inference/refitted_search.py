@@ -10,6 +10,7 @@ from fingervision.diagnosis.inference.explanation_candidates import Progress
 from fingervision.diagnosis.inference.hypothesis import Explanation, Point, Problem
 from fingervision.diagnosis.inference.hypothesis_fit import fit
 from fingervision.diagnosis.inference.map_imitators import imitating_effects, imitating_parts
+from fingervision.diagnosis.inference.map_repeatability import foretells_other_passes
 from fingervision.diagnosis.inference.position_map import (
     NAME,
     PositionMap,
@@ -201,7 +202,10 @@ def _beside_map(state: _Searched, look: _Look) -> _Searched:
         first, _ = likeliest_map(plain, rest)
         beside = look.again(_excluding(replace(beside.data, position_map=first), parts))
         plain = _without(beside.found.problem, first)
-    second, _ = likeliest_map(plain, _left(plain, beside.found.best))
+    rest = _left(plain, beside.found.best)
+    second, _ = likeliest_map(plain, rest)
+    if not (asked or foretells_other_passes(plain, rest, second)):
+        return state
     if first.is_like(second):
         second = first
     else:

@@ -12,6 +12,7 @@ from fingervision.diagnosis.inference.search import Findings
 from fingervision.diagnosis.input.observations import Observations
 from fingervision.diagnosis.input.recorded_input import scatter_in_holds
 from fingervision.diagnosis.noise.replicates import resolution
+from fingervision.diagnosis.noise.residual_scatter import most_noise
 from fingervision.domain.effect import Array
 from fingervision.domain.report import Verdict
 
@@ -19,8 +20,6 @@ STANDING_SHARE = 0.05
 """Share of the disagreement, as RMS, that a named explanation may leave: the catalogue's forms are off by that much."""
 STANDING_NOISES = 3.0
 """Standard deviations of the noise that it may leave in any case: less hardly shows to the eye."""
-CORRELATED = 10.0
-"""Times the scatter from sample to sample that noise may have in all: an autoregression of 0.95 has six times it."""
 TRUSTED = 10.0
 """Times the measurement's own random uncertainty that noise may have: more is structure that looks like noise."""
 NEEDED = 1.1
@@ -96,7 +95,7 @@ def standing(data: Observations, problem: Problem, before_mm: Array, after_mm: A
     if data.run_gains is not None:
         after_mm = after_mm - data.run_gains.scatter_mm
     history = data.chain.history
-    n, both = history.input_mm.size, history.both_edges
+    n, both, runs = history.input_mm.size, history.both_edges, history.runs
     aside = problem.whitener.aside[:n]
     noises = [noise.total_mm for noise in problem.whitener.noises]
     if history.commanded:
@@ -109,7 +108,7 @@ def standing(data: Observations, problem: Problem, before_mm: Array, after_mm: A
         # Slow structure passes for correlated noise, which leaves traces in what changes from sample to sample.
         parts = np.split(after_mm, len(data.channels))
         digits = resolution(data.table.gap_mm) / float(np.sqrt(12.0))
-        most = [CORRELATED * max(short_scatter(part, history.runs), digits) for part in parts]
+        most = [most_noise(part, runs, digits) for part in parts]
         noises = [min(noise, limit or noise) for noise, limit in zip(noises, most, strict=True)]
     if data.table.u_random_mm is not None:
         stated = TRUSTED * float(np.median(data.table.u_random_mm))
@@ -130,13 +129,6 @@ def standing(data: Observations, problem: Problem, before_mm: Array, after_mm: A
     rounding_mm = 0.5 * resolution(data.table.gap_mm) if data.repeats is not None else 0.0
     kept, gross = int(np.sum(~aside)), float(np.mean(aside & ~data.distrusted))
     return Standing(rms(before_mm), rms(after_mm), noise, kept, degrees, rounding_mm, gross)
-
-
-def short_scatter(residual_mm: Array, runs: tuple[slice, ...]) -> float:
-    """Standard deviation of white noise from the median third difference of a residual; 0 in runs of a few samples."""
-    differences = np.concatenate([np.diff(residual_mm[run], 3) for run in runs])
-    # Third differences of white noise have 1 + 9 + 9 + 1 times its variance; 0.6745 is the normal median.
-    return float(np.median(np.abs(differences))) / 0.6745 / float(np.sqrt(20.0)) if differences.size else 0.0
 
 
 def _without_scatter(values: Array, runs: tuple[slice, ...]) -> Array:

@@ -17,6 +17,9 @@ one table in a hundred without one."""
 TREND_DEGREE = 3
 """Degree of the polynomial in time that takes a drift or a run-in out of the repeats: it follows either over some
 cycles."""
+APART = 0.25
+"""Share of the scatter's power that may be left once places or sides drift apart, for that to be believed: nine
+coefficients are many for a few dozen repeats, and without them the noise comes out too large by a factor of 2 at most."""
 OFF_GRID = 0.02
 """Steps by which a difference may miss a multiple of the smallest one: the last digits that are written are rounded."""
 BY_ACCIDENT = 1e-3
@@ -95,7 +98,9 @@ def visits(path_mm: Array, runs: tuple[slice, ...], rows: NDArray[np.intp]) -> N
     return np.where((side != 0) & new, label, -1)[rows]
 
 
-def pure_error(values: Array, time_s: Array, label: NDArray[np.intp], aside: Flags) -> PureError | None:
+def pure_error(
+    values: Array, time_s: Array, label: NDArray[np.intp], aside: Flags, place_mm: Array | None = None
+) -> PureError | None:
     """Estimate the scatter of repeats; None where too little repeats.
 
     Parameters
@@ -108,6 +113,8 @@ def pure_error(values: Array, time_s: Array, label: NDArray[np.intp], aside: Fla
         As `visits` gives it.
     aside : ndarray of bool, shape (n,)
         Values that do not count.
+    place_mm : ndarray of float, shape (n,), or None
+        Recorded input of each, by which places may drift apart; None to leave that out.
     """
     numbers, counts = np.unique(label[(label >= 0) & ~aside], return_counts=True)
     groups = [np.flatnonzero((label == number) & ~aside) for number in numbers[counts > 1]]
@@ -119,13 +126,22 @@ def pure_error(values: Array, time_s: Array, label: NDArray[np.intp], aside: Fla
     pooled = float(rest @ rest) / degrees
     trend = _trend_sigmas([values[group] for group in groups], pooled)
     rows = np.concatenate(groups)
-    straight = _without_trend(rest, groups, time_s)
+    straight, taken = _without_trend(rest, groups, time_s), TREND_DEGREE
+    if place_mm is not None and degrees - 3 * TREND_DEGREE >= FEWEST_DEGREES:
+        ends = np.cumsum([group.size for group in groups])[:-1]
+        left = float(straight @ straight) / (degrees - TREND_DEGREE)
+        if _trend_sigmas(np.split(straight, ends), left) > TREND_SIGMAS:
+            # Places that drift apart, as a gain does, or sides that do, as a play that runs in.
+            centred = (place_mm - place_mm.mean()) / max(float(np.ptp(place_mm)), 1e-300)
+            apart = _without_trend(rest, groups, time_s, centred, np.where(label % 2, 0.5, -0.5))
+            if float(apart @ apart) / (degrees - 3 * TREND_DEGREE) < APART * left:
+                straight, taken = apart, 3 * TREND_DEGREE
     if trend <= TREND_SIGMAS and degrees - TREND_DEGREE >= FEWEST_DEGREES:
         trend = max(trend, _drift_sigmas(rest, straight, rows))
-    if trend <= TREND_SIGMAS or degrees - TREND_DEGREE < FEWEST_DEGREES:
+    if trend <= TREND_SIGMAS or degrees - taken < FEWEST_DEGREES:
         return PureError(_without_gross_errors(rest, degrees), degrees, trend, _wandering(rest, rows))
-    sd_mm = _without_gross_errors(straight, degrees - TREND_DEGREE)
-    return PureError(sd_mm, degrees - TREND_DEGREE, trend, _wandering(straight, rows))
+    sd_mm = _without_gross_errors(straight, degrees - taken)
+    return PureError(sd_mm, degrees - taken, trend, _wandering(straight, rows))
 
 
 def _drift_sigmas(rest: Array, straight: Array, rows: NDArray[np.intp]) -> float:
@@ -145,10 +161,12 @@ def _drift_sigmas(rest: Array, straight: Array, rows: NDArray[np.intp]) -> float
     return sigmas if drifts < wanders else 0.0
 
 
-def _without_trend(rest: Array, groups: list[NDArray[np.intp]], time_s: Array) -> Array:
-    """Subtract from the repeats' residuals a polynomial in time that is common to all groups."""
+def _without_trend(rest: Array, groups: list[NDArray[np.intp]], time_s: Array, *shares: Array) -> Array:
+    """Take a polynomial in time out of what repeats leave, which all groups share; one more for each of `shares`."""
     at = np.concatenate([time_s[group] for group in groups])
     powers = np.vander((at - at.mean()) / max(float(np.ptp(at)), 1e-300), TREND_DEGREE + 1)[:, :-1]
+    own_rows = np.concatenate(groups)
+    powers = np.hstack([powers, *(powers * share[own_rows, None] for share in shares)])
     begin = 0
     for group in groups:
         own = slice(begin, begin + group.size)

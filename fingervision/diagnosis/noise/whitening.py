@@ -1,6 +1,6 @@
 """Whitening: correlated noise of unequal variance converted to unit white noise, by a Kalman filter (Kalman 1960)."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -126,6 +126,7 @@ class RunOffsets:
     scales_mm: tuple[float, ...]
     drawn: int = 0
     most_mm: float = np.inf
+    _metrics: dict[tuple[float, ...], Array] = field(default_factory=dict, init=False, repr=False)
 
     @classmethod
     def of(cls, whitener: Whitener) -> "RunOffsets":
@@ -147,10 +148,17 @@ class RunOffsets:
         return cls(design, design.T @ design, channels, runs, bool(free), scales, drawn, whitener.runs_scatter_mm)
 
     def metric(self, sigma_mm: tuple[float, ...]) -> Array:
-        """Return G: r^T r - (Z^T r)^T G (Z^T r) is the squared length with offsets of these spreads allowed."""
+        """Return G with r^T r - (Z^T r)^T G (Z^T r) the squared length once offsets of these spreads are allowed."""
+        known = self._metrics.get(sigma_mm)
+        if known is not None:
+            return known
         prior = [max(sigma_mm[channel], 1e-9) for channel in range(self.channels) for _ in range(self.runs)]
         prior += [MIDLINE_FREE_MM] * int(self.midline) + [1.0] * self.drawn
-        return np.asarray(np.linalg.inv(self.gram + np.diag(1.0 / np.array(prior) ** 2)), dtype=np.float64)
+        found = np.asarray(np.linalg.inv(self.gram + np.diag(1.0 / np.array(prior) ** 2)), dtype=np.float64)
+        # Spreads come from a grid, and with one run there is only one: the searches ask for the same again and again.
+        found.setflags(write=False)
+        self._metrics[sigma_mm] = found
+        return found
 
     def squared(self, whitened: Array, metric: Array) -> float:
         """Squared length of a whitened column with the offsets of a metric allowed."""

@@ -27,7 +27,7 @@ from fingervision.storage.toml_section import Section
 from fingervision.vision.circle_fit import Circle, NoCircleFitError, fit_circle
 from fingervision.vision.response_shift import edge_shift_px
 from fingervision.vision.straight_edge_fit import reach_px
-from fingervision.vision.template_search import BEYOND_PX, best_match
+from fingervision.vision.template_search import BEYOND_PX, Template
 
 KEYS = ("x_px", "y_px", "diameter_px", "reach_px", "polarity")
 QUANTITIES = (("x", "length"), ("y", "length"), ("diameter", "length"))
@@ -176,7 +176,7 @@ class FollowedCircle:
             places = half - template.shape[0] // 2 - ceil(reach / by)
             beyond = max(min(places, half - template.shape[0] // 2 - 1), 1)
             for tone in (1, -1) if sign == 0 else (sign,):
-                match = best_match(small, tone * template, beyond)
+                match = Template(tone * template).best_match(small, beyond)
                 if best is None or match.correlation > best[0].correlation:
                     best = (match, share)
         assert best is not None  # noqa: S101 - there are diameters to try

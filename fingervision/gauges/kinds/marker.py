@@ -15,7 +15,7 @@ from fingervision.gauges.status import GaugeStatus
 from fingervision.storage.toml_section import Section
 from fingervision.vision.symmetry_fit import BEYOND_PX as WINDOW_BEYOND_PX
 from fingervision.vision.symmetry_fit import NoSymmetryError, Symmetric, fit_symmetry
-from fingervision.vision.template_search import BEYOND_PX, best_match
+from fingervision.vision.template_search import BEYOND_PX, Template
 
 KEYS = ("x_px", "y_px", "size_px", "shape", "reach_px")
 QUANTITIES = (("x", "length"), ("y", "length"))
@@ -65,7 +65,7 @@ class FollowedMarker:
         self._spec = spec
         self._half = max(int(spec.size_px) // 2, 3)
         self._at = spec.middle_px
-        self._template: NDArray[np.float32] | None = None
+        self._template: Template | None = None
         self._times = 1.0
 
     def _zone(self) -> Mark:
@@ -126,7 +126,7 @@ class FollowedMarker:
         least = 2 * (self._half + BEYOND_PX) + 3
         if min(levels.shape) < least:
             return GaugeStatus.OUT_OF_VIEW, ""
-        match = best_match(levels.astype(np.float32), self._template)
+        match = self._template.best_match(levels.astype(np.float32))
         is_cut = levels.shape != (2 * half + 1, 2 * half + 1)
         if match.correlation < LEAST_CORRELATION:
             return (GaugeStatus.OUT_OF_VIEW if is_cut else GaugeStatus.NOT_FOUND), ""
@@ -178,9 +178,9 @@ class FollowedMarker:
         if own.shape != (2 * self._half + 1, 2 * self._half + 1):
             return GaugeStatus.OUT_OF_VIEW, ""
         levels, _ = picture.part(x - half, y - half, 2 * half + 1, 2 * half + 1)
-        template = own.astype(np.float32)
+        template = Template(own.astype(np.float32))
         if min(levels.shape) >= 2 * (self._half + BEYOND_PX) + 3:
-            match = best_match(levels.astype(np.float32), template)
+            match = template.best_match(levels.astype(np.float32))
             if not match.is_alone:
                 return GaugeStatus.AMBIGUOUS, "another mark like it lies within 1.5 reach_px"
         self._template = template

@@ -21,7 +21,7 @@ from fingervision.vision.patch_registration import (
     reference_covariance,
     register,
 )
-from fingervision.vision.template_search import BEYOND_PX, best_match, chance_correlation, high_pass_noise
+from fingervision.vision.template_search import BEYOND_PX, Template, chance_correlation, high_pass_noise
 
 KEYS = ("x_px", "y_px", "width_px", "height_px", "reach_px")
 QUANTITIES = (("shift_x", "length"), ("shift_y", "length"), ("rotation", "angle"))
@@ -75,7 +75,7 @@ class FollowedPatch:
         self.half = (max(int(spec.width_px) // 2, 4), max(int(spec.height_px) // 2, 4))
         self.reference: PatchReference | None = None
         self._around: Floats | None = None
-        self._template: Floats | None = None
+        self._template: Template | None = None
         self._template_turn = 0.0
         self._least_correlation, self._aliased_px = LEAST_CORRELATION, 0.0
         self._refused: Reading | None = None
@@ -152,12 +152,13 @@ class FollowedPatch:
         chance = chance_correlation(reference.template)
         if chance > MOST_BY_CHANCE:
             return self._never(GaugeStatus.LOW_CONTRAST, "its texture is too coarse for its size: enlarge it")
-        if not best_match(part[MARGIN_PX:-MARGIN_PX, MARGIN_PX:-MARGIN_PX], reference.template).is_alone:
+        template = Template(reference.template)
+        if not template.best_match(part[MARGIN_PX:-MARGIN_PX, MARGIN_PX:-MARGIN_PX]).is_alone:
             return self._never(GaugeStatus.AMBIGUOUS, "its pattern repeats within 1.5 reach_px: lower reach_px")
         self._least_correlation = max(LEAST_CORRELATION, chance)
         self._aliased_px = ALIASED_PX * min(max((reference.fine - FROM_FINE) / (TO_FINE - FROM_FINE), 0.0), 1.0)
         self.reference = reference
-        self._around, self._template = part, reference.template
+        self._around, self._template = part, template
         self._at = (float(column), float(row), 0.0)
         zero = (Shift((x, y), (x, y), 0.0, 0.0), Shift((x, y), (x, y), 0.5 * np.pi, 0.0), Angle((x, y), 0.0, 0.0, True))
         return Reading(GaugeStatus.OK, zero, (Mark(((x, y),)),), self._zone())
@@ -173,7 +174,7 @@ class FollowedPatch:
         )
         if levels.shape[0] < 2 * (b + BEYOND_PX) + 3 or levels.shape[1] < 2 * (a + BEYOND_PX) + 3:
             return self._failed(GaugeStatus.OUT_OF_VIEW)
-        match = best_match(levels.astype(np.float32), self._turned(turn))
+        match = self._turned(turn).best_match(levels.astype(np.float32))
         away = hypot(left + match.x_px - x, top + match.y_px - y)
         is_cut = levels.shape != (2 * (b + reach) + 1, 2 * (a + reach) + 1)
         if match.correlation < 0.8 * self._least_correlation or away > self._spec.reach_px * self._times + 1.0:
@@ -187,8 +188,8 @@ class FollowedPatch:
         part = _padded(picture, *corner, 2 * (a + more) + 1, 2 * (b + more) + 1)
         return part, corner, np.array([left + match.x_px, top + match.y_px, turn])
 
-    def _turned(self, turn: float) -> Floats:
-        """The template, rotated as the patch was in the previous frame."""
+    def _turned(self, turn: float) -> Template:
+        """The template, turned as the patch was in the last frame."""
         assert self._template is not None  # noqa: S101 - there is a reference
         assert self._around is not None  # noqa: S101 - likewise
         if abs(turn - self._template_turn) > TURN_AT:
@@ -200,7 +201,7 @@ class FollowedPatch:
                 borderMode=cv2.BORDER_REFLECT_101,
             )  # fmt: skip
             row, column = int(middle[1]), int(middle[0])
-            self._template = np.ascontiguousarray(turned[row - b : row + b + 1, column - a : column + a + 1])
+            self._template = Template(np.ascontiguousarray(turned[row - b : row + b + 1, column - a : column + a + 1]))
             self._template_turn = turn
         return self._template
 
