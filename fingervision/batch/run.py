@@ -98,10 +98,7 @@ class Batch:
 
     @property
     def exit_code(self) -> ExitCode:
-        """0 all done; 3 done, but some inputs were bad; 1 stopped or none done.
-
-        2 all failed by the same wrong usage.
-        """
+        """0 all done; 3 done, but some inputs were bad; 1 stopped or none done; 2 wrong usage in all inputs."""
         codes = {outcome.exit_code for outcome in self.outcomes}
         if self.stopped:
             return ExitCode.COULD_NOT

@@ -150,14 +150,14 @@ def _picture(seen: Seen, zero_mm: float) -> bytes:
 
 
 def draw_beforehand(view: View) -> None:
-    """Draw the picture that the next messages will ask for; not while measuring lags."""
+    """Draw the picture that the next messages will need, unless the measurement lags behind."""
     seen = view.seen
     if seen is not None and not view.in_a_hurry:
         _PICTURES.of(seen, view.choices.zero_mm)
 
 
 def is_short(view: View, known: Known) -> bool:
-    """Whether the next message takes but a moment: few rows, and no model that has to be asked."""
+    """Whether the next message is quickly composed: few rows, and no model to evaluate."""
     return (
         known.identity == view.identity
         and view.row_count - known.rows < ROWS_IN_A_MOMENT
@@ -166,7 +166,7 @@ def is_short(view: View, known: Known) -> bool:
 
 
 def state_has_changed() -> None:
-    """Tell the next messages to ask the view for its state anew: a command was obeyed."""
+    """Make the next messages read the view's state again, after a command was executed."""
     _STATES.forget()
 
 
@@ -186,7 +186,7 @@ class _Pictures:
 
 
 class _States:
-    """What every page is told of a view, put together once for all pages that ask at about the same time."""
+    """State of a view, composed once for all pages that request it at about the same time."""
 
     def __init__(self) -> None:
         self._lock = Lock()

@@ -18,11 +18,11 @@ class View(Protocol):
     Attributes
     ----------
     out : Path
-        Folder for what the user keeps.
+        Folder for files that the user saves.
     choices : Choices
-        What the user chose.
+        Settings that the user chose.
     features : dict
-        What stands beside the measurement (a model, a bed), by name; commands of that concern find it there.
+        Additions to the measurement (a model, a bed) by name, where the commands of that topic find them.
     """
 
     out: Path

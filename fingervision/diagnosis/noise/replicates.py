@@ -19,7 +19,7 @@ TREND_DEGREE = 3
 cycles."""
 APART = 0.25
 """Share of the scatter's power that may be left once places or sides drift apart, for that to be believed: nine
-coefficients are many for a few dozen repeats, and without them the noise comes out too large by a factor of 2 at most."""
+coefficients are many for a few dozen repeats, and without them the noise is too large by a factor of 2 at most."""
 OFF_GRID = 0.02
 """Steps by which a difference may miss a multiple of the smallest one: the last digits that are written are rounded."""
 BY_ACCIDENT = 1e-3
@@ -162,7 +162,7 @@ def _drift_sigmas(rest: Array, straight: Array, rows: NDArray[np.intp]) -> float
 
 
 def _without_trend(rest: Array, groups: list[NDArray[np.intp]], time_s: Array, *shares: Array) -> Array:
-    """Take a polynomial in time out of what repeats leave, which all groups share; one more for each of `shares`."""
+    """Subtract from the repeats' residuals a polynomial in time common to all groups, and one for each of `shares`."""
     at = np.concatenate([time_s[group] for group in groups])
     powers = np.vander((at - at.mean()) / max(float(np.ptp(at)), 1e-300), TREND_DEGREE + 1)[:, :-1]
     own_rows = np.concatenate(groups)

@@ -22,7 +22,7 @@ class Controls:
     stopped, paused : bool
         Whether the run shall end, or wait.
     halted : bool
-        Whether a pause has stopped the motor since somebody last set it to False.
+        Whether a pause has stopped the motor since the flag was last set to False.
     """
 
     def __init__(self) -> None:
