@@ -22,7 +22,7 @@ def choices_of(
 
     Raises
     ------
-    FingervisionError
+    DataError, InputFileError
         The calibration cannot be read.
     UsageError
         An option makes no sense.

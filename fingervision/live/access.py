@@ -58,7 +58,7 @@ def access(host: str, port: int, password_file: Path | None, certificate: Path |
     ------
     UsageError
         It would be reached from beyond this machine without a password, or only half of what TLS needs is there.
-    FingervisionError
+    DataError, InputFileError
         A file cannot be read, or the password is too short.
     """
     if (certificate is None) != (key is None):

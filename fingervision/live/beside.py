@@ -48,8 +48,10 @@ def stand_beside(session: Session, beside: Beside) -> None:
 
     Raises
     ------
+    DataError
+        The log has fewer than two rows.
     FingervisionError
-        The model or the log cannot be read.
+        The model or the log cannot be read, or the gauges are not for these frames.
     """
     model, bench = beside.model, session.capture.source
     if beside.gauges is not None:

@@ -83,7 +83,7 @@ class Choices:
         ------
         UsageError
             The region lies outside the frame, or the height is not positive.
-        FingervisionError
+        DataError
             The scale is for other frames.
         """
         width_px, height_px = description.width_px, description.height_px

@@ -125,7 +125,7 @@ def put_live_gauges(session: Session, path: Path, *, is_asked_for: bool = False)
 
     Raises
     ------
-    FingervisionError
+    DataError, InputFileError
         The file exists and cannot be meant for these frames.
     """
     description = session.description

@@ -16,7 +16,7 @@ def opened(name: str, wish: Wish) -> Capture:
 
     Raises
     ------
-    FingervisionError
+    DataError, DeviceError, InputFileError
         It cannot be opened.
     UsageError
         It is asked for what only a camera of this machine can do.

@@ -24,7 +24,7 @@ def kept_token(out: Path, file_name: str = FILE) -> str:
 
     Raises
     ------
-    FingervisionError
+    OutputError
         The folder cannot be written.
     """
     path = out / file_name

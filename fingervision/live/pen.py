@@ -23,7 +23,7 @@ class Pen:
 
         Raises
         ------
-        FingervisionError
+        StateError
             Another page has it.
         """
         if not self.may_write(page):

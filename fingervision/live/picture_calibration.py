@@ -34,7 +34,7 @@ def calibrated(frame: Frame, region: Region, kind: str, size_mm: float, u_size_m
 
     Raises
     ------
-    FingervisionError
+    NoCalibrationError
         There is no such reference there.
     """
     try:

@@ -57,7 +57,7 @@ class Recorder:
 
         Raises
         ------
-        FingervisionError
+        OutputError
             The run could not be written to its end.
         """
         if not self.failure:

@@ -96,8 +96,10 @@ def run(capture: Capture, choices: Choices, out: Path, showing: Showing, beside:
 
     Raises
     ------
+    DeviceError
+        Nothing could be measured to the end.
     FingervisionError
-        The scale is for other frames, the port is in use, or nothing could be measured to the end.
+        The scale is for other frames, or the port is in use.
     """
     try:
         session = Session(capture, choices, out)

@@ -15,7 +15,7 @@ def save_gaps(view: View) -> Path:
 
     Raises
     ------
-    FingervisionError
+    OutputError
         The file cannot be written.
     """
     if view.table is not None:

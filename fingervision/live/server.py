@@ -41,7 +41,7 @@ def bound(host: str, port: int) -> socket.socket:
 
     Raises
     ------
-    FingervisionError
+    ProcessError, UsageError
         The port is in use, or the address is not of this machine.
     """
     try:

@@ -152,7 +152,7 @@ class Session:
 
         Raises
         ------
-        FingervisionError
+        StateError
             It cannot be meant for these frames, or would change a recording under way.
         """
         with self._lock:
@@ -169,8 +169,10 @@ class Session:
 
         Raises
         ------
-        FingervisionError
-            There is one already, the scale is not known, or the folder cannot be written.
+        StateError
+            There is one already, the source has ended, or the scale is not known.
+        OutputError
+            The folder cannot be written.
         """
         with self._lock:
             task = self.choices.task
@@ -200,7 +202,7 @@ class Session:
 
         Raises
         ------
-        FingervisionError
+        StateError
             There is none, or it could not be written to its end.
         """
         with self._lock:

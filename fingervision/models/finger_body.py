@@ -48,7 +48,7 @@ _LEAST_NODES = 6
 _FOLLOWED = 12
 """Nearest nodes of the mesh that a node of the bars follows."""
 _STIFF = 1e-3
-"""Compliance of a follower's tie, relative to that of a square of the finger's width: it carries contact forces only."""
+"""Compliance of a follower's tie, relative to that of a square of the finger's width: only contact forces pass it."""
 _PLANAR = np.ix_([0, 1, 5], [0, 1, 5])
 _MOST_KEPT = 32
 _UNIT = Material("unit", 1.0, 0.3, 1.0, 1.0)
@@ -94,7 +94,7 @@ def finger_body(gripper: Gripper, skeleton: Skeleton) -> FingerBody:
 
     Raises
     ------
-    FingervisionError
+    DataError, ModelError
         Where the hinges do not cut it from the rest.
     """
     members = skeleton.members

@@ -72,7 +72,7 @@ def check_uncertainties(gripper: Gripper) -> None:
 
     Raises
     ------
-    FingervisionError
+    DataError, ModelError
         Where one standard uncertainty either way leaves no gripper.
     """
     for name, estimate in _numbers(gripper).items():

@@ -35,7 +35,7 @@ def large_equilibrium(body: DrivenBody, input_mm: float, start: Equilibrium, *, 
 
     Raises
     ------
-    FingervisionError
+    ModelError
         Where the iteration does not settle.
     """
     moved = start.displacement_mm + (input_mm - start.input_mm) * body.unit_displacement_mm

@@ -113,7 +113,7 @@ def sweep_answers(gripper: Gripper, variations: Sequence[Variation], theory: Hin
 
     Raises
     ------
-    FingervisionError
+    DataError, ModelError, UsageError
         Where a corner of the grid is no gripper, or the grid is too large.
     """
     grid = list(product(*(variation.values for variation in variations)))
@@ -166,7 +166,7 @@ def mechanism_sweep_answers(
 
     Raises
     ------
-    FingervisionError
+    DataError, ModelError, UsageError
         Where a variant is no mechanism, or the grid is too large.
     """
     grid = list(product(*(variation.values for variation in variations)))

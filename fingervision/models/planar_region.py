@@ -83,7 +83,7 @@ class PlanarRegion:
 
         Raises
         ------
-        FingervisionError
+        DataError
             Where two parts of it touch in a point, so that the body is not defined there.
         """
         curves = [curve for _, shape in self.steps for curve in shape.curves()]

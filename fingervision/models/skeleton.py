@@ -159,7 +159,7 @@ def skeleton_of(
 
     Raises
     ------
-    FingervisionError
+    DataError, ModelError
         Where the members do not follow each other.
     """
     links, lever = gripper.links, gripper.lever

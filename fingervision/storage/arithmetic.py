@@ -38,7 +38,7 @@ def number(raw: Any, names: Mapping[str, float], what: str) -> float:
 
     Raises
     ------
-    FingervisionError
+    DataError
         Where it is no finite number of a sensible size, or uses what is not known.
     """
     if isinstance(raw, str):

@@ -60,7 +60,7 @@ def add_channels(gaps: Path, poses: Sequence[FramePoses], names: Mapping[str, st
 
     Raises
     ------
-    FingervisionError
+    DataError
         The table is of another recording.
     """
     with gaps.open(encoding="utf-8", newline="") as file:

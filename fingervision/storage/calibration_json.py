@@ -32,7 +32,7 @@ def write_calibration(calibration: Calibration, path: Path) -> None:
 
     Raises
     ------
-    FingervisionError
+    OutputError
         The file cannot be written.
     """
     limits = {
@@ -104,7 +104,7 @@ def read_calibration(path: Path) -> Calibration:
 
     Raises
     ------
-    FingervisionError
+    DataError, InputFileError
         There is no such file, it is from a newer schema, or it makes no sense.
     """
     try:

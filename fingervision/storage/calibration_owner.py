@@ -14,7 +14,7 @@ def refuse_foreign(out: Path) -> None:
 
     Raises
     ------
-    FingervisionError
+    OutputError
         Something else stands there.
     """
     if not out.exists():
@@ -32,7 +32,7 @@ def write_picture(out: Path, name: str, picture: NDArray[np.uint8]) -> None:
 
     Raises
     ------
-    FingervisionError
+    OutputError
         It cannot be written.
     """
     import cv2

@@ -21,7 +21,7 @@ def read_columns(path: Path, required: tuple[str, ...], known: tuple[str, ...]) 
 
     Raises
     ------
-    FingervisionError
+    DataError, InputFileError
         The file cannot be read, is no table, or a required column is missing: with the nearest name found.
     """
     text = _text(path)
@@ -60,7 +60,7 @@ def header_of(path: Path) -> list[str]:
 
     Raises
     ------
-    FingervisionError
+    DataError, InputFileError
         The file cannot be read.
     """
     header = next(_reader(path, _text(path)), None)
@@ -98,7 +98,7 @@ def read_block(path: Path) -> dict[str, NDArray[np.float64]] | None:
 
     Raises
     ------
-    FingervisionError
+    DataError, InputFileError
         The file cannot be read.
     """
     lines = _text(path).splitlines()

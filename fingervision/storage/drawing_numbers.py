@@ -36,7 +36,7 @@ def bare_tables(tables: Mapping[str, Any], origin: str) -> tuple[dict[str, Any],
 
     Raises
     ------
-    FingervisionError
+    DataError
         Where an uncertainty is no positive number, or belongs to a list.
     """
     bare = copy.deepcopy(dict(tables))
@@ -76,7 +76,7 @@ def changed_tables(
 
     Raises
     ------
-    FingervisionError
+    DataError
         Where a name is that of no number.
     """
     changed = copy.deepcopy(dict(tables))

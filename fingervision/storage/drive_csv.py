@@ -23,7 +23,7 @@ def read_drive(path: Path) -> DriveHistory:
 
     Raises
     ------
-    FingervisionError
+    DataError, InputFileError
         The file cannot be read, a column is missing, a cell is no number, times do not increase, or a run comes back
         after another.
     """
@@ -70,7 +70,7 @@ def drive_rows(
 
     Raises
     ------
-    FingervisionError
+    DataError
         Times do not increase, or a run comes back after another.
     """
     times = values["time_s"]

@@ -23,7 +23,7 @@ def read_gap_readings(path: Path, by_input: bool) -> dict[float | None, list[flo
 
     Raises
     ------
-    FingervisionError
+    DataError, InputFileError
         The file cannot be read or holds no gaps.
     """
     readings: dict[float | None, list[float]] = {}

@@ -178,7 +178,7 @@ def with_drive(path: Path, state: Callable[[float], Driven | None], *, has_force
 
     Raises
     ------
-    FingervisionError
+    OutputError
         The table cannot be read or written again; the old one stays.
     """
     part = path.with_name(f".{path.name}.part")

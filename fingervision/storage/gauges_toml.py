@@ -22,7 +22,7 @@ def text_of(path: Path) -> str | None:
 
     Raises
     ------
-    FingervisionError
+    DataError, InputFileError
         It cannot be read.
     """
     try:
@@ -95,7 +95,7 @@ def write_gauges_text(path: Path, text: str) -> None:
 
     Raises
     ------
-    FingervisionError
+    OutputError
         It cannot be written; what was there stays.
     """
     part = path.with_name(f".{path.name}.part")

@@ -30,7 +30,7 @@ def mechanism_from_gripper(tables: Mapping[str, Any], path: Path) -> Mechanism:
 
     Raises
     ------
-    FingervisionError
+    DataError, InputFileError
         Where a key is unknown, a number is no number, or the drawing cannot be a mechanism.
     """
     origin = str(path)

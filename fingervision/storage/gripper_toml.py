@@ -54,7 +54,7 @@ def read_gripper(path: Path) -> Gripper:
 
     Raises
     ------
-    FingervisionError
+    DataError, InputFileError
         The file cannot be read, a key is missing, unknown or no number, or the drawing cannot be a gripper.
     """
     try:

@@ -70,7 +70,7 @@ def read_iso230_table(path: Path) -> Iso230Rows | None:
 
     Raises
     ------
-    FingervisionError
+    DataError
         In a sentence: columns missing, words that are no direction, a reading that stands twice, deviations under the
         name of positions or the other way round.
     """
@@ -96,7 +96,7 @@ def iso230_rows(
 
     Raises
     ------
-    FingervisionError
+    DataError
         As `read_iso230_table`.
     """
     blocks = {name: match for name in header if (match := MATRIX.fullmatch(name)) is not None}

@@ -78,7 +78,7 @@ def lost_frames(files: Sequence[Path]) -> tuple[LostFrame, ...]:
 
     Raises
     ------
-    FingervisionError
+    DataError, InputFileError
         There should be a table, and it is not there or cannot be read.
     """
     if len(files) != 1:

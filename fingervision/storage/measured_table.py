@@ -29,7 +29,7 @@ def read_measured_table(path: Path) -> MeasuredTable:
 
     Raises
     ------
-    FingervisionError
+    DataError, InputFileError
         In a sentence: columns missing, cells that are no numbers, fewer than five rows, an input or a gap that
         never changes, times that repeat within a run.
     """
@@ -84,7 +84,7 @@ def measured_rows(
 
     Raises
     ------
-    FingervisionError
+    DataError
         As `read_measured_table`.
     """
     values = dict(values)

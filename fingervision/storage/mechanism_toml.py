@@ -77,7 +77,7 @@ class MechanismDrawing:
 
         Raises
         ------
-        FingervisionError
+        DataError, InputFileError
             A number is unknown, or the drawing cannot be a mechanism.
         """
         tables = changed_tables(self.tables, changes, str(self.path), absolute=absolute) if changes else self.tables
@@ -104,7 +104,7 @@ def read_drawing(path: Path) -> MechanismDrawing:
 
     Raises
     ------
-    FingervisionError
+    DataError, InputFileError
         The file cannot be read, or states an uncertainty that is none.
     """
     try:
@@ -121,7 +121,7 @@ def read_mechanism(path: Path) -> Mechanism:
 
     Raises
     ------
-    FingervisionError
+    DataError, InputFileError
         The file cannot be read, a key is missing, unknown or no number, or the drawing cannot be a mechanism.
     """
     return read_drawing(path).mechanism()

@@ -53,7 +53,7 @@ def read_model(
 
     Raises
     ------
-    FingervisionError
+    DataError, InputFileError, ModelError, UsageError
         The file is neither, or its base is missing.
     """
     if path.suffix.lower() in SUFFIXES:

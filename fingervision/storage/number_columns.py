@@ -41,7 +41,7 @@ def numbers_in(path: Path, name: str, cells: Sequence[str]) -> Numbers:
 
     Raises
     ------
-    FingervisionError
+    DataError
         A cell is no finite number; the first is named with its data row.
     """
     try:

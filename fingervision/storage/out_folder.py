@@ -13,7 +13,7 @@ def out_folder(path: Path) -> Iterator[None]:
 
     Raises
     ------
-    FingervisionError
+    OutputError
         It cannot be made or written.
     """
     try:

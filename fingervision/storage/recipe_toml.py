@@ -16,7 +16,7 @@ def read_recipe(path: Path) -> Recipe[Section]:
 
     Raises
     ------
-    FingervisionError
+    DataError, InputFileError
         There is no such file, it is no TOML, it is from a newer schema, it has no step, or a key is unknown.
     """
     document, text = read_document(path, "recipe")

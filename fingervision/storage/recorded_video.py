@@ -68,7 +68,7 @@ class RecordedVideo:
 
         Raises
         ------
-        FingervisionError
+        OutputError
             The file cannot be written.
         """
         self._begin(item, packets)

@@ -23,7 +23,7 @@ def response_named(name: str) -> CameraResponse | None:
     ------
     UsageError
         It is neither.
-    FingervisionError
+    DataError
         The file is no response.
     """
     if name == "auto":
@@ -43,7 +43,7 @@ def read_response(path: Path) -> CameraResponse:
 
     Raises
     ------
-    FingervisionError
+    DataError, InputFileError
         The file cannot be read, or is no response.
     """
     try:
@@ -79,7 +79,7 @@ def write_response(response: CameraResponse, path: Path) -> None:
 
     Raises
     ------
-    FingervisionError
+    OutputError
         The file cannot be written.
     """
     top = response.top_level or 255

@@ -52,7 +52,7 @@ def mark_owner(out: Path, source: Path) -> None:
 
     Raises
     ------
-    FingervisionError
+    OutputError
         The folder cannot be written.
     """
     with out_folder(out):
@@ -65,7 +65,7 @@ def began_in(out: Path) -> int | None:
 
     Raises
     ------
-    FingervisionError
+    OutputError
         The folder cannot be written.
     """
     if _owner(out) is None:
@@ -94,7 +94,7 @@ def finish_in(out: Path, source: Path, names: Iterable[str], began_ns: int | Non
 
     Raises
     ------
-    FingervisionError
+    OutputError
         The folder cannot be written.
     """
     mark_owner(out, source)

@@ -13,7 +13,7 @@ def sample_folder() -> Path:
 
     Raises
     ------
-    FingervisionError
+    InstallationError
         The installation lacks them.
     """
     package = Path(fingervision.__file__).parent

@@ -111,7 +111,7 @@ def read_samples(path: Path) -> list[SampleRow]:
 
     Raises
     ------
-    FingervisionError
+    DataError
         The file is not one of a run on the bed.
     """
     try:

@@ -34,7 +34,7 @@ def read_settings(path: Path) -> dict[str, Any]:
 
     Raises
     ------
-    FingervisionError
+    DataError, InputFileError
         It cannot be read, or a key is unknown or has no such value.
     """
     values, text = read_document(path, "settings")
@@ -80,7 +80,7 @@ def write_settings(path: Path, settings: Mapping[str, Any]) -> None:
 
     Raises
     ------
-    FingervisionError
+    OutputError
         It cannot be written.
     """
     lines = [

@@ -26,7 +26,7 @@ def read_sn_line(raw: Any, name: str, origin: str) -> SNLine:
 
     Raises
     ------
-    FingervisionError
+    DataError
         Where it is no falling line of positive amplitudes over rising cycles.
     """
     what = f"{name} in {origin}"

@@ -38,7 +38,7 @@ def read_steps(path: Path) -> StepData:
 
     Raises
     ------
-    FingervisionError
+    DataError, InputFileError
         The file cannot be read, or a value in it cannot be meant; the sentence names the line.
     """
     values, text = read_document(path, "step data")

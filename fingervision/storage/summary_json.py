@@ -24,7 +24,7 @@ def write_summary(path: Path, summary: Mapping[str, Any]) -> None:
 
     Raises
     ------
-    FingervisionError
+    OutputError
         The file cannot be written.
     """
     part = path.with_name(f".{path.name}.part")

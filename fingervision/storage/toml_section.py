@@ -30,7 +30,7 @@ def read_document(path: Path, what: str) -> tuple[dict[str, Any], str]:
 
     Raises
     ------
-    FingervisionError
+    DataError, InputFileError
         There is no such file, or it is not TOML.
     """
     try:

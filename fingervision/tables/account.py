@@ -138,7 +138,7 @@ def account(path: Path, kind: str | None, given: Mapping[str, Entry]) -> Account
 
     Raises
     ------
-    FingervisionError
+    DataError, InputFileError, OpenQuestionError
         No table can be read at all.
     """
     kinds = KINDS if kind is None else (kind,)

@@ -36,7 +36,7 @@ def decode(content: bytes, given: str | None = None) -> tuple[str, str]:
 
     Raises
     ------
-    FingervisionError
+    DataError
         The stated encoding does not fit, or none does.
     """
     if given is not None:

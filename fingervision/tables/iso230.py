@@ -60,7 +60,7 @@ def iso230_rows_of(raw: RawTable, given: Entry) -> Iso230Rows | None:
 
     Raises
     ------
-    FingervisionError
+    DataError
         As `storage.iso230_table.read_iso230_table`.
     OpenQuestionError
         A unit is open, or whether the readings are positions or deviations.

@@ -87,7 +87,7 @@ def entry_for(table: Path, kind: str | None, columns: Path | None = None) -> Ent
 
     Raises
     ------
-    FingervisionError
+    DataError, InputFileError
         The named file is not there, or a key is wrong.
     """
     path = columns if columns is not None else table.parent / NAME
@@ -140,7 +140,7 @@ def entry_of_settings(settings: Sequence[str], source: Path) -> Entry:
 
     Raises
     ------
-    FingervisionError
+    DataError
         One is no key, or has no value.
     """
     document: dict[str, Any] = {}
@@ -193,7 +193,7 @@ def write_entry(path: Path, table: str, kind: str | None, entry: Entry) -> bool:
 
     Raises
     ------
-    FingervisionError
+    OutputError
         It cannot be read or written.
     """
     block = entry_text(table, kind, entry)

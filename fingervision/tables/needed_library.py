@@ -21,7 +21,7 @@ def needed_library(name: str, path: Path, what: str) -> Any:
 
     Raises
     ------
-    FingervisionError
+    MissingLibraryError
         It is not installed.
     """
     try:

@@ -25,7 +25,7 @@ def chosen_part(path: Path, names: Mapping[str, Sequence[str]], given: Entry, wh
 
     Raises
     ------
-    FingervisionError
+    DataError
         There is none, or not the stated one.
     OpenQuestionError
         Several may be meant.

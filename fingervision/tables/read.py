@@ -34,7 +34,7 @@ def read_measured_table(path: Path, columns: Path | None = None) -> MeasuredTabl
 
     Raises
     ------
-    FingervisionError
+    DataError, InputFileError
         It cannot be read, or not be worked with.
     OpenQuestionError
         It can be read in more than one way.
@@ -67,7 +67,7 @@ def read_drive(path: Path, columns: Path | None = None) -> DriveHistory:
 
     Raises
     ------
-    FingervisionError
+    DataError, InputFileError
         It cannot be read, or not be worked with.
     OpenQuestionError
         It can be read in more than one way.
@@ -124,7 +124,7 @@ def read_simulation_table(path: Path, columns: Path | None = None) -> TableModel
 
     Raises
     ------
-    FingervisionError
+    DataError, InputFileError
         It cannot be read, or not be worked with.
     OpenQuestionError
         It can be read in more than one way.
@@ -163,7 +163,7 @@ def read_model(path: Path, kind: str = "lumped", columns: Path | None = None) ->
 
     Raises
     ------
-    FingervisionError
+    DataError, InputFileError, ModelError, UsageError
         As `storage.model_toml.read_model` and `read_simulation_table`.
     """
     reader: Callable[[Path], TableModel] = partial(read_simulation_table, columns=columns)

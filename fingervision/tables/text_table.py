@@ -44,7 +44,7 @@ def table_of_lines(path: Path, lines: Sequence[str], given: Entry, encoding: str
 
     Raises
     ------
-    FingervisionError
+    DataError
         There is no table, or too many rows are none.
     OpenQuestionError
         A mark may be a decimal comma or set thousands apart.

@@ -112,7 +112,7 @@ def understand(raw: RawTable, kind: str, given: Entry) -> Understood:
 
     Raises
     ------
-    FingervisionError
+    DataError
         What the user has decided does not fit the table.
     """
     about = Findings(notes=list(raw.notes), left_out=list(raw.left_out))

@@ -70,7 +70,7 @@ def factor(text: str, dimension: str) -> float | None:
 
     Raises
     ------
-    FingervisionError
+    InstallationError
         The pint library is not there.
     """
     try:

@@ -31,7 +31,7 @@ def guarded(build: Callable[[], Any], protocol: type, who: str, origin: Origin) 
 
     Raises
     ------
-    FingervisionError
+    PluginShapeError
         It could not be built, or is not what the protocol asks for; it is closed then.
     """
     try:

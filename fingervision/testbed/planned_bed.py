@@ -68,7 +68,7 @@ def planned_bed(name: str) -> PlannedBed:
 
     Raises
     ------
-    FingervisionError
+    DataError, InputFileError, UsageError
         The configuration makes no sense, or its kind of actuator says nothing about itself without its hardware.
     """
     top = read_configuration(name)

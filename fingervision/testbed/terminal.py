@@ -37,7 +37,7 @@ class Terminal:
 
         Raises
         ------
-        FingervisionError
+        StateError
             The run was stopped while the question stood.
         """
         # Before the words are seen: an answer may come at once.

@@ -24,7 +24,7 @@ def opened_bed(name: str, hide: tuple[str, ...], choices: Choices) -> tuple[Capt
 
     Raises
     ------
-    FingervisionError
+    DataError, InputFileError, UsageError
         It cannot be opened, or has neither camera nor scale.
     """
     hidden = hidden_from(hide)

@@ -41,7 +41,7 @@ def obey(view: View, request: Request) -> Answer:
 
     Raises
     ------
-    FingervisionError
+    UsageError
         It cannot be done, or is nothing that can be asked.
     """
     name = request.get("do")

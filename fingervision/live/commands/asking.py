@@ -43,7 +43,7 @@ def seen_of(view: View) -> Seen:
 
     Raises
     ------
-    FingervisionError
+    StateError
         There is none yet.
     """
     if view.seen is None:

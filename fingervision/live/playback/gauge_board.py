@@ -103,7 +103,7 @@ class GaugeBoard:
 
         Raises
         ------
-        FingervisionError
+        DataError, InputFileError
             It cannot be read, or holds what cannot be meant for these frames; the gauges then stay as they are.
         """
         before = text_of(self.path)
@@ -133,7 +133,7 @@ class GaugeBoard:
         ------
         ChangedMeanwhileError
             Somebody else has.
-        FingervisionError
+        DataError, InputFileError, OutputError
             There is no gauge, or the file cannot be written; what was there stays.
         """
         with self._lock:
@@ -162,7 +162,7 @@ class GaugeBoard:
 
         Raises
         ------
-        FingervisionError
+        DataError, FieldError, StateError
             A value cannot be meant; a `FieldError` says in which key.
         """
         with self._lock:
@@ -183,7 +183,7 @@ class GaugeBoard:
 
         Raises
         ------
-        FingervisionError
+        DataError, FieldError, StateError
             There is no such gauge, or a value cannot be meant; the gauge then stays as it was.
         """
         with self._lock:
@@ -200,7 +200,7 @@ class GaugeBoard:
 
         Raises
         ------
-        FingervisionError
+        StateError
             There is none of that name.
         """
         with self._lock:

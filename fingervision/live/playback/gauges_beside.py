@@ -61,7 +61,7 @@ def put_gauges_beside(playback: Playback, path: Path, *, is_asked_for: bool = Fa
 
     Raises
     ------
-    FingervisionError
+    DataError, InputFileError
         The file exists and cannot be meant for these frames.
     """
     description = playback.description

@@ -99,7 +99,7 @@ class Playback:
 
         Raises
         ------
-        FingervisionError
+        LimitError
             No recording is played so fast or slow.
         """
         if not SPEEDS[0] <= speed <= SPEEDS[1]:
@@ -117,7 +117,7 @@ class Playback:
 
         Raises
         ------
-        FingervisionError
+        LimitError
             It is no range of this recording.
         """
         if first is None or last is None:
@@ -134,7 +134,7 @@ class Playback:
 
         Raises
         ------
-        FingervisionError
+        DataError, UsageError
             It cannot be meant for these frames.
         """
         chosen, unzeroed = self.choices.changed(**changes)

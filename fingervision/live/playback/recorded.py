@@ -63,7 +63,7 @@ def recorded(name: str, rate_hz: float | None, choices: Choices, drive: tuple[st
 
     Raises
     ------
-    FingervisionError
+    DataError, InputFileError, UsageError
         It cannot be opened, or the run's folder has no video.
     """
     path = Path(name)

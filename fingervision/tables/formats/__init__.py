@@ -58,7 +58,7 @@ def read_raw(path: Path, given: Entry) -> RawTable:
 
     Raises
     ------
-    FingervisionError
+    DataError, InputFileError
         The file cannot be read, or holds no table.
     """
     if path.exists() and not path.is_file():

@@ -33,7 +33,7 @@ def read_apart(name: str, path: Path, given: Entry) -> RawTable:
 
     Raises
     ------
-    FingervisionError
+    DataError
         The file cannot be read, or its reader crashed.
     OpenQuestionError
         As the format's reader.

@@ -75,7 +75,7 @@ def move(bed: Bed, to_mm: float, speed_mm_s: float, looking: Looking | None = No
 
     Raises
     ------
-    FingervisionError
+    DeviceError, LimitError, StateError
         The target or the speed is beyond a limit (nothing was moved), or the motion was broken off.
     """
     limits = bed.limits

@@ -25,7 +25,7 @@ def draw_steps(path: Path, name: str, motions: Sequence[PlannedMotion], limits: 
 
     Raises
     ------
-    FingervisionError
+    OutputError
         The picture cannot be written.
     """
     figure = Figure(figsize=SIZE_INCHES, layout="constrained")

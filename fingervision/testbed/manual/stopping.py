@@ -22,7 +22,7 @@ def stop_bed(name: str) -> str:
 
     Raises
     ------
-    FingervisionError
+    DataError, DeviceError, InputFileError, UsageError
         The bed cannot be opened, or the other process does not let go of it.
     """
     if name == SIMULATED:

@@ -11,7 +11,7 @@ def check_move(limits: StageLimits, to_mm: float, speed_mm_s: float) -> None:
 
     Raises
     ------
-    FingervisionError
+    LimitError
         The sentence says the limit and what was asked for.
     """
     if not limits.lower_mm <= to_mm <= limits.upper_mm:
@@ -29,7 +29,7 @@ def check_speed(limits: StageLimits, speed_mm_s: float) -> None:
 
     Raises
     ------
-    FingervisionError
+    LimitError
         The sentence says the limit and what was asked for.
     """
     if not 0.0 <= speed_mm_s <= limits.speed_mm_s:

@@ -54,7 +54,7 @@ def planned(number: int, step: Step, from_mm: float, limits: StageLimits) -> Pla
 
     Raises
     ------
-    FingervisionError
+    LimitError
         The motion leaves the stroke, is faster than the stage, or needs more force; the sentence says which and by how
         much, and for a time that is too short the shortest.
     """
@@ -120,7 +120,7 @@ def planned_sequence(data: StepData, limits: StageLimits, from_mm: float | None 
 
     Raises
     ------
-    FingervisionError
+    LimitError
         A motion cannot be done.
     """
     motions: list[PlannedMotion] = []

@@ -46,7 +46,7 @@ def route(
 
     Raises
     ------
-    FingervisionError
+    LimitError
         No blocks lead there, or only faster ones.
     """
     if at_mm is not None and abs(to_mm - at_mm) <= SAME_MM:
@@ -103,7 +103,7 @@ def jog_step(steps: Mapping[int, Step], speed_mm_s: float, top_speed_mm_s: float
 
     Raises
     ------
-    FingervisionError
+    LimitError
         There is none.
     """
     speeds = {

@@ -69,7 +69,7 @@ def plan(
 
     Raises
     ------
-    FingervisionError
+    DataError
         A step is beyond a limit, or makes no sense: which line, and by how much.
     """
     if recipe.below_force_n > limits.force_n:
@@ -109,7 +109,7 @@ def timed_segments(
 
     Raises
     ------
-    FingervisionError
+    DataError
         The step makes no sense by itself.
     """
     for act, key in kind_of(section).acts(section, at_mm):

@@ -14,7 +14,7 @@ def check_moves(plan: Plan, actuator: MoveCheck, limits: SoftLimits, at_mm: floa
 
     Raises
     ------
-    FingervisionError
+    LimitError
         With the line of the recipe, and the actuator's reason.
     """
     for leg in plan.legs:

@@ -59,7 +59,7 @@ class Runner:
         ------
         StoppedError
             The user ended it.
-        FingervisionError
+        DeviceError, LimitError, StateError
             A limit was met, an instrument failed, or no fingers are in view; the motor stands then.
         """
         watch, actuator, replays = self.watch, self.watch.bed.actuator, self.watch.bed.replays

@@ -32,7 +32,7 @@ def measured_slot(frames: Sequence[Frame], size_mm: float, scale: Scale) -> dict
 
     Raises
     ------
-    FingervisionError
+    DeviceError
         No slot is seen.
     """
     pictures = [KnownSize(f"frame {frame.index}", "slot", size_mm, 0.0, to_grey(frame.pixels)) for frame in frames]

@@ -51,7 +51,7 @@ def remains(path: Path, recipe: Recipe[Section], digest: str) -> Remains | None:
 
     Raises
     ------
-    FingervisionError
+    DataError, OutputError
         The folder holds something else, a finished run, or one of another recipe or bed.
     """
     held = contents(path)

@@ -153,7 +153,7 @@ def rows_before(path: Path) -> list[SampleRow]:
 
     Raises
     ------
-    FingervisionError
+    DataError
         There is no finished run in the folder.
     """
     table = path / (JOINED if (path / JOINED).exists() else SAMPLES)

@@ -68,7 +68,7 @@ class Watch:
         ------
         StoppedError
             The user ended the run.
-        FingervisionError
+        DeviceError, LimitError
             The actuator has an alarm, or the force is beyond a limit.
         """
         self._end_if_stopped()
@@ -89,7 +89,7 @@ class Watch:
 
         Raises
         ------
-        FingervisionError
+        DeviceError, LimitError, StoppedError
             As `look`, or the gap is beyond its limit.
         """
         look = self.look()

@@ -27,7 +27,7 @@ def hidden_from(words: tuple[str, ...]) -> Hidden:
     ------
     UsageError
         An effect or parameter is not in the catalogue, or a value is no number.
-    FingervisionError
+    DataError, InputFileError
         A file cannot be read or makes no sense.
     """
     effects: dict[str, dict[str, float]] = {}
