@@ -40,7 +40,7 @@ def connected(scheduler: str, patience_s: float = PATIENCE_S) -> Iterator[Any]:
     ------
     UsageError
         The address cannot be one.
-    FingervisionError
+    MissingLibraryError, ProcessError
         Dask is not installed, nothing answers, there are no workers, or they run other versions.
     """
     try:
@@ -90,7 +90,7 @@ def outcomes_of(client: Any, tasks: Sequence[Task], perform: Perform) -> Generat
 
     Raises
     ------
-    FingervisionError
+    ProcessError
         The scheduler is gone.
     """
     from distributed import KilledWorker, as_completed

@@ -106,7 +106,7 @@ class BodyTracker:
 
         Raises
         ------
-        FingervisionError
+        DataError, UsageError
             The drawing cannot be laid on that frame, or the scale is for frames of another size.
         """
         for item in frames:

@@ -130,7 +130,7 @@ def by_silhouette(grey: Array, mechanism: Mechanism, px_per_mm: float, flat: Fla
 
     Raises
     ------
-    FingervisionError
+    DataError
         It fits nowhere, or in several ways.
     """
     height, width = grey.shape

@@ -31,7 +31,7 @@ def draw_gap(
 
     Raises
     ------
-    FingervisionError
+    OutputError
         The picture cannot be written.
     """
     figure = gap_figure(series, drive, clock)

@@ -82,7 +82,7 @@ def measure_in_memory(source: FrameSource, task: Task, on_progress: Progress | N
     ------
     UsageError
         The region lies outside the frame.
-    FingervisionError
+    DataError, InputFileError, OutputError
         The scale is for other frames, or a gauge lies outside of them.
     """
     check_task(task, source.description)

@@ -81,7 +81,7 @@ def measure(source: FrameSource, task: Task, out: Path, on_progress: Progress | 
     ------
     UsageError
         The region lies outside the frame, or a frame is asked for that there is not.
-    FingervisionError
+    OutputError
         The results cannot be written, or the scale is for other frames. The rows until then are in gaps.csv.
     """
     refuse_camera(source)

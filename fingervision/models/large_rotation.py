@@ -89,7 +89,7 @@ def large_equilibrium(
 
     Raises
     ------
-    FingervisionError
+    ModelError
         Where the iteration does not settle.
     """
     return _next(_Tangent(body, contact=contact), input_mm, [start])

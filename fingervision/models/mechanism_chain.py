@@ -198,7 +198,7 @@ class MechanismChain:
 
         Raises
         ------
-        FingervisionError
+        ModelError
             Where large rotation or contact is asked for.
         """
         if large_rotation or contact:

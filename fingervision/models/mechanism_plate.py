@@ -104,7 +104,7 @@ class MechanismPlate:
 
         Raises
         ------
-        FingervisionError
+        DataError, ModelError
             Where a contact's faces are none, or nothing holds the mechanism.
         """
         if self._wanders():

@@ -84,7 +84,7 @@ class PlanarRegion:
 
         Raises
         ------
-        FingervisionError
+        DataError
             Where two parts of it touch in a point, so that the body is not defined there.
         """
         return _loops_of(self.steps, self.marks_mm)

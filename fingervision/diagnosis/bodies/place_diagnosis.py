@@ -44,7 +44,7 @@ def without_places(table: MeasuredTable, model: CorrectedModel) -> tuple[Measure
 
     Raises
     ------
-    FingervisionError
+    DataError
         A place is not one of the drawing's.
     """
     placed = {key: next(iter(values.values())).value for key, values in model.effects.items() if split_key(key)[1]}

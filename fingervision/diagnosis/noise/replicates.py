@@ -188,7 +188,7 @@ def _drift_sigmas(rest: Array, straight: Array, rows: NDArray[np.intp]) -> float
 
 
 def _without_trend(rest: Array, groups: list[NDArray[np.intp]], time_s: Array, *shares: Array) -> Array:
-    """Take a polynomial in time out of what repeats leave, which all groups share; one more for each of `shares`."""
+    """Subtract from the repeats' residuals a polynomial in time common to all groups, and one for each of `shares`."""
     at = np.concatenate([time_s[group] for group in groups])
     powers = np.vander((at - at.mean()) / max(float(np.ptp(at)), 1e-300), TREND_DEGREE + 1)[:, :-1]
     own_rows = np.concatenate(groups)

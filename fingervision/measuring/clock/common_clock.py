@@ -28,7 +28,7 @@ def join_drive(table: Path, drive: DriveHistory, clock: ClockOffset) -> bool:
 
     Raises
     ------
-    FingervisionError
+    OutputError
         The table cannot be written again; the old one is still there.
     """
     joined: list[bool] = []
