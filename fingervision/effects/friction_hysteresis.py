@@ -1,4 +1,4 @@
-"""A smooth loop, independent of speed."""
+"""Friction hysteresis: a smooth loop of output over input, independent of speed."""
 
 from dataclasses import replace
 
@@ -10,7 +10,7 @@ from fingervision.effects.play_operator import drawn_sliders
 
 
 def act(input_mm: Array, history: History, values: Values) -> Array:
-    """Apply the effect: a smooth loop, independent of speed."""
+    """Apply the effect: a smooth hysteresis loop, independent of speed."""
     out = np.empty_like(input_mm)
     for index, run in enumerate(history.runs):
         start = values.get(start_key(index), 0.0)

@@ -1,4 +1,4 @@
-"""The stage cannot follow faster than a highest speed."""
+"""Slew limit: the stage cannot move faster than its highest speed."""
 
 from dataclasses import replace
 
@@ -22,12 +22,15 @@ _follow = loop("slew_limit_follow")
 
 
 def follow(input_mm: Array, time_s: Array, speed_mm_s: float) -> Array:
-    """Follow one run's input at no more than `speed_mm_s`, from its first sample on; exact; shape (n,)."""
+    """Output of a stage that follows one run's input at no more than `speed_mm_s`, shape (n,).
+
+    Exact for an input that is linear between its samples.
+    """
     return filled(_follow, input_mm, np.ascontiguousarray(time_s), speed_mm_s)
 
 
 def act(input_mm: Array, history: History, values: Values) -> Array:
-    """Apply the effect: the stage follows at its highest speed at most."""
+    """Apply the effect: the stage follows the input at no more than its highest speed."""
     out = np.empty_like(input_mm)
     for run in history.runs:
         out[run] = follow(input_mm[run], history.times[run], values["speed_mm_s"])

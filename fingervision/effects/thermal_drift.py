@@ -1,4 +1,4 @@
-"""A slow symmetric change, whatever the input."""
+"""Thermal drift: a slow symmetric change of the gap, whatever the input."""
 
 from dataclasses import replace
 
@@ -10,7 +10,7 @@ from fingervision.domain.response import Response
 
 
 def act(response: Response, history: History, values: Values) -> Response:
-    """Apply the effect: a slow symmetric change, whatever the input."""
+    """Apply the effect: a slow symmetric change of the gap, whatever the input."""
     if values["amplitude_mm"] == 0.0:
         return response
     return response.with_gap(response.gap_mm - values["amplitude_mm"] * np.expm1(-history.clock_s / values["tau_s"]))

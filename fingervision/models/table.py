@@ -1,4 +1,4 @@
-"""A simulation table as a model: linear between its rows."""
+"""A simulation table as a model, linear between its rows."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -11,7 +11,7 @@ from fingervision.domain.response import Response
 
 @dataclass(frozen=True, eq=False)
 class TableModel:
-    """Comsol, MATLAB, Ansys or anything else that gave the gap at some inputs.
+    """A table from Comsol, MATLAB, Ansys or any other source that gives the gap at some inputs.
 
     Parameters
     ----------
@@ -37,7 +37,10 @@ class TableModel:
         return float(self.input_mm[0]), float(self.input_mm[-1])
 
     def respond(self, input_mm: NDArray[np.float64]) -> Response:
-        """Interpolate; beyond an end follow the straight line through the last quarter of the rows there."""
+        """Interpolate linearly.
+
+        Beyond an end, extrapolate the straight line through the last quarter of the rows there.
+        """
         lowest, highest = self.input_range_mm
         inside = input_mm.min() >= lowest and input_mm.max() <= highest
         beyond = None if inside else (np.minimum(input_mm - lowest, 0.0), np.maximum(input_mm - highest, 0.0))
@@ -60,7 +63,7 @@ class TableModel:
 
     @cached_property
     def _end_slopes(self) -> dict[str, tuple[float, float]]:
-        """Slope of each column at the lower and the upper end; a diagnosis asks for them ten thousand times."""
+        """Slope of each column at the lower and the upper end; computed once, as a diagnosis needs it very often."""
         columns = {"left": self.left_mm, "right": self.right_mm, "force": self.force_n}
         rows = max(2, -(-self.input_mm.size // 4))
 

@@ -1,4 +1,4 @@
-"""Search effects and refit the uncertain dimensions of the drawing, in turn until both agree."""
+"""Search for effects and refit the uncertain dimensions of the drawing alternately, until both agree."""
 
 from dataclasses import dataclass, replace
 
@@ -55,7 +55,7 @@ def refitted_search(
     without: frozenset[str],
     progress: Progress,
 ) -> Refitted:
-    """Search, stage by stage: between samples, beside a map of position errors, beside a redrawn gripper.
+    """Search in stages: interpolation between samples, a map of position errors, run gains, a redrawn gripper.
 
     Parameters
     ----------
@@ -99,8 +99,8 @@ def _over_the_ends(state: Searched, look: Look) -> Searched:
 def _common_offset(state: Searched, look: Look) -> Searched:
     """Search once more for a constant that the runs share, where their offsets had taken it.
 
-    Runs that are off by nearly the same amount share a cause and no accident: they may then be offset against each
-    other by no more than they depart from their mean.
+    Runs with nearly the same offset share a cause; the spread of their offsets is then limited to their departure from
+    the mean.
     """
     runs = len(state.data.chain.history.runs)
     found = state.found

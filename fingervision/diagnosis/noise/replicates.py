@@ -59,7 +59,7 @@ class PureError:
 
     @property
     def has_trend(self) -> bool:
-        """Whether the repeats drift or run in."""
+        """Whether the repeats show a drift or a run-in."""
         return self.trend_sigmas > TREND_SIGMAS
 
 
@@ -175,11 +175,11 @@ def _without_run_offsets(values: Array, groups: list[NDArray[np.intp]], runs: tu
 
 
 def _drift_sigmas(rest: Array, straight: Array, rows: NDArray[np.intp]) -> float:
-    """Standard deviations by which readings that follow one another are alike, where that is a drift; else 0.
+    """Significance of the likeness of successive readings, in standard deviations, where it is a drift; else 0.
 
-    A smooth curve in time and a reading noise that wanders both make neighbours alike, wherever they were taken. The
-    likelier one is the reason, each at the price of its parameters (Schwarz 1978): the logarithm of what is left by
-    the curve, or by predicting each reading from the one before.
+    A drift (a smooth curve in time) and correlated reading noise both make successive readings alike, wherever they
+    were taken. The more probable of the two is taken as the cause, each with the penalty of its parameters (Schwarz
+    1978): the log variance left by the curve, or by predicting each reading from the previous one.
     """
     share, sigmas = _follows_sigmas(rest, rows)
     if sigmas <= TREND_SIGMAS:
@@ -192,7 +192,7 @@ def _drift_sigmas(rest: Array, straight: Array, rows: NDArray[np.intp]) -> float
 
 
 def _without_trend(rest: Array, groups: list[NDArray[np.intp]], time_s: Array, *shares: Array) -> Array:
-    """Take a polynomial in time out of what repeats leave, which all groups share; one more for each of `shares`."""
+    """Subtract from the repeats' residuals a polynomial in time common to all groups, and one for each of `shares`."""
     at = np.concatenate([time_s[group] for group in groups])
     powers = np.vander((at - at.mean()) / max(float(np.ptp(at)), 1e-300), TREND_DEGREE + 1)[:, :-1]
     own_rows = np.concatenate(groups)
@@ -206,15 +206,15 @@ def _without_trend(rest: Array, groups: list[NDArray[np.intp]], time_s: Array, *
 
 
 def _wandering(rest: Array, rows: NDArray[np.intp]) -> float:
-    """Correlation of what repeats leave in consecutive rows; 0 where independent readings would show as much."""
+    """Correlation of the repeats' residuals in successive rows; 0 where independent readings would show as much."""
     share, sigmas = _follows_sigmas(rest, rows)
     return min(share, MOST_WANDERING) if sigmas > TREND_SIGMAS else 0.0
 
 
 def _follows_sigmas(rest: Array, rows: NDArray[np.intp]) -> tuple[float, float]:
-    """Correlation of what repeats leave in consecutive rows, and how many standard deviations that is.
+    """Correlation of the repeats' residuals in successive rows, and its value in standard deviations.
 
-    Of k independent pairs it has a standard deviation of 1 / sqrt(k) (Bartlett 1946, doi:10.2307/2983611).
+    For k independent pairs its standard deviation is 1 / sqrt(k) (Bartlett 1946, doi:10.2307/2983611).
     """
     ordered = rest[np.argsort(rows)]
     follows = np.diff(np.sort(rows)) == 1
@@ -233,7 +233,7 @@ def _without_gross_errors(rest: Array, degrees: int) -> float:
 
 
 def _trend_sigmas(groups: list[Array], pooled: float) -> float:
-    """Von Neumann's ratio over all groups, as standard deviations below its expectation (von Neumann 1941)."""
+    """Von Neumann's ratio over all groups, in standard deviations below its expectation (von Neumann 1941)."""
     if pooled <= 0.0:
         return 0.0
     neighbours = sum(float(np.sum(np.diff(group) ** 2)) for group in groups)
@@ -245,9 +245,9 @@ def _trend_sigmas(groups: list[Array], pooled: float) -> float:
 
 
 def resolution(values: Array) -> float:
-    """Smallest difference of values that all lie on one grid, as a reading of few digits gives them; 0 without one.
+    """Spacing of the grid on which all values lie, as readings of few digits do; 0 without such a grid.
 
-    From few distinct values no step can be estimated: a 12-bit reading over their range is assumed.
+    From few distinct values no spacing can be estimated: a 12-bit reading over their range is assumed.
     """
     steps = np.diff(np.unique(np.round(values, 10)))
     steps = steps[steps > 1e-9]
