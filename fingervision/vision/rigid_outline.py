@@ -1,10 +1,10 @@
-"""The rigid motion of one body in a picture, from every stretch of its outline that can be seen.
+"""Rigid motion of one body in a picture, from all visible stretches of its outline.
 
-The straight stretches of an outline are cut into chunks about a millimetre long. In each chunk all pixels within reach
-of the edge are fitted by one blurred step, I = a + b Phi(-(s - d) / sigma_e), s the pixel's distance along the outward
-normal: no resampling, so that a pixel's phase does not bias it. The chunks' offsets d are then one rigid motion by
-weighted least squares, with Tukey's weights for what covers an edge. What the chunks scatter beyond their own noise
-widens the covariance.
+The straight stretches of an outline are divided into chunks about a millimetre long. In each chunk one blurred step is
+fitted to all pixels near the edge, I = a + b Phi(-(s - d) / sigma_e), with s the pixel's distance along the outward
+normal. Nothing is resampled, so that the sub-pixel phase causes no bias. Weighted least squares over the chunks'
+offsets d then gives one rigid motion; Tukey's weights suppress chunks whose edge is covered. Scatter of the chunks
+beyond their own noise widens the covariance.
 """
 
 from collections.abc import Sequence
@@ -63,7 +63,7 @@ class Chunks:
     half_length: float
 
     def moved(self, shift: Array, angle: float, about: Array) -> "Chunks":
-        """Move them rigidly: turned about a point, then shifted."""
+        """Move the chunks rigidly: turned about a point, then shifted."""
         c, s = np.cos(angle), np.sin(angle)
         turn = np.array([[c, -s], [s, c]])
         middles = turn @ (self.middles - about[:, None]) + (about + shift)[:, None]
@@ -71,20 +71,20 @@ class Chunks:
 
 
 class FlatMap(Protocol):
-    """From the picture to the plane as seen squarely and without distortion, in pixels, and back."""
+    """Map from the picture to the object plane without perspective and distortion, in pixels, and back."""
 
     def to_flat(self, points: Array) -> Array:
-        """Take lens and perspective off points, shape (2, n)."""
+        """Remove lens distortion and perspective from points, shape (2, n)."""
         ...
 
     def to_picture(self, points: Array) -> Array:
-        """Put them on again."""
+        """Apply lens distortion and perspective to points, shape (2, n)."""
         ...
 
 
 @dataclass(frozen=True, slots=True)
 class EdgeView:
-    """How edges of bodies show in a picture.
+    """How the edges of bodies appear in a picture.
 
     Parameters
     ----------
@@ -113,7 +113,7 @@ _GAUSS_WEIGHTS = np.array([5.0, 8.0, 5.0]) / 18.0
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RigidFit:
-    """A rigid motion in a picture.
+    """A rigid motion measured in a picture.
 
     Parameters
     ----------
@@ -165,7 +165,7 @@ def fit_rigid(
     start: tuple[Array, float],
     view: EdgeView = PLAIN,
 ) -> RigidFit | None:
-    """Fit a body's motion from near a start; None where too little of its outline is seen.
+    """Fit a body's motion from a near starting value; None where too little of its outline is visible.
 
     Parameters
     ----------
@@ -212,7 +212,7 @@ def capture_rigid(
     start: tuple[Array, float],
     view: EdgeView = PLAIN,
 ) -> RigidFit | None:
-    """Fit from farther away: in the picture halved again and again, the coarsest first.
+    """Fit from a farther starting value: in successively halved pictures, the coarsest first.
 
     Parameters
     ----------
@@ -238,7 +238,7 @@ def capture_rigid(
 
 
 def halved(grey: NDArray[np.float64], times: int) -> list[NDArray[np.float64]]:
-    """Halve a picture so many times, four pixels to one."""
+    """Halve a picture `times` times, averaging four pixels into one."""
     out = []
     for _ in range(times):
         height, width = (size // 2 * 2 for size in grey.shape)
@@ -250,7 +250,7 @@ def halved(grey: NDArray[np.float64], times: int) -> list[NDArray[np.float64]]:
 
 @dataclass(frozen=True, slots=True)
 class _Halved:
-    """A map of a picture that was halved."""
+    """The map for a picture that was halved."""
 
     whole: FlatMap
     scale: float
@@ -265,7 +265,7 @@ class _Halved:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _InPicture:
-    """Chunks as the picture shows them, and how much longer a way across them is on the flat plane."""
+    """Chunks in picture coordinates, and how much longer a distance across them is in the flat plane."""
 
     middles: Array
     normals: Array
@@ -274,7 +274,7 @@ class _InPicture:
 
 
 def _in_picture(chunks: Chunks, flat: FlatMap | None) -> _InPicture:
-    """Map chunks into the picture: each by its mean place and by its chord."""
+    """Map chunks into the picture by their mean position and their chord."""
     count, half = chunks.middles.shape[1], chunks.half_length
     if flat is None or not count:
         return _InPicture(chunks.middles, chunks.normals, np.full(count, half), np.ones(count))
@@ -292,7 +292,7 @@ def _in_picture(chunks: Chunks, flat: FlatMap | None) -> _InPicture:
 
 
 def _edges(grey: NDArray[np.float64], flat_chunks: Chunks, body_is_dark: bool, blur: float, view: EdgeView) -> _Edges:
-    """Fit a blurred step to the pixels about every chunk; offsets are those of the flat plane."""
+    """Fit a blurred step to the pixels about every chunk; offsets are in the flat plane."""
     chunks = _in_picture(flat_chunks, view.flat)
     count = chunks.middles.shape[1]
     height, width = grey.shape
@@ -335,7 +335,7 @@ def _edges(grey: NDArray[np.float64], flat_chunks: Chunks, body_is_dark: bool, b
 def _like_the_others(
     blurs: Array, level: Array, contrast: Array, noise: Array, used: NDArray[np.bool_]
 ) -> NDArray[np.bool_]:
-    """Whether a chunk shows the body's own edge, by the median of all chunks that show one."""
+    """Whether a chunk shows the body's own edge, compared with the median of all chunks that show an edge."""
     usual = float(np.median(contrast[used]))
     # A shadow falls on up to half of a body's sides: the better half tells what an edge of its own looks like.
     sharp, quiet = float(np.quantile(blurs[used], 0.25)), float(np.quantile(noise[used], 0.25))
@@ -352,9 +352,10 @@ def _like_the_others(
 def _step(
     values: Array, s: Array, blur: float, body_is_dark: bool
 ) -> tuple[float, float, float, float, float, float] | None:
-    """Fit a blurred step by Gauss and Newton's iteration; None where there is none.
+    """Fit a blurred step by Gauss-Newton iteration; None where there is no step.
 
-    Offset, its variance, blur, level of the body, its difference from the ground, standard deviation of the noise.
+    Returned are offset, its variance, blur, level of the body, its difference from the background, and standard
+    deviation of the noise.
 
     Pixels are squares: their own width adds 1/12 to the square of the blur (measuring.md).
     """
@@ -387,9 +388,9 @@ def _step(
 
 
 def _rigid(chunks: Chunks, edges: _Edges, about: Array) -> tuple[Array, Array, Array, tuple[float, float]] | None:
-    """Small rigid motion by the chunks' offsets, its covariance, what shared errors do to it, and the size's error.
+    """Small rigid motion from the chunks' offsets, its covariance, the effect of shared errors, and the size's error.
 
-    None where the offsets do not hold it.
+    None where the offsets do not determine the motion.
     """
     used = edges.used
     arm = chunks.middles[:, used] - about[:, None]
@@ -426,7 +427,7 @@ def _rigid(chunks: Chunks, edges: _Edges, about: Array) -> tuple[Array, Array, A
 
 
 def _size_error(columns: Array, offset: Array, sd: Array) -> tuple[float, float]:
-    """Relative error of the body's size beside a rigid motion and edges that are all seen farther out, and its u."""
+    """Relative error of the body's size, and its standard uncertainty, fitted beside motion and edge offset."""
     whitened, wanted = columns / sd[:, None], offset / sd
     scale = np.linalg.norm(whitened, axis=0)
     if offset.size < FEWEST + columns.shape[1] or scale.min() <= 0.0:
