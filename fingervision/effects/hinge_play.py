@@ -1,4 +1,4 @@
-"""A pivot with play: its pin stands at the side of its hole to which the load points."""
+"""Hinge play: a pivot's pin lies against the side of its hole to which the load points."""
 
 import numpy as np
 
@@ -8,7 +8,7 @@ from fingervision.domain.response import Response
 
 
 def act(response: Response, history: History, values: Values) -> Response:
-    """Lose half the play of the opening on either side of rest: with a table no pivot is known by name."""
+    """Reduce the opening by half the play on either side of rest; in a table no single pivot is known."""
     opening_mm = response.gap_mm - history.rest_gap_mm
     half_mm = 0.5 * values["play_mm"]
     return response.with_gap(history.rest_gap_mm + opening_mm - np.clip(opening_mm, -half_mm, half_mm))

@@ -1,4 +1,4 @@
-"""The force differs (modulus, hinge thickness), the gap hardly."""
+"""Hinge stiffness error (modulus, hinge thickness): the force differs, the gap hardly."""
 
 from dataclasses import replace
 

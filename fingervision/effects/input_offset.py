@@ -1,4 +1,4 @@
-"""The input's zero is off."""
+"""Input offset: the zero of the recorded input is wrong."""
 
 from fingervision.domain.effect import Array, DriveEffect, History, Stage, Values
 from fingervision.domain.further_check import FurtherCheck
@@ -6,7 +6,7 @@ from fingervision.domain.parameter import Parameter
 
 
 def act(input_mm: Array, history: History, values: Values) -> Array:
-    """Apply the effect: the input's zero is off, until it is taken anew."""
+    """Apply the effect: the zero of the input is wrong, until the stage is referenced again."""
     out = input_mm + values["offset_mm"]
     for run, rezeroed in zip(history.runs, history.rezeroed, strict=False):
         if rezeroed:

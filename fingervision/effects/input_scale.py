@@ -1,4 +1,4 @@
-"""The input's unit is off."""
+"""Input scale error: the recorded input has a wrong scale factor."""
 
 from fingervision.domain.effect import Array, DriveEffect, History, Stage, Values
 from fingervision.domain.further_check import FurtherCheck
@@ -6,7 +6,7 @@ from fingervision.domain.parameter import Parameter
 
 
 def act(input_mm: Array, history: History, values: Values) -> Array:
-    """Apply the effect: the input's unit is off."""
+    """Apply the effect: the recorded input has a wrong scale factor."""
     return (1.0 + values["ratio"]) * input_mm
 
 

@@ -1,4 +1,4 @@
-"""The amplification differs (link length, hinge position)."""
+"""Lever ratio error: the amplification differs (link length, hinge position)."""
 
 from fingervision.domain.effect import History, PointEffect, Stage, Values
 from fingervision.domain.further_check import FurtherCheck

@@ -1,4 +1,4 @@
-"""A link of another length than drawn: a hinge or a measuring point sits farther out or nearer."""
+"""Link length error: a link is longer or shorter than drawn, so that a hinge or measuring point sits elsewhere."""
 
 from fingervision.domain.effect import History, PointEffect, Stage, Values
 from fingervision.domain.parameter import Parameter
@@ -6,7 +6,7 @@ from fingervision.domain.response import Response
 
 
 def act(response: Response, history: History, values: Values) -> Response:
-    """Open less by as much as the lever's short arm is longer: with a table no link is known by name."""
+    """Reduce the opening by the ratio by which the lever's short arm is longer; in a table no single link is known."""
     opening_mm = response.gap_mm - history.rest_gap_mm
     return response.with_gap(history.rest_gap_mm + opening_mm / (1.0 + values["ratio"]))
 

@@ -9,7 +9,7 @@ from fingervision.domain.response import Response
 
 
 def act(response: Response, history: History, values: Values) -> Response:
-    """Apply the effect: px/mm is off."""
+    """Apply the effect: the scale (px/mm) is wrong by a factor."""
     return replace(
         response,
         left_mm=response.left_mm * (1.0 + values["ratio"]),

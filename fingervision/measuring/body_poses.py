@@ -50,7 +50,7 @@ LAID_BY_ALL = (
 
 @dataclass(frozen=True, slots=True, eq=False)
 class BodiesMeasured:
-    """What following the bodies of a recording left behind.
+    """Result of following the bodies of a recording.
 
     Parameters
     ----------
@@ -94,11 +94,11 @@ class BodyTracker:
         self.placed: Placed | None = None
 
     def poses(self, frames: Iterable[Frame | LostFrame]) -> Iterator[FramePoses]:
-        """Follow them; the first frame that can be read tells where the drawing lies.
+        """Yield the poses of each frame; the first readable frame determines where the drawing lies.
 
         Raises
         ------
-        FingervisionError
+        DataError, UsageError
             The drawing cannot be laid on that frame, or the scale is for frames of another size.
         """
         for item in frames:
@@ -116,7 +116,7 @@ class BodyTracker:
         return [*bodies, *(flexure.name for flexure in self.mechanism.flexures)]
 
     def _view(self, picture: Picture) -> EdgeView:
-        """How edges show: half of the edge bias widens what is dark on each of its sides."""
+        """How edges appear: edge bias widens a dark body by half of it on each side."""
         dark = self.placed is None or self.placed.body_is_dark
         outward_px = (0.5 if dark else -0.5) * self.scale.edge_bias_px
         flat, shared_pixels = flat_map_of(self.scale), picture.shared_pixels
@@ -162,7 +162,7 @@ class BodyTracker:
         self._check_size(grey, index, self._view(picture))
 
     def _check_size(self, grey: Array, index: int, view: EdgeView) -> None:
-        """Hold the sizes of the bodies against the drawing: what is off is a wrong scale, or another mechanism."""
+        """Compare the sizes of the bodies with the drawing: a difference means a wrong scale, or another mechanism."""
         fits = [self._fit(grey, [], number, view) for number in range(len(self.outlines))]
         self._note_shadows([o.body.name for o, fit in zip(self.outlines, fits, strict=True)
                             if fit is not None and fit.by_shadows.any()], index)  # fmt: skip
@@ -195,7 +195,7 @@ class BodyTracker:
         self.placed = replace(self.placed, notes=(*self.placed.notes, words))
 
     def _fit(self, grey: Array, pyramid: list[Array], number: int, view: EdgeView) -> RigidFit | None:
-        """Fit near where it was last; else from farther away."""
+        """Fit from the pose in the last frame, or else by a search from farther away."""
         dark = self.placed is not None and self.placed.body_is_dark
         chunks, about, last = self._chunks[number], self._about[number], self._last[number]
         found = fit_rigid(grey, chunks, about, dark, last, view)
@@ -242,7 +242,7 @@ class BodyTracker:
         return COVERED if inside.size and inside.mean() >= LEAST_IN_VIEW else OUT_OF_VIEW
 
     def _hinges(self, poses: Mapping[str, SeenPose], shared: Mapping[str, SharedPose]) -> dict[str, SeenPose]:
-        """Angles of hinges: how far the body beyond turned against the one before."""
+        """Angles of hinges: rotation of the body beyond a hinge against the body before it."""
         found = {}
         for flexure in self.mechanism.flexures:
             first, last = (self._joined(flexure.name, side).body.name for side in (-1.0, 1.0))
@@ -276,7 +276,7 @@ def measure_bodies(
     out: Path,
     settings: Settings | None = None,
 ) -> BodiesMeasured:
-    """Follow the bodies of a recording into bodies.csv, and add them to the rows of its gaps.csv where there is one.
+    """Measure the bodies of a recording into bodies.csv, and add them to the rows of an existing gaps.csv.
 
     Parameters
     ----------

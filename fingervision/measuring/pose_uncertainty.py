@@ -1,7 +1,8 @@
-"""Uncertainty of a body's pose: its own edges in a frame, and what all frames share.
+"""Uncertainty of a body's pose: from its own edges in each frame, and from errors common to all frames.
 
-Shared are where the drawing was laid (a fit too), the scale, the edge bias, lens and plane. A pose counts from the
-drawing, so that an error of the scale grows with the distance from what the drawing was laid by.
+Common errors are those of the drawing's placement (itself a fit), the scale, the edge bias, lens and plane. A pose is
+counted from the drawing, so that an error of the scale grows with the distance from the features by which the drawing
+was placed.
 """
 
 from dataclasses import dataclass
@@ -19,7 +20,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SharedErrors:
-    """What all frames share of the uncertainty of poses.
+    """Errors of poses that are common to all frames.
 
     Parameters
     ----------
@@ -53,7 +54,7 @@ class SharedErrors:
         return max(self.plane.relative_u(at, 0.0), self.plane.relative_u(at, 0.5 * pi), self.size_error)
 
     def of_pose(self, fit: RigidFit, about_px: Array, in_picture: Array) -> "SharedPose":
-        """Work out what the shared errors do to one pose.
+        """Compute the effect of the common errors on one pose.
 
         Parameters
         ----------
@@ -82,7 +83,7 @@ class SharedErrors:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SharedPose:
-    """What the shared errors do to one pose, in pixels and rad.
+    """Effect of the common errors on one pose, in pixels and rad.
 
     Parameters
     ----------
@@ -104,7 +105,7 @@ class SharedPose:
 
     @property
     def covariance(self) -> Array:
-        """All of it, shape (3, 3)."""
+        """Covariance of all common errors together, shape (3, 3)."""
         own = (
             self.placed
             + self.by_shadows
@@ -115,7 +116,10 @@ class SharedPose:
         return own
 
     def u_turn_against(self, other: "SharedPose") -> float:
-        """Standard uncertainty, shared by all frames, of the angle between two bodies: the drawing's place cancels."""
+        """Standard uncertainty, common to all frames, of the angle between two bodies (rad).
+
+        The placement's error cancels.
+        """
         bias = float(self.by_bias[2] - other.by_bias[2])
         scale = float(self.by_scale[2] - other.by_scale[2])
         shadows = max(float(self.by_shadows[2, 2] + other.by_shadows[2, 2]), 0.0) ** 0.5
@@ -123,7 +127,7 @@ class SharedPose:
 
 
 def in_drawing(place: Placement) -> Array:
-    """Matrix that takes (x px, y px, rad) of the flat plane into (x mm, y mm, mrad) of the drawing's axes."""
+    """Matrix that converts (x px, y px, rad) of the flat plane to (x mm, y mm, mrad) of the drawing's axes."""
     into = np.zeros((3, 3))
     into[:2, :2] = place.axes.T / place.px_per_mm
     into[2, 2] = 1e3 * place.turn_sign

@@ -15,7 +15,7 @@ from fingervision.models.plane_shapes import Shape
 
 @dataclass(frozen=True, slots=True)
 class Face:
-    """Nodes of the outline in an upright box: x from, x to, y from, y to."""
+    """The nodes of the outline inside an upright box: x from, x to, y from, y to (mm)."""
 
     name: str
     box_mm: tuple[float, float, float, float]
@@ -122,7 +122,7 @@ def check_mechanism(mechanism: Mechanism, region: PlanarRegion) -> None:
 
     Raises
     ------
-    FingervisionError
+    DataError
         Where it is not one body, a flexure holds no material or its neck is no neck, or a probe lies outside.
     """
     name = mechanism.name
@@ -169,7 +169,7 @@ def check_mechanism(mechanism: Mechanism, region: PlanarRegion) -> None:
 
 
 def _check_leaf(flexure: Flexure, region: PlanarRegion, uncut: PlanarRegion, name: str) -> None:
-    """A leaf is free for longer than it is thick, and both its ends lie inside bodies."""
+    """Check that a leaf is free for longer than it is thick, and that both its ends lie inside bodies."""
     t, reach = flexure.thickness_mm, flexure.half_length_mm
     beside = np.array([flexure.point_mm(x * t, s * 0.501 * t) for x in (-0.5, 0.5) for s in (-1.0, 1.0)]).T
     if region.holds(beside).any():

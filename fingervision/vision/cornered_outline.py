@@ -1,7 +1,7 @@
 """Step 6 for fingers with cut corners: the outline near the measuring point and at the tip as straight lines.
 
-A corner that is cut off leaves a straight side of its own between top and flank. Near the measuring point the outline
-is then a straight line as far as the residuals allow, and the tip is the higher end of the top, another one.
+A chamfered corner is a straight side of its own between top and flank. Near the measuring point the outline is then
+fitted by a straight line, as long as the residuals allow; the tip is the higher end of the line fitted to the top.
 """
 
 import numpy as np
@@ -28,7 +28,7 @@ FLATTEST = 2.0
 
 
 def cornered_measuring_point(points: OutlinePoints, below_tip_px: float, shared: float) -> MeasuringPoint | None:
-    """Tip and edge of a finger with straight sides and corners of any kind; None where they are not straight.
+    """Tip and edge of a finger with straight sides and corners of any kind; None where the sides are not straight.
 
     Parameters
     ----------
@@ -54,7 +54,7 @@ def cornered_measuring_point(points: OutlinePoints, below_tip_px: float, shared:
 
 
 def _line(t: Floats, v: Floats, u: Floats) -> tuple[Floats, Floats, float]:
-    """Weighted line v = c + m t: (c, m), their covariance, and the mean square of the residuals."""
+    """Weighted line v = c + m t: (c, m), their covariance, and the mean squared residual."""
     powers = np.column_stack((np.ones_like(t), t))
     scaled = powers / u[:, None] ** 2
     covariance: Floats = np.asarray(np.linalg.pinv(scaled.T @ powers), dtype=float)
@@ -64,7 +64,7 @@ def _line(t: Floats, v: Floats, u: Floats) -> tuple[Floats, Floats, float]:
 
 
 def _tip(points: OutlinePoints) -> tuple[float, float, float] | None:
-    """Height of the outermost point, its variance, and where across it lies."""
+    """Height of the outermost point, its variance, and its position across the finger."""
     is_top = ~points.is_row & (points.y < points.y.min() + TOP_PX)
     if np.count_nonzero(is_top) < 2 * FEWEST_POINTS:
         return None
@@ -84,7 +84,7 @@ def _tip(points: OutlinePoints) -> tuple[float, float, float] | None:
 
 
 def _side(points: OutlinePoints, height: float, apex: float) -> tuple[float, float, float] | None:
-    """Inner side at a height, its slope, and its variance."""
+    """Position of the inner side at a height, its slope, and its variance."""
     inner = points.x > min(apex, float(np.median(points.x)))
     blur = float(np.median(points.blur))
     for reach in REACHES_PX:

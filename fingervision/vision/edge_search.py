@@ -1,4 +1,4 @@
-"""Where steps of light may be along a direction: the mean profile of a zone and the lobes of its derivative."""
+"""Find candidate edges along a direction: lobes of the derivative of a zone's mean profile."""
 
 from dataclasses import dataclass
 from functools import lru_cache
@@ -28,7 +28,7 @@ _steps = loop("edge_search_steps")
 
 @dataclass(frozen=True, slots=True)
 class StepCandidate:
-    """A step along the zone's direction.
+    """A candidate edge along the zone's direction.
 
     Parameters
     ----------

@@ -1,12 +1,12 @@
-"""Step 6, the finger's end: the outline as three straight sides joined by two round corners.
+"""Step 6, the finger's end: its outline fitted by three straight sides and two round corners.
 
 A printed or cut finger ends in an inner flank, a top and an outer flank, each straight, with a fillet of any radius
-(sharp to fully round) between them. Fitting this shape to the edge points of a finger as one thing uses every
-point, needs no window, and gives the tip and the inner edge together with their joint covariance.
+(from sharp to fully round) between them. One fit of this shape to all edge points of a finger needs no window, and
+gives the tip and the inner edge together with their joint covariance.
 
-Blur moves the half-level of a curved edge towards the inside of the curve by sigma^2 kappa / 2 (kappa the
-curvature); near the end of a fillet it feels part of the curvature only. The points are compared with the
-outline moved in that way, so what is found is the outline before the blur.
+Blur moves the half-level of a curved edge towards the inside of the curve by sigma^2 kappa / 2 (kappa the curvature);
+near the end of a fillet only part of the curvature counts. The points are compared with the outline displaced in this
+way, so that the result is the outline before the blur.
 """
 
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""Step 8, the gap: the distance between the two measuring points, and how surely it is known."""
+"""Step 8, the gap: the distance between the two measuring points, with its uncertainty."""
 
 from dataclasses import replace
 from math import atan, degrees, hypot, sqrt
@@ -167,7 +167,7 @@ def measure_gap(
 
 
 def _gripping(fingers: CoarseFingers, below_tip_px: float) -> NoGap | None:
-    """Say so where a part hides an inner edge at the measuring height."""
+    """Return the status `gripping` where a part hides an inner edge at the measuring height."""
     sides = [
         name
         for name, finger in (("left", fingers.left), ("right", fingers.right))
@@ -180,7 +180,7 @@ def _gripping(fingers: CoarseFingers, below_tip_px: float) -> NoGap | None:
 
 
 def _refuse(edges: EdgePoints, full_scale: int, light_gap: bool) -> NoGap | None:
-    """Reasons to give no number that the edges themselves show."""
+    """Return the reason why the edges give no number, if any."""
     real = edges.lines.weight > 0
     inner = real & IS_INNER
     if np.count_nonzero(inner) < FEWEST_ROWS:  # a slanted or touching tip: what faces the gap is seen in columns
@@ -208,7 +208,7 @@ def _refuse(edges: EdgePoints, full_scale: int, light_gap: bool) -> NoGap | None
 
 
 def _way_px(edges: EdgePoints) -> float:
-    """How far the faster finger moved while the shutter was open: motion across the fingers spreads flanks alone."""
+    """Displacement of the faster finger during the exposure (pixels): such motion blurs only the flanks."""
     flanks, tips = (edges.blur_px[:, part] ** 2 for part in (0, 1))
     return sqrt(12.0 * max(0.0, float((flanks - tips).max())))
 
@@ -220,7 +220,7 @@ def _no_fingers(
     holds: list[bool],
     below_tip_px: float,
 ) -> NoGap | None:
-    """Say so where what was measured is round all over: a finger has straight flanks."""
+    """Return the status `no_fingers` where the measured objects are round all over: a finger has straight flanks."""
     pair = (fingers.left, fingers.right)
     turn = common_turn([finger.inner_sign * end.parameters[OUTER_M] for finger, end in zip(pair, ends, strict=True)])
     are_fingers = [
@@ -249,7 +249,7 @@ def _assemble(
     light_gap: bool,
     largest_variance: float,
 ) -> GapMeasurement | NoGap:
-    """From the fingers' own axes back to the picture; what is less sure than that is none."""
+    """Transform from the fingers' axes back to the picture, and refuse a result of larger variance than allowed."""
     orientation = fingers.orientation
     across, along, found = [], [], []
     for k, (finger, m) in enumerate(zip((fingers.left, fingers.right), measured, strict=True)):

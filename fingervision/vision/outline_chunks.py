@@ -1,8 +1,8 @@
 """The edge in every stretch of a body's outline: where it is seen against where it is drawn, how blurred, how surely.
 
-The straight stretches of an outline are cut into chunks about a millimetre long. In each chunk all pixels within reach
-of the edge are fitted by one blurred step, I = a + b Phi(-(s - d) / sigma_e), s the pixel's distance along the outward
-normal: no resampling, so that a pixel's phase does not bias it.
+The straight stretches of an outline are divided into chunks about a millimetre long. In each chunk one blurred step is
+fitted to all pixels near the edge, I = a + b Phi(-(s - d) / sigma_e), with s the pixel's distance along the outward
+normal. Nothing is resampled, so that the sub-pixel phase causes no bias.
 """
 
 from dataclasses import dataclass, replace
@@ -50,7 +50,7 @@ class Chunks:
     half_length: float
 
     def moved(self, shift: Array, angle: float, about: Array) -> "Chunks":
-        """Move them rigidly: turned about a point, then shifted."""
+        """Move the chunks rigidly: turned about a point, then shifted."""
         c, s = np.cos(angle), np.sin(angle)
         turn = np.array([[c, -s], [s, c]])
         middles = turn @ (self.middles - about[:, None]) + (about + shift)[:, None]
@@ -58,20 +58,20 @@ class Chunks:
 
 
 class FlatMap(Protocol):
-    """From the picture to the plane as seen squarely and without distortion, in pixels, and back."""
+    """Map from the picture to the object plane without perspective and distortion, in pixels, and back."""
 
     def to_flat(self, points: Array) -> Array:
-        """Take lens and perspective off points, shape (2, n)."""
+        """Remove lens distortion and perspective from points, shape (2, n)."""
         ...
 
     def to_picture(self, points: Array) -> Array:
-        """Put them on again."""
+        """Apply lens distortion and perspective to points, shape (2, n)."""
         ...
 
 
 @dataclass(frozen=True, slots=True)
 class EdgeView:
-    """How edges of bodies show in a picture.
+    """How the edges of bodies appear in a picture.
 
     Parameters
     ----------
@@ -127,7 +127,7 @@ class ChunkEdges:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _InPicture:
-    """Chunks as the picture shows them, and how much longer a way across them is on the flat plane."""
+    """Chunks in picture coordinates, and how much longer a distance across them is in the flat plane."""
 
     middles: Array
     normals: Array
@@ -136,7 +136,7 @@ class _InPicture:
 
 
 def _in_picture(chunks: Chunks, flat: FlatMap | None) -> _InPicture:
-    """Map chunks into the picture: each by its mean place and by its chord."""
+    """Map chunks into the picture by their mean position and their chord."""
     count, half = chunks.middles.shape[1], chunks.half_length
     if flat is None or not count:
         return _InPicture(chunks.middles, chunks.normals, np.full(count, half), np.ones(count))
@@ -214,7 +214,7 @@ def chunk_edges(
 def _like_the_others(
     blurs: Array, level: Array, contrast: Array, noise: Array, used: NDArray[np.bool_]
 ) -> NDArray[np.bool_]:
-    """Whether a chunk shows the body's own edge, by the median of all chunks that show one."""
+    """Whether a chunk shows the body's own edge, compared with the median of all chunks that show an edge."""
     usual = float(np.median(contrast[used]))
     # A shadow falls on up to half of a body's sides: the better half tells what an edge of its own looks like.
     sharp, quiet = float(np.quantile(blurs[used], 0.25)), float(np.quantile(noise[used], 0.25))
@@ -231,10 +231,10 @@ def _like_the_others(
 def _step(
     values: Array, s: Array, blur: float, body_is_dark: bool
 ) -> tuple[float, float, float, float, float, float, float] | None:
-    """Fit a blurred step by Gauss and Newton's iteration; None where there is none.
+    """Fit a blurred step by Gauss-Newton iteration; None where there is no step.
 
-    Offset, its variance, blur of the optics and its u, level of the body, its difference from the ground, standard
-    deviation of the noise.
+    Returned are offset, its variance, blur of the optics and its standard uncertainty, level of the body, its
+    difference from the background, and standard deviation of the noise.
 
     Pixels are squares: their own width adds 1/12 to the square of the blur (measuring.md).
     """

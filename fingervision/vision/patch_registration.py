@@ -1,10 +1,10 @@
-"""How far a textured piece of surface has moved and turned: registration of patches against a reference picture.
+"""Translation and rotation of a textured surface: registration of patches against a reference picture.
 
 Inverse-compositional Gauss-Newton of the zero-normalised sum of squared differences over translation and rotation
 (Baker & Matthews, Int. J. Computer Vision 56(3), 2004, doi:10.1023/B:VISI.0000011205.11775.fd; Pan, Li & Tong,
 Experimental Mechanics 53(7), 2013, doi:10.1007/s11340-013-9717-6). A linear gradient of light and a gain are removed
-from both pictures. Both are smoothed alike and interpolated by cubic B-splines (`spline_interpolation`). Many patches
-of one size are registered together.
+from both pictures. Both pictures are smoothed in the same way and interpolated by cubic B-splines
+(`spline_interpolation`). Many patches of one size are registered together.
 """
 
 from dataclasses import dataclass
@@ -94,7 +94,7 @@ class PatchReference:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Registered:
-    """Where patches lie in another picture; arrays over the k patches.
+    """Positions and rotations of patches in another picture; arrays over the k patches.
 
     Parameters
     ----------
@@ -121,7 +121,7 @@ class Registered:
 
 @cache
 def _grid(half_width: int, half_height: int) -> tuple[Floats, Floats, Doubles]:
-    """Columns and rows from the middle, and an orthonormal basis of planes, shape (3, n)."""
+    """Columns and rows counted from the centre, and an orthonormal basis of planes, shape (3, n)."""
     y, x = np.mgrid[-half_height : half_height + 1, -half_width : half_width + 1]
     dx, dy = x.ravel().astype(np.float64), y.ravel().astype(np.float64)
     basis = np.stack((np.ones_like(dx), dx, dy))
@@ -131,7 +131,7 @@ def _grid(half_width: int, half_height: int) -> tuple[Floats, Floats, Doubles]:
 
 @cache
 def _extent(half_width: int, half_height: int) -> tuple[int, float]:
-    """Pixels of a patch, and the sum of their squared distances from its middle."""
+    """Number of pixels of a patch, and the sum of their squared distances from its centre."""
     dx, dy, _ = _grid(half_width, half_height)
     return dx.size, float((dx.astype(np.float64) ** 2 + dy.astype(np.float64) ** 2).sum())
 
@@ -237,13 +237,13 @@ def _covariance(
     half_size: tuple[int, int],
     shared_pixels: float,
 ) -> tuple[Doubles, Doubles]:
-    """Covariance of x, y and turn from what is left, and the noise of one picture.
+    """Covariance of x, y and rotation from the residuals, and the noise of one picture.
 
-    Both pictures have noise. Smoothed and interpolated levels have less of it than pixels, so the residuals show
-    `sigma^2 (k_0 + g^2 k)` with `k` by the phase; the estimate feels the noise of the pixels through the smoothing
-    alone, because the texture is coarser than the pixels: `2 sigma^2` times the Gram matrix of the gradients smoothed
-    once more. The gradients of the reference hold noise as well, which adds to their Gram matrix and is taken off it
-    (errors in variables): covariance = sigma_r^2 H^-1 S_seen H^-1.
+    Both pictures have noise. Smoothed and interpolated levels have less noise than pixels, so that the residuals have
+    the variance `sigma^2 (k_0 + g^2 k)`, where `k` depends on the sub-pixel phase. The estimate is affected by the
+    pixels' noise after smoothing only, because the texture is coarser than the pixels: `2 sigma^2` times the Gram
+    matrix of the gradients smoothed once more. The noise in the gradients of the reference increases their Gram matrix
+    and is subtracted from it (errors in variables): covariance = sigma_r^2 H^-1 S_seen H^-1.
     """
     count, (n, turned) = squares.size, _extent(*half_size)
     table = phase_power(SMOOTHING_PX)
@@ -258,7 +258,7 @@ def _covariance(
 
 
 def _propagated(hessian: Doubles, score: Doubles, noisy: Doubles, spread: Doubles) -> Doubles:
-    """Covariances of k patches, shape (k, 3, 3); infinite where gradients are those of noise or of one direction."""
+    """Covariances of k patches, shape (k, 3, 3); infinite for gradients of noise only, or of one direction only."""
     true = hessian - noisy
     size = np.sqrt(np.maximum(np.einsum("kii->ki", hessian), 1e-30))
     surely = hessian - NOISE_MARGIN * noisy
@@ -270,9 +270,9 @@ def _propagated(hessian: Doubles, score: Doubles, noisy: Doubles, spread: Double
 
 
 def reference_covariance(reference: PatchReference, noise: float) -> Doubles:
-    """Covariance of x, y and turn that a registration of this patch will have, shape (3, 3).
+    """Predicted covariance of x, y and rotation for a registration of this patch, shape (3, 3).
 
-    Infinite where its gradients are no more than those of the noise, or lie in one direction alone.
+    Infinite where the gradients do not exceed those of the noise, or have one direction only.
 
     Parameters
     ----------

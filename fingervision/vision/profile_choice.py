@@ -1,9 +1,9 @@
-"""Select the model of the mean profile across a flank, and from it the position of the finger's edge.
+"""Select the model of the mean profile across a flank, which gives the position of the finger's edge.
 
-A shadow, a wall and a line of glare each leave their own mean profile. Some of them cannot be told apart on one flank
-alone: a wall half as light as the ground looks like motion during the exposure, and glare like a wall on the other side
-of the edge. A wall is seen on the inner flank only, because the camera looks between the fingers; motion spreads both
-flanks and no tip; glare and shadow go all around.
+A shadow, a side wall and a line of glare each leave a characteristic mean profile. Some of these are indistinguishable
+on one flank alone: a wall half as light as the background looks like motion blur, and glare like a wall on the other
+side of the edge. A wall is visible on the inner flank only, because the camera looks into the gap from its middle;
+motion blurs both flanks and no tip; glare and shadow surround the finger.
 """
 
 from dataclasses import dataclass, replace
@@ -67,7 +67,7 @@ U_SHADOW, U_WALL, U_GLARE = 0.1, 0.1, 0.35
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Profile:
-    """Mean light across a flank: places outwards from the single step, light, and how many pixels."""
+    """Mean light across a flank: distances outwards from the fitted step, light, and numbers of pixels."""
 
     t: Floats
     light: Floats
@@ -77,7 +77,7 @@ class _Profile:
 def with_profile(
     upright: GreyImage, edges: EdgePoints, light: Floats, top_level: int, is_outline: bool = False
 ) -> EdgePoints:
-    """The same points, moved to the finger's own edge where something beside it has drawn the fitted step away.
+    """Return the points moved to the finger's own edge where a structure beside it has displaced the fitted step.
 
     Parameters
     ----------
@@ -175,7 +175,7 @@ def with_profile(
 
 
 def _sharpened(upright: GreyImage, edges: EdgePoints, light: Floats, top_level: int, room: int) -> EdgePoints | None:
-    """The same points without what sharpening of the stored levels has moved them by; None where there is none."""
+    """Return the points corrected for sharpening of the stored levels; None where there is no sharpening."""
     stored = np.arange(float(light.size))
     left, right = (_profile(upright, edges, stored, k, slice(0, INNER), room) for k in range(2))
     if left is None or right is None:
@@ -193,12 +193,12 @@ def _sharpened(upright: GreyImage, edges: EdgePoints, light: Floats, top_level: 
 
 
 def _are_of_size(fits: list[ProfileFit], sign: float) -> bool:
-    """Whether what stands beside a dark finger's edge has the sign that it must have, and the size of such things."""
+    """Whether the structure beside a dark finger's edge has a plausible sign and size."""
     return all(SHARES[0] < sign * fit.share < SHARES[1] for fit in fits)
 
 
 def _room(edges: EdgePoints) -> int:
-    """How far the window may reach before it meets the other finger (pixels)."""
+    """How far a window may extend before it meets the other finger (pixels)."""
     real = [edges.position[k, :INNER][edges.lines.weight[k, :INNER] > 0] for k in range(2)]
     if not (real[0].size and real[1].size):
         return 0
@@ -213,7 +213,7 @@ def _best(
     is_blur_known: bool = False,
     too_many: float = np.inf,
 ) -> ProfileFit:
-    """The best fit of a model from any of its starts."""
+    """The best fit of a model among all starting values."""
     weights = profile.count * weight
     blurs = (blur,) if is_blur_known or kind == STEP else (blur, OWN_BLUR * blur)
     return min(
@@ -227,7 +227,7 @@ def _best(
 
 
 def _profile(upright: GreyImage, edges: EdgePoints, light: Floats, k: int, part: slice, room: int) -> _Profile | None:
-    """Mean profile of the half of a flank that is farther from the tip; None where it is short or not straight."""
+    """Mean profile of the half of a flank farther from the tip; None where it is short or not straight."""
     real = np.flatnonzero(edges.lines.weight[k, part] > 0)
     rows = real[real.size // 2 :]
     if rows.size < FEWEST_ROWS or room < REACH_PX // 2:
@@ -258,9 +258,9 @@ def _profile(upright: GreyImage, edges: EdgePoints, light: Floats, k: int, part:
 
 
 def _rows_between(looked_at: Ints) -> Ints:
-    """Every row between the first and the last that were looked at, also where lines were thinned out.
+    """Every row between the first and the last searched one, also where lines were thinned out.
 
-    Where many in succession were left out, a part hides the edge there.
+    Where many successive rows were left out, a part hides the edge there.
     """
     looked_at = np.sort(looked_at)
     rows, steps = np.arange(looked_at[0], looked_at[-1] + 1), np.diff(looked_at).astype(np.float64)
@@ -273,18 +273,18 @@ def _rows_between(looked_at: Ints) -> Ints:
 
 
 def _across(edges: EdgePoints) -> Floats:
-    """Movement along every line for one pixel across the picture: a wall is the outline seen again beside itself."""
+    """Movement along every line per pixel of movement across the picture: a wall repeats the outline beside itself."""
     towards_gap = edges.lines.outward[:, :1] * edges.lines.slope
     return np.where(IS_INNER, 1.0, np.where(IS_ROW, 0.0, np.maximum(towards_gap, 0.0)))
 
 
 def _beyond_wall(fit: ProfileFit) -> ProfileFit:
-    """The far edge of a wall, where the near one was found."""
+    """The far edge of a wall, where the fit found the near one."""
     return fit._replace(position=fit.position + fit.breadth)
 
 
 def _moved(edges: EdgePoints, fits: list[ProfileFit], u_relative: float, by_pixel: Floats, beside: str) -> EdgePoints:
-    """Edges at the place that a model gives; what is not known of it is stated."""
+    """Move the edges to the positions that a model gives, and state the remaining uncertainty."""
     moves = np.array([fit.position for fit in fits])[:, None] * by_pixel
     u_px = [float(np.hypot(fit.u_position, u_relative * fit.position)) for fit in fits]
     position = edges.position + edges.lines.outward * moves
@@ -292,7 +292,7 @@ def _moved(edges: EdgePoints, fits: list[ProfileFit], u_relative: float, by_pixe
 
 
 def _with_blur(edges: EdgePoints, widths: list[float]) -> EdgePoints:
-    """Edges whose inner flanks are blurred as the outer ones are: a wall is no blur."""
+    """Give the inner flanks the blur of the outer ones: a wall is not blur."""
     blur_px = edges.blur_px.copy()
     blur_px[:, 0] = [np.sqrt(max(width**2 - PIXEL_VARIANCE, 0.0)) for width in widths]
     blur_px[:, 1] = np.minimum(blur_px[:, 0], blur_px[:, 1])
@@ -300,12 +300,12 @@ def _with_blur(edges: EdgePoints, widths: list[float]) -> EdgePoints:
 
 
 def _unsure(edges: EdgePoints, limit_px: list[float], beside: str) -> EdgePoints:
-    """Edges that stay, with what nobody can tell: anywhere up to the limit."""
+    """Leave the edges in place, with an uncertainty of up to the limit because the cause is undecided."""
     u_px = [max(abs(m.shift_px), limit / np.sqrt(3.0)) for m, limit in zip(edges.marks, limit_px, strict=True)]
     return replace(edges, marks=_stated(edges, u_px), beside=beside)
 
 
 def _stated(edges: EdgePoints, u_px: list[float]) -> tuple[EdgeMark, EdgeMark]:
-    """Marks that hold these uncertainties; both edges err alike."""
+    """Marks with the given uncertainties; both edges have the same error."""
     left, right = (EdgeMark(u, mark.beyond) for u, mark in zip(u_px, edges.marks, strict=True))
     return left, right

@@ -2,7 +2,7 @@
 
 A finger's edge is a step of light that the optics spread. Beside it there may be a second step (the side wall of a
 thick part, between the finger's face and the ground), a ramp (a soft shadow on the ground) or a bright line (glare
-along the edge, on the finger). Each of them draws a single step that is fitted towards itself.
+along the edge, on the finger). Each of these displaces a fitted single step towards itself.
 """
 
 from typing import NamedTuple
@@ -39,7 +39,7 @@ _fit_profile = loop("profile_models_fit_profile")
 
 
 class ProfileFit(NamedTuple):
-    """One model of a profile.
+    """One model of a profile, fitted.
 
     Parameters
     ----------
@@ -66,7 +66,7 @@ class ProfileFit(NamedTuple):
 
 
 def addition(kind: int, t: float, blur: float, breadth: float) -> float:
-    """The part beside the step, blurred, at a distance from the edge outwards."""
+    """The structure beside the step, blurred, as a function of the distance outwards from the edge."""
     return float(_addition(kind, t, blur, breadth))
 
 

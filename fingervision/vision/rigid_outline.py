@@ -1,8 +1,9 @@
-"""The rigid motion of one body in a picture, from every stretch of its outline that can be seen.
+"""Rigid motion of one body in a picture, from all visible stretches of its outline.
 
-The offsets of all chunks of the outline (`outline_chunks`) are one rigid motion by weighted least squares, with
-Tukey's weights for what covers an edge. What the chunks scatter beyond their own noise widens the covariance. Sides
-that a shadow may lie along (`one_sided_blur`) have an offset of their own, as uncertain as their blur says.
+Weighted least squares over the offsets of all chunks of the outline (`outline_chunks`) gives one rigid motion; Tukey's
+weights suppress chunks whose edge is covered. Scatter of the chunks beyond their own noise widens the covariance. Edge
+bias, size, and the offset of every side that a shadow may lie along (`one_sided_blur`) are unknowns beside the motion,
+each with its standard uncertainty as prior.
 """
 
 from collections.abc import Sequence
@@ -31,7 +32,7 @@ LEAST_IN_VIEW = 0.4
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RigidFit:
-    """A rigid motion in a picture.
+    """A rigid motion measured in a picture.
 
     Parameters
     ----------
@@ -77,7 +78,7 @@ def fit_rigid(
     start: tuple[Array, float],
     view: EdgeView = PLAIN,
 ) -> RigidFit | None:
-    """Fit a body's motion from near a start; None where too little of its outline is seen.
+    """Fit a body's motion from a near starting value; None where too little of its outline is visible.
 
     Parameters
     ----------
@@ -124,7 +125,7 @@ def capture_rigid(
     start: tuple[Array, float],
     view: EdgeView = PLAIN,
 ) -> RigidFit | None:
-    """Fit from farther away: in the picture halved again and again, the coarsest first.
+    """Fit from a farther starting value: in successively halved pictures, the coarsest first.
 
     Parameters
     ----------
@@ -150,7 +151,7 @@ def capture_rigid(
 
 
 def halved(grey: NDArray[np.float64], times: int) -> list[NDArray[np.float64]]:
-    """Halve a picture so many times, four pixels to one."""
+    """Halve a picture `times` times, averaging four pixels into one."""
     out = []
     for _ in range(times):
         height, width = (size // 2 * 2 for size in grey.shape)
@@ -162,7 +163,7 @@ def halved(grey: NDArray[np.float64], times: int) -> list[NDArray[np.float64]]:
 
 @dataclass(frozen=True, slots=True)
 class _Halved:
-    """A map of a picture that was halved."""
+    """The map for a picture that was halved."""
 
     whole: FlatMap
     scale: float
@@ -178,19 +179,21 @@ class _Halved:
 def _rigid(
     chunks: Chunks, edges: ChunkEdges, about: Array, view: EdgeView
 ) -> tuple[Array, Array, Array, Array, tuple[float, float]] | None:
-    """Small rigid motion by the chunks' offsets, its covariance, what shared errors do to it, and the size's error.
+    """Small rigid motion from the chunks' offsets, its covariance, the effect of shared errors, and the size's error.
 
-    None where the offsets do not hold it. What shared errors do: columns for edges farther out and a larger body, shape
-    (3, 2), and the covariance by shadows, shape (3, 3).
+    None where the offsets do not determine the motion. Shared errors: columns for edges farther out and a larger body,
+    shape (3, 2), and the covariance by shadows, shape (3, 3).
     """
     used = edges.used
     arm = chunks.middles[:, used] - about[:, None]
     nx, ny = chunks.normals[:, used]
     rigid = np.stack([nx, ny, -nx * arm[1] + ny * arm[0]], axis=1)
     doubtful = doubtful_offsets(chunks.middles[:, used], chunks.normals[:, used], edges.blur[used], edges.u_blur[used])
-    # A doubtful side has an offset of its own, of which nothing is known but how large it may be.
-    columns = np.hstack([rigid, doubtful])
-    prior = np.diag([0.0] * 3 + [1.0] * doubtful.shape[1])
+    # An edge seen farther out is one offset of all chunks; a body that is larger than drawn moves each by its distance;
+    # a doubtful side has an offset of its own. Of each of these it is known how large it may be.
+    shared = np.stack([np.ones_like(nx), nx * arm[0] + ny * arm[1]], axis=1)
+    columns = np.hstack([rigid, shared * (view.u_outward_px, view.u_size), doubtful])
+    prior = np.diag([0.0] * 3 + [1.0] * (columns.shape[1] - 3))
     offset, sd = edges.offset[used], np.sqrt(edges.variance[used])
     weight = np.ones(offset.size)
     move = np.zeros(3)
@@ -211,31 +214,19 @@ def _rigid(
     kept = weight > 0.0
     if kept.sum() < max(FEWEST, LEAST_SHARE * edges.in_view.sum()):
         return None
-    # An edge seen farther out is one offset of all chunks; a body that is larger than drawn moves each by its distance.
-    shared = np.stack([np.ones_like(nx), nx * arm[0] + ny * arm[1]], axis=1)
-    known = shared * (view.u_outward_px, view.u_size)
-    spread = max(1.0, _left_over(rigid, np.hstack([known, doubtful]), offset, w) / max(float(weight.sum()) - 3.0, 1.0))
+    # What errors of known size take up is none of the noise, and costs their own square.
+    left_over = float(np.sum(weight * rest**2)) + float(move[3:] @ move[3:])
+    spread = max(1.0, left_over / max(float(weight.sum()) - 3.0, 1.0))
     inverse = np.linalg.inv(normal)
     size = _size_error(np.hstack([rigid, shared]), offset, sd)
-    noise, by_shadows = (inverse[:3] @ part @ inverse[:, :3] for part in (normal - prior, prior))
+    noise = inverse[:3] @ (normal - prior) @ inverse[:, :3]
+    by_shadows = inverse[:3, 5:] @ inverse[5:, :3]
     by_shared = inverse[:3] @ (columns.T @ (w[:, None] * shared))
     return move[:3], spread * noise, by_shared, by_shadows, size
 
 
-def _left_over(columns: Array, known: Array, offset: Array, weight: Array) -> float:
-    """Weighted sum of squares that neither a rigid motion nor errors of known size leave.
-
-    `known` are one standard uncertainty's worth of each such error: what is taken up by it costs its own square.
-    """
-    whole = np.hstack([columns, known])
-    normal = whole.T @ (weight[:, None] * whole)
-    normal[np.diag_indices(whole.shape[1])] += [0.0] * columns.shape[1] + [1.0] * known.shape[1]
-    right = whole.T @ (weight * offset)
-    return float(weight @ offset**2 - right @ np.linalg.solve(normal, right))
-
-
 def _size_error(columns: Array, offset: Array, sd: Array) -> tuple[float, float]:
-    """Relative error of the body's size beside a rigid motion and edges that are all seen farther out, and its u."""
+    """Relative error of the body's size, and its standard uncertainty, fitted beside motion and edge offset."""
     whitened, wanted = columns / sd[:, None], offset / sd
     scale = np.linalg.norm(whitened, axis=0)
     if offset.size < FEWEST + columns.shape[1] or scale.min() <= 0.0:

@@ -52,7 +52,7 @@ _edges = loop("straight_edge_fit_edges")
 
 @dataclass(frozen=True, slots=True)
 class Band:
-    """Where the edges are looked for: axes turned by `direction_rad`, counted from a middle.
+    """Band in which the edges are searched: axes turned by `direction_rad`, counted from a centre.
 
     Parameters
     ----------
@@ -72,7 +72,7 @@ class Band:
 
 @dataclass(frozen=True, slots=True)
 class EdgeStart:
-    """First guess of one edge.
+    """Initial estimate of one edge.
 
     Parameters
     ----------
@@ -144,7 +144,7 @@ def reach_px(blur_px: float) -> float:
 
 
 def blurred_box_step(away: Floats, sigma: float, width: float) -> tuple[Floats, Floats, Floats]:
-    """Blurred unit step averaged over a box, and its derivatives by distance and by sigma.
+    """Blurred unit step averaged over a box, and its derivatives with respect to distance and sigma.
 
     Parameters
     ----------

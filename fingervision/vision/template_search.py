@@ -1,4 +1,4 @@
-"""Where in a picture something looks like a template (zero-normalised correlation), and whether only there."""
+"""Find a template in a picture by zero-normalised correlation, and check that the match is unique."""
 
 from dataclasses import dataclass
 
@@ -24,7 +24,7 @@ _best = loop("template_search_best")
 
 @dataclass(frozen=True, slots=True)
 class Match:
-    """The best place of a template.
+    """The best match of a template.
 
     Parameters
     ----------
@@ -43,7 +43,7 @@ class Match:
 
 
 class Template:
-    """Something to look for, prepared for many searches.
+    """A template, prepared for repeated searches.
 
     Parameters
     ----------
@@ -58,7 +58,7 @@ class Template:
         self._spectra: dict[tuple[int, ...], Floats] = {}
 
     def best_match(self, part: Floats, beyond_px: int = BEYOND_PX) -> Match:
-        """Find it in a part of a picture.
+        """Find the template in a part of a picture.
 
         Parameters
         ----------
@@ -86,7 +86,7 @@ class Template:
 
 
 def independent_pixels(template: Floats) -> float:
-    """How many independent pixels a texture has: their number over the area of its squared autocorrelation."""
+    """Number of independent pixels in a texture: its pixels divided by the area of its squared autocorrelation."""
     levels = template.astype(np.float64) - template.mean()
     spectrum = np.abs(np.fft.fft2(levels, [2 * size for size in levels.shape])) ** 2
     correlation = np.fft.ifft2(spectrum).real
@@ -96,12 +96,12 @@ def independent_pixels(template: Floats) -> float:
 
 
 def chance_correlation(template: Floats) -> float:
-    """Correlation that another texture as coarse as this one may reach somewhere in a search."""
+    """Correlation that an unrelated texture of the same coarseness may reach by chance somewhere in a search."""
     return float(np.tanh(CHANCE_SIGMAS / np.sqrt(max(independent_pixels(template), FEWEST_INDEPENDENT) - 3.0)))
 
 
 def high_pass_noise(levels: Floats) -> float:
-    """Standard deviation of white noise from differences of second differences.
+    """Standard deviation of white noise, from a high-pass filter (a second difference along each axis).
 
     Immerkaer, Computer Vision and Image Understanding 64(2), 1996, doi:10.1006/cviu.1996.0060.
     """

@@ -29,7 +29,7 @@ _MIRRORED = 1e-3
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Candidate:
-    """One explanation with one parameter.
+    """One explanation with one parameter, its size.
 
     Parameters
     ----------
@@ -62,17 +62,17 @@ class Candidate:
 
     @property
     def key(self) -> str:
-        """Name and place as a report spells them: `hinge_stiffness_error@right hinge 2`."""
+        """Name and place as in a report: `hinge_stiffness_error@right hinge 2`."""
         return effect_key(self.name, self.place)
 
     @property
     def full_key(self) -> str:
-        """The same with the end of a link that sits off, as a `model.toml` tells it."""
+        """Key with the end of a link that is misplaced, as in a `model.toml`."""
         return effect_key(self.name, self.place, self.detail)
 
 
 def candidates_of(prediction: BodyPrediction) -> tuple[Candidate, ...]:
-    """List the explanations that a drawing has a place for, and those without a place that poses can tell."""
+    """List the explanations with a place in the drawing, and those without a place that poses can distinguish."""
     found = [*_hinges(prediction), *_links(prediction), *_pivots(prediction)]
     found += [*_pairs(prediction, found), *_without_place(prediction)]
     return tuple(found)
@@ -90,9 +90,9 @@ def _stiffer(prediction: BodyPrediction, flexure: int) -> Added:
 
 
 def _links(prediction: BodyPrediction) -> list[Candidate]:
-    """Links between what holds a body: one end sits too far out along the line that joins both.
+    """Links between the hinges of a body: one end lies too far out along the line through both ends.
 
-    Of a body that many flexures hold, each is joined to the nearest others (a minimum spanning tree).
+    In a body held by many flexures, each is joined to the nearest others (a minimum spanning tree).
     """
     mechanism, found = prediction.answers.mechanism, []
     numbers = {flexure.name: place for place, flexure in enumerate(mechanism.flexures)}
@@ -134,7 +134,7 @@ def _changed(prediction: BodyPrediction, changes: Callable[[float], PlaceChanges
 
 
 def _tree(points: object) -> list[tuple[str, str]]:
-    """Join points by the shortest lines (Prim's algorithm)."""
+    """Join points by the shortest total length of lines (Prim's algorithm)."""
     places = dict(points)  # type: ignore[call-overload]
     names = list(places)
     inside, joins = names[:1], []
@@ -160,7 +160,7 @@ def _slipping(prediction: BodyPrediction, flexure: int) -> Added:
 
 
 def _pairs(prediction: BodyPrediction, singles: Sequence[Candidate]) -> list[Candidate]:
-    """A link and its mirror image together: both alike change the lever ratio, oppositely the symmetry."""
+    """A link together with its mirror image: equal changes alter the lever ratio, opposite ones the symmetry."""
     found = []
     mirrored = mirror_of(prediction)
     by_key = {(each.place, each.detail): each for each in singles if each.name == "link_length_error"}
@@ -178,7 +178,7 @@ def _pairs(prediction: BodyPrediction, singles: Sequence[Candidate]) -> list[Can
 
 
 def _by_length(prediction: BodyPrediction, one: Candidate, other: Candidate, sign: float) -> float:
-    """Ratio of the openings, or share of the right finger, by a relative change of both links' lengths."""
+    """Ratio of the openings, or share of the right finger, per relative change of both links' lengths."""
     answers = prediction.answers
     if GAP not in answers.mechanism.pairs:
         return 0.0
@@ -198,7 +198,7 @@ def _together(one: Candidate, other: Candidate, sign: float, scale: float) -> Ad
 
 
 def mirror_of(prediction: BodyPrediction) -> Callable[[str], str]:
-    """Return what exchanges every hinge, probe and body in a text for its mirror image about x = 0."""
+    """Return a function that replaces each hinge, probe or body in a text by its mirror image about x = 0."""
     answers = prediction.answers
     size = answers.mechanism.region.size_mm
     at = {flexure.name: flexure.at_mm for flexure in answers.mechanism.flexures} | answers.mechanism.probes
@@ -225,7 +225,7 @@ def mirror_of(prediction: BodyPrediction) -> Callable[[str], str]:
 
 
 def mirrored_channels(prediction: BodyPrediction) -> dict[str, tuple[str, float]]:
-    """Channels whose mirror image was measured too, and the sign with which they are alike."""
+    """Channels whose mirror image was measured too, with the sign that relates the two."""
     mirrored, found = mirror_of(prediction), {}
     for name in prediction.channels:
         body, dot, part = name.rpartition(".")

@@ -19,7 +19,7 @@ MOST = 6
 
 
 def fitted_words(fitted: Fitted) -> str:
-    """Say what differs where: `right hinge 2: 14 +- 3 % too soft`."""
+    """Sentence on what differs where: `right hinge 2: 14 +- 3 % too soft`."""
     candidate, size, u = fitted.candidate, fitted.size, COVER * fitted.u_stated
     where = candidate.place or candidate.name
     if candidate.parameter.name == "play_mm":
@@ -37,7 +37,7 @@ def fitted_words(fitted: Fitted) -> str:
 
 
 def set_words(members: Sequence[Fitted]) -> str:
-    """Say the answer: one place, or the set of those that these data cannot tell apart."""
+    """Sentence with the answer: one place, or the set of places that these data cannot distinguish."""
     keys = list(dict.fromkeys(member.candidate.key for member in members))
     if len(keys) == 1:
         return fitted_words(members[0])
@@ -46,7 +46,7 @@ def set_words(members: Sequence[Fitted]) -> str:
 
 
 def body_places(evidence: BodyEvidence, answers: PlaceAnswers) -> tuple[Place, ...]:
-    """Find the parts of the input's range where a body's pose cannot be noise, the sharpest of every channel."""
+    """Find the ranges of input in which a body's pose cannot be noise, the most significant one for each channel."""
     prediction, findings = evidence.prediction, evidence.findings
     u, kept = prediction.input_mm, findings.noise.kept
     found = []
@@ -72,7 +72,7 @@ def body_places(evidence: BodyEvidence, answers: PlaceAnswers) -> tuple[Place, .
 
 
 def _joined(channel: str, answers: PlaceAnswers) -> str:
-    """Say which hinges hold the body of a channel."""
+    """Names of the hinges at the body of a channel."""
     body = channel.rpartition(".")[0]
     numbers = {each.name: number for number, each in answers.numbered_bodies().items()}
     if body not in numbers:

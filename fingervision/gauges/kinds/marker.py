@@ -1,4 +1,4 @@
-"""Where a printed mark is: a dot, a cross, or a corner of a chessboard."""
+"""Position of a printed mark: a dot, a cross, or a corner of a chessboard."""
 
 from dataclasses import dataclass
 from math import ceil, hypot, sqrt
@@ -36,7 +36,7 @@ LEAST_SURE_PX = 0.5
 
 @dataclass(frozen=True, slots=True)
 class MarkerSpec:
-    """Keys of a mark: its middle in the first frame, a window that holds it, its shape, how far it may move."""
+    """Settings of a marker gauge: centre in the first frame, window size, shape, and how far the mark may move."""
 
     middle_px: tuple[float, float]
     size_px: float
@@ -49,7 +49,7 @@ class MarkerSpec:
 
 
 def read(section: Section) -> MarkerSpec:
-    """Read one gauge's keys."""
+    """Read the keys of one gauge."""
     return MarkerSpec(
         common_keys.middle(section),
         section.number("size_px", low=SMALLEST_PX, high=LARGEST_PX),
@@ -59,7 +59,7 @@ def read(section: Section) -> MarkerSpec:
 
 
 class FollowedMarker:
-    """One mark in the frames of one recording."""
+    """Measures one mark in the frames of one recording."""
 
     def __init__(self, spec: MarkerSpec) -> None:
         self._spec = spec
@@ -114,7 +114,7 @@ class FollowedMarker:
         return place, found.covariance
 
     def _near(self, picture: Picture) -> list[tuple[float, float]] | tuple[GaugeStatus, str]:
-        """First guesses of the middle."""
+        """Initial estimates of the centre."""
         x, y = self._at
         if self._template is None:
             step = max(NEAR * self._spec.size_px * 0.7, 1.0)
@@ -171,7 +171,7 @@ class FollowedMarker:
         return found.quarter_turn < -LEAST_QUARTER
 
     def _taken(self, picture: Picture, place: tuple[float, float]) -> tuple[GaugeStatus, str] | None:
-        """Keep what it looks like, unless another like it is within reach."""
+        """Store a template of the mark, unless a similar mark is within reach."""
         half = self._half + ceil(GUARD * self._spec.reach_px) + BEYOND_PX
         x, y = round(place[0]), round(place[1])
         own, _ = picture.part(x - self._half, y - self._half, 2 * self._half + 1, 2 * self._half + 1)

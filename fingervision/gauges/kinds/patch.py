@@ -1,4 +1,4 @@
-"""How far a textured piece of surface has moved and turned since the first frame."""
+"""Displacement and rotation of a textured piece of surface since the first frame."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -49,7 +49,7 @@ Floats = NDArray[np.float32]
 
 @dataclass(frozen=True, slots=True)
 class PatchSpec:
-    """Keys of a patch: its middle and size in the first frame, and how far it may move."""
+    """Settings of a patch gauge: centre and size in the first frame, and how far the patch may move."""
 
     middle_px: tuple[float, float]
     width_px: float
@@ -62,13 +62,13 @@ class PatchSpec:
 
 
 def read(section: Section) -> PatchSpec:
-    """Read one gauge's keys."""
+    """Read the keys of one gauge."""
     width, height = (section.number(key, low=SMALLEST_PX, high=LARGEST_PX) for key in ("width_px", "height_px"))
     return PatchSpec(common_keys.middle(section), width, height, common_keys.reach(section))
 
 
 class FollowedPatch:
-    """One patch in the frames of one recording."""
+    """Measures one patch in the frames of one recording."""
 
     def __init__(self, spec: PatchSpec) -> None:
         self._spec = spec
@@ -124,7 +124,7 @@ class FollowedPatch:
         return Mark(tuple((x + cos(turn) * u - sin(turn) * v, y + sin(turn) * u + cos(turn) * v) for u, v in corners))
 
     def _never(self, status: GaugeStatus, words: str) -> Reading:
-        """The first frame shows nothing to register against: there will be no number in this recording."""
+        """Record that the first frame has no texture to register against: no frame of this recording gives a number."""
         self._refused = Reading(status, zone=self._zone(), words=words)
         return self._refused
 
@@ -133,7 +133,7 @@ class FollowedPatch:
         return Reading(status, zone=self._zone(), words=words)
 
     def begun(self, picture: Picture) -> Reading:
-        """Take the reference from the first frame that could be read; a later one would be another zero."""
+        """Take the reference from the first readable frame; a later one would change the zero."""
         if self._refused is not None:
             return self._refused
         (a, b), (x, y) = self.half, self._spec.middle_px
@@ -164,7 +164,7 @@ class FollowedPatch:
         return Reading(GaugeStatus.OK, zero, (Mark(((x, y),)),), self._zone())
 
     def sought(self, picture: Picture) -> tuple[Floats, tuple[int, int], NDArray[np.float64]] | Reading:
-        """Find the patch coarsely; the part of the picture to register it in, and the first guess."""
+        """Locate the patch roughly: the part of the picture in which to register it, and the initial estimate."""
         a, b = self.half
         x, y, turn = self._at
         reach = ceil(GUARD * self._spec.reach_px * self._times) + BEYOND_PX
@@ -208,7 +208,7 @@ class FollowedPatch:
     def taken(
         self, place: tuple[float, float, float], covariance: NDArray[np.float64], correlation: float, settled: bool
     ) -> Reading:
-        """Judge what the registration found, and remember it."""
+        """Accept or reject the registration's result, and store it."""
         x, y, turn = place
         if not settled or correlation < self._least_correlation:
             return self._failed(GaugeStatus.NOT_FOUND)
@@ -232,7 +232,10 @@ class FollowedPatch:
 
 
 def _padded(picture: Picture, x: int, y: int, width: int, height: int) -> Floats:
-    """Light of a rectangle; beyond the picture's border it is reflected, which only interpolation's tails feel."""
+    """Light in a rectangle.
+
+    Beyond the picture's border it is reflected, which affects only the tails of the interpolation.
+    """
     levels, (left, top) = picture.part(x, y, width, height)
     part = levels.astype(np.float32)
     if part.shape == (height, width):

@@ -1,4 +1,4 @@
-"""The offset between the recording's clock and the stage's log, found from the motion that both show."""
+"""Offset between the recording's clock and the stage log's clock, found from the motion that both record."""
 
 from dataclasses import dataclass, replace
 
@@ -49,7 +49,7 @@ to 100 parts in a million, and compressed pictures bend a motion by as much."""
 
 @dataclass(frozen=True, slots=True)
 class ClockOffset:
-    """One clock for both records: recording's time = log's time + offset_s + rate (log's time - reference_s).
+    """Relation of the two clocks: recording's time = log's time + offset_s + rate (log's time - reference_s).
 
     Parameters
     ----------
@@ -81,17 +81,17 @@ class ClockOffset:
     notes: tuple[str, ...] = ()
 
     def log_time_s(self, time_s: float) -> float:
-        """Give the log's time at an instant of the recording."""
+        """Convert a time of the recording to the log's clock (s)."""
         return self.reference_s + (time_s - self.reference_s - self.offset_s) / (1.0 + self.rate)
 
     def recording_time_s(self, log_time_s: Array) -> Array:
-        """Give the recording's times at times of the log; shape (n,)."""
+        """Convert times of the log to the recording's clock (s); shape (n,)."""
         return np.asarray(log_time_s + self.offset_s + self.rate * (log_time_s - self.reference_s))
 
 
 @dataclass(frozen=True, slots=True)
 class NoClockOffset:
-    """Why no offset can be told.
+    """Reason why the offset cannot be determined.
 
     Parameters
     ----------
@@ -167,7 +167,7 @@ def _too_little(time_s: Array, gap_mm: Array, drive: DriveHistory) -> NoClockOff
 def _fitted(
     time_s: Array, gap_mm: Array, path: LogPath, candidate: Candidate, plays: tuple[float, ...]
 ) -> tuple[Motion, Fit]:
-    """Fit the frames that lie within the log under a candidate."""
+    """Fit the frames that lie within the log, starting from a candidate offset."""
     middle_s = 0.5 * float(time_s[0] + time_s[-1])
     start = Alignment(candidate.offset_s, candidate.rate, 0.0, 0.0)
     motion = Motion(time_s, gap_mm, path, middle_s, WHITE)
@@ -188,7 +188,10 @@ def _between_runs(log_s: Array, drive: DriveHistory) -> NDArray[np.bool_]:
 
 
 def _information(motion: Motion, found: Fit) -> float:
-    """Logarithm of the likelihood ratio to a gap that stands: more frames explained as well count more."""
+    """Log likelihood ratio against a constant gap.
+
+    It grows with the number of frames that are explained equally well.
+    """
     around = motion.gap_mm - motion.gap_mm.mean()
     return float(motion.time_s.size * np.log(max(float(around @ around), 1e-30) / max(found.squares, 1e-30)))
 
@@ -228,7 +231,7 @@ def _explained(motion: Motion, found: Fit) -> float:
 
 
 def _unrefuted(motion: Motion, drive: DriveHistory, best: Fit, others: list[Candidate], frame_s: float) -> list[float]:
-    """Offsets that explain the frames which they share with the best one as well as that does."""
+    """Offsets that explain the frames shared with the best offset as well as that one does."""
     found = []
     by_chance = _by_chance(motion, drive, best)
     for candidate in others:
@@ -247,10 +250,11 @@ def _unrefuted(motion: Motion, drive: DriveHistory, best: Fit, others: list[Cand
 
 
 def _by_chance(motion: Motion, drive: DriveHistory, best: Fit) -> float:
-    """By how much another part of the log may fit worse for its own noise alone, in chi-square.
+    """How much worse another part of the log may fit because of its own noise only, in chi-square.
 
-    The frames' noise is the same under every offset, the log's is another: two sums of n squares of it differ by a
-    standard deviation of 2 n^(1/2). What smoothing takes off the log is not counted: rather one candidate too many.
+    The frames' noise is the same under every offset, but the log's noise is not: two sums of n squares of it differ by
+    a standard deviation of 2 n^(1/2). That smoothing reduces the log's noise is not taken into account, which gives
+    rather one candidate too many.
     """
     # Second differences of white noise have six times its variance; turns of the motion are few.
     log_mm2 = (1.4826 * float(np.median(np.abs(np.diff(drive.input_mm, 2))))) ** 2 / 6.0
@@ -260,7 +264,7 @@ def _by_chance(motion: Motion, drive: DriveHistory, best: Fit) -> float:
 
 
 def _shares_motion(motion: Motion, at: Alignment) -> bool:
-    """Whether the frames within the log hold half of the gap's motion, or of the log's."""
+    """Whether the frames within the log contain half of the gap's motion, or half of the log's."""
     log_s, times_s = motion.log_time_s(at), motion.drive.time_s
     inside = (log_s >= times_s[0]) & (log_s <= times_s[-1])
     under = (times_s >= log_s[0]) & (times_s <= log_s[-1])
@@ -273,12 +277,12 @@ def _shares_motion(motion: Motion, at: Alignment) -> bool:
 
 
 def _residual(motion: Motion, best: Fit) -> Array:
-    """Residual of the best alignment over other frames."""
+    """Residual of the best alignment, computed over other frames."""
     return most_likely(motion, best.at, (0.0, 0.08)).residual_mm
 
 
 def _ambiguous(offsets_s: list[float]) -> NoClockOffset:
-    """Name the offsets among which a periodic motion does not decide."""
+    """List the offsets that fit a periodic motion equally well."""
     nearest = np.unique(np.round(offsets_s, 4))
     said = ", ".join(f"{one:.3f}" for one in nearest[:6]) + (" ..." if nearest.size > 6 else "")
     apart = f", {np.median(np.diff(nearest)):.3g} s apart," if nearest.size > 1 else ""
@@ -290,7 +294,7 @@ def _ambiguous(offsets_s: list[float]) -> NoClockOffset:
 
 
 def _stated(motion: Motion, at: Posterior, best: Fit, frame_s: float) -> ClockOffset | NoClockOffset:
-    """Put the fit into the terms of the log's clock, at the log's first row."""
+    """Convert the fit to an offset at the log's first row, on the log's clock."""
     first_s = float(motion.drive.time_s[0])
     more = np.sqrt(inflation(motion, best.at))
     offset_s, rate, covariance = at.offset_s, at.rate, at.covariance * np.outer(more[:2], more[:2])

@@ -1,4 +1,4 @@
-"""Offset and rate of two clocks, play, start and scale fitted together: variable projection over the motion."""
+"""Joint fit of offset and rate of two clocks, play, initial state and scale, by variable projection."""
 
 from dataclasses import dataclass, field, replace
 
@@ -36,7 +36,7 @@ OFFSET_STEP_S, RATE_STEP, START_STEP, PLAY_STEP = 1e-4, 1e-7, 0.02, 1e-5
 
 @dataclass(frozen=True, slots=True)
 class Alignment:
-    """Where one record lies on the other, with the play between them.
+    """Offset and rate of the two records, with the play between input and gap.
 
     Parameters
     ----------
@@ -86,7 +86,7 @@ WHITE = Noise(np.empty(0), np.empty(0))
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Motion:
-    """Frames that lie within the log, and the log.
+    """The frames that lie within the log, and the log.
 
     Parameters
     ----------
@@ -116,9 +116,10 @@ class Motion:
         return np.asarray(self.time_s - at.offset_s - at.rate * (self.time_s - self.middle_s))
 
     def input_at(self, at: Alignment) -> Array:
-        """Input behind the play at the frames; exact for a log that goes straight from sample to sample.
+        """Input after the play at the frames; exact for a log that is linear between its samples.
 
-        Between two samples the input is monotone, so that the play operator is one clip of its state at the earlier.
+        Between two samples the input is monotone, so that the play is computed by clipping its state at the earlier
+        one.
         """
         log_s = self.log_time_s(at)
         inputs = np.interp(log_s, self.drive.time_s, self.drive.input_mm)
@@ -132,7 +133,8 @@ class Motion:
     def design(self, inputs: Array) -> Array:
         """Columns 1, z and max(0, z - z_k) at knots z_k of the input z over the log's range; shape (n, 2 + knots).
 
-        Gap against input is a line that may bend at every knot: a gripper's curve, and the kink where fingers meet.
+        Gap against input is a line that may bend at every knot: this represents a gripper's curve, and the kink where
+        the fingers meet.
         """
         low, high = float(self.drive.input_mm.min()), float(self.drive.input_mm.max())
         z = (2.0 * inputs - (low + high)) / max(high - low, 1e-12)
@@ -141,10 +143,10 @@ class Motion:
         return np.concatenate([np.stack([np.ones_like(z), z], axis=1), np.maximum(z[:, None] - knots, 0.0)], axis=1)
 
     def whitened(self, columns: Array) -> Array:
-        """Take the autoregression out along time, and the error that a stretch shares.
+        """Whiten columns: remove the autoregression along time, and the error common to a stretch of the log.
 
-        The first frames, which have no past, are left out. The shared error's variance is taken out by the symmetric
-        root of the inverse covariance, a matrix of rank one beside the unit matrix.
+        The first frames, which have no past, are left out. The common error's variance is removed by the symmetric root
+        of the inverse covariance, a rank-one change of the unit matrix.
         """
         noise = self.noise
         terms = noise.terms
@@ -163,7 +165,7 @@ class Motion:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Fit:
-    """A fit of the motion.
+    """A fit of the gap's motion to the log.
 
     Parameters
     ----------
@@ -195,7 +197,7 @@ class Fit:
 
 
 def fit(motion: Motion, start: Alignment, *, free_play: bool) -> Fit:
-    """Fit offset, rate, start state (and play) by Gauss-Newton; scale and bend are solved for on the way.
+    """Fit offset, rate, initial state (and play) by Gauss-Newton; scale and bends are solved for in each step.
 
     Parameters
     ----------
@@ -241,11 +243,11 @@ def fit(motion: Motion, start: Alignment, *, free_play: bool) -> Fit:
 
 
 def inflation(motion: Motion, at: Alignment) -> Array:
-    """Ratio by which offset, rate and play scatter more than independent residuals would make them, as variances.
+    """Ratio of the variance of offset, rate and play to its value for independent residuals.
 
-    An input that is off stays off while the stage stands, or until it turns, and the motion's form is never quite the
-    model's: the residual's pull on the parameters is summed over stretches of the recording, and the scatter of these
-    sums taken for what it is (White 1980, doi:10.2307/1912934, for clusters).
+    An error of the input persists while the stage stands, or until it reverses, and the model of the motion is never
+    exact. The residuals' contributions to the parameters are therefore summed over stretches of the recording, and the
+    variance follows from the scatter of these sums (White 1980, doi:10.2307/1912934, for clusters).
     """
     solved = _solve(motion, at)
     rows = solved.white.size - solved.weights.size + 2
@@ -267,7 +269,7 @@ def _prior(size: int) -> Array:
 
 
 def _information(motion: Motion, at: Alignment, solved: "_Solved", *, free_play: bool) -> tuple[Array, Array]:
-    """Normal matrix over the residual's variance, priors included, and the jacobian."""
+    """Normal matrix divided by the residual's variance, priors included, and the Jacobian."""
     jacobian = _jacobian(motion, at, solved, free_play=free_play)
     variance = solved.squares / max(solved.degrees, 1)
     return jacobian.T @ jacobian / variance + _prior(jacobian.shape[1]), jacobian
@@ -284,7 +286,7 @@ class _Solved:
 
 
 def _solve(motion: Motion, at: Alignment) -> _Solved:
-    """Solve for scale and bend, the bend held small beside the scale."""
+    """Solve for scale and bends, with a prior that keeps the bends small compared with the scale."""
     design = motion.design(motion.input_at(at))
     white_design, white_gap = motion.whitened(design), motion.whitened(motion.gap_mm)
     straight = np.linalg.lstsq(white_design[:, :2], white_gap, rcond=None)[0]
@@ -306,7 +308,7 @@ def _solve(motion: Motion, at: Alignment) -> _Solved:
 
 
 def _jacobian(motion: Motion, at: Alignment, solved: _Solved, *, free_play: bool) -> Array:
-    """Change of the whitened prediction, without what scale and bend take up; shape (m + knots, 3 or 4)."""
+    """Derivatives of the whitened prediction, after projection on scale and bends; shape (m + knots, 3 or 4)."""
     columns = []
     for name, step in (
         ("offset_s", OFFSET_STEP_S),

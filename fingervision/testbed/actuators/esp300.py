@@ -71,16 +71,16 @@ class Esp300Stage:
 
     @property
     def alarm(self) -> Alarm | None:
-        """The controller's last error that keeps it from moving."""
+        """The controller's last error that keeps the axis from moving."""
         return self._alarm
 
     def home(self) -> None:
-        """Go to the reference and make it position 0."""
+        """Go to the reference and define it as position 0."""
         self._ready()
         self._do(lambda: self._axis.home(1))
 
     def check(self, from_mm: float, to_mm: float, speed_mm_s: float) -> None:
-        """Refuse what is beyond the limits."""
+        """Refuse motions beyond the limits."""
         check_move(self.limits, to_mm, speed_mm_s)
 
     def move(self, to_mm: float, speed_mm_s: float) -> None:
@@ -102,7 +102,7 @@ class Esp300Stage:
             self.move(self.limits.upper_mm if speed_mm_s > 0.0 else self.limits.lower_mm, abs(speed_mm_s))
 
     def run_step(self, number: int) -> None:
-        """Refuse: this controller keeps programs, no step data."""
+        """Refuse: this controller stores programs, not step data."""
         raise LimitError(f"Step {number} must be kept by the controller, but an ESP300 has none: use move.")
 
     def stop(self) -> None:
@@ -111,7 +111,7 @@ class Esp300Stage:
             self._axis.write("ST")
 
     def readings(self) -> tuple[Reading, ...]:
-        """The position of now: the controller keeps none of before."""
+        """The present position only, because the controller stores no earlier ones."""
         with self._line:
             asked_s = self._clock.now_s()
             position_mm = float(self._asked(lambda: self._axis.position))
@@ -120,7 +120,7 @@ class Esp300Stage:
         return (Reading(0.5 * (asked_s + got_s), asked_s, got_s, position_mm, moving),)
 
     def close(self) -> None:
-        """Stop and let go of the line."""
+        """Stop and close the port."""
         if self._closed:
             return
         self._closed = True
@@ -133,7 +133,7 @@ class Esp300Stage:
             raise StateError("The stage must stand before it moves again, but is busy: stop it first.")
 
     def _do(self, act: Callable[[], None]) -> None:
-        """Give a command, and ask whether the controller took it."""
+        """Send a command, and ask whether the controller accepted it."""
         with self._line:
             self._asked(act)
             errors = self._asked(lambda: self._controller.errors)
@@ -155,12 +155,12 @@ class Esp300Stage:
 
 
 def without_hardware(section: Section, folder: Path) -> FreeMoves:
-    """What the stage can do, for a plan that is checked away from the bed."""
+    """Limits of the stage, for checking a plan without the bed."""
     return FreeMoves(stated_limits(section))
 
 
 def build(section: Section, context: BuildContext) -> Esp300Stage:
-    """Connect to it as its section of the configuration says: `port` is a VISA resource such as ASRL/dev/ttyUSB0."""
+    """Connect as the section of the configuration states: `port` is a VISA resource such as ASRL/dev/ttyUSB0."""
     try:
         from pymeasure.instruments.newport import ESP300
         from pymeasure.instruments.newport.esp300 import Axis

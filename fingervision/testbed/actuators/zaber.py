@@ -1,10 +1,10 @@
 """A Zaber stage (X-, A-Series and others with Zaber's ASCII protocol) by zaber-motion; needs the extra `zaber`.
 
-`port` is a serial port, or HOST:PORT of a controller in the network. `microstep_mm` is the stage's microstep size,
-which its data sheet states: places are asked for and read in microsteps, speeds in microsteps/s x 1.6384 (Zaber, "ASCII
-Protocol Manual", units), so that neither a device database nor a network is needed.
-Tested with zaber-motion against an emulated device in the network, written from the manual (tests/adapters/
-zaber_device.py); not on hardware. The library's own mock connection answers no commands.
+`port` is a serial port, or HOST:PORT of a controller in the network. `microstep_mm` is the stage's microstep size from
+its data sheet. Positions are sent and read in microsteps, speeds in microsteps/s x 1.6384 (Zaber, "ASCII Protocol
+Manual", units), so that neither a device database nor a network is needed. Tested with zaber-motion against an emulated
+device in the network, written from the manual (tests/adapters/ zaber_device.py); not on hardware. The library's own
+mock connection cannot be used, because it answers no commands.
 """
 
 import threading
@@ -70,16 +70,16 @@ class ZaberStage:
 
     @property
     def alarm(self) -> Alarm | None:
-        """The device's last refusal, such as a stall or a reference that is not known."""
+        """The device's last refusal, such as a stall or an unknown reference."""
         return self._alarm
 
     def home(self) -> None:
-        """Go to the reference and make it position 0."""
+        """Go to the reference and define it as position 0."""
         self._ready()
         self._do(lambda: self._axis.home(wait_until_idle=False))
 
     def check(self, from_mm: float, to_mm: float, speed_mm_s: float) -> None:
-        """Refuse what is beyond the limits."""
+        """Refuse motions beyond the limits."""
         check_move(self.limits, to_mm, speed_mm_s)
 
     def move(self, to_mm: float, speed_mm_s: float) -> None:
@@ -101,7 +101,7 @@ class ZaberStage:
             self.move(self.limits.upper_mm if speed_mm_s > 0.0 else self.limits.lower_mm, abs(speed_mm_s))
 
     def run_step(self, number: int) -> None:
-        """Refuse: this device keeps no step data that a bed knows."""
+        """Refuse: this device has no step data that a bed could use."""
         raise LimitError(f"Step {number} must be kept by the controller, but a Zaber stage has none: use move.")
 
     def stop(self) -> None:
@@ -110,7 +110,7 @@ class ZaberStage:
             self._axis.stop(wait_until_idle=False)
 
     def readings(self) -> tuple[Reading, ...]:
-        """The position of now: the device keeps none of before."""
+        """The present position only, because the device stores no earlier ones."""
         with self._line:
             asked_s = self._clock.now_s()
             position_mm = float(self._asked(self._axis.get_position)) * self._microstep_mm
@@ -119,7 +119,7 @@ class ZaberStage:
         return (Reading(0.5 * (asked_s + got_s), asked_s, got_s, position_mm, moving),)
 
     def close(self) -> None:
-        """Stop, give back the highest speed, and let go of the line."""
+        """Stop, restore the maximum speed, and close the port."""
         if self._closed:
             return
         self._closed = True
@@ -135,7 +135,7 @@ class ZaberStage:
             raise StateError("The stage must stand before it moves again, but is busy: stop it first.")
 
     def _do(self, act: Callable[[], None]) -> None:
-        """Give a command; what the device refuses becomes its alarm."""
+        """Send a command; a refusal by the device becomes its alarm."""
         from zaber_motion.exceptions import CommandFailedException
 
         try:
@@ -164,12 +164,12 @@ class ZaberStage:
 
 
 def without_hardware(section: Section, folder: Path) -> FreeMoves:
-    """What the stage can do, for a plan that is checked away from the bed."""
+    """Limits of the stage, for checking a plan without the bed."""
     return FreeMoves(stated_limits(section))
 
 
 def build(section: Section, context: BuildContext) -> ZaberStage:
-    """Connect to it as its section of the configuration says."""
+    """Connect as the section of the configuration states."""
     try:
         from zaber_motion.ascii import Connection
     except ImportError as error:
