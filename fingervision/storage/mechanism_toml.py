@@ -187,7 +187,7 @@ class _Reader(DrawingReader):
             corners = tuple((x, y) for x, y in points)
             if len(set(corners)) < len(corners) or crosses_itself(corners):
                 raise DataError(
-                    f"{what}.polygon_mm in {self.origin} must go round without crossing itself, but crosses itself; put "
+                    f"{what}.polygon_mm in {self.origin} must go round without crossing itself, but does not; put "
                     "its points in order, each once."
                 )
             return Polygon(corners)
