@@ -151,17 +151,19 @@ def _content(path: Path, inside: tuple[Path, ...] = ()) -> str:
     import tomllib
 
     from fingervision.batch.fingerprint import content_hash
-    from fingervision.storage.plain_file import plain
+    from fingervision.storage.plain_file import plain, why
 
     try:
         found = content_hash(plain(path))
-        base = tomllib.loads(path.read_text(encoding="utf-8")).get("base") if path.suffix.lower() == ".toml" else None
+        base = (
+            tomllib.loads(path.read_text(encoding="utf-8-sig")).get("base") if path.suffix.lower() == ".toml" else None
+        )
     except FileNotFoundError:
         raise InputFileError(f"There is no file {path}: check the options.") from None
     except (OSError, ValueError) as error:
-        raise InputFileError(f"{path} could not be read ({error}): check the options.") from error
+        raise InputFileError(f"{path} could not be read ({why(error)}): check the options.") from error
     place = path.resolve()
-    if base is None or (path.parent / str(base)).resolve() in (*inside, place):
+    if not (isinstance(base, str) and base.isprintable()) or (path.parent / base).resolve() in (*inside, place):
         return found  # a model that rests on itself is said where it is read
     return hashlib.sha256(f"{found}\n{_content(path.parent / str(base), (*inside, place))}".encode()).hexdigest()
 

@@ -6,6 +6,7 @@ from pathlib import Path
 
 from fingervision.domain.errors import DataError, InputFileError, UsageError
 from fingervision.live.guard import LOOPBACK_NAMES
+from fingervision.storage.plain_file import plain
 
 LEAST_LETTERS = 12
 """Guesses are answered one a second (`guard.GUESS_COSTS_S`): so many letters outlast any bench."""
@@ -90,7 +91,7 @@ def _check_pair(certificate: Path, key: Path) -> None:
 
 def _password(file: Path) -> str:
     try:
-        words = file.read_text(encoding="utf-8").strip()
+        words = plain(file).read_text(encoding="utf-8").strip()
     except (OSError, UnicodeDecodeError) as error:
         raise InputFileError(f"The password cannot be read from {file}: give a text file.") from error
     if len(words) < LEAST_LETTERS:

@@ -168,6 +168,7 @@ class Page:
 
     async def _socket(self, page: WebSocket) -> None:
         if len(self._sockets) >= PAGES_AT_ONCE:
+            await page.accept()  # a socket that was never open cannot say why it closes
             await page.close(TRY_AGAIN_LATER, f"At most {PAGES_AT_ONCE} pages may look at once: close one.")
             return
         socket_of_page = PageSocket(page, self._view, self._watch, self._pen, self._steps)

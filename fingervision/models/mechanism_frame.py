@@ -175,7 +175,8 @@ class MechanismFrame:
         # Small displacements leave the axes of every segment where they are: loads are those of a tiny share of them.
         share = 1.0 if large_rotation else _TINY * self._size_mm / max(float(np.abs(moved).max()), _TINY)
         loads = self.frame.end_loads(share * moved) / share
-        stress = max(nominal_stress_mpa(span, loads[list(own)], mechanism, self.theory)
+        stress = max(nominal_stress_mpa(span, loads[list(own)], mechanism, self.theory,
+                                        width_effect=self._width_effect)
                      for span, own in zip(self.spans, self.segments, strict=True))  # fmt: skip
         poses = plate_poses(self.plate, self.bodies, self._field(moved, large=large_rotation), large=large_rotation)
         pairs = pair_distances_mm(mechanism, probes, large=large_rotation)

@@ -10,7 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fingervision.domain.errors import DataError, InputFileError, unreadable
+from fingervision.storage.decimal_number import decimal_number
 from fingervision.storage.number_block import number_block
+from fingervision.storage.plain_file import why
 
 CHUNK_LINES = 1000
 """Lines that are taken apart at once: their cells stay in the cache. All at once take ten times the file in memory."""
@@ -117,7 +119,7 @@ def _text(path: Path) -> str:
     except FileNotFoundError:
         raise InputFileError(f"There is no table {path}.") from None
     except (OSError, UnicodeDecodeError) as error:
-        raise unreadable(error)(f"{path} must be a CSV table in UTF-8, but could not be read: {error}.") from error
+        raise unreadable(error)(f"{path} must be a CSV table in UTF-8, but could not be read: {why(error)}.") from error
 
 
 def _cells(path: Path, text: str) -> Iterator[list[str]]:
@@ -136,7 +138,7 @@ def number(path: Path, name: str, row: int, cell: str) -> float | None:
     if not cell:
         return None
     try:
-        value = float(cell)
+        value = decimal_number(cell)
     except ValueError:
         value = float("nan")
     if not isfinite(value):

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from fingervision.domain.drive import DriveHistory
 from fingervision.domain.errors import DataError, FingervisionError, InputFileError
 from fingervision.storage.csv_columns import read_block
+from fingervision.storage.decimal_number import are_decimal, decimal_number
 
 COLUMNS = ("time_s", "input_mm", "force_n")
 
@@ -125,7 +126,8 @@ def _lines(path: Path) -> list[tuple[int, list[str]]]:
 
 def _numbers(path: Path, lines: Sequence[int], name: str, cells: Sequence[str]) -> NDArray[np.float64]:
     try:
-        value = np.array(list(map(float, cells)), dtype=np.float64)
+        read = float if are_decimal(cells) else decimal_number
+        value = np.array(list(map(read, cells)), dtype=np.float64)
     except ValueError:
         value = np.array([np.nan])
     if not np.all(np.isfinite(value)):
@@ -135,7 +137,7 @@ def _numbers(path: Path, lines: Sequence[int], name: str, cells: Sequence[str]) 
 
 def _number(path: Path, line: int, name: str, cell: str) -> float:
     try:
-        value = float(cell)
+        value = decimal_number(cell)
     except ValueError:
         value = float("nan")
     if not isfinite(value):

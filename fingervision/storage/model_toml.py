@@ -23,7 +23,7 @@ from fingervision.models.table import TableModel
 from fingervision.plugins.origin import SESSION
 from fingervision.storage.gripper_toml import read_gripper
 from fingervision.storage.mechanism_toml import is_mechanism, read_mechanism
-from fingervision.storage.plain_file import plain
+from fingervision.storage.plain_file import plain, why
 from fingervision.storage.simulation_table import read_simulation_table
 
 POINTS = "points"
@@ -66,18 +66,21 @@ def read_model(
     except FileNotFoundError:
         raise InputFileError(f"There is no model {path}.") from None
     except (ValueError, RecursionError, OSError) as error:
-        raise unreadable(error)(f"{path} must be a TOML file, but could not be read: {error}.") from error
+        raise unreadable(error)(f"{path} must be a TOML file, but could not be read: {why(error)}.") from error
     if "base" not in document:
         return _gripper(path, kind)
     if document.get("schema", 1) != 1:
         raise DataError(
-            f"schema in {path} must be 1, but is {document['schema']}: a newer fingervision wrote it; use that one."
+            f"schema in {path} must be 1, but is {document['schema']!r}: a newer fingervision wrote it; use that one."
         )
     place = path.resolve()
     if place in inside:
         raise DataError(f"The base of {path} must be another model, but leads back to itself: mend `base`.")
     kind = str(document.get("kind", kind))
-    base = read_model(path.parent / str(document["base"]), kind, (*inside, place), table)
+    named = document["base"]
+    if not (isinstance(named, str) and named.strip() and named.isprintable()):
+        raise DataError(f"The base in {path} must be the name of a file, but is {named!r}: mend it.")
+    base = read_model(path.parent / named, kind, (*inside, place), table)
     names: dict[str, str] = {key: str(document[key]) for key in ("input", "gap") if key in document}
     if names and isinstance(base.base, FunctionModel):
         base = _function(base.base.path, names)

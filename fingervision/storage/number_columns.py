@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fingervision.storage.csv_columns import number
+from fingervision.storage.decimal_number import are_decimal, decimal_number
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -45,12 +46,13 @@ def numbers_in(path: Path, name: str, cells: Sequence[str]) -> Numbers:
         A cell is no finite number; the first is named with its data row.
     """
     try:
-        value = np.array(list(map(float, cells)), dtype=np.float64)
+        read = float if are_decimal(cells) else decimal_number
+        value = np.array(list(map(read, cells)), dtype=np.float64)
         present = np.ones(value.size, dtype=np.bool_)
     except ValueError:
         present = np.array([bool(cell) for cell in cells], dtype=np.bool_)
         try:
-            value = np.array([float(cell) if cell else 0.0 for cell in cells], dtype=np.float64)
+            value = np.array([decimal_number(cell) if cell else 0.0 for cell in cells], dtype=np.float64)
         except ValueError:
             value = np.full(len(cells), np.nan)
     if not np.all(np.isfinite(value)):

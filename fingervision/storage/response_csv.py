@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 from calib.camera_response import CURVES, CameraResponse, standard_response
 from calib.errors import CalibrationError
 from fingervision.domain.errors import DataError, OutputError, UsageError, unreadable
-from fingervision.storage.plain_file import plain
+from fingervision.storage.decimal_number import decimal_number
+from fingervision.storage.plain_file import plain, why
 
 COLUMNS = ("level", "light")
 # Full scales that pictures have.
@@ -50,11 +51,11 @@ def read_response(path: Path) -> CameraResponse:
         with plain(path).open(newline="", encoding="utf-8-sig") as file:
             rows = list(csv.reader(line for line in file if not line.startswith("#")))
     except (OSError, UnicodeDecodeError) as error:
-        raise unreadable(error)(f"The camera response {path} could not be read: {error}.") from error
+        raise unreadable(error)(f"The camera response {path} could not be read: {why(error)}.") from error
     if not rows or tuple(cell.strip() for cell in rows[0]) != COLUMNS:
         raise DataError(f"{path} must begin with the line {','.join(COLUMNS)}, but does not.")
     try:
-        level, light = np.array([[float(cell) for cell in row] for row in rows[1:] if row]).reshape(-1, 2).T
+        level, light = np.array([[decimal_number(cell) for cell in row] for row in rows[1:] if row]).reshape(-1, 2).T
     except ValueError as error:
         raise DataError(f"Every row of {path} must be two numbers, level and light ({error}).") from error
     top = level[-1] if level.size else 0.0

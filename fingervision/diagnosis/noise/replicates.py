@@ -99,7 +99,12 @@ def visits(path_mm: Array, runs: tuple[slice, ...], rows: NDArray[np.intp]) -> N
 
 
 def pure_error(
-    values: Array, time_s: Array, label: NDArray[np.intp], aside: Flags, place_mm: Array | None = None
+    values: Array,
+    time_s: Array,
+    label: NDArray[np.intp],
+    aside: Flags,
+    place_mm: Array | None = None,
+    runs: tuple[slice, ...] = (),
 ) -> PureError | None:
     """Estimate the scatter of repeats; None where too little repeats.
 
@@ -115,11 +120,15 @@ def pure_error(
         Values that do not count.
     place_mm : ndarray of float, shape (n,), or None
         Recorded input of each, by which places may drift apart; None to leave that out.
+    runs : tuple of slice
+        Rows of each run, whose offsets are no scatter of readings; empty to leave that out.
     """
     numbers, counts = np.unique(label[(label >= 0) & ~aside], return_counts=True)
     groups = [np.flatnonzero((label == number) & ~aside) for number in numbers[counts > 1]]
     groups = [group[np.argsort(time_s[group], kind="stable")] for group in groups]
     degrees = sum(group.size - 1 for group in groups)
+    values, zeroings = _without_run_offsets(values, groups, runs)
+    degrees -= zeroings
     if degrees < FEWEST_DEGREES:
         return None
     rest = np.concatenate([values[group] - values[group].mean() for group in groups])
@@ -142,6 +151,23 @@ def pure_error(
         return PureError(_without_gross_errors(rest, degrees), degrees, trend, _wandering(rest, rows))
     sd_mm = _without_gross_errors(straight, degrees - taken)
     return PureError(sd_mm, degrees - taken, trend, _wandering(straight, rows))
+
+
+def _without_run_offsets(values: Array, groups: list[NDArray[np.intp]], runs: tuple[slice, ...]) -> tuple[Array, int]:
+    """Take each run's own zero out, as the visits that runs share tell it; also how many zeros were estimated."""
+    if len(runs) < 2 or not groups:
+        return values, 0
+    number = np.zeros(values.size, dtype=np.intp)
+    for index, run in enumerate(runs):
+        number[run] = index
+    own = (number[:, None] == np.arange(1, len(runs))).astype(np.float64)
+    rows = np.concatenate(groups)
+    rest = np.concatenate([values[group] - values[group].mean() for group in groups])
+    design = np.concatenate([own[group] - own[group].mean(axis=0) for group in groups])
+    zeros, _, rank, _ = np.linalg.lstsq(design, rest, rcond=1e-9)
+    out = values.copy()
+    out[rows] -= own[rows] @ zeros
+    return out, int(rank)
 
 
 def _drift_sigmas(rest: Array, straight: Array, rows: NDArray[np.intp]) -> float:
