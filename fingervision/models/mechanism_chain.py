@@ -252,7 +252,7 @@ class MechanismChain:
                     if one in self._reached and other not in self._reached:
                         self._reached[other] = [*self._reached[one], place]
             if len(self._reached) == before:
-                raise ModelError(f"A probe of {self.mechanism.name} lies on a body that hangs on nothing.")
+                raise ModelError(f"A probe of {self.mechanism.name} lies on a body that nothing holds.")
         return self._reached[body]
 
     def _inward(self, point: tuple[float, float]) -> Array:
