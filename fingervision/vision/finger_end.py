@@ -31,6 +31,8 @@ WORST_MISFIT = 1e3
 # Where so many points are set aside, or again so many fewer by another start, it is asked for; at no more misfit than
 # this share above.
 FEWEST_ASIDE, MORE_MISFIT = 3, 1.3
+# With more misfit than this the outline is of another shape, whatever the radii.
+NO_SHAPE = 4.0
 # Rounding leaves no less of a pivot than this.
 SMALLEST_PIVOT = 1e-15
 
@@ -92,7 +94,7 @@ def fit_from_any_radius(points: OutlinePoints, start: Floats, origin: Floats, u_
     The first guess of a radius takes the corner for a right one, which that of a tapered finger is not.
     """
     best = fit_finger_end(points, start, origin, u_prior)
-    if np.count_nonzero(best.robust <= 0.0) < FEWEST_ASIDE:
+    if np.count_nonzero(best.robust <= 0.0) < FEWEST_ASIDE or best.misfit > NO_SHAPE:
         return best
     inner, outer = best.parameters[[INNER_R, OUTER_R]]
     for radius in (0.0, min(inner, outer), max(inner, outer)):
