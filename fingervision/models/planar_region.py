@@ -164,8 +164,8 @@ def _chained(pieces: list[Curve], same_mm: float) -> tuple[Loop, ...]:
             x, y = piece.end_mm
             what = "ends" if near.size == 0 else "touches itself in a point"
             raise DataError(
-                f"The outline must close and part the body everywhere, but it {what} at ({x:.6g}, {y:.6g}) mm; "
-                "let the shapes overlap there, or stay apart."
+                f"The outline must be closed and separate the body from the void everywhere, but it {what} at "
+                f"({x:.6g}, {y:.6g}) mm; let the shapes overlap there, or stay apart."
             )
         following[place] = int(near[0])
     loops = []
