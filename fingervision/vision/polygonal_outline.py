@@ -24,6 +24,9 @@ Ints = NDArray[np.int_]
 
 # Sides are looked for down to so much below the measuring height (pixels).
 BELOW_PX = 40.0
+# A top is what lies within so many pixels of the outermost point; this share of it, in the middle, is straight to this
+# mean square (in units of the points' own uncertainties; a curve of 150 px radius leaves more).
+TOP_PX, MIDDLE_SHARE, TOP_STRAIGHTEST = 2.0, 0.6, 4.0
 # A finger's end has two flanks, a top and at most two cut corners on either side; a curve would need more.
 FEWEST_SIDES, MOST_SIDES = 3, 7
 # Blur bends a right corner's half-level by more than 0.01 sigma over so many sigma along its sides, and one that turns
@@ -76,6 +79,8 @@ def polygonal_measuring_point(points: OutlinePoints, below_tip_px: float, shared
     shared : float
         Neighbouring points that share their errors.
     """
+    if not _has_straight_top(points):
+        return None
     chain = _chain(points, float(points.y.min()) + below_tip_px + BELOW_PX)
     x, y, u = points.x[chain], points.y[chain], points.u[chain]
     is_row, blur = points.is_row[chain], float(np.median(points.blur))
@@ -108,6 +113,19 @@ def polygonal_measuring_point(points: OutlinePoints, below_tip_px: float, shared
         change = np.array((other.tip - read.tip, other.edge - read.edge))
         covariance += np.outer(change, change)
     return MeasuringPoint(read.tip, read.apex, read.edge, read.slope, covariance)
+
+
+def _has_straight_top(points: OutlinePoints) -> bool:
+    """Whether the middle of what is highest is straight, at a glance: drops are not looked at further."""
+    is_top = ~points.is_row & (points.y < points.y.min() + TOP_PX)
+    x, y, u = points.x[is_top], points.y[is_top], points.u[is_top]
+    if x.size < 2 * FEWEST_POINTS:
+        return True
+    near = np.abs(x - np.median(x)) <= 0.5 * MIDDLE_SHARE * np.ptp(x)
+    x, y, u = x[near], y[near], u[near]
+    x = x - x.mean()
+    away = y - y.mean() - x * (x @ y) / max(float(x @ x), 1e-12)
+    return bool(np.mean((away / u) ** 2) < TOP_STRAIGHTEST)
 
 
 def _chain(points: OutlinePoints, lowest: float) -> Ints:
