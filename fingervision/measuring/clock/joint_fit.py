@@ -110,6 +110,11 @@ def fit(motion: Motion, start: Alignment, *, free_play: bool) -> Fit:
     return Fit(at, squares, solved.degrees, normal, solved.residual_mm, float(solved.weights[1]))
 
 
+def squares_at(motion: Motion, at: Alignment) -> float:
+    """Sum of squares that scale, bend and creep leave at an alignment, in mm^2."""
+    return _solve(motion, at).squares
+
+
 def inflation(motion: Motion, at: Alignment) -> Array:
     """Ratio of the variance of offset, rate and play to its value for independent residuals.
 
