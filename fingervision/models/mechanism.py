@@ -11,6 +11,7 @@ from fingervision.domain.gripper import Material, PointMm
 from fingervision.models.flexure import Flexure
 from fingervision.models.planar_region import PlanarRegion
 from fingervision.models.plane_shapes import Shape
+from fingervision.models.width_effect import force_uncertainty
 
 
 @dataclass(frozen=True, slots=True)
@@ -106,6 +107,12 @@ class Mechanism:
     pairs: dict[str, tuple[str, str]]
     contacts: tuple[Contact, ...] = ()
     body_names: tuple[str, ...] = ()
+
+    @property
+    def width_error(self) -> float:
+        """Relative uncertainty of the force by how far the plate's width holds the flexures back."""
+        doubt = max((flexure.width_doubt(self.plate_mm) for flexure in self.flexures), default=0.0)
+        return 2.0 * force_uncertainty(self.material) + self.material.poisson_ratio**2 * doubt
 
     @property
     def region(self) -> PlanarRegion:
