@@ -1,4 +1,4 @@
-"""A deformed body on paper: a frame that fits it, its outline at rest, and its stress."""
+"""Drawing of a deformed body: frame, outline at rest, and stress."""
 
 from typing import Any
 
@@ -23,7 +23,7 @@ _COLOURS = "YlOrRd"
 
 
 def framed(low: Array, high: Array) -> tuple[Figure, Axes]:
-    """Make a figure whose proportions are those of what it holds.
+    """Make a figure with the proportions of its content.
 
     Parameters
     ----------
@@ -44,7 +44,7 @@ def framed(low: Array, high: Array) -> tuple[Figure, Axes]:
 def draw_body(
     axes: Axes, plate: PlaneStressPlate, moved: Array, stress: Array, top_mpa: float, *, side: float = 1.0
 ) -> Any:
-    """Draw a body at rest by its outline and deformed by its stress; return what a colour bar needs.
+    """Draw a body's outline at rest and its deformed shape coloured by stress; return the data for a colour bar.
 
     Parameters
     ----------
@@ -76,7 +76,7 @@ def draw_body(
 
 
 def extent_mm(plate: PlaneStressPlate, moved: Array, *, mirrored: bool = False) -> tuple[Array, Array]:
-    """Box round a body at rest and deformed."""
+    """Bounding box of a body at rest and deformed."""
     at_rest = plate.nodes_mm
     there = at_rest + np.stack([moved[plate.x_dofs], moved[plate.y_dofs]])
     both = np.hstack([at_rest, there])

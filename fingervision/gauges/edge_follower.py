@@ -1,4 +1,4 @@
-"""One straight edge, found again in every frame near where it was, and fitted with whatever edges are beside it."""
+"""Follow one straight edge from frame to frame, and fit it together with other edges beside it."""
 
 from dataclasses import dataclass, replace
 from math import atan, ceil, cos, hypot, pi, sin
@@ -88,13 +88,13 @@ class EdgeFound:
 
     @property
     def dark_side(self) -> int:
-        """+1 where it is dark beyond the edge."""
+        """+1 where the dark side lies beyond the edge, -1 where it lies before it."""
         return -1 if self.contrast > 0.0 else 1
 
 
 @dataclass(frozen=True, slots=True)
 class NotFound:
-    """Why there is no edge."""
+    """Reason why no edge was found."""
 
     status: GaugeStatus
     words: str = ""
@@ -102,7 +102,7 @@ class NotFound:
 
 @dataclass(frozen=True, slots=True)
 class Axes:
-    """A gauge's own axes in the picture: t along its direction, s 90 degrees further on.
+    """A gauge's own axes in the picture: t along its direction, s turned by 90 degrees.
 
     Parameters
     ----------
@@ -117,18 +117,18 @@ class Axes:
     direction_rad: float
 
     def point(self, t_px: float, s_px: float = 0.0) -> tuple[float, float]:
-        """A place in the picture."""
+        """Picture coordinates of a point given in the gauge's axes."""
         cosine, sine = cos(self.direction_rad), sin(self.direction_rad)
         return self.x_px + cosine * t_px - sine * s_px, self.y_px + sine * t_px + cosine * s_px
 
     def box(self, t_px: float, half_t_px: float, half_s_px: float) -> Mark:
-        """A rectangle about a place on t, to be drawn."""
+        """A rectangle about a position on t, for drawing."""
         signs = ((-1, -1), (1, -1), (1, 1), (-1, 1), (-1, -1))
         return Mark(tuple(self.point(t_px + a * half_t_px, b * half_s_px) for a, b in signs))
 
 
 class EdgeFollower:
-    """Finds one edge near where it was.
+    """Finds one edge near its position in the previous frame.
 
     Parameters
     ----------
@@ -151,19 +151,19 @@ class EdgeFollower:
 
     @property
     def zone(self) -> Mark:
-        """Where it is looked for."""
+        """The zone in which the edge is searched."""
         return self.axes.box(self.at_px, self.reach_px * self.times, 0.5 * self.length_px)
 
     def turned_to(self, axes: Axes, at_px: float, slope: float) -> None:
-        """Go on with other axes."""
+        """Return the follower with other axes."""
         self.axes, self.at_px, self.slope = axes, at_px, slope
 
     def lost(self) -> None:
-        """Look farther in the next frame."""
+        """Widen the search zone for the next frame."""
         self.times = min(self.times + 1.0, float(MOST_TIMES)) if self.known is not None else 1.0
 
     def candidate(self, picture: Picture) -> tuple[StepCandidate, list[StepCandidate]] | NotFound:
-        """The one step that may be the edge, and the others beside it."""
+        """The only step that may be the edge, with the other steps beside it."""
         reach = self.first_reach_px if self.known is None else self.reach_px * self.times
         guard = reach if self.known is None else GUARD * reach
         half = ceil(guard) + BEYOND_PX
@@ -212,7 +212,7 @@ class EdgeFollower:
         return [s for s in steps if abs(s.position_px) <= reach and (sign == 0 or s.contrast * sign > 0.0)]
 
     def _steepest(self, seen: Profile, reach: float) -> float:
-        """Largest step from strip to strip within reach, of the gauge's polarity."""
+        """Largest step from strip to strip within reach, with the gauge's polarity."""
         rise = np.where((seen.weight[1:] > 0.5) & (seen.weight[:-1] > 0.5), np.diff(seen.level), 0.0)
         rise = self.polarity * rise if self.polarity else np.abs(rise)
         near = np.abs(np.arange(rise.size) + 0.5 - seen.half) <= reach + 1.0
@@ -233,14 +233,14 @@ class EdgeFollower:
         return one
 
     def keep(self, found: EdgeFound) -> None:
-        """Remember where it was."""
+        """Store the position for the next frame."""
         self.known, self.at_px, self.slope, self.times = found, found.position_px, found.slope, 1.0
 
 
 def fit_near(
     follower: EdgeFollower, picture: Picture, chosen: list[StepCandidate], steps: list[StepCandidate]
 ) -> tuple[list[EdgeFound], float] | NotFound:
-    """Fit chosen steps together with whatever stands within their window.
+    """Fit chosen edges together with all other edges within their window.
 
     Parameters
     ----------
@@ -371,7 +371,7 @@ def _edge(follower: EdgeFollower, picture: Picture, fitted: StraightEdges, k: in
 
 
 def _cut_plateau(picture: Picture, levels: Floats) -> int:
-    """Whether one side may be lighter (+1) or darker (-1) than the scale reaches: much of it is at its end."""
+    """Whether one side may be lighter (+1) or darker (-1) than the scale reaches, because much of it is clipped."""
     middle = 0.5 * (float(levels.min()) + float(levels.max()))
     light = levels > middle
     if np.count_nonzero(levels >= picture.top) > MOST_CLIPPED * np.count_nonzero(light):
@@ -380,5 +380,5 @@ def _cut_plateau(picture: Picture, levels: Floats) -> int:
 
 
 def normal_of(axes: Axes, slope: float) -> float:
-    """Direction across an edge that leans by `slope` against the axes."""
+    """Direction across an edge whose slope in the axes is `slope` (radians)."""
     return (axes.direction_rad - atan(slope) + pi) % (2.0 * pi) - pi

@@ -8,7 +8,7 @@ from fingervision.gauges.status import GaugeStatus
 
 @dataclass(frozen=True, slots=True)
 class Mark:
-    """Something to draw: a polyline of two or more points, or a cross at one.
+    """A shape to draw: a polyline of two or more points, or a cross at one point.
 
     Parameters
     ----------
@@ -21,7 +21,7 @@ class Mark:
 
 @dataclass(frozen=True, slots=True)
 class Reading:
-    """One gauge in one frame.
+    """Result of one gauge in one frame.
 
     Parameters
     ----------

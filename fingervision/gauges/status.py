@@ -1,10 +1,10 @@
-"""Whether a gauge gave a number in a frame, and if not, why."""
+"""Status of a gauge in a frame: it has a number, or a reason why it has none."""
 
 from enum import StrEnum
 
 
 class GaugeStatus(StrEnum):
-    """The state of one gauge in one frame; words that gaps.csv has mean the same here."""
+    """The status of one gauge in one frame; statuses that gaps.csv has mean the same here."""
 
     OK = "ok"
     DAMAGED = "damaged"

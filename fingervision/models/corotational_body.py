@@ -1,7 +1,8 @@
-"""A condensed body in large rotation: its axes turn with its first frame, and in them it stays linear.
+"""A condensed body in large rotation: in axes that rotate with its first frame it stays linear.
 
 The corotational formulation of Crisfield (Non-linear Finite Element Analysis of Solids and Structures, volume 1,
-section 7.3) for an element of any number of nodes: energy d' K d / 2 with d the frames' motions as seen from the first.
+section 7.3) for an element with any number of nodes: the energy is d' K d / 2, with d the frames' motions relative to
+the first frame.
 """
 
 from dataclasses import dataclass
@@ -36,7 +37,7 @@ class CorotationalBody:
     stiffness_n_mm: Array
 
     def strained(self, moved: Array) -> Array:
-        """Motions of the frames as seen from the first one, shape (3 m,), by their motions."""
+        """Motions of the frames relative to the first one, shape (3 m,), from their absolute motions."""
         local = moved.reshape(-1, 3)
         at_rest = self.places_mm - self.places_mm[0]
         drift = local[:, :2] - local[0, :2]
@@ -49,7 +50,7 @@ class CorotationalBody:
         return np.column_stack([drift @ back.T + at_rest @ less.T, apart]).ravel()
 
     def slope(self, moved: Array) -> Array:
-        """Change of `strained` by the frames' motions, shape (3 m, 3 m)."""
+        """Derivative of `strained` by the frames' motions, shape (3 m, 3 m)."""
         local = moved.reshape(-1, 3)
         back = turned_axes(-float(local[0, 2]))
         chord = self.places_mm - self.places_mm[0] + local[:, :2] - local[0, :2]
@@ -64,7 +65,7 @@ class CorotationalBody:
         return found.reshape(local.size, local.size)
 
     def forces_n(self, moved: Array) -> tuple[Array, Array]:
-        """Tangent stiffness, shape (3 m, 3 m), and forces, shape (3 m,), at some motions of the frames."""
+        """Tangent stiffness, shape (3 m, 3 m), and forces, shape (3 m,), for given motions of the frames."""
         local = moved.reshape(-1, 3)
         loads = self.stiffness_n_mm @ self.strained(moved)
         slope = self.slope(moved)

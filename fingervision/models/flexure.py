@@ -1,4 +1,4 @@
-"""One flexure of a drawing: what it adds or cuts, its height along its axis, and how its width holds it back."""
+"""One flexure of a drawing: the shapes that it adds or cuts, its height along its axis, and the effect of its width."""
 
 from dataclasses import dataclass
 from math import cos, radians, sin, sqrt
@@ -25,7 +25,7 @@ _POISSON = 0.34
 
 @dataclass(frozen=True, slots=True)
 class Flexure:
-    """One flexure; each has its own numbers.
+    """One flexure, with its own dimensions.
 
     Parameters
     ----------
@@ -57,7 +57,7 @@ class Flexure:
     fillet_mm: float = 0.0
 
     def point_mm(self, along: Any, across: Any) -> tuple[Any, Any]:
-        """Return a point, or arrays of points, by the way along the axis and across it."""
+        """A point, or array of points, from its coordinates along and across the axis."""
         c, s = cos(radians(self.axis_deg)), sin(radians(self.axis_deg))
         return self.at_mm[0] + c * along - s * across, self.at_mm[1] + s * along + c * across
 
@@ -66,7 +66,7 @@ class Flexure:
         return Polygon(tuple(self.point_mm(a, b) for a, b in places))
 
     def steps(self) -> list[tuple[bool, Shape]]:
-        """Return the shapes that it adds or cuts."""
+        """Shapes that the flexure adds to or cuts from the region."""
         half = 0.5 * self.thickness_mm
         if self.kind == "leaf":
             ends = (*self.point_mm(-self.half_length_mm, 0.0), *self.point_mm(self.half_length_mm, 0.0))
@@ -86,11 +86,11 @@ class Flexure:
 
     @property
     def is_notch(self) -> bool:
-        """Whether its surfaces are arcs throughout."""
+        """Whether its surfaces are circular or elliptic arcs over the whole length."""
         return self.kind in ("circular", "elliptic")
 
     def height_mm(self, x_mm: Array) -> Array:
-        """Height at stations along the axis from the middle."""
+        """Height at positions along the axis, counted from the middle (mm)."""
         t, a = self.thickness_mm, self.half_length_mm
         if self.is_notch:
             return self.notch(1.0).height_mm(x_mm)
@@ -100,7 +100,7 @@ class Flexure:
         return np.asarray(t + 2.0 * self.fillet_mm * (1.0 - np.sqrt(1.0 - within**2)))
 
     def notch(self, plate_mm: float) -> Notch:
-        """Return the notch that it is: of a circular or elliptic flexure."""
+        """The notch of a circular or elliptic flexure."""
         return Notch(self.thickness_mm, self.half_length_mm, self.depth_mm, plate_mm)
 
     @property
@@ -129,7 +129,7 @@ class Flexure:
         return 0.5 * (swayed - bent)
 
     def zone(self, plate_mm: float) -> ConstrainedZone:
-        """Where the plate's width holds it back, and how far."""
+        """Zone in which the plate's width restrains the flexure, and how strongly."""
         share = self.width_share(plate_mm)
         height = 0.5 * self.thickness_mm + self.depth_mm
         return ConstrainedZone(self.at_mm, self.axis_deg, self.half_length_mm, height, share)

@@ -1,8 +1,8 @@
-"""The stretch of a drawn flexure that bends as a beam: where it begins and ends, and the compliance of its segments.
+"""The stretch of a flexure that bends as a beam: where it begins and ends, and the compliance of its segments.
 
-A notch is a beam between the places where it meets its body, corrected by the hinge tables. Of a leaf and of a straight
-neck the beam ends one and a half thicknesses before the roots: by Saint-Venant's principle stress is a beam's there,
-and how the roots yield is left to the elastic bodies.
+A notch is a beam between the points where it meets its bodies, corrected by the tables for hinges. For a leaf and for a
+straight neck, the beam ends one and a half thicknesses before the roots: by Saint-Venant's principle the stress there
+is a beam's, and the compliance of the roots belongs to the elastic bodies.
 """
 
 from dataclasses import dataclass, replace
@@ -70,7 +70,7 @@ class FlexureSpan:
 
     @property
     def slab(self) -> Polygon:
-        """What parts the bodies on either side where it is cut away."""
+        """Region that separates the bodies on either side where the flexure is cut away."""
         (a, b), (low, high) = self.cut_mm, self.heights_mm
         corners = ((a, -0.5), (b, -0.5), (b, 0.5), (a, 0.5))
         heights = (low, high, high, low)
@@ -78,13 +78,13 @@ class FlexureSpan:
                                                                                          strict=True)))  # fmt: skip
 
     def notch(self, plate_mm: float) -> Notch:
-        """Return the notch that it is or that bends as it does."""
+        """The notch with the same bending behaviour."""
         web_mm = max(float(self.flexure.height_mm(np.array([end]))[0]) for end in self.free_mm)
         notch = self.flexure.notch(plate_mm)
         return replace(notch, web_mm=web_mm) if self.flexure.is_notch else notch
 
     def stations_mm(self, plate_mm: float) -> Array:
-        """Ends of the segments, close together where a notch bends; shape (segments + 1,)."""
+        """Ends of the segments, closer together where a notch bends; shape (segments + 1,)."""
         if not self.flexure.is_notch:
             return np.linspace(*self.cut_mm, _SEGMENTS_OF_LEAF + 1)
         # A notch may meet its bodies sooner on the one side than on the other.
@@ -146,7 +146,7 @@ def span_of(flexure: Flexure, region: PlanarRegion) -> FlexureSpan:
 
 
 def _alone(flexure: Flexure, region: PlanarRegion, stations: Array) -> NDArray[np.bool_]:
-    """Whether at each station the flexure's own height is all that is there: material just inside, void just beside."""
+    """Whether at each station the flexure's own height is all the material there is."""
     half = 0.5 * flexure.height_mm(stations)
     apart = _BESIDE * flexure.thickness_mm
     found = np.ones(stations.size, dtype=bool)
@@ -158,7 +158,7 @@ def _alone(flexure: Flexure, region: PlanarRegion, stations: Array) -> NDArray[n
 
 
 def _cut(flexure: Flexure, region: PlanarRegion, side: float, end_mm: float) -> tuple[float, float]:
-    """Station and height of the cut on one side."""
+    """Position and height of the cut on one side."""
     t = flexure.thickness_mm
     if not flexure.is_notch:
         straight = min(end_mm, flexure.half_length_mm - flexure.fillet_mm)

@@ -1,4 +1,4 @@
-"""The figures of a gripper with the uncertainty that its drawing's stated numbers give them."""
+"""Uncertainty of a gripper's figures from the stated uncertainties of its dimensions."""
 
 from collections.abc import Mapping, Sequence
 from operator import attrgetter
@@ -31,10 +31,10 @@ def gripper_uncertainty(
 ) -> dict[str, FigureUncertainty]:
     """Propagate the stated uncertainties of a drawing to every figure of `gripper_figures`.
 
-    The answers for changed drawings come from the lumped model (out of the plane from the stiffness matrix), in small
-    displacements, by bars alone in their ratio to the drawing's (`changed_drawings`), with contact where the physics
-    includes it. Finite elements of every changed drawing would take
-    minutes, and an uncertainty needs two digits only. The same u is stated beside the figures of the other kinds.
+    The figures of changed drawings come from the lumped model (out of the plane from the stiffness matrix), with small
+    displacements, with contact where the physics includes it; a bar model gives their ratio to the drawing's own
+    (`changed_drawings`). Finite elements of every changed drawing would take minutes, and an uncertainty needs two
+    digits only. The same uncertainty is stated for the figures of the other kinds of model.
 
     Parameters
     ----------
@@ -68,11 +68,11 @@ def gripper_uncertainty(
 
 
 def check_uncertainties(gripper: Gripper) -> None:
-    """Refuse stated uncertainties by which the drawing cannot be redrawn.
+    """Refuse stated uncertainties for which no changed drawing exists.
 
     Raises
     ------
-    FingervisionError
+    DataError, ModelError
         Where one standard uncertainty either way leaves no gripper.
     """
     for name, estimate in _numbers(gripper).items():
@@ -92,7 +92,7 @@ def _numbers(gripper: Gripper) -> dict[str, Estimate]:
 
 
 def _changed(gripper: Gripper, changes: Mapping[str, float]) -> Gripper:
-    """Redraw a gripper, and refuse numbers that no gripper has."""
+    """Return a gripper with changed dimensions; refuse dimensions that no gripper can have."""
     for name, by in changes.items():
         value = attrgetter(name)(gripper) + by
         if not name.endswith(_ANY_SIGN) and value <= 0.0:

@@ -89,7 +89,7 @@ def large_equilibrium(
 
     Raises
     ------
-    FingervisionError
+    ModelError
         Where the iteration does not settle.
     """
     return _next(_Tangent(body, contact=contact), input_mm, [start])
@@ -150,9 +150,9 @@ def _predicted(body: DrivenBody, input_mm: float, path: list[Equilibrium]) -> Ar
 def large_path(
     body: DrivenBody, last_mm: float, *, start: Equilibrium | None = None, contact: bool = False, least: int = 3
 ) -> list[Equilibrium]:
-    """Follow the equilibria from a first one, or from rest, to an input in steps of at most half a millimetre.
+    """Follow the equilibria from a first one, or from rest, to an input, in steps of at most half a millimetre.
 
-    At least three of them make a curve; one is enough where the last equilibrium alone is wanted (`least`).
+    A curve needs at least three steps; one is enough where only the last equilibrium is needed (`least`).
     """
     path = [start or body.at_rest()]
     first_mm = path[0].input_mm
@@ -169,7 +169,7 @@ def large_path(
 
 
 def first_touch(body: DrivenBody, guess_mm: float) -> Equilibrium:
-    """Find the input at which the first point of the inner face meets the symmetry plane, by Newton's rule."""
+    """Find the input at which the first point of the inner face meets the symmetry plane, by Newton's method."""
     if guess_mm in body.touches:
         return body.touches[guess_mm]
     tangent = _Tangent(body, contact=False)

@@ -1,8 +1,8 @@
-"""The gripper as a chain of lumped flexures and elastic links (the paper's SimMechanics model).
+"""The gripper as a chain of lumped flexures and elastic links, as in the SimMechanics model of Hricko & Havlik (2015).
 
-Each notch is cut into segments, close together at the neck; each has the compliance of its own integral, so that their
-sum is that of the notch to rounding, however thin. What remains is beam theory's own error, which the corrected hinge
-mends. The finger between the hinges is one elastic body (`finger_body`).
+Each notch is divided into segments, closer together at the neck. Each segment's compliance is the integral over it, so
+that their sum is the notch's compliance up to rounding, however thin the notch is. The remaining error is that of beam
+theory, which the correction of the hinges removes. The finger between the hinges is one elastic body (`finger_body`).
 """
 
 from collections.abc import Sequence
@@ -47,7 +47,7 @@ bars of 9 mm)."""
 
 
 class LumpedGripper:
-    """Segments and bars, both halves alike.
+    """Segments and bars of two identical halves.
 
     Parameters
     ----------
@@ -89,33 +89,33 @@ class LumpedGripper:
 
     @property
     def input_range_mm(self) -> tuple[float, float]:
-        """Smallest and largest input that the model is meant for."""
+        """Smallest and largest input for which the model is meant (mm)."""
         return covered_inputs_mm(self.gripper, self.half.first_touch_mm())
 
     @property
     def rest_gap_mm(self) -> float:
-        """The gap at input zero."""
+        """The gap at input zero (mm)."""
         return 2.0 * self.half.measured_rest_mm
 
     def respond(self, input_mm: NDArray[np.float64]) -> Response:
-        """Answer statically at each input."""
+        """Respond statically at each input."""
         return symmetric_response(self.half, self.physics, input_mm)
 
     def body_poses(self, input_mm: NDArray[np.float64]) -> dict[str, NDArray[np.float64]]:
-        """Answer the poses of the bodies at each input: x_mm, y_mm, angle_mrad, shape (n, 3) each."""
+        """Poses of the bodies at each input: x_mm, y_mm, angle_mrad, shape (n, 3) each."""
         poses = poses_of_frame(self.gripper, self.skeleton, large=self.physics.large_rotation)
         return gripper_poses(self.half, self.physics, poses, input_mm)
 
     def peak_stress(self) -> PeakStress:
-        """Largest stress in the hinges by 1 mm of input, on the notch or, by beam theory, nominal."""
+        """Largest stress in the hinges per 1 mm of input, in the notch or, by beam theory, nominal."""
         return peak_hinge_stress(self.gripper, self.skeleton, self.half.unit_displacement_mm, self.theory)
 
     def equilibria(self, inputs_mm: Sequence[float]) -> list[Equilibrium]:
-        """Return the body at some inputs, with the physics that the model was built with."""
+        """Equilibria at the given inputs, with the physics that the model includes."""
         return equilibria(self.half, self.physics, inputs_mm)
 
     def loaded(self, inputs_mm: Sequence[float]) -> list[LoadedState]:
-        """Gap, forces and largest nominal stress at some inputs, in the deformed shape where the model has it."""
+        """Gap, forces and largest nominal stress at the given inputs, with the physics that the model includes."""
         return [self.stressed(state) for state in self.equilibria(inputs_mm)]
 
     def stressed(self, state: Equilibrium) -> LoadedState:
@@ -133,20 +133,20 @@ class LumpedGripper:
         return tuple((rad_s / (2.0 * np.pi)).tolist())
 
     def swaying_modes_hz(self, *, count: int = 1) -> tuple[float, ...]:
-        """First antisymmetric in-plane natural frequencies, the drive free to go sideways."""
+        """First antisymmetric in-plane natural frequencies, with the drive free to move sideways (Hz)."""
         rad_s, _ = self.half.swaying_modes(count=count)
         return tuple((rad_s / (2.0 * np.pi)).tolist())
 
     @property
     def _errors(self) -> tuple[float, float, float, float]:
-        """Relative model errors of slope, force, modes and grip; by beam theory, of its bars and joints alone."""
+        """Relative model errors of slope, force, modes and grip; by beam theory those of bars and joints only."""
         if not isinstance(self.frame, JoinedFrame):
             return _SLOPE_OF_BARS, _FORCE_OF_BARS, _MODE_OF_BARS, _GRIP_OF_BARS
         force = _FORCE_ERROR + 2.0 * force_uncertainty(self.gripper.material)
         return _SLOPE_ERROR, force, _MODE_ERROR, _GRIP_ERROR
 
     def figures(self) -> ModelFigures:
-        """Compute the model's row of the comparison."""
+        """Figures of the model for the comparison table."""
         slope, force, mode, grip = self._errors
         return ModelFigures(
             gap_per_input(self.half),

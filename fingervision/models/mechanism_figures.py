@@ -1,4 +1,4 @@
-"""The figures of a mechanism drawn by bodies, whatever its kind of model."""
+"""Figures of a mechanism drawn by bodies, for any kind of model."""
 
 from fingervision.models.mechanism_chain import MechanismChain
 from fingervision.models.mechanism_frame import MechanismFrame
@@ -9,7 +9,7 @@ MechanismModel = MechanismPlate | MechanismFrame | MechanismChain
 
 
 def mechanism_figures(model: MechanismModel) -> dict[str, float]:
-    """Compute small displacements by 1 mm of input, the range to yield, touches and natural frequencies.
+    """Compute small displacements per 1 mm of input, the range up to yield, touches and natural frequencies.
 
     Parameters
     ----------

@@ -1,8 +1,8 @@
 """A planar mechanism of lumped flexures between elastic bodies: any topology, loops included.
 
-The paper's lumped model for any drawing. Flexures are chains of beam segments, corrected by the hinge tables; what they
-join is cut from the drawing and condensed to a few frames (`condensed_bodies`). Flexures and bodies turn as far as they
-will.
+It is the lumped model of Hricko & Havlik (2015), extended to any drawing. Flexures are chains of beam segments,
+corrected by the hinge tables; the bodies that they join are cut from the drawing and condensed to a few frames
+(`condensed_bodies`). Flexures and bodies may rotate by any angle.
 """
 
 from collections.abc import Callable
@@ -136,7 +136,7 @@ class MechanismFrame:
         )  # fmt: skip
 
     def _gaps_of(self, contact: Contact) -> Callable[[Array], Gaps]:
-        """Gaps of a contact by the motions of the frames: of the two nodes of its face that lie farthest apart."""
+        """Gaps of a contact from the motions of the frames, at the two nodes of its face that are farthest apart."""
         plate = self.plate
         pair = contact_pair(plate, contact, self.mechanism, self._size_mm)
         places = plate.nodes_mm[:, pair.nodes]
@@ -155,11 +155,14 @@ class MechanismFrame:
 
     @property
     def stiffness_n_mm(self) -> float:
-        """Force at the drive by 1 mm of input, at rest."""
+        """Force at the drive per 1 mm of input, at rest (N/mm)."""
         return self.driven.input_stiffness_n_mm
 
     def touch_input_mm(self) -> dict[str, float]:
-        """Input nearest to rest at which each contact first touches, in small displacements; absent where never."""
+        """Input nearest to zero at which each contact first touches, in small displacements.
+
+        Without those that never do.
+        """
         names = [contact.name for contact in self.mechanism.contacts]
         return {n: at for n, at in zip(names, self.driven.touch_inputs_mm(), strict=True) if at is not None}
 
@@ -212,7 +215,7 @@ class MechanismFrame:
 
     @cached_property
     def bodies(self) -> tuple[LinkBody, ...]:
-        """What the flexures join."""
+        """The bodies that the flexures join."""
         return bodies_of(self.mechanism, self.spans)
 
     def _field(self, moved: Array, *, large: bool) -> Array:
@@ -223,7 +226,7 @@ class MechanismFrame:
                               np.zeros(self.plate.unknowns)))  # fmt: skip
 
     def _motion(self, moved: Array, point: tuple[float, float], *, large: bool) -> tuple[float, float]:
-        """Displacement of a point: of the body that it lies on, or with the nearest section of its flexure."""
+        """Displacement of a point of a body, or with the nearest section of a flexure."""
         for span, own in zip(self.spans, self.segments, strict=True):
             if span.slab.holds(np.array(point)[:, None])[0]:
                 nodes = np.unique(self.frame.ends[list(own)])
@@ -236,9 +239,9 @@ class MechanismFrame:
         return self.assembly.motion_mm(moved, point, large=large)
 
     def modes_hz(self, *, drive_held: bool, count: int = 3) -> tuple[float, ...]:
-        """First natural frequencies in the plane, the drive held or free to move along its direction.
+        """First natural frequencies in the plane, with the drive fixed or free to move along its direction (Hz).
 
-        The bodies' own vibrations between their frames are added to the condensed motions (Craig and Bampton, AIAA
+        The bodies' own vibration modes with fixed frames are added to the condensed motions (Craig and Bampton, AIAA
         Journal 6 (1968) 1313).
         """
         size = self.frame.unknowns

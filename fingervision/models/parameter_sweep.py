@@ -1,4 +1,4 @@
-"""A grid over numbers of a drawing: the lumped model, changed in the ratio in which its bars alone change."""
+"""A grid over dimensions of a drawing: the lumped model's figures, changed by the ratio that a bar model computes."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -40,7 +40,7 @@ _MOST_MECHANISMS = 400
 
 @dataclass(frozen=True, slots=True)
 class Variation:
-    """Values that one number of a drawing takes.
+    """Values of one dimension of a drawing.
 
     Parameters
     ----------
@@ -77,7 +77,7 @@ def parse_variation(text: str) -> Variation:
 
 
 def varied(gripper: Gripper, variations: Sequence[Variation], values: Sequence[float]) -> Gripper:
-    """Redraw a gripper with some numbers at given values, and all that hangs on them."""
+    """Return a gripper with some dimensions at given values, and all dependent ones adapted."""
     for variation, value in zip(variations, values, strict=True):
         try:
             now = attrgetter(variation.name)(gripper)
@@ -93,7 +93,7 @@ def varied(gripper: Gripper, variations: Sequence[Variation], values: Sequence[f
 
 
 def sweep_answers(gripper: Gripper, variations: Sequence[Variation], theory: HingeTheory) -> tuple[Array, Array]:
-    """Answer every combination of the values.
+    """Compute the responses for every combination of the values.
 
     Parameters
     ----------
@@ -113,7 +113,7 @@ def sweep_answers(gripper: Gripper, variations: Sequence[Variation], theory: Hin
 
     Raises
     ------
-    FingervisionError
+    DataError, ModelError, UsageError
         Where a corner of the grid is no gripper, or the grid is too large.
     """
     grid = list(product(*(variation.values for variation in variations)))
@@ -134,7 +134,7 @@ def sweep_answers(gripper: Gripper, variations: Sequence[Variation], theory: Hin
 
 
 def _figures(model: LumpedGripper) -> dict[str, float]:
-    """Figures of a drawing by the names of `COLUMNS`."""
+    """Figures of a drawing under the names of `COLUMNS`."""
     stress, touch = model.peak_stress().mpa_per_mm, model.half.first_touch_mm()
     at_yield = model.gripper.material.yield_mpa / stress
     mode = model.modes_hz(drive_held=False, count=1)[0]
@@ -146,7 +146,7 @@ def _figures(model: LumpedGripper) -> dict[str, float]:
 def mechanism_sweep_answers(
     redrawn_to: Callable[[Mapping[str, float]], Mechanism], variations: Sequence[Variation]
 ) -> tuple[Array, tuple[str, ...], Array]:
-    """Answer every combination of the values for a mechanism drawn by bodies.
+    """Compute the responses for every combination of the values, for a mechanism drawn by bodies.
 
     Parameters
     ----------
@@ -166,7 +166,7 @@ def mechanism_sweep_answers(
 
     Raises
     ------
-    FingervisionError
+    DataError, ModelError, UsageError
         Where a variant is no mechanism, or the grid is too large.
     """
     grid = list(product(*(variation.values for variation in variations)))

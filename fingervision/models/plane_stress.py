@@ -1,6 +1,6 @@
 """An elastic plate in plane stress: quadratic triangles, small or large displacements.
 
-Where its width holds a flexure back the law lies between plane stress and plane strain (`width_effect`).
+In a flexure restrained by its width, the law lies between plane stress and plane strain (`width_effect`).
 """
 
 from functools import cached_property
@@ -23,7 +23,7 @@ _CORNERS = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0]])
 
 
 def _stress(strain: Any, moduli: Any) -> Any:
-    """Plane-stress law, thickness direction free: Timoshenko and Goodier, Theory of Elasticity, chapter 2."""
+    """Stress in plane stress, where the thickness is free: Timoshenko and Goodier, Theory of Elasticity, chapter 2."""
     E, nu = moduli
     return E / (1.0 + nu) * strain + E * nu / (1.0 - nu**2) * eye(trace(strain), 2)
 
@@ -70,12 +70,15 @@ class PlaneStressPlate:
 
     @property
     def corner_triangles(self) -> Indices:
-        """Corners of the triangles as places in `nodes_mm`, shape (3, m)."""
+        """Corner nodes of the triangles as indices of `nodes_mm`, shape (3, m)."""
         return np.asarray(self._mesh.t[:3])
 
     @cached_property
     def outline_edges(self) -> Indices:
-        """Edges of the outline as places in `nodes_mm`: two ends and the middle, the void on the left; shape (3, k)."""
+        """Edges of the outline as indices of `nodes_mm`: two ends and the middle, the void on the left.
+
+        Shape (3, k).
+        """
         facets = self._mesh.boundary_facets()
         corners = int(self._basis.nodal_dofs.shape[1])
         ends = self._mesh.facets[:, facets]
@@ -86,7 +89,7 @@ class PlaneStressPlate:
 
     @cached_property
     def _slopes(self) -> tuple[Array, Array]:
-        """Slopes of the six shape functions at the quadrature points, shape (m, q, 2, 6), and weights, shape (m, q)."""
+        """Derivatives of six shape functions at quadrature points, shape (m, q, 2, 6), and weights, shape (m, q)."""
         scalar = skfem.Basis(self._mesh, skfem.ElementTriP2(), intorder=4)
         slopes = np.stack([np.asarray(shape[0].grad) for shape in scalar.basis])  # (6, 2, m, q)
         return np.ascontiguousarray(slopes.transpose(2, 3, 1, 0)), np.asarray(scalar.dx) * self.plate_mm
@@ -100,7 +103,7 @@ class PlaneStressPlate:
 
     @cached_property
     def _law(self) -> Array:
-        """Stress (xx, yy, xy) by strain (xx, yy, twice xy) in every triangle, shape (m, 1, 3, 3)."""
+        """Matrix from strain (xx, yy, twice xy) to stress (xx, yy, xy) in every triangle, shape (m, 1, 3, 3)."""
         E, nu = (np.broadcast_to(value, self._share.shape)[:, 0] for value in self._moduli)
         law = np.zeros((E.size, 1, 3, 3))
         law[:, 0, 0, 0] = law[:, 0, 1, 1] = E / (1.0 - nu**2)
@@ -115,7 +118,7 @@ class PlaneStressPlate:
 
     @cached_property
     def mass_t(self) -> csr_matrix:
-        """Consistent mass matrix in tonnes, the unit that goes with N and mm."""
+        """Consistent mass matrix in tonnes, the unit consistent with N and mm."""
         weight = self.material.density_t_mm3 * self.plate_mm
 
         def inertia(u: Any, v: Any, _: Any) -> Any:

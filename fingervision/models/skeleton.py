@@ -1,9 +1,9 @@
 """The half gripper as a tree of bars, hinges and stiff joints, from the clamp to the drive and to the tip.
 
-Bars bend along their whole axes, up to where the axes meet, but for the finger within the cross bar. The drive block
-yields as a plane body does under the shuttle (`drive_block_root`); the way from a bar's axis to a point on its face is
-rigid. Against finite elements of nine held-out grippers the gap per input is within 0.41 %, the force within 1.5 %
-(`tests/benchmarks/models_held_out.py`).
+Bars bend over their whole axes, up to where the axes meet, except the finger inside the cross bar. The drive block is
+elastic under the shuttle (`drive_block_root`); the connection from a bar's axis to a point on its face is rigid.
+Compared with finite elements for nine grippers that were not used in the tuning, the gap per input agrees within 0.41
+%, the force within 1.5 % (`tests/benchmarks/models_held_out.py`).
 """
 
 from dataclasses import dataclass, replace
@@ -31,7 +31,7 @@ _LEAST_BAR = 0.01
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Member:
-    """One link of the tree: fixed to its parent's end at its start, loaded at its own end.
+    """One member of the tree: fixed to its parent's end at its start, loaded at its own end.
 
     Parameters
     ----------
@@ -102,7 +102,10 @@ class _Tree:
         return parent
 
     def hinge(self, parent: int, start: PointMm, end: PointMm, name: str, theory: HingeTheory, segments: int) -> int:
-        """Cut a notch into segments; one that ends before its reach, at another body, has them so much closer there."""
+        """Divide a notch into segments.
+
+        If another body begins before its full length, its segments are shorter there.
+        """
         material, notch = self.gripper.material, notches_of(self.gripper)[0 if name == "hinge 1" else 1]
         centre = self.gripper.lever.hinge1_mm if name == "hinge 1" else self.gripper.lever.hinge2_mm
         edges = notch.stations_mm(max(segments, 1))
@@ -136,7 +139,7 @@ def skeleton_of(
     block: Array | None = None,
     ends_mm: tuple[float, float] | None = None,
 ) -> Skeleton:
-    """Reduce a drawing to its tree.
+    """Reduce a drawing to its tree of members.
 
     Parameters
     ----------
@@ -156,7 +159,7 @@ def skeleton_of(
 
     Raises
     ------
-    FingervisionError
+    DataError, ModelError
         Where the members do not follow each other.
     """
     links, lever = gripper.links, gripper.lever
@@ -232,7 +235,7 @@ def skeleton_of(
 
 
 def _bending_out_of_plane(member: Member, gripper: Gripper) -> Member:
-    """Let a member bend and twist out of the plane as a bar of its own width does."""
+    """Give a member the out-of-plane bending and torsion of a bar of its own width."""
     length = float(np.hypot(*np.subtract(member.end_mm, member.start_mm)))
     bar = bar_compliance(length, member.width_mm, gripper.body.plate_mm, gripper.material)
     bar[_PLANAR] = member.compliance[_PLANAR]
@@ -240,7 +243,7 @@ def _bending_out_of_plane(member: Member, gripper: Gripper) -> Member:
 
 
 def _yielding(member: Member, at_start: Array) -> Member:
-    """Let a rigid member yield where it begins, by a compliance (x, y, rotation) in the ground's axes."""
+    """Give a rigid member an elastic joint at its start, by a compliance (x, y, rotation) in global axes."""
     way = np.subtract(member.end_mm, member.start_mm)
     c, s = way / np.hypot(*way)
     carried = np.array([[1.0, 0.0, -way[1]], [0.0, 1.0, way[0]], [0.0, 0.0, 1.0]])

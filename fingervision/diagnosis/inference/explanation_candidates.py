@@ -47,7 +47,7 @@ def single_effects(problem: Problem, atoms: Signatures, iterations: int) -> list
 def extended(
     problem: Problem, atoms: Signatures, bases: list[Explanation], most: int, progress: Progress
 ) -> list[Explanation]:
-    """Add each effect to each base: starts from signatures on what the base leaves, then joint refits."""
+    """Add each effect to each base explanation: start from signatures in the base's residual, then refit jointly."""
     owner = np.array(atoms.names)
     planned: list[tuple[float, Explanation, str, dict[str, float]]] = []
     scanned = SCANNED if problem.chain.history.input_mm.size <= LONG else 1
@@ -80,10 +80,10 @@ def extended(
 
 
 def swapped(problem: Problem, atoms: Signatures, pairs: list[Explanation]) -> list[Explanation]:
-    """Try every other effect in the place of each of the best explanation's, the others where they were put.
+    """Replace each effect of the best explanation by every other effect, the rest starting at their fitted values.
 
-    Alone it had stood elsewhere: fitted to what two effects do, it ends far out in a valley out of which no joint
-    search finds its way.
+    Fitted alone, the other effect absorbed the action of two effects, and its parameters end far out in a valley from
+    which no joint search returns.
     """
     if not pairs:
         return pairs
@@ -98,7 +98,7 @@ def swapped(problem: Problem, atoms: Signatures, pairs: list[Explanation]) -> li
 
 
 def different(problem: Problem, explanations: list[Explanation], most: int) -> list[Explanation]:
-    """Keep the best of those that predict the same: an offset of the input, of the gap and of an edge often do."""
+    """Keep the best of several explanations with equal predictions, such as offsets of input, gap and edge."""
     found, predicted = list[Explanation](), list[Array]()
     for explanation in explanations:
         curve = problem.whitened(explanation.values)
@@ -112,7 +112,7 @@ def different(problem: Problem, explanations: list[Explanation], most: int) -> l
 
 
 def added_share(problem: Problem, smaller: Explanation, larger: Explanation) -> float:
-    """Size of what the larger explanation adds, as a share of all that it changes in the prediction, in mm."""
+    """Size of what the larger explanation adds, as a fraction of its whole change of the prediction in mm."""
     bare, before, after = (problem.chain.stacked(values) for values in ({}, smaller.values, larger.values))
     if below_the_input(problem, float(np.sqrt(np.mean((after - before) ** 2)))):
         return 0.0
@@ -120,7 +120,7 @@ def added_share(problem: Problem, smaller: Explanation, larger: Explanation) -> 
 
 
 def within_a_step(problem: Problem, explanation: Explanation) -> bool:
-    """Whether an effect in it acts by less than an encoder's step, on a few rows or at the ends: as roundings do."""
+    """Whether one of its effects acts by less than an encoder step, on few rows or at the ends, as rounding does."""
     history = problem.chain.history
     if history.input_step_mm == 0.0:
         return False
@@ -146,10 +146,10 @@ def likeliest(candidates: list[Explanation], samples: int) -> Explanation:
 
 
 def simplest(singles: list[Explanation], samples: int, nothing: Explanation) -> Explanation:
-    """Choose one effect, the simpler form where the richer one gains no more than forms deviate.
+    """Choose one effect; a simpler formula is preferred if the richer one gains no more than formulas deviate.
 
-    Such a difference is the forms' own fault, and no reason to choose a resonance for a delay that falls between two
-    samples.
+    Such a difference is due to the formulas' inexactness, and no reason to prefer a resonance to a delay that falls
+    between two samples.
     """
     best = likeliest(singles, samples)
     within = FORM_SHARE**2 * (nothing.score - best.score)

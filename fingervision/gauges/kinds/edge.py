@@ -1,4 +1,4 @@
-"""Where one straight edge lies along a direction."""
+"""Position of one straight edge along a direction."""
 
 from dataclasses import dataclass
 
@@ -16,7 +16,7 @@ QUANTITIES = (("position", "length"),)
 
 @dataclass(frozen=True, slots=True)
 class EdgeSpec:
-    """Keys of an edge: its middle, the direction that it is measured along, its length, how far it may move."""
+    """Settings of an edge gauge: centre, measuring direction, length, and how far the edge may move."""
 
     middle_px: tuple[float, float]
     direction_rad: float
@@ -30,7 +30,7 @@ class EdgeSpec:
 
 
 def read(section: Section) -> EdgeSpec:
-    """Read one gauge's keys."""
+    """Read the keys of one gauge."""
     return EdgeSpec(
         common_keys.middle(section),
         common_keys.angle(section, "direction_deg"),
@@ -41,7 +41,7 @@ def read(section: Section) -> EdgeSpec:
 
 
 class FollowedEdge:
-    """One edge in the frames of one recording."""
+    """Measures one edge in the frames of one recording."""
 
     def __init__(self, spec: EdgeSpec) -> None:
         axes = Axes(*spec.middle_px, spec.direction_rad)

@@ -1,4 +1,4 @@
-"""Where a straight edge lies and how it is turned: position across it, and angle."""
+"""Position and angle of a straight edge."""
 
 from dataclasses import dataclass
 from math import atan, cos, hypot, pi, sin, sqrt
@@ -19,7 +19,7 @@ TURN_AT = 0.2
 
 @dataclass(frozen=True, slots=True)
 class LineSpec:
-    """Keys of a line: its middle, its own direction, its length, how far it may move."""
+    """Settings of a line gauge: centre, direction, length, and how far the line may move."""
 
     middle_px: tuple[float, float]
     angle_rad: float
@@ -33,7 +33,7 @@ class LineSpec:
 
 
 def read(section: Section) -> LineSpec:
-    """Read one gauge's keys."""
+    """Read the keys of one gauge."""
     return LineSpec(
         common_keys.middle(section),
         common_keys.angle(section, "angle_deg"),
@@ -44,10 +44,10 @@ def read(section: Section) -> LineSpec:
 
 
 class FollowedLine:
-    """One line in the frames of one recording.
+    """Measures one line in the frames of one recording.
 
-    `position` is counted across the line as it was drawn, through the gauge's middle, so that it is one number of one
-    direction in all frames; `angle` is the line's direction, within 90 degrees of `angle_deg`.
+    `position` is counted across the line as it was drawn, through the gauge's centre, so that it has the same direction
+    in all frames; `angle` is the line's direction, within 90 degrees of `angle_deg`.
     """
 
     def __init__(self, spec: LineSpec) -> None:
@@ -88,14 +88,14 @@ class FollowedLine:
         return Reading(GaugeStatus.OK, quantities, (Mark(ends), Mark((place,))), zone)
 
     def _turn(self, position_px: float, slope: float) -> None:
-        """Let the search lie along the line again."""
+        """Turn the search zone to the line's present direction."""
         axes = self._edge.axes
         x, y = axes.point(position_px)
         self._edge.turned_to(Axes(x, y, axes.direction_rad - atan(slope)), 0.0, 0.0)
 
 
 def _crossing(fixed: Axes, axes: Axes, position_px: float, slope: float) -> tuple[float, float]:
-    """Where the line meets the fixed gauge's own axis t."""
+    """Position where the line crosses the axis t of the fixed gauge."""
     x, y = axes.point(position_px)
     along_x, along_y = (
         cos(axes.direction_rad) * slope - sin(axes.direction_rad),

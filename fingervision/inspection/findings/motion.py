@@ -1,4 +1,4 @@
-"""Motion: fingers that move while the shutter is open."""
+"""Motion: fingers that move during the exposure."""
 
 import numpy as np
 
@@ -16,7 +16,7 @@ FORMULA = (
 
 
 def find(sample: Sample) -> Finding | None:
-    """Compare the flanks' spread to the tips': motion across the fingers spreads flanks alone."""
+    """Compare the blur of the flanks to that of the tips: motion across the fingers blurs only the flanks."""
     refused = refusing(sample, "motion", (Status.BLURRED,), REMEDY) if sample.is_smeared else None
     if not sample.looks or (refused is not None and refused.share_refused > MOSTLY_REFUSED):
         return refused

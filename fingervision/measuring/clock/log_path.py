@@ -1,4 +1,4 @@
-"""The stage between two rows of its log, and how well that is known."""
+"""Path of the stage between the rows of its log, with its uncertainty."""
 
 from dataclasses import dataclass
 from itertools import groupby, pairwise
@@ -9,6 +9,7 @@ from scipy.interpolate import Akima1DInterpolator
 
 from fingervision.domain.drive import DriveHistory
 from fingervision.domain.effect import Array
+from fingervision.measuring.clock.log_turns import turned
 from fingervision.stage_record.encoder import input_sigma, on_lines
 from fingervision.stage_record.local_polynomial_smoothing import smoothed
 
@@ -29,13 +30,15 @@ LONG_ROWS = 4 * CORNER_ROWS
 """Rows of a stretch whose ends may be left out of the look at its rounding errors."""
 AVERAGED = 0.5
 """Leverage below which a row is the mean of several, and shares its error with its neighbours."""
+TURN_SIGMAS, LEAST_TURN = 6.0, 0.01
+"""Standard deviations of a row, and share of the log's range, by which a motion must come back for it to be a turn."""
 STANDS = 0.1
 """Step over its neighbour's below which the stage stands: noise of a log is seldom more."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SharedErrors:
-    """Stretches of the log that may be off by one and the same error each.
+    """Stretches of the log, each of which may have one common error.
 
     Parameters
     ----------
@@ -54,7 +57,7 @@ class SharedErrors:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LogPath:
-    """The way of the input through the log's rows.
+    """Path of the input through the log's rows.
 
     Parameters
     ----------
@@ -64,17 +67,29 @@ class LogPath:
         Standard uncertainty at each of them of what lies between rows.
     shared : SharedErrors
         What neighbours are off by alike.
+    turned_mm : ndarray of float, shape (n,)
+        Input with all turns pushed out by their uncertainty.
+    rows : DriveHistory
+        The log as it is.
+    step_mm : float
+        Its encoder's step; 0 where none is seen.
     """
 
     drive: DriveHistory
     u_mm: Array
     shared: SharedErrors
+    turned_mm: Array
+    rows: DriveHistory
+    step_mm: float
 
     @classmethod
     def of(cls, log: DriveHistory) -> "LogPath":
-        """Smooth the rows as far as their error is random, and draw Akima's curve through them, which keeps corners.
+        """Smooth the rows as far as their error is random, and draw Akima's curve through them.
 
-        A play follows every peak of a noisy record, and would seem to lead by two standard deviations of it.
+        Akima's curve preserves corners.
+
+        Without smoothing, the play would follow every peak of a noisy record, and would seem to lead by two standard
+        deviations of the noise.
         """
         names = log.run or ("",) * log.time_s.size
         lengths = [len(list(group)) for _, group in groupby(names)]
@@ -96,18 +111,20 @@ class LogPath:
         of_runs = tuple(names[run.start] for run, piece in zip(runs, pieces, strict=True) for _ in piece[0])
         time_s, input_mm, errors = (np.concatenate([piece[k] for piece in pieces]) for k in range(3))
         drive = DriveHistory(time_s, input_mm, None if log.run is None else of_runs)
-        return cls(drive, errors, shared)
+        least_mm = max(2.0 * step_mm, TURN_SIGMAS * sigma_mm, LEAST_TURN * float(np.ptp(input_mm)))
+        return cls(drive, errors, shared, turned(input_mm, errors, least_mm), log, step_mm)
 
 
 def _shared_errors(
     time_s: Array, input_mm: Array, smooth_mm: Array, u_mm: Array, leverage: Array, still_mm: float, step_mm: float
 ) -> tuple[SharedErrors, Array]:
-    """Split an encoder's rounding into what neighbours share and what scatters from row to row.
+    """Split an encoder's rounding error into a part common to neighbouring rows and a random part.
 
-    Rounding does not average as noise does: a stage that stands lies anywhere within a step, one that moves by whole
-    steps from row to row is rounded alike in each, and of one that is slower only the crossings of its lines count. The
-    path may be shifted as far as every row keeps within half a step of it; where the rounding errors spread over the
-    step nothing is left of that. Where a stroke begins or ends, the stage moves unseen within a step.
+    Rounding errors do not average out like noise. A stage at rest lies anywhere within a step. A stage that moves by
+    whole steps from row to row is rounded equally in each row. Of a slower stage only the crossings of lines are
+    informative. The path may be shifted as long as every row stays within half a step of it; where the rounding errors
+    cover the whole step, no such shift is possible. At the beginning and the end of a stroke, motion within one step is
+    invisible.
 
     Returns
     -------
@@ -186,7 +203,7 @@ def _piece(time_s: Array, input_mm: Array, u_mm: Array) -> tuple[Array, Array, A
 
 
 def _corners(time_s: Array, input_mm: Array, second: Array, u_mm: Array) -> tuple[NDArray[np.intp], Array, Array]:
-    """Intervals in which two straight lines meet, and where they do: a turn lies between two rows, and not on one."""
+    """Intervals in which two straight lines meet, and the point where they do: a reversal lies between two rows."""
     k = np.arange(2, time_s.size - 3)
     bend, beside = second[k] + second[k + 1], second[k - 1] + second[k + 2]
     speed = np.diff(input_mm) / np.diff(time_s)
@@ -202,9 +219,9 @@ def _corners(time_s: Array, input_mm: Array, second: Array, u_mm: Array) -> tupl
 
 
 def _standing_step(input_mm: Array, sigma_mm: float, leverage: Array) -> float:
-    """Step from row to row below which the stage stands; 0 where it never moves.
+    """Step from row to row below which the stage is at rest; 0 where it never moves (mm).
 
-    A smoothed record of k rows scatters from one to the next by the k-th part of its own scatter.
+    In a record smoothed over k rows, the scatter from one row to the next is 1/k of its own scatter.
     """
     steps = np.abs(np.diff(input_mm))
     scatter = sigma_mm * np.minimum(leverage[:-1], leverage[1:]) ** 1.5
@@ -213,9 +230,9 @@ def _standing_step(input_mm: Array, sigma_mm: float, leverage: Array) -> float:
 
 
 def _flattened(input_mm: Array, sigma_mm: float, leverage: Array) -> Array:
-    """Where the stage stands, put it at one place, and keep what leads there from overshooting it.
+    """Set the stage to one position while it is at rest, and keep the path to it from overshooting it.
 
-    A smoothed corner overshoots by some standard deviations of a row, and a play remembers each overshoot.
+    Smoothing makes corners overshoot by some standard deviations of a row, and a play remembers each overshoot.
     """
     still = _standing_step(input_mm, sigma_mm, leverage)
     if still == 0.0:
@@ -238,9 +255,10 @@ def _flattened(input_mm: Array, sigma_mm: float, leverage: Array) -> Array:
 
 
 def _curve(time_s: Array, input_mm: Array, fine_s: Array, interval: NDArray[np.intp]) -> Array:
-    """Draw Akima's curve; beside an interval in which the stage stands it stays between its rows.
+    """Draw Akima's curve; next to an interval in which the stage is at rest it stays between its rows.
 
-    A stage that arrives and stands has not been beyond the place where it stands, and a play remembers where it was.
+    A stage that arrives and stops has not been beyond its position of rest, and the play depends on the extreme
+    position.
     """
     curve = np.asarray(Akima1DInterpolator(time_s, input_mm)(fine_s), dtype=np.float64)
     steps = np.abs(np.diff(input_mm))
