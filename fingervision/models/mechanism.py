@@ -13,7 +13,6 @@ from fingervision.models.planar_region import PlanarRegion
 from fingervision.models.plane_shapes import Shape
 from fingervision.models.width_effect import force_uncertainty
 
-
 _SAME_AREA = 1e-2
 """Areas are those of polygons through the arcs, good to 1e-3."""
 
@@ -164,9 +163,9 @@ def check_mechanism(mechanism: Mechanism, region: PlanarRegion) -> None:
             _check_leaf(flexure, region, uncut, name)
         elif flexure.is_notch and any(_is_hole(loop.area_mm2, flexure) for loop in region.loops):
             raise DataError(
-                f"The cuts of flexure {flexure.name} of {name} must open through the faces of what they part, but a whole "
-                f"ellipse of {flexure.half_length_mm:g} by {flexure.depth_mm:g} mm is a closed hole; make it larger, or "
-                "check its unit."
+                f"The cuts of flexure {flexure.name} of {name} must open through the faces of what they part, but a "
+                f"whole ellipse of {flexure.half_length_mm:g} by {flexure.depth_mm:g} mm is a closed hole; make it "
+                "larger, or check its unit."
             )
     for place, flexure in enumerate(mechanism.flexures):
         for other in mechanism.flexures[:place]:
