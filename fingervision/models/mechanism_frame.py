@@ -33,7 +33,6 @@ from fingervision.models.mechanism_state import MechanismState, pair_distances_m
 from fingervision.models.planar_region import PlanarRegion
 from fingervision.models.plane_stress import PlaneStressPlate
 from fingervision.models.triangulate import triangulate
-from fingervision.models.width_effect import force_uncertainty
 
 Array = NDArray[np.float64]
 
@@ -178,7 +177,7 @@ class MechanismFrame:
             if span.flexure.is_notch:
                 ratio = min(span.notch(plate_mm).curvature_ratio, 1.0)
                 stress = max(stress, _STRESS_MISUSED * sqrt(ratio) * part / max(whole, _TINIEST))
-        force = _FORCE_ERROR + 2.0 * force_uncertainty(self.mechanism.material)
+        force = _FORCE_ERROR + self.mechanism.width_error
         return force + _FORCE_MISUSED * misused / max(every, _TINIEST), _STRESS_ERROR + stress
 
     @property
