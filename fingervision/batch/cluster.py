@@ -40,7 +40,7 @@ def connected(scheduler: str, patience_s: float = PATIENCE_S) -> Iterator[Any]:
     ------
     UsageError
         The address cannot be one.
-    FingervisionError
+    MissingLibraryError, ProcessError
         Dask is not installed, nothing answers, there are no workers, or they run other versions.
     """
     try:
@@ -78,8 +78,8 @@ def _check_workers(client: Any, scheduler: str, patience_s: float) -> None:
         words = difference(here, there) if isinstance(there, dict) else f"no fingervision ({there})"
         if words:
             raise ProcessError(
-                f"Every worker must run what runs here, but {address} has {words}: install the same there "
-                "and restart it."
+                f"Every worker must have the versions that are installed here, but {address} has {words}: install "
+                "the same there and restart it."
             )
 
 
@@ -90,7 +90,7 @@ def outcomes_of(client: Any, tasks: Sequence[Task], perform: Perform) -> Generat
 
     Raises
     ------
-    FingervisionError
+    ProcessError
         The scheduler is gone.
     """
     from distributed import KilledWorker, as_completed

@@ -18,7 +18,7 @@ def inputs_of(names: tuple[str, ...], out: Path) -> tuple[str, ...]:
 
     Raises
     ------
-    FingervisionError
+    InputFileError
         Nothing matches at all.
     UsageError
         All that matches lies in `out`.

@@ -73,7 +73,7 @@ class LocalCrew:
 
         Raises
         ------
-        FingervisionError
+        ProcessError
             All of them died of it.
         """
         for worker in self._workers.values():

@@ -98,10 +98,7 @@ class Batch:
 
     @property
     def exit_code(self) -> ExitCode:
-        """0 all done; 3 done, but some inputs were bad; 1 stopped or none done.
-
-        2 all failed by the same wrong usage.
-        """
+        """0 all done; 3 done, but some inputs were bad; 1 stopped or none done; 2 wrong usage in all inputs."""
         codes = {outcome.exit_code for outcome in self.outcomes}
         if self.stopped:
             return ExitCode.COULD_NOT
@@ -123,7 +120,7 @@ def planned(job: Job) -> Plan:
 
     Raises
     ------
-    FingervisionError
+    OutputError
         Nothing matches, or the folder for the results holds something else. Nothing is written yet.
     """
     names = inputs_of(job.inputs, job.out)
@@ -166,8 +163,10 @@ def run(plan: Plan, crew: Crew, on_progress: Progress | None = None) -> Batch:
 
     Raises
     ------
-    FingervisionError
-        The folder for the results cannot be made, the overview cannot be written, or the crew is gone.
+    OutputError
+        The folder for the results cannot be made, or the overview cannot be written.
+    ProcessError
+        All workers are gone.
     """
     _claim(plan.job)
     numbers = plan.to_do

@@ -46,7 +46,7 @@ def command() -> None:
 
 
 def _batch_of(name: str) -> click.Command:
-    """Give a command for many inputs: the single one's options, and those of a batch."""
+    """Make a batch command: the options of the single command, and those of a batch."""
     single = cli.get_command(click.Context(cli), name)
     assert single is not None  # noqa: S101 - named below
     options = [
@@ -118,7 +118,7 @@ def _run(
 
 
 def _arguments(given: Mapping[click.Option, Any], *, absolute: bool) -> list[str]:
-    """Write options as on a command line; files by their whole path for other machines."""
+    """Write options as on a command line; files with absolute paths for other machines."""
     words: list[str] = []
     for option, value in given.items():
         flag = option.opts[0]
@@ -131,7 +131,7 @@ def _arguments(given: Mapping[click.Option, Any], *, absolute: bool) -> list[str
 
 
 def _options_key(name: str, given: Mapping[click.Option, Any]) -> str:
-    """Hash what decides the results besides the input: options, the content of files that they name, the version."""
+    """Hash of what determines the results besides the input: options, content of files that they name, version."""
     import hashlib
     import json
 
@@ -146,7 +146,7 @@ def _options_key(name: str, given: Mapping[click.Option, Any]) -> str:
 
 
 def _content(path: Path, inside: tuple[Path, ...] = ()) -> str:
-    """Hash of a file, and of the files that a corrected model rests on."""
+    """Hash of a file, and of the files to which a corrected model refers."""
     import hashlib
     import tomllib
 
@@ -169,9 +169,9 @@ def _content(path: Path, inside: tuple[Path, ...] = ()) -> str:
 
 
 def _check_options(name: str, arguments: tuple[str, ...], ask: "Perform") -> None:
-    """Refuse options that cannot be meant, once and before any work.
+    """Refuse invalid options, once and before any work.
 
-    The command is asked for an input that does not exist: it must complain of that and of nothing else.
+    The command is called for an input that does not exist: its only error must be about that input.
     """
     from tempfile import TemporaryDirectory
 
@@ -220,7 +220,7 @@ class _Bar:
 
 
 def _report(plan: "Plan", batch: "Batch", as_json: bool) -> None:
-    """Say what came out, and what went wrong on the error stream."""
+    """Print the result, and errors on the error stream."""
     import json
 
     if as_json:

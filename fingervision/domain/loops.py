@@ -39,7 +39,7 @@ def loop(name: str) -> Callable[..., Any]:
 
     Raises
     ------
-    FingervisionError
+    InstallationError
         If the loops are not built and cannot be built here.
     """
     found: Callable[..., Any] = getattr(_library(), name)

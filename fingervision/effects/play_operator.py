@@ -15,8 +15,9 @@ def play(input_mm: Array, width_mm: float, start: float) -> Array:
 
 
 def drawn_sliders(input_mm: Array, reach_mm: float, count: int, start: float) -> Array:
-    """Sum how far elastic sliders with reaches of k / count of `reach_mm` are drawn along one run's input; (n,).
+    """Sum of the extensions of elastic sliders with reaches of k / count of `reach_mm`, along one run's input; (n,).
 
-    Slider k is drawn by what a play of twice its reach withholds. `start` is the same share of its reach for all.
+    The extension of slider k is the difference between the input and the output of a play of twice its reach. The
+    initial extension is the fraction `start` of the reach for all sliders.
     """
     return filled(_sliders, input_mm, reach_mm, count, start)

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from fingervision.domain.effect import Array, DriveEffect, History, Stage, Values
+from fingervision.domain.effect import Array, DriveEffect, Flags, History, Stage, Values
 from fingervision.domain.loops import filled, loop
 from fingervision.domain.parameter import Parameter
 
@@ -37,14 +37,19 @@ def act(input_mm: Array, history: History, values: Values) -> Array:
     return out
 
 
-def _steady_speeds(input_mm: Array, time_s: Array) -> Array:
-    """Mean speeds over `WINDOW` samples of one direction; over fewer, the steps of the encoder would dominate."""
+def _steady_speeds(input_mm: Array, time_s: Array, jumps: Flags) -> Array:
+    """Speeds over `WINDOW` samples that go one way: neighbouring samples differ by whole steps of an encoder.
+
+    `jumps` marks the moves, shape (n - 1,), that are a command's jump and no motion: stretches that hold one are left
+    out.
+    """
     if input_mm.size <= WINDOW:
         return np.zeros(0)
     net = np.abs(input_mm[WINDOW:] - input_mm[:-WINDOW])
     way = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(input_mm)))])
     travelled = way[WINDOW:] - way[:-WINDOW]
-    one_way = (net > ONE_WAY * travelled) & (net > 0.0)
+    jumped = np.concatenate([[0], np.cumsum(jumps)])
+    one_way = (net > ONE_WAY * travelled) & (net > 0.0) & (jumped[WINDOW:] == jumped[:-WINDOW])
     return np.asarray((net / (time_s[WINDOW:] - time_s[:-WINDOW]))[one_way])
 
 
@@ -58,15 +63,15 @@ def narrow(history: History) -> tuple[Parameter, ...] | str:
         move = np.abs(np.diff(history.input_mm[run]))
         # A single move between two stands is a command's jump: it asks for a speed, and shows none.
         stands = np.pad(move <= 4.0 * history.input_sigma_mm, 1, constant_values=True)
-        alone = stands[:-2] & stands[2:]
-        jumping.append((move / np.diff(history.times[run]))[~stands[1:-1] & alone])
-        moving.append(_steady_speeds(history.input_mm[run], history.times[run]) if not alone.all() else np.zeros(0))
-    steady, jumps = np.concatenate(moving), np.concatenate(jumping)
-    if not steady.size and not jumps.size:
+        jumps = ~stands[1:-1] & stands[:-2] & stands[2:]
+        jumping.append((move / np.diff(history.times[run]))[jumps])
+        moving.append(_steady_speeds(history.input_mm[run], history.times[run], jumps))
+    steady, asked = np.concatenate(moving), np.concatenate(jumping)
+    if not steady.size and not asked.size:
         return "the input never moves between two samples"
-    fastest = float(np.max(np.concatenate([steady, jumps])))
+    fastest = float(np.max(np.concatenate([steady, asked])))
     slowest, fast = np.quantile(steady, (SLOWEST_SHARE, FASTEST_SHARE)) if steady.size else (JUMP_RANGE * fastest, 0.0)
-    if max(float(fast), float(np.max(jumps, initial=0.0))) < APART * slowest:
+    if max(float(fast), float(np.max(asked, initial=0.0))) < APART * slowest:
         return f"the input moves at one speed only, about {fastest:.3g} mm/s: a limit below it would follow nothing"
     (speed_limit,) = EFFECT.parameters
     return (replace(speed_limit, lower=float(slowest), upper=fastest, neutral=fastest),)

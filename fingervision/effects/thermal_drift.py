@@ -1,5 +1,7 @@
 """Thermal drift: a slow symmetric change of the gap, whatever the input."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from fingervision.domain.effect import History, PointEffect, Stage, Values
@@ -12,6 +14,14 @@ def act(response: Response, history: History, values: Values) -> Response:
     if values["amplitude_mm"] == 0.0:
         return response
     return response.with_gap(response.gap_mm - values["amplitude_mm"] * np.expm1(-history.clock_s / values["tau_s"]))
+
+
+def narrow(history: History) -> tuple[Parameter, ...] | str:
+    """Leave out what is over before the second reading: it is an offset by another name."""
+    amplitude, tau = EFFECT.parameters
+    if history.sample_time_s >= tau.upper:
+        return f"readings are {history.sample_time_s:.3g} s apart, and a warming would be over between two of them"
+    return amplitude, replace(tau, lower=max(tau.lower, history.sample_time_s))
 
 
 EFFECT = PointEffect(
@@ -29,5 +39,6 @@ EFFECT = PointEffect(
     needs_times=True,
     needs_shared_clock=True,
     demonstrated=True,
+    narrow=narrow,
     act=act,
 )

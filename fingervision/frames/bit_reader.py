@@ -1,4 +1,4 @@
-"""Bits of a coded stream's header, one field after the other."""
+"""Bits of a coded stream's header, read one field after another."""
 
 MOST_ZEROS = 32
 
@@ -16,7 +16,7 @@ class BitReader:
         self._bits, self._left = int.from_bytes(content, "big"), 8 * len(content)
 
     def take(self, count: int) -> int:
-        """Read a number of so many bits; IndexError behind the end."""
+        """Read a number of `count` bits; IndexError after the end."""
         self._left -= count
         if self._left < 0:
             raise IndexError

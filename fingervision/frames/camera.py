@@ -36,7 +36,7 @@ def open_frames(name: str, wish: Wish) -> "CameraFrames":
 
     Raises
     ------
-    FingervisionError
+    DeviceError
         There is no such camera, somebody else has it, or it gives no picture.
     """
     return CameraFrames(name, wish)

@@ -15,7 +15,7 @@ from fingervision.frames.spoken_damage import listening
 
 @dataclass(frozen=True, slots=True)
 class CodedTime:
-    """A packet of a video, in the order of decoding.
+    """A packet of a video, in decoding order.
 
     Parameters
     ----------
@@ -43,7 +43,7 @@ class CodedTime:
 
 
 def is_shown(packet: "av.Packet[Any]", codec: str) -> bool:
-    """Whether a packet gives a picture: a bit of the first byte of VP8 says whether it does (RFC 6386, 9.1)."""
+    """Whether a packet presents a picture; in VP8 a bit of the first byte tells (RFC 6386, 9.1)."""
     return codec != "vp8" or bool(bytes(packet)[0] & 0x10)
 
 

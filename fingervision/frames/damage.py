@@ -36,7 +36,7 @@ class DamageTrail:
         codec.copy_opaque = True
 
     def enters(self, packet: av.Packet[av.VideoStream], *, is_shown: bool = True) -> None:
-        """Note a packet that goes into the decoder, and whether a picture is awaited for it."""
+        """Record a packet that enters the decoder, and whether a picture is expected from it."""
         self._last = next(self._numbers)
         packet.opaque = self._last
         if packet.is_keyframe and self._broken:

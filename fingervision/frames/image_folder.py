@@ -27,7 +27,7 @@ def open_frames(name: str, wish: Wish) -> "ImageFolder":
 
     Raises
     ------
-    FingervisionError
+    DataError, InputFileError
         There are no images, or none can be read, or their times make no sense.
     UsageError
         The rate is not positive, or the images have times already.

@@ -21,7 +21,7 @@ def times_of(files: tuple[Path, ...]) -> tuple[float, ...] | None:
 
     Raises
     ------
-    FingervisionError
+    DataError
         The table cannot be read, has a bad row, or does not fit the images.
     """
     table = files[0].parent / TIMES_FILE

@@ -1,20 +1,20 @@
-"""Which pictures of a file hang on one that is missing, where the codec does not count its pictures.
+"""Find pictures of a file that depend on a missing one, for codecs that do not count their pictures.
 
-H.264 counts (see `reference_chain`), HEVC names what it hangs on, MPEG-2 keeps an even rate (`transport_stream`). The
-others are decoded without a word when a whole packet is missing: the differences of the next picture are taken to an
-older one, and a moving finger stands where it was. Four things tell of it, all read before decoding:
+H.264 counts them (see `reference_chain`), HEVC names the references, MPEG-2 has a constant rate (`transport_stream`).
+Other codecs are decoded without an error when a whole packet is missing: the differences of the next picture are added
+to an older one, and a moving finger is shown in an old position. Four signs are used, all read before decoding:
 
-* AV1 numbers the pictures in the order in which they are shown. A number left out is a picture that is missing; numbers
-  in a row are proof that none is, whatever the times say.
-* MPEG-4 part 2 turns a bit with every P picture, a count modulo two. One picture too few shows in it; where it fits,
-  an odd number of missing times was never coded.
-* In MPEG-4 part 2 a B picture lies between two others in time. One that is shown after all that came hangs on a
-  missing one.
-* Times. In a file whose times are an even row, coded at a rate and not as a camera delivered them, a hole of whole
-  steps is a missing picture. Where times are uneven, or holes are a habit, the camera or the coder left pictures out,
-  and a hole tells nothing: there a missing VP8 or VP9 picture, or two of MPEG-4, stay unnoticed.
+* AV1 numbers the pictures in the order in which they are shown. An omitted number means a missing picture; consecutive
+  numbers prove that none is missing, whatever the times are.
+* MPEG-4 part 2 turns a bit with every P picture, a count modulo two. One missing picture is visible in it; if the bit
+  fits, an odd number of missing times was never coded.
+* In MPEG-4 part 2 a B picture lies between two others in time. A B picture presented after all pictures received so far
+  depends on a missing one.
+* Times. In a file with equidistant times (coded at a rate, instead of as a camera delivered the frames), a hole of
+  whole steps is a missing picture. If times are irregular, or holes are frequent, the camera or the coder omitted
+  pictures, and a hole means nothing: there a missing VP8 or VP9 picture, or two of MPEG-4, stay undetected.
 
-AVI is not judged by times, since it counts frames and says itself where none was coded (an empty chunk).
+AVI is not judged by times, because it counts frames and marks omitted ones by an empty chunk.
 """
 
 from bisect import bisect_right
@@ -62,7 +62,7 @@ TIME_LEFT_OUT = (
 
 
 def missing_references(path: Path, stream: av.VideoStream, container_format: str) -> dict[int, str]:
-    """Read the packets of a file, without decoding, and tell before which of them a picture is missing.
+    """Read the packets of a file without decoding, and return before which of them a picture is missing.
 
     Parameters
     ----------
@@ -86,7 +86,7 @@ def missing_references(path: Path, stream: av.VideoStream, container_format: str
 
 
 def judged(packets: list[CodedTime], *, are_timed: bool) -> dict[int, str]:
-    """Tell before which packets a picture is missing on which they hang.
+    """Find the packets that depend on a missing picture before them.
 
     Parameters
     ----------
@@ -105,7 +105,7 @@ def judged(packets: list[CodedTime], *, are_timed: bool) -> dict[int, str]:
 
 
 def _by_number(packets: list[CodedTime]) -> dict[int, str]:
-    """Follow AV1's numbers; layers of time that were taken out leave the same step between all."""
+    """Check AV1's numbers; removed temporal layers leave the same step between all numbers."""
     numbered = [(number, packet) for number, packet in enumerate(packets) if packet.order is not None]
     steps = [
         (number, (packet.order - before.order) % packet.modulus)
@@ -117,7 +117,7 @@ def _by_number(packets: list[CodedTime]) -> dict[int, str]:
 
 
 def _by_turn(packets: list[CodedTime]) -> dict[int, str]:
-    """Follow MPEG-4's bit, where it turns with every P picture; behind I pictures it begins alike, or is not judged."""
+    """Check MPEG-4's bit where it toggles with every P picture, and starts with the same value after I pictures."""
     needed = [(number, packet) for number, packet in enumerate(packets) if packet.is_needed]
     pairs = [(number, before, packet) for (_, before), (number, packet) in pairwise(needed) if packet.turn is not None]
     inner = [(number, packet.turn != before.turn) for number, before, packet in pairs if before.turn is not None]
@@ -145,7 +145,7 @@ def _shown_too_late(packets: list[CodedTime]) -> list[int]:
 
 
 def _by_time(packets: list[CodedTime], unturned: dict[int, str]) -> dict[int, str]:
-    """Find the holes of an even row, and the packets that may hang on what is missing there."""
+    """Find the holes in equidistant times, and the packets that may depend on what is missing there."""
     shown = sorted({packet.tick for packet in packets if packet.is_shown and packet.tick is not None})
     steps = [after - before for before, after in pairwise(shown)]
     usual = _usual(steps)
@@ -173,7 +173,7 @@ def _by_time(packets: list[CodedTime], unturned: dict[int, str]) -> dict[int, st
 
 
 def _turns_on(packets: list[CodedTime], number: int, unturned: dict[int, str]) -> bool:
-    """Whether the bit is followed, and the next P picture turns it as if nothing were missing."""
+    """Whether the bit is in use, and the next P picture toggles it as if nothing were missing."""
     before = next((each for each in reversed(packets[:number]) if each.is_needed), None)
     following = next((k for k in range(number, len(packets)) if packets[k].is_needed), None)
     if before is None or before.turn is None or following is None or packets[following].turn is None:
@@ -182,14 +182,14 @@ def _turns_on(packets: list[CodedTime], number: int, unturned: dict[int, str]) -
 
 
 def _key_is_due(keys: list[int], at: int, missing_ticks: float) -> bool:
-    """Whether a key frame, which sets the bit back, may be missing behind a time."""
+    """Whether a key frame, which resets the bit, may be missing after a time."""
     before = bisect_right(keys, at)
     every = min((b - a for a, b in pairwise(keys)), default=None)
     return every is None or before == 0 or at + missing_ticks + TICKS >= keys[before - 1] + every
 
 
 def _sticks_out(steps: list[int], k: int) -> bool:
-    """Whether a step is longer than is usual before it, and than is usual behind it: a new rate is no hole."""
+    """Whether a step is longer than the usual ones before and after it, unlike at a change of rate."""
     before, behind = steps[max(0, k - BESIDE) : k], steps[k + 1 : k + 1 + BESIDE]
     return all(steps[k] > median(some) + TICKS for some in (before, behind) if some)
 
@@ -199,7 +199,7 @@ def _is_whole(step: int, usual: float) -> bool:
 
 
 def _usual(steps: list[int]) -> float | None:
-    """Step of an even row, in ticks; None where the times are none."""
+    """Step of equidistant times, in ticks; None where they are not equidistant."""
     if not steps:
         return None
     middle = sorted(steps)[len(steps) // 2]

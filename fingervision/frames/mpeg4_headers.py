@@ -1,8 +1,8 @@
-"""What MPEG-4 part 2 writes before every picture: its kind, and a bit by which encoders count every second one.
+"""Data that MPEG-4 part 2 writes before every picture: its type, and a bit that encoders toggle.
 
-Half-pixel values are rounded one way in one P picture and the other way in the next, so that rounding does not add up
-(`vop_rounding_type`). Encoders turn the bit with every P picture and set it back at each I picture, which makes it a
-count modulo two: one picture that is missing shows.
+Half-pixel values are rounded up in one P picture and down in the next, so that rounding errors do not accumulate
+(`vop_rounding_type`). Encoders toggle the bit with every P picture and reset it at each I picture, so that it counts
+modulo two and reveals one missing picture.
 
 Source: ISO/IEC 14496-2, 6.2.3 (video object layer), 6.2.5 (video object plane), 6.3.5.
 """
@@ -23,7 +23,7 @@ MOST_SECONDS = 3600
 
 
 class Mpeg4Kind(Enum):
-    """Kind of a picture by what it hangs on (`vop_coding_type`)."""
+    """Type of a picture by its dependence on others (`vop_coding_type`)."""
 
     I_PICTURE = 0
     P_PICTURE = 1
@@ -33,7 +33,7 @@ class Mpeg4Kind(Enum):
 
 @dataclass(frozen=True, slots=True)
 class Mpeg4Picture:
-    """What a picture's header says.
+    """Content of a picture's header.
 
     Parameters
     ----------
@@ -48,7 +48,7 @@ class Mpeg4Picture:
 
 
 class Mpeg4Headers:
-    """Reads the headers of pictures; keeps what the layer's header says of their form.
+    """Reads the headers of pictures; stores what the layer's header states of their form.
 
     Parameters
     ----------
@@ -61,7 +61,7 @@ class Mpeg4Headers:
         self._units(extradata or b"")
 
     def of(self, packet: bytes) -> Mpeg4Picture | None:
-        """Read the first picture of a packet; None where there is none that can be read."""
+        """Read the first picture of a packet; None where there is no readable one."""
         return self._units(packet)
 
     def _units(self, content: bytes) -> Mpeg4Picture | None:
@@ -93,7 +93,7 @@ class Mpeg4Headers:
 
 
 def _increment_bits(header: bytes) -> int | None:
-    """Length of `vop_time_increment` by a layer's header; None for shapes other than a rectangle."""
+    """Length of `vop_time_increment` from a layer's header; None for shapes other than a rectangle."""
     bits = BitReader(header)
     bits.take(1 + 8)
     if bits.take(1):

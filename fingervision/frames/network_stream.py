@@ -57,7 +57,7 @@ def open_frames(name: str, wish: Wish) -> "NetworkStream":
 
     Raises
     ------
-    FingervisionError
+    DeviceError
         Nobody answers, or the answer is no video.
     UsageError
         A size or rate is wished, which the camera alone decides.

@@ -94,7 +94,7 @@ class LiveSource(Protocol):
 
         Raises
         ------
-        FingervisionError
+        DeviceError
             The source is cut off.
         """
         ...

@@ -163,7 +163,7 @@ def open_source(name: str, wish: Wish | None = None) -> FrameSource:
 
     Raises
     ------
-    FingervisionError
+    DataError, DeviceError, InputFileError
         No kind of source knows the name, or the one that does cannot read it.
     UsageError
         Several kinds accept it.

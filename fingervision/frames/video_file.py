@@ -58,7 +58,7 @@ def open_frames(name: str, wish: Wish) -> "VideoFile":
 
     Raises
     ------
-    FingervisionError
+    DataError, InputFileError
         It cannot be read, is no video, or has no picture in it.
     UsageError
         A rate is given for what has its own times.

@@ -61,7 +61,7 @@ def read_gauges(path: Path) -> tuple[Gauge, ...]:
 
     Raises
     ------
-    FingervisionError
+    DataError, InputFileError
         The file cannot be read, or a value in it cannot be meant; the sentence names the line.
     """
     return gauges_in(path, *read_document(path, "gauge file"))
@@ -81,7 +81,7 @@ def gauges_in(path: Path, values: Mapping[str, Any], text: str) -> tuple[Gauge, 
 
     Raises
     ------
-    FingervisionError
+    DataError
         A value in it cannot be meant; the sentence names the line.
     """
     top = Section(path, text, "", values)
@@ -111,7 +111,7 @@ def gauge_of(section: Section, others: Collection[str]) -> Gauge:
 
     Raises
     ------
-    FingervisionError
+    DataError
         A value in it cannot be meant.
     """
     name = section.word("name")
@@ -130,7 +130,7 @@ def check_gauges(gauges: tuple[Gauge, ...], width_px: int, height_px: int) -> No
 
     Raises
     ------
-    FingervisionError
+    DataError
         One does; the sentence names it.
     """
     for gauge in gauges:

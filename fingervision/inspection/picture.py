@@ -34,7 +34,7 @@ def draw_inspection(path: Path, sample: Sample, findings: list[Finding]) -> None
 
     Raises
     ------
-    FingervisionError
+    OutputError
         The picture cannot be written.
     """
     figure = Figure(figsize=(12.0, 5.2), layout="constrained")

@@ -43,6 +43,8 @@ def one_of(argument: str, value: object, words: Iterable[str]) -> str:
 
     Raises
     ------
+    ArgumentTypeError
+        It is no text.
     UnknownNameError
         It is none of them; with the nearest.
     """

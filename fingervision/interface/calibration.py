@@ -62,7 +62,7 @@ class Calibration:
 
         Raises
         ------
-        FingervisionError
+        DataError, InputFileError
             There is no such file, or it is no calibration.
         """
         name = path_of("path", path, "a calibration file")
@@ -81,7 +81,7 @@ class Calibration:
 
         Raises
         ------
-        FingervisionError
+        OutputError
             It cannot be written, or another file stands there.
         """
         out = path_of("path", path, "a calibration file")
@@ -96,7 +96,7 @@ class Calibration:
 
         Raises
         ------
-        FingervisionError
+        OutputError
             One cannot be written.
         """
         for name, picture in self.pictures.items():
@@ -151,7 +151,7 @@ class Calibration:
         ------
         UsageError
             An item that cannot be meant.
-        FingervisionError
+        DataError, InputFileError
             A picture cannot be read, or is of another size than the calibration's.
         """
         from fingervision.interface.reference_pictures import known_sizes, references_of

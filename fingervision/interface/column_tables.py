@@ -28,7 +28,7 @@ def drive_from_columns(table: Any) -> DriveHistory:
         It holds no columns.
     ArgumentError
         A column is missing, or holds what is no number.
-    FingervisionError
+    DataError
         Times do not increase, or a run comes back after another.
     """
     columns = columns_of("drive", table, "a drive table's file name, DriveHistory, DataFrame or mapping of columns")
@@ -53,7 +53,7 @@ def measured_from_columns(table: Any) -> MeasuredTable:
         It holds no columns.
     ArgumentError
         A column is missing, or holds what is no number.
-    FingervisionError
+    DataError
         As `fingervision.read_table`.
     """
     columns = columns_of(
@@ -76,7 +76,7 @@ def simulation_from_columns(columns: Mapping[str, list[Any]]) -> TableModel:
     ------
     ArgumentError
         A column is missing, or holds what is no number.
-    FingervisionError
+    DataError
         Fewer than two rows, an input that stands twice, a gap that does not depend on the input.
     """
     for name in ("input_mm", "gap_mm"):

@@ -123,7 +123,7 @@ class Comparison:
         ------
         UsageError
             The folder holds the results of another table.
-        FingervisionError
+        OutputError
             It cannot be written.
         """
         return save_results(self, folder)

@@ -121,7 +121,7 @@ class Diagnosis:
         ------
         UsageError
             The folder holds the results of another table.
-        FingervisionError
+        OutputError
             It cannot be written.
         """
         return save_results(self, folder)

@@ -43,7 +43,7 @@ def recording_of(
         It holds no pictures.
     UsageError
         An argument that this source has no use for.
-    FingervisionError
+    DataError, DeviceError, InputFileError
         It cannot be read.
     """
     if rate_hz is not None:

@@ -119,7 +119,7 @@ def measure(
     ------
     UsageError
         An argument that cannot be meant; as `ArgumentError` it names the argument and says what it must be.
-    FingervisionError
+    DataError, InputFileError, OpenQuestionError
         The recording, the calibration or the drive cannot be read.
 
     Examples

@@ -172,7 +172,7 @@ class Measurement:
         ------
         UsageError
             The measurement has no drive.
-        FingervisionError
+        DataError, NoCalibrationError
             There are too few such frames, or they do not move.
         """
         from fingervision.interface.measurement_tables import measured_table
@@ -284,7 +284,7 @@ class Measurement:
         ------
         UsageError
             The folder holds the results of another recording, or there is no such frame.
-        FingervisionError
+        OutputError
             It cannot be written.
         """
         from fingervision.measuring.save import save_measured

@@ -42,7 +42,7 @@ def scale_of(calibration: Any, px_per_mm: Any) -> tuple[Scale, Path | None]:
     ------
     UsageError
         Both are given, or neither, or no camera has such a scale.
-    FingervisionError
+    DataError, InputFileError
         The calibration cannot be read.
     """
     if calibration is not None and px_per_mm is not None:
@@ -94,7 +94,7 @@ def measuring_task(
     ------
     UsageError
         An argument that cannot be meant.
-    FingervisionError
+    DataError, InputFileError, OpenQuestionError
         A file cannot be read.
     """
     from calib.camera_response import CameraResponse

@@ -90,7 +90,7 @@ def known_sizes(references: Sequence[Reference], u_size_mm: float) -> list[Known
 
     Raises
     ------
-    FingervisionError
+    DataError, InputFileError, UsageError
         One cannot be read, or is of another size.
     """
     u_mm = number("u_size_mm", u_size_mm)
@@ -107,7 +107,7 @@ def read_pictures(sources: Sequence[Any]) -> list[tuple[str, GreyImage]]:
     ------
     UsageError
         A file is named twice, or what is no picture.
-    FingervisionError
+    DataError, InputFileError
         One cannot be read, or is of another size.
     """
     paths = [Path(each) for each in sources if isinstance(each, str | os.PathLike)]

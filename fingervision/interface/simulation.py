@@ -154,7 +154,7 @@ class Simulation:
 
         Raises
         ------
-        FingervisionError
+        OutputError
             It cannot be written.
         """
         import csv

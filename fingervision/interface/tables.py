@@ -73,7 +73,7 @@ def read_table(
     ------
     OpenQuestionError
         The table can be read in more than one way; the sentence says how to settle it.
-    FingervisionError
+    DataError, InputFileError
         It cannot be read, or not be worked with.
 
     Examples
@@ -110,7 +110,7 @@ def read_model(
 
     Raises
     ------
-    FingervisionError
+    DataError, InputFileError, ModelError, UsageError
         It cannot be read.
 
     Examples
@@ -146,7 +146,7 @@ def measured_given(measured: Any, columns: Any = None) -> Given:
     ------
     ArgumentTypeError
         It holds no table.
-    FingervisionError
+    DataError, InputFileError, OpenQuestionError
         It cannot be read, or not be worked with.
     """
     if isinstance(measured, str | os.PathLike):
@@ -168,7 +168,7 @@ def model_given(model: Any, kind: str, columns: Any = None) -> Given:
     ------
     ArgumentTypeError
         It is no model.
-    FingervisionError
+    DataError, InputFileError, ModelError, UsageError
         It cannot be read.
     """
     if isinstance(model, str | os.PathLike):
@@ -247,7 +247,7 @@ def own_base(model: CorrectedModel, out: Path) -> CorrectedModel:
 
     Raises
     ------
-    FingervisionError
+    OutputError
         The file cannot be written.
     """
     if model.base_path or not isinstance(model.base, TableModel):

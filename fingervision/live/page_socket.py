@@ -1,4 +1,7 @@
-"""One page's socket: the newest goes out when the page has the one before; requests come in, checked and counted."""
+"""Socket of one page: a new state is sent when the page has received the previous one.
+
+Requests are checked and counted.
+"""
 
 import asyncio
 import contextlib
@@ -31,7 +34,7 @@ TAKE_OVER = "take_over"
 
 
 class PageSocket:
-    """Serves one page until either end is gone.
+    """Serves one page until either side closes the connection.
 
     Parameters
     ----------
@@ -56,7 +59,10 @@ class PageSocket:
         self.ending = False
 
     async def serve(self) -> None:
-        """Send and receive; when either ends, however it ends, the page is let go, and connects anew if it is there."""
+        """Send and receive.
+
+        If either fails, the connection is closed, and the page connects again if it still exists.
+        """
         page = self._page
         await page.accept()
         tasks = [asyncio.create_task(self._send()), asyncio.create_task(self._receive())]
@@ -80,7 +86,7 @@ class PageSocket:
         return {"viewer": self._is_viewer, "holds_pen": not self._is_viewer and self._pen.may_write(self)}
 
     async def _send(self) -> None:
-        """Send the newest, then wait until the page has it: nothing ever queues up."""
+        """Send the newest state, then wait until the page has received it, so that nothing queues up."""
         view, known = self._view, known_by(self._page)
         shown: Seen | None = None
         pictured_s = float("-inf")
@@ -145,7 +151,7 @@ class PageSocket:
 
 
 def known_by(page: WebSocket) -> Known:
-    """What a page that comes back has; numbers that are none count as nothing."""
+    """Rows and messages that a returning page has already; invalid numbers count as zero."""
     asked = page.query_params
     numbers = [asked.get(name, "") for name in ("rows", "messages")]
     if not all(number.isascii() and number.isdigit() and len(number) <= MOST_DIGITS for number in numbers):
@@ -154,7 +160,7 @@ def known_by(page: WebSocket) -> Known:
 
 
 def request_of(text: str) -> dict[str, Any]:
-    """What a message asks; what is no request asks for nothing."""
+    """Parse a message as a request; an invalid one is an empty request."""
     try:
         request = json.loads(text)
     except (ValueError, RecursionError):

@@ -1,4 +1,4 @@
-"""Who waits for a new picture: one look at the view serves all pages."""
+"""Waiting for a new picture: one check of the view serves all pages."""
 
 import asyncio
 
@@ -26,7 +26,7 @@ class PictureWatch:
         self._looking: asyncio.Task[None] | None = None
 
     async def other_than(self, shown: Seen | None, timeout_s: float) -> None:
-        """Wait until the view shows another picture than this, or for so long.
+        """Wait until the view shows another picture than `shown`, at most for `timeout_s`.
 
         Parameters
         ----------

@@ -1,4 +1,4 @@
-"""One message to the page: what is new since the last, and the newest picture with what was measured drawn in."""
+"""One message to the page: everything new since the last one, and the newest picture with the measured edges."""
 
 import json
 import struct
@@ -30,7 +30,7 @@ _NOTHING = NoGap(Status.NO_FINGERS, "The scale is not known: nothing is measured
 
 @dataclass(frozen=True, slots=True)
 class Known:
-    """What a page has: of which count, and how many rows and messages of it.
+    """What a page has received: version, and numbers of rows and messages.
 
     Parameters
     ----------
@@ -47,14 +47,14 @@ class Known:
 
 @dataclass(frozen=True, slots=True)
 class Next:
-    """A message, and what the page then has."""
+    """A message, and what the page has after receiving it."""
 
     content: bytes
     known: Known
 
 
 def message(view: View, known: Known, seen: Seen | None, about: Mapping[str, Any] | None = None) -> Next:
-    """Put together the next message.
+    """Compose the next message.
 
     Parameters
     ----------
@@ -96,7 +96,7 @@ def message(view: View, known: Known, seen: Seen | None, about: Mapping[str, Any
 
 
 def points(view: View, rows: list[GapRow]) -> list[list[Any]]:
-    """Rows for the chart: time, gap, its standard uncertainty, frame, why there is none, and the model's gap."""
+    """Rows for the chart: time, gap, its standard uncertainty, frame, reason for a missing gap, and the model's gap."""
     model = view.features.get("model")
     predicted = [None] * len(rows) if model is None else model.predicted_mm(rows)
     return [
@@ -117,7 +117,7 @@ def _u_mm(row: GapRow) -> float | None:
 
 
 def _now(view: View, seen: Seen | None) -> dict[str, Any] | None:
-    """A picture's row in figures."""
+    """Values of the picture's row."""
     choices = view.choices
     if seen is None or seen.row is None:
         return None
@@ -150,14 +150,14 @@ def _picture(seen: Seen, zero_mm: float) -> bytes:
 
 
 def draw_beforehand(view: View) -> None:
-    """Draw the picture that the next messages will ask for; not while measuring lags."""
+    """Draw the picture that the next messages will need, unless the measurement lags behind."""
     seen = view.seen
     if seen is not None and not view.in_a_hurry:
         _PICTURES.of(seen, view.choices.zero_mm)
 
 
 def is_short(view: View, known: Known) -> bool:
-    """Whether the next message takes but a moment: few rows, and no model that has to be asked."""
+    """Whether the next message is quickly composed: few rows, and no model to evaluate."""
     return (
         known.identity == view.identity
         and view.row_count - known.rows < ROWS_IN_A_MOMENT
@@ -166,12 +166,12 @@ def is_short(view: View, known: Known) -> bool:
 
 
 def state_has_changed() -> None:
-    """Tell the next messages to ask the view for its state anew: a command was obeyed."""
+    """Make the next messages read the view's state again, after a command was executed."""
     _STATES.forget()
 
 
 class _Pictures:
-    """The newest picture, drawn once however many pages look."""
+    """The newest picture, drawn only once for all pages."""
 
     def __init__(self) -> None:
         self._lock = Lock()
@@ -186,7 +186,7 @@ class _Pictures:
 
 
 class _States:
-    """What every page is told of a view, put together once for all pages that ask at about the same time."""
+    """State of a view, composed once for all pages that request it at about the same time."""
 
     def __init__(self) -> None:
         self._lock = Lock()

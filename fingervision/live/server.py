@@ -1,4 +1,4 @@
-"""The page's server: files of the page, a socket for the live view, the gaps as a file. Bound to loopback."""
+"""Server of the page: its files, a socket for the live view, and the gaps as a file. Bound to loopback."""
 
 import asyncio
 import errno
@@ -37,11 +37,11 @@ DOOR = ".live_page.html"
 
 
 def bound(host: str, port: int) -> socket.socket:
-    """Bind the address that the page is served at.
+    """Bind the address at which the page is served.
 
     Raises
     ------
-    FingervisionError
+    ProcessError, UsageError
         The port is in use, or the address is not of this machine.
     """
     try:
@@ -118,7 +118,7 @@ class Page:
         )
 
     def door(self) -> Path:
-        """Write a page that only this user can read, and that leads to the address."""
+        """Write a local page that redirects to the address, readable only by this user."""
         path = self._view.out.resolve() / DOOR
         with out_folder(self._view.out):
             path.unlink(missing_ok=True)
@@ -128,7 +128,7 @@ class Page:
         return path
 
     def serve(self, until: Event) -> None:
-        """Serve until told to end."""
+        """Serve until `until` is set."""
         thread = Thread(target=self._run, name="page", daemon=True)
         thread.start()
         while not until.wait(0.2) and thread.is_alive():

@@ -11,7 +11,7 @@ from fingervision.domain.frame import Frame, LostFrame
 from fingervision.domain.status import Status
 from fingervision.frames.source import FrameSource
 from fingervision.gauges.recording import GaugeRecording
-from fingervision.measuring.clock.alignment import ClockOffset
+from fingervision.measuring.clock.clock_offset import ClockOffset
 from fingervision.measuring.clock.common_clock import join_drive
 from fingervision.measuring.frame_loop import Progress, measure_frames, prepared
 from fingervision.measuring.gap_figure import draw_gap
@@ -81,7 +81,7 @@ def measure(source: FrameSource, task: Task, out: Path, on_progress: Progress | 
     ------
     UsageError
         The region lies outside the frame, or a frame is asked for that there is not.
-    FingervisionError
+    OutputError
         The results cannot be written, or the scale is for other frames. The rows until then are in gaps.csv.
     """
     refuse_camera(source)

@@ -65,7 +65,7 @@ def claimed(path: Path, recording_files: tuple[Path, ...]) -> OutputFolder:
 
     Raises
     ------
-    FingervisionError
+    OutputError
         The folder cannot be made or written, or holds files of these names that no measurement wrote.
     UsageError
         The folder is where the recording's images are, or the recording would be replaced.

@@ -42,7 +42,7 @@ def save_measured(
     ------
     UsageError
         The folder holds the results of another recording, or there is no such frame.
-    FingervisionError
+    OutputError
         The folder cannot be written, or holds files that no measurement wrote.
     """
     description, task, series = found.source.description, found.task, found.series

@@ -34,7 +34,7 @@ def write_steps(
 
     Raises
     ------
-    FingervisionError
+    OutputError
         A picture cannot be written.
     """
     written = []

@@ -126,7 +126,7 @@ def check_task(task: Task, description: Description) -> None:
     ------
     UsageError
         The region lies outside the frame, or a drive is given for frames without times.
-    FingervisionError
+    DataError
         The scale is for other frames.
     """
     width_px, height_px = description.width_px, description.height_px

@@ -175,7 +175,7 @@ def assemble_bodies(
 
     Raises
     ------
-    FingervisionError
+    ModelError
         Where a face holds nothing or a body is joined to nothing.
     """
     frames = _Frames(plate, mechanism, size_mm)

@@ -1,7 +1,7 @@
-"""Figures of changed drawings: bars alone answer them, and change the model's own figures in that ratio.
+"""Figures of changed drawings: a bar model computes the ratio by which the model's own figures change.
 
-A finger that is meshed takes half a second, bars a few milliseconds. Where a figure is no finite number of one sign, or
-bars have it off by more than half, it is the bars' own.
+A meshed finger takes half a second, bars take a few milliseconds. If a figure is not finite or changes sign, or the bar
+model is wrong by more than half, the bar model's own figure is used.
 """
 
 from collections.abc import Callable, Mapping
@@ -14,7 +14,7 @@ _MOST = 2.0
 
 
 def ratios(own: Figures, bars: Figures) -> dict[str, float]:
-    """Return the model's own figures of the drawing over those of bars alone; 1 where there is no such ratio."""
+    """Ratio of the model's own figures to those of the bar model, for the drawing; 1 where there is no ratio."""
     return {name: _ratio(own[name], value) for name, value in bars.items()}
 
 
@@ -26,12 +26,12 @@ def _ratio(own: float | None, bars: float | None) -> float:
 
 
 def scaled(figures: Figures, by: Mapping[str, float]) -> dict[str, float | None]:
-    """Change figures in these ratios."""
+    """Multiply figures by these ratios."""
     return {name: None if value is None else by.get(name, 1.0) * value for name, value in figures.items()}
 
 
 def in_ratio(bars: Callable[[Mapping[str, float]], Figures], own: Figures) -> Callable[[Mapping[str, float]], Figures]:
-    """Make figures of changed drawings out of those of bars.
+    """Compute figures of changed drawings from those of the bar model.
 
     Parameters
     ----------

@@ -123,7 +123,7 @@ def contact_pair(plate: PlaneStressPlate, contact: Contact, mechanism: Mechanism
 
     Raises
     ------
-    FingervisionError
+    DataError
         Where a face holds none, or the faces overlap at rest.
     """
     nodes = nodes_on(plate, contact.face, mechanism, size_mm)

@@ -96,7 +96,7 @@ class PaperDamping:
 
         Raises
         ------
-        FingervisionError
+        ModelError
             Where a mode lies below w0 or its ratio outside (0, 0.3).
         """
         reference_rad_s = float(rad_s.min()) if self.reference_rad_s is None else self.reference_rad_s
@@ -124,7 +124,7 @@ def checked(ratios: Array) -> Array:
 
     Raises
     ------
-    FingervisionError
+    ModelError
         For others.
     """
     if np.any(ratios <= 0.0) or np.any(ratios >= _MOST):

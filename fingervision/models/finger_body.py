@@ -1,10 +1,10 @@
-"""The gripper's finger as one elastic body: all between both hinges and the tip, condensed from plane finite elements.
+"""The gripper's finger, from both hinges to the tip, as one elastic body condensed from plane finite elements.
 
 Bars that bend up to where their axes meet are no match for the joint of root, cross bar, shuttle and finger, which
-are as wide as they are long: the force on a gripped part is then up to a third too low. The body is cut from the drawing
-at the ends of the notches, meshed, and condensed statically (Guyan, AIAA Journal 3 (1965) 380) to the cuts, the tip's
-inner face, and mean motions of a few patches between them, by which its mass moves. The other nodes of the bars follow
-it, for pictures and poses.
+are as wide as they are long: the force on a gripped part is then up to a third too low. The body is cut from the
+drawing at the ends of the notches, meshed, and condensed statically (Guyan, AIAA Journal 3 (1965) 380) to the cuts, the
+tip's inner face, and mean motions of a few patches between them, by which its mass moves. The other nodes of the bars
+follow it, for pictures and poses.
 """
 
 from dataclasses import dataclass, replace
@@ -48,7 +48,7 @@ _LEAST_NODES = 6
 _FOLLOWED = 12
 """Nearest nodes of the mesh that a node of the bars follows."""
 _STIFF = 1e-3
-"""Compliance of what ties a follower over that of a square of the finger's width: a contact's is all that it carries."""
+"""Compliance of what ties a follower over that of a square of the finger's width: it carries a contact's load alone."""
 _PLANAR = np.ix_([0, 1, 5], [0, 1, 5])
 _MOST_KEPT = 32
 _UNIT = Material("unit", 1.0, 0.3, 1.0, 1.0)
@@ -58,7 +58,7 @@ _BODY = Body(1.0, 1.0, 1.0, 0.0, 0.0)
 
 @dataclass(frozen=True, slots=True)
 class _Station:
-    """A node of the bars: the member that ends there, the place, and the member's width."""
+    """A node of the bars: the member that ends there, its position, and the member's width."""
 
     name: str
     at_mm: PointMm
@@ -67,7 +67,7 @@ class _Station:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FingerBody:
-    """The finger by the nodes of the bars that it stands for.
+    """The finger, by the nodes of the bars that it replaces.
 
     Parameters
     ----------
@@ -85,16 +85,16 @@ class FingerBody:
 
     @property
     def unknowns(self) -> Indices:
-        """Three motions a node: x, y, rotation."""
+        """Number of unknowns, three per node: x, y, rotation."""
         return np.asarray((3 * self.nodes[:, None] + np.arange(3)).ravel())
 
 
 def finger_body(gripper: Gripper, skeleton: Skeleton) -> FingerBody:
-    """Condense the finger of a drawing; bodies that differ by modulus, density or plate alone are meshed once.
+    """Condense the finger of a drawing; the mesh is reused if only modulus, density or plate thickness differ.
 
     Raises
     ------
-    FingervisionError
+    DataError, ModelError
         Where the hinges do not cut it from the rest.
     """
     members = skeleton.members
@@ -117,7 +117,7 @@ def finger_body(gripper: Gripper, skeleton: Skeleton) -> FingerBody:
 
 
 def finger_ends_mm(gripper: Gripper) -> tuple[float, float]:
-    """Ways from the middle of hinge 1 and of hinge 2 to the cuts at which the finger begins."""
+    """Distances from the centres of hinges 1 and 2 to the cuts at which the finger begins (mm)."""
     first, second = _spans(gripper.hinge, gripper.lever, gripper.links)
     return first.cut_mm[1], second.cut_mm[1]
 
@@ -131,7 +131,7 @@ def is_of_finger(name: str) -> bool:
 def _unit_body(
     body: Body, hinge: Hinge, lever: Lever, links: Links, poisson: float, stations: tuple[_Station, ...]
 ) -> tuple[Indices, Array, Array]:
-    """Order of the stations, stiffness and mass by their motions, by unit modulus, density (kg/m^3) and plate."""
+    """Order of the stations, with stiffness and mass for unit modulus, density (kg/m^3) and plate thickness."""
     gripper = Gripper(Material("unit", 1.0, poisson, 1.0, 1.0), body, hinge, lever, links)
     mechanism = half_mechanism(gripper)
     spans = _spans(hinge, lever, links)
@@ -167,7 +167,7 @@ def _spans(hinge: Hinge, lever: Lever, links: Links) -> tuple[FlexureSpan, ...]:
 
 
 def _finger_region(mechanism: Mechanism, spans: tuple[FlexureSpan, ...]) -> PlanarRegion:
-    """Take away the drive block, the flexures and what hangs on their other ends."""
+    """Remove the drive block, the flexures and the bodies at their other ends."""
     far = 2.0 * mechanism.region.size_mm
     steps: list[tuple[bool, Shape]] = [*mechanism.bodies[:_BLOCK], *mechanism.bodies[_BLOCK + 1 :]]
     steps += [step for flexure in mechanism.flexures for step in flexure.steps()]
@@ -179,7 +179,7 @@ def _finger_region(mechanism: Mechanism, spans: tuple[FlexureSpan, ...]) -> Plan
 
 
 def _link_widths_mm(mechanism: Mechanism) -> list[float]:
-    """Widths of the links that the hinges are cut into, each across its hinge's axis."""
+    """Widths of the links into which the hinges are cut, each measured across its hinge's axis (mm)."""
     widths = []
     for (_, shape), flexure in zip(mechanism.bodies, mechanism.flexures, strict=False):
         corners = np.array(shape.corners_mm) if isinstance(shape, Polygon) else np.zeros((1, 2))
@@ -197,7 +197,7 @@ def _frames(
     stations: tuple[_Station, ...],
     size_mm: float,
 ) -> tuple[list[Frame], list[int]]:
-    """Frames that are kept, each moved to its station, and the stations: both cuts, the face, patches between them."""
+    """The kept frames, each moved to its station, and the stations: both cuts, the face, patches in between."""
     names = [station.name for station in stations]
     cuts = [0, len(names) - 1 - names[::-1].index("stub")]
     face = names.index("measuring point")
@@ -226,14 +226,14 @@ def _frames(
 
 
 def _moved(frame: Frame, to_mm: PointMm) -> Frame:
-    """Tell a frame by the motion of another point of the same rigid section."""
+    """Express a frame by the motion of another point of the same rigid section."""
     arm = frame.at_mm - np.array(to_mm)
     carried = np.array([[1.0, 0.0, -arm[1]], [0.0, 1.0, arm[0]], [0.0, 0.0, 1.0]])
     return Frame(np.array(to_mm), frame.rows, frame.motion @ carried)
 
 
 def _patch_frame(plate: PlaneStressPlate, nodes: Indices, at_mm: PointMm) -> Frame:
-    """Mean motion of a patch: the rigid one that is nearest to that of its nodes."""
+    """Mean motion of a patch: the rigid motion nearest to that of its nodes."""
     rigid = _rigid(plate, nodes, at_mm)
     fit = np.linalg.pinv(rigid)
     rows = np.zeros((3, plate.unknowns))
@@ -242,7 +242,7 @@ def _patch_frame(plate: PlaneStressPlate, nodes: Indices, at_mm: PointMm) -> Fra
 
 
 def _rigid(plate: PlaneStressPlate, nodes: Indices, at_mm: PointMm) -> Array:
-    """Displacements of nodes, x then y, by the rigid motions of a point, shape (2 k, 3)."""
+    """Displacements of nodes, x then y, under rigid motions of a point, shape (2 k, 3)."""
     x, y = plate.nodes_mm[:, nodes] - np.array(at_mm)[:, None]
     one, zero = np.ones(nodes.size), np.zeros(nodes.size)
     return np.vstack([np.column_stack([one, zero, -y]), np.column_stack([zero, one, x])])
@@ -256,7 +256,7 @@ def _tie(
     kept: list[int],
     place: int,
 ) -> Array:
-    """Motion of a follower by those of the kept stations, shape (3, 3 k)."""
+    """Motion of a following node from those of the kept stations, shape (3, 3 k)."""
     station = stations[place]
     tie = np.zeros((3, shapes_mm.shape[1]))
     if station.name in _ON_FACE:

@@ -58,7 +58,7 @@ class FunctionModel:
 
         Raises
         ------
-        FingervisionError
+        ModelError
             The model fails, or its gap does not depend on the input, or never settles.
         """
         up = np.linspace(low_mm, high_mm, STEPS)
@@ -100,7 +100,7 @@ class FunctionModel:
 
         Raises
         ------
-        FingervisionError
+        ModelError
             The file cannot be run, crashes, does not end, or answers what is no number.
         """
         with TemporaryDirectory(prefix="fingervision-") as folder:

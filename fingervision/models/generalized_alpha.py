@@ -67,7 +67,7 @@ def integrate(
 
     Raises
     ------
-    FingervisionError
+    ModelError
         Where a step does not settle.
     """
     rho = high_frequency_radius

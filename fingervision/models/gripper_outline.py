@@ -69,7 +69,7 @@ def check_outline(gripper: Gripper, origin: str = "the drawing") -> None:
 
     Raises
     ------
-    FingervisionError
+    DataError
         Where the half is not one body, a notch is a closed hole, a hinge does not hold its two sides together or does
         not part them, or the clamp, the drive face or the tip's inner face is no face of the body.
     """

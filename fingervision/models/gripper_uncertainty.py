@@ -31,10 +31,10 @@ def gripper_uncertainty(
 ) -> dict[str, FigureUncertainty]:
     """Propagate the stated uncertainties of a drawing to every figure of `gripper_figures`.
 
-    The answers for changed drawings come from the lumped model (out of the plane from the stiffness matrix), in small
-    displacements, by bars alone in their ratio to the drawing's (`changed_drawings`), with contact where the physics
-    includes it. Finite elements of every changed drawing would take
-    minutes, and an uncertainty needs two digits only. The same u is stated beside the figures of the other kinds.
+    The figures of changed drawings come from the lumped model (out of the plane from the stiffness matrix), with small
+    displacements, with contact where the physics includes it; a bar model gives their ratio to the drawing's own
+    (`changed_drawings`). Finite elements of every changed drawing would take minutes, and an uncertainty needs two
+    digits only. The same uncertainty is stated for the figures of the other kinds of model.
 
     Parameters
     ----------
@@ -72,7 +72,7 @@ def check_uncertainties(gripper: Gripper) -> None:
 
     Raises
     ------
-    FingervisionError
+    DataError, ModelError
         Where one standard uncertainty either way leaves no gripper.
     """
     for name, estimate in _numbers(gripper).items():

@@ -30,7 +30,7 @@ def frame_of(gripper: Gripper, skeleton: Skeleton) -> CorotationalFrame:
 
 
 def joined_frame_of(gripper: Gripper, skeleton: Skeleton) -> JoinedFrame:
-    """Make the elements of a tree of members, but for the finger, which is one body."""
+    """Convert a tree of members to elements, except for the finger, which is one body."""
     body, bars = finger_body(gripper, skeleton), frame_of(gripper, skeleton)
     places = np.array([place for place, member in enumerate(skeleton.members) if not is_of_finger(member.name)])
     elements = CorotationalFrame(bars.nodes_mm, bars.ends[places], bars.end_compliance[places])
@@ -87,10 +87,10 @@ def _end_compliance(gripper: Gripper, axis_mm: Array, place: int, skeleton: Skel
 def _mass_t(
     nodes: Array, ends: NDArray[np.int64], skeleton: Skeleton, frame: CorotationalFrame | JoinedFrame
 ) -> csr_matrix:
-    """Half of each member's mass at each end, with the rotational inertia that a uniform bar then lacks or exceeds.
+    """Half of each member's mass at each end, with the correction to a uniform bar's rotational inertia.
 
-    The paper's mass matrix (2), m and I_z, node by node: I_z of a bar about its middle is m (l^2 + w^2) / 12. A body
-    that stands for members has its own.
+    This is the mass matrix (2) of Hricko & Havlik (2015), m and I_z, node by node: I_z of a bar about its centre is m
+    (l^2 + w^2) / 12. A body that replaces members has its own mass matrix.
     """
     mass, inertia = np.zeros(len(nodes)), np.zeros(len(nodes))
     body = frame.body if isinstance(frame, JoinedFrame) else None

@@ -30,7 +30,7 @@ def half_plate(gripper: Gripper, plate: PlaneStressPlate) -> DrivenBody:
 
     Raises
     ------
-    FingervisionError
+    DataError
         Where the mesh has no node on the clamp, the axis, the drive face or the tip's inner face.
     """
     links, lever = gripper.links, gripper.lever

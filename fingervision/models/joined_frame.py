@@ -1,4 +1,4 @@
-"""The half gripper's frame: pillar, hinges and shuttle as elements, the finger as one body that turns with its root."""
+"""Frame of the half gripper: pillar, hinges and shuttle as elements, the finger as one body that rotates."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -16,7 +16,7 @@ Indices = NDArray[np.int64]
 
 @dataclass(frozen=True, eq=False)
 class JoinedFrame:
-    """Elements and a body on the nodes of one tree; large rotations, small strains.
+    """Elements and one body at the nodes of one tree; large rotations, small strains.
 
     Parameters
     ----------
@@ -49,7 +49,7 @@ class JoinedFrame:
         return np.repeat(dofs, dofs.size), np.tile(dofs, dofs.size)
 
     def internal_force_n(self, displacement: Array) -> tuple[csr_matrix, Array]:
-        """Tangent stiffness and nodal forces, as `CorotationalFrame.internal_force_n` has them."""
+        """Tangent stiffness and nodal forces, as in `CorotationalFrame.internal_force_n`."""
         tangent, force = self.elements.internal_force_n(displacement)
         dofs = self.body.unknowns
         stiffness, loads = self.body.turning.forces_n(displacement[dofs])
@@ -63,5 +63,5 @@ class JoinedFrame:
         return loads
 
     def stiffness_n_mm(self) -> csr_matrix:
-        """Linear stiffness at rest."""
+        """Linear stiffness in the undeformed shape."""
         return self.internal_force_n(np.zeros(self.unknowns))[0]

@@ -129,7 +129,7 @@ def build_model(kind: str, gripper: Gripper, physics: Physics, theory: HingeTheo
     ------
     UsageError
         Where the kind is unknown or does not know the physics asked for.
-    FingervisionError
+    PluginShapeError
         A model from outside the package fails, or answers what is no answer.
     """
     try:

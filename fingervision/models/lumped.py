@@ -1,8 +1,8 @@
 """The gripper as a chain of lumped flexures and elastic links, as in the SimMechanics model of Hricko & Havlik (2015).
 
-Each notch is cut into segments, close together at the neck; each has the compliance of its own integral, so that their
-sum is that of the notch to rounding, however thin. What remains is beam theory's own error, which the corrected hinge
-mends. The finger between the hinges is one elastic body (`finger_body`).
+Each notch is divided into segments, closer together at the neck. Each segment's compliance is the integral over it, so
+that their sum is the notch's compliance up to rounding, however thin the notch is. The remaining error is that of beam
+theory, which the correction of the hinges removes. The finger between the hinges is one elastic body (`finger_body`).
 """
 
 from collections.abc import Sequence
@@ -139,14 +139,14 @@ class LumpedGripper:
 
     @property
     def _errors(self) -> tuple[float, float, float, float]:
-        """Relative model errors of slope, force, modes and grip; by beam theory, of its bars and joints alone."""
+        """Relative model errors of slope, force, modes and grip; by beam theory those of bars and joints only."""
         if not isinstance(self.frame, JoinedFrame):
             return _SLOPE_OF_BARS, _FORCE_OF_BARS, _MODE_OF_BARS, _GRIP_OF_BARS
         force = _FORCE_ERROR + 2.0 * force_uncertainty(self.gripper.material)
         return _SLOPE_ERROR, force, _MODE_ERROR, _GRIP_ERROR
 
     def figures(self) -> ModelFigures:
-        """Compute the model's row of the comparison."""
+        """Figures of the model for the comparison table."""
         slope, force, mode, grip = self._errors
         return ModelFigures(
             gap_per_input(self.half),

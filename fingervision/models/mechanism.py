@@ -122,7 +122,7 @@ def check_mechanism(mechanism: Mechanism, region: PlanarRegion) -> None:
 
     Raises
     ------
-    FingervisionError
+    DataError
         Where it is not one body, a flexure holds no material or its neck is no neck, or a probe lies outside.
     """
     name = mechanism.name

@@ -92,7 +92,7 @@ class DrivenMechanism:
 
         Raises
         ------
-        FingervisionError
+        ModelError
             Where nothing holds the mechanism.
         """
         try:
@@ -129,7 +129,7 @@ class DrivenMechanism:
 
         Raises
         ------
-        FingervisionError
+        ModelError
             Where it cannot be followed from rest.
         """
         gaps = self.gaps if contact else ()

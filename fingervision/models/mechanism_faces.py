@@ -24,7 +24,7 @@ def nodes_on(plate: PlaneStressPlate, face: Face, mechanism: Mechanism, size_mm:
 
     Raises
     ------
-    FingervisionError
+    DataError
         Where there is no part of the outline.
     """
     x, y = plate.nodes_mm
@@ -94,7 +94,7 @@ def supports_of(plate: PlaneStressPlate, mechanism: Mechanism, size_mm: float) -
 
     Raises
     ------
-    FingervisionError
+    DataError
         Where a face holds none, the drive's is fixed, or nothing is.
     """
     fixed = tuple(nodes_on(plate, face, mechanism, size_mm) for face in mechanism.fixed)

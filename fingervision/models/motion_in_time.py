@@ -87,7 +87,7 @@ def gripper_motion(
 
     Raises
     ------
-    FingervisionError
+    ModelError
         Where large rotation or contact meets vibrations that neither way can follow.
     """
     law = damping or ModalDamping()

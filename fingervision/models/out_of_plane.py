@@ -62,7 +62,7 @@ def out_of_plane(
 
     Raises
     ------
-    FingervisionError
+    DataError, ModelError
         Where a face holds no part of the outline.
     """
     region = mechanism.region

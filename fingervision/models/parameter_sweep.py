@@ -1,4 +1,4 @@
-"""A grid over numbers of a drawing: the lumped model, changed in the ratio in which its bars alone change."""
+"""A grid over dimensions of a drawing: the lumped model's figures, changed by the ratio that a bar model computes."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -113,7 +113,7 @@ def sweep_answers(gripper: Gripper, variations: Sequence[Variation], theory: Hin
 
     Raises
     ------
-    FingervisionError
+    DataError, ModelError, UsageError
         Where a corner of the grid is no gripper, or the grid is too large.
     """
     grid = list(product(*(variation.values for variation in variations)))
@@ -134,7 +134,7 @@ def sweep_answers(gripper: Gripper, variations: Sequence[Variation], theory: Hin
 
 
 def _figures(model: LumpedGripper) -> dict[str, float]:
-    """Figures of a drawing by the names of `COLUMNS`."""
+    """Figures of a drawing under the names of `COLUMNS`."""
     stress, touch = model.peak_stress().mpa_per_mm, model.half.first_touch_mm()
     at_yield = model.gripper.material.yield_mpa / stress
     mode = model.modes_hz(drive_held=False, count=1)[0]
@@ -166,7 +166,7 @@ def mechanism_sweep_answers(
 
     Raises
     ------
-    FingervisionError
+    DataError, ModelError, UsageError
         Where a variant is no mechanism, or the grid is too large.
     """
     grid = list(product(*(variation.values for variation in variations)))

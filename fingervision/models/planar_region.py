@@ -5,7 +5,7 @@ body's outline. Nothing is approximated: a notch stays an arc.
 """
 
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 from itertools import pairwise
 
 import numpy as np
@@ -22,6 +22,7 @@ _BESIDE = 1e-6
 _TURNS_IN = -0.2
 """Sine of the turn to the right beyond which a corner turns into the body."""
 _CHORDS = 33
+_MOST_KEPT = 64
 _SAME = 1e-8
 """Of the body's size: corners closer than this are one."""
 
@@ -83,9 +84,12 @@ class PlanarRegion:
 
         Raises
         ------
-        FingervisionError
+        DataError
             Where two parts of it touch in a point, so that the body is not defined there.
         """
+        return _loops_of(self.steps, self.marks_mm)
+
+    def _traced(self) -> tuple[Loop, ...]:
         curves = [curve for _, shape in self.steps for curve in shape.curves()]
         pieces: list[Curve] = []
         boxes = np.array([_box_mm(curve) for curve in curves])
@@ -123,6 +127,12 @@ class PlanarRegion:
         return kept
 
 
+@lru_cache(maxsize=_MOST_KEPT)
+def _loops_of(steps: tuple[tuple[bool, Shape], ...], marks_mm: tuple[Point, ...]) -> tuple[Loop, ...]:
+    """Outline of a body; kept, because every kind of model of a drawing asks for it."""
+    return PlanarRegion(steps, marks_mm)._traced()  # noqa: SLF001 (its own class)
+
+
 def sharp_corners_mm(region: PlanarRegion) -> list[Array]:
     """Re-entrant corners without a radius, at which the stress is singular (mm)."""
     found = []
@@ -154,8 +164,8 @@ def _chained(pieces: list[Curve], same_mm: float) -> tuple[Loop, ...]:
             x, y = piece.end_mm
             what = "ends" if near.size == 0 else "touches itself in a point"
             raise DataError(
-                f"The outline must close and part the body everywhere, but it {what} at ({x:.6g}, {y:.6g}) mm; "
-                "let the shapes overlap there, or stay apart."
+                f"The outline must be closed and separate the body from the void everywhere, but it {what} at "
+                f"({x:.6g}, {y:.6g}) mm; let the shapes overlap there, or stay apart."
             )
         following[place] = int(near[0])
     loops = []

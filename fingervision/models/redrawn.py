@@ -23,7 +23,7 @@ def redrawn(gripper: Gripper, name: str, by: float) -> Gripper:
 
     Raises
     ------
-    FingervisionError
+    DataError
         Where the name is not that of a number.
     """
     section, _, key = name.partition(".")

@@ -61,7 +61,7 @@ def mesh_of(gripper: Gripper) -> PlaneMesh:
 
     Raises
     ------
-    FingervisionError
+    DataError, ModelError
         Where the outline is not that of a gripper.
     """
     if not is_reference(gripper):

@@ -102,7 +102,10 @@ class _Tree:
         return parent
 
     def hinge(self, parent: int, start: PointMm, end: PointMm, name: str, theory: HingeTheory, segments: int) -> int:
-        """Cut a notch into segments; one that ends before its reach, at another body, has them so much closer there."""
+        """Divide a notch into segments.
+
+        If another body begins before its full length, its segments are shorter there.
+        """
         material, notch = self.gripper.material, notches_of(self.gripper)[0 if name == "hinge 1" else 1]
         centre = self.gripper.lever.hinge1_mm if name == "hinge 1" else self.gripper.lever.hinge2_mm
         edges = notch.stations_mm(max(segments, 1))
@@ -156,7 +159,7 @@ def skeleton_of(
 
     Raises
     ------
-    FingervisionError
+    DataError, ModelError
         Where the members do not follow each other.
     """
     links, lever = gripper.links, gripper.lever

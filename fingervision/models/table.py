@@ -37,22 +37,33 @@ class TableModel:
         return float(self.input_mm[0]), float(self.input_mm[-1])
 
     def respond(self, input_mm: NDArray[np.float64]) -> Response:
-        """Interpolate; beyond an end follow the straight line through the last quarter of the rows there."""
+        """Interpolate linearly.
+
+        Beyond an end, extrapolate the straight line through the last quarter of the rows there.
+        """
         lowest, highest = self.input_range_mm
         inside = input_mm.min() >= lowest and input_mm.max() <= highest
         beyond = None if inside else (np.minimum(input_mm - lowest, 0.0), np.maximum(input_mm - highest, 0.0))
-        columns = {"left": self.left_mm, "right": self.right_mm} | (
-            {} if self.force_n is None else {"force": self.force_n}
-        )
-        found = {name: np.interp(input_mm, self.input_mm, column) for name, column in columns.items()}
-        if beyond is not None:
-            for name, (low, high) in self._end_slopes.items():
-                found[name] = np.asarray(found[name] + low * beyond[0] + high * beyond[1], dtype=np.float64)
-        return Response(found["left"], found["right"], found.get("force"))
+
+        def at(name: str, column: NDArray[np.float64]) -> NDArray[np.float64]:
+            found = np.interp(input_mm, self.input_mm, column)
+            if beyond is None:
+                return found
+            low, high = self._end_slopes[name]
+            return np.asarray(found + low * beyond[0] + high * beyond[1], dtype=np.float64)
+
+        right = at("right", self.right_mm)
+        left = -right if self._symmetric else at("left", self.left_mm)
+        return Response(left, right, None if self.force_n is None else at("force", self.force_n))
+
+    @cached_property
+    def _symmetric(self) -> bool:
+        """Whether the fingers are mirror images, as they are where the table knows the gap alone."""
+        return bool(np.array_equal(self.left_mm, -self.right_mm))
 
     @cached_property
     def _end_slopes(self) -> dict[str, tuple[float, float]]:
-        """Slope of each column at the lower and the upper end; a diagnosis asks for them ten thousand times."""
+        """Slope of each column at the lower and the upper end; computed once, as a diagnosis needs it very often."""
         columns = {"left": self.left_mm, "right": self.right_mm, "force": self.force_n}
         rows = max(2, -(-self.input_mm.size // 4))
 

@@ -42,7 +42,7 @@ def triangulate(region: PlanarRegion, across: float, body_mm: float) -> PlaneMes
 
     Raises
     ------
-    FingervisionError
+    ModelError
         Where the body is so fine beside its size that no sensible number of triangles fills it.
     """
     field = size_field(region, across, body_mm)

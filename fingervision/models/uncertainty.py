@@ -83,7 +83,7 @@ def propagate(
 
     Raises
     ------
-    FingervisionError
+    ModelError
         Where a number cannot be redrawn by its uncertainty, or too many samples are no drawings.
     """
     used = {name: estimate.u or 0.0 for name, estimate in numbers.items() if estimate.u}

@@ -77,9 +77,10 @@ def write_clip(path: Path, frames: Iterable[Frame], codec: Codec) -> None:
 
     Raises
     ------
-    FingervisionError
-        The file cannot be written, times are missing or do not increase, sizes change, the clip is empty, or the
-        container or codec cannot hold the frames.
+    DataError
+        Times are missing or do not increase, sizes change, or the clip is empty.
+    OutputError
+        The file cannot be written, or the container or codec cannot hold the frames.
     """
     if path.suffix not in CONTAINERS:
         msg = f"A clip's name must end in {', '.join(CONTAINERS)}, because these keep every time, but is {path.name}."
@@ -94,7 +95,7 @@ def write_clip(path: Path, frames: Iterable[Frame], codec: Codec) -> None:
             _encode(container, first, source, codec)
     except OSError as error:
         msg = f"{path} must be a file that can be written, but it could not be: {error.strerror}."
-        raise DataError(msg) from error
+        raise OutputError(msg) from error
 
 
 def _encode(container: OutputContainer, first: Frame, others: Iterator[Frame], codec: Codec) -> None:

@@ -30,7 +30,7 @@ def deformed_outlines(edges: NDArray[np.int64], nodes_px: NDArray[np.float64]) -
 
     Raises
     ------
-    FingervisionError
+    DataError
         The edges do not close.
     """
     following = {int(edge[0]): place for place, edge in enumerate(edges.T)}

@@ -43,7 +43,7 @@ def dust(
 
     Raises
     ------
-    FingervisionError
+    DataError
         A grain without size, or no level to choose from.
     """
     if not (count >= 0 and 0.0 < size_px[0] <= size_px[1] and levels):

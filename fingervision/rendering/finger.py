@@ -124,7 +124,7 @@ def finger_shape(width_px: float, length_px: float, tip: Tip, tilt_deg: float = 
 
     Raises
     ------
-    FingervisionError
+    DataError
         The tip does not fit on the finger, or it is tilted or slanted by more than STEEPEST_DEG.
     """
     half = width_px / 2

@@ -24,7 +24,7 @@ def through_jpeg(pixels: Pixels, quality: int) -> Pixels:
 
     Raises
     ------
-    FingervisionError
+    DataError
         The frame has not 8 bits, or the quality does not exist.
     """
     if pixels.dtype != np.uint8:

@@ -169,7 +169,7 @@ def disc(x_px: float, y_px: float, radius_px: float) -> Outline:
 
     Raises
     ------
-    FingervisionError
+    DataError
         The radius is not positive.
     """
     if not radius_px > 0.0:

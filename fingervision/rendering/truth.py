@@ -73,7 +73,7 @@ def truth(scene: Scene, camera: Camera, below_tip_px: float) -> TrueGap | NoGap:
 
     Raises
     ------
-    FingervisionError
+    DataError
         More than two fingers, or two that point different ways.
     """
     if len(scene.fingers) < 2:
@@ -211,7 +211,7 @@ def measuring_point(shape: Outline, below_tip_px: float, side: int) -> tuple[flo
 
     Raises
     ------
-    FingervisionError
+    DataError
         The finger does not reach to that line.
     """
     tip = _tip(shape, Direction.UP).along_px

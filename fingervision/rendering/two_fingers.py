@@ -76,7 +76,7 @@ def two_fingers(
 
     Raises
     ------
-    FingervisionError
+    DataError
         A size is no number, the step between the tips is greater than the gap, or the tips do not reach to the
         measuring height.
     """

@@ -1,4 +1,4 @@
-"""Columns of a CSV table with units in their names: comma, point, `#` comments, an empty cell is no value."""
+"""Columns of a CSV table with units in their names: comma, decimal point, `#` comments, empty cells."""
 
 import csv
 import difflib
@@ -19,11 +19,11 @@ CHUNK_LINES = 1000
 
 
 def read_columns(path: Path, required: tuple[str, ...], known: tuple[str, ...]) -> dict[str, list[str]]:
-    """Read the known columns as text, by name; others are not looked at.
+    """Read the known columns as text, by name; other columns are ignored.
 
     Raises
     ------
-    FingervisionError
+    DataError, InputFileError
         The file cannot be read, is no table, or a required column is missing: with the nearest name found.
     """
     text = _text(path)
@@ -62,7 +62,7 @@ def header_of(path: Path) -> list[str]:
 
     Raises
     ------
-    FingervisionError
+    DataError, InputFileError
         The file cannot be read.
     """
     header = next(_reader(path, _text(path)), None)
@@ -70,7 +70,7 @@ def header_of(path: Path) -> list[str]:
 
 
 def _without_quotes(text: str, names: list[str], wanted: list[str]) -> dict[str, list[str]] | None:
-    """Read the wanted columns of a table without quotes, several times faster; None where a row must be looked at."""
+    """Read columns of a table without quotes, several times faster; None where a row needs the ordinary reader."""
     if '"' in text:
         return None
     lines = text.splitlines()
@@ -89,18 +89,18 @@ def _without_quotes(text: str, names: list[str], wanted: list[str]) -> dict[str,
 
 
 def _reader(path: Path, text: str) -> Iterator[tuple[int, list[str]]]:
-    """Rows with their numbers; comments and empty rows left out."""
+    """Rows with their numbers, without comments and empty rows."""
     for number, cells in enumerate(_cells(path, text), start=1):
         if cells and not cells[0].lstrip().startswith("#") and any(map(str.strip, cells)):
             yield number, cells
 
 
 def read_block(path: Path) -> dict[str, NDArray[np.float64]] | None:
-    """Read a large table that holds nothing but numbers, by name; None where it is not quite that.
+    """Read a large table of numbers only, by name; None where it contains anything else.
 
     Raises
     ------
-    FingervisionError
+    DataError, InputFileError
         The file cannot be read.
     """
     lines = _text(path).splitlines()

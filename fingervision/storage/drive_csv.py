@@ -20,11 +20,11 @@ COLUMNS = ("time_s", "input_mm", "force_n")
 def read_drive(path: Path) -> DriveHistory:
     """Read a drive table.
 
-    Lines that start with `#` are comments; columns may stand in any order, and others than these are not looked at.
+    Lines that start with `#` are comments; the columns may be in any order, and other columns are ignored.
 
     Raises
     ------
-    FingervisionError
+    DataError, InputFileError
         The file cannot be read, a column is missing, a cell is no number, times do not increase, or a run comes back
         after another.
     """
@@ -56,7 +56,7 @@ def read_drive(path: Path) -> DriveHistory:
 def drive_rows(
     path: Path, values: Mapping[str, NDArray[np.float64]], runs: tuple[str, ...] | None, lines: Sequence[int]
 ) -> DriveHistory:
-    """Take the columns of a drive table, where their times increase and the rows of a run stand together.
+    """Select the columns of a drive table, and check that times increase and rows of a run are contiguous.
 
     Parameters
     ----------
@@ -71,7 +71,7 @@ def drive_rows(
 
     Raises
     ------
-    FingervisionError
+    DataError
         Times do not increase, or a run comes back after another.
     """
     times = values["time_s"]
@@ -95,7 +95,7 @@ def drive_rows(
 
 
 def _lines(path: Path) -> list[tuple[int, list[str]]]:
-    """Rows with their line numbers; comments and empty lines left out."""
+    """Rows with their line numbers, without comments and empty lines."""
     if path.exists() and not path.is_file():
         raise DataError(f"{path} must be a table in a file, but is a folder or a pipe: save it as a file first.")
     try:

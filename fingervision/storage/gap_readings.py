@@ -1,4 +1,4 @@
-"""Gaps of a gaps.csv as repeated readings of parts, for a gauge study."""
+"""Gaps in a gaps.csv as repeated readings of parts, for a gauge study (repeatability and reproducibility)."""
 
 import csv
 from math import isfinite
@@ -13,7 +13,7 @@ SAME_INPUT_PLACES = 3
 
 
 def read_gap_readings(path: Path, by_input: bool) -> dict[float | None, list[float]]:
-    """Read the gaps of all frames that gave one.
+    """Read the gaps of all frames that have one.
 
     Parameters
     ----------
@@ -24,7 +24,7 @@ def read_gap_readings(path: Path, by_input: bool) -> dict[float | None, list[flo
 
     Raises
     ------
-    FingervisionError
+    DataError, InputFileError
         The file cannot be read or holds no gaps.
     """
     readings: dict[float | None, list[float]] = {}

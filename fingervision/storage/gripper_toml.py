@@ -1,4 +1,4 @@
-"""gripper.toml: a gripper's drawing; every number with its unit, an uncertainty beside it where one is known."""
+"""The file gripper.toml: a gripper's drawing, with every number's unit, and its uncertainty where one is known."""
 
 import difflib
 import math
@@ -54,7 +54,7 @@ def read_gripper(path: Path) -> Gripper:
 
     Raises
     ------
-    FingervisionError
+    DataError, InputFileError
         The file cannot be read, a key is missing, unknown or no number, or the drawing cannot be a gripper.
     """
     try:
@@ -208,13 +208,13 @@ def _check(gripper: Gripper, origin: str) -> None:
 
 
 def read_material(tables: Mapping[str, Any], origin: str) -> Material:
-    """Read the section [material], the same in every drawing."""
+    """Read the section [material], which is the same in every drawing."""
     section: Mapping[str, type] = {"material": Material}
     return _read_sections({"material": tables.get("material")}, section, origin, {})["material"]  # type: ignore[no-any-return]
 
 
 def check_material(material: Material, origin: str) -> None:
-    """Refuse Poisson's ratios that no material has, and ask about a modulus that cannot be in MPa."""
+    """Refuse impossible Poisson's ratios, and moduli that cannot be in MPa."""
     if material.poisson_ratio >= 0.5:
         raise DataError(f"material.poisson_ratio in {origin} must be below 0.5, but is {material.poisson_ratio:g}.")
     if not _LEAST_DENSITY <= material.density_kg_m3 <= _MOST_DENSITY:
@@ -235,7 +235,7 @@ def check_material(material: Material, origin: str) -> None:
 
 
 def _check_links(gripper: Gripper, origin: str) -> None:
-    """Refuse links without extent, from which no model can be made."""
+    """Refuse links without extent, for which no model can be built."""
     links = gripper.links
     for name in ("pillar_and_root_mm", "drive_block_mm"):
         x0, x1, y0, y1 = getattr(links, name)

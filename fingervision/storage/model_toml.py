@@ -1,4 +1,4 @@
-"""model.toml, a corrected model; and the choice of reader for every kind of model file."""
+"""The file model.toml, a corrected model; and the choice of reader for every kind of model file."""
 
 import json
 import os
@@ -53,7 +53,7 @@ def read_model(
 
     Raises
     ------
-    FingervisionError
+    DataError, InputFileError, ModelError, UsageError
         The file is neither, or its base is missing.
     """
     if path.suffix.lower() in SUFFIXES:
@@ -114,7 +114,7 @@ def read_model(
 
 
 def _function(path: Path, names: Mapping[str, str]) -> CorrectedModel:
-    """Take an FMU or a Python file as a model, which covers whatever it answers."""
+    """Read an FMU or a Python file as a model that accepts any input."""
     if not path.is_file():
         raise InputFileError(f"There is no model {path}.")
     everywhere = (-float("inf"), float("inf"))
@@ -122,7 +122,7 @@ def _function(path: Path, names: Mapping[str, str]) -> CorrectedModel:
 
 
 def _check(name: str, values: Mapping[str, Estimate], path: Path, origin: str) -> None:
-    """Refuse what is no effect of the catalogue, or lacks one of its parameters; `origin` is where it came from."""
+    """Refuse an unknown effect, or one with a missing parameter; `origin` is where it came from."""
     if name not in catalogue() and origin:
         advice = f"add `--effects {origin}`" if origin.endswith(".py") else f"install {origin}"
         if origin == str(SESSION):
@@ -155,7 +155,7 @@ def _check(name: str, values: Mapping[str, Estimate], path: Path, origin: str) -
 
 
 def _check_curve(name: str, values: Mapping[str, Estimate], path: Path) -> None:
-    """Refuse a curve whose points are no numbers, too few, or not in the order of their inputs."""
+    """Refuse a curve whose points are not numbers, too few, or not in the order of their inputs."""
     inputs, errors = curve_points({key: estimate.value for key, estimate in values.items()})
     if inputs.size and not (
         inputs.size > 1
@@ -170,7 +170,7 @@ def _check_curve(name: str, values: Mapping[str, Estimate], path: Path) -> None:
 
 
 def _gripper(path: Path, kind: str) -> CorrectedModel:
-    """Build a gripper whose effects are its own physics."""
+    """Build a gripper that computes mechanism effects by its own physics."""
     if kind not in kinds():
         raise DataError(f"The kind of model for {path} must be one of {', '.join(kinds())}, but is {kind}: choose one.")
     if is_mechanism(path):
@@ -183,7 +183,7 @@ def _gripper(path: Path, kind: str) -> CorrectedModel:
 def write_model(
     path: Path, base_path: Path, effects: Mapping[str, Mapping[str, Estimate]], kind: str | None = None
 ) -> None:
-    """Write a corrected model; the base is named relative to the file."""
+    """Write a corrected model; the base model's path is relative to the file."""
     base = Path(os.path.relpath(base_path.resolve(), path.parent.resolve())).as_posix()
     lines = ["schema = 1", f"base = {json.dumps(base, ensure_ascii=False)}", *([f'kind = "{kind}"'] if kind else [])]
     for name, parameters in effects.items():

@@ -1,4 +1,4 @@
-"""Columns of numbers as a table holds them: values, and where a cell is empty."""
+"""Columns of numbers in a table: values, and which cells are empty."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -28,7 +28,7 @@ class Numbers:
 
     @classmethod
     def whole(cls, value: NDArray[np.float64]) -> "Numbers":
-        """Take a column without empty cells."""
+        """Convert a column without empty cells."""
         return cls(value, np.ones(value.size, dtype=np.bool_))
 
     @property
@@ -38,11 +38,11 @@ class Numbers:
 
 
 def numbers_in(path: Path, name: str, cells: Sequence[str]) -> Numbers:
-    """Read cells as finite numbers; an empty cell is no value.
+    """Read cells as finite numbers; an empty cell means no value.
 
     Raises
     ------
-    FingervisionError
+    DataError
         A cell is no finite number; the first is named with its data row.
     """
     try:

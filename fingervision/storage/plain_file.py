@@ -1,11 +1,11 @@
-"""A pipe or a device is no document: reading it waits for somebody to write, or never ends."""
+"""Refuse pipes and devices as documents: reading them would wait for a writer, or never end."""
 
 import errno
 from pathlib import Path
 
 
 def plain(path: Path) -> Path:
-    """Pass on the path of what can be read to its end.
+    """Return the path if it can be read to its end.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""A camera's response as a file: `level,light`, one row a level, from 0 to the depth's full scale."""
+"""A camera's response as a file: `level,light`, one row per level, from 0 to the full scale."""
 
 import csv
 from pathlib import Path
@@ -18,13 +18,13 @@ TOP_LEVELS = (255, 1023, 4095, 16383, 65535)
 
 
 def response_named(name: str) -> CameraResponse | None:
-    """What --response names: a standard curve or a file; None for auto.
+    """Response named by --response: a standard curve or a file; None for auto.
 
     Raises
     ------
     UsageError
         It is neither.
-    FingervisionError
+    DataError
         The file is no response.
     """
     if name == "auto":
@@ -44,7 +44,7 @@ def read_response(path: Path) -> CameraResponse:
 
     Raises
     ------
-    FingervisionError
+    DataError, InputFileError
         The file cannot be read, or is no response.
     """
     try:
@@ -80,7 +80,7 @@ def write_response(response: CameraResponse, path: Path) -> None:
 
     Raises
     ------
-    FingervisionError
+    OutputError
         The file cannot be written.
     """
     top = response.top_level or 255

@@ -62,7 +62,7 @@ def open_bed(
 
     Raises
     ------
-    FingervisionError
+    DataError, InputFileError, UsageError
         The configuration makes no sense, or a part cannot be opened; what was open by then is closed.
     """
     top = read_configuration(name)
@@ -148,7 +148,7 @@ def read_configuration(name: str) -> Section:
 
     Raises
     ------
-    FingervisionError
+    DataError, InputFileError, UsageError
         There is no such file, or it is no bed's.
     """
     if name == SIMULATED:

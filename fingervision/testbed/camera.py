@@ -62,7 +62,7 @@ class BedCamera(Protocol):
 
         Raises
         ------
-        FingervisionError
+        DeviceError
             The camera is stale: no frame came within its patience; or it was cut off.
         """
         ...

@@ -60,7 +60,7 @@ class PluggedKind:
 
         Raises
         ------
-        FingervisionError
+        PluginShapeError
             It could not be built, or lacks what its protocol asks for.
         """
         name = "" if str(self._entry.origin) == self._entry.name else f"{self._entry.name} of "

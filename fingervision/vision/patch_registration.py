@@ -131,7 +131,7 @@ def _grid(half_width: int, half_height: int) -> tuple[Floats, Floats, Doubles]:
 
 @cache
 def _extent(half_width: int, half_height: int) -> tuple[int, float]:
-    """Pixels of a patch, and the sum of their squared distances from its middle."""
+    """Number of pixels of a patch, and the sum of their squared distances from its centre."""
     dx, dy, _ = _grid(half_width, half_height)
     return dx.size, float((dx.astype(np.float64) ** 2 + dy.astype(np.float64) ** 2).sum())
 

@@ -43,7 +43,7 @@ class Match:
 
 
 class Template:
-    """Something to look for, prepared for many searches.
+    """A template, prepared for repeated searches.
 
     Parameters
     ----------
@@ -58,7 +58,7 @@ class Template:
         self._spectra: dict[tuple[int, ...], Floats] = {}
 
     def best_match(self, part: Floats, beyond_px: int = BEYOND_PX) -> Match:
-        """Find it in a part of a picture.
+        """Find the template in a part of a picture.
 
         Parameters
         ----------

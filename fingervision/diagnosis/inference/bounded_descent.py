@@ -134,7 +134,8 @@ def bounded_step(matrix: Array, pull: Array, bounds: tuple[Array, Array]) -> Arr
     ndarray of float, shape (p,)
         The step.
     """
-    step, held = np.linalg.lstsq(matrix, pull, rcond=1e-12)[0], np.zeros(pull.size, dtype=bool)
+    step: Array = np.asarray(np.linalg.lstsq(matrix, pull, rcond=1e-12)[0], dtype=np.float64)
+    held = np.zeros(pull.size, dtype=bool)
     if not np.any((step < bounds[0]) | (step > bounds[1])):
         return step
     for _ in range(pull.size):

@@ -1,8 +1,8 @@
-"""Whether a map of position errors repeats: what it learns from some passes must foretell the others.
+"""Check that a map of position errors is repeatable: a map fitted to some passes must predict the others.
 
-A map is by definition the same each time the place comes (ISO 230-2). Runs that differ in gain, or a creep that is cut
-into holds at several places, can be fitted by a curve over the input as well; but such a curve does not foretell the
-run that it was not fitted to.
+By definition, a map is the same at each visit of a position (ISO 230-2). Runs that differ in gain, or a creep
+interrupted by stops at several positions, can be fitted by a curve over the input as well; but such a curve does not
+predict a run that was not used in its fit.
 """
 
 import numpy as np
@@ -18,11 +18,11 @@ MOST_PASSES = 8
 
 
 def foretells_other_passes(problem: Problem, explanation: Explanation, position_map: PositionMap) -> bool:
-    """Cross-validate a map: each run, or of one run each visit of the places, is predicted from all the others.
+    """Cross-validate a map: predict each part (run, or visit of the positions in a single run) from all others.
 
-    The logarithm of the predictive density of a part is that of all rows minus that of the others (Geisser & Eddy
-    1979, doi:10.1080/01621459.1979.10481632). Summed over the parts it must be larger than without a map, and no part
-    may contradict the others by very strong evidence: one run's own error is none of the place's.
+    The log predictive density of a part is that of all rows minus that of the other rows (Geisser & Eddy 1979,
+    doi:10.1080/01621459.1979.10481632). Its sum over the parts must be larger than without a map, and no part may
+    contradict the others by very strong evidence: the error of a single run is not a map.
 
     Parameters
     ----------
@@ -61,13 +61,13 @@ def foretells_other_passes(problem: Problem, explanation: Explanation, position_
 
 
 def _gain(gram: Array, aim: Array) -> float:
-    """Twice the logarithm of the marginal likelihood over that without a map."""
+    """Twice the log marginal likelihood with a map, minus that without a map."""
     inner = np.eye(aim.size) + gram
     return float(aim @ np.linalg.solve(inner, aim) - np.linalg.slogdet(inner)[1])
 
 
 def _parts(history: History) -> NDArray[np.intp]:
-    """Number the part of each row: its run, or where there is one run how often its place was visited before."""
+    """Part of each row: its run, or in a single run the number of earlier visits of its position."""
     input_mm = history.input_mm
     part = np.zeros(input_mm.size, dtype=np.intp)
     if len(history.runs) > 1:

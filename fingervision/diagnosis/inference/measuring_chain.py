@@ -56,6 +56,13 @@ class MeasuringChain:
         effects = {name: obeyed(effect, laws.get(name)) for name, effect in catalogue().items()}
         return {name: _along_curves(effect) for name, effect in effects.items()} if self.curved else effects
 
+    @cached_property
+    def _stages(self) -> tuple[tuple[DriveEffect, ...], tuple[PointEffect, ...]]:
+        """Effects of the drive, and those of mechanism and camera, each in order."""
+        effects = self.effects.values()
+        drives = tuple(effect for effect in effects if isinstance(effect, DriveEffect))
+        return drives, tuple(effect for effect in effects if isinstance(effect, PointEffect))
+
     def with_input(self, input_mm: Array) -> "MeasuringChain":
         """Replace the input of the measured rows, and of the points of the path that repeat it.
 
@@ -78,7 +85,7 @@ class MeasuringChain:
         """
         acting = {**self.fixed, **settings}
         history = self.history if self.path is None else self.path.history
-        points = [e for name, e in self.effects.items() if name in acting and isinstance(e, PointEffect)]
+        points = [effect for effect in self._stages[1] if effect.name in acting]
         response = self.model.respond(self._driven_mm(acting))
         if self.dynamics is not None and self.dynamics[0] is history.time_s:
             response = response.plus(self.dynamics[1])
@@ -106,9 +113,9 @@ class MeasuringChain:
     def _driven_mm(self, acting: Settings) -> Array:
         history = self.history if self.path is None else self.path.history
         input_mm = history.input_mm
-        for name, effect in self.effects.items():
-            if name in acting and isinstance(effect, DriveEffect):
-                input_mm = effect.act(input_mm, history, acting[name])
+        for effect in self._stages[0]:
+            if effect.name in acting:
+                input_mm = effect.act(input_mm, history, acting[effect.name])
         return input_mm
 
     def stacked(self, settings: Settings) -> Array:

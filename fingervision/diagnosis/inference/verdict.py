@@ -29,6 +29,8 @@ AS_MUCH = 2.0**0.5
 that structure bends the richer form as it does the noise."""
 MANY_ASIDE = 0.1
 """Share of the rows that may be gross errors beside a model that agrees: of more, something is the cause."""
+COMMON = 2.0
+"""Standard errors from zero from which on the mean of the runs' offsets is a constant that they share."""
 LACK_OF_FIT = 1e-3
 """Significance of the F ratio of lack of fit to pure error, above which nothing is to be explained."""
 
@@ -132,11 +134,17 @@ def standing(data: Observations, problem: Problem, before_mm: Array, after_mm: A
 
 
 def _without_scatter(values: Array, runs: tuple[slice, ...]) -> Array:
-    """Subtract each run's deviation from the mean of all runs; a common constant remains."""
+    """Subtract each run's deviation from the mean of all runs; a common constant remains, if it is one.
+
+    Runs that were zeroed by chance have a mean that is not zero, by as much as their scatter lets it be.
+    """
     means = np.array([values[run].mean() for run in runs])
+    common = float(means.mean())
+    if len(runs) > 1 and abs(common) < COMMON * float(np.std(means, ddof=1)) / len(runs) ** 0.5:
+        common = 0.0
     out = values.copy()
     for run, mean in zip(runs, means, strict=True):
-        out[run] -= mean - means.mean()
+        out[run] -= mean - common
     return out
 
 

@@ -26,7 +26,7 @@ def at_rest_beside(table: MeasuredTable, model: CorrectedModel) -> tuple[Correct
 
     Raises
     ------
-    FingervisionError
+    DataError
         The table has no times.
     """
     if not isinstance(model.base, FunctionModel):

@@ -175,7 +175,8 @@ class Observations:
         parts = np.split(self.stacked_mm - self.chain.stacked({}), len(self.channels))
         clock = history.clock_s if history.shared_clock else np.arange(history.input_mm.size, dtype=np.float64)
         found = [
-            pure_error(part, clock, self.repeats, out, history.input_mm) for part, out in zip(parts, aside, strict=True)
+            pure_error(part, clock, self.repeats, out, history.input_mm, history.runs)
+            for part, out in zip(parts, aside, strict=True)
         ]
         kept = [error for error in found if error is not None]
         return kept if len(kept) == len(found) else None

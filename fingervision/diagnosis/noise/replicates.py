@@ -18,8 +18,9 @@ TREND_DEGREE = 3
 """Degree of the polynomial in time that takes a drift or a run-in out of the repeats: it follows either over some
 cycles."""
 APART = 0.25
-"""Share of the scatter's power that may be left once places or sides drift apart, for that to be believed: nine
-coefficients are many for a few dozen repeats, and without them the noise comes out too large by a factor of 2 at most."""
+"""Share of the scatter's power that may be left once places or sides drift apart, or runs have zeros of their own, for
+that to be believed: these are many coefficients for a few dozen repeats, and without them the noise is too large by a
+factor of 2 at most."""
 OFF_GRID = 0.02
 """Steps by which a difference may miss a multiple of the smallest one: the last digits that are written are rounded."""
 BY_ACCIDENT = 1e-3
@@ -99,7 +100,12 @@ def visits(path_mm: Array, runs: tuple[slice, ...], rows: NDArray[np.intp]) -> N
 
 
 def pure_error(
-    values: Array, time_s: Array, label: NDArray[np.intp], aside: Flags, place_mm: Array | None = None
+    values: Array,
+    time_s: Array,
+    label: NDArray[np.intp],
+    aside: Flags,
+    place_mm: Array | None = None,
+    runs: tuple[slice, ...] = (),
 ) -> PureError | None:
     """Estimate the scatter of repeats; None where too little repeats.
 
@@ -115,11 +121,15 @@ def pure_error(
         Values that do not count.
     place_mm : ndarray of float, shape (n,), or None
         Recorded input of each, by which places may drift apart; None to leave that out.
+    runs : tuple of slice
+        Rows of each run, whose offsets are no scatter of readings; empty to leave that out.
     """
     numbers, counts = np.unique(label[(label >= 0) & ~aside], return_counts=True)
     groups = [np.flatnonzero((label == number) & ~aside) for number in numbers[counts > 1]]
     groups = [group[np.argsort(time_s[group], kind="stable")] for group in groups]
     degrees = sum(group.size - 1 for group in groups)
+    values, zeroings = _without_run_offsets(values, groups, runs)
+    degrees -= zeroings
     if degrees < FEWEST_DEGREES:
         return None
     rest = np.concatenate([values[group] - values[group].mean() for group in groups])
@@ -144,6 +154,26 @@ def pure_error(
     return PureError(sd_mm, degrees - taken, trend, _wandering(straight, rows))
 
 
+def _without_run_offsets(values: Array, groups: list[NDArray[np.intp]], runs: tuple[slice, ...]) -> tuple[Array, int]:
+    """Take each run's own zero out, where it is most of the scatter; also how many zeros were estimated."""
+    if len(runs) < 2 or not groups:
+        return values, 0
+    number = np.zeros(values.size, dtype=np.intp)
+    for index, run in enumerate(runs):
+        number[run] = index
+    own = (number[:, None] == np.arange(1, len(runs))).astype(np.float64)
+    rows = np.concatenate(groups)
+    rest = np.concatenate([values[group] - values[group].mean() for group in groups])
+    design = np.concatenate([own[group] - own[group].mean(axis=0) for group in groups])
+    zeros, _, rank, _ = np.linalg.lstsq(design, rest, rcond=1e-9)
+    left, degrees = rest - design @ zeros, sum(group.size - 1 for group in groups)
+    if rank >= degrees or float(left @ left) / (degrees - rank) >= APART * float(rest @ rest) / degrees:
+        return values, 0
+    out = values.copy()
+    out[rows] -= own[rows] @ zeros
+    return out, int(rank)
+
+
 def _drift_sigmas(rest: Array, straight: Array, rows: NDArray[np.intp]) -> float:
     """Significance of the likeness of successive readings, in standard deviations, where it is a drift; else 0.
 
@@ -162,7 +192,7 @@ def _drift_sigmas(rest: Array, straight: Array, rows: NDArray[np.intp]) -> float
 
 
 def _without_trend(rest: Array, groups: list[NDArray[np.intp]], time_s: Array, *shares: Array) -> Array:
-    """Take a polynomial in time out of what repeats leave, which all groups share; one more for each of `shares`."""
+    """Subtract from the repeats' residuals a polynomial in time common to all groups, and one for each of `shares`."""
     at = np.concatenate([time_s[group] for group in groups])
     powers = np.vander((at - at.mean()) / max(float(np.ptp(at)), 1e-300), TREND_DEGREE + 1)[:, :-1]
     own_rows = np.concatenate(groups)

@@ -1,4 +1,4 @@
-"""How much noise a residual can hold: what changes slowly is structure, or cannot be told from it."""
+"""Upper bound of the noise in a residual: slow changes are structure, or indistinguishable from it."""
 
 import numpy as np
 
@@ -14,7 +14,7 @@ one of 0.8 has 1.3 times it). With ten times the scatter from sample to sample a
 
 
 def most_noise(residual_mm: Array, runs: tuple[slice, ...], digits_mm: float) -> float:
-    """Largest standard deviation that a residual's noise may have; 0 where the runs are too short to tell.
+    """Largest standard deviation that a residual's noise may have (mm); 0 where the runs are too short.
 
     Parameters
     ----------
@@ -37,9 +37,9 @@ def _short_scatter(residual_mm: Array, runs: tuple[slice, ...]) -> float:
 
 
 def _local_scatter(residual_mm: Array, runs: tuple[slice, ...]) -> float:
-    """Median standard deviation within stretches, each about its own mean; 0 without any.
+    """Median standard deviation within stretches, each about its own mean; 0 without stretches.
 
-    The median, for a resonance or a jump that nothing explains is large in a few of them.
+    The median is used because an unexplained resonance or jump is large in a few stretches only.
     """
     found = []
     for run in runs:

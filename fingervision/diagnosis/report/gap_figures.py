@@ -16,7 +16,7 @@ FEW_ROWS = 80
 
 
 def gap_against_input(curves: GapCurves, title: str) -> Figure:
-    """Draw the gap over the recorded input, with opening and closing distinguished (Hricko & Havlik, 2015, figure 9)."""
+    """Draw the gap over the recorded input, opening and closing distinguished (Hricko & Havlik, 2015, figure 9)."""
     with plain_style():
         figure = Figure(figsize=(6.3, 4.2), layout="constrained")
         axes = figure.subplots()

@@ -213,7 +213,7 @@ def opened(settings: BoardSettings, clock: Clock) -> Board:
 
     Raises
     ------
-    FingervisionError
+    DeviceError
         There is no such port, another program has it, nothing answers, it has another firmware, or it is wired
         otherwise than its sketch can drive.
     """

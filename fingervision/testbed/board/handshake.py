@@ -66,7 +66,7 @@ class Handshake:
 
         Raises
         ------
-        FingervisionError
+        DeviceError
             A step of the handshake did not come; the drive line is down then.
         """
         with _no_collection():

@@ -121,7 +121,7 @@ class BoardLink:
 
         Raises
         ------
-        FingervisionError
+        DeviceError
             The connection is lost.
         BoardRefusalError
             The board did not do it.

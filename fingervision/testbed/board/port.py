@@ -54,7 +54,7 @@ def opened_port(name: str) -> serial.Serial:
 
     Raises
     ------
-    FingervisionError
+    DeviceError
         There is no such port, another program has it, or this user may not open it.
     """
     try:

@@ -13,7 +13,7 @@ def board_of(section: Section, context: BuildContext) -> Board:
 
     Raises
     ------
-    FingervisionError
+    DataError, DeviceError, InputFileError
         Its file cannot be meant, or it cannot be opened.
     """
     path = context.folder / section.word(KEY)

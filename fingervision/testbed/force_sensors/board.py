@@ -56,7 +56,7 @@ class BoardForceSensor:
 
         Raises
         ------
-        FingervisionError
+        DeviceError
             The board is lost, or sends no samples.
         """
         until_s = self._clock.now_s() + 1e-3 * self._board.settings.force_period_ms + ON_ITS_WAY_S
