@@ -46,6 +46,9 @@ BESIDE = 4
 # A bit that turns by chance does so in half of the pictures: nineteen in twenty, of ten at least, are no chance.
 FEWEST_TURNS, TURNING_SHARE = 10, 0.95
 
+OWN_RECORDING = "Recorded by fingervision, with a list of its lost frames beside it."
+"""Comment of a container whose packets were judged when they came, and whose marks are kept with it."""
+
 NUMBER_LEFT_OUT = "A picture that it hangs on is missing: the numbers of the coded pictures leave one out."
 BIT_NOT_TURNED = (
     "A picture that it hangs on is missing: the bit that turns with every coded picture (vop_rounding_type) did not."
