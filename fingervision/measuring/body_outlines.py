@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from fingervision.models.mechanism import Mechanism
 from fingervision.models.mechanism_bodies import LinkBody, bodies_of
-from fingervision.vision.rigid_outline import REACH_PX, Chunks, FlatMap
+from fingervision.vision.outline_chunks import REACH_PX, Chunks, FlatMap
 
 Array = NDArray[np.float64]
 

@@ -31,18 +31,10 @@ from fingervision.measuring.scale import Scale
 from fingervision.models.mechanism import Mechanism
 from fingervision.models.mechanism_bodies import column_name
 from fingervision.storage.bodies_csv import add_channels, write_bodies
+from fingervision.vision.outline_chunks import Chunks, EdgeView, FlatMap
 from fingervision.vision.pipeline import Settings
 from fingervision.vision.response_shift import edge_shift_px
-from fingervision.vision.rigid_outline import (
-    LEAST_IN_VIEW,
-    Chunks,
-    EdgeView,
-    FlatMap,
-    RigidFit,
-    capture_rigid,
-    fit_rigid,
-    halved,
-)
+from fingervision.vision.rigid_outline import LEAST_IN_VIEW, RigidFit, capture_rigid, fit_rigid, halved
 
 Array = NDArray[np.float64]
 
@@ -127,9 +119,10 @@ class BodyTracker:
         """How edges appear: edge bias widens a dark body by half of it on each side."""
         dark = self.placed is None or self.placed.body_is_dark
         outward_px = (0.5 if dark else -0.5) * self.scale.edge_bias_px
+        flat, shared_pixels = flat_map_of(self.scale), picture.shared_pixels
         if self.placed is None:
-            return EdgeView(flat_map_of(self.scale), outward_px, picture.shared_pixels)
-        return EdgeView(flat_map_of(self.scale), outward_px, picture.shared_pixels, *self._levels)
+            return EdgeView(flat, outward_px, shared_pixels)
+        return EdgeView(flat, outward_px, shared_pixels, *self._levels, *self._shared.at(picture.size_px))
 
     def _place(self, grey: Array, index: int, view: EdgeView, picture: Picture) -> None:
         height, width = grey.shape
@@ -145,7 +138,11 @@ class BodyTracker:
         if not placed.body_is_dark:
             view = replace(view, outward_px=-view.outward_px)
         self._levels = inside, ground - inside
-        view = replace(view, body_level=inside, contrast=ground - inside)
+        plane = PlaneScale(self.scale, (width, height)) if isinstance(self.scale, Calibration) else None
+        u_outward_px, u_size = SharedErrors(None, np.zeros(2), plane).at((width, height))
+        view = replace(
+            view, body_level=inside, contrast=ground - inside, u_outward_px=u_outward_px, u_size=u_size
+        )  # fmt: skip
         laid = refined(grey, self.outlines, placed.place, placed.body_is_dark, view)
         if laid is None:
             raise DataError(
@@ -154,7 +151,6 @@ class BodyTracker:
             )
         notes = placed.notes if laid.by_fixed else (*placed.notes, LAID_BY_ALL)
         self.placed = Placed(laid.place, placed.body_is_dark, notes)
-        plane = PlaneScale(self.scale, (width, height)) if isinstance(self.scale, Calibration) else None
         other, shift_px = self.settings.other_response, 0.0
         if other is not None:
             shares = (inside / picture.top, ground / picture.top)
@@ -168,6 +164,8 @@ class BodyTracker:
     def _check_size(self, grey: Array, index: int, view: EdgeView) -> None:
         """Compare the sizes of the bodies with the drawing: a difference means a wrong scale, or another mechanism."""
         fits = [self._fit(grey, [], number, view) for number in range(len(self.outlines))]
+        self._note_shadows([o.body.name for o, fit in zip(self.outlines, fits, strict=True)
+                            if fit is not None and fit.by_shadows.any()], index)  # fmt: skip
         told = [(fit.size_error, fit.u_size_error) for fit in fits if fit is not None]
         weight = sum(u**-2 for _, u in told)
         if self.placed is None or weight == 0.0:
@@ -186,6 +184,15 @@ class BodyTracker:
             )
         self._shared = replace(self._shared, size_error=abs(error))
         self.placed = replace(self.placed, notes=(*self.placed.notes, f"{words}; u of the poses holds it."))
+
+    def _note_shadows(self, names: Sequence[str], index: int) -> None:
+        if self.placed is None or not names:
+            return
+        words = (
+            f"on frame {index} one side of {' and of '.join(names)} is blurred otherwise than the others: a shadow or "
+            "glare may lie along it, or the body moved; u of the poses holds it, and even light takes it away."
+        )
+        self.placed = replace(self.placed, notes=(*self.placed.notes, words))
 
     def _fit(self, grey: Array, pyramid: list[Array], number: int, view: EdgeView) -> RigidFit | None:
         """Fit from the pose in the last frame, or else by a search from farther away."""

@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 from fingervision.domain.errors import DataError, UsageError
 from fingervision.measuring.body_outlines import BodyOutline, Placement, in_sight, silhouette
 from fingervision.models.mechanism import Mechanism
-from fingervision.vision.rigid_outline import PLAIN, Chunks, EdgeView, FlatMap, RigidFit, capture_rigid, halved
+from fingervision.vision.outline_chunks import PLAIN, Chunks, EdgeView, FlatMap
+from fingervision.vision.rigid_outline import RigidFit, capture_rigid, halved
 
 Array = NDArray[np.float64]
 

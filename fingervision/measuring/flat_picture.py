@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from calib.measured_scale import Calibration
 from fingervision.measuring.scale import Scale
-from fingervision.vision.rigid_outline import FlatMap
+from fingervision.vision.outline_chunks import FlatMap
 
 Array = NDArray[np.float64]
 

@@ -25,6 +25,8 @@ Array = NDArray[np.float64]
 
 _ACROSS, _BODY = 4.0, 0.025
 """Triangles across what is thin, and edge length over the body's size: as for the paper's sample."""
+_STRESS_ERROR = 0.01
+"""Beside meshes twice and three times as fine: 0.3 % (`tests/benchmarks/models_held_out.py`)."""
 _BESIDE_CORNER = 0.5
 """Of the thinnest flexure: stress nearer to a sharp corner is a figure of the mesh, and is left out."""
 
@@ -139,6 +141,11 @@ class MechanismPlate:
     def force_error(self) -> float:
         """Relative error of the force, from the mesh and the width effect."""
         return 0.005 + 2.0 * force_uncertainty(self.mechanism.material)
+
+    @property
+    def stress_error(self) -> float:
+        """Relative model error of the stress in the flexures: of the mesh."""
+        return _STRESS_ERROR
 
     def touch_input_mm(self) -> dict[str, float]:
         """Input nearest to zero at which each contact first touches, in small displacements.

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fingervision.domain.loops import loop
-from fingervision.vision.finger_shape import PARAMETERS
+from fingervision.vision.finger_shape import INNER_R, OUTER_R, PARAMETERS
 from fingervision.vision.outline_points import OutlinePoints
 
 Floats = NDArray[np.float64]
@@ -28,6 +28,9 @@ BIWEIGHT_REACH, SIGMAS_IN_MEDIAN = 4.685, 1.4826
 LOOKS = ((100.0, 0.0), (10.0, 10.0), (1.5, 1.0), (1.0, 1.0))
 # A shape whose residuals spread over more than so many sigma is no shape.
 WORST_MISFIT = 1e3
+# Where so many points are set aside, or again so many fewer by another start, it is asked for; at no more misfit than
+# this share above.
+FEWEST_ASIDE, MORE_MISFIT = 3, 1.3
 # Rounding leaves no less of a pivot than this.
 SMALLEST_PIVOT = 1e-15
 
@@ -81,3 +84,21 @@ def fit_finger_end(points: OutlinePoints, start: Floats, origin: Floats, u_prior
     seen = (points.x, points.y, points.u, points.is_row, points.blur)
     misfit = _fit(*seen, start, origin, u_prior, p, covariance, residual, robust)
     return FingerEnd(p, covariance, origin, misfit, residual, robust)
+
+
+def fit_from_any_radius(points: OutlinePoints, start: Floats, origin: Floats, u_prior: Floats) -> FingerEnd:
+    """The same fit, begun again with other radii where it sets points aside: a wrong fillet makes dust of its corner.
+
+    The first guess of a radius takes the corner for a right one, which that of a tapered finger is not.
+    """
+    best = fit_finger_end(points, start, origin, u_prior)
+    if np.count_nonzero(best.robust <= 0.0) < FEWEST_ASIDE:
+        return best
+    inner, outer = best.parameters[[INNER_R, OUTER_R]]
+    for radius in (0.0, min(inner, outer), max(inner, outer)):
+        again = start.copy()
+        again[[INNER_R, OUTER_R]] = radius
+        other = fit_finger_end(points, again, origin, u_prior)
+        if other.misfit <= MORE_MISFIT * best.misfit and other.robust.sum() > best.robust.sum() + FEWEST_ASIDE:
+            best = other
+    return best

@@ -47,3 +47,20 @@ def test_gross_errors_at_any_time_are_set_aside_only_while_they_are_few(tmp_path
     gap[wrong] += rng.uniform(0.3, 1.0, int(wrong.sum())) * rng.choice([-1.0, 1.0], int(wrong.sum()))
     verdict = diagnosed(tmp_path, gap, ramp).report.verdict
     assert verdict is (Verdict.AGREES if share < 0.1 else Verdict.UNKNOWN)
+
+
+@pytest.mark.slow
+def test_a_square_wave_shows_dead_time_and_highest_speed(tmp_path: Path) -> None:
+    command = np.tile(np.repeat([0.0, 4.0], 40), 3)
+    fine_s = np.arange(command.size * 50) / (50 * RATE_HZ)
+    asked = command[np.clip(((fine_s - 0.12) * RATE_HZ).astype(int), 0, None)]
+    place = np.zeros_like(fine_s)
+    for k in range(1, place.size):
+        place[k] = place[k - 1] + np.clip(asked[k] - place[k - 1], -6.0 / (50 * RATE_HZ), 6.0 / (50 * RATE_HZ))
+    noise = np.random.default_rng(8).normal(0.0, NOISE_MM, command.size)
+    report = diagnosed(tmp_path, 1.0 + place[::50] + noise, command).report
+    assert report.verdict in (Verdict.NAMED, Verdict.AMBIGUOUS)
+    assert all("slew_limit" in names for names in report.alternatives)
+    found = {key: value.value for effect in report.effects for key, value in effect.parameters.items()}
+    assert found["speed_mm_s"] == pytest.approx(6.0, rel=0.03)
+    assert found["delay_s"] == pytest.approx(0.12, abs=0.01)

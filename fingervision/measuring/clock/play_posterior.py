@@ -5,7 +5,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from fingervision.domain.effect import Array
-from fingervision.measuring.clock.joint_fit import Alignment, Fit, Motion, fit
+from fingervision.measuring.clock.joint_fit import Fit, fit
+from fingervision.measuring.clock.motion_model import Alignment, Motion
 
 PLAY_PRIOR_MM = 0.1
 """Scale of the half-Cauchy prior of the play: that of worn or geared stages; ten times as much stays possible."""
