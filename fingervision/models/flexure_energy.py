@@ -1,4 +1,4 @@
-"""How far flexures work as they are meant to: notches bent at their necks, leaves bent, neither of them stretched."""
+"""Whether flexures deform as intended: notches bent at their necks, leaves bent, none of them stretched."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,7 +9,7 @@ Array = NDArray[np.float64]
 
 
 def misused_energy(span: FlexureSpan, end_loads: Array, compliances: Array, plate_mm: float) -> tuple[float, float]:
-    """Strain energy of a flexure that is not in its working direction, and all of it, in N mm.
+    """Strain energy of a flexure outside its intended deformation, and its total strain energy (N mm).
 
     Parameters
     ----------
