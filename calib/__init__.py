@@ -1,6 +1,6 @@
-"""Where in millimetres is this pixel, and how surely? For any flat scene.
+"""Convert pixels of any flat scene to millimetres, with uncertainty.
 
-The public names stand in `__all__`; each is imported when it is first asked for. Everything takes and gives numpy
+The public names are listed in `__all__`; each is imported when it is first used. All functions take and return numpy
 arrays; pictures are grey levels of shape (height, width).
 
 Examples
@@ -81,7 +81,7 @@ def __dir__() -> list[str]:
 
 
 class _Package(ModuleType):
-    """A package in which a public function stands before the module of its name, whoever imported that first."""
+    """Package type in which a public function takes precedence over the module of the same name."""
 
     def __setattr__(self, name: str, value: object) -> None:
         is_own = isinstance(value, ModuleType) and _HOMES.get(name) == name

@@ -1,4 +1,4 @@
-"""Whether a measured object agrees with its certificate."""
+"""Test whether a measured object agrees with its certificate."""
 
 from dataclasses import dataclass
 from math import hypot
@@ -9,7 +9,7 @@ COVERAGE_FACTOR = 2.0
 
 @dataclass(frozen=True, slots=True)
 class Agreement:
-    """A measurement beside a certified value.
+    """A measurement compared with a certified value.
 
     Parameters
     ----------

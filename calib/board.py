@@ -1,4 +1,4 @@
-"""Chessboards and ChArUco boards: the corners of their squares, sub-pixel."""
+"""Chessboards and ChArUco boards: sub-pixel corners of their squares."""
 
 from dataclasses import dataclass
 from math import isfinite
@@ -57,7 +57,7 @@ class Board:
     marker_mm: float | None = None
 
     def __post_init__(self) -> None:
-        """Refuse what cannot be a board."""
+        """Refuse an impossible board."""
         if min(self.columns, self.rows) < 3:
             raise CalibrationError(f"A board must have at least 3x3 corners, but {self.columns}x{self.rows} is stated.")
         if not (isfinite(self.square_mm) and self.square_mm > 0.0):
@@ -74,7 +74,7 @@ class Board:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class BoardCorners:
-    """The corners that one picture shows.
+    """The corners visible in one picture.
 
     Parameters
     ----------
@@ -133,7 +133,7 @@ def _chessboard(grey: NDArray[np.uint8], board: Board) -> tuple[Floats, Ints] | 
 
 
 def _charuco(grey: NDArray[np.uint8], board: Board) -> tuple[Floats, Ints] | None:
-    """Corners under the dictionary that fits; none is stated on the command line, so the picture has to say."""
+    """Corners under the dictionary that fits; the dictionary is found from the picture."""
     assert board.marker_mm is not None  # noqa: S101 - the caller asks only for boards with markers
     best: tuple[Floats, Ints] | None = None
     for name in DICTIONARIES:

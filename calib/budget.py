@@ -1,4 +1,4 @@
-"""Where a distance's uncertainty comes from: every contribution side by side, and the one place that combines them."""
+"""Uncertainty budget of a distance: every contribution side by side, and the one place that combines them."""
 
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -20,7 +20,7 @@ LENS_STEP = 0.1
 
 @dataclass(frozen=True, slots=True, eq=False)
 class BudgetLine:
-    """One source of uncertainty.
+    """One source of uncertainty, with its contribution to n distances.
 
     Parameters
     ----------
@@ -42,18 +42,18 @@ class BudgetLine:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Budget:
-    """All sources of n distances' uncertainty."""
+    """All sources of uncertainty of n distances."""
 
     lines: tuple[BudgetLine, ...]
 
     @property
     def u_mm(self) -> Floats:
-        """Combined standard uncertainty: independent sources add in square (JCGM 100:2008, equation 10)."""
+        """Combined standard uncertainty (mm): squares of independent sources add (JCGM 100:2008, equation 10)."""
         return self._combined(self.lines)
 
     @property
     def u_random_mm(self) -> Floats:
-        """The part that differs from frame to frame."""
+        """The part that differs from frame to frame (mm)."""
         return self._combined(tuple(line for line in self.lines if not line.shared))
 
     @staticmethod
@@ -76,7 +76,7 @@ class Budget:
 def distance_budget(
     scale: "Calibration", points_px: Floats, flat_px: Floats, value_mm: Floats, u_random_px: Floats, polarity: Floats
 ) -> Budget:
-    """Every contribution to n distances.
+    """Compute every contribution to n distances.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""A scale that somebody states, without saying how surely."""
+"""A scale stated by the user, without uncertainty."""
 
 from dataclasses import dataclass
 from math import isfinite
@@ -13,7 +13,7 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True)
 class BareScale:
-    """A scale that somebody states, without an uncertainty.
+    """A scale stated by the user, without uncertainty.
 
     Parameters
     ----------
@@ -29,17 +29,17 @@ class BareScale:
     px_per_mm: float
 
     def __post_init__(self) -> None:
-        """Refuse what cannot be a scale."""
+        """Refuse an impossible scale."""
         if not (isfinite(self.px_per_mm) and self.px_per_mm > 0.0):
             raise ValueError(f"px_per_mm must be positive, but is {self.px_per_mm}.")
 
     @property
     def edge_bias_px(self) -> float:
-        """Nothing is known of the edges: 0."""
+        """Zero, because nothing is known about the edges."""
         return 0.0
 
     def distances(self, points_px: Floats, u_random_px: Floats, light_gap: NDArray[np.bool_]) -> Distances:
-        """Distances between pairs of points; nothing is known of the scale's own uncertainty.
+        """Distances between pairs of points, without the unknown uncertainty of the scale.
 
         Parameters
         ----------
@@ -66,7 +66,7 @@ class BareScale:
     def positions_mm(
         self, points_px: Floats, axis: int, light_gap: NDArray[np.bool_], frame_size_px: tuple[int, int]
     ) -> Floats:
-        """Coordinates of both points of each distance along an axis of the picture, from the picture's middle, in mm.
+        """Coordinates of both points of each distance along an axis of the picture, from the picture's centre, in mm.
 
         Parameters
         ----------
@@ -87,4 +87,4 @@ class BareScale:
         return np.asarray((points[:, :, axis] - middle_px) / self.px_per_mm)
 
     def check_frame_size(self, width_px: int, height_px: int) -> None:
-        """Nothing to refuse: a bare scale was made on no particular frame."""
+        """Do nothing: a bare scale belongs to no particular frame size."""

@@ -1,4 +1,4 @@
-"""The calibration picture: a reference with what was found on it, residuals magnified."""
+"""The calibration picture: a reference with the edges found on it, residuals magnified."""
 
 import cv2
 import numpy as np
@@ -66,7 +66,7 @@ def picture_of_lines(
     residual_um: Floats,
     words: str,
 ) -> Picture:
-    """Draw the middle of every line of a scale, and how far each is off its place, magnified.
+    """Draw the centre of every line of a scale, and its magnified deviation from the nominal position.
 
     Parameters
     ----------

@@ -1,7 +1,7 @@
-"""The camera's response: which light a stored grey level stands for.
+"""The camera's response: the light that a stored grey level represents.
 
-An edge lies where the light passes half-way between its plateaus. In levels that a camera has put through a transfer
-curve (gamma) the half-way level is another one, and the edge is found elsewhere, the farther off the larger the blur.
+An edge lies where the light passes the mean of its two plateaus. In levels after a transfer curve (gamma), the mean
+level lies elsewhere, and the edge appears displaced, the more so the larger the blur.
 """
 
 from collections.abc import Callable
@@ -47,7 +47,7 @@ class CameraResponse:
     top_level: int | None = None
 
     def __post_init__(self) -> None:
-        """Refuse what cannot be a response."""
+        """Refuse an impossible response."""
         level, light = self.level, self.light
         if level.shape != light.shape or level.ndim != 1 or level.size < FEWEST_POINTS:
             raise CalibrationError(
@@ -70,7 +70,7 @@ class CameraResponse:
             )
 
     def table(self, top_level: int, size: int) -> Floats:
-        """Light of every stored level on the scale of the levels themselves: 0 gives 0, full scale gives full scale.
+        """Light of every stored level, on the scale of the levels: 0 gives 0, full scale gives full scale.
 
         Parameters
         ----------
@@ -93,14 +93,14 @@ class CameraResponse:
         return np.asarray(top_level * np.interp(share, self.level, self.light))
 
     def linearised(self, grey: Grey, top_level: int) -> NDArray[np.uint16]:
-        """Give a picture's light in 16 bits."""
+        """Convert a picture to light, in 16 bits."""
         table = self.table(top_level, int(np.iinfo(grey.dtype).max) + 1) * (65535.0 / top_level)
         return np.rint(table).astype(np.uint16)[grey]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MeasuredResponse:
-    """A response with how well it explains its pictures.
+    """A measured response with the residuals of its fit.
 
     Parameters
     ----------

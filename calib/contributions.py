@@ -1,4 +1,4 @@
-"""The sources of a distance's uncertainty, one function each; `calib.budget` alone combines them.
+"""Sources of a distance's uncertainty, one function each; only `calib.budget` combines them.
 
 Every function returns a standard uncertainty in millimetres, shape (n,), for n distances. The formula is
 gap_mm = (gap_px + p b) / s, with p = +1 for a light gap and -1 for a dark one (JCGM 100:2008, equation 13).
@@ -20,14 +20,15 @@ def edge_noise_mm(u_random_px: Floats, px_per_mm: float) -> Floats:
 
 
 def estimator_mm(limits: Limits, px_per_mm: float, count: int) -> Floats:
-    """Phase bias of the edge finder, two independent edges."""
+    """Phase error of the edge fit, for two independent edges."""
     return np.full(count, sqrt(2.0) * rectangular(limits.estimator_px) / px_per_mm)
 
 
 def scale_and_bias_mm(value_mm: Floats, polarity: Floats, px_per_mm: float, covariance: Floats) -> Floats:
-    """Whatever moves scale and edge bias, by the covariance of (px_per_mm, edge_bias_px).
+    """Contribution of a cause that moves scale and edge bias, from the covariance of (px_per_mm, edge_bias_px).
 
-    Called once for each cause: the reference's size, the reference's edges, and the edge bias that no reference tells.
+    Called once for each cause: the reference's size, the reference's edges, and the edge bias where no reference
+    determines it.
     """
     variance = (
         covariance[1, 1] + value_mm**2 * covariance[0, 0] - 2.0 * polarity * value_mm * covariance[0, 1]
@@ -36,7 +37,7 @@ def scale_and_bias_mm(value_mm: Floats, polarity: Floats, px_per_mm: float, cova
 
 
 def plane_mm(value_mm: Floats, limits: Limits) -> Floats:
-    """Gripper nearer or farther than the reference: dg / g = dz / Z."""
+    """Gripper nearer to or farther from the camera than the reference: dg / g = dz / Z."""
     return np.asarray(np.abs(value_mm) * rectangular(limits.plane_mm) / limits.camera_distance_mm)
 
 
@@ -46,12 +47,12 @@ def foreshortening_mm(value_mm: Floats, limits: Limits) -> Floats:
 
 
 def keystone_mm(change_mm_per_rad: Floats, limits: Limits) -> Floats:
-    """Perspective of a tilted plane: one side of the picture is nearer; two axes, `change_mm_per_rad` shape (2, n)."""
+    """Perspective of a tilted plane, one side of which is nearer; two axes, `change_mm_per_rad` shape (2, n)."""
     return np.asarray(np.hypot(change_mm_per_rad[0], change_mm_per_rad[1]) * rectangular(limits.tilt_rad))
 
 
 def lens_mm(change_mm_per_unit: Floats, limits: Limits) -> Floats:
-    """Distortion that is left: its change of the distance, less its change of the scale; per unit of distortion."""
+    """Residual distortion: its change of the distance minus its change of the scale; per unit of distortion."""
     return np.asarray(np.abs(change_mm_per_unit) * rectangular(limits.lens_relative))
 
 

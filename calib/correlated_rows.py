@@ -1,4 +1,4 @@
-"""How many neighbouring rows carry one independent error."""
+"""Correlation of residuals in rows: number of neighbouring rows that count as one independent row."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,8 +10,9 @@ LONGEST_PART = 0.25
 def rows_in_one(residual: NDArray[np.float64]) -> float:
     """Return the integrated correlation time of residuals in rows, at least 1.
 
-    The variance of a mean over n rows is that of one row times this over n. The sum over lags ends where pairs of
-    correlations turn negative (Geyer, Statistical Science 7(4), 1992, 473-483, initial positive sequence).
+    The variance of a mean over n rows is the variance of one row times this number, divided by n. The sum over lags
+    ends where the sum of a pair of correlations becomes negative (Geyer, Statistical Science 7(4), 1992, 473-483,
+    initial positive sequence).
 
     Parameters
     ----------

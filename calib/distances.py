@@ -1,4 +1,4 @@
-"""Distances in millimetres, and how surely they are known."""
+"""Distances in millimetres, with their uncertainty."""
 
 from dataclasses import dataclass
 

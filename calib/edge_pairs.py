@@ -1,4 +1,4 @@
-"""Pairs of parallel straight edges in a picture: everything that could be the width of a bar or a slot."""
+"""Pairs of parallel straight edges in a picture: every candidate for the width of a bar or a slot."""
 
 from collections.abc import Sequence
 
@@ -53,7 +53,7 @@ def find_edge_pairs(grey: Grey, region: tuple[int, int, int, int] | None = None)
 
 
 def straight_edges_in_view(grey: Grey, region: tuple[int, int, int, int] | None) -> int:
-    """Count straight edges, for saying what is missing where there is no pair."""
+    """Count straight edges, to report what is missing where there is no pair."""
     return len(find_straight_edges(_part(grey, region)[0], FINDING_SIDES_PX[0]))
 
 
@@ -78,7 +78,7 @@ def has_square_end(grey: Grey, region: tuple[int, int, int, int] | None, pair: P
 
 
 def _part(grey: Grey, region: tuple[int, int, int, int] | None) -> tuple[Grey, int, int]:
-    """Return the region of a picture and where it begins."""
+    """Return the region of a picture, and its origin."""
     x, y, width, height = region if region is not None else (0, 0, grey.shape[1], grey.shape[0])
     if x < 0 or y < 0 or width < 1 or height < 1 or x + width > grey.shape[1] or y + height > grey.shape[0]:
         raise CalibrationError(

@@ -1,8 +1,8 @@
-"""The edge spread function: where a blurred step lies in every row of pixels that crosses it.
+"""The edge spread function: position of a blurred step in every row of pixels across it.
 
-Each row holds one edge: a step between two levels of its own, spread by a Gaussian and integrated over the pixel. All
-rows share the spread. The position is the maximum-likelihood one under white noise, so its variance is the Cramer-Rao
-bound (Kakarala & Hero, IEEE PAMI 14(7), 1992, 769-773). Grey levels are never resampled or smoothed.
+Each row contains one edge: a step between two levels of its own, blurred by a Gaussian and integrated over the pixel.
+All rows share one blur. The position is the maximum-likelihood estimate under white noise, so that its variance is the
+Cramer-Rao bound (Kakarala & Hero, IEEE PAMI 14(7), 1992, 769-773). Grey levels are never resampled or smoothed.
 """
 
 from dataclasses import dataclass
@@ -35,7 +35,7 @@ CLIPPED_ASYMMETRY = 0.08
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CoarseEdge:
-    """A straight edge to within a pixel or two: x = at_px + slope * row.
+    """A straight edge known to a pixel or two: x = at_px + slope * row.
 
     Parameters
     ----------

@@ -1,5 +1,5 @@
-"""The error that a user reads: one sentence that says what, what it must be, what it is, and what to do."""
+"""Error for users: one sentence with the subject, what it must be, what it is, and what to do."""
 
 
 class CalibrationError(ValueError):
-    """The scene cannot be calibrated or measured, for a reason that the message states in a sentence."""
+    """The scene cannot be calibrated or measured; the message states the reason in one sentence."""

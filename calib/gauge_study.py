@@ -1,4 +1,4 @@
-"""Gauge repeatability and reproducibility: how much of a tolerance the measurement itself takes up."""
+"""Gauge repeatability and reproducibility: the share of a tolerance that the measurement itself uses up."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -51,11 +51,11 @@ class GaugeStudy:
 
     @property
     def grr_mm(self) -> float:
-        """Repeatability and reproducibility together."""
+        """Combined standard deviation of repeatability and reproducibility (mm)."""
         return hypot(self.repeatability_mm, self.reproducibility_mm)
 
     def percent_of(self, tolerance_mm: float) -> float:
-        """%GRR: six standard deviations of the gauge as part of a tolerance's whole width.
+        """%GRR: six standard deviations of the gauge as a percentage of a tolerance's full width.
 
         Raises
         ------
@@ -68,13 +68,13 @@ class GaugeStudy:
 
     @property
     def percent_of_total(self) -> float | None:
-        """%GRR of the total variation; None where all parts are one part, so that there is no other variation."""
+        """%GRR of the total variation; None where all parts are the same part, without other variation."""
         total = hypot(self.grr_mm, self.part_mm)
         return 100.0 * self.grr_mm / total if self.parts > 1 and total > 0.0 else None
 
 
 def refuse_moving(readings_mm: Sequence[float], name: str) -> None:
-    """Refuse readings of one part that move: their spread is that of the motion and says nothing of the gauge.
+    """Refuse readings of one part in motion, because their spread is due to the motion, not to the gauge.
 
     Parameters
     ----------
@@ -105,7 +105,7 @@ def gauge_study(readings_mm: Sequence[Sequence[Sequence[float]]]) -> GaugeStudy:
     """Analyse a crossed study with random parts and recordings.
 
     AIAG, Measurement Systems Analysis, 4th ed. 2010, appendix A (analysis of variance): components from mean squares, a
-    negative one taken as zero; an interaction that does not show is pooled with repeatability.
+    negative one set to zero; an interaction that is not significant is pooled with repeatability.
 
     Parameters
     ----------
@@ -155,7 +155,7 @@ def gauge_study(readings_mm: Sequence[Sequence[Sequence[float]]]) -> GaugeStudy:
 
 
 def verdict(percent: float) -> str:
-    """Say what %GRR means, in the manual's words."""
+    """Meaning of %GRR, in the manual's words."""
     if percent < GOOD_PERCENT:
         return "acceptable"
     return "may be acceptable for some uses" if percent <= DOUBTFUL_PERCENT else "not acceptable"

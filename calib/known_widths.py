@@ -1,4 +1,4 @@
-"""Bars and slots of known size: which pair of edges in each picture is the one that was certified."""
+"""Bars and slots of known size: choice of the pair of edges in each picture that was certified."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -52,7 +52,7 @@ class KnownSize:
     grey: Grey
 
     def __post_init__(self) -> None:
-        """Refuse what cannot be a size."""
+        """Refuse an impossible size."""
         if self.kind not in KINDS:
             raise CalibrationError(f"{self.name} must show a bar or a slot, but {self.kind!r} is stated.")
         if not (isfinite(self.size_mm) and self.size_mm > 0.0):
@@ -100,7 +100,10 @@ def find_widths(
 def _choices(
     picture: KnownSize, pairs: Sequence[ParallelEdges], region: tuple[int, int, int, int] | None
 ) -> list[ParallelEdges]:
-    """List the widths of the one object: one, or two where a rectangle is seen whole; longer edges first."""
+    """List the possible widths of the object: one, or two where a rectangle is completely visible.
+
+    Longer edges first.
+    """
     where = "the region" if region is not None else "the picture"
     if not pairs:
         edges = straight_edges_in_view(picture.grey, region)
@@ -133,7 +136,7 @@ def _choices(
 
 
 def _of_kind(kind: str, pairs: Sequence[ParallelEdges]) -> list[ParallelEdges]:
-    """Bars among bars and gaps: what lies outermost is a bar, what lies between two bars is a slot."""
+    """Bars and slots among pairs of edges: an outermost pair is a bar, a pair between two bars is a slot."""
     if len({pair.light for pair in pairs}) == 1:
         return list(pairs)
     main = pairs[0]
@@ -152,7 +155,7 @@ def _one_object(pair: ParallelEdges, other: ParallelEdges) -> bool:
 
 
 def _refuse_cut(picture: KnownSize, width: ParallelEdges, region: tuple[int, int, int, int] | None) -> None:
-    """Refuse a rectangle of which three sides are seen: the fourth, beyond the border, may be the one meant."""
+    """Refuse a rectangle with three visible sides: the fourth, beyond the border, may belong to the certified width."""
     if width.length_px < CLEARLY_LONGER * width.width_px and has_square_end(picture.grey, region, width):
         raise CalibrationError(
             f"{picture.name} shows three sides of a rectangle, and the border may cut off an edge of the "
@@ -177,7 +180,7 @@ def _expected(
 
 
 def _settled(pictures: Sequence[KnownSize], choices: Sequence[Sequence[ParallelEdges]]) -> list[ParallelEdges]:
-    """Take the widths that agree on the scale."""
+    """Choose the widths that agree on the scale."""
     sizes = np.array([picture.size_mm for picture in pictures])
     longer_edges = [found[0] for found in choices]
     combinations = [list(each) for each in product(*choices)] if len(choices) <= MOST_COMBINED else [longer_edges]
@@ -209,7 +212,7 @@ def _disagreement(widths: Sequence[ParallelEdges], sizes: NDArray[np.float64]) -
 def _refuse_unit(
     pictures: Sequence[KnownSize], combinations: Sequence[Sequence[ParallelEdges]], sizes: NDArray[np.float64]
 ) -> None:
-    """Refuse where a single size in another unit would make all pictures agree."""
+    """Refuse sizes where changing the unit of a single one would make all pictures agree."""
     for index, picture in enumerate(pictures):
         for factor, words in WRONG_UNITS.items():
             other = sizes.copy()

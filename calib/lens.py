@@ -1,4 +1,4 @@
-"""Lens distortion: where a pixel would be if straight lines stayed straight."""
+"""Lens distortion: positions of pixels if straight lines stayed straight."""
 
 from dataclasses import dataclass, replace
 
@@ -33,7 +33,7 @@ class Lens:
         return np.array([[f_x, 0.0, c_x], [0.0, f_y, c_y], [0.0, 0.0, 1.0]])
 
     def undistort(self, points_px: Floats) -> Floats:
-        """Where the points would be seen without distortion, by the same pinhole camera.
+        """Map points to their positions without distortion, in the same pinhole camera.
 
         Parameters
         ----------
@@ -57,7 +57,7 @@ class Lens:
         return np.stack([x * f_x + c_x, y * f_y + c_y], axis=-1)
 
     def distort(self, points_px: Floats) -> Floats:
-        """Where points that an undistorted pinhole camera would see are seen; the inverse of `undistort`."""
+        """Map points of an undistorted pinhole camera to their distorted positions; the inverse of `undistort`."""
         f_x, f_y, c_x, c_y, k1, k2, p1, p2, k3 = self.parameters
         x, y = (points_px[..., 0] - c_x) / f_x, (points_px[..., 1] - c_y) / f_y
         r2 = x * x + y * y

@@ -21,7 +21,7 @@ WORTH_A_PARAMETER = 10.8
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LensFit:
-    """A lens and how well it explains the pictures.
+    """A lens, with the residuals of its fit.
 
     Parameters
     ----------
@@ -85,7 +85,7 @@ def _covariance(
     rotations: Floats,
     translations: Floats,
 ) -> tuple[Floats, tuple[Floats, ...]]:
-    """Covariance of the lens with all poses free; OpenCV gives standard deviations alone, and they hang together."""
+    """Covariance of the lens with all poses free, because OpenCV gives only standard deviations."""
     normal, count, squares = np.zeros((LENS, LENS)), 0, 0.0
     residuals = []
     held = coefficients.ravel()[4] == 0.0
@@ -109,7 +109,7 @@ def _covariance(
 
 
 def straightness_px(corners: BoardCorners, lens: Lens | None) -> Floats:
-    """Distances of the corners from straight lines through every row and column of the board, lens taken off.
+    """Distances of the corners from straight lines through the board's rows and columns, corrected for the lens.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""What the user states about the bench: the limits within which each imperfection lies."""
+"""Limits of the bench stated by the user: the range of each imperfection."""
 
 from dataclasses import dataclass, fields
 from math import radians, sqrt
@@ -11,7 +11,7 @@ class Limits:
     """Half-widths of the imperfections that no picture shows; the true value lies within +- the limit.
 
     A limit a stands for the standard uncertainty a / sqrt(3) of a rectangular distribution (JCGM 100:2008, 4.3.7). The
-    defaults are those of an ordinary bench: a camera 100 mm away, looking squarely, set up with care.
+    defaults are those of an ordinary bench: a camera at 100 mm distance, perpendicular, set up with care.
 
     Parameters
     ----------
@@ -43,7 +43,7 @@ class Limits:
     expansion_per_k: float = 11.5e-6
 
     def __post_init__(self) -> None:
-        """Refuse what cannot be a limit."""
+        """Refuse an impossible limit."""
         for field in fields(self):
             value = getattr(self, field.name)
             if not (isinstance(value, int | float) and 0.0 <= value < float("inf")):

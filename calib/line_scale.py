@@ -1,8 +1,8 @@
-"""The lines of a line scale (stage micrometer): where each lies, how wide it is, and how surely.
+"""Lines of a line scale (stage micrometer): position, width and uncertainty of each.
 
 A line is a stripe with two edges: c + A (step(t - x1) - step(t - x2)), each step spread by one Gaussian. Blooming and
-the camera's response move its two edges in opposite senses, so that its middle stays where it is, whatever they are: a
-pitch needs no edge bias. The width does, and says how large it is where the line's own width is known.
+the camera's response move its two edges in opposite directions and leave its centre in place, so that a pitch needs no
+edge bias. The width is changed, and shows the edge bias where the line's own width is known.
 """
 
 from dataclasses import dataclass
@@ -141,7 +141,10 @@ def find_lines(grey: Grey, region: tuple[int, int, int, int] | None = None) -> S
 
 
 def _direction(part: Floats) -> tuple[float, bool]:
-    """Slope of the lines in columns per row (structure tensor: Bigun & Granlund, ICCV 1987); whether they lie level."""
+    """Slope of the lines in columns per row (structure tensor: Bigun & Granlund, ICCV 1987).
+
+    Whether the lines are horizontal.
+    """
     soft = cv2.GaussianBlur(part, (0, 0), 1.0)
     gx, gy = cv2.Sobel(soft, cv2.CV_64F, 1, 0), cv2.Sobel(soft, cv2.CV_64F, 0, 1)
     angle = 0.5 * np.arctan2(2.0 * float(np.sum(gx * gy)), float(np.sum(gx * gx) - np.sum(gy * gy)))
@@ -151,7 +154,7 @@ def _direction(part: Floats) -> tuple[float, bool]:
 
 
 def _refined(upright: Floats, slope: float) -> float:
-    """The slope at which the mean profile along the lines has most contrast."""
+    """Slope at which the mean profile along the lines has the largest contrast."""
     step = np.tan(np.radians(SEARCH_DEG)) / 4.0
     while step > np.radians(FINE_DEG):
         tried = [slope + k * step for k in (-2, -1, 0, 1, 2)]
@@ -161,7 +164,10 @@ def _refined(upright: Floats, slope: float) -> float:
 
 
 def _profile(upright: Floats, slope: float, rows: tuple[int, int]) -> Floats:
-    """Mean level along the lines, at whole columns of the middle row; the picture's own columns where it is covered."""
+    """Mean level along the lines, at whole columns of the middle row.
+
+    Only the picture's own columns where it is covered.
+    """
     used = np.arange(rows[0], rows[1] + 1)
     offset = slope * (used - 0.5 * (rows[0] + rows[1]))
     columns = np.arange(upright.shape[1], dtype=np.float64)
@@ -179,7 +185,7 @@ def _profile(upright: Floats, slope: float, rows: tuple[int, int]) -> Floats:
 
 
 def _rows(upright: Floats, slope: float) -> tuple[int, int]:
-    """The longest run of rows in which the lines are seen as plainly as where they are seen best."""
+    """Longest run of rows in which the lines have nearly their best contrast."""
     middle = 0.5 * (upright.shape[0] - 1)
     offset = np.rint(slope * (np.arange(upright.shape[0]) - middle)).astype(int)
     shifted = np.array([np.roll(row, -by) for row, by in zip(upright, offset, strict=True)])
@@ -205,7 +211,7 @@ def _rows(upright: Floats, slope: float) -> tuple[int, int]:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Coarse:
-    """Lines to a pixel, along the middle row."""
+    """Lines located to one pixel, along the middle row."""
 
     middle: Floats
     width: float
@@ -257,7 +263,7 @@ def _coarse(upright: Floats, slope: float, rows: tuple[int, int]) -> _Coarse:
 def _measured(
     upright: Floats, slope: float, rows: tuple[int, int], coarse: _Coarse
 ) -> tuple[Floats, Floats, Floats, float, Floats]:
-    """Place along the middle row, lean against the slope, width, common blur, and uncertainty of the places."""
+    """Position along the middle row, residual slope, width, common blur, and uncertainty of the positions."""
     row = 0.5 * (rows[0] + rows[1])
     whole = np.arange(rows[0], rows[1] + 1)
     # The spread of the optics is one for all lines: some of them tell it.
@@ -294,7 +300,7 @@ def _fit(
     coarse: _Coarse,
     blur: float | None,
 ) -> tuple[float, float, float]:
-    """Middle at the middle row, width and blur of one line (or a piece of it), by least squares on the levels."""
+    """Centre at the middle row, width and blur of one line (or a part of it), by least squares on the levels."""
     reach = int(np.ceil(0.5 * coarse.pitch))
     line = middle + slope * (rows - row)
     columns = np.rint(line).astype(int)[:, None] + np.arange(-reach, reach + 1)
@@ -321,7 +327,10 @@ def _fit(
 
 
 def _binned(t: Floats, level: Floats) -> tuple[Floats, Floats, Floats]:
-    """Means over bins that are narrow against every edge, each at its pixels' own mean place; root of their number."""
+    """Means over bins that are narrow compared with any edge, each at the mean position of its pixels.
+
+    Root of their number.
+    """
     place = np.floor((t - t.min()) / BIN_PX).astype(int)
     count = np.bincount(place)
     full = count > 0

@@ -1,4 +1,4 @@
-"""A scale that was measured on a reference: what `calib.calibration.BareScale` says, with its uncertainty."""
+"""A scale measured on a reference: the interface of `calib.calibration.BareScale`, with uncertainty."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -42,7 +42,7 @@ class Reference:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ScalePart:
-    """Share of one cause in the covariance of scale and edge bias.
+    """Contribution of one cause to the covariance of scale and edge bias.
 
     Parameters
     ----------
@@ -61,7 +61,7 @@ class ScalePart:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Response:
-    """How the fitted (px_per_mm, edge_bias_px) moved with the imperfections that the reference was seen through.
+    """Derivatives of the fitted (px_per_mm, edge_bias_px) by the imperfections through which the reference was seen.
 
     Parameters
     ----------
@@ -77,7 +77,7 @@ class Response:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Calibration:
-    """Where in millimetres a pixel of a flat scene is, and how surely: gap_mm = (gap_px + b) / s for a light gap.
+    """Conversion of a flat scene's pixels to millimetres, with uncertainty: gap_mm = (gap_px + b) / s for a light gap.
 
     Parameters
     ----------
@@ -132,7 +132,7 @@ class Calibration:
     response_shift_px: float | None = None
 
     def __post_init__(self) -> None:
-        """Refuse what cannot be a calibration."""
+        """Refuse an impossible calibration."""
         if not 0.0 < self.px_per_mm < float("inf"):
             raise CalibrationError(f"px_per_mm must be positive, but is {self.px_per_mm}.")
         if not np.isfinite(self.edge_bias_px):
@@ -142,12 +142,15 @@ class Calibration:
 
     @property
     def covariance(self) -> Floats:
-        """Covariance of (px_per_mm, edge_bias_px), shape (2, 2): the independent causes added."""
+        """Covariance of (px_per_mm, edge_bias_px), shape (2, 2): the sum over the independent causes."""
         return np.asarray(np.sum([part.covariance for part in self.parts] or [np.zeros((2, 2))], axis=0))
 
     @property
     def u_px_per_mm(self) -> float:
-        """Standard uncertainty of the scale; plane, tilt and lens belong to the distance's budget and are not in it."""
+        """Standard uncertainty of the scale.
+
+        Plane, tilt and lens belong to the distance's budget and are not included.
+        """
         return sqrt(float(self.covariance[0, 0]))
 
     @property
@@ -160,7 +163,7 @@ class Calibration:
         return f"+-{getattr(self.limits, name):g} {unit} ({'stated' if name in self.stated else 'default'})"
 
     def flatten(self, points_px: Floats) -> Floats:
-        """Take lens and perspective off measured points, shape (..., 2); pictures are never resampled."""
+        """Remove lens distortion and perspective from measured points, shape (..., 2); pictures are never resampled."""
         return self.flatten_by(self.lens, points_px)
 
     def flatten_by(self, lens: Lens | None, points_px: Floats) -> Floats:
@@ -171,14 +174,17 @@ class Calibration:
         return flat if self.plane is None else self.plane.flatten(flat)
 
     def unflatten(self, points_px: Floats) -> Floats:
-        """Put lens and perspective on points of the flat plane, shape (..., 2); the inverse of `flatten`."""
+        """Apply lens distortion and perspective to points of the flat plane, shape (..., 2).
+
+        The inverse of `flatten`.
+        """
         seen = np.asarray(points_px, dtype=np.float64)
         if self.plane is not None:
             seen = self.plane.unflatten(seen)
         return seen if self.lens is None else self.lens.distort(seen)
 
     def budget(self, points_px: Floats, u_random_px: Floats, light_gap: NDArray[np.bool_]) -> Budget:
-        """Where the uncertainty of each distance comes from; arguments as for `distances`."""
+        """Uncertainty budget of each distance; arguments as for `distances`."""
         return self._measured(points_px, u_random_px, light_gap)[1]
 
     def distances(self, points_px: Floats, u_random_px: Floats, light_gap: NDArray[np.bool_]) -> Distances:
@@ -208,9 +214,10 @@ class Calibration:
         light_gap: NDArray[np.bool_],
         frame_size_px: tuple[int, int],
     ) -> Floats:
-        """Where both points are along an axis of the picture, from its middle.
+        """Positions of both points along an axis of the picture, from its centre (mm).
 
-        Each edge takes half of the edge bias, so that the difference is the distance's component along the axis.
+        Half of the edge bias is applied to each edge, so that the difference is the distance's component along the
+        axis.
 
         Parameters
         ----------
@@ -235,7 +242,7 @@ class Calibration:
         return np.asarray((flat[:, :, axis] - centre_px(frame_size_px)[axis] + outward_px) / self.px_per_mm)
 
     def check_frame_size(self, width_px: int, height_px: int) -> None:
-        """Refuse frames of another size: another size is another camera, binning or crop, so another scale."""
+        """Refuse frames of another size, which means another camera, binning or crop, and so another scale."""
         if (width_px, height_px) != self.frame_size_px:
             width, height = self.frame_size_px
             raise CalibrationError(

@@ -73,16 +73,16 @@ class ParallelEdges:
 
     @property
     def middle_px(self) -> Floats:
-        """Middle between the edges, shape (2,)."""
+        """Centre between the edges, shape (2,)."""
         return np.asarray(self.points_px.mean(axis=0))
 
     @property
     def length_px(self) -> float:
-        """Length of the shorter edge that was used."""
+        """Length of the shorter edge that was used (pixels)."""
         return min(float(np.linalg.norm(edge[-1] - edge[0])) for edge in self.edges_px)
 
     def moved(self, x_px: int, y_px: int) -> "ParallelEdges":
-        """Return the edges of a region in coordinates of the picture in which it begins at (x, y)."""
+        """Convert the edges of a region to coordinates of the picture in which it begins at (x, y)."""
         offset = np.array([x_px, y_px], dtype=np.float64)
         rows = y_px if self.profiles == "rows" else x_px
         return replace(
@@ -94,13 +94,13 @@ class ParallelEdges:
         )
 
     def words(self) -> str:
-        """Say what and where it is, for a user who has to choose."""
+        """Description of the pair and its position, for a user who has to choose."""
         x, y = self.middle_px
         return f"{self.width_px:.1f} px {'light' if self.light else 'dark'} at ({x:.0f}, {y:.0f})"
 
 
 def measure_parallel_edges(grey: Floats, lines: tuple[Floats, Floats], light: bool) -> ParallelEdges:
-    """Measure the width between two edges that are known to a pixel or two.
+    """Measure the width between two edges whose positions are known to a pixel or two.
 
     Parameters
     ----------
@@ -138,7 +138,7 @@ def measure_parallel_edges(grey: Floats, lines: tuple[Floats, Floats], light: bo
 
 
 def _gather(grey: Floats, coarse: CoarseEdge, line: Floats, room_px: float) -> EdgeRows:
-    """Rows in which the edge is seen, from the coarse line outwards as far as it stays straight."""
+    """Rows in which the edge is visible, from the coarse line outwards as far as it stays straight."""
     rows = np.arange(max(0, int(np.ceil(line[:, 1].min()))), min(grey.shape[0] - 1, int(line[:, 1].max())) + 1)
     # The first look leaves the ends out, where corners are; the second knows the line and looks everywhere.
     inner = rows[rows.size // 8 : rows.size - rows.size // 8]
@@ -158,7 +158,7 @@ def _gather(grey: Floats, coarse: CoarseEdge, line: Floats, room_px: float) -> E
 
 
 def _one_run(rows: Ints, sound: NDArray[np.bool_], seed: int, corner_px: float, height: int) -> NDArray[np.bool_]:
-    """Sound rows about `seed`, across breaks that are short against the run, without the corners at its ends."""
+    """Valid rows around `seed`, across short interruptions, without the corners at the ends."""
     good = rows[sound]
     if good.size == 0:
         return sound

@@ -1,6 +1,6 @@
-"""How an imperfect camera moves points in the picture: the displacement per unit of each imperfection.
+"""Displacement of points in the picture per unit of each imperfection of the camera.
 
-The camera's axis is taken to pass through the middle of the picture.
+The camera's axis is assumed to pass through the centre of the picture.
 """
 
 import numpy as np
@@ -10,7 +10,7 @@ Floats = NDArray[np.float64]
 
 
 def centre_px(frame_size_px: tuple[int, int]) -> Floats:
-    """Middle of the picture, shape (2,), where the centre of the first pixel is (0, 0)."""
+    """Centre of the picture, shape (2,), where the centre of the first pixel is (0, 0)."""
     return (np.array(frame_size_px, dtype=np.float64) - 1.0) / 2.0
 
 
@@ -27,7 +27,7 @@ def lens_shift_px(points_px: Floats, frame_size_px: tuple[int, int]) -> Floats:
 def tilt_shift_px(points_px: Floats, frame_size_px: tuple[int, int], distance_px: float, axis: int) -> Floats:
     """Displacement by perspective where the plane is tilted by one radian, to first order.
 
-    A point at (x, y) of a plane that recedes along x is seen at (x, y) / (1 - x t / Z).
+    A point at (x, y) of a plane that recedes along x appears at (x, y) / (1 - x t / Z).
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""The plane of a flat scene: perspective taken off, so that a distance in pixels is the same everywhere."""
+"""The plane of a flat scene: correction of perspective, after which a distance in pixels is the same everywhere."""
 
 from dataclasses import dataclass
 
@@ -10,7 +10,7 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Plane:
-    """Homography from the picture to the plane, scaled so that the middle of the picture stays where it is.
+    """Homography from the picture to the plane, scaled so that the picture's centre stays in place.
 
     Hartley & Zisserman, Multiple View Geometry, 2nd ed., 2.3.
 
@@ -23,11 +23,11 @@ class Plane:
     homography: Floats
 
     def flatten(self, points_px: Floats) -> Floats:
-        """Where the points would be seen by a camera that looks squarely; `points_px` has shape (..., 2)."""
+        """Map points to their positions in a camera perpendicular to the plane; `points_px` has shape (..., 2)."""
         return apply_homography(self.homography, points_px)
 
     def unflatten(self, points_px: Floats) -> Floats:
-        """Where points of the squarely seen plane are in the picture; the inverse of `flatten`."""
+        """Map points of the plane to their positions in the picture; the inverse of `flatten`."""
         return apply_homography(np.asarray(np.linalg.inv(self.homography), dtype=np.float64), points_px)
 
 

@@ -25,7 +25,7 @@ STEP_LENS = 1e-3
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PlaneFit:
-    """A plane seen by the camera.
+    """A plane fitted to the corners in one picture.
 
     Parameters
     ----------
@@ -90,7 +90,7 @@ def _homography(board_mm: Floats, points_px: Floats) -> Floats:
 
 
 def _squared(to_picture: Floats, middle: Floats) -> tuple[Plane, float, float]:
-    """Plane that keeps the middle and the directions there, its scale, and its least stretch over its greatest."""
+    """Plane that keeps the centre and its directions, its scale, and the ratio of its least to its greatest stretch."""
     to_board = np.asarray(np.linalg.inv(to_picture), dtype=np.float64)
     at = apply_homography(to_board, middle)
     steps = MIDDLE_PX * np.array([[1.0, 0.0], [-1.0, 0.0], [0.0, 1.0], [0.0, -1.0]])
@@ -107,7 +107,7 @@ def _squared(to_picture: Floats, middle: Floats) -> tuple[Plane, float, float]:
 
 
 def _log_scales(to_picture: Floats, middle: Floats) -> Floats:
-    """Logarithms of the scale along x and along y in the middle of the picture, shape (2,)."""
+    """Logarithms of the scale along x and along y at the centre of the picture, shape (2,)."""
     to_board = np.asarray(np.linalg.inv(to_picture), dtype=np.float64)
     steps = MIDDLE_PX * np.array([[1.0, 0.0], [-1.0, 0.0], [0.0, 1.0], [0.0, -1.0]])
     seen = apply_homography(to_board, middle + steps)
@@ -115,7 +115,7 @@ def _log_scales(to_picture: Floats, middle: Floats) -> Floats:
 
 
 def _gradient(quantity: Callable[[Floats], Floats], points: Floats) -> Floats:
-    """Change of a quantity of shape (k,) per pixel of every corner; shape (n, 2, k)."""
+    """Derivative of a quantity of shape (k,) by the position of every corner; shape (n, 2, k)."""
     changes = []
     for index in np.ndindex(*points.shape):
         moved = points.copy()

@@ -1,7 +1,7 @@
-"""A smooth response curve through levels whose light is known up to a factor for each place of the scene.
+"""A smooth response curve through levels whose light is known, up to a factor for each place of the scene.
 
-ln f is a power law and a smooth correction to it: cameras are nearly power laws (Grossberg & Nayar, 2004,
-doi:10.1109/TPAMI.2004.88), and the logarithm alone has no end at level 0.
+ln f is a power law plus a smooth correction: cameras are nearly power laws (Grossberg & Nayar, 2004,
+doi:10.1109/TPAMI.2004.88), and a correction of the logarithm alone would diverge at level 0.
 """
 
 import numpy as np

@@ -1,9 +1,9 @@
-"""A camera's response from the shape of straight edges: blur spreads a step of light evenly to both sides.
+"""A camera's response from the shape of straight edges: blur spreads a step of light symmetrically.
 
 The optics and the pixels blur light, and nearly every blur is symmetric. An edge spread function is then odd about the
-edge in light; in levels that a transfer curve has bent it is not, and the exponent that makes it odd again is the
-camera's. A slanted edge shows its profile at many places within a pixel (ISO 12233). What sharpens or smooths after the
-transfer curve, or a bevel along the edge, bends the profile as well: the fit then leaves more than noise.
+edge in light. In levels after a transfer curve it is not, and the exponent that makes it odd again is the camera's. A
+slanted edge samples its profile at many positions within a pixel (ISO 12233). Sharpening or smoothing after the
+transfer curve, or a bevel along the edge, changes the profile as well: the fit then leaves more than noise.
 """
 
 from collections.abc import Sequence
@@ -58,7 +58,7 @@ EXPONENTS = (0.2, 5.0)
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Profile:
-    """Pixels across one edge: distance to its light side (pixels), level (share of full scale), and first guesses."""
+    """Pixels across one edge: distance to its light side (pixels), level (fraction of full scale), starting values."""
 
     away_px: Floats
     level: Floats
@@ -68,7 +68,7 @@ class _Profile:
 
 
 def response_from_edges(pictures: Sequence[Grey], top_level: int, name: str) -> MeasuredResponse:
-    """Find a camera's response, as a power law.
+    """Fit a camera's response, as a power law.
 
     Parameters
     ----------
@@ -126,7 +126,7 @@ def response_from_edges(pictures: Sequence[Grey], top_level: int, name: str) -> 
 
 
 def _overshoot(profile: _Profile) -> float:
-    """How far the mean profile goes beyond its plateaus on either side, as a share of the step, beyond its noise."""
+    """Overshoot of the mean profile beyond its plateaus on either side, as a fraction of the step, beyond its noise."""
     bins = np.floor(profile.away_px / OVERSHOOT_BIN_PX).astype(int)
     bins -= bins.min()
     count = np.bincount(bins)
@@ -152,7 +152,7 @@ def _profiles(grey: Grey, top_level: int) -> list[_Profile]:
 
 
 def _apart_px(edge: StraightEdge, other: StraightEdge) -> float:
-    """Least distance of another edge's ends and middle from the line of an edge, where it lies beside it."""
+    """Least distance of another edge's ends and centre from the line of an edge, where the two overlap."""
     points = np.vstack([other.ends, other.ends.mean(axis=0)])
     along = (points - edge.ends[0]) @ edge.direction
     beside = np.abs((points - edge.ends[0]) @ edge.to_dark)
@@ -233,7 +233,7 @@ def _noise_of(profiles: Sequence[_Profile]) -> Floats:
 
 
 def _left(unknowns: Floats, profiles: Sequence[_Profile]) -> Floats:
-    """Residuals of all pixels over their noise; shape (pixels,)."""
+    """Residuals of all pixels divided by their noise; shape (pixels,)."""
     exponent, sigma = float(np.exp(unknowns[0])), float(np.exp(unknowns[1]))
     wide, ratio = float(unknowns[2]), float(np.exp(unknowns[3]))
     out = []

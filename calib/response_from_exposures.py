@@ -1,7 +1,7 @@
 """A camera's response from pictures of one still scene at several known exposures.
 
-A pixel's light is its scene's times the exposure, whatever the scene: ln f(level) = ln scene + ln exposure. Scene and
-f are found together by least squares (Debevec & Malik, SIGGRAPH 1997, doi:10.1145/258734.258884).
+The light of a pixel is that of its scene times the exposure, for any scene: ln f(level) = ln scene + ln exposure. Scene
+and f are found together by least squares (Debevec & Malik, SIGGRAPH 1997, doi:10.1145/258734.258884).
 """
 
 from collections.abc import Sequence
@@ -28,7 +28,7 @@ PLACES = 400
 def response_from_exposures(
     pictures: Sequence[Grey], exposures: Sequence[float], top_level: int, name: str
 ) -> MeasuredResponse:
-    """Find a camera's response.
+    """Fit a camera's response.
 
     Parameters
     ----------
@@ -65,7 +65,7 @@ def response_from_exposures(
 
 
 def _flat_levels(pictures: Sequence[Grey], top_level: int) -> Floats:
-    """Mean levels of flat squares, shape (pictures, places), shares of full scale."""
+    """Mean levels of uniform squares, shape (pictures, places), as fractions of full scale."""
     height, width = (size // SIDE_PX * SIDE_PX for size in pictures[0].shape)
     means, spreads = [], []
     for picture in pictures:

@@ -1,7 +1,7 @@
 """A camera's response from one picture of a grey wedge whose fields have certified optical densities.
 
-A field of density D reflects (or passes) 10**-D of the light (ISO 5-1), so that ln f(level) = -D ln 10 plus a constant
-over the whole wedge: the same equation as that of an exposure series, with one place in the scene.
+A field of density D reflects (or transmits) 10**-D of the light (ISO 5-1), so that ln f(level) = -D ln 10 plus a
+constant over the whole wedge: the same equation as for an exposure series, with one place in the scene.
 """
 
 from collections.abc import Sequence
@@ -27,7 +27,7 @@ LARGEST_SPREAD = 0.5
 def response_from_wedge(
     grey: Grey, densities: Sequence[float], top_level: int, name: str, region: tuple[int, int, int, int] | None = None
 ) -> MeasuredResponse:
-    """Find a camera's response.
+    """Fit a camera's response.
 
     Parameters
     ----------
@@ -72,7 +72,7 @@ def response_from_wedge(
 def _field_levels(
     grey: Grey, fields: int, top_level: int, region: tuple[int, int, int, int] | None
 ) -> tuple[Floats, Floats]:
-    """Mean and scatter of each field's middle part, shares of full scale; shape (fields,)."""
+    """Mean and scatter in the central part of each field, as fractions of full scale; shape (fields,)."""
     x, y, width, height = region if region is not None else (0, 0, grey.shape[1], grey.shape[0])
     part = grey[y : y + height, x : x + width].astype(np.float64) / top_level
     part = part if part.shape[1] >= part.shape[0] else part.T

@@ -18,7 +18,7 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class BoardFit:
-    """The calibration and how well it explains the pictures.
+    """The calibration, with the residuals of its fit.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Scale from the lines of a line scale: one straight line through all their places."""
+"""Scale from the lines of a line scale: one straight line fitted to all their positions."""
 
 from dataclasses import dataclass
 
@@ -21,7 +21,7 @@ OUTLIER_SIGMAS, OUTLIER_SHARE = 6.0, 0.02
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LineScaleFit:
-    """The calibration and how well the lines agree.
+    """The calibration, with the residuals of the lines.
 
     Parameters
     ----------
@@ -68,7 +68,7 @@ def scale_from_lines(
     reference: Reference,
     stated: frozenset[str] = frozenset(),
 ) -> LineScaleFit:
-    """Fit the places of all lines to whole numbers of the pitch.
+    """Fit the positions of all lines to integer multiples of the pitch.
 
     Parameters
     ----------
@@ -174,7 +174,7 @@ def _straight_line(k: Floats, at: Floats, weight: Floats) -> _Line:
 def _bends(
     lines: ScaleLines, used: NDArray[np.bool_], frame_size_px: tuple[int, int], slope: float, limits: Limits
 ) -> tuple[Floats, ...]:
-    """Shift of each line by the lens, and by a tilt about either axis, each at one unit of its limit."""
+    """Shift of each line by the lens, and by a tilt about either axis, each per unit of its limit."""
     points = lines.middle_px[used]
     distance_px = limits.camera_distance_mm * slope
     lens = lens_shift_px(points, frame_size_px) @ lines.across
@@ -190,7 +190,7 @@ def _budget(
     limits: Limits,
     stated: frozenset[str],
 ) -> list[ScalePart]:
-    """What the scale owes to the certificate, to the single lines, to the fit of their edges, and to the edge bias."""
+    """Uncertainty of the scale from the certificate, the single lines, the fit of their edges, and the edge bias."""
     size, one_line = line.slope * u_length_mm / span_mm, line.slope * u_line_mm * float(np.linalg.norm(line.gain))
     return [
         _part("reference size", size, "length of the scale, the certificate (--u-length-mm)"),
@@ -210,7 +210,7 @@ def _part(source: str, u_scale: float, supplied: str) -> ScalePart:
 
 
 def _numbered(at_px: Floats) -> tuple[NDArray[np.int_], NDArray[np.bool_]]:
-    """Which line of the scale each one is, and whether it stands where that line must."""
+    """Number of each line on the scale, and whether it stands near its nominal position."""
     steps = np.diff(at_px)
     pitch = float(np.median(steps))
     index = np.concatenate([[0], np.cumsum(np.maximum(np.rint(steps / pitch), 1.0))]).astype(np.int_)
@@ -242,7 +242,7 @@ def _numbered(at_px: Floats) -> tuple[NDArray[np.int_], NDArray[np.bool_]]:
 
 
 def _chi_square(residual: Floats, k: Floats, u: Floats, bends: tuple[Floats, ...], limits: Limits) -> tuple[float, int]:
-    """Residuals against lines and edges, and against what lens and tilt may do within their limits."""
+    """Chi-square of the residuals, with lens and tilt free within their limits."""
     covariance = np.diag(u**2) + np.outer(bends[0], bends[0]) * rectangular(limits.lens_relative) ** 2
     for bend in bends[1:]:
         covariance += np.outer(bend, bend) * rectangular(limits.tilt_rad) ** 2

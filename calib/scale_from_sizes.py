@@ -46,7 +46,7 @@ class MeasuredSize:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ScaleFit:
-    """The calibration and how well the straight line holds.
+    """The calibration, with the residuals of the straight line.
 
     Parameters
     ----------
@@ -81,8 +81,8 @@ def scale_from_sizes(
 ) -> ScaleFit:
     """Fit gap_mm = (gap_px + p b) / s to objects of known size, with p = +1 for a light gap and -1 for a dark object.
 
-    As a straight line: p gap_px = s (p gap_mm) - b. Three different sizes, or a light and a dark one, give s and b;
-    fewer give s alone, and b stays in the budget with its limit.
+    As a straight line this is p gap_px = s (p gap_mm) - b. Three different sizes, or a light and a dark one, give s and
+    b; fewer give only s, and b stays in the budget with its limit.
 
     Parameters
     ----------
@@ -172,7 +172,7 @@ def _seen_through(
 
 
 def _chi_square(line: StraightLine, x: Floats, covariance: Floats, bias_known: bool) -> float:
-    """Residuals against all that the user expects: a lens that bends the line within its limit is no misfit."""
+    """Chi-square of the residuals with the lens free within its limit."""
     design = np.stack([x, np.ones_like(x)], axis=1) if bias_known else x[:, None]
     inverse = np.linalg.inv(covariance)
     refit = np.linalg.solve(design.T @ inverse @ design, design.T @ inverse @ line.residual)

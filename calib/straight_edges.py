@@ -1,4 +1,4 @@
-"""Straight edges of a picture, to within a pixel: where to look for the two edges of a bar or a slot."""
+"""Straight edges of a picture, located to one pixel: where to look for the two edges of a bar or a slot."""
 
 from dataclasses import dataclass
 from math import hypot
@@ -23,7 +23,7 @@ SHORTEST_EDGE_PX = 14.0
 class StraightEdge:
     """A straight edge from (x0, y0) to (x1, y1), pixels; the dark side lies to the right when looking along it.
 
-    To the right as seen on the picture, with x to the right and y down.
+    The right is that of the picture with x to the right and y down.
     """
 
     x0: float
@@ -56,8 +56,8 @@ class StraightEdge:
 def find_straight_edges(grey: NDArray[np.uint8] | NDArray[np.uint16], side_px: int) -> list[StraightEdge]:
     """Straight edges, the longest first.
 
-    Line segments after Grompone von Gioi et al. (IEEE PAMI 32(4), 2010, 722-732), joined where they
-    continue each other.
+    They are line segments after Grompone von Gioi et al. (IEEE PAMI 32(4), 2010, 722-732), joined where they continue
+    each other.
 
     Parameters
     ----------

@@ -16,7 +16,7 @@ STEPS, SETTLED = 50, 1e-15
 
 @dataclass(frozen=True, slots=True, eq=False)
 class StraightLine:
-    """y = intercept + slope x.
+    """A straight line y = intercept + slope x, with its covariance.
 
     Parameters
     ----------
@@ -95,7 +95,10 @@ def _york(x: Floats, y: Floats, u_x: Floats, u_y: Floats, slope: float) -> tuple
 
 
 def line_through_origin(x: Floats, y: Floats, u_x: Floats, u_y: Floats) -> StraightLine:
-    """Line through the origin, each point weighted by its uncertainty in both directions; arguments as above."""
+    """Line through the origin, each point weighted by its uncertainty in both directions.
+
+    Arguments as in `line_with_errors`.
+    """
     if not np.any(x):
         raise CalibrationError("A straight line through the origin needs a size other than zero.")
     slope = float(x @ y / (x @ x))

@@ -1,4 +1,4 @@
-"""The straight line through an edge that was found in rows of pixels, and how surely it is known."""
+"""Straight line through an edge that was found in rows of pixels, with its uncertainty."""
 
 from dataclasses import dataclass
 from math import sqrt
@@ -58,7 +58,7 @@ class StraightRows:
 
     @classmethod
     def through(cls, edge: EdgeRows) -> "StraightRows":
-        """Fit the line, without the rows that do not belong to it.
+        """Fit the line, excluding rows that do not belong to it.
 
         Raises
         ------

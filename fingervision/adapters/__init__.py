@@ -1,1 +1,1 @@
-"""Adapters to the software of laboratories, one a file; each needs a library of its own, which is an extra."""
+"""Adapters to the software of laboratories, one per file; each needs its own library, which is an optional extra."""

@@ -1,8 +1,7 @@
-"""A bed for bluesky: stage, force sensor and camera as devices of its RunEngine.
+"""A test bed for bluesky: stage, force sensor and camera as devices of its RunEngine.
 
-The stage is movable, readable, stoppable and flyable; the force sensor readable; the camera, with its frames measured,
-readable and flyable: one event a frame, with stage and force at the frame's exposure. `bluesky_agent` suggests the next
-run.
+The stage is movable, readable, stoppable and flyable; the force sensor is readable. The camera is readable and flyable:
+each measured frame is one event, with stage position and force at its exposure. `bluesky_agent` suggests the next run.
 
 Tested with a real RunEngine of bluesky 1.15 on the simulated bed (tests/adapters/test_bluesky.py); on hardware only as
 far as the bed's own devices are. A simulated bed must be opened with `pace=1`: time then passes for every device alike.
@@ -30,7 +29,7 @@ JOINED_WITHIN_S = 5.0
 
 
 class _Shared:
-    """An actuator whose readings go to each who asks: otherwise one would take them from the other."""
+    """An actuator whose readings are shared by several readers; otherwise one reader would take them from another."""
 
     def __init__(self, actuator: Any, lock: threading.RLock) -> None:
         self._actuator, self._lock = actuator, lock
@@ -65,7 +64,7 @@ class _Consumer:
 
 
 class StageDevice:
-    """The stage: `set(mm)` moves, `stop` stops at once, `prepare((to_mm, speed_mm_s))` and `kickoff` fly."""
+    """The stage: `set(mm)` moves, `stop` stops at once, `prepare((to_mm, speed_mm_s))` and `kickoff` start a flight."""
 
     parent = None
 
@@ -82,13 +81,13 @@ class StageDevice:
         return {"fields": [self.name]}
 
     def set(self, value: float) -> ThreadStatus:
-        """Move to a position in mm at `speed_mm_s`; done when the stage stands there."""
+        """Move to a position in mm at `speed_mm_s`; the status is done when the stage stands there."""
         self._within(value)
         self._actuator.move(float(value), self.speed_mm_s)
         return ThreadStatus(self._until_rest)
 
     def stop(self, success: bool = True) -> None:
-        """Stop the motor at once, whatever else is under way."""
+        """Stop the motor at once, whatever command is under way."""
         self._actuator.stop()
 
     def read(self) -> dict[str, dict[str, Any]]:
@@ -109,7 +108,7 @@ class StageDevice:
         return {f"{self.name}_speed": {"source": "settings", "dtype": "number", "shape": [], "units": "mm/s"}}
 
     def prepare(self, value: tuple[float, float]) -> ThreadStatus:
-        """State where a flight goes, and at which speed in mm/s."""
+        """Set target (mm) and speed (mm/s) of a flight."""
         self._within(value[0])
         self._flight = value
         return ThreadStatus(lambda: None)
@@ -160,7 +159,7 @@ class StageDevice:
 
 
 class ForceDevice:
-    """The force sensor: readable."""
+    """The force sensor, a readable device."""
 
     parent = None
 
@@ -180,7 +179,7 @@ class ForceDevice:
 
 
 class GapDevice:
-    """The camera with its frames measured: readable after `trigger`, flyable with one event a frame."""
+    """The camera with its frames measured: readable after `trigger`, or flyable with one event per frame."""
 
     parent = None
 
@@ -196,11 +195,11 @@ class GapDevice:
 
     @property
     def hints(self) -> dict[str, list[str]]:
-        """What plots show by themselves."""
+        """Fields that bluesky plots by default."""
         return {"fields": [f"{self.name}_gap_mm"]}
 
     def trigger(self) -> ThreadStatus:
-        """Take a frame that is exposed from now on, and measure it."""
+        """Take a frame whose exposure begins after this call, and measure it."""
 
         def work() -> None:
             with self._lock:
@@ -213,7 +212,7 @@ class GapDevice:
         return ThreadStatus(work)
 
     def read(self) -> dict[str, dict[str, Any]]:
-        """Gap, edges, stage and force of the frame that was triggered last; None where a frame has no gap."""
+        """Gap, edges, stage and force of the last triggered frame; None where a frame has no gap."""
         if self._newest is None:
             raise StateError(f"{self.name} must be triggered before it is read: no frame was taken yet.")
         at_s = self._unix_s + self._at_s
@@ -236,7 +235,7 @@ class GapDevice:
         return ThreadStatus(lambda: None)
 
     def complete(self) -> ThreadStatus:
-        """End with a few frames after now."""
+        """Stop after the next few frames."""
         self._stop_flight.set()
         flight = self._flight
 
@@ -248,18 +247,21 @@ class GapDevice:
         return ThreadStatus(work)
 
     def describe_collect(self) -> dict[str, dict[str, dict[str, Any]]]:
-        """The stream of a flight: what a frame has."""
+        """The stream of a flight: the columns of a frame."""
         return {f"{self.name}_flight": self.describe()}
 
     def collect(self) -> Iterator[dict[str, Any]]:
-        """Give every frame of the flight."""
+        """Yield every frame of the flight."""
         for exposed_s, data in self._flown:
             at_s = self._unix_s + exposed_s
             yield {"time": at_s, "data": data, "timestamps": dict.fromkeys(data, at_s)}
         self._flown = []
 
     def _begin(self) -> float:
-        """Know where the stage is before the first frame that counts; time on the bed's clock from which they do."""
+        """Read the stage before the first frame that counts, and return the time from which frames count.
+
+        The time is in seconds on the bed's clock.
+        """
         instruments = [one for one in (self._sight.position, self._sight.force) if one is not None]
         until_s = self._clock.now_s() + JOINED_WITHIN_S
         for one in instruments:
@@ -308,7 +310,7 @@ class GapDevice:
 
 
 class Devices(NamedTuple):
-    """The devices of a bed; None where it has no such part."""
+    """The devices of a bed; None for a part that the bed lacks."""
 
     stage: StageDevice
     force: ForceDevice | None

@@ -1,4 +1,4 @@
-"""An agent for bluesky that suggests the next run, and a plan that drives the steps of a recipe.
+"""An agent for bluesky that suggests the next run, and a plan that executes the steps of a recipe.
 
 `NextRunAgent` takes measured rows (`ingest`, or as a subscriber of the RunEngine), diagnoses them, and suggests the run
 that best separates the explanations still possible (`suggest`). Needs the extra `bluesky`.
@@ -20,7 +20,7 @@ ROW = ("run", "time_s", "input_mm", "gap_mm", "left_mm", "right_mm", "force_n")
 
 
 class NextRunAgent:
-    """Diagnoses what was measured, and suggests the run that separates what is left open.
+    """Diagnoses measured rows, and suggests the run that separates the explanations still possible.
 
     Parameters
     ----------
@@ -47,7 +47,7 @@ class NextRunAgent:
         self._answer = None
 
     def __call__(self, name: str, document: Mapping[str, Any]) -> None:
-        """Take the documents of a RunEngine: each of its runs is a run of the table."""
+        """Receive the documents of a RunEngine; each of its runs becomes a run of the table."""
         if name == "start":
             self._run += 1
         if name == "event":
@@ -57,7 +57,7 @@ class NextRunAgent:
                 self._ingest_event(at_s, {key: values[k] for key, values in document["data"].items()})
 
     def report(self) -> Diagnosis:
-        """Diagnose everything that was taken so far."""
+        """Diagnose all rows taken so far."""
         if self._answer is None:
             with TemporaryDirectory(prefix="fingervision-") as folder:
                 path = Path(folder) / "measured.csv"
@@ -70,7 +70,7 @@ class NextRunAgent:
         return self._answer
 
     def suggest(self, batch_size: int = 1) -> list[dict[str, Any]]:
-        """Suggest the next run: `name`, `steps` as in a recipe, `separates`; empty where nothing is open."""
+        """Suggest the next run: `name`, `steps` as in a recipe, `separates`; empty where one explanation is left."""
         proposed = self.report().report.next_run
         if proposed is None or batch_size < 1:
             return []
@@ -87,7 +87,7 @@ class NextRunAgent:
 def run_steps(steps: Sequence[Mapping[str, Any]], stage: StageDevice, gap: GapDevice) -> Iterator[Any]:
     """Give a bluesky plan for the steps of a recipe: one run, the gap flown while the stage moves.
 
-    Kinds: triangle, move and hold; others need the bed's own runner (`fingervision bed run`).
+    The kinds triangle, move and hold are supported; others need the bed's own runner (`fingervision bed run`).
     """
     import bluesky.plan_stubs as bps
     import bluesky.preprocessors as bpp

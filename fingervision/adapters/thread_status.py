@@ -5,7 +5,7 @@ from collections.abc import Callable
 
 
 class ThreadStatus:
-    """Status of something that a thread waits for; done when the thread has ended.
+    """Status of work in a thread; done when the thread has ended.
 
     Parameters
     ----------
@@ -33,22 +33,22 @@ class ThreadStatus:
 
     @property
     def done(self) -> bool:
-        """Whether it has ended."""
+        """Whether the work has ended."""
         return self._ended.is_set()
 
     @property
     def success(self) -> bool:
-        """Whether it has ended as it should."""
+        """Whether the work has ended without an error."""
         return self.done and self._error is None
 
     def exception(self, timeout: float | None = 0.0) -> BaseException | None:
-        """Wait for its end and give what it raised; TimeoutError where it goes on."""
+        """Wait for the end and return the exception raised, if any; TimeoutError if it still runs at the time limit."""
         if not self._ended.wait(timeout):
             raise TimeoutError
         return self._error
 
     def add_callback(self, callback: Callable[["ThreadStatus"], None]) -> None:
-        """Call when done; at once where it is."""
+        """Call `callback` when the work is done; at once if it already is."""
         with self._lock:
             if not self._ended.is_set():
                 self._callbacks.append(callback)

@@ -1,1 +1,4 @@
-"""Many recordings or tables: each in its own result folder, on this machine's cores or on an existing Dask cluster."""
+"""Batch processing of many recordings or tables, on this machine's cores or on an existing Dask cluster.
+
+Each input gets its own result folder.
+"""

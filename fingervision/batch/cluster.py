@@ -22,7 +22,7 @@ WINDOW = 4
 
 @contextmanager
 def connected(scheduler: str, patience_s: float = PATIENCE_S) -> Iterator[Any]:
-    """Connect to a cluster and check that its workers run what runs here.
+    """Connect to a cluster and check that its workers run the same versions as this machine.
 
     Parameters
     ----------
@@ -40,7 +40,7 @@ def connected(scheduler: str, patience_s: float = PATIENCE_S) -> Iterator[Any]:
     ------
     UsageError
         The address cannot be one.
-    FingervisionError
+    MissingLibraryError, ProcessError
         Dask is not installed, nothing answers, there are no workers, or they run other versions.
     """
     try:
@@ -78,19 +78,19 @@ def _check_workers(client: Any, scheduler: str, patience_s: float) -> None:
         words = difference(here, there) if isinstance(there, dict) else f"no fingervision ({there})"
         if words:
             raise ProcessError(
-                f"Every worker must run what runs here, but {address} has {words}: install the same there "
-                "and restart it."
+                f"Every worker must have the versions that are installed here, but {address} has {words}: install "
+                "the same there and restart it."
             )
 
 
 def outcomes_of(client: Any, tasks: Sequence[Task], perform: Perform) -> Generator[tuple[int, Outcome], None, None]:
-    """Work on tasks on a cluster, and give each outcome as it comes, with its task's number.
+    """Process tasks on a cluster, and yield each outcome as it arrives, with its task's number.
 
-    The scheduler hands the task of a dead worker to another one; it may be done twice, which does no harm.
+    The scheduler gives the task of a dead worker to another one; a task may then run twice, which does no harm.
 
     Raises
     ------
-    FingervisionError
+    ProcessError
         The scheduler is gone.
     """
     from distributed import KilledWorker, as_completed
@@ -133,12 +133,12 @@ def outcomes_of(client: Any, tasks: Sequence[Task], perform: Perform) -> Generat
 
 
 def _absolute(task: Task) -> Task:
-    """Name files so that a process with another working directory finds them."""
+    """Make file names absolute, so that a process with another working directory finds them."""
     return replace(task, input=os.path.abspath(task.input), folder=Path(os.path.abspath(task.folder)))  # noqa: PTH100
 
 
 def _work_there(task: Task, perform: Perform, wanted: dict[str, str]) -> Outcome:
-    """Work on a worker; one that joined after the check is checked here."""
+    """Process a task on a worker; a worker that joined after the check is checked here."""
     words = difference(wanted, versions())
     if words:
         return failure(task, f"A worker joined that has {words}: install the same there and restart it.")

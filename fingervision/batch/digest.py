@@ -1,4 +1,4 @@
-"""Digest of one result for the overview: a row of a table and a small picture."""
+"""Summary of one result for the overview: a table row and a small picture."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -13,7 +13,7 @@ CURVE_POINTS = 48
 
 @dataclass(frozen=True, slots=True)
 class Digest:
-    """One result in short.
+    """Summary of one result.
 
     Parameters
     ----------
@@ -31,7 +31,7 @@ class Digest:
 
 
 def thinned(values: NDArray[np.float64]) -> tuple[float | None, ...]:
-    """Give the values at evenly spaced places, to five figures.
+    """Select evenly spaced values, rounded to five figures.
 
     Parameters
     ----------

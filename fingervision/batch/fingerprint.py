@@ -12,7 +12,7 @@ SETTLED_NS = 3_000_000_000
 
 
 def files_of(path: Path) -> list[Path]:
-    """Files of an input: itself and the columns.toml beside it; of a folder, what lies in it and is not hidden."""
+    """Files of an input: itself and the columns.toml beside it; for a folder, its files that are not hidden."""
     if not path.is_dir():
         columns = path.parent / COLUMNS
         return [path, columns] if columns != path and columns.is_file() else [path]
@@ -20,7 +20,7 @@ def files_of(path: Path) -> list[Path]:
 
 
 def stamp_of(path: Path) -> str:
-    """Sizes and times of change; while they are the same, so is the content of what has settled.
+    """Sizes and modification times; while they are unchanged, so is the content of files that are settled.
 
     Raises
     ------
@@ -35,7 +35,7 @@ def stamp_of(path: Path) -> str:
 
 
 def is_settled(path: Path) -> bool:
-    """Whether the last change is so long ago that a later one has another time.
+    """Whether the last change is old enough that a further change would give another modification time.
 
     Raises
     ------

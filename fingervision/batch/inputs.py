@@ -12,13 +12,13 @@ from fingervision.domain.errors import InputFileError, UsageError
 def inputs_of(names: tuple[str, ...], out: Path) -> tuple[str, ...]:
     """List every input once, in natural order within each name (run2 before run10).
 
-    A folder is an input by itself (of images), and then what lies in it is not. Nothing inside `out` is an input: the
-    videos that an earlier call wrote match the pattern as well. A path that is not there is kept, so that it is listed
-    with its sentence; a pattern that matches nothing too, as long as others match.
+    A folder is one input (of images); then the files in it are not inputs. Nothing inside `out` is an input, because
+    videos written by an earlier call may match the pattern as well. A missing path is kept, so that it is listed with
+    its error; so is a pattern without a match, if others match.
 
     Raises
     ------
-    FingervisionError
+    InputFileError
         Nothing matches at all.
     UsageError
         All that matches lies in `out`.

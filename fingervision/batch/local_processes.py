@@ -1,4 +1,4 @@
-"""Workers on this machine: one process a core, one task at a time each."""
+"""Worker processes on this machine: one per core, each with one task at a time."""
 
 import multiprocessing
 import os
@@ -29,18 +29,18 @@ class _Worker:
 
 
 def cores() -> tuple[int, ...]:
-    """Cores that this process may use."""
+    """Number of cores that this process may use."""
     if hasattr(os, "sched_getaffinity"):
         return tuple(sorted(os.sched_getaffinity(0)))
     return tuple(range(os.cpu_count() or 1))
 
 
 class LocalCrew:
-    """Processes of this machine that start at once, and work on one task at a time each.
+    """Worker processes of this machine, started together, each with one task at a time.
 
-    Each process is bound to one core, so that decoders, OpenCV and linear algebra start one thread and not one a core:
-    as many processes as cores then fill the machine and no more. A process that dies (of a fault in a decoder, for
-    want of memory) costs its own task alone.
+    Each process is bound to one core, so that decoders, OpenCV and linear algebra start one thread each instead of one
+    per core; as many processes as cores then fill the machine exactly. A process that dies (by a fault in a decoder, or
+    for lack of memory) loses only its own task.
 
     Parameters
     ----------
@@ -57,7 +57,7 @@ class LocalCrew:
         self._fill_up()
 
     def __enter__(self) -> Self:
-        """Give the crew; all of it has ended when the block is left."""
+        """Return the crew; all of its processes end when the block is left."""
         return self
 
     def __exit__(self, *_: object) -> None:
@@ -67,13 +67,13 @@ class LocalCrew:
             worker.process.join()
 
     def answer(self, command: str, arguments: tuple[str, ...]) -> Ended:
-        """Have a command performed whose result is its answer.
+        """Let a worker execute a command and return its answer.
 
-        Every process is asked, so that all of them import meanwhile what the tasks will need; the first answer counts.
+        Every process is asked, so that all of them meanwhile import what the tasks need; the first answer counts.
 
         Raises
         ------
-        FingervisionError
+        ProcessError
             All of them died of it.
         """
         for worker in self._workers.values():
@@ -95,7 +95,7 @@ class LocalCrew:
         )
 
     def outcomes_of(self, tasks: Sequence[Task]) -> Generator[tuple[int, Outcome], None, None]:
-        """Work on tasks, and give each outcome as it comes, with its task's number; the crew is then let go.
+        """Process tasks, and yield each outcome as it arrives, with its task's number; the workers end afterwards.
 
         Parameters
         ----------
@@ -161,7 +161,7 @@ class LocalCrew:
         del self._workers[worker.link]
 
     def _let_go(self) -> None:
-        """End what is in hand; who is idle ends by itself, while others go on here."""
+        """End the tasks in progress; idle workers end by themselves."""
         busy = [worker for worker in self._workers.values() if worker.number is not None or worker.is_asked]
         for worker in busy:
             worker.process.kill()
@@ -183,7 +183,7 @@ def _died(task: Task, exit_code: int | None) -> str:
 
 @contextmanager
 def _no_interrupt() -> Iterator[None]:
-    """Hold Ctrl-C back: a process that starts meanwhile never gets it, also before it can say that it will not."""
+    """Block Ctrl-C, so that a process started meanwhile never receives it, even before it can ignore it."""
     if not hasattr(signal, "pthread_sigmask"):
         yield
         return
@@ -195,7 +195,7 @@ def _no_interrupt() -> Iterator[None]:
 
 
 def _serve(link: Connection, perform: Perform, core: int) -> None:
-    """Be a worker until the link is closed."""
+    """Main loop of a worker, until the connection is closed."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches the whole group; the one who handed out decides
     if hasattr(os, "sched_setaffinity"):
         with suppress(OSError):

@@ -11,7 +11,7 @@ LONGEST = 200
 
 
 def folder_names(inputs: Sequence[Path], taken: Collection[str]) -> tuple[str, ...]:
-    """Name a folder for each input; no two are the same, also where capitals do not count.
+    """Choose a unique folder name for each input, also if upper and lower case are not distinguished.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""All results together: a table, a figure, and a page with a small picture of each."""
+"""Overview of all results: a table, a figure, and a page with a small picture of each."""
 
 import csv
 import hashlib
@@ -28,7 +28,7 @@ content-visibility:auto;contain-intrinsic-size:170px 130px}
 
 
 def write_overview(out: Path, command: str, outcomes: Sequence[Outcome]) -> None:
-    """Write batch.csv, batch.png and index.html, unless they are there and say the same.
+    """Write batch.csv, batch.png and index.html, unless they exist with the same content.
 
     Raises
     ------
@@ -46,7 +46,7 @@ def write_overview(out: Path, command: str, outcomes: Sequence[Outcome]) -> None
 
 
 def table_text(out: Path, reduction: Reduction, outcomes: Sequence[Outcome]) -> str:
-    """Write one line an input; an empty cell where there is no value."""
+    """Write one line per input; an empty cell where there is no value."""
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow((*FIRST_COLUMNS, *reduction.COLUMNS, "seconds"))
@@ -61,7 +61,7 @@ def table_text(out: Path, reduction: Reduction, outcomes: Sequence[Outcome]) -> 
 
 
 def _no_formula(cell: Cell) -> Cell:
-    """Keep a spreadsheet from calculating a name: an apostrophe says that it is text."""
+    """Keep a spreadsheet from treating a name as a formula, by an apostrophe that marks text."""
     return f"'{cell}" if isinstance(cell, str) and cell.startswith(("=", "+", "-", "@", "\t")) else cell
 
 

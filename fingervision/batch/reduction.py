@@ -1,4 +1,4 @@
-"""How the results of a command are brought into a table, a figure and small pictures: one module a command."""
+"""How the results of a command are summarised in a table, a figure and small pictures: one module per command."""
 
 import importlib
 import pkgutil
@@ -17,22 +17,22 @@ PREFIX = "results_of_"
 
 
 class Reduction(Protocol):
-    """What a module `results_of_<command>` offers."""
+    """What a module `results_of_<command>` must provide."""
 
     COLUMNS: tuple[str, ...]
     """Columns of its table after those that every command has."""
 
     def digest_of(self, folder: Path) -> Digest:
-        """Read one result folder."""
+        """Summarise one result folder."""
         ...
 
     def draw(self, figure: "Figure", outcomes: Sequence[Outcome]) -> None:
-        """Draw all of them."""
+        """Draw the figure of all results."""
         ...
 
 
 def reduction_of(command: str) -> Reduction:
-    """Find the reduction of a command.
+    """Find the module that summarises the results of a command.
 
     Raises
     ------
@@ -43,6 +43,6 @@ def reduction_of(command: str) -> Reduction:
 
 
 def commands() -> tuple[str, ...]:
-    """Name the commands whose results can be brought together."""
+    """Names of the commands whose results can be summarised."""
     names = (module.name for module in pkgutil.iter_modules(fingervision.batch.__path__))
     return tuple(sorted(name.removeprefix(PREFIX) for name in names if name.startswith(PREFIX)))

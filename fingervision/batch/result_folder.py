@@ -1,4 +1,4 @@
-"""The folder of one result: written beside its place, renamed into it when whole, with a record of what it is of."""
+"""The folder of one result: written beside its final place and renamed when complete, with a record of its input."""
 
 import errno
 import hashlib
@@ -24,7 +24,7 @@ PART = re.compile(r"\.(?P<name>.+)\.part~(?P<host>[^~]+)~(?P<pid>\d+)~[0-9a-f]{8
 
 @dataclass(frozen=True, slots=True)
 class Record:
-    """What a result was made of, and what came out.
+    """Input of a result, and its outcome.
 
     Parameters
     ----------
@@ -60,7 +60,7 @@ class Record:
 
 
 def read_record(folder: Path) -> Record | None:
-    """Read the record of a result; None where there is none that can be read."""
+    """Read the record of a result; None where there is none, or it is unreadable."""
     try:
         held: Mapping[str, object] = json.loads((folder / RECORD).read_bytes())
         if held.pop("schema") != SCHEMA:  # type: ignore[attr-defined]
@@ -118,7 +118,7 @@ def states_of_tables(folder: Path) -> dict[str, tuple[int, int, str]]:
 
 
 def is_whole(folder: Path, record: Record) -> bool:
-    """Whether a result's tables are there as they were written; read only where their time of change is another."""
+    """Whether a result's tables are unchanged since they were written; they are read only if their time differs."""
     try:
         for name, (size, changed_ns, content) in record.tables.items():
             stat = (folder / name).stat()
@@ -135,7 +135,7 @@ def _hash(path: Path) -> str:
 
 
 def replace_text(path: Path, text: str) -> None:
-    """Write a text file; an older one stays whole until the new one is.
+    """Replace a text file; an older one stays complete until the new one is complete.
 
     Raises
     ------
@@ -153,14 +153,15 @@ def replace_text(path: Path, text: str) -> None:
 
 
 def new_part(folder: Path) -> Path:
-    """Name a folder beside the result's own, that no other worker uses; it tells whose it is."""
+    """Choose a name beside the result folder that no other worker uses; it contains the worker's identity."""
     return folder.with_name(f".{folder.name}.part~{_host()}~{os.getpid()}~{uuid4().hex[:8]}")
 
 
 def publish(part: Path, folder: Path, record: Record) -> None:
-    """Rename a whole result into its place; an older one is moved aside first and then removed.
+    """Rename a complete result into its place; an older one is moved aside first and then removed.
 
-    Where another worker was quicker with the same (a scheduler may hand out a task twice), its result stays.
+    Where another worker has finished the same task first (a scheduler may assign a task twice), that worker's result
+    stays.
 
     Raises
     ------
@@ -194,7 +195,7 @@ def is_same(there: Record, wanted: Record) -> bool:
 
 
 def remove_left_parts(out: Path) -> None:
-    """Remove what workers of this machine left that are no more; parts of living ones and of other machines stay."""
+    """Remove unfinished folders of dead workers of this machine; those of live workers and of other machines stay."""
     for entry in out.iterdir():
         found = PART.fullmatch(entry.name)
         if found is not None and found["host"] == _host() and not _lives(int(found["pid"])):

@@ -1,4 +1,4 @@
-"""Diagnoses together: how often each answer was given, and what it left of the disagreement."""
+"""Summary of diagnoses: how often each verdict was given, and the disagreement that it left."""
 
 import json
 from collections import Counter
@@ -23,7 +23,7 @@ FEWEST_PLACES = 6
 
 
 def digest_of(folder: Path) -> Digest:
-    """Read report.json of one diagnosis."""
+    """Summarise report.json of one diagnosis."""
     report = json.loads((folder / "report.json").read_text(encoding="utf-8"))
     names = " + ".join(effect["name"] for effect in report["effects"])
     values = [
@@ -45,7 +45,7 @@ def digest_of(folder: Path) -> Digest:
 
 
 def draw(figure: "Figure", outcomes: Sequence[Outcome]) -> None:
-    """Draw how often each answer was given, and the disagreement after it against that before."""
+    """Draw how often each verdict was given, and the disagreement after it against that before it."""
     left, right = figure.subplots(1, 2)
     done = [outcome.digest.cells for outcome in outcomes if outcome.digest is not None]
     answers = Counter((str(cells["effects"]) or str(cells["verdict"]), str(cells["verdict"])) for cells in done)

@@ -1,4 +1,4 @@
-"""Measurements together: how far each recording's gap went, and how surely."""
+"""Summary of measurements: range of each recording's gap, with its uncertainty."""
 
 import csv
 import json
@@ -29,7 +29,7 @@ MOST_NAMES = 40
 
 
 def digest_of(folder: Path) -> Digest:
-    """Read summary.json and gaps.csv of one measurement."""
+    """Summarise summary.json and gaps.csv of one measurement."""
     summary = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
     with (folder / "gaps.csv").open(encoding="utf-8", newline="") as file:
         gap_mm = np.array([float(row["gap_mm"]) if row["gap_mm"] else np.nan for row in csv.DictReader(file)])

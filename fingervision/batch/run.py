@@ -1,4 +1,4 @@
-"""A batch from start to finish: what is to be done, doing it, and the overview of all of it."""
+"""A batch from start to finish: planning, execution, and the overview of all results."""
 
 import json
 import os
@@ -23,7 +23,7 @@ OWN_FILES = (MARK, "batch.csv", "batch.png", "index.html")
 
 @dataclass(frozen=True, slots=True)
 class Job:
-    """What the user wants: one command, with the same options, on many inputs.
+    """The user's request: one command with the same options on many inputs.
 
     Parameters
     ----------
@@ -48,7 +48,7 @@ class Job:
 
 @dataclass(frozen=True, slots=True)
 class Plan:
-    """What is there already and what is to be done.
+    """Inputs whose result exists already, and inputs to process.
 
     Parameters
     ----------
@@ -66,7 +66,7 @@ class Plan:
 
     @property
     def to_do(self) -> tuple[int, ...]:
-        """Places of the tasks that remain."""
+        """Indices of the tasks that remain."""
         return tuple(number for number in range(len(self.tasks)) if number not in self.done)
 
 
@@ -93,12 +93,12 @@ class Batch:
 
     @property
     def bad(self) -> tuple[Outcome, ...]:
-        """Outcomes with a sentence to read."""
+        """Outcomes that have a message to read."""
         return tuple(outcome for outcome in self.outcomes if outcome.exit_code)
 
     @property
     def exit_code(self) -> ExitCode:
-        """0 all done; 3 done, but some inputs were bad; 1 stopped or none done; 2 none for the same wrong usage."""
+        """0 all done; 3 done, but some inputs were bad; 1 stopped or none done; 2 wrong usage in all inputs."""
         codes = {outcome.exit_code for outcome in self.outcomes}
         if self.stopped:
             return ExitCode.COULD_NOT
@@ -114,13 +114,13 @@ Progress = Callable[[int, int], None]
 
 
 def planned(job: Job) -> Plan:
-    """Find the inputs, and which of them have their result.
+    """Find the inputs, and which of them already have their result.
 
     An input keeps its folder from an earlier call; a new one gets the shortest unused name.
 
     Raises
     ------
-    FingervisionError
+    OutputError
         Nothing matches, or the folder for the results holds something else. Nothing is written yet.
     """
     names = inputs_of(job.inputs, job.out)
@@ -148,9 +148,9 @@ def planned(job: Job) -> Plan:
 
 
 def run(plan: Plan, crew: Crew, on_progress: Progress | None = None) -> Batch:
-    """Have a crew do what remains, and write the overview of all of it.
+    """Let workers process the remaining tasks, and write the overview of all results.
 
-    A full disk and Ctrl-C stop it; what is done is kept, and another call goes on.
+    A full disk or Ctrl-C stops the batch; finished results are kept, and another call continues.
 
     Parameters
     ----------
@@ -163,8 +163,10 @@ def run(plan: Plan, crew: Crew, on_progress: Progress | None = None) -> Batch:
 
     Raises
     ------
-    FingervisionError
-        The folder for the results cannot be made, the overview cannot be written, or the crew is gone.
+    OutputError
+        The folder for the results cannot be made, or the overview cannot be written.
+    ProcessError
+        All workers are gone.
     """
     _claim(plan.job)
     numbers = plan.to_do
@@ -203,7 +205,7 @@ def run(plan: Plan, crew: Crew, on_progress: Progress | None = None) -> Batch:
 
 
 def _check_folder(job: Job) -> None:
-    """Refuse a folder for the results that is something else."""
+    """Refuse a result folder that is used for something else."""
     try:
         entries = [entry.name for entry in os.scandir(job.out) if not entry.name.startswith(".")]
     except FileNotFoundError:
@@ -224,7 +226,7 @@ def _check_folder(job: Job) -> None:
 
 
 def _claim(job: Job) -> None:
-    """Make the folder for the results, and mark it as ours."""
+    """Create the result folder, and mark it as that of a batch."""
     mark = job.out / MARK
     try:
         job.out.mkdir(parents=True, exist_ok=True)

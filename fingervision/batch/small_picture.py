@@ -1,4 +1,4 @@
-"""A small picture of a curve, drawn into the page itself."""
+"""A small picture of a curve, embedded in the page."""
 
 from collections.abc import Sequence
 
@@ -6,7 +6,7 @@ WIDTH_PX, HEIGHT_PX, MARGIN_PX = 156, 44, 2
 
 
 def small_picture(curve: Sequence[float | None]) -> str:
-    """Draw values at even distances as SVG, scaled to their own range; holes stay open.
+    """Draw evenly spaced values as SVG, scaled to their own range; missing values leave holes.
 
     Parameters
     ----------

@@ -9,7 +9,7 @@ from fingervision.batch.digest import Digest
 
 @dataclass(frozen=True, slots=True)
 class Task:
-    """One input, to be worked on by one command.
+    """One input to be processed by one command.
 
     Parameters
     ----------
@@ -92,5 +92,5 @@ class Outcome:
 
 
 def failure(task: Task, words: str, seconds: float = 0.0, exit_code: int = 1, *, disk_full: bool = False) -> Outcome:
-    """Give the outcome of an input that left no result."""
+    """Return the outcome of an input without a result."""
     return Outcome(task.input, None, exit_code, words, None, seconds, disk_full)

@@ -1,4 +1,4 @@
-"""Versions of the software of a worker, and a hash of the source of this package."""
+"""Versions of a worker's software, and a hash of this package's source."""
 
 import hashlib
 import platform
@@ -14,7 +14,7 @@ LIBRARIES = ("numpy", "scipy", "opencv-python-headless", "scikit-image", "av", "
 
 @cache
 def versions() -> dict[str, str]:
-    """Name what is installed here, by what it is called."""
+    """Versions of the installed software, by name."""
     found = {"Python": ".".join(platform.python_version_tuple()[:2]), "fingervision": fingervision.__version__}
     for library in LIBRARIES:
         try:
@@ -25,14 +25,14 @@ def versions() -> dict[str, str]:
 
 
 def difference(here: dict[str, str], there: dict[str, str]) -> str:
-    """Say what differs, in words; empty where nothing does."""
+    """Describe the differences between two sets of versions; empty where there is none."""
     return ", ".join(
         f"{name} {there.get(name, 'unknown')} instead of {here[name]}" for name in here if there.get(name) != here[name]
     )
 
 
 def _source() -> str:
-    """Hash of every module and loop of both packages: two copies of one version may still differ."""
+    """Hash of every module and C loop of both packages, because two copies of one version may still differ."""
     found = hashlib.sha256()
     for package in (fingervision, calib):
         top = Path(str(package.__file__)).parent

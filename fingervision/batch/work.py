@@ -1,4 +1,4 @@
-"""One input from start to finish, in a worker; doing it twice does no harm."""
+"""Process one input in a worker; doing so twice does no harm."""
 
 import errno
 import os
@@ -24,10 +24,10 @@ NO_ROOM = (errno.ENOSPC, errno.EDQUOT)
 
 
 def work(task: Task, perform: Perform) -> Outcome:
-    """Bring the result of one input into its folder, unless it is there.
+    """Put the result of one input into its folder, unless it is there already.
 
-    Every failure is an outcome with a sentence. The folder appears whole, by a rename; an older result stays until
-    then, and stays where the new one fails.
+    Every failure becomes an outcome with a sentence. The folder appears complete, by a rename; an older result stays
+    until then, and also if the new one fails.
 
     Parameters
     ----------
@@ -54,7 +54,7 @@ def work(task: Task, perform: Perform) -> Outcome:
 
 
 def outcome_of(name: str, folder: Path, record: Record) -> Outcome:
-    """Give the outcome that a record tells of."""
+    """Return the outcome stated by a record."""
     return Outcome(name, folder, record.exit_code, record.words, record.digest, record.seconds, kept=True)
 
 

@@ -1,4 +1,4 @@
-"""The command line: one command a file, found by its file's name; thin."""
+"""The command line: one command per file, found by the file's name."""
 
 import errno
 import importlib
@@ -19,11 +19,11 @@ from fingervision.domain.errors import ExitCode, FingervisionError, UsageError
 class Commands(click.Group):
     """Every module in this package whose name has no leading underscore is a command of that name.
 
-    The module holds it as `command` and imports nothing heavy at its top, so that `--help` stays fast.
+    The module defines the command as `command` and imports nothing heavy at its top, so that `--help` stays fast.
     """
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
-        """Refuse empty names: a path that is empty would be the current folder."""
+        """Refuse empty names, because an empty path would mean the current folder."""
         for number, argument in enumerate(args, start=1):
             if argument == "" or (argument.startswith("--") and argument.endswith("=")):
                 raise UsageError(
@@ -37,7 +37,7 @@ class Commands(click.Group):
         return sorted(module.name for module in pkgutil.iter_modules(__path__) if not module.name.startswith("_"))
 
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
-        """Import the command's module, and only that."""
+        """Import the command's module, and no other."""
         if cmd_name not in self.list_commands(ctx):
             return None
         command = importlib.import_module(f"{__name__}.{cmd_name}").command
@@ -45,7 +45,7 @@ class Commands(click.Group):
         return command
 
     def invoke(self, ctx: click.Context) -> Any:
-        """Run the command; an argument's error names its option."""
+        """Run the command; an error about an argument names its option."""
         from fingervision.interface.argument_names import command_words
 
         with command_words():
@@ -59,7 +59,7 @@ def cli() -> None:
 
 
 def main() -> None:
-    """Run the command line; a foreseen error is one sentence and an exit code, never a traceback."""
+    """Run the command line; a foreseen error gives one sentence and an exit code, never a traceback."""
     # Who is asked to terminate (by a scheduler, at shut-down) ends as with Ctrl-C: in order, and with a sentence.
     with suppress(ValueError):  # not in a thread
         signal.signal(signal.SIGTERM, signal.default_int_handler)
@@ -97,7 +97,7 @@ def main() -> None:
 
 
 def _mend_streams() -> None:
-    """Put something where a standard stream was closed, and let names pass that are not UTF-8."""
+    """Replace closed standard streams, and allow names that are not UTF-8."""
     # A file that is opened would take the closed one's place, and FFmpeg would write its words into it.
     while (lowest := os.open(os.devnull, os.O_RDWR)) <= 2:
         pass

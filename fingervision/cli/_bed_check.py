@@ -1,4 +1,4 @@
-"""`fingervision bed check`: what a recipe would drive, how long it takes, and whether it fits the bed."""
+"""`fingervision bed check`: the motions of a recipe, its duration, and whether the bed can execute it."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""`fingervision bed home`: go to the reference, and make it position 0."""
+"""`fingervision bed home`: go to the reference, which becomes position 0."""
 
 import click
 
@@ -16,7 +16,7 @@ Examples:
 def command(bed_name: str) -> None:
     """Go to the reference: position 0.
 
-    This also clears what stopped the motor before.
+    This also clears the reason of an earlier stop.
     """
     from fingervision.testbed.bed_factory import open_bed
     from fingervision.testbed.manual import manual_control

@@ -1,4 +1,4 @@
-"""`fingervision bed run`: a recipe on the bed, from the first check to the table that `diagnose` takes."""
+"""`fingervision bed run`: execute a recipe on the bed, giving the table that `diagnose` takes."""
 
 from pathlib import Path
 

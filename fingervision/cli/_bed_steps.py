@@ -1,4 +1,4 @@
-"""`fingervision bed steps`: step data as a table and a plot, and run on a bed."""
+"""`fingervision bed steps`: step data as a table and a plot, and their execution on a bed."""
 
 from pathlib import Path
 

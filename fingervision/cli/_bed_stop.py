@@ -1,4 +1,4 @@
-"""`fingervision bed stop`: stop the motor, whoever moves it."""
+"""`fingervision bed stop`: stop the motor, whichever program moves it."""
 
 import click
 

@@ -1,4 +1,4 @@
-"""Options that state the bench: what no picture shows and the uncertainty budget needs."""
+"""Options that state properties of the bench that no picture shows and the uncertainty budget needs."""
 
 from collections.abc import Callable
 from typing import Any

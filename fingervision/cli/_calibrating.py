@@ -1,4 +1,4 @@
-"""The calibrating commands: options to arguments of `fingervision.calibrate`, its result to files and words."""
+"""The calibrating commands: options to arguments of `fingervision.calibrate`, and its result to files and text."""
 
 import json
 from collections.abc import Iterator, Sequence
@@ -14,7 +14,7 @@ from fingervision.domain.errors import NoCalibrationError, UsageError
 
 @contextmanager
 def sentences() -> Iterator[None]:
-    """Let calib's errors reach the user as this program's."""
+    """Convert calib's errors to this program's."""
     from calib.errors import CalibrationError
 
     try:

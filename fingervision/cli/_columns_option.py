@@ -1,4 +1,4 @@
-"""The option that says what the columns of foreign tables are."""
+"""The option that states the meaning of the columns of foreign tables."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""The option that adds effects of one's own to the catalogue for one command."""
+"""The option that adds user-defined effects to the catalogue for one command."""
 
 from collections.abc import Callable
 from functools import wraps
@@ -11,7 +11,7 @@ Command = Callable[..., Any]
 
 
 def effects_option(command: Command) -> Command:
-    """Add `--effects`: files whose effects stand in the catalogue while the command runs."""
+    """Add `--effects`: files whose effects belong to the catalogue while the command runs."""
 
     @wraps(command)
     def with_effects(*arguments: Any, effects_files: tuple[Path, ...], **options: Any) -> Any:

@@ -1,4 +1,4 @@
-"""A choice among the kinds of model there are, listed when it is asked for."""
+"""A choice among the kinds of model, listed only when needed."""
 
 from typing import Any
 
@@ -6,7 +6,7 @@ import click
 
 
 class KindChoice(click.ParamType):  # type: ignore[type-arg]  # generic in new versions of click alone
-    """A kind of model, built in or installed; nothing but names is looked at.
+    """A kind of model, built in or installed; only names are read.
 
     Parameters
     ----------
@@ -25,11 +25,11 @@ class KindChoice(click.ParamType):  # type: ignore[type-arg]  # generic in new v
         return (*kind_names(), *self._also)
 
     def get_metavar(self, *_: Any, **__: Any) -> str:
-        """Names in the help."""
+        """Names for the help."""
         return f"[{'|'.join(self._names())}]"
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> str:
-        """Refuse what is no kind, with the nearest."""
+        """Refuse an unknown kind, naming the nearest known one."""
         from difflib import get_close_matches
 
         names = self._names()

@@ -1,4 +1,4 @@
-"""Translate options of `live` to the settings of the live view."""
+"""Convert options of `live` to the settings of the live view."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -18,11 +18,11 @@ def choices_of(
     tips: str,
     roi: str | None,
 ) -> "Choices":
-    """Read what the options say of scale, height, direction and region.
+    """Read scale, height, direction and region from the options.
 
     Raises
     ------
-    FingervisionError
+    DataError, InputFileError
         The calibration cannot be read.
     UsageError
         An option makes no sense.

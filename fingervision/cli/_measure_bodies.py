@@ -1,4 +1,4 @@
-"""`fingervision measure --mechanism`: the bodies of a drawing, followed through a recording."""
+"""`fingervision measure --mechanism`: measure the poses of a mechanism's bodies in a recording."""
 
 from pathlib import Path
 
@@ -18,7 +18,7 @@ from fingervision.storage.mechanism_toml import is_mechanism, read_mechanism
 def follow_bodies(
     source: FrameSource, drawing: Path, points: tuple[str, ...], task: Task, folder: Path, as_json: bool
 ) -> None:
-    """Follow the bodies, write bodies.csv, and say how often each was seen."""
+    """Measure the bodies, write bodies.csv, and print how often each was found."""
     given = [parse_point(text) for text in points]
     how = prepared(source.description, task)
     frames = coded(source, how.description.coding)

@@ -23,7 +23,7 @@ MOST_FIELDS = 200
 def measure_response(
     items: Sequence[str], edges: bool, densities: str | None, roi: str | None, out: Path, as_json: bool
 ) -> None:
-    """Measure a response, write it and say what it is.
+    """Measure a response, write it and print its description.
 
     Raises
     ------

@@ -126,7 +126,7 @@ def predict(
 
 @contextmanager
 def _naming(path: Path) -> Iterator[None]:
-    """Let a refusal of a drawing name its file."""
+    """Add the drawing's file name to an error."""
     try:
         yield
     except FingervisionError as error:
@@ -136,14 +136,14 @@ def _naming(path: Path) -> Iterator[None]:
 
 
 def _inputs_mm(inputs: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Rows of the static table: the drive's own inputs, or as many as a curve needs."""
+    """Inputs of the static table: the drive's own inputs, or as many as a curve needs."""
     if inputs.size < 2:
         raise UsageError(f"--drive must hold at least two different inputs, but holds {inputs.size}.")
     return inputs if inputs.size <= _MOST_ROWS else np.linspace(inputs[0], inputs[-1], _MOST_ROWS)
 
 
 def _curve(states: list[MechanismState]) -> PchipInterpolator:
-    """Lengths and force over the input, in the order of a motion's columns; a contact may bend it sharply."""
+    """Lengths and force over the input, in the column order of a motion; a contact may bend the curve sharply."""
     rows = [
         [*state.pairs_mm.values(), *(part for probe in state.probes_mm.values() for part in probe), state.force_n]
         for state in states
@@ -175,7 +175,7 @@ def _warn(
     mechanism: Mechanism, model: MechanismModel, states: list[MechanismState], table: dict[str, dict[str, float]], *,
     contact: bool,
 ) -> None:  # fmt: skip
-    """Say what the answers leave out: the yield, faces that pass through each other, kinds that differ."""
+    """Warn of limits of the results: yield, faces that penetrate each other, kinds that differ."""
     worst = max(states, key=lambda state: state.stress_mpa)
     if worst.stress_mpa > mechanism.material.yield_mpa:
         at_yield_mm = next(iter(table.values()))["input_at_yield_mm"]

@@ -1,4 +1,4 @@
-"""`fingervision model --frequency`: how a mechanism answers a drive that shakes it."""
+"""`fingervision model --frequency`: response of a mechanism to a vibrating drive."""
 
 import csv
 from collections.abc import Callable, Mapping
@@ -54,7 +54,7 @@ def parse_band(text: str) -> Band:
 def answer_frequencies(
     models: Mapping[str, Any], band: Band, damping: str, name: str, out: Path, *, as_json: bool
 ) -> None:
-    """Write frequency.csv and frequency.png of every kind with masses."""
+    """Write frequency.csv and frequency.png of every kind of model with masses."""
     found: dict[str, FrequencyResponse] = {}
     for kind, model in models.items():
         if isinstance(getattr(model, "half", None), DrivenBody):
@@ -74,7 +74,7 @@ def answer_frequencies(
 
 
 def modes_to(reduce: Callable[[int], ModalModel], highest_hz: float, unknowns: int) -> ModalModel:
-    """Take as many modes as lie below a frequency, and one more."""
+    """Choose the modes below a frequency, and one more."""
     count = min(MODES, unknowns - 2)
     while True:
         reduced = reduce(count)
@@ -90,7 +90,7 @@ def modes_to(reduce: Callable[[int], ModalModel], highest_hz: float, unknowns: i
 
 
 def respond_to(reduced: ModalModel, free: FreeModes, band: Band, damping: str) -> FrequencyResponse:
-    """Answer a band, resolved about every resonance."""
+    """Compute the response over a band, resolved around every resonance."""
     law = parse_damping(damping)
     for rad_s in (reduced.rad_s, free.rad_s):
         known = described(law, rad_s).size
@@ -105,7 +105,7 @@ def respond_to(reduced: ModalModel, free: FreeModes, band: Band, damping: str) -
 
 
 def peaks_of(answer: FrequencyResponse, column: str) -> str:
-    """Say where the response peaks, with the drive held to its motion and free under its force."""
+    """Sentence on where the response peaks, with the drive's motion prescribed and with the drive free."""
     words = []
     for what, curve in (
         ("per input", answer.per_input[column]), ("per force", answer.per_force_mm_n[column]),
@@ -137,7 +137,7 @@ def write_frequencies(found: Mapping[str, FrequencyResponse], columns: tuple[str
 
 
 def draw_frequencies(found: Mapping[str, FrequencyResponse], column: str, title: str, path: Path) -> None:
-    """Draw amplitude and phase by input (drive held to its motion) and by force (drive free)."""
+    """Draw amplitude and phase by input (motion prescribed) and by force (drive free)."""
     figure = Figure(figsize=(10.0, 7.0), layout="constrained")
     (upper, upper_force), (lower, lower_force) = figure.subplots(2, 2, sharex=True, height_ratios=(3, 2))
     label = column.removesuffix("_mm").replace("_", " ")
@@ -178,7 +178,7 @@ def mechanism_frequencies(model: MechanismPlate, band: Band, damping: str, out: 
 
 
 def main_column(reduced: ModalModel) -> str:
-    """Return the gap where there is one, else the length that moves most."""
+    """Return the gap where there is one, else the length that changes most."""
     if GAP in reduced.observed:
         return GAP
     return max(reduced.observed, key=lambda column: abs(reduced.observed[column].per_input))

@@ -1,4 +1,4 @@
-"""`fingervision model --object-mm`: the grip on a part between the fingers, as a table and a figure."""
+"""`fingervision model --object-mm`: gripping force on a part between the fingers, as a table and a figure."""
 
 import csv
 from collections.abc import Mapping
@@ -49,9 +49,9 @@ def write_grip(
     gripper: Gripper, models: Mapping[str, Any], part: Part, inputs: NDArray[np.float64] | None, name: str, out: Path,
     *, errors: Mapping[str, float], as_json: bool,
 ) -> None:  # fmt: skip
-    """Write grip.csv and grip.png of every kind, and say what holds the part; small displacements.
+    """Write grip.csv and grip.png of every kind, and print how the part is held; small displacements.
 
-    `errors` are the kinds' relative model errors of the grip.
+    `errors` are the relative model errors of the gripping force by kind.
     """
     rows: dict[str, NDArray[np.float64]] = {}
     said = []
@@ -80,7 +80,7 @@ def write_grip(
 
 
 def _closing_limit_mm(gripper: Gripper, model: Any, touch_mm: float | None) -> float:
-    """Return an input by which the part is held well: half as far again as from rest to the touch of the fingers."""
+    """Input by which the part is held well: 1.5 times as far as from rest to the touch of the fingers (mm)."""
     touch = model.half.first_touch_mm() if hasattr(model, "half") else model.first_touch_mm()
     reach = abs(touch) if touch is not None else 0.01 * gripper.body.height_mm
     return (touch_mm or 0.0) - 0.5 * reach
@@ -97,7 +97,7 @@ def _row(model: Any, input_mm: float, part: Part) -> tuple[float, ...]:
 
 
 def _words(gripper: Gripper, kind: str, model: Any, part: Part, touch_mm: float, error: float) -> str:
-    """Say when a part is touched, how fast the grip rises, and where the hinges would yield."""
+    """Sentence on when a part is touched, how fast the grip rises, and where the hinges would yield."""
     limit = gripper.material.yield_mpa
     step = 0.2 * abs(model.half.first_touch_mm() or touch_mm)
     near = [model.stressed(grip_equilibrium(model.half, touch_mm - by, part)) for by in (0.0, step)]

@@ -1,4 +1,4 @@
-"""`fingervision model --modes`: natural frequencies, their shapes drawn, and as a film."""
+"""`fingervision model --modes`: natural frequencies, with their shapes as drawings and as a film."""
 
 from collections.abc import Mapping, Sequence
 from fractions import Fraction
@@ -30,7 +30,7 @@ _MOST_FILM_MODES = 18
 def write_gripper_modes(
     models: Mapping[str, Any], wanted: ModesWanted, name: str, out: Path, *, film: bool, as_json: bool
 ) -> None:
-    """Write modes.csv for every kind that vibrates, and the pictures of the best of them."""
+    """Write modes.csv for every kind with masses, and the pictures of the most trusted of them."""
     found = {
         kind: gripper_mode_shapes(model, wanted)
         for kind, model in models.items()
@@ -40,7 +40,7 @@ def write_gripper_modes(
 
 
 def write_modes(found: Mapping[str, Sequence[ModeShape]], name: str, out: Path, *, film: bool, as_json: bool) -> None:
-    """Write modes.csv, modes.png and, where asked for, modes.mp4."""
+    """Write modes.csv, modes.png and, if requested, modes.mp4."""
     lines = ["kind,family,number,frequency_hz"]
     for kind, shapes in found.items():
         lines += [f"{kind},{s.family},{s.number},{s.frequency_hz:.7g}" for s in shapes]
@@ -63,7 +63,7 @@ def write_modes(found: Mapping[str, Sequence[ModeShape]], name: str, out: Path, 
 
 
 def _panels(shapes: Sequence[ModeShape], title: str) -> tuple[Figure, list[tuple[Axes, LineCollection, ModeShape]]]:
-    """Draw every mode in a panel of its own, each family beginning a row; return what moves in it."""
+    """Draw every mode in its own panel, one row per family; return the parts that move."""
     families = [[s for s in shapes if s.family == f] for f in dict.fromkeys(s.family for s in shapes)]
     columns = min(_A_ROW, max(map(len, families)))
     if columns == 1:
@@ -99,7 +99,7 @@ def _panels(shapes: Sequence[ModeShape], title: str) -> tuple[Figure, list[tuple
 
 
 def _film(shapes: Sequence[ModeShape], title: str, path: Path) -> None:
-    """Write every mode swinging at one period a second, side by side."""
+    """Write a film of every mode vibrating with a period of one second, side by side."""
     figure, moving = _panels(shapes, f"{title}; slowed to one swing a second")
     # H.264 with halved colour needs even sides.
     sides = [2 * ceil(side * _FILM_DPI / 2) / _FILM_DPI for side in figure.get_size_inches()]

@@ -28,7 +28,7 @@ _STYLES = ("-", "--", "-.")
 
 
 def at_rate(drive: DriveHistory, rate_hz: float | None) -> DriveHistory:
-    """Put samples between the drive's own, straight between them, where a rate is asked for."""
+    """Interpolate the drive linearly to a higher rate, where one is requested."""
     if rate_hz is None:
         return drive
     if not (isfinite(rate_hz) and rate_hz > 0.0):
@@ -53,7 +53,7 @@ def at_rate(drive: DriveHistory, rate_hz: float | None) -> DriveHistory:
 
 @dataclass(frozen=True, slots=True)
 class MotionAsked:
-    """Options of `model` for motion in time and frequency, checked before anything is computed."""
+    """Options of `model` for motion in time and frequency, checked before any computation."""
 
     drive: DriveHistory | None
     modes: ModesWanted | None
@@ -63,7 +63,7 @@ class MotionAsked:
 
     @property
     def moves(self) -> bool:
-        """Whether anything in motion was asked for."""
+        """Whether a motion in time or frequency was requested."""
         return self.drive is not None or self.modes is not None or self.band is not None
 
 
@@ -77,7 +77,7 @@ def motion_asked(
     *,
     film: bool,
 ) -> MotionAsked:
-    """Read what was asked for.
+    """Read the options.
 
     Raises
     ------
@@ -101,7 +101,7 @@ def motion_asked(
 def move(
     models: Mapping[str, Any], asked: MotionAsked, name: str, folders: Mapping[str, Path], out: Path, *, as_json: bool
 ) -> None:
-    """Answer all that was asked for in motion of a gripper's models."""
+    """Compute all requested motions of a gripper's models."""
     if asked.drive is not None:
         follow_drive(models, asked.drive, asked.damping, name, folders, out, as_json=as_json)
     if asked.band is not None:
@@ -115,7 +115,7 @@ def move(
 def move_mechanism(
     model: MechanismPlate, asked: MotionAsked, static: PchipInterpolator | None, out: Path, *, as_json: bool
 ) -> None:
-    """Answer all that was asked for in motion of a mechanism drawn by bodies."""
+    """Compute all requested motions of a mechanism drawn by bodies."""
     name = model.mechanism.name
     if asked.drive is not None:
         mechanism_motion(model, asked.drive, asked.damping, static, out, as_json=as_json)
@@ -150,7 +150,7 @@ def follow_drive(
 
 
 def words_of(motion: Motion, column: str) -> str:
-    """Say how far a mechanism vibrates, and with which damping."""
+    """Sentence on how far a mechanism vibrates, and with which damping."""
     pairs = ", ".join(
         f"{z:.3g} at {f:.4g} Hz" for z, f in zip(motion.damping_ratios[:3], motion.modes_hz[:3], strict=True)
     )
@@ -166,7 +166,7 @@ _SEEN_ROWS = 60
 
 
 def draw_motion(motions: Mapping[str, Motion], column: str, title: str, path: Path) -> None:
-    """Draw input, one length, its difference from the static answer, and the force over time."""
+    """Draw input, one length, its difference from the static response, and the force over time."""
     figure = Figure(figsize=(8.0, 9.0), layout="constrained")
     panels = figure.subplots(4, 1, sharex=True)
     label = column.removesuffix("_mm").replace("_", " ")
@@ -202,7 +202,7 @@ def mechanism_motion(
 ) -> None:
     """Write response.csv and response.png of a mechanism drawn by bodies.
 
-    With large rotation or contact `static` gives the equilibria: the observed lengths in their order, then the force.
+    With large rotation or contact, `static` gives the equilibria: the observed lengths in order, then the force.
     """
     name = model.mechanism.name
     reduced = model.modal_model(MODES)

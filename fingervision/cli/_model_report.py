@@ -1,4 +1,4 @@
-"""The table of the `model` command, and the sentences about what limits its answers."""
+"""Table of the `model` command, and sentences on the limits of its results."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -18,7 +18,7 @@ from fingervision.models.yield_limit import input_at_yield_mm
 
 
 def write_table(rows: Mapping[str, Mapping[str, Any]], path: Path) -> None:
-    """Write models.csv: one line a kind, empty where a kind knows nothing."""
+    """Write models.csv: one line per kind, with empty cells for figures that a kind lacks."""
     names = list(next(iter(rows.values())))
     lines = [",".join(["kind", *names])]
     lines += [",".join([kind, *(_cell(row[name]) for name in names)]) for kind, row in rows.items()]
@@ -30,7 +30,7 @@ def _cell(value: float | None) -> str:
 
 
 def print_table(rows: Mapping[str, Mapping[str, Any]], *, as_json: bool) -> None:
-    """Print one row a figure, one column a kind."""
+    """Print one row per figure, one column per kind."""
     import json
 
     if as_json:
@@ -54,7 +54,7 @@ def say_what_limits(
     *,
     as_json: bool,
 ) -> None:
-    """Warn of stress beyond the yield, of fingers that pass through each other, and of what a kind does not have."""
+    """Warn of stress beyond the yield, of fingers that penetrate each other, and of physics that a kind lacks."""
     for kind in by_trust(models):
         if hasattr(models[kind], "loaded"):
             _warn_of_stress(gripper, models[kind], inputs)

@@ -1,4 +1,4 @@
-"""`fingervision model --vary`: a table and a plot over numbers of the drawing."""
+"""`fingervision model --vary`: a table and a plot over dimensions of the drawing."""
 
 import json
 from collections.abc import Sequence
@@ -50,7 +50,7 @@ def sweep_mechanism(drawing: MechanismDrawing, texts: tuple[str, ...], out: Path
 
 
 def number_unit(name: str) -> str:
-    """Return the unit of a drawing's number by its name; lengths that a drawing names itself are in mm."""
+    """Unit of a drawing's number; lengths named by the drawing itself are in mm."""
     return next((unit for end, unit in _ENDS.items() if name.endswith(end)), "mm" if "lengths." in name else "1")
 
 
@@ -84,7 +84,7 @@ def _write(
 def _draw(
     name: str, variations: Sequence[Variation], values: Array, columns: Sequence[str], answers: Array, path: Path
 ) -> None:
-    """Draw every column over the number that runs fastest; the first number colours the curves of a grid."""
+    """Draw every column over the number that varies fastest; the first number colours the curves of a grid."""
     last = variations[-1]
     count = len(last.values)
     first = values[::count, 0]

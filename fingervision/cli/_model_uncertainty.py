@@ -1,4 +1,4 @@
-"""The figures of `fingervision model` with their uncertainty, where a drawing states that of its numbers."""
+"""Figures of `fingervision model` with their uncertainty, where the drawing states that of its dimensions."""
 
 import csv
 from collections.abc import Mapping
@@ -30,7 +30,7 @@ def write_uncertainty(
     found: Mapping[str, FigureUncertainty], rows: Mapping[str, Mapping[str, float | None]], name: str, out: Path,
     *, as_json: bool,
 ) -> None:  # fmt: skip
-    """Write uncertainty.csv and uncertainty.png, and print the best kind's figures with what contributes most.
+    """Write uncertainty.csv and uncertainty.png, and print the most trusted kind's figures with the main contributions.
 
     Parameters
     ----------
@@ -78,7 +78,7 @@ def _method(own: FigureUncertainty) -> str:
 
 
 def _draw(stated: Mapping[str, FigureUncertainty], row: Mapping[str, float | None], title: str, path: Path) -> None:
-    """Draw, for the main figures, which numbers their variance comes from."""
+    """Draw, for the main figures, how much each dimension contributes to the variance."""
     names = [figure for figure in _DRAWN if figure in stated] or list(stated)[: len(_DRAWN)]
     inputs = list(dict.fromkeys(n for figure in names for n, _ in stated[figure].shares))
     figure = Figure(figsize=(9.0, 1.6 + 0.5 * max(len(names), 1)), layout="constrained")

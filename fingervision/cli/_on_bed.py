@@ -9,7 +9,7 @@ Command = Callable[..., Any]
 
 
 def bed_option(command: Command) -> Command:
-    """Add `--bed`: the word simulated, or the file that says what the bed is made of."""
+    """Add `--bed`: the word simulated, or the configuration file of a bed."""
     return click.option(
         "--bed", "bed_name", default="simulated", show_default=True, metavar="simulated|CONFIG.toml",
         help="The bed: simulated, or a file that says what it is made of (see fingervision/testbed/README.md).",

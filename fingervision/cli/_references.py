@@ -1,4 +1,4 @@
-"""Pictures of references as the command line names them: IMAGE=SIZE_MM, slot:IMAGE=SIZE_MM."""
+"""References on the command line: IMAGE=SIZE_MM, slot:IMAGE=SIZE_MM."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -14,7 +14,7 @@ def named_references(
     form: str = "SIZE_MM with a positive size",
     example: str = "ref5.png=5.000",
 ) -> list[tuple[str, Path, float]]:
-    """Kind, picture and value of every item; `form` and `example` say in a sentence what the value must be."""
+    """Kind, picture and value of every item; `form` and `example` state in an error what the value must be."""
     return [_item(item, kind, form, example) for item in items]
 
 

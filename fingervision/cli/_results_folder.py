@@ -1,4 +1,4 @@
-"""Where a command's results go: never over those of another input."""
+"""Folder of a command's results, which never replaces those of another input."""
 
 from pathlib import Path
 
@@ -6,7 +6,7 @@ import click
 
 
 def results_folder(out: Path, source: Path) -> Path:
-    """Give the folder that --out names, or the usual one; another where that holds the results of another input.
+    """Return the folder of --out, or the default one; another if that has the results of another input.
 
     Parameters
     ----------
@@ -31,7 +31,7 @@ def results_folder(out: Path, source: Path) -> Path:
 
 
 def running_command() -> str:
-    """Give the command line that is running, as a result names it."""
+    """Return the present command line, for the provenance of a result."""
     import shlex
     import sys
 

@@ -1,4 +1,4 @@
-"""A command run by a program: its sentence and exit code are returned, and nothing is printed."""
+"""Run a command for a program: its message and exit code are returned, and nothing is printed."""
 
 from contextlib import redirect_stderr, redirect_stdout
 from io import StringIO

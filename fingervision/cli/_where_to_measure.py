@@ -1,4 +1,4 @@
-"""Options of every command that measures pictures: the scale, the height, the tips' direction, the region."""
+"""Options of every command that measures pictures: scale, height, direction of the tips, region."""
 
 from collections.abc import Callable
 from functools import wraps
@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 
 
 def _take_settings(context: click.Context, parameter: click.Parameter, path: Path | None) -> Path | None:
-    """Let a settings file stand for options that are not given."""
+    """Use a settings file for options that are not given."""
     if path is None:
         return None
     from fingervision.storage.settings_toml import read_settings
@@ -60,7 +60,7 @@ OPTIONS = (
 
 
 def where_to_measure(command: Callable[..., Any]) -> Callable[..., Any]:
-    """Give a command these options."""
+    """Add these options to a command."""
 
     @wraps(command)
     def with_one_scale(**options: Any) -> Any:

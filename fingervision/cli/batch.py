@@ -46,7 +46,7 @@ def command() -> None:
 
 
 def _batch_of(name: str) -> click.Command:
-    """Give a command for many inputs: the single one's options, and those of a batch."""
+    """Make a batch command: the options of the single command, and those of a batch."""
     single = cli.get_command(click.Context(cli), name)
     assert single is not None  # noqa: S101 - named below
     options = [
@@ -118,7 +118,7 @@ def _run(
 
 
 def _arguments(given: Mapping[click.Option, Any], *, absolute: bool) -> list[str]:
-    """Write options as on a command line; files by their whole path for other machines."""
+    """Write options as on a command line; files with absolute paths for other machines."""
     words: list[str] = []
     for option, value in given.items():
         flag = option.opts[0]
@@ -131,7 +131,7 @@ def _arguments(given: Mapping[click.Option, Any], *, absolute: bool) -> list[str
 
 
 def _options_key(name: str, given: Mapping[click.Option, Any]) -> str:
-    """Hash what decides the results besides the input: options, the content of files that they name, the version."""
+    """Hash of what determines the results besides the input: options, content of files that they name, version."""
     import hashlib
     import json
 
@@ -146,30 +146,32 @@ def _options_key(name: str, given: Mapping[click.Option, Any]) -> str:
 
 
 def _content(path: Path, inside: tuple[Path, ...] = ()) -> str:
-    """Hash of a file, and of the files that a corrected model rests on."""
+    """Hash of a file, and of the files to which a corrected model refers."""
     import hashlib
     import tomllib
 
     from fingervision.batch.fingerprint import content_hash
-    from fingervision.storage.plain_file import plain
+    from fingervision.storage.plain_file import plain, why
 
     try:
         found = content_hash(plain(path))
-        base = tomllib.loads(path.read_text(encoding="utf-8")).get("base") if path.suffix.lower() == ".toml" else None
+        base = (
+            tomllib.loads(path.read_text(encoding="utf-8-sig")).get("base") if path.suffix.lower() == ".toml" else None
+        )
     except FileNotFoundError:
         raise InputFileError(f"There is no file {path}: check the options.") from None
     except (OSError, ValueError) as error:
-        raise InputFileError(f"{path} could not be read ({error}): check the options.") from error
+        raise InputFileError(f"{path} could not be read ({why(error)}): check the options.") from error
     place = path.resolve()
-    if base is None or (path.parent / str(base)).resolve() in (*inside, place):
+    if not (isinstance(base, str) and base.isprintable()) or (path.parent / base).resolve() in (*inside, place):
         return found  # a model that rests on itself is said where it is read
     return hashlib.sha256(f"{found}\n{_content(path.parent / str(base), (*inside, place))}".encode()).hexdigest()
 
 
 def _check_options(name: str, arguments: tuple[str, ...], ask: "Perform") -> None:
-    """Refuse options that cannot be meant, once and before any work.
+    """Refuse invalid options, once and before any work.
 
-    The command is asked for an input that does not exist: it must complain of that and of nothing else.
+    The command is called for an input that does not exist: its only error must be about that input.
     """
     from tempfile import TemporaryDirectory
 
@@ -218,7 +220,7 @@ class _Bar:
 
 
 def _report(plan: "Plan", batch: "Batch", as_json: bool) -> None:
-    """Say what came out, and what went wrong on the error stream."""
+    """Print the result, and errors on the error stream."""
     import json
 
     if as_json:

@@ -19,7 +19,7 @@ class BedCommands(click.Group):
         return sorted(module.name.removeprefix(PREFIX) for module in modules if module.name.startswith(PREFIX))
 
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
-        """Import the subcommand's module, and only that."""
+        """Import the subcommand's module, and no other."""
         if cmd_name not in self.list_commands(ctx):
             return None
         command = importlib.import_module(f"{fingervision.cli.__name__}.{PREFIX}{cmd_name}").command

@@ -1,4 +1,4 @@
-"""fingervision calibrate: pixels to millimetres from a reference, with an uncertainty that is true."""
+"""`fingervision calibrate`: pixels to millimetres from a reference, with an uncertainty budget."""
 
 import json
 from collections.abc import Callable, Sequence

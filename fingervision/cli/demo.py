@@ -1,4 +1,4 @@
-"""`fingervision demo`: the whole loop on the simulated bed, each step in a line."""
+"""`fingervision demo`: the whole procedure on the simulated bed, with each step in a line."""
 
 from pathlib import Path
 

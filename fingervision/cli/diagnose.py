@@ -1,4 +1,4 @@
-"""`fingervision diagnose`: which effect is missing, added to the model, with the disagreement before and after."""
+"""`fingervision diagnose`: name the missing effect, add it to the model, and compare before and after."""
 
 from pathlib import Path
 
@@ -53,7 +53,7 @@ def command(
     columns: Path | None,
     as_json: bool,
 ) -> None:
-    """Name the effect that a model lacks beside a measured table."""
+    """Name the effect that a model lacks, from a measured table."""
     import json
     import sys
 

@@ -1,4 +1,4 @@
-"""`fingervision example`: a runnable case, copied into a folder of one's own."""
+"""`fingervision example`: copy a runnable example into a new folder."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""`fingervision gauge`: draw gauges of one's own on a recording, in the browser."""
+"""`fingervision gauge`: draw user-defined gauges on a recording, in the browser."""
 
 from pathlib import Path
 

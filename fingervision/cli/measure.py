@@ -209,7 +209,7 @@ class _Bar:
 
 
 def _report(measured: "Measured", as_json: bool) -> None:
-    """Say what came out on standard output, and what went wrong on the error stream."""
+    """Print the result on standard output, and errors on the error stream."""
     from fingervision.domain.status import Status
     from fingervision.storage.summary_json import summary_text
 

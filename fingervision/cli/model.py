@@ -234,7 +234,7 @@ def _inputs_mm(drive: Path, columns: Path | None, gripper: "Gripper") -> "NDArra
 
 
 def _with_rows_between(inputs: "NDArray[np.float64]", figures: "ModelFigures") -> "NDArray[np.float64]":
-    """Add rows between a drive's inputs, and the first touch: a table is read as straight between its rows."""
+    """Add rows between a drive's inputs, and at the first touch, because a table is linear between its rows."""
     import numpy as np
 
     low, high = float(inputs.min()), float(inputs.max())
@@ -244,7 +244,7 @@ def _with_rows_between(inputs: "NDArray[np.float64]", figures: "ModelFigures") -
 
 
 def _inputs_until_touch(figures: "ModelFigures") -> "NDArray[np.float64]":
-    """Inputs from the first touch to three times as far the other way: the paper's own range."""
+    """Inputs from the first touch to three times as far in the other direction: the published range."""
     import numpy as np
 
     touch = figures.contact_input_mm or -0.1

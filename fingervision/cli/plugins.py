@@ -1,4 +1,4 @@
-"""`fingervision plugins`: every part that can be added by others, and where each comes from."""
+"""`fingervision plugins`: every part that can be added by plug-ins, and its origin."""
 
 from typing import Any
 

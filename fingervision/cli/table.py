@@ -1,4 +1,4 @@
-"""`fingervision table`: what a foreign table was understood as, and columns.toml to read it so again."""
+"""`fingervision table`: how a foreign table was interpreted, and columns.toml to read it in the same way again."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -84,7 +84,7 @@ def command(
 
 
 def _name_for(file: Path, target: Path) -> str:
-    """Path of the table from the folder of columns.toml."""
+    """Path of the table relative to the folder of columns.toml."""
     import os
 
     return Path(os.path.relpath(file.resolve(), target.parent.resolve())).as_posix()
@@ -129,7 +129,7 @@ def _print(found: "Account") -> None:
 
 
 def _draw(found: "Account", png: Path) -> None:
-    """Draw the curve with the file's name, as it was understood."""
+    """Draw the curve as it was interpreted, with the file's name."""
     from fingervision.domain.errors import DataError, OutputError
 
     curve = found.curve()

@@ -1,1 +1,1 @@
-"""The whole loop on the simulated bed, from a hidden effect to the report that names it."""
+"""The whole procedure on the simulated bed, from a hidden effect to the report that names it."""

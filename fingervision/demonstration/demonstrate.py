@@ -1,4 +1,4 @@
-"""The whole loop on the simulated bed: hide, run, measure, diagnose, run what was proposed, and say how it ended."""
+"""The whole procedure on the simulated bed: hide an effect, run, measure, diagnose, and do the run proposed."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -37,7 +37,7 @@ Say = Callable[[str], None]
 
 @dataclass(frozen=True, slots=True)
 class Shown:
-    """How a demonstration ended.
+    """Outcome of a demonstration.
 
     Parameters
     ----------
@@ -58,27 +58,27 @@ class Shown:
 
     @property
     def among(self) -> bool:
-        """Whether what was hidden is among what the data cannot tell apart."""
+        """Whether the hidden effect is in the ambiguity set of the answer."""
         return any(set(names) == set(self.hidden.effects) for names in self.report.alternatives)
 
     @property
     def found(self) -> bool:
-        """Whether the answer is what was hidden."""
+        """Whether the diagnosis named the hidden effect."""
         return {effect.name for effect in self.report.effects} == set(self.hidden.effects) and (
             self.report.verdict is (Verdict.NAMED if self.hidden.effects else Verdict.AGREES)
         )
 
 
 def demonstrated() -> tuple[str, ...]:
-    """Name the effects that a few short runs can tell from everything else."""
+    """Names of the effects that a few short runs can distinguish from all others."""
     return tuple(name for name, effect in catalogue().items() if effect.demonstrated)
 
 
 def drawn(seed: int) -> Hidden:
-    """Choose an effect and its size by a seed: one of those that the catalogue says can be demonstrated.
+    """Choose by a seed an effect, among those declared fit for a demonstration, and its size.
 
-    Each effect draws a lot by its name, so that a new one changes what only those seeds hide for which it wins
-    (rendezvous hashing: Thaler & Ravishankar 1998, doi:10.1109/90.663936).
+    Each effect draws a random number from the seed and its name, and the highest one wins (rendezvous hashing: Thaler &
+    Ravishankar 1998, doi:10.1109/90.663936), so that a new effect changes only the seeds for which it wins.
     """
     rng = np.random.default_rng([seed, 7])
     name = max(demonstrated(), key=lambda name: float(np.random.default_rng([seed, crc32(name.encode())]).random()))
@@ -91,7 +91,7 @@ def drawn(seed: int) -> Hidden:
 
 
 def demonstrate(hidden: Hidden, seed: int, out: Path, say: Say) -> Shown:
-    """Run the loop until the answer is one, or nothing more is proposed.
+    """Repeat diagnosis and proposed run until one explanation is left, or nothing more is proposed.
 
     Parameters
     ----------
@@ -138,7 +138,7 @@ def demonstrate(hidden: Hidden, seed: int, out: Path, say: Say) -> Shown:
 
 
 def _answer(table: Path, simulation: Path, out: Path, seed: int) -> tuple[Diagnosis, Path]:
-    """Diagnose and write what `fingervision diagnose` writes."""
+    """Diagnose, and write the files that `fingervision diagnose` writes."""
     model = read_model(simulation)
     done = diagnose(read_measured_table(table), model, seed=seed)
     with out_folder(out):

@@ -1,1 +1,1 @@
-"""Where simulation and measurement disagree, which effect is missing, and what remains."""
+"""Compare simulation and measurement: where they disagree, which effect is missing, and what remains."""

@@ -27,7 +27,7 @@ PIECE_S, LEAST_PIECE = 1.0, 12
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Comparison:
-    """Regions that cannot be noise, and the residual that they were found in.
+    """Regions where the residual cannot be noise, and that residual.
 
     Parameters
     ----------
@@ -49,7 +49,7 @@ class Comparison:
     noise_mm: float
 
     def document(self) -> dict[str, object]:
-        """Lay the comparison out for programs."""
+        """The comparison as a document for programs."""
         return {
             "schema": 1,
             "rms_mm": self.rms_mm,
@@ -72,9 +72,9 @@ class Comparison:
 
 
 def rough(residual_mm: Array, history: History) -> Array:
-    """What is left of a residual beside broken lines, one from reversal to reversal in each run; shape as given.
+    """Residual minus broken lines, one from reversal to reversal in each run; shape as given.
 
-    A step where the direction turns reaches all frequencies, so that a spectrum alone would take it for noise.
+    A step at a reversal contains all frequencies, so that a spectrum alone would take it for noise.
     """
     n = history.input_mm.size
     if history.time_s is None:

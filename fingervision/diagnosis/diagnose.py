@@ -29,7 +29,7 @@ MOST_DRIVES = 2
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Diagnosis:
-    """The report with the arrays that its figures are drawn from.
+    """The report, with the arrays for its figures.
 
     Parameters
     ----------
@@ -62,7 +62,7 @@ def diagnose(
     without: frozenset[str] = frozenset(),
     progress: Progress = lambda _: None,
 ) -> Diagnosis:
-    """Explain a measured table by a model and the catalogue's effects.
+    """Explain the difference between a measured table and a model by effects of the catalogue.
 
     Parameters
     ----------
@@ -100,7 +100,7 @@ def _diagnosed(
     without: frozenset[str],
     progress: Progress,
 ) -> Diagnosis:
-    """Diagnose once; an effect from elsewhere that fails on the way ends it."""
+    """Diagnose once; an effect of a plug-in that fails on the way ends the diagnosis."""
     table, bare = without_places(table, model)
 
     def explain(seen: MeasuredTable, by: CorrectedModel) -> Diagnosis:
@@ -119,7 +119,7 @@ def _explained(
     without: frozenset[str],
     progress: Progress,
 ) -> Diagnosis:
-    """Explain the gap, the fingers and the force by the catalogue."""
+    """Explain gap, finger positions and force by effects of the catalogue."""
     begin_s = time.perf_counter()
     rng = np.random.default_rng(seed)
     data = prepare(table, model, without)
@@ -145,7 +145,7 @@ def _searched(
     without: frozenset[str],
     progress: Progress,
 ) -> Refitted:
-    """Search; where the model is a function of time, drive it again behind what was found and search again."""
+    """Search for effects; a dynamic model is recomputed with the effects found, and the search repeated."""
     refitted = refitted_search(data, rng, forced, without, progress)
     for _ in range(MOST_DRIVES):
         noise_mm = min(noise.total_mm for noise in refitted.found.problem.whitener.noises)

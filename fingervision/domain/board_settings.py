@@ -6,7 +6,7 @@ from enum import IntEnum
 
 
 class Role(IntEnum):
-    """What a pin is for; the numbers are those of the board's sketch (`lines.h`)."""
+    """What a pin is for. The numbers are those of the Arduino sketch of the board (`lines.h`)."""
 
     SELECT_0 = 0
     SELECT_1 = 1
@@ -43,7 +43,7 @@ class Line:
 
 @dataclass(frozen=True, slots=True)
 class BoardSettings:
-    """A board, its wiring and its times.
+    """A microcontroller board: its port, its wiring, and its time limits.
 
     Parameters
     ----------
@@ -67,10 +67,10 @@ class BoardSettings:
 
     @property
     def moves(self) -> bool:
-        """Whether a motor controller is wired to it."""
+        """Whether a motor controller is wired to the board."""
         return Role.DRIVE in self.lines
 
     @property
     def senses_force(self) -> bool:
-        """Whether a force sensor is wired to it."""
+        """Whether a force sensor is wired to the board."""
         return Role.FORCE in self.lines

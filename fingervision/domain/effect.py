@@ -9,6 +9,7 @@ from types import MappingProxyType
 import numpy as np
 from numpy.typing import NDArray
 
+from fingervision.domain.drawing_form import DrawingForm
 from fingervision.domain.further_check import FurtherCheck, PictureForm
 from fingervision.domain.parameter import Parameter
 from fingervision.domain.response import Response
@@ -32,7 +33,7 @@ class Stage(StrEnum):
 
 @dataclass(frozen=True, eq=False)
 class History:
-    """The samples that a chain runs over: what an effect may know besides the signal it acts on.
+    """The samples over which effects are computed: what an effect may use besides the signal that it acts on.
 
     Parameters
     ----------
@@ -86,7 +87,7 @@ class History:
 
     @property
     def times(self) -> Array:
-        """Times, shape (n,); only for effects that declared that they need them."""
+        """Times of the samples, shape (n,); only for an effect that declares that it needs times."""
         if self.time_s is None:
             message = "an effect that needs times was run on a table without them."
             raise ValueError(message)
@@ -111,7 +112,7 @@ class History:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class InputPath:
-    """Path of the input, including points between and outside the measured rows, for effects with memory.
+    """Path of the input, with points between and outside the measured rows, for effects with memory such as backlash.
 
     Parameters
     ----------
@@ -128,7 +129,7 @@ class InputPath:
     owner: NDArray[np.intp]
 
     def moved(self, by_mm: Array) -> "InputPath":
-        """Move the recorded inputs of the measured rows, and the points that repeat them; `by_mm` of shape (n,)."""
+        """Shift the recorded inputs of the measured rows and of the points that repeat them; `by_mm` of shape (n,)."""
         shift = np.where(self.owner >= 0, by_mm[self.owner], 0.0)
         return replace(self, history=replace(self.history, input_mm=self.history.input_mm + shift))
 
@@ -149,7 +150,7 @@ def effect_key(name: str, place: str = "", end: str = "") -> str:
 
 
 def split_key(key: str) -> tuple[str, str, str]:
-    """Take an effect's key apart: name, place, end."""
+    """Split an effect's key into its name, its place, and the end of that place."""
     name, _, rest = key.partition("@")
     place, _, end = rest.partition("; ")
     return name, place, end
@@ -161,7 +162,7 @@ PointAct = Callable[[Response, History, Values], Response]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Effect:
-    """One entry of the catalogue.
+    """One physical effect of the catalogue.
 
     Parameters
     ----------
@@ -217,6 +218,8 @@ class Effect:
         simulated camera sees the two points moved, which for drifts and scales is the same.
     at_frames : bool
         Whether it is defined on the samples: a simulation looks at it with the frames, not in between.
+    in_drawing : DrawingForm or None
+        How it acts beside a drawing whose bodies' poses were measured; None where these do not show it.
     demonstrated : bool
         Whether a few short runs can tell it from everything else: `fingervision demo` hides one of these.
     """
@@ -247,10 +250,11 @@ class Effect:
     odd: tuple[str, ...] = ()
     in_picture: Callable[[Values], PictureForm] | None = None
     at_frames: bool = False
+    in_drawing: DrawingForm | None = None
     demonstrated: bool = False
 
     def search(self, history: History) -> tuple[Parameter, ...] | str:
-        """Return the parameters with the bounds that these data leave, or the reason why these cannot show it."""
+        """Return the parameters with bounds narrowed to what the data can show, or the reason why they show nothing."""
         if self.needs_times and history.time_s is None:
             return "the table has no time_s, and without times the order of rows means nothing"
         if self.needs_shared_clock and not history.shared_clock:
@@ -268,7 +272,7 @@ class Effect:
 
 
 def start_key(run: int) -> str:
-    """Name of the start state of a run among an effect's values."""
+    """Return the key of a run's start state among an effect's parameter values."""
     return f"start_{run + 1}"
 
 
@@ -278,10 +282,10 @@ def _start(words: str, run: int) -> Parameter:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DriveEffect(Effect):
-    """An effect on what the mechanism receives: `act(input_mm, history, values)` gives the input after it.
+    """An effect on the input: `act(input_mm, history, values)` returns the input that the mechanism receives.
 
-    `act_curved` is the same law where the stage went along curves between two samples instead of straight lines, for a
-    delay; None where that makes no difference.
+    `act_curved` computes the same effect for a stage that moved along a curve, not a straight line, between two
+    samples; None where that makes no difference. Only delays need it.
     """
 
     act: DriveAct
@@ -290,9 +294,9 @@ class DriveEffect(Effect):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PointEffect(Effect):
-    """An effect of the mechanism or camera: `act(response, history, values)` gives the points after it.
+    """An effect of the mechanism or camera: `act(response, history, values)` returns the changed measuring points.
 
-    `act_curved` as in `DriveEffect`.
+    `act_curved` means the same as in `DriveEffect`.
     """
 
     act: PointAct

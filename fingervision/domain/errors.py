@@ -1,6 +1,7 @@
 """Errors that a user reads: one sentence that says what, what it must be, what it is, and what to do.
 
-Whoever catches an error asks for its class, and for the facts that it carries; the wording may change with any version.
+Code that catches an error relies on its class and on the facts that it carries; the wording may change with any
+version.
 
     FingervisionError                exit code 1
     ├── UsageError                   the request is wrong; exit code 2
@@ -27,7 +28,7 @@ from enum import IntEnum
 
 
 class ExitCode(IntEnum):
-    """How a command ended."""
+    """Exit code of a command: how it ended."""
 
     DONE = 0
     COULD_NOT = 1
@@ -36,7 +37,7 @@ class ExitCode(IntEnum):
 
 
 class FingervisionError(Exception):
-    """Something could not be done, for a reason that the message states in a sentence.
+    """An operation could not be done; the message states the reason in one sentence.
 
     The command line prints the message without a traceback and ends with `exit_code`.
     """
@@ -45,13 +46,13 @@ class FingervisionError(Exception):
 
 
 class UsageError(FingervisionError):
-    """The request itself is wrong: an option or argument that cannot be meant."""
+    """The request itself is wrong: an option or argument has a value that makes no sense."""
 
     exit_code = ExitCode.WRONG_USAGE
 
 
 class ArgumentError(UsageError, ValueError):
-    """One argument has a value that cannot be meant.
+    """One argument has a value that is not allowed.
 
     Parameters
     ----------
@@ -71,11 +72,11 @@ class ArgumentError(UsageError, ValueError):
 
 
 class ArgumentTypeError(ArgumentError, TypeError):
-    """One argument is of a kind that cannot be meant."""
+    """One argument is of a type that is not accepted."""
 
 
 class UnknownNameError(ArgumentError):
-    """A name that there is not, with the nearest one that there is.
+    """A name is unknown; the message gives the nearest known name.
 
     Parameters
     ----------
@@ -100,15 +101,15 @@ class UnknownNameError(ArgumentError):
 
 
 class InputFileError(FingervisionError, OSError):
-    """A file or folder that shall be read cannot be found or opened."""
+    """An input file or folder cannot be found or opened."""
 
 
 class DataError(FingervisionError, ValueError):
-    """A file, a recording or an array can be read, but does not hold what it must."""
+    """A file, a recording or an array can be read, but its content is not what it must be."""
 
 
 def unreadable(error: Exception) -> type[InputFileError] | type[DataError]:
-    """Class for a file that could not be taken in: the system refused it, or its content is another.
+    """Choose the error class for a file that could not be read: the system refused access, or the content is wrong.
 
     Examples
     --------
@@ -119,15 +120,15 @@ def unreadable(error: Exception) -> type[InputFileError] | type[DataError]:
 
 
 class OutputError(FingervisionError, OSError):
-    """A result cannot be written: no room, no permission, or the place is taken by something else."""
+    """A result cannot be written: the disk is full, permission is missing, or another file is in the way."""
 
 
 class NoCalibrationError(FingervisionError, ValueError):
-    """The pictures of known sizes give no calibration."""
+    """The pictures of objects of known size give no calibration."""
 
 
 class ModelError(FingervisionError):
-    """A model of the mechanism has no answer: no equilibrium, no mesh, a body that can move freely, no end in time."""
+    """A model of the mechanism has no answer, such as no equilibrium, no mesh, or a body that can move freely."""
 
 
 class DeviceError(FingervisionError):
@@ -139,7 +140,7 @@ class LimitError(FingervisionError):
 
 
 class StateError(FingervisionError):
-    """The request is right, but cannot be done in the present state, such as during a recording or a motion."""
+    """The request is valid, but not in the present state, such as during a recording or a motion."""
 
 
 class ProcessError(FingervisionError):
@@ -147,7 +148,7 @@ class ProcessError(FingervisionError):
 
 
 class InstallationError(FingervisionError):
-    """A part of this installation is missing."""
+    """A part of this installation of fingervision is missing."""
 
 
 class MissingLibraryError(InstallationError, ImportError):

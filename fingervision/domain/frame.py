@@ -1,4 +1,4 @@
-"""One picture of a recording, or the hole where one should be."""
+"""One picture of a recording, or the placeholder for a picture that is missing."""
 
 from dataclasses import dataclass
 from enum import StrEnum
@@ -13,7 +13,7 @@ Pixels = NDArray[np.uint8] | NDArray[np.uint16]
 
 
 class Coding(StrEnum):
-    """Compression between sensor and pixels: which pixels share its errors.
+    """Compression between sensor and pixels, which tells which pixels share their errors.
 
     A lossy codec that treats every picture by itself (JPEG) leaves errors that are shared over a few pixels; one that
     predicts a picture from its neighbours (H.264) moves whole blocks.
@@ -26,7 +26,7 @@ class Coding(StrEnum):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Frame:
-    """One picture with the source's own time.
+    """One picture with the time stamp that its source gave it.
 
     Parameters
     ----------

@@ -1,14 +1,14 @@
-"""Checks beside the stage's motion that tell one effect from another, and what an effect does to the picture."""
+"""Checks that need no other stage motion and tell one effect from another; how an effect changes the picture."""
 
 from dataclasses import dataclass
 from enum import Enum
 
 
 class FurtherCheck(Enum):
-    """A check that needs no other motion: the sentence of advice that goes with it.
+    """A check that needs no other motion of the stage, with the sentence that advises it.
 
-    An effect states for the checks that concern it whether it shows in them (True) or stays out of them (False). A
-    check tells two effects apart where one shows in it and the other stays out.
+    An effect states, for the checks that concern it, whether it is visible in the check (True) or not (False). A check
+    distinguishes two effects when one of them is visible in it and the other is not.
     """
 
     SLOT = "measure a slot of known width in the fingers' place: what the camera adds shows in it, the gripper does not"
@@ -31,7 +31,7 @@ class FurtherCheck(Enum):
 
 @dataclass(frozen=True, slots=True)
 class PictureForm:
-    """Change of the picture itself by a camera effect, beyond moving the two measuring points.
+    """How a camera effect changes the picture, beyond moving the two measuring points.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""What one frame says about the gap between two fingers."""
+"""What is measured of the gap between two fingers in one frame."""
 
 from dataclasses import dataclass, replace
 from math import hypot
@@ -9,7 +9,7 @@ from fingervision.domain.status import Status
 
 @dataclass(frozen=True, slots=True)
 class FingerEdge:
-    """The inner edge of one finger at the measuring height, and the tip that the height is counted from.
+    """The inner edge of one finger at the measuring height, and the finger's tip, from which that height is counted.
 
     Pixel coordinates: x right, y down, the centre of the full frame's first pixel is (0, 0).
 
@@ -43,7 +43,7 @@ class FingerEdge:
 
 @dataclass(frozen=True, slots=True)
 class HeldPart:
-    """A part between the fingers that both hold: where their inner edges are, half-way along it.
+    """A part that both fingers hold: positions of their inner edges half-way along the part.
 
     Parameters
     ----------
@@ -64,11 +64,11 @@ class HeldPart:
 
     @property
     def width_px(self) -> float:
-        """How far the inner edges are apart where they hold the part, across the fingers."""
+        """Distance between the fingers' inner edges where they touch the held part, across the fingers (pixels)."""
         return hypot(self.right_x_px - self.left_x_px, self.right_y_px - self.left_y_px)
 
     def shifted(self, x_px: float, y_px: float) -> "HeldPart":
-        """The same part in a picture whose origin lies so far to the left and above."""
+        """Return the part with x_px and y_px added to its coordinates, as after cropping the picture."""
         return replace(
             self,
             left_x_px=self.left_x_px + x_px,
@@ -129,10 +129,13 @@ class GapMeasurement:
 
     @property
     def u_picture_px(self) -> float:
-        """Standard uncertainty of `gap_px` for all that this picture leaves open in every frame alike.
+        """Standard uncertainty of `gap_px` from this picture alone, the same in every frame (pixels).
 
-        The true response lies anywhere between the one that was taken and the other one: a rectangular distribution
-        that ends at the value found (JCGM 100:2008, 4.3.7, about its end and not its middle).
+        It combines the systematic part of the edges with the camera's unknown response.
+
+        Of the response: the true gap lies between its values for the assumed and for the alternative response, a
+        rectangular distribution with the measured value at one end (after JCGM 100:2008, 4.3.7, which has the value in
+        the middle).
         """
         return hypot(self.u_shift_px, self.response_shift_px / 3.0**0.5)
 
@@ -147,7 +150,7 @@ class GapMeasurement:
         return hypot(self.right.x_px - self.left.x_px, self.right.y_px - self.left.y_px)
 
     def shifted(self, x_px: float, y_px: float) -> "GapMeasurement":
-        """The same measurement in a picture whose origin lies so far to the left and above."""
+        """Return the measurement with x_px and y_px added to its coordinates, as after cropping the picture."""
         along_px = y_px if self.direction.is_vertical else x_px
         left, right = (
             replace(edge, x_px=edge.x_px + x_px, y_px=edge.y_px + y_px, tip_px=edge.tip_px + along_px)
@@ -158,7 +161,7 @@ class GapMeasurement:
 
 @dataclass(frozen=True, slots=True)
 class NoGap:
-    """There is no number in this frame, and this is why.
+    """A frame without a gap value, with the reason.
 
     Parameters
     ----------
@@ -175,5 +178,5 @@ class NoGap:
     held: HeldPart | None = None
 
     def shifted(self, x_px: float, y_px: float) -> "NoGap":
-        """The same in a picture whose origin lies so far to the left and above."""
+        """Return the frame's state with the coordinates of a held part, if any, shifted by x_px and y_px."""
         return self if self.held is None else replace(self, held=self.held.shifted(x_px, y_px))

@@ -9,7 +9,7 @@ PointMm = tuple[float, float]
 
 @dataclass(frozen=True, slots=True)
 class SNLine:
-    """How many cycles a material endures: a straight line of stress amplitude over cycles, both logarithmic.
+    """S-N line of fatigue: stress amplitude over number of cycles, a straight line with both axes logarithmic.
 
     Parameters
     ----------
@@ -107,7 +107,7 @@ class Hinge:
 
 @dataclass(frozen=True, slots=True)
 class Lever:
-    """Where the hinges and the drive lie in one half; x from the symmetry axis, y up from the clamp.
+    """Positions of hinges and drive in one half of the gripper; x from the symmetry axis, y up from the clamp (mm).
 
     Parameters
     ----------
@@ -138,7 +138,7 @@ class Lever:
 
 @dataclass(frozen=True, slots=True)
 class Links:
-    """The bars and polygons whose union, less the notches, is the right half of the body.
+    """The bars and polygons whose union, minus the notches, is the right half of the body.
 
     Parameters
     ----------

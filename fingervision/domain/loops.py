@@ -1,4 +1,4 @@
-"""Loops in C, called like functions of Python: found where they were built, or built once where they were not."""
+"""Loops compiled from C, called like Python functions; found where they were built, or built at first use."""
 
 import os
 import sys
@@ -21,10 +21,10 @@ NAME = "_loops"
 
 
 def loop(name: str) -> Callable[..., Any]:
-    """One of the loops of the package's .c files.
+    """Return one of the compiled loops of the package's .c files.
 
-    Other threads run meanwhile. The same numbers give the same digits on every machine but for the C library's own exp,
-    log and erf: no sum is taken in another order for speed.
+    The loop releases Python's global lock, so that other threads run meanwhile. The same input gives the same digits on
+    every machine, apart from the C library's own exp, log and erf: no sum is reordered for speed.
 
     Parameters
     ----------
@@ -39,7 +39,7 @@ def loop(name: str) -> Callable[..., Any]:
 
     Raises
     ------
-    FingervisionError
+    InstallationError
         If the loops are not built and cannot be built here.
     """
     found: Callable[..., Any] = getattr(_library(), name)
@@ -47,7 +47,7 @@ def loop(name: str) -> Callable[..., Any]:
 
 
 def filled(run: Callable[..., Any], signal: NDArray[np.float64], *values: object) -> NDArray[np.float64]:
-    """What a loop that goes through one signal, sample by sample, makes of it; shape (n,)."""
+    """Run a compiled loop over one signal, sample by sample, and return its output; shape (n,)."""
     out = np.empty(signal.shape)
     run(np.ascontiguousarray(signal, dtype=np.float64), *values, out)
     return out
@@ -78,7 +78,7 @@ def _library() -> ModuleType:
 
 
 def _places() -> Iterator[Path]:
-    """Where the library may lie: where an installation puts it, beside the sources, in the user's own cache."""
+    """Folders where the compiled library may lie: in the installation, beside the sources, or in the user's cache."""
     yield loops_build.PACKAGE / "domain"
     yield loops_build.PACKAGE / "domain" / "__pycache__"
     own = os.environ.get("LOCALAPPDATA") if sys.platform == "win32" else os.environ.get("XDG_CACHE_HOME")
@@ -87,7 +87,7 @@ def _places() -> Iterator[Path]:
 
 
 def _forget_others(place: Path, name: str) -> None:
-    """Throw away what was built from older sources."""
+    """Delete libraries that were built from older sources."""
     for path in place.glob(f"{NAME}-*"):
         if path.name != name:
             with suppress(OSError):  # another process uses it, or has thrown it away

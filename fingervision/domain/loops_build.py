@@ -1,8 +1,8 @@
-"""How the loops in C are built: one source from all .c files of the package, one library from that.
+"""Build of the C loops: all .c files of the package are joined into one source and compiled into one library.
 
-A .c file gets its constants from the .py file of the same name, where each is stated once with its reason, and from
-the files that it names in a line `/* after NAME */`. Nothing but the standard library is used here: an installation
-builds before anything else is there.
+The constants of a .c file come from the .py file of the same name, where each is stated once with its reason, and from
+the files that it names in a line `/* after NAME */`. Only the standard library is used here, because an installation
+builds the loops before any dependency is installed.
 """
 
 import ast
@@ -39,7 +39,7 @@ def loop_files() -> list[Path]:
 
 
 def library_name() -> str:
-    """File name of the library that belongs to the sources as they are, on this kind of machine."""
+    """File name of the library for the present sources on this kind of machine."""
     digest = hashlib.sha256(" ".join(FLAGS).encode())
     files = [PACKAGE / HEADER, PACKAGE / DOOR, Path(__file__)]
     for path in loop_files():
@@ -99,14 +99,14 @@ def compiler() -> list[str] | None:
 
 
 def _links() -> list[str]:
-    """What Python's functions are found in: the running program, but for Windows, where all code may lie anywhere."""
+    """Linker options by which the loops find the functions of Python and of the C library."""
     if sys.platform == "win32":
         return [f"-L{Path(sys.base_prefix) / 'libs'}", "-lpython3"]
     return ["-fPIC", "-undefined", "dynamic_lookup"] if sys.platform == "darwin" else ["-fPIC", "-lm"]
 
 
 def one_source() -> str:
-    """All loops as one C file, each with the constants of its own .py file."""
+    """Join all loops into one C source, each with the constants of its own .py file."""
     pieces, loops, done = [(PACKAGE / HEADER).read_text(encoding="utf-8")], [], set[Path]()
     prepared: list[str] = []
     waiting = loop_files()
@@ -142,7 +142,7 @@ def _constants_beside(path: Path) -> dict[str, Constant]:
 
 
 def constants(path: Path) -> dict[str, Constant]:
-    """The numbers, and tuples of numbers, that a .py file gives NAMES IN CAPITALS, and those that it imports."""
+    """Read the constants of a .py file: numbers and tuples of numbers with NAMES IN CAPITALS, also imported ones."""
     found: dict[str, object] = {"range": range, "len": len}
     for node in ast.parse(path.read_text(encoding="utf-8")).body:
         if isinstance(node, ast.ImportFrom) and node.module and node.module.startswith("fingervision."):

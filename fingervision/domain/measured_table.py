@@ -1,4 +1,4 @@
-"""What was measured at the bench: gap and fingers against the recorded input."""
+"""What was measured on the bench: gap and finger positions against the recorded input."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -13,7 +13,7 @@ from fingervision.domain.reference_slot import ReferenceSlot
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Channel:
-    """A column of one's own: where a body or a point of the mechanism was seen, in mm or mrad.
+    """A user-named column: position (mm) or rotation (mrad) of a body or point of the mechanism.
 
     Parameters
     ----------
@@ -32,7 +32,7 @@ class Channel:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RecordedPath:
-    """Every row that has an input, measured or not, runs one after the other, sorted by time within each.
+    """Every row with an input, whether its gap was measured or not; run after run, each sorted by time.
 
     Parameters
     ----------
@@ -52,7 +52,7 @@ class RecordedPath:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MeasuredTable:
-    """Rows of a measured table that have a value, runs one after the other, sorted by time within each.
+    """Rows of a measured table that have a gap, run after run, each sorted by time.
 
     Parameters
     ----------

@@ -15,7 +15,7 @@ from fingervision.domain.response import Response
 
 @runtime_checkable
 class Model(Protocol):
-    """Anything that predicts the gap from the input, at rest at each input."""
+    """Anything that predicts the static gap for each input."""
 
     def respond(self, input_mm: NDArray[np.float64]) -> Response:
         """Answer statically at each input; positive inputs open the gripper.
@@ -30,7 +30,7 @@ class Model(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class PhysicalLaw:
-    """How a drawn gripper itself obeys an effect of the catalogue, instead of the form used with a table.
+    """How an effect of the catalogue acts in a model of a drawn gripper, instead of its general formula for tables.
 
     Parameters
     ----------
@@ -50,7 +50,7 @@ class PhysicalLaw:
 
 @runtime_checkable
 class PhysicalModel(Model, Protocol):
-    """A parametric gripper, where a mechanism effect is the physics itself and not the form used with a table."""
+    """A parametric gripper in which a mechanism effect changes the physics, instead of the formula for tables."""
 
     @property
     def laws(self) -> Mapping[str, PhysicalLaw]:
@@ -59,9 +59,9 @@ class PhysicalModel(Model, Protocol):
 
     @property
     def uncertain(self) -> Mapping[str, Estimate]:
-        """Numbers of the drawing whose uncertainty is stated, by dotted name: they may be refitted within it."""
+        """Dimensions of the drawing that have a stated uncertainty, by dotted name; a fit may vary them within it."""
         ...
 
     def redrawn(self, changes: Mapping[str, float]) -> "PhysicalModel":
-        """Return the gripper with some of its numbers changed by so much, each in its own unit."""
+        """Return the gripper with some of its dimensions changed by the given amounts, each in its own unit."""
         ...

@@ -54,7 +54,7 @@ class Parameter:
     run: int | None = None
 
     def starting_values(self) -> NDArray[np.float64]:
-        """Values from which a search sets out, inside the bounds.
+        """Values inside the bounds from which a search starts.
 
         Returns
         -------

@@ -1,4 +1,4 @@
-"""How coarsely a codec has rounded a picture, place by place."""
+"""How coarsely a codec has rounded each place of a picture."""
 
 from dataclasses import dataclass
 
@@ -11,10 +11,11 @@ BLOCK_PX = 16
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Quantiser:
-    """Steps to which a codec rounds what it changes in a picture (the coefficients of its cosine transform).
+    """Quantiser steps of a codec: to which multiples it rounds the coefficients of its cosine transform.
 
-    A coder leaves alone what is less than a part of a step: an edge may be displaced by so much and nothing more is
-    sent. Steps of codecs that leave more or less of a step alone are given as those of H.264 that leave as much.
+    A coder sends no change that is less than a fraction of a step, so that an edge may be displaced by that much
+    unnoticed. The steps of other codecs, whose dead zone is another fraction, are given as the H.264 steps with the
+    same dead zone.
 
     Parameters
     ----------
@@ -35,11 +36,14 @@ class Quantiser:
         return float(self.step[top : bottom + 1, left : right + 1].max())
 
     def seen_from(self, x_px: int, y_px: int) -> "Quantiser":
-        """The same for a part of the picture that begins at this column and row."""
+        """Return the quantiser of the part of the picture that begins at this column and row."""
         return Quantiser(self.step, (self.first_px[0] - x_px, self.first_px[1] - y_px))
 
     def turned(self, quarters: int, width_px: int, height_px: int) -> "Quantiser":
-        """The same for the picture turned anticlockwise by so many quarters; its size is that before the turn."""
+        """Return the quantiser of the picture turned anticlockwise by `quarters` right angles.
+
+        Width and height are those before the turn.
+        """
         found = self
         for _ in range(quarters % 4):
             columns = found.step.shape[1]

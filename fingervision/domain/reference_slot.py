@@ -1,11 +1,11 @@
-"""A reference slot: a width that is known, measured in the fingers' plane through the same camera and scale."""
+"""A reference slot: an opening of known width in the fingers' plane, measured through the same camera and scale."""
 
 from dataclasses import dataclass
 
 
 @dataclass(frozen=True, slots=True)
 class ReferenceSlot:
-    """One slot and what was measured of it.
+    """One reference slot and the width that was measured of it.
 
     Parameters
     ----------

@@ -19,7 +19,7 @@ class Verdict(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class NamedEffect:
-    """An effect of the answer with its parameters.
+    """One effect named by a diagnosis, with its parameters.
 
     Parameters
     ----------
@@ -46,13 +46,13 @@ class NamedEffect:
     shown: Mapping[str, str] = field(default_factory=lambda: MappingProxyType({}))
 
     def display_name(self, key: str) -> str:
-        """What people read in the place of a parameter's key; the key where nothing is declared."""
+        """Return the name of a parameter that people read; its key where no such name is declared."""
         return self.shown.get(key, key)
 
 
 @dataclass(frozen=True, slots=True)
 class Place:
-    """A region where the residual cannot be noise: channel, variable, its limits, size, significance, a sentence."""
+    """A region where the residual cannot be noise: channel, variable, limits, size, significance, and a sentence."""
 
     channel: str
     variable: str
@@ -66,7 +66,10 @@ class Place:
 
 @dataclass(frozen=True, slots=True)
 class Disagreement:
-    """RMS of measured minus predicted in mm, midline constant removed; unseen: runs left out in turn."""
+    """RMS of measured minus predicted gap in mm, without the constant of the midline.
+
+    `unseen` is the same with each run predicted from the other runs.
+    """
 
     before_rms_mm: float
     after_rms_mm: float
@@ -78,7 +81,7 @@ class Disagreement:
 
 @dataclass(frozen=True, slots=True)
 class NextRun:
-    """The run that would separate what is open: its steps, the promised gain in chi-square and its interval."""
+    """The run that would best separate the open explanations: its steps, and its expected chi-square gain."""
 
     name: str
     steps: tuple[Mapping[str, object], ...]
@@ -90,7 +93,7 @@ class NextRun:
 
 @dataclass(frozen=True, slots=True)
 class DiagnosisReport:
-    """The whole answer; fields as in report.json.
+    """The result of a diagnosis, with the fields of report.json.
 
     `explained_share` is 1 - (after / before)^2, `standing_share` after / before, both of the disagreement without the
     runs' scatter and outliers; `pure_error_mm` is the scatter of repeats of the gap, None where nothing repeats.

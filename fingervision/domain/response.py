@@ -1,6 +1,6 @@
-"""Positions of the two measuring points: the answer of a gripper or measuring chain to an input history."""
+"""Positions of the two measuring points: the response of a gripper or a measuring chain to an input history."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Response:
-    """The measuring points of both fingers over a history, and the force at the drive where there is one.
+    """Positions of both fingers' measuring points over a history, and the force at the drive where it is known.
 
     Parameters
     ----------
@@ -29,25 +29,25 @@ class Response:
 
     @property
     def midline_mm(self) -> NDArray[np.float64]:
-        """The middle between the points, shape (n,)."""
+        """Mean of the two measuring points' positions, shape (n,)."""
         return 0.5 * (self.left_mm + self.right_mm)
 
     def with_gap(self, gap_mm: NDArray[np.float64]) -> "Response":
-        """Return the same midline with another gap: both fingers move equally, in opposite directions."""
+        """Return the response with another gap and the same midline: both fingers move equally and oppositely."""
         half_mm = 0.5 * (gap_mm - self.gap_mm)
-        return replace(self, left_mm=self.left_mm - half_mm, right_mm=self.right_mm + half_mm)
+        return Response(self.left_mm - half_mm, self.right_mm + half_mm, self.force_n)
 
     def plus(self, more: "Response") -> "Response":
-        """Add what moves each point, and the force where both have one."""
+        """Add the displacements of `more` to the measuring points, and its force where both have one."""
         both = self.force_n is not None and more.force_n is not None
         force_n = self.force_n + more.force_n if both else self.force_n  # type: ignore[operator]
         return Response(self.left_mm + more.left_mm, self.right_mm + more.right_mm, force_n)
 
     def shifted(self, by_mm: NDArray[np.float64] | float) -> "Response":
-        """Both points moved together, to the right where `by_mm` is positive."""
-        return replace(self, left_mm=self.left_mm + by_mm, right_mm=self.right_mm + by_mm)
+        """Move both points by `by_mm`, to the right where it is positive."""
+        return Response(self.left_mm + by_mm, self.right_mm + by_mm, self.force_n)
 
     def at(self, rows: NDArray[np.intp]) -> "Response":
-        """Pick samples; `rows` of shape (k,)."""
+        """Select samples; `rows` of shape (k,)."""
         force_n = None if self.force_n is None else self.force_n[rows]
         return Response(self.left_mm[rows], self.right_mm[rows], force_n)

@@ -1,10 +1,10 @@
-"""Whether a frame gave a number, and if not, why."""
+"""The status of a frame: it has a gap, or a reason why it has none."""
 
 from enum import StrEnum
 
 
 class Status(StrEnum):
-    """The state of one frame, in the order in which reasons are looked for: the first that applies is given."""
+    """Status of a frame, in the order in which the reasons are tested; the first that applies is given."""
 
     OK = "ok"
     DAMAGED = "damaged"

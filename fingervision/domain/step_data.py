@@ -1,6 +1,6 @@
-"""Step data: the blocks that a motor controller keeps, each one motion.
+"""Step data: the blocks stored in a motor controller, each of which is one motion.
 
-What a block holds in cycle-time and in speed entry is section 3 of the paper.
+Both ways of stating a block, cycle time and speed, are those of section 3 of Hricko & Havlik (2015).
 """
 
 from collections.abc import Mapping
@@ -11,14 +11,14 @@ MOST_STEPS = 15
 
 
 class Coordinates(StrEnum):
-    """What a block's target counts from."""
+    """Whether a block's target position is absolute, or relative to where the motion starts."""
 
     ABSOLUTE = "absolute"
     RELATIVE = "relative"
 
 
 class Operation(StrEnum):
-    """What a block does at its target: hold the position, or push on against what is there."""
+    """What a block does at its target: hold the position, or push with a limited force."""
 
     MOVING = "moving"
     PUSHING = "pushing"
@@ -26,7 +26,7 @@ class Operation(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class CycleTime:
-    """Cycle-time entry: how long the motion takes; speed and acceleration follow from it.
+    """Motion stated by its duration; speed and acceleration follow from it.
 
     Parameters
     ----------
@@ -39,7 +39,7 @@ class CycleTime:
 
 @dataclass(frozen=True, slots=True)
 class SpeedEntry:
-    """Speed entry: how fast the motion is; its time follows.
+    """Motion stated by its speed and acceleration; its duration follows from them.
 
     Parameters
     ----------
@@ -82,13 +82,13 @@ class Step:
     pushing_force_n: float | None = None
 
     def end_mm(self, start_mm: float) -> float:
-        """Position at the end of the motion, from where it starts."""
+        """Position at the end of the motion that starts at `start_mm` (mm)."""
         return self.target_mm if self.coordinates is Coordinates.ABSOLUTE else start_mm + self.target_mm
 
 
 @dataclass(frozen=True, slots=True)
 class StepData:
-    """All blocks of a controller, and an order to run them in.
+    """All blocks of a controller, and the order in which they run.
 
     Parameters
     ----------

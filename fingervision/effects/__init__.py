@@ -1,7 +1,7 @@
-"""Physical effects, one a file, named as in the catalogue: a module that holds an `EFFECT` is an entry.
+"""Physical effects, one per file, named as in the catalogue: every module that holds an `EFFECT` is an entry.
 
-Effects of other distributions (entry points of the group `fingervision.effects`), of files, and of this session stand
-in the catalogue beside them.
+Effects from other distributions (entry points of the group `fingervision.effects`), from files, and from this session
+are entries of the catalogue too.
 """
 
 import importlib
@@ -42,19 +42,19 @@ def catalogue() -> dict[str, Effect]:
 
 
 def origin_of(name: str) -> Origin:
-    """Say where an effect of the catalogue comes from."""
+    """State where an effect of the catalogue comes from."""
     return _catalogue()[1][name]
 
 
 def that_show(check: FurtherCheck) -> tuple[str, ...]:
-    """Name the effects that show in a check, in the catalogue's order."""
+    """Names of the effects that are visible in a check, in the catalogue's order."""
     return tuple(name for name, effect in catalogue().items() if effect.checks.get(check) is True)
 
 
 def register(effect: Effect) -> Effect:
     """Add an effect to the catalogue of this process, and give it back.
 
-    An effect that was registered so before is replaced by one of the same name: a notebook's cell runs twice.
+    A registered effect is replaced when another of the same name is registered, because a notebook cell may run twice.
 
     Raises
     ------
@@ -69,12 +69,12 @@ def register(effect: Effect) -> Effect:
 
 
 def withdraw(name: str) -> None:
-    """Take back what was registered; nothing happens where nothing was."""
+    """Remove a registered effect; nothing happens where there is none."""
     REGISTRY.remove(name)
 
 
 def added_effects(paths: tuple[Path, ...]) -> AbstractContextManager[None]:
-    """Add the effects that files hold for as long as a `with` block lasts."""
+    """Add the effects of some files while a `with` block lasts."""
     return REGISTRY.with_files(paths)
 
 
@@ -91,7 +91,7 @@ def _catalogue() -> tuple[dict[str, Effect], dict[str, Origin]]:
 
 
 def _place(effect: Effect, *, built_in: bool) -> tuple[int, float, bool, str]:
-    """Place in the chain: by stage, then by `order`; what has the same goes behind what is built in, then by name."""
+    """Sort key in the chain: stage, then `order`; at equal order built-in effects come first, then the name decides."""
     return list(Stage).index(effect.stage), effect.order, not built_in, effect.name
 
 

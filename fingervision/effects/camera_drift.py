@@ -1,4 +1,4 @@
-"""The camera or its clamp moves, both points together."""
+"""Camera drift: the camera or its clamp moves, which shifts both measuring points together."""
 
 from fingervision.domain.effect import History, PointEffect, Stage, Values
 from fingervision.domain.further_check import FurtherCheck
@@ -7,7 +7,7 @@ from fingervision.domain.response import Response
 
 
 def act(response: Response, history: History, values: Values) -> Response:
-    """Apply the effect: the camera or its clamp moves, both points together."""
+    """Apply the effect: the camera moves, which shifts both measuring points together."""
     return response.shifted(values["rate_mm_per_s"] * history.clock_s)
 
 

@@ -1,4 +1,4 @@
-"""Frames are stamped late."""
+"""Camera latency: frames carry a time stamp later than their exposure."""
 
 from dataclasses import replace
 
@@ -10,12 +10,12 @@ from fingervision.effects.time_delay import delay_that_shows, late
 
 
 def act(response: Response, history: History, values: Values) -> Response:
-    """Apply the effect: frames are stamped late."""
+    """Apply the effect: frames carry a time stamp later than their exposure."""
     return _stamped(response, history, values, curved=False)
 
 
 def act_curved(response: Response, history: History, values: Values) -> Response:
-    """Apply the effect to points that went along curves between the frames."""
+    """Apply the effect to points that moved along curves, not straight lines, between the frames."""
     return _stamped(response, history, values, curved=True)
 
 

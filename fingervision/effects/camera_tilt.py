@@ -1,4 +1,4 @@
-"""The plane is tilted: keystone."""
+"""Camera tilt: the fingers' plane is not parallel to the sensor, which gives keystone distortion."""
 
 from dataclasses import replace
 
@@ -9,7 +9,7 @@ from fingervision.domain.response import Response
 
 
 def act(response: Response, history: History, values: Values) -> Response:
-    """Apply the effect: the plane is tilted: keystone."""
+    """Apply the effect: the plane is tilted, which gives keystone distortion."""
     return replace(
         response,
         left_mm=response.left_mm / (1.0 + values["k_per_mm"] * response.left_mm),

@@ -1,4 +1,4 @@
-"""The mechanism is late behind the recorded input."""
+"""Drive lag: the mechanism follows the recorded input with a delay."""
 
 from fingervision.domain.effect import Array, DriveEffect, History, Stage, Values
 from fingervision.domain.further_check import FurtherCheck
@@ -7,12 +7,12 @@ from fingervision.effects.time_delay import delay_that_shows, late
 
 
 def act(input_mm: Array, history: History, values: Values) -> Array:
-    """Apply the effect: the mechanism is late behind the recorded input."""
+    """Apply the effect: the mechanism follows the recorded input with a delay."""
     return late(input_mm, history, values["delay_s"])
 
 
 def act_curved(input_mm: Array, history: History, values: Values) -> Array:
-    """Apply the effect to a stage that went along curves between the recorded inputs."""
+    """Apply the effect to a stage that moved along curves, not straight lines, between the recorded inputs."""
     return late(input_mm, history, values["delay_s"], curved=True)
 
 

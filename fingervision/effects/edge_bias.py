@@ -1,4 +1,4 @@
-"""Threshold or blooming moves both edges."""
+"""Edge bias: the threshold or blooming of the sensor moves both edges."""
 
 from fingervision.domain.effect import History, PointEffect, Stage, Values
 from fingervision.domain.further_check import FurtherCheck

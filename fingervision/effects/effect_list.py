@@ -1,4 +1,4 @@
-"""The catalogue as `fingervision.effects` shows it: iterated, counted, and asked for an effect by its name."""
+"""The catalogue as `fingervision.effects`: iterate over it, take its length, or look up an effect by its name."""
 
 from collections.abc import Iterator
 from html import escape
@@ -9,7 +9,7 @@ from fingervision.domain.errors import UnknownNameError
 
 
 class EffectList(ModuleType):
-    """The package of the effects, which is a list of them as well, in the order in which they act.
+    """Type of the package of the effects, which also acts as a list of them in the order in which they act.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""An error that repeats with the scale's period."""
+"""Cyclic encoder error: a position error that repeats with the period of the encoder's scale."""
 
 from dataclasses import replace
 
@@ -9,7 +9,7 @@ from fingervision.domain.parameter import Parameter
 
 
 def act(input_mm: Array, history: History, values: Values) -> Array:
-    """Apply the effect: an error that repeats with the scale's period."""
+    """Apply the effect: a position error that repeats with the period of the encoder's scale."""
     if values["amplitude_mm"] == 0.0:
         return input_mm
     phase = 2.0 * np.pi * input_mm / values["period_mm"] + values["phase_rad"]

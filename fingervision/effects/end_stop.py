@@ -1,4 +1,4 @@
-"""The stage stops short."""
+"""End stop: the stage stops before it reaches the commanded position."""
 
 from dataclasses import replace
 
@@ -10,7 +10,7 @@ from fingervision.domain.parameter import Parameter
 
 
 def act(input_mm: Array, history: History, values: Values) -> Array:
-    """Apply the effect: the stage stops short."""
+    """Apply the effect: the stage stops before it reaches the commanded position."""
     return np.maximum(np.minimum(input_mm, values["upper_mm"]), values["lower_mm"])
 
 

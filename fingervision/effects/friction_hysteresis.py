@@ -1,4 +1,4 @@
-"""A smooth loop, independent of speed."""
+"""Friction hysteresis: a smooth loop of output over input, independent of speed."""
 
 from dataclasses import replace
 
@@ -6,17 +6,15 @@ import numpy as np
 
 from fingervision.domain.effect import Array, DriveEffect, History, Stage, Values, start_key
 from fingervision.domain.parameter import Parameter
-from fingervision.effects.play_operator import play
+from fingervision.effects.play_operator import drawn_sliders
 
 
 def act(input_mm: Array, history: History, values: Values) -> Array:
-    """Apply the effect: a smooth loop, independent of speed."""
+    """Apply the effect: a smooth hysteresis loop, independent of speed."""
     out = np.empty_like(input_mm)
     for index, run in enumerate(history.runs):
         start = values.get(start_key(index), 0.0)
-        lag = np.zeros_like(input_mm[run])
-        for k in range(1, 9):
-            lag += input_mm[run] - play(input_mm[run], 2.0 * values["reach_mm"] * k / 8.0, start)
+        lag = drawn_sliders(input_mm[run], values["reach_mm"], 8, start)
         out[run] = input_mm[run] - values["fraction"] * lag / 8.0
     return out
 

@@ -1,14 +1,15 @@
-"""A pivot with play: its pin stands at the side of its hole to which the load points."""
+"""Hinge play: a pivot's pin lies against the side of its hole to which the load points."""
 
 import numpy as np
 
+from fingervision.domain.drawing_form import DrawingForm, DrawnPart
 from fingervision.domain.effect import History, PointEffect, Stage, Values
 from fingervision.domain.parameter import Parameter
 from fingervision.domain.response import Response
 
 
 def act(response: Response, history: History, values: Values) -> Response:
-    """Lose half the play of the opening on either side of rest: with a table no pivot is known by name."""
+    """Reduce the opening by half the play on either side of rest; in a table no single pivot is known."""
     opening_mm = response.gap_mm - history.rest_gap_mm
     half_mm = 0.5 * values["play_mm"]
     return response.with_gap(history.rest_gap_mm + opening_mm - np.clip(opening_mm, -half_mm, half_mm))
@@ -24,5 +25,8 @@ EFFECT = PointEffect(
     residual="a step where the load on the pivot changes sign; poses of the bodies tell which pivot",
     parameters=(Parameter("play_mm", "mm", 0.0, 0.5, "full width of the play", typical=0.02),),
     needs_bodies=True,
+    in_drawing=DrawingForm(
+        DrawnPart.PIVOT, Parameter("play_mm", "mm", 0.0, 0.5, "full width of the play", typical=0.02), reference=0.01
+    ),
     act=act,
 )

@@ -1,12 +1,13 @@
-"""The input's zero is off."""
+"""Input offset: the zero of the recorded input is wrong."""
 
+from fingervision.domain.drawing_form import DrawingForm, DrawnPart
 from fingervision.domain.effect import Array, DriveEffect, History, Stage, Values
 from fingervision.domain.further_check import FurtherCheck
 from fingervision.domain.parameter import Parameter
 
 
 def act(input_mm: Array, history: History, values: Values) -> Array:
-    """Apply the effect: the input's zero is off, until it is taken anew."""
+    """Apply the effect: the zero of the input is wrong, until the stage is referenced again."""
     out = input_mm + values["offset_mm"]
     for run, rezeroed in zip(history.runs, history.rezeroed, strict=False):
         if rezeroed:
@@ -24,5 +25,8 @@ EFFECT = DriveEffect(
     residual="nearly a constant; follows the slope of a curved model",
     parameters=(Parameter("offset_mm", "mm", -0.5, 0.5, "offset of the input", typical=0.05),),
     checks={FurtherCheck.REZERO: True},
+    in_drawing=DrawingForm(
+        DrawnPart.CONSTANT, Parameter("offset_mm", "mm", -0.5, 0.5, "offset of the input", typical=0.05)
+    ),
     act=act,
 )

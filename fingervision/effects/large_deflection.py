@@ -1,4 +1,4 @@
-"""The rotation of the links is not small."""
+"""Large deflection: the links rotate by angles that are not small."""
 
 from dataclasses import replace
 
@@ -11,7 +11,7 @@ from fingervision.domain.response import Response
 
 
 def act(response: Response, history: History, values: Values) -> Response:
-    """Apply the effect: the rotation of the links is not small."""
+    """Apply the effect: the links rotate by angles that are not small."""
     if values["reach_mm"] == 0.0:  # no arc given
         return response
     reach_mm, opening_mm = values["reach_mm"], response.gap_mm - history.rest_gap_mm

@@ -1,4 +1,4 @@
-"""Radial distortion about the image centre."""
+"""Lens distortion: radial, about the image centre."""
 
 from dataclasses import replace
 

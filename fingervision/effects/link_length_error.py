@@ -1,12 +1,13 @@
-"""A link of another length than drawn: a hinge or a measuring point sits farther out or nearer."""
+"""Link length error: a link is longer or shorter than drawn, so that a hinge or measuring point sits elsewhere."""
 
+from fingervision.domain.drawing_form import DrawingForm, DrawnPart
 from fingervision.domain.effect import History, PointEffect, Stage, Values
 from fingervision.domain.parameter import Parameter
 from fingervision.domain.response import Response
 
 
 def act(response: Response, history: History, values: Values) -> Response:
-    """Open less by as much as the lever's short arm is longer: with a table no link is known by name."""
+    """Reduce the opening by the ratio by which the lever's short arm is longer; in a table no single link is known."""
     opening_mm = response.gap_mm - history.rest_gap_mm
     return response.with_gap(history.rest_gap_mm + opening_mm / (1.0 + values["ratio"]))
 
@@ -21,5 +22,8 @@ EFFECT = PointEffect(
     residual="in proportion to the opening; poses of the bodies tell which link",
     parameters=(Parameter("ratio", "", -0.1, 0.1, "relative error of the link's length", typical=0.01),),
     needs_bodies=True,
+    in_drawing=DrawingForm(
+        DrawnPart.LINK, Parameter("ratio", "", -0.1, 0.1, "relative error of the length", typical=0.01), reference=0.003
+    ),
     act=act,
 )

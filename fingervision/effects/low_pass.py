@@ -9,5 +9,5 @@ _low_pass = loop("low_pass_low_pass")
 
 
 def low_pass(signal: Array, time_s: Array, tau_s: float, start: float) -> Array:
-    """Relax one run's signal towards itself with time constant `tau_s`, from `start` at the first sample; (n,)."""
+    """Low-pass filter one run's signal with time constant `tau_s`, from the state `start`; shape (n,)."""
     return filled(_low_pass, signal, np.ascontiguousarray(time_s), tau_s, start)

@@ -3,12 +3,21 @@
 from fingervision.domain.effect import Array
 from fingervision.domain.loops import filled, loop
 
-_play = loop("play_operator_play")
+_play, _sliders = loop("play_operator_play"), loop("play_operator_sliders")
 
 
 def play(input_mm: Array, width_mm: float, start: float) -> Array:
-    """Follow one run's input with a play of full width `width_mm`; shape (n,).
+    """Output of a play of full width `width_mm` for one run's input; shape (n,).
 
-    The state begins `start` half widths above the first input: -1 and 1 are the two ends of the play.
+    Initially the output lies `start` half widths above the first input; -1 and 1 are the two ends of the play.
     """
     return filled(_play, input_mm, width_mm, start)
+
+
+def drawn_sliders(input_mm: Array, reach_mm: float, count: int, start: float) -> Array:
+    """Sum of the extensions of elastic sliders with reaches of k / count of `reach_mm`, along one run's input; (n,).
+
+    The extension of slider k is the difference between the input and the output of a play of twice its reach. The
+    initial extension is the fraction `start` of the reach for all sliders.
+    """
+    return filled(_sliders, input_mm, reach_mm, count, start)

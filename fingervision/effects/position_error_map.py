@@ -1,4 +1,4 @@
-"""The stage errs by the same amount at the same place, in both directions."""
+"""Position error map: the stage has the same error at the same position in both directions."""
 
 from collections.abc import Sequence
 
@@ -22,7 +22,7 @@ def covariance(inputs_mm: Array, length_mm: float) -> Array:
 
 
 def without_line(inputs_mm: Array, read: Array | None = None) -> Array:
-    """Projector that takes mean and straight line out of values at some inputs; shape (k, k).
+    """Projector that removes mean and straight line from values at the given inputs; shape (k, k).
 
     Parameters
     ----------
@@ -37,7 +37,7 @@ def without_line(inputs_mm: Array, read: Array | None = None) -> Array:
 
 
 def curve_values(inputs_mm: Sequence[float], errors_mm: Sequence[float]) -> dict[str, float]:
-    """Values of the effect that state its curve, point by point."""
+    """Parameter values of the effect that encode its curve, point by point."""
     out: dict[str, float] = {}
     for k, (at, error) in enumerate(zip(inputs_mm, errors_mm, strict=True), start=1):
         out |= {f"point_{k}_input_mm": float(at), f"point_{k}_error_mm": float(error)}
@@ -45,14 +45,20 @@ def curve_values(inputs_mm: Sequence[float], errors_mm: Sequence[float]) -> dict
 
 
 def curve_points(values: Values) -> tuple[Array, Array]:
-    """Inputs and errors of the curve that the values state, each of shape (k,); empty where they state none."""
+    """Inputs and errors of the curve that the parameter values encode, each of shape (k,).
+
+    Empty where they encode none.
+    """
     count = sum(key.endswith("_error_mm") for key in values)
     inputs, errors = ([values[f"point_{k}_{what}_mm"] for k in range(1, count + 1)] for what in ("input", "error"))
     return np.array(inputs), np.array(errors)
 
 
 def typical_curve(low_mm: float, high_mm: float, rms_mm: float, length_mm: float) -> tuple[Array, Array]:
-    """Draw the curve that stands for a map of which size and length alone are known: always the same one."""
+    """Return the curve that stands for a map of which only RMS and correlation length are known.
+
+    Always the same curve.
+    """
     at = np.linspace(low_mm, high_mm, TYPICAL_NODES)
     root = np.linalg.cholesky(covariance(at, length_mm) + 1e-9 * np.eye(at.size))
     drawn = without_line(at) @ root @ np.random.default_rng(TYPICAL_SEED).standard_normal(at.size)
@@ -60,7 +66,7 @@ def typical_curve(low_mm: float, high_mm: float, rms_mm: float, length_mm: float
 
 
 def act(input_mm: Array, history: History, values: Values) -> Array:
-    """Apply the effect: add the stage's error at each place; beyond the last point it stays."""
+    """Apply the effect: add the stage's error at each position; constant beyond the curve's last point."""
     at, errors = curve_points(values)
     if not at.size:
         if values["rms_mm"] == 0.0:

@@ -1,4 +1,4 @@
-"""The fingers rest at another gap."""
+"""Rest gap error: the fingers rest at another gap than stated."""
 
 from fingervision.domain.effect import History, PointEffect, Stage, Values
 from fingervision.domain.further_check import FurtherCheck
@@ -7,7 +7,7 @@ from fingervision.domain.response import Response
 
 
 def act(response: Response, history: History, values: Values) -> Response:
-    """Apply the effect: the fingers rest at another gap."""
+    """Apply the effect: the fingers rest at another gap than stated."""
     return response.with_gap(response.gap_mm + values["offset_mm"])
 
 

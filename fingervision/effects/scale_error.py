@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 
+from fingervision.domain.drawing_form import DrawingForm, DrawnPart
 from fingervision.domain.effect import History, PointEffect, Stage, Values
 from fingervision.domain.further_check import FurtherCheck
 from fingervision.domain.parameter import Parameter
@@ -9,7 +10,7 @@ from fingervision.domain.response import Response
 
 
 def act(response: Response, history: History, values: Values) -> Response:
-    """Apply the effect: px/mm is off."""
+    """Apply the effect: the scale (px/mm) is wrong by a factor."""
     return replace(
         response,
         left_mm=response.left_mm * (1.0 + values["ratio"]),
@@ -27,5 +28,8 @@ EFFECT = PointEffect(
     residual="proportional to the gap",
     parameters=(Parameter("ratio", "", -0.2, 0.2, "relative error of the scale", typical=0.02),),
     checks={FurtherCheck.SLOT: True},
+    in_drawing=DrawingForm(
+        DrawnPart.PICTURE, Parameter("ratio", "", -0.2, 0.2, "relative error", typical=0.01), reference=0.01
+    ),
     act=act,
 )

@@ -1,10 +1,10 @@
-"""The stage cannot follow faster than a highest speed."""
+"""Slew limit: the stage cannot move faster than its highest speed."""
 
 from dataclasses import replace
 
 import numpy as np
 
-from fingervision.domain.effect import Array, DriveEffect, History, Stage, Values
+from fingervision.domain.effect import Array, DriveEffect, Flags, History, Stage, Values
 from fingervision.domain.loops import filled, loop
 from fingervision.domain.parameter import Parameter
 
@@ -22,26 +22,33 @@ _follow = loop("slew_limit_follow")
 
 
 def follow(input_mm: Array, time_s: Array, speed_mm_s: float) -> Array:
-    """Follow one run's input at no more than `speed_mm_s`, from its first sample on; exact; shape (n,)."""
+    """Output of a stage that follows one run's input at no more than `speed_mm_s`, shape (n,).
+
+    Exact for an input that is linear between its samples.
+    """
     return filled(_follow, input_mm, np.ascontiguousarray(time_s), speed_mm_s)
 
 
 def act(input_mm: Array, history: History, values: Values) -> Array:
-    """Apply the effect: the stage follows at its highest speed at most."""
+    """Apply the effect: the stage follows the input at no more than its highest speed."""
     out = np.empty_like(input_mm)
     for run in history.runs:
         out[run] = follow(input_mm[run], history.times[run], values["speed_mm_s"])
     return out
 
 
-def _steady_speeds(input_mm: Array, time_s: Array) -> Array:
-    """Speeds over `WINDOW` samples that go one way: neighbouring samples differ by whole steps of an encoder."""
+def _steady_speeds(input_mm: Array, time_s: Array, jumps: Flags) -> Array:
+    """Mean speeds over `WINDOW` samples of one direction; over fewer, the steps of the encoder would dominate.
+
+    `jumps` marks moves, shape (n - 1,), that are a command's jump instead of a motion; stretches with one are excluded.
+    """
     if input_mm.size <= WINDOW:
         return np.zeros(0)
     net = np.abs(input_mm[WINDOW:] - input_mm[:-WINDOW])
     way = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(input_mm)))])
     travelled = way[WINDOW:] - way[:-WINDOW]
-    one_way = (net > ONE_WAY * travelled) & (net > 0.0)
+    jumped = np.concatenate([[0], np.cumsum(jumps)])
+    one_way = (net > ONE_WAY * travelled) & (net > 0.0) & (jumped[WINDOW:] == jumped[:-WINDOW])
     return np.asarray((net / (time_s[WINDOW:] - time_s[:-WINDOW]))[one_way])
 
 
@@ -55,15 +62,15 @@ def narrow(history: History) -> tuple[Parameter, ...] | str:
         move = np.abs(np.diff(history.input_mm[run]))
         # A single move between two stands is a command's jump: it asks for a speed, and shows none.
         stands = np.pad(move <= 4.0 * history.input_sigma_mm, 1, constant_values=True)
-        alone = stands[:-2] & stands[2:]
-        jumping.append((move / np.diff(history.times[run]))[~stands[1:-1] & alone])
-        moving.append(_steady_speeds(history.input_mm[run], history.times[run]) if not alone.all() else np.zeros(0))
-    steady, jumps = np.concatenate(moving), np.concatenate(jumping)
-    if not steady.size and not jumps.size:
+        jumps = ~stands[1:-1] & stands[:-2] & stands[2:]
+        jumping.append((move / np.diff(history.times[run]))[jumps])
+        moving.append(_steady_speeds(history.input_mm[run], history.times[run], jumps))
+    steady, asked = np.concatenate(moving), np.concatenate(jumping)
+    if not steady.size and not asked.size:
         return "the input never moves between two samples"
-    fastest = float(np.max(np.concatenate([steady, jumps])))
+    fastest = float(np.max(np.concatenate([steady, asked])))
     slowest, fast = np.quantile(steady, (SLOWEST_SHARE, FASTEST_SHARE)) if steady.size else (JUMP_RANGE * fastest, 0.0)
-    if max(float(fast), float(np.max(jumps, initial=0.0))) < APART * slowest:
+    if max(float(fast), float(np.max(asked, initial=0.0))) < APART * slowest:
         return f"the input moves at one speed only, about {fastest:.3g} mm/s: a limit below it would follow nothing"
     (speed_limit,) = EFFECT.parameters
     return (replace(speed_limit, lower=float(slowest), upper=fastest, neutral=fastest),)

@@ -12,12 +12,12 @@ _stick = loop("stick_slip_stick")
 
 
 def stick(input_mm: Array, jump_mm: float) -> Array:
-    """Hold one run's input until it has moved on by more than `jump_mm`; shape (n,)."""
+    """Output that stays until one run's input has moved on by more than `jump_mm`; shape (n,)."""
     return filled(_stick, input_mm, jump_mm)
 
 
 def act(input_mm: Array, history: History, values: Values) -> Array:
-    """Apply the effect: moves in jumps."""
+    """Apply the effect: the output sticks and then moves in jumps."""
     out = np.empty_like(input_mm)
     for run in history.runs:
         out[run] = stick(input_mm[run], values["jump_mm"])

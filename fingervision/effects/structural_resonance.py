@@ -1,4 +1,4 @@
-"""Rings after fast moves."""
+"""Structural resonance: the structure rings after fast moves."""
 
 from dataclasses import replace
 
@@ -13,12 +13,15 @@ _ring = loop("structural_resonance_ring")
 
 
 def ring(signal: Array, time_s: Array, frequency_hz: float, damping_ratio: float) -> Array:
-    """Drive a second-order system with one run's signal, at rest at the first sample; exact; shape (n,)."""
+    """Response of a second-order system to one run's signal, at rest at the first sample; shape (n,).
+
+    Exact for a signal that is linear between its samples.
+    """
     return filled(_ring, signal, np.ascontiguousarray(time_s), frequency_hz, min(damping_ratio, 0.9999))
 
 
 def act(response: Response, history: History, values: Values) -> Response:
-    """Apply the effect: rings after fast moves."""
+    """Apply the effect: the structure rings after fast moves."""
     if values["frequency_hz"] == 0.0:  # no resonance given
         return response
     opening_mm = response.gap_mm - history.rest_gap_mm

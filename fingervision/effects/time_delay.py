@@ -1,4 +1,4 @@
-"""Delay of a signal by a time, along straight lines or a curve between its samples."""
+"""Delay of a signal by a time, interpolated along straight lines or a curve between its samples."""
 
 from dataclasses import replace
 
@@ -15,7 +15,7 @@ FEWEST = 4
 
 
 def late(signal: Array, history: History, delay_s: float, *, curved: bool = False) -> Array:
-    """Delay a signal; before a run's start it was as at its first sample.
+    """Delay a signal; before its run's start it is taken as constant.
 
     Parameters
     ----------
@@ -44,9 +44,9 @@ def late(signal: Array, history: History, delay_s: float, *, curved: bool = Fals
 
 
 def delay_that_shows(history: History, delay: Parameter) -> tuple[Parameter, ...] | str:
-    """Bound a delay by what the data can show: none where every reading was taken when it was over.
+    """Bound a delay by what the data can show; none is visible where the stage stood still longer than the delay.
 
-    Under step commands the prediction changes in jumps as the delay passes from one sample to the next.
+    Under step commands the prediction changes in jumps when the delay passes from one sample to the next.
     """
     if history.dwell_s <= delay.upper:
         return (replace(delay, rugged=True, starts=COMMANDED_STARTS) if history.commanded else delay,)

@@ -19,7 +19,7 @@ SAMPLES = 12
 
 
 class EffectAnswerError(FingervisionError):
-    """An effect from outside the package failed, or answered what is no answer, at some parameters.
+    """An effect from outside the package failed, or returned an invalid response, at some parameters.
 
     Parameters
     ----------
@@ -35,7 +35,7 @@ class EffectAnswerError(FingervisionError):
 
 
 def effects_in(held: object) -> dict[str, Effect]:
-    """Give the effects that a module holds at its top, or that an object is, each checked on a trial.
+    """Return the effects that a module holds at its top level, or the effect that an object is; each is tried first.
 
     Raises
     ------
@@ -60,7 +60,7 @@ def effects_in(held: object) -> dict[str, Effect]:
 
 
 def try_effect(effect: object) -> DriveEffect | PointEffect:
-    """Hold an effect against what every effect must be, and give it back.
+    """Check that an effect meets every requirement on effects, and return it.
 
     Raises
     ------
@@ -98,7 +98,7 @@ def try_effect(effect: object) -> DriveEffect | PointEffect:
 
 
 def guarded(effect: DriveEffect | PointEffect) -> Effect:
-    """Give the effect with each of its answers looked at: one that is no answer is said by the effect's name."""
+    """Wrap an effect so that each of its responses is checked; an error for an invalid one names the effect."""
     if isinstance(effect, DriveEffect):
         return replace(effect, act=partial(_checked_drive, effect))
     return replace(effect, act=partial(_checked_points, effect))

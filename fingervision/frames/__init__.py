@@ -1,1 +1,1 @@
-"""Frame sources: one a file; each yields frames in order, with the source's own times."""
+"""Frame sources, one per file; each yields frames in order, with the source's own time stamps."""

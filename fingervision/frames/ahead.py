@@ -1,4 +1,4 @@
-"""Decoding ahead: the next frames are read on another core while this one is measured."""
+"""Decode ahead: the next frames are decoded on another core while the present one is measured."""
 
 from collections.abc import Generator, Iterable
 from dataclasses import dataclass
@@ -15,16 +15,16 @@ PATIENCE_S = 0.2
 
 @dataclass(frozen=True, slots=True)
 class _End:
-    """After the last frame: how reading ended."""
+    """Marks the end of the frames, with the exception that ended reading, if any."""
 
     error: BaseException | None
 
 
 def decoded_ahead(source: Iterable[Frame | LostFrame]) -> Generator[Frame | LostFrame, None, None]:
-    """Pass on the frames of a source, read by a thread of its own.
+    """Yield the frames of a source, read by a thread of its own.
 
-    The decoders leave Python's lock while they work, so decoding and measuring use two cores. However long the
-    recording, at most `FRAMES_AHEAD` frames wait.
+    The decoders release Python's global lock while they work, so that decoding and measuring use two cores. At most
+    `FRAMES_AHEAD` frames wait, however long the recording is.
 
     Parameters
     ----------

@@ -20,7 +20,7 @@ MUST = (
 
 
 def stated_shape(pictures: object, argument: str = "source") -> NDArray[np.generic]:
-    """Give an array as a stack of pictures, whose levels are not looked at yet.
+    """Interpret an array as a stack of pictures; its levels are not checked yet.
 
     Parameters
     ----------
@@ -76,8 +76,8 @@ def stated_shape(pictures: object, argument: str = "source") -> NDArray[np.gener
 def levels_of(picture: NDArray[np.generic], words: str = "", argument: str = "source") -> Pixels:
     """Levels of one picture of 8 or 16 bits.
 
-    An alpha channel that is opaque is left out. Floats are taken as 0 for black and 1 for the end of the scale;
-    they become levels of 16 bits, or of 8 where they were made from these.
+    An alpha channel is dropped where it is opaque. Floats must lie between 0 (black) and 1 (full scale); they become
+    levels of 16 bits, or of 8 bits where they were made from these.
 
     Parameters
     ----------
@@ -137,7 +137,7 @@ def levels_of(picture: NDArray[np.generic], words: str = "", argument: str = "so
 
 
 def _stored(picture: NDArray[np.generic]) -> NDArray[np.generic]:
-    """Levels of floats from 0 to 1: the 8 bits that they were made from, where all are multiples of 1/255, else 16."""
+    """Convert floats from 0 to 1 to levels: of 8 bits where all are multiples of 1/255, else of 16 bits."""
     light = np.asarray(picture, dtype=np.float64)
     levels = np.rint(255.0 * light)
     if np.abs(255.0 * light - levels).max() < OF_EIGHT_BITS:
@@ -146,7 +146,7 @@ def _stored(picture: NDArray[np.generic]) -> NDArray[np.generic]:
 
 
 def what_it_is(value: object) -> str:
-    """Say of what kind a value is, with its size where it has one: 'a list of 3'."""
+    """Type of a value in words, with its size where it has one: 'a list of 3'."""
     kind = type(value)
     library = kind.__module__.partition(".")[0]
     name = kind.__name__ if library in ("builtins", "__main__") else f"{library} {kind.__name__}"

@@ -1,4 +1,4 @@
-"""Pictures that are in memory as a recording: numpy arrays of any depth, grey or colour."""
+"""Pictures in memory as a recording: numpy arrays of any bit depth, grey or colour."""
 
 import hashlib
 from collections.abc import Iterator, Sequence
@@ -77,7 +77,7 @@ class ArrayFrames:
         )
 
     def __iter__(self) -> Iterator[Frame | LostFrame]:
-        """Hand over the pictures one by one; each is checked and converted when its turn comes."""
+        """Yield the pictures one by one; each is checked and converted when its turn comes."""
         is_single = self.pictures.ndim < 4 and len(self._stack) == 1
         for index, picture in enumerate(self._stack):
             words = "" if is_single else f" of picture {index}"
@@ -96,7 +96,7 @@ class ArrayFrames:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class KeptFrames:
-    """Frames of a camera that were kept in memory, as a recording.
+    """Frames of a camera, kept in memory as a recording.
 
     Parameters
     ----------
@@ -110,7 +110,7 @@ class KeptFrames:
     frames: tuple[Frame | LostFrame, ...] = field(repr=False)
 
     def __iter__(self) -> Iterator[Frame | LostFrame]:
-        """Hand over the frames once more."""
+        """Yield the frames again."""
         return iter(self.frames)
 
 

@@ -1,11 +1,11 @@
-"""Which frame a packet of an AVI file is, from where it lies: AVI has no times, it counts.
+"""Frame number of a packet of an AVI file from its position in the file: AVI stores no times, only an order.
 
-A reader that loses a frame in a damaged place counts on as if there had been none, and every frame after it is too
-early. The file's own index (idx1) says where each frame lies, so a packet that lies where the index says is that frame,
-whatever was lost before it. Where bytes are missing, what follows lies nearer to the front, not more than the index is;
-packets whose lengths, one after the other, occur only once in the rest of the index are those frames. Where no byte is
-missing, a packet that lies elsewhere than the index says was never written: its header is damaged. Without an index, or
-where it does not say, frames are counted as long as one chunk follows another without a hole.
+A reader that loses a frame in a damaged place goes on counting, and every frame after it gets too low a number. The
+file's own index (idx1) states the position of each frame, so that a packet at a stated position is that frame, whatever
+was lost before it. Where bytes are missing, the following packets lie nearer to the front than the index states. They
+are identified by a sequence of packet lengths that occurs only once in the rest of the index. Where no byte is missing,
+a packet at a position that the index does not state was never written: its header is damaged. Without a valid index,
+frames are counted as long as one chunk follows another without a hole.
 
 Source: Microsoft, AVI RIFF File Reference (chunks, LIST, idx1).
 """
@@ -29,7 +29,7 @@ KNOWN_CHUNK = re.compile(rb"\d\d(dc|db|wb|tx|pc|iv)|ix\d\d|rec ")
 
 
 class AviPlaces:
-    """Numbers the packets of a video stream; they must be given in the order of the file.
+    """Numbers the packets of a video stream, which must be given in the order of the file.
 
     Parameters
     ----------
@@ -59,7 +59,7 @@ class AviPlaces:
         """Frames that the index has, with a picture, between the last two packets that could be numbered."""
 
     def number(self, position: int, size: int) -> int | None:
-        """Which frame, from 0, the packet is whose bytes begin here; None where nothing tells.
+        """Frame number, from 0, of the packet whose bytes begin here; None where it cannot be determined.
 
         Parameters
         ----------
@@ -85,7 +85,7 @@ class AviPlaces:
         return found
 
     def _by_length(self, begin: int, size: int) -> int | None:
-        """Which frame has the lengths of this packet and of those before it that could not be numbered, if one does."""
+        """Frame number from the lengths of this packet and of the unnumbered ones before it, if only one fits."""
         if self.is_lost:
             possible = self._possible + 1
             possible = possible[possible < len(self._sizes)]
@@ -102,7 +102,7 @@ class AviPlaces:
         return number
 
     def _counted(self, begin: int) -> int | None:
-        """Go from chunk to chunk; each picture on the way is a frame: one that the camera dropped, or the reader."""
+        """Go from chunk to chunk and count the pictures; one on the way was dropped by the camera or by the reader."""
         if self._end is None:
             return None
         at, number = self._end, self._number + 1
@@ -124,7 +124,7 @@ class AviPlaces:
 
 
 def _index(file: BinaryIO, tag: bytes, begin: int, streams: int) -> tuple[NDArray[np.int64], NDArray[np.int64], int]:
-    """Read where each frame's chunk begins, how long it is, and how many bytes are missing before the index."""
+    """Read each frame's position and length from the index, and how many bytes are missing before the index."""
     end = file.seek(0, 2)
     start = max(0, end - TAIL_BYTES)
     file.seek(start)

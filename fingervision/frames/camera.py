@@ -1,4 +1,4 @@
-"""Cameras of this machine through OpenCV: V4L2, Media Foundation, AVFoundation; what was asked is read back."""
+"""Cameras of this machine through OpenCV: V4L2, Media Foundation, AVFoundation; settings are read back."""
 
 import sys
 from collections.abc import Iterator
@@ -27,7 +27,7 @@ FAILED_READS = 3
 
 
 def accepts(name: str) -> bool:
-    """Whether this is a camera's number or device."""
+    """Whether a name is the number or the device of a camera."""
     return (name.isdigit() and not Path(name).exists()) or name.startswith("/dev/video")
 
 
@@ -36,14 +36,14 @@ def open_frames(name: str, wish: Wish) -> "CameraFrames":
 
     Raises
     ------
-    FingervisionError
+    DeviceError
         There is no such camera, somebody else has it, or it gives no picture.
     """
     return CameraFrames(name, wish)
 
 
 def found_cameras() -> list[tuple[str, str]]:
-    """List the cameras of this machine: what to give as a source, and the camera's own name."""
+    """List the cameras of this machine, each with its name as a source and its own name."""
     if sys.platform == "linux":
         devices = sorted(DEVICES.glob("video*"), key=lambda path: int(path.name.removeprefix("video")))
         return [(f"/dev/{device.name}", _first_line(device / "name")) for device in devices]
@@ -60,7 +60,7 @@ def found_cameras() -> list[tuple[str, str]]:
 class CameraFrames:
     """A camera that is open.
 
-    Grey levels are those of the camera's luma; times are the host's on arrival.
+    Grey levels are the camera's luma; time stamps are the computer's clock on arrival.
 
     Parameters
     ----------
@@ -97,12 +97,12 @@ class CameraFrames:
         self.description = self._described(wish, (pixels.shape[1], pixels.shape[0]))
 
     def __iter__(self) -> Iterator[Frame | LostFrame]:
-        """Frames as they come."""
+        """Yield the frames as they arrive."""
         for received in self.received():
             yield received.item
 
     def received(self) -> Iterator[Received]:
-        """Frames as they come, until the camera is closed or gone."""
+        """Yield the frames as they arrive, until the camera is closed or unplugged."""
         failed = 0
         try:
             for index in count():
@@ -125,7 +125,7 @@ class CameraFrames:
         self._closed.set()
 
     def _ask(self, wish: Wish) -> None:
-        """Ask for pictures as they are wished and that nothing changes by itself; cameras take what they like."""
+        """Request the wished settings, and no automatic changes; a camera accepts only some of them."""
         with _quiet():
             for what, value in requests(self._capture.getBackendName(), wish, self._read()):
                 self._capture.set(what, value)
@@ -134,7 +134,7 @@ class CameraFrames:
         return {what: self._capture.get(what) for what in READ}
 
     def _described(self, wish: Wish, size_px: tuple[int, int]) -> Description:
-        """Describe the camera as it is now, with a sentence for each thing in which it does otherwise."""
+        """Description of the camera as it is set now, with a sentence for each setting that differs from the wish."""
         backend = self._capture.getBackendName()
         with _quiet():
             read = self._read()
@@ -172,7 +172,7 @@ def _check_device(name: str) -> None:
 
 
 def _luma(pixels: Any) -> Pixels:
-    """Grey levels of OpenCV's blue, green and red, or of raw YUYV."""
+    """Grey levels of an OpenCV picture (blue, green, red), or of raw YUYV."""
     if pixels.ndim == 2:
         levels: Pixels = pixels
         return levels
@@ -193,7 +193,7 @@ def _first_line(file: Path) -> str:
 
 @contextmanager
 def _quiet() -> Iterator[None]:
-    """Keep OpenCV's own words about cameras that are not there off the screen."""
+    """Suppress OpenCV's own messages about missing cameras."""
     before = cv2.utils.logging.getLogLevel()
     cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_SILENT)
     try:

@@ -1,15 +1,16 @@
-"""Requested and actual settings of a camera, in OpenCV's properties and their peculiarities.
+"""Requested and actual settings of a camera, as properties of OpenCV, whose meaning differs between systems.
 
-The properties mean something else behind each of OpenCV's backends (modules/videoio/src/cap_v4l.cpp, cap_msmf.cpp and
+The properties have another meaning in each of OpenCV's backends (modules/videoio/src/cap_v4l.cpp, cap_msmf.cpp and
 cap_avfoundation_mac.mm of OpenCV 4 and 5):
 
-* V4L2 reads -1 for what a camera does not have. Its exposure counts 0.1 ms (V4L2_CID_EXPOSURE_ABSOLUTE); its automatic
-  exposure is a menu in which 1 is manual and 3 is the usual automatic. Where the environment asks for normalised values
-  the menu reads 0.25 and 0.75 and everything else is a share of an unknown range; mode 0 switches that off.
-* Media Foundation's exposure is the logarithm to base 2 of seconds. Writing to an automatic writes its value too (the
-  focus would run to 0), and reading one back says nothing; writing a value makes it manual, so that writing back what
-  was read holds it.
-* AVFoundation has size and rate alone.
+* V4L2 returns -1 for a property that a camera lacks. Its exposure counts units of 0.1 ms (V4L2_CID_EXPOSURE_ABSOLUTE);
+  its automatic exposure is a menu in which 1 is manual and 3 is the usual automatic mode. If the environment asks for
+  normalised values, the menu returns 0.25 and 0.75 and every other property a fraction of an unknown range; mode 0
+  switches that off.
+* Media Foundation's exposure is the logarithm to base 2 of seconds. Setting an automatic mode also sets its value (the
+  focus would run to 0), and reading the mode back gives no information. Setting a value makes it manual, so that
+  writing back the value just read holds it.
+* AVFoundation supports size and frame rate only.
 """
 
 from collections.abc import Callable, Iterator, Mapping
@@ -39,7 +40,7 @@ SAME_SHARE = 0.01
 
 @dataclass(frozen=True, slots=True)
 class Control:
-    """A number that a camera can be set to.
+    """A numeric setting of a camera.
 
     Parameters
     ----------
@@ -82,7 +83,7 @@ READ = (
 
 @dataclass(frozen=True, slots=True)
 class Settled:
-    """What a camera does in the end.
+    """The settings that a camera finally has.
 
     Parameters
     ----------
@@ -97,7 +98,7 @@ class Settled:
 
 
 def requests(backend: str, wish: Wish, found: Mapping[int, float]) -> Iterator[tuple[int, float]]:
-    """Properties and values to set, in the order in which a camera must be asked.
+    """Properties and values to set, in the order in which a camera must receive them.
 
     Parameters
     ----------
@@ -132,7 +133,7 @@ def requests(backend: str, wish: Wish, found: Mapping[int, float]) -> Iterator[t
 
 
 def settled(backend: str, wish: Wish, read: Mapping[int, float]) -> Settled:
-    """Compare what a camera reads back with what it was asked for.
+    """Compare the settings read back from a camera with those requested.
 
     Parameters
     ----------
@@ -179,12 +180,12 @@ def settled(backend: str, wish: Wish, read: Mapping[int, float]) -> Settled:
 
 
 def coding_of(settings: Mapping[str, str]) -> Coding:
-    """What compression a camera's pictures went through before they arrived, by the format that it reads back."""
+    """Compression of a camera's pictures before they arrived, judged by the pixel format that it reports."""
     return CODINGS.get(settings.get("format", ""), Coding.LOSSLESS)
 
 
 def four_letters(number: float) -> str:
-    """Name of a format; "unknown" where there is none."""
+    """Four-letter name of a pixel format; "unknown" where there is none."""
     letters = "".join(chr((int(number) >> shift) & 0xFF) for shift in (0, 8, 16, 24)) if number > 0.0 else ""
     return letters.strip() if letters.isascii() and letters.isprintable() and letters.strip() else "unknown"
 

@@ -6,7 +6,7 @@ import av
 def cut_off(
     container: av.container.InputContainer, stream: av.VideoStream, packets: int, last_end_s: float | None
 ) -> str | None:
-    """Say so if the file states more than it holds.
+    """Return a sentence if the file states more video than it holds.
 
     Parameters
     ----------
@@ -43,7 +43,7 @@ def cut_off(
 
 
 def _clock_s(clock: str | None) -> float | None:
-    """Seconds of Matroska's hours:minutes:seconds."""
+    """Convert Matroska's hours:minutes:seconds to seconds."""
     try:
         hours, minutes, seconds = (float(part) for part in (clock or "").split(":"))
     except ValueError:

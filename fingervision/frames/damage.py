@@ -1,4 +1,4 @@
-"""How far damage reaches in a coded video: from the broken packet to the next key frame."""
+"""Extent of damage in a coded video: from the broken packet to the next key frame."""
 
 from __future__ import annotations
 
@@ -12,12 +12,13 @@ Picture = tuple[int | None, av.VideoFrame | str]
 
 
 class DamageTrail:
-    """Follows packets into a decoder and pictures out of it.
+    """Follows packets into a decoder and pictures out of it, and marks the pictures that are damaged.
 
-    A picture that is coded as a difference hangs on those before it. After a packet that could not be decoded the
-    decoder goes on with a guess, and pictures look whole and are wrong; so everything that was coded after a broken
-    packet is damaged until a key frame that is not itself broken. Pictures leave in another order than packets enter,
-    so every packet carries its number through the decoder (FFmpeg's `copy_opaque`, see `prepare`).
+    A picture that is coded as a difference depends on the pictures before it. After a packet that could not be decoded,
+    the decoder continues with a guess, and its pictures look sound but are wrong. Every picture coded after a broken
+    packet is therefore damaged, until a key frame that is not itself broken. Pictures leave the decoder in another
+    order than their packets enter, so that every packet carries its number through the decoder (FFmpeg's `copy_opaque`,
+    see `prepare`).
     """
 
     def __init__(self) -> None:
@@ -31,34 +32,35 @@ class DamageTrail:
 
     @staticmethod
     def prepare(codec: av.CodecContext) -> None:
-        """Make a decoder, before its first packet, hand on the numbers of packets to their pictures."""
+        """Set up a decoder, before its first packet, to pass the numbers of packets on to their pictures."""
         codec.copy_opaque = True
 
-    def enters(self, packet: av.Packet[av.VideoStream]) -> None:
-        """Note a packet that goes into the decoder."""
+    def enters(self, packet: av.Packet[av.VideoStream], *, is_shown: bool = True) -> None:
+        """Record a packet that enters the decoder, and whether a picture is expected from it."""
         self._last = next(self._numbers)
         packet.opaque = self._last
         if packet.is_keyframe and self._broken:
             self._stated_keys.add(self._last)
         if packet.is_corrupt:
             self.breaks("It is incomplete in the file.")
-        if packet.pts is not None and not packet.is_discard:
+        if packet.pts is not None and not packet.is_discard and is_shown:
             heapq.heappush(self._entered, (packet.pts, self._last))
 
     def breaks(self, why: str) -> None:
-        """Note that the packet that went in last could not be decoded, or not be found whole."""
+        """Record that the last packet could not be decoded, or was not found complete."""
         self._broken.setdefault(self._last, why)
 
     def recovers(self, over: int) -> None:
-        """Note that the packet that went in last is right whatever came before the packet so many before it.
+        """Record that the last packet is right, whatever came before the packet `over` positions earlier.
 
-        Streams without key frames are refreshed part by part: once every part was, no picture hangs on older ones.
+        Streams without key frames are refreshed part by part: once every part has been refreshed, no picture depends on
+        older ones.
         """
         if self._broken:
             self._recoveries[self._last] = self._last - over
 
     def fails(self, why: str) -> Iterator[Picture]:
-        """Note that the packet that went in last, a picture by itself, gives none; its place is taken now."""
+        """Record that the last packet, a picture that depends on no other, gives none; a lost frame takes its place."""
         self.breaks(why)
         own = [entry for entry in self._entered if entry[1] == self._last]
         for entry in own:
@@ -67,22 +69,22 @@ class DamageTrail:
         yield own[0][0] if own else None, why
 
     def hole(self, why: str) -> None:
-        """Note that something is missing between the packet that went in last, whose end may be hurt, and the next."""
+        """Record a hole in the stream after the last packet, whose end may be damaged, too."""
         self.breaks(why)
         self.missing(why)
 
     def missing(self, why: str) -> None:
-        """Note that a whole picture is missing between the packet that went in last, which is sound, and the next."""
+        """Record that a whole picture is missing after the last packet, which itself is sound."""
         self._last = next(self._numbers)
         self._broken[self._last] = why
 
     def lost(self, tick: int, why: str) -> None:
-        """Note a frame that should have come now and is not there; it leaves in its turn."""
+        """Record a frame that should have come now and is missing; it is passed on in its turn."""
         self.hole(why)
         heapq.heappush(self._entered, (tick, self._last))
 
     def leaves(self, picture: av.VideoFrame) -> Iterator[Picture]:
-        """Give the picture that came out, after the lost ones that should have come before it."""
+        """Yield the picture that came out, after the lost ones that should have come before it."""
         tick = picture.pts
         if tick in self._given_up:
             return  # behind damage pictures may leave too late; its place is taken
@@ -107,7 +109,7 @@ class DamageTrail:
         yield tick, self._words(number) if self._hangs_on_damage(number) else picture
 
     def rest(self) -> Iterator[Picture]:
-        """Give what was still awaited behind damage when the recording ended."""
+        """Yield the damaged frames that were still awaited when the recording ended."""
         while self._entered:
             tick, number = heapq.heappop(self._entered)
             if self._broken:

@@ -1,4 +1,4 @@
-"""Pictures of an open video file, in order; what is broken, missing, or hangs on that, is said instead."""
+"""Pictures of an open video file, in order, with lost frames in place of broken or missing pictures."""
 
 from collections.abc import Iterator
 from contextlib import suppress
@@ -8,9 +8,11 @@ from pathlib import Path
 import av
 
 from fingervision.frames.avi_places import AviPlaces
+from fingervision.frames.coded_times import is_shown
 from fingervision.frames.cut_off import cut_off
 from fingervision.frames.damage import DamageTrail, Picture
 from fingervision.frames.matroska_times import ClusterTimes
+from fingervision.frames.missing_references import OWN_RECORDING, missing_references
 from fingervision.frames.sound_jpeg import SoundJpeg
 from fingervision.frames.spoken_damage import Heard, listening
 from fingervision.frames.stream_losses import StreamLosses
@@ -41,17 +43,22 @@ def pictures(container: av.container.InputContainer, stream: av.VideoStream, pat
     trail = DamageTrail()
     packets, last_end_s, at_end = 0, None, ""
     losses = StreamLosses(container.format.name, stream)
-    with listening(stream.codec_context.name) as heard:
-        jpegs = SoundJpeg(stream.codec_context.name)
+    codec = stream.codec_context.name
+    is_judged = container.metadata.get("comment") == OWN_RECORDING
+    unfollowed = {} if is_judged else missing_references(path, stream, container.format.name)
+    with listening(codec) as heard:
+        jpegs = SoundJpeg(codec)
         jpegs.learn(_first_packets(path, stream))
         for read in _read(container, stream, path, heard):
             packet = read.packet
             yield from _before(read, trail)
             if packet.size:
+                if packets in unfollowed:
+                    trail.missing(unfollowed[packets])
                 packets += 1
                 if leap := losses.before(packet, trail):
                     yield None, leap
-                trail.enters(packet)
+                trail.enters(packet, is_shown=is_shown(packet, codec))
                 losses.behind(packet, trail)
                 if packet.pts is not None and packet.time_base is not None:
                     last_end_s = max(last_end_s or 0.0, float((packet.pts + (packet.duration or 0)) * packet.time_base))
@@ -74,7 +81,7 @@ def pictures(container: av.container.InputContainer, stream: av.VideoStream, pat
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Read:
-    """A packet, and what is known of its place once the next one is read.
+    """A packet, with what the next packet shows about its place.
 
     Parameters
     ----------
@@ -104,7 +111,7 @@ class _Read:
 
 
 def _read(container: av.container.InputContainer, stream: av.VideoStream, path: Path, heard: Heard) -> Iterator[_Read]:
-    """Read packets one ahead, since a gap in the stream shows in the packet after it."""
+    """Read packets one ahead, because a gap in the stream shows only in the packet after it."""
     demuxed = container.demux(stream)
     places = AviPlaces(path, stream.index, len(container.streams)) if container.format.name == "avi" else None
     clusters = ClusterTimes(path, stream.index) if "matroska" in container.format.name else None
@@ -145,7 +152,7 @@ def _read(container: av.container.InputContainer, stream: av.VideoStream, path: 
 
 
 def _before(read: _Read, trail: DamageTrail) -> Iterator[Picture]:
-    """Say what is missing before a packet."""
+    """Record what is missing before a packet."""
     if read.loses_time:
         if read.is_placed:
             trail.hole(f"{MISSING} before it.")

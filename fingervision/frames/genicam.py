@@ -1,8 +1,8 @@
 """GenICam cameras (GigE Vision, USB3 Vision, CoaXPress) by their maker's GenTL producer; needs the extra `genicam`.
 
-A camera's name is `genicam:PRODUCER.cti`, or `genicam:PRODUCER.cti#SERIAL` where several cameras are there. The
-producer is the file that the camera's maker installs (GenICam GenTL Standard, EMVA, 2019); `harvesters` reads it.
-Tested against Viky, the simulated camera that comes with the GenICam reference implementation; not on hardware.
+A camera's name is `genicam:PRODUCER.cti`, or `genicam:PRODUCER.cti#SERIAL` if there are several cameras. The producer
+is the driver file that the camera's maker installs (GenICam GenTL Standard, EMVA, 2019); `harvesters` loads it. Tested
+with Viky, the simulated camera that comes with the GenICam reference implementation; not with hardware.
 """
 
 from collections.abc import Iterator, Mapping
@@ -32,7 +32,7 @@ SILENT_S, ASKED_EVERY_S = 2.0, 0.2
 
 
 def accepts(name: str) -> bool:
-    """Whether this names a GenICam camera."""
+    """Whether a name is that of a GenICam camera."""
     return name.startswith(START)
 
 
@@ -52,7 +52,9 @@ def open_frames(name: str, wish: Wish) -> "GenicamFrames":
 
 
 class GenicamFrames:
-    """A camera that is open. Times are the camera's own where it states them, else the host's on arrival.
+    """A camera that is open.
+
+    Time stamps are the camera's own where it sends them, else the computer's clock on arrival.
 
     Parameters
     ----------
@@ -102,12 +104,12 @@ class GenicamFrames:
         first.queue()
 
     def __iter__(self) -> Iterator[Frame | LostFrame]:
-        """Frames as they come."""
+        """Yield the frames as they arrive."""
         for received in self.received():
             yield received.item
 
     def received(self) -> Iterator[Received]:
-        """Frames as they come, until the camera is closed or gone.
+        """Yield the frames as they arrive, until the camera is closed or unplugged.
 
         Raises
         ------
@@ -133,7 +135,7 @@ class GenicamFrames:
         self._closed.set()
 
     def _next(self) -> Any:
-        """The next buffer; None once the source is closed."""
+        """Return the next buffer; None once the source is closed."""
         silent_since_s = monotonic()
         while not self._closed.is_set():
             try:
@@ -165,7 +167,7 @@ class GenicamFrames:
 
 
 def levels(data: NDArray[np.generic], size: tuple[int, int]) -> Pixels:
-    """Grey levels of a buffer, which the producer fills again: a copy of shape (height, width)."""
+    """Copy the grey levels out of a buffer, which the producer will fill again; shape (height, width)."""
     pixels: Pixels = np.array(data).reshape(size)
     return pixels
 
@@ -205,7 +207,7 @@ def _connected(name: str) -> tuple[Any, Any]:
 
 
 def _ask(nodes: Any, wish: Wish) -> tuple[str, ...]:
-    """Ask for what is wished, and for grey levels; give a sentence for each thing that the camera does not take."""
+    """Request the wished settings and grey levels; return a sentence for each one that the camera refuses."""
     asked: dict[str, Any] = {}
     if _value(nodes, "PixelFormat") not in MONO:
         asked["PixelFormat"] = next((each for each in MONO if each in _choices(nodes, "PixelFormat")), None)
@@ -250,7 +252,7 @@ def _choices(nodes: Any, node: str) -> tuple[str, ...]:
 
 
 def _own_time_s(buffer: Any) -> float | None:
-    """When the camera says that it took the picture, seconds of its own clock; None where it does not."""
+    """Time of the exposure by the camera's own clock (s); None where the camera states none."""
     try:
         return 1e-9 * float(buffer.timestamp_ns)
     except Exception:

@@ -1,6 +1,8 @@
-"""Numbers that H.264 writes before every picture, by which a picture that never came is noticed."""
+"""Numbers that H.264 writes before every picture, which reveal a picture that was lost."""
 
 from dataclasses import dataclass
+
+from fingervision.frames.bit_reader import BitReader
 
 # Kinds of NAL units (ITU-T H.264, table 7-1).
 PICTURE, KEY_PICTURE, SUPPLEMENT, SEQUENCE, PICTURE_SET = 1, 5, 6, 7, 8
@@ -9,13 +11,12 @@ RECOVERY_POINT = 6
 HIGH_PROFILES = frozenset({44, 83, 86, 100, 110, 118, 122, 128, 134, 135, 138, 139, 244})
 # Headers are far shorter; what is longer is not looked at.
 HEADER_BYTES = 96
-MOST_ZEROS = 32
 INTRA_SLICES = frozenset({2, 7})
 
 
 @dataclass(frozen=True, slots=True)
 class CodedPicture:
-    """What a picture's first slice header says.
+    """Content of a picture's first slice header.
 
     Parameters
     ----------
@@ -78,7 +79,7 @@ class H264Numbers:
                 self._learn(unit)
 
     def of(self, packet: bytes) -> CodedPicture | None:
-        """Read a packet; None where it holds no picture that can be read."""
+        """Read the slice header in a packet; None where the packet holds no readable picture."""
         recovers_after = None
         try:
             units = _after_lengths(packet, self._length_bytes) if self._length_bytes else _between_start_codes(packet)
@@ -95,7 +96,7 @@ class H264Numbers:
         return None
 
     def _learn(self, unit: bytes) -> None:
-        bits = _Bits(unit)
+        bits = _bits(unit)
         try:
             if unit[0] & 0x1F == SEQUENCE:
                 name, sequence = _sequence(bits)
@@ -107,7 +108,7 @@ class H264Numbers:
             return
 
     def _picture(self, unit: bytes, recovers_after: int | None) -> CodedPicture:
-        bits = _Bits(unit)
+        bits = _bits(unit)
         bits.golomb()  # first macroblock
         is_intra = bits.golomb() in INTRA_SLICES
         sequence = self._sequences[self._sequence_of[bits.golomb()]]
@@ -127,32 +128,13 @@ class H264Numbers:
         )
 
 
-class _Bits:
+def _bits(unit: bytes) -> BitReader:
     """Bits of a unit behind its first byte, without the bytes that keep start codes out (7.3.1)."""
-
-    def __init__(self, unit: bytes) -> None:
-        content = unit[1 : 1 + HEADER_BYTES].replace(b"\0\0\3", b"\0\0")
-        self._bits, self._left = int.from_bytes(content, "big"), 8 * len(content)
-
-    def take(self, count: int) -> int:
-        """Read an unsigned number of so many bits; IndexError behind the end."""
-        self._left -= count
-        if self._left < 0:
-            raise IndexError
-        return (self._bits >> self._left) & ((1 << count) - 1)
-
-    def golomb(self) -> int:
-        """Read an unsigned number of the Exp-Golomb code (9.1)."""
-        zeros = 0
-        while not self.take(1):
-            zeros += 1
-            if zeros > MOST_ZEROS:
-                raise ValueError
-        return (1 << zeros) - 1 + self.take(zeros)
+    return BitReader(unit[1 : 1 + HEADER_BYTES].replace(b"\0\0\3", b"\0\0"))
 
 
-def _sequence(bits: _Bits) -> tuple[int, _Sequence]:
-    """Read sequence parameters (7.3.2.1.1) as far as the first that is needed here goes."""
+def _sequence(bits: BitReader) -> tuple[int, _Sequence]:
+    """Read the sequence parameters (7.3.2.1.1) up to the last one that is needed here."""
     profile = bits.take(8)
     bits.take(16)
     name = bits.golomb()
@@ -184,7 +166,7 @@ def _sequence(bits: _Bits) -> tuple[int, _Sequence]:
     return name, _Sequence(number_bits, may_leap, bool(bits.take(1)), separate)
 
 
-def _skip_scaling(bits: _Bits, count: int) -> None:
+def _skip_scaling(bits: BitReader, count: int) -> None:
     last = following = 8
     for _ in range(count):
         if following:
@@ -194,7 +176,7 @@ def _skip_scaling(bits: _Bits, count: int) -> None:
 
 
 def _recovery(unit: bytes) -> int | None:
-    """Reference pictures until everything is right to the bit; None where no recovery point promises that (D.1.8)."""
+    """Number of frames until the picture is exact after a recovery point; None where there is none (D.1.8)."""
     content = unit.replace(b"\0\0\3", b"\0\0")
     at = 1
     while at + 2 < len(content):
@@ -206,7 +188,7 @@ def _recovery(unit: bytes) -> int | None:
             size, at = size + 255, at + 1
         size, at = size + content[at], at + 1
         if kind == RECOVERY_POINT:
-            bits = _Bits(b"\6" + content[at : at + size])
+            bits = _bits(b"\6" + content[at : at + size])
             count, is_exact, is_broken = bits.golomb(), bits.take(1), bits.take(1)
             return count if is_exact and not is_broken else None
         at += size

@@ -22,14 +22,14 @@ TIFF_STARTS = (b"II*\x00", b"MM\x00*", b"II+\x00", b"MM\x00+")
 
 
 class UnreadableImageError(Exception):
-    """An image cannot be measured; the message says why in a sentence."""
+    """An image cannot be read; the message gives the reason in a sentence."""
 
 
 def read_image(file: Path) -> Pixels:
     """Read an image at its own bit depth.
 
-    An alpha channel is left out; the levels below it are as stored. A file that ends early or fails its checksum is
-    refused, because the decoders fill in what is missing.
+    An alpha channel is dropped; the colour levels stay as stored. A file that ends early or fails its checksum is
+    refused, because decoders would fill in the missing part.
 
     Parameters
     ----------
@@ -76,7 +76,7 @@ def read_image(file: Path) -> Pixels:
 
 
 def _stated_size_px(content: bytes) -> tuple[int, int]:
-    """Width and height that a PNG or JPEG states, before anything is made of that size; (0, 0) for other formats."""
+    """Width and height stated by a PNG or JPEG, read before memory is reserved; (0, 0) for other formats."""
     if content.startswith(PNG_SIGNATURE) and len(content) >= 24:
         width_px, height_px = struct.unpack_from(">II", content, 16)
         return width_px, height_px
@@ -91,7 +91,7 @@ def _stated_size_px(content: bytes) -> tuple[int, int]:
 
 
 def _decoded(content: bytes) -> NDArray[Any] | None:
-    """Levels in OpenCV's order (blue first), or None."""
+    """Levels in OpenCV's order (blue first); None where the content cannot be decoded."""
     try:
         return cv2.imdecode(np.frombuffer(content, np.uint8), cv2.IMREAD_UNCHANGED)
     except cv2.error:
@@ -99,7 +99,7 @@ def _decoded(content: bytes) -> NDArray[Any] | None:
 
 
 def _check_png(name: str, content: bytes) -> None:
-    """Go through the chunks (PNG specification, section 5): each has its length, type and CRC-32, the last is IEND."""
+    """Check the chunks (PNG specification, section 5): length, type and CRC-32 of each, and that the last is IEND."""
     place = len(PNG_SIGNATURE)
     while True:
         if place + 12 > len(content):

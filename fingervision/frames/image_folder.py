@@ -1,4 +1,4 @@
-"""Folders and globs of images, in natural order, with times where there are any."""
+"""Folders and glob patterns of images, in natural order, with times where these are stated."""
 
 import glob
 import re
@@ -15,7 +15,7 @@ from fingervision.frames.source import Description, Wish
 
 
 def accepts(name: str) -> bool:
-    """Whether this is a folder, an image, or a pattern that files match."""
+    """Whether a name is a folder, an image, or a pattern that matches files."""
     path = Path(name)
     if path.exists():
         return path.is_dir() or (path.is_file() and path.suffix.lower() in IMAGE_SUFFIXES)
@@ -23,11 +23,11 @@ def accepts(name: str) -> bool:
 
 
 def open_frames(name: str, wish: Wish) -> "ImageFolder":
-    """Open the images of a folder, of a pattern, or a single one.
+    """Open the images of a folder or a pattern, or a single image.
 
     Raises
     ------
-    FingervisionError
+    DataError, InputFileError
         There are no images, or none can be read, or their times make no sense.
     UsageError
         The rate is not positive, or the images have times already.
@@ -37,7 +37,7 @@ def open_frames(name: str, wish: Wish) -> "ImageFolder":
 
 @dataclass(frozen=True, slots=True)
 class ImageFolder:
-    """Images as a recording.
+    """Image files as a recording.
 
     Parameters
     ----------
@@ -139,13 +139,13 @@ def _files(name: str) -> tuple[Path, ...]:
 
 
 def _natural(file: Path) -> tuple[tuple[int, int, str], ...]:
-    """Digits count as numbers, everything else as letters."""
+    """Sort key in which digits count as numbers and all other characters as letters."""
     parts = re.split(r"([0-9]+)", str(file))
     return tuple((1, int(part), part) if place % 2 else (0, 0, part) for place, part in enumerate(parts))
 
 
 def _first_readable(name: str, files: tuple[Path, ...]) -> tuple[int, int]:
-    """Height and width of the first image that can be read; the recording has its size."""
+    """Height and width of the first readable image, which are those of the recording."""
     first_words = ""
     for file in files:
         try:

@@ -1,4 +1,4 @@
-"""Times of images from a table beside them."""
+"""Times of images from a table in their folder."""
 
 import csv
 from math import isfinite
@@ -21,7 +21,7 @@ def times_of(files: tuple[Path, ...]) -> tuple[float, ...] | None:
 
     Raises
     ------
-    FingervisionError
+    DataError
         The table cannot be read, has a bad row, or does not fit the images.
     """
     table = files[0].parent / TIMES_FILE
@@ -53,7 +53,7 @@ def times_of(files: tuple[Path, ...]) -> tuple[float, ...] | None:
 
 
 def _rows(table: Path) -> list[tuple[int, list[str]]]:
-    """Rows with their line numbers; comments and empty lines left out."""
+    """Rows of the table with their line numbers, without comments and empty lines."""
     try:
         lines = table.read_text(encoding="utf-8-sig").splitlines()
     except (OSError, UnicodeDecodeError) as error:

@@ -1,4 +1,4 @@
-"""The luma plane of a decoded picture, as the decoder left it."""
+"""The luma plane of a decoded picture, as the decoder stored it."""
 
 from typing import Any
 
@@ -15,10 +15,10 @@ PLANAR = ("yuv4", "yuva4", "yuvj4", "gray", "nv1", "nv2", "nv4", "p0", "p2", "p4
 
 
 def luma(picture: av.VideoFrame) -> Pixels:
-    """Grey levels of a picture, or its colours where it has no luma.
+    """Grey levels of a picture, or its colours where it has no luma plane.
 
-    Nothing is converted: 8-bit luma is the decoder's own memory. Between 9 and 15 bits are widened to 16 so that the
-    largest level becomes 65535.
+    Nothing is converted: 8-bit luma is returned as the decoder's own memory. Luma of 9 to 15 bits is scaled to 16 bits,
+    so that its largest level becomes 65535.
 
     Parameters
     ----------
@@ -51,7 +51,7 @@ def luma(picture: av.VideoFrame) -> Pixels:
 
 
 def _colours(picture: av.VideoFrame, bits: int) -> Pixels:
-    """Red, green and blue of a picture that is stored so; exact for the RGB formats."""
+    """Red, green and blue of a picture stored in an RGB format; without loss."""
     grey = picture.format.name.startswith(("mono", "gray"))
     wanted = ("gray16le" if bits > 8 else "gray") if grey else ("rgb48le" if bits > 8 else "rgb24")
     levels: Any = picture.to_ndarray(format=wanted)

@@ -1,8 +1,8 @@
-"""Whether the time of a Matroska cluster is the one that its frames had: one damaged number moves all of them.
+"""Check the time of a Matroska cluster, because one damaged number there moves all of its frames.
 
-A cluster states one time, and its blocks count from it, so a bit flipped there moves seconds of frames forward or back.
-The file's index (cues) states the times of key frames once more: a cluster that holds none of the times that its cues
-state is not where it says. Where there is no cue, clusters follow one another: of two that overlap, neither is believed
+A cluster states one time, from which its blocks count, so that one flipped bit there moves seconds of frames forward or
+back. The file's index (cues) repeats the times of the key frames: a cluster that holds none of the times stated by its
+cues has a wrong time. Where there is no cue, clusters must follow one another: of two that overlap, neither is trusted
 unless a cue confirms it, and the last one must lie within the stated duration.
 
 Source: RFC 9559 (Matroska), 5.1.3 (clusters), 5.1.5 (cues); RFC 8794 (EBML), 4 and 5 (variable-size numbers).
@@ -26,7 +26,7 @@ MOST_REORDERED = 16
 
 @dataclass(frozen=True, slots=True)
 class _Element:
-    """An EBML element: its name, and where its content lies."""
+    """An EBML element: its name, and the position of its content."""
 
     name: bytes
     begin: int
@@ -35,14 +35,14 @@ class _Element:
 
 @dataclass(slots=True)
 class _Cluster:
-    """A cluster: where it lies, and the times of the video's blocks in it."""
+    """A cluster: its position, and the times of its video blocks."""
 
     begin: int
     ticks: list[int] = field(default_factory=list)
 
 
 class ClusterTimes:
-    """Knows the clusters of a file whose time is not to be believed.
+    """The clusters of a file whose times are not trustworthy.
 
     Parameters
     ----------
@@ -66,13 +66,13 @@ class ClusterTimes:
         self._doubtful = _doubtful(clusters, cues, duration)
 
     def is_doubtful(self, position: int | None) -> bool:
-        """Whether the time of the packet at this place is not known."""
+        """Whether the packet at this position has an untrustworthy time."""
         at = -1 if position is None else bisect_right(self._begins, position) - 1
         return at >= 0 and self._doubtful[at]
 
 
 def _track(content: mmap.mmap, stream: int) -> int:
-    """Number that the blocks of a stream bear; streams are counted in the order of their tracks."""
+    """Number that the blocks of a stream carry; streams are counted in the order of their tracks."""
     at = content.find(TRACKS)
     while at >= 0:
         tracks = _element(content, at)
@@ -134,7 +134,7 @@ def _clusters(content: mmap.mmap, track: int) -> list[_Cluster]:
 
 
 def _cues(content: mmap.mmap, track: int) -> dict[int, set[int]]:
-    """Times that the index states, by the place of their cluster."""
+    """Times stated by the index, by the position of their cluster."""
     stated: dict[int, set[int]] = {}
     segment, at = content.find(SEGMENT), content.rfind(CUES)
     whole = _element(content, segment) if segment >= 0 else None
@@ -159,7 +159,7 @@ def _cues(content: mmap.mmap, track: int) -> dict[int, set[int]]:
 
 
 def _duration(content: mmap.mmap) -> float | None:
-    """Length in ticks, where it is stated."""
+    """Duration in ticks; None where it is not stated."""
     at = content.find(INFO)
     while at >= 0:  # the name stands in the file's table of contents too
         info = _element(content, at)
@@ -184,7 +184,10 @@ def _child(content: mmap.mmap, parent: _Element, name: bytes) -> _Element | None
 
 
 def _element(content: mmap.mmap, at: int) -> _Element | None:
-    """The element that begins here; one of unknown length, as live streams write them, reaches to the file's end."""
+    """The element that begins at this position.
+
+    One of unknown length, as in live streams, extends to the file's end.
+    """
     name, begin = _number(content, at, keep_marker=True)
     if begin == at or begin - at > 4:
         return None
@@ -197,7 +200,7 @@ def _element(content: mmap.mmap, at: int) -> _Element | None:
 
 
 def _number(content: mmap.mmap, at: int, *, keep_marker: bool) -> tuple[int, int]:
-    """A number of 1 to 8 bytes, and where it ends; it ends where it begins if there is none."""
+    """Read a number of 1 to 8 bytes, and its end, which equals its beginning if there is no number."""
     if at >= len(content) or content[at] == 0:
         return 0, at
     length = 9 - content[at].bit_length()

@@ -1,4 +1,4 @@
-"""Network cameras: rtsp:// and http:// streams through PyAV, with the camera's own packets kept."""
+"""Network cameras: rtsp:// and http:// streams through PyAV, with the camera's coded packets kept."""
 
 import io
 import re
@@ -41,12 +41,12 @@ LOSSLESS_CODECS = frozenset({"png", "rawvideo", "ffv1"})
 
 
 def accepts(name: str) -> bool:
-    """Whether this is the address of a stream."""
+    """Whether a name is the address of a stream."""
     return name.startswith(STARTS)
 
 
 def without_password(name: str) -> str:
-    """Give the address as it may be shown and kept: a camera's password belongs in neither page nor run."""
+    """Return the address without the camera's password, for display on the page and storage in the run."""
     # A password may hold `/` and `@`: what stands before the last @ is who asks, not where.
     shown = re.sub(r"^(\w+://[^/@:?#]*):.*@", r"\1:***@", name)
     return SECRET_PARAMETERS.sub(r"\1***", shown)
@@ -57,7 +57,7 @@ def open_frames(name: str, wish: Wish) -> "NetworkStream":
 
     Raises
     ------
-    FingervisionError
+    DeviceError
         Nobody answers, or the answer is no video.
     UsageError
         A size or rate is wished, which the camera alone decides.
@@ -71,10 +71,10 @@ def open_frames(name: str, wish: Wish) -> "NetworkStream":
 
 
 class NetworkStream:
-    """A connected stream; after a cut another one is made by opening it again.
+    """A connected stream; after an interruption it is opened again as a new one.
 
-    Times are those of the stream (RTSP, MPEG-TS), or the host's on arrival where it has none: pictures in a row over
-    HTTP carry no times, and times counted from a stated rate would be made up.
+    Time stamps are those of the stream (RTSP, MPEG-TS), or else the computer's clock on arrival: a sequence of JPEG
+    pictures over HTTP carries no times, and times derived from a nominal frame rate would be invented.
 
     Parameters
     ----------
@@ -100,9 +100,10 @@ class NetworkStream:
             self._container.close()
             raise DeviceError(f"The stream {self.name} must hold a video that can be decoded, but has none.")
         self._stream = self._container.streams.video[0]
-        # How the stream is coded, in a container of our own: a recording may begin after the camera's is closed.
+        # How the stream is coded, in a container of our own: a recording may begin after the camera's is closed. By its
+        # parameters, since there may be no encoder by the name of its decoder (AV1).
         self._kept = av.open(io.BytesIO(), "w", format="matroska")
-        self.template: av.VideoStream | None = self._kept.add_stream_from_template(self._stream)
+        self.template: av.VideoStream | None = self._kept.add_stream_from_template(self._stream, opaque=True)
         codec = self._stream.codec_context
         codec.options = STRICT | EXPORTED
         DamageTrail.prepare(codec)
@@ -132,12 +133,12 @@ class NetworkStream:
         )
 
     def __iter__(self) -> Iterator[Frame | LostFrame]:
-        """Frames as they come; ends with an error when the stream is cut off."""
+        """Yield the frames as they arrive; an interruption raises an error."""
         for received in self.received():
             yield received.item
 
     def received(self) -> Iterator[Received]:
-        """Frames with the packets that they came in."""
+        """Yield the frames with the packets in which they arrived."""
         numbers, trail = count(), DamageTrail()
         losses = StreamLosses(self._container.format.name, self._stream)
         last_s: float | None = None
@@ -163,7 +164,7 @@ class NetworkStream:
             self._container.close()
 
     def close(self) -> None:
-        """End the iteration with the next packet, or when it has been waited for in vain."""
+        """End the iteration with the next packet, or after the time limit for it."""
         self._closed.set()
 
     def _packets(self) -> Iterator[tuple[Any, float]]:
@@ -218,7 +219,10 @@ class NetworkStream:
         return OwnPacket(packet, shown_s, decode_s, packet.is_keyframe)
 
     def _time_s(self, tick: int | None, arrived_s: float, before_s: float | None) -> float:
-        """Place a tick on the source's clock; without one, a tick behind what came before, so that order stays."""
+        """Convert a tick to the source's clock.
+
+        Without a tick, take one tick after the previous frame, which keeps the order.
+        """
         if not self.has_own_clock or self._stream.time_base is None:
             return arrived_s
         if tick is None:

@@ -1,7 +1,7 @@
 """The quantiser of every block of a decoded picture, as the decoder read it in the stream.
 
-FFmpeg gives it where it is asked (`export_side_data=venc_params`, libavutil/video_enc_params.h) for H.264, VP9 and the
-MPEG family to MPEG-4 part 2; for other codecs nothing is known.
+FFmpeg reports it on request (`export_side_data=venc_params`, libavutil/video_enc_params.h) for H.264, VP9 and the MPEG
+family up to MPEG-4 part 2; for other codecs it is unknown.
 """
 
 import struct
@@ -41,7 +41,7 @@ VP9_STEPS = _vp9_steps()
 
 
 def quantiser_steps(picture: av.VideoFrame) -> Quantiser | None:
-    """Steps of a decoded picture as H.264 would have them; None where its codec says nothing of them.
+    """Quantiser steps of a decoded picture, on the scale of H.264; None where its codec does not report them.
 
     Parameters
     ----------

@@ -12,7 +12,7 @@ from fingervision.frames.source import Description
 
 @dataclass(frozen=True, slots=True, eq=False)
 class OwnPacket:
-    """A packet as the camera coded it.
+    """A packet in the camera's own coding.
 
     Parameters
     ----------
@@ -32,7 +32,7 @@ class OwnPacket:
 
 @dataclass(frozen=True, slots=True)
 class Driven:
-    """The stage at a frame's exposure.
+    """State of the stage at a frame's exposure.
 
     Parameters
     ----------
@@ -51,7 +51,7 @@ class Driven:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Received:
-    """A frame of a live source.
+    """A frame as received from a live source.
 
     Parameters
     ----------
@@ -72,33 +72,33 @@ class Received:
 
 
 class LiveSource(Protocol):
-    """A source that goes on by itself and may be cut and opened again."""
+    """A source that runs by itself, and may be interrupted and opened again."""
 
     @property
     def description(self) -> Description:
-        """What is known before the frames are read."""
+        """What is known of the source before its frames are read."""
         ...
 
     @property
     def has_own_clock(self) -> bool:
-        """Whether times are the source's; otherwise they are the host's monotonic clock on arrival."""
+        """Whether times are those of the source; otherwise they are the computer's monotonic clock on arrival."""
         ...
 
     @property
     def template(self) -> av.VideoStream | None:
-        """The coded stream that packets belong to, where there is one."""
+        """The coded stream to which the packets belong; None where there is none."""
         ...
 
     def received(self) -> Iterator[Received]:
-        """Frames as they come; ends where a recording ends.
+        """Yield the frames as they arrive; ends where a recording ends.
 
         Raises
         ------
-        FingervisionError
+        DeviceError
             The source is cut off.
         """
         ...
 
     def close(self) -> None:
-        """Let go of the camera or connection; the iteration then ends."""
+        """Close the camera or connection, which ends the iteration."""
         ...

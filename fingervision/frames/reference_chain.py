@@ -1,4 +1,4 @@
-"""Whether a coded picture follows the one that it hangs on: a picture that never came leaves a hole in the numbers."""
+"""Check that a coded picture follows its reference picture: a lost picture leaves a hole in the frame numbers."""
 
 from collections import deque
 from enum import Enum
@@ -15,7 +15,7 @@ LEAP_SHARE = 1.5
 
 
 class Link(Enum):
-    """What the numbers say of a picture: it follows, something that it may hang on is missing, or they say nothing."""
+    """What the frame numbers tell of a picture: it follows on, a reference may be missing, or nothing is known."""
 
     FOLLOWS = "follows"
     BROKEN = "broken"
@@ -23,15 +23,15 @@ class Link(Enum):
 
 
 class ReferenceChain:
-    """Follows the numbers of H.264 pictures in the order of decoding (ITU-T H.264, 7.4.3, `frame_num`).
+    """Follows the frame numbers of H.264 pictures in decoding order (ITU-T H.264, 7.4.3, `frame_num`).
 
-    A decoder that gets no picture conceals nothing and says nothing: it takes the differences of the next picture to
-    whatever came before. Pictures on which no other hangs (most of those between two others in time) may be missing
-    without any harm, and are told apart. HEVC needs no such rule: its pictures name those that they hang on, and FFmpeg
-    says which of them it has not. Other codecs write no numbers; there nothing is said.
+    A decoder that misses a picture reports nothing: it adds the differences of the next picture to whichever picture
+    came before. Pictures that are no reference for others (most of those between two others in time) may be missing
+    without harm, and are recognised. HEVC needs no such check: its pictures name their references, and FFmpeg reports
+    which of them are missing. Other codecs write no numbers, so that nothing can be checked.
 
-    Memory management that sets numbers back amid a stream (operation 5) is not looked for, since no camera is known to
-    use it; pictures behind it would be taken for broken until the next key frame.
+    Resets of the numbers in mid-stream (memory management operation 5) are not detected, since no camera is known to
+    use them; pictures after one would be taken for damaged until the next key frame.
 
     Parameters
     ----------
@@ -53,7 +53,7 @@ class ReferenceChain:
         """How many pictures ago the recovery began that the last picture completes; None where it completes none."""
 
     def link(self, packet: "av.Packet[av.VideoStream]") -> Link:
-        """Look at the next packet."""
+        """Check the next packet."""
         missing = self._missing(packet.dts)
         self.recovered_over = None
         picture = self._numbers.of(bytes(packet)) if self._numbers is not None else None
@@ -88,14 +88,14 @@ class ReferenceChain:
         return Link.UNKNOWN if picture.may_leap and step and not missing else Link.BROKEN
 
     def _may_hide_a_key(self, before: CodedPicture, missing: int, modulus: int) -> bool:
-        """Whether so many pictures may be missing that the numbers, set back or once around, come out the same."""
+        """Whether a loss could be hidden because the numbers, after a reset or a full cycle, come out the same."""
         if missing >= modulus:
             return True
         is_due = self._key_every is None or self._since_key + 1 + missing >= self._key_every
         return missing > before.number and is_due
 
     def _missing(self, tick: int | None) -> int:
-        """Pictures that are missing before this one, as far as the times tell."""
+        """Number of pictures missing before this one, as far as the times tell."""
         step = None if self._tick is None or tick is None else tick - self._tick
         self._tick = tick
         if step is None or step <= 0:

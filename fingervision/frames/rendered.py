@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class RenderedFrames:
-    """A sequence of scenes through a camera.
+    """A sequence of scenes seen through a rendered camera.
 
     Parameters
     ----------
@@ -64,7 +64,7 @@ class RenderedFrames:
         )
 
     def __iter__(self) -> Iterator[Frame | LostFrame]:
-        """Draw the frames one by one."""
+        """Render the frames one by one."""
         from fingervision.rendering import render  # a third of a second that no recording of a camera needs
 
         for index, scene in enumerate(self.scenes):

@@ -1,4 +1,4 @@
-"""A frame of a recording by its time, without reading what comes before: for looking, never for measuring a series."""
+"""Random access to a frame by its time: for display only, never for measuring a series."""
 
 from pathlib import Path
 from typing import Protocol
@@ -16,15 +16,15 @@ MOST_FRAMES_TO_DECODE = 600
 
 
 class Seeking(Protocol):
-    """A recording whose frames can be found one by one."""
+    """A recording whose single frames can be accessed directly."""
 
     def frame(self, index: int, time_s: float) -> Frame | None:
-        """Frame of exactly that time; None where there is none such, or it cannot be decoded by itself."""
+        """Return the frame of exactly that time; None where there is none, or it cannot be decoded alone."""
         ...
 
 
 def seeking(name: str) -> Seeking | None:
-    """Seek in a video file; None where frames are found by counting anyway.
+    """Open a video file for random access; None for sources whose frames are accessed by number anyway.
 
     Parameters
     ----------
@@ -37,7 +37,7 @@ def seeking(name: str) -> Seeking | None:
 
 
 class VideoSeeking:
-    """Seeks in a video file; the decoder goes on from where it was when the next frame is asked for.
+    """Random access to a video file; for the following frame the decoder continues from where it was.
 
     Parameters
     ----------
@@ -52,7 +52,7 @@ class VideoSeeking:
         self._tick: int | None = None
 
     def frame(self, index: int, time_s: float) -> Frame | None:
-        """Frame of exactly that time; None where there is none such, or it cannot be decoded by itself."""
+        """Return the frame of exactly that time; None where there is none, or it cannot be decoded alone."""
         try:
             return self._found(index, time_s)
         except (av.FFmpegError, OSError, ValueError):

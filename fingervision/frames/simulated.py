@@ -1,4 +1,4 @@
-"""A gripper that opens and closes for ever, drawn with known truth: for whoever has no camera at hand."""
+"""A drawn gripper that opens and closes for ever with a known gap, for use without a camera."""
 
 from collections.abc import Iterator
 from itertools import count
@@ -26,12 +26,12 @@ SEED = 1
 
 
 def accepts(name: str) -> bool:
-    """Whether this is the word simulated."""
+    """Whether a name is the word `simulated`."""
     return name == NAME
 
 
 def open_frames(name: str, wish: Wish) -> "SimulatedGripper":
-    """Start the simulated gripper at the wished size and rate.
+    """Start the simulated gripper with the requested size and frame rate.
 
     Raises
     ------
@@ -42,12 +42,12 @@ def open_frames(name: str, wish: Wish) -> "SimulatedGripper":
 
 
 def true_gap_mm(index: int) -> float:
-    """Gap that is drawn in a frame, before it is rounded to pixels' levels."""
+    """Gap that is drawn in a frame, before rounding to grey levels (mm)."""
     return CLOSED_MM + (OPEN_MM - CLOSED_MM) * 0.5 * (1.0 - cos(2.0 * pi * (index % CYCLE_FRAMES) / CYCLE_FRAMES))
 
 
 class SimulatedGripper:
-    """A simulated camera; frames come at its rate, with exact times.
+    """A simulated camera; frames come at its frame rate, with exact times.
 
     Parameters
     ----------
@@ -83,12 +83,12 @@ class SimulatedGripper:
         )
 
     def __iter__(self) -> Iterator[Frame | LostFrame]:
-        """Frames at their own pace."""
+        """Yield the frames in real time."""
         for received in self.received():
             yield received.item
 
     def received(self) -> Iterator[Received]:
-        """Frames at their own pace, until closed."""
+        """Yield the frames in real time, until closed."""
         rng = np.random.default_rng(SEED)
         drawn: dict[int, Pixels] = {}
         started_s = monotonic()

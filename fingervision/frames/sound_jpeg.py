@@ -1,10 +1,10 @@
-"""Whether a JPEG holds exactly the blocks that it states: a second decoder is asked, which says what FFmpeg lets pass.
+"""Check that a JPEG holds exactly the blocks that it states, with a second decoder that reports what FFmpeg ignores.
 
-Damage in a JPEG lets the Huffman codes behind it be read otherwise, and often too few or too many bytes are left where
-the picture, or the part of it before a restart marker, is full. (A single flipped bit is often caught up with within a
-few blocks: what it draws is judged by `measuring.sound_picture`.) FFmpeg fills what is missing with
-what was in memory and leaves the rest; libjpeg-turbo counts both (warnings JWRN_HIT_MARKER and JWRN_EXTRANEOUS_DATA,
-ITU-T T.81, F.2.2.5 and E.2.4).
+Damage in a JPEG changes how the following Huffman codes are read, and often leaves too few or too many bytes at the end
+of the picture, or of the part before a restart marker. (After a single flipped bit the codes often fit again within a
+few blocks: the visible error is judged by `measuring.sound_picture`.) FFmpeg fills missing blocks with whatever was in
+memory and ignores surplus bytes; libjpeg-turbo reports both (warnings JWRN_HIT_MARKER and JWRN_EXTRANEOUS_DATA, ITU-T
+T.81, F.2.2.5 and E.2.4).
 """
 
 from collections.abc import Iterable
@@ -18,10 +18,10 @@ PICTURES_TO_LEARN = 16
 
 
 class SoundJpeg:
-    """Judges the pictures of one Motion JPEG stream.
+    """Checks the pictures of one Motion JPEG stream.
 
-    What is said of a picture is believed only as long as most pictures of the stream are sound: otherwise the camera
-    writes them so.
+    A fault is reported only as long as most pictures of the stream are sound: otherwise the camera itself writes such
+    pictures.
 
     Parameters
     ----------
@@ -34,13 +34,13 @@ class SoundJpeg:
         self._sound = self._unsound = 0
 
     def learn(self, pictures: Iterable[bytes]) -> None:
-        """Look at a few pictures beforehand."""
+        """Check a few pictures in advance, to learn what is usual for the stream."""
         if self._is_one:
             for picture, _ in zip(pictures, range(PICTURES_TO_LEARN), strict=False):
                 self._count(not _fault(picture))
 
     def fault(self, picture: bytes) -> str:
-        """Say what is wrong with a picture; empty where nothing is.
+        """Describe a picture's fault; empty where it has none.
 
         Parameters
         ----------

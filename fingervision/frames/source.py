@@ -1,4 +1,4 @@
-"""Where frames come from: what every source says of itself, and how one is found."""
+"""Protocol of frame sources, with their description, and how a source is found by its name."""
 
 import importlib
 import logging
@@ -65,12 +65,12 @@ class Description:
 
     @property
     def lossy(self) -> bool:
-        """Whether anything of the picture is lost."""
+        """Whether the coding loses any of the picture."""
         return self.coding is not Coding.LOSSLESS
 
 
 class FrameSource(Protocol):
-    """A recording or a camera: its frames in order, each read once, as a picture or marked as lost."""
+    """A recording or a camera: its frames in order, each either a picture or marked as lost; each is read once."""
 
     @property
     def description(self) -> Description:
@@ -84,7 +84,7 @@ class FrameSource(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class CameraWish:
-    """What the user asks of a camera of this machine; None leaves a setting as it is.
+    """Settings that the user requests of a camera of this machine; None leaves a setting unchanged.
 
     Parameters
     ----------
@@ -122,7 +122,7 @@ class CameraWish:
 
 @dataclass(frozen=True, slots=True)
 class Wish:
-    """What the user asks of a source.
+    """Options that the user sets for a source.
 
     Parameters
     ----------
@@ -143,24 +143,27 @@ class SourceKind(Protocol):
     """A module, or another object, that opens sources by name."""
 
     def accepts(self, name: str) -> bool:
-        """Whether a name is one of this kind; called for every recording, so it must be quick and open nothing."""
+        """Whether a name belongs to this kind of source.
+
+        Called for every recording, so it must be fast and open nothing.
+        """
         ...
 
     def open_frames(self, name: str, wish: Wish) -> FrameSource:
-        """Open it; FingervisionError with a sentence where that cannot be."""
+        """Open the source; raise FingervisionError with a sentence where that is impossible."""
         ...
 
 
 def open_source(name: str, wish: Wish | None = None) -> FrameSource:
-    """Open a recording or camera by the name that the user gave.
+    """Open a recording or camera by its name.
 
-    Every module of this package that has `accepts(name) -> bool` and `open_frames(name, wish) -> FrameSource` is a
-    kind of source, as is every such module or object of another distribution (entry points of the group
-    `fingervision.frame_sources`). One that states `TAKES_THE_REST = True` is asked where no other accepts the name.
+    Every module of this package that has `accepts(name) -> bool` and `open_frames(name, wish) -> FrameSource` is a kind
+    of source, as is every such module or object of another distribution (entry points of the group
+    `fingervision.frame_sources`). A kind with `TAKES_THE_REST = True` is asked only if no other accepts the name.
 
     Raises
     ------
-    FingervisionError
+    DataError, DeviceError, InputFileError
         No kind of source knows the name, or the one that does cannot read it.
     UsageError
         Several kinds accept it.
@@ -210,7 +213,7 @@ def _opened(entry: Entry[SourceKind], name: str, wish: Wish) -> FrameSource:
 
 
 def kinds() -> list[SourceKind]:
-    """Kinds of source that open recordings by name."""
+    """Kinds of sources that open a recording by its name."""
     return [entry.value for entry in REGISTRY.entries()]
 
 

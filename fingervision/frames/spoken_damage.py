@@ -1,4 +1,4 @@
-"""Damage that FFmpeg reports in its log only: collected by decoder, and kept off the screen."""
+"""Damage that FFmpeg reports only in its log: collected for each decoder, and kept off the screen."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -16,10 +16,10 @@ HELPERS = ("swscaler", "swresampler", "")
 
 @dataclass(slots=True)
 class Heard:
-    """What was said of errors since it was asked last.
+    """Errors logged since the last request.
 
-    Decoders fill in a damaged part from the picture before it, and containers skip to the next place that looks whole;
-    both say so in the log, and most of it is no error that the caller gets.
+    Decoders fill in a damaged part from the previous picture, and containers skip to the next place that looks sound.
+    Both only log it; most of it is never returned to the caller as an error.
 
     Parameters
     ----------
@@ -34,7 +34,7 @@ class Heard:
     log: list[tuple[int, str, str]] = field(default_factory=list)
 
     def of_picture(self) -> str:
-        """Take what the decoder said, its first sentence; empty where it said nothing."""
+        """Return and clear the decoder's first logged sentence; empty where there is none."""
         said = [
             words.strip() for level, speaker, words in self.log if speaker == self.decoder and level <= av.logging.ERROR
         ]
@@ -43,7 +43,7 @@ class Heard:
         return said[0].rstrip(".") if said else ""
 
     def of_file(self) -> str:
-        """Take what the container said and leave what the decoder said."""
+        """Return and clear the container's sentences, keeping those of the decoder."""
         said = [
             words.strip()
             for level, speaker, words in self.log
@@ -56,7 +56,7 @@ class Heard:
 
 @contextmanager
 def listening(decoder: str, warnings: tuple[str, ...] = ()) -> Iterator[Heard]:
-    """Listen to what FFmpeg says of errors, and keep it off the user's screen."""
+    """Collect FFmpeg's error log, and keep it off the user's screen."""
     before = av.logging.get_level()
     av.logging.set_level(av.logging.WARNING if warnings else av.logging.ERROR)
     try:

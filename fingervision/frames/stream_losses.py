@@ -1,4 +1,4 @@
-"""What the packets of a stream tell of those that never came, beside what the container says itself."""
+"""Lost packets of a stream, from the packets that did arrive, beside what the container reports itself."""
 
 import av
 
@@ -10,7 +10,7 @@ LOST_REFERENCE = "A picture that it hangs on is missing: the numbers of the code
 
 
 class StreamLosses:
-    """Follows the packets of a stream, and tells the trail of damage what is missing.
+    """Follows the packets of a stream, and reports missing ones to the damage trail.
 
     Parameters
     ----------
@@ -26,7 +26,10 @@ class StreamLosses:
         self._chain = ReferenceChain(codec.name, codec.extradata)
 
     def before(self, packet: "av.Packet[av.VideoStream]", trail: DamageTrail) -> str:
-        """Tell the trail of what is missing before a packet; gives a sentence if whole frames of an even row are."""
+        """Report missing packets before this one to the damage trail.
+
+        Return a sentence if whole frames of an even row are missing.
+        """
         link = self._chain.link(packet)
         leaps = self._transport.leaps(packet)
         if link is Link.BROKEN:
@@ -36,7 +39,7 @@ class StreamLosses:
         return MISSING if leaps else ""
 
     def behind(self, packet: "av.Packet[av.VideoStream]", trail: DamageTrail) -> None:
-        """Tell the trail of the packet that it took in last."""
+        """Report damage of the last packet to the damage trail, after it entered the decoder."""
         self._transport.behind(packet, trail)
         if self._chain.recovered_over is not None:
             trail.recovers(self._chain.recovered_over)

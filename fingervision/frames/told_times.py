@@ -1,4 +1,4 @@
-"""Damage seen in time stamps: times that run backwards, isolated jumps, missing frames."""
+"""Damage visible in time stamps: times that run backwards, isolated jumps, missing frames."""
 
 from collections import Counter, deque
 from collections.abc import Iterable, Iterator
@@ -17,12 +17,12 @@ OUT_OF_ROW = "Its time does not fit between those of the frames around it, which
 
 
 def believable(pictures: Iterable[Picture]) -> Iterator[Picture]:
-    """Pass on pictures in order of presentation, and lost ones instead of those whose time cannot be.
+    """Yield pictures in order of presentation, with lost frames in place of those whose time is impossible.
 
-    Pictures leave a decoder in the order in which they are shown. A time that is earlier than the one before it is
-    wrong, or the one before it is; neither is known, and both pictures are lost, with all until times are beyond both.
-    A single time that is off an otherwise even row is wrong by itself. A repeated time is left alone: that is a
-    duplicate.
+    Pictures leave a decoder in the order of presentation. If a time is earlier than the one before it, one of the two
+    is wrong, but not known which. Both pictures are lost, and so are all that follow until times are later than both. A
+    single time that departs from an otherwise regular series is wrong by itself. A repeated time is left unchanged: it
+    means a duplicate frame.
 
     Parameters
     ----------
@@ -66,9 +66,10 @@ def believable(pictures: Iterable[Picture]) -> Iterator[Picture]:
 
 
 class EvenRow:
-    """Notices frames that are missing in a row of even steps, in the order of decoding.
+    """Detects missing frames in a regular series of times, in decoding order.
 
-    For formats that are broadcast (MPEG-TS): their encoders keep an even rate, and what is missing was lost on the way.
+    Used for broadcast formats (MPEG-TS): their encoders keep a constant rate, so that a missing frame was lost in
+    transmission.
 
     Parameters
     ----------
@@ -82,7 +83,7 @@ class EvenRow:
         self._last: int | None = None
 
     def leaps(self, tick: int) -> bool:
-        """Whether frames are missing between the tick before and this one."""
+        """Whether frames are missing between the previous tick and this one."""
         step = None if self._last is None else tick - self._last
         self._last = tick
         if step is None:
@@ -95,7 +96,7 @@ class EvenRow:
 
 
 def _usual(steps: "deque[int]") -> float | None:
-    """Step of an even row; None if it is none."""
+    """Step of a regular series; None if it is irregular."""
     if len(steps) < EVEN_STEPS:
         return None
     usual = sum(steps) / len(steps)

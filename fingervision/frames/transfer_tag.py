@@ -1,4 +1,4 @@
-"""What a recording's own tag says of the camera's transfer curve."""
+"""The camera's transfer curve as stated by a tag in the recording."""
 
 import struct
 from collections.abc import Iterator
@@ -18,7 +18,7 @@ HEAD_BYTES = 1 << 16
 
 
 def transfer_tag(files: tuple[Path, ...]) -> str | None:
-    """Name of the standard response that the first file states; None where it states none.
+    """Name of the standard response stated in the first file; None where it states none.
 
     Parameters
     ----------

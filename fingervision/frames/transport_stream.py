@@ -1,4 +1,4 @@
-"""What an MPEG transport stream tells of losses beside its marks: incomplete pictures, and an even row with holes."""
+"""Losses in an MPEG transport stream that it does not mark: incomplete pictures, and holes in a regular series."""
 
 import av
 
@@ -13,7 +13,7 @@ EVEN_CODECS = frozenset({"mpeg1video", "mpeg2video"})
 
 
 class TransportLosses:
-    """Follows the packets of a transport stream, or of a codec of even rate; of another it says nothing.
+    """Follows the packets of a transport stream, or of a codec with constant rate; for others it reports nothing.
 
     Parameters
     ----------
@@ -35,7 +35,7 @@ class TransportLosses:
         return self._is_even and packet.dts is not None and self._row.leaps(packet.dts)
 
     def behind(self, packet: "av.Packet[av.VideoStream]", trail: DamageTrail) -> None:
-        """Tell the trail, behind a packet that entered, whether it is incomplete without being marked."""
+        """Report to the damage trail, after a packet entered, if it is incomplete without being marked so."""
         # Pictures are cut out of the stream after its damage was marked: the mark may be one too early.
         if self._is_one and (packet.pts is None or self._was_corrupt):
             trail.breaks("It is incomplete.")

@@ -1,4 +1,4 @@
-"""Video files through PyAV: any container, the container's own times, read in sequence and never by seeking."""
+"""Video files through PyAV: any container, with its own time stamps, read in sequence and never by seeking."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field
@@ -48,7 +48,7 @@ TAKES_THE_REST = True
 
 
 def accepts(name: str) -> bool:
-    """Whether this is a file that is not an image."""
+    """Whether a name is a file that is not an image."""
     path = Path(name)
     return path.is_file() and path.suffix.lower() not in IMAGE_SUFFIXES
 
@@ -58,7 +58,7 @@ def open_frames(name: str, wish: Wish) -> "VideoFile":
 
     Raises
     ------
-    FingervisionError
+    DataError, InputFileError
         It cannot be read, is no video, or has no picture in it.
     UsageError
         A rate is given for what has its own times.
@@ -129,7 +129,7 @@ class VideoFile:
             )
 
     def __iter__(self) -> Iterator[Frame | LostFrame]:
-        """Decode in sequence; what cannot be decoded, and what hangs on it, is damaged."""
+        """Decode in sequence; frames that cannot be decoded, or depend on such frames, are marked as damaged."""
         numbers = count()
         last_tick: int | None = None
         with self._opened() as container:
@@ -180,12 +180,12 @@ def _stream(container: av.container.InputContainer, name: str) -> av.VideoStream
 
 
 def _tracks(container: av.container.InputContainer) -> list[av.VideoStream]:
-    """Tracks that are videos: a cover picture, which stands among them, is none."""
+    """Tracks that are videos; a cover picture, which is listed among them, is excluded."""
     return [one for one in container.streams.video if not one.disposition & Disposition.attached_pic]
 
 
 def _rotation_deg(container: av.container.InputContainer, stream: av.VideoStream) -> int:
-    """Angle by which the file asks to turn its pictures, anticlockwise; 0 where the first cannot be decoded."""
+    """Angle by which the file asks to turn its pictures, anticlockwise; 0 where the first picture cannot be decoded."""
     try:
         first = next(iter(container.decode(stream)), None)
     except (av.FFmpegError, OSError):
@@ -194,7 +194,7 @@ def _rotation_deg(container: av.container.InputContainer, stream: av.VideoStream
 
 
 def upright(pixels: Pixels, rotation_deg: int) -> Pixels:
-    """Turn a picture by quarters as its file asks; other angles are left alone."""
+    """Turn a picture by quarter turns as its file asks; other angles are ignored."""
     if rotation_deg % QUARTER_DEG or not rotation_deg:
         return pixels
     turned: Pixels = np.ascontiguousarray(np.rot90(pixels, rotation_deg // QUARTER_DEG))  # type: ignore[assignment]
@@ -202,7 +202,7 @@ def upright(pixels: Pixels, rotation_deg: int) -> Pixels:
 
 
 def upright_steps(picture: av.VideoFrame) -> Quantiser | None:
-    """Quantiser of a picture as the file asks to turn it."""
+    """Quantiser steps of a picture, turned as the file asks."""
     steps = quantiser_steps(picture)
     if steps is None or picture.rotation % QUARTER_DEG:
         return steps

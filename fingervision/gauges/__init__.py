@@ -1,1 +1,1 @@
-"""Gauges of one's own: named things that are measured in every frame, each kind in a file of `kinds`."""
+"""User-defined gauges: named quantities that are measured in every frame; each kind is a file in `kinds`."""

@@ -1,4 +1,4 @@
-"""Gauges drawn into a picture: where each looked, what it found, and its name."""
+"""Gauges drawn into a picture: the searched zone, the result, and the name of each."""
 
 from collections.abc import Sequence
 
@@ -54,7 +54,7 @@ def _cross(canvas: Canvas, point: tuple[float, float], colour: tuple[int, int, i
 
 
 def _name(canvas: Canvas, gauge: Gauge, reading: Reading, colour: tuple[int, int, int], size: float) -> None:
-    """Name, and status where there is no number, at the upper right of what was looked at; readable on any ground."""
+    """Draw the name, and the status where there is no number, beside the gauge; legible on any background."""
     places = reading.zone.points_px if reading.zone is not None else (gauge.spec.middle_px,)
     words = gauge.name if reading.status is GaugeStatus.OK else f"{gauge.name}: {reading.status.value}"
     words = words.encode("ascii", "replace").decode()

@@ -1,4 +1,4 @@
-"""What a kind of gauge asks for, found by letting it read a table that notes every question."""
+"""The keys that a kind of gauge reads, found by letting it read a table that records every request."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass, field
@@ -14,7 +14,7 @@ USUAL_PX = 40.0
 
 @dataclass(frozen=True, slots=True)
 class Field:
-    """One key of a kind.
+    """One key of a kind of gauge.
 
     Parameters
     ----------
@@ -36,7 +36,7 @@ class Field:
 
     @property
     def usual(self) -> float | str:
-        """What a new gauge begins with."""
+        """Value with which a new gauge begins."""
         if self.default is not None:
             return self.default
         if self.choices:
@@ -48,7 +48,7 @@ class Field:
 
 @dataclass(frozen=True, slots=True)
 class _Noting(Section):
-    """A table that has every key, and notes what it is asked."""
+    """A table that has every key, and records which keys are requested."""
 
     noted: dict[str, Field] = field(default_factory=dict)
 
@@ -68,7 +68,7 @@ class _Noting(Section):
 
 @cache
 def fields_of(kind_name: str) -> tuple[Field, ...]:
-    """Give the keys of a kind, in its order, with defaults, limits and words."""
+    """The keys of a kind of gauge, in its order, with defaults, limits and descriptions."""
     kind = kind_named(kind_name)
     noting = _Noting(Path(), "", "", {})
     kind.read(noting)

@@ -1,4 +1,4 @@
-"""gauges.toml: the gauges of one picture.
+"""The file gauges.toml: the gauges of one picture.
 
 schema = 1
 [[gauge]]
@@ -52,7 +52,7 @@ class Gauge:
 
     @property
     def quantities(self) -> tuple[tuple[str, str], ...]:
-        """Names of its numbers, and whether each is a length or an angle."""
+        """Names of the gauge's quantities, and whether each is a length or an angle."""
         return self.kind.QUANTITIES
 
 
@@ -61,14 +61,14 @@ def read_gauges(path: Path) -> tuple[Gauge, ...]:
 
     Raises
     ------
-    FingervisionError
+    DataError, InputFileError
         The file cannot be read, or a value in it cannot be meant; the sentence names the line.
     """
     return gauges_in(path, *read_document(path, "gauge file"))
 
 
 def gauges_in(path: Path, values: Mapping[str, Any], text: str) -> tuple[Gauge, ...]:
-    """Make gauges of what a file holds.
+    """Make the gauges from the content of a file.
 
     Parameters
     ----------
@@ -81,7 +81,7 @@ def gauges_in(path: Path, values: Mapping[str, Any], text: str) -> tuple[Gauge, 
 
     Raises
     ------
-    FingervisionError
+    DataError
         A value in it cannot be meant; the sentence names the line.
     """
     top = Section(path, text, "", values)
@@ -100,7 +100,7 @@ def gauges_in(path: Path, values: Mapping[str, Any], text: str) -> tuple[Gauge, 
 
 
 def gauge_of(section: Section, others: Collection[str]) -> Gauge:
-    """Make one gauge of its table.
+    """Make one gauge from its table.
 
     Parameters
     ----------
@@ -111,7 +111,7 @@ def gauge_of(section: Section, others: Collection[str]) -> Gauge:
 
     Raises
     ------
-    FingervisionError
+    DataError
         A value in it cannot be meant.
     """
     name = section.word("name")
@@ -126,11 +126,11 @@ def gauge_of(section: Section, others: Collection[str]) -> Gauge:
 
 
 def check_gauges(gauges: tuple[Gauge, ...], width_px: int, height_px: int) -> None:
-    """Refuse gauges whose middle lies outside of the frames.
+    """Refuse gauges whose centre lies outside the frames.
 
     Raises
     ------
-    FingervisionError
+    DataError
         One does; the sentence names it.
     """
     for gauge in gauges:

@@ -1,4 +1,4 @@
-"""A frame as gauges see it: levels of light, computed where they are needed."""
+"""A frame as gauges use it: levels converted to light where they are needed."""
 
 from dataclasses import dataclass
 
@@ -21,7 +21,7 @@ EDGE_SHARED_PIXELS = SHARED_PIXELS | {Coding.INTERFRAME: 36.0}
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Picture:
-    """One frame as gauges see it.
+    """One frame as gauges use it.
 
     Parameters
     ----------
@@ -50,23 +50,23 @@ class Picture:
 
     @property
     def coding(self) -> Coding:
-        """What stood between the sensor and the pixels."""
+        """Compression between the sensor and the pixels."""
         return self.frame.coding
 
     @property
     def shared_pixels(self) -> float:
-        """So many pixels count as one, as far as the codec is known to share its errors."""
+        """Number of pixels that count as one, from what is known of the codec's shared errors."""
         return SHARED_PIXELS[self.frame.coding]
 
     @property
     def edge_shared_pixels(self) -> float:
-        """The same for edges: where the quantiser is known, `displaced_px` says what they share."""
+        """The same for edges: 1 where the quantiser is known, because `displaced_px` then states the shared error."""
         return EDGE_SHARED_PIXELS[self.frame.coding] if self.frame.quantiser is None else 1.0
 
     def displaced_px(
         self, place_px: tuple[float, float], half_px: tuple[float, float], inside: float, contrast: float
     ) -> float:
-        """Standard uncertainty of an edge's place for what the codec may have done to all of it alike.
+        """Standard uncertainty of an edge's position from a codec error common to the whole edge (pixels).
 
         Parameters
         ----------
@@ -87,7 +87,7 @@ class Picture:
         return displaced_px(quantiser.near(*place_px, *half_px), (levels[1] - levels[0]) * EIGHT_BITS / self.top)
 
     def part(self, x_px: int, y_px: int, width_px: int, height_px: int) -> tuple[Floats, tuple[int, int]]:
-        """Light in a rectangle, cut to the picture, and the rectangle's first column and row as far as it is inside."""
+        """Light in a rectangle cut to the picture, with the first column and row of the cut rectangle."""
         width, height = self.size_px
         left, top = min(max(x_px, 0), width), min(max(y_px, 0), height)
         right, bottom = min(max(x_px + width_px, left), width), min(max(y_px + height_px, top), height)
@@ -95,13 +95,13 @@ class Picture:
         return (stored.astype(np.float64) if self.light is None else self.light[stored]), (left, top)
 
     def holds(self, x_px: float, y_px: float, width_px: float, height_px: float) -> bool:
-        """Whether a rectangle lies wholly inside the picture."""
+        """Whether a rectangle lies entirely inside the picture."""
         width, height = self.size_px
         return x_px >= -0.5 and y_px >= -0.5 and x_px + width_px <= width + 0.5 and y_px + height_px <= height + 0.5
 
 
 def picture_of(frame: Frame, settings: Settings) -> Picture:
-    """Prepare a frame for its gauges."""
+    """Prepare a frame for the gauges."""
     grey = to_grey(frame.pixels)
     response: CameraResponse = settings.response
     top = top_level(grey, settings.bits if response.top_level is None else response.top_level.bit_length())

@@ -1,4 +1,4 @@
-"""From the picture to the plane for any point and direction, with what all frames share of the uncertainty."""
+"""Conversion from the picture to the object plane at any point, with the uncertainty common to all frames."""
 
 from dataclasses import dataclass, field
 from math import cos, hypot, pi, sin, sqrt
@@ -19,7 +19,7 @@ SQUARE_PX, SECTOR_RAD, BASELINE_PX = 32.0, pi / 12.0, 64.0
 
 @dataclass(frozen=True, slots=True)
 class PlaneScale:
-    """A scale with the size of the frames that it is for.
+    """A scale with the size of the frames for which it is valid.
 
     Parameters
     ----------
@@ -35,12 +35,12 @@ class PlaneScale:
 
     @property
     def px_per_mm(self) -> float:
-        """Pixels to the millimetre."""
+        """Pixels per millimetre."""
         return self.scale.px_per_mm
 
     @property
     def edge_bias_px(self) -> float:
-        """What a light gap between dark edges lacks in the picture."""
+        """Width that a light gap between dark edges loses in the picture (pixels)."""
         return self.scale.edge_bias_px
 
     @property
@@ -49,13 +49,13 @@ class PlaneScale:
         return 0.5 * (self.frame_size_px[0] - 1), 0.5 * (self.frame_size_px[1] - 1)
 
     def flatten(self, points_px: Floats) -> Floats:
-        """Take lens and perspective off points, shape (n, 2)."""
+        """Remove lens distortion and perspective from points, shape (n, 2)."""
         return self.scale.flatten(points_px) if isinstance(self.scale, Calibration) else points_px
 
     def relative_u(self, point_px: tuple[float, float], direction_rad: float) -> float:
-        """Relative standard uncertainty of a length there, that all frames share; 0 where nothing is known of it.
+        """Relative standard uncertainty, common to all frames, of a length at a point; 0 where it is unknown.
 
-        Scale, plane, tilt, lens and temperature are in it; bias and phase of edges are not.
+        It includes scale, plane, tilt, lens and temperature, but not the bias and phase error of edges.
         """
         if not isinstance(self.scale, Calibration):
             return 0.0
@@ -77,19 +77,19 @@ class PlaneScale:
         return sqrt(variance / length_mm**2 + of_scale)
 
     def u_edge_px(self, u_response_px: float) -> float:
-        """What all frames share of the uncertainty of one edge: half of the edge bias, phase, camera response."""
+        """Uncertainty of one edge common to all frames: half of the edge bias, phase, camera response (pixels)."""
         if not isinstance(self.scale, Calibration):
             return 0.0
         return hypot(0.5 * self.scale.u_edge_bias_px, self.u_phase_px, u_response_px)
 
     @property
     def u_phase_px(self) -> float:
-        """What the sub-pixel phase leaves open of an edge or a registered patch (`estimator_px` of the calibration)."""
+        """Uncertainty of an edge or registered patch from the sub-pixel phase (`estimator_px` of the calibration)."""
         return rectangular(self.scale.limits.estimator_px) if isinstance(self.scale, Calibration) else 0.0
 
     @property
     def u_angle_rad(self) -> float:
-        """What tilt and lens leave open of an angle: half of what they may shorten one axis against the other."""
+        """Uncertainty of an angle from tilt and lens (rad): half of the distortion of one axis against the other."""
         if not isinstance(self.scale, Calibration):
             return 0.0
         limits = self.scale.limits

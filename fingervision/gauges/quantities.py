@@ -1,7 +1,8 @@
-"""What a gauge can measure: a number in pixels with its uncertainty, and the points that decide it on the plane.
+"""Quantities that a gauge can measure: a number in pixels with its uncertainty, and the points that define it.
 
-Lens and plane are taken off the measured points; the picture is never resampled. In millimetres `u` holds the whole
-budget of a calibration; with a bare scale, which has no uncertainty, it is the fit's own part, as in pixels.
+The measured points are corrected for lens and perspective; the picture is never resampled. In millimetres `u` includes
+the whole uncertainty budget of a calibration. With a bare scale, which has no uncertainty, it is the fit's own part
+only, as in pixels.
 """
 
 from dataclasses import dataclass
@@ -16,7 +17,7 @@ ANGLE_REACH_PX = 10.0
 
 
 class Cell(NamedTuple):
-    """Value, standard uncertainty and unit, as a row of gauges.csv holds them."""
+    """Value, standard uncertainty and unit, as in a row of gauges.csv."""
 
     value: float
     u: float
@@ -24,27 +25,27 @@ class Cell(NamedTuple):
 
 
 class Quantity(Protocol):
-    """One number of a gauge."""
+    """One quantity that a gauge measures."""
 
     @property
     def points_px(self) -> tuple[Point, ...]:
-        """Points of the picture that decide it."""
+        """Points of the picture that define the quantity."""
         ...
 
     def in_pixels(self) -> Cell:
-        """The number in the picture."""
+        """The quantity in the picture, in pixels or degrees."""
         ...
 
     def on_plane(self, flat: tuple[Point, ...], scale: PlaneScale) -> Cell:
-        """The number on the plane; `flat` are the points with lens and perspective taken off."""
+        """The quantity in the object plane; `flat` are the points corrected for lens and perspective."""
         ...
 
 
 @dataclass(frozen=True, slots=True)
 class Position:
-    """Where a point or an edge is along a direction.
+    """Position of a point or an edge along a direction.
 
-    In pixels it is counted from the middle of the picture's first pixel, in millimetres from the picture's middle, as
+    In pixels it is counted from the centre of the picture's first pixel; in millimetres from the picture's centre, as
     `left_mm` in gaps.csv.
 
     Parameters
@@ -78,7 +79,7 @@ class Position:
         return Cell(x * cos(self.direction_rad) + y * sin(self.direction_rad), self.u_px, "px")
 
     def on_plane(self, flat: tuple[Point, ...], scale: PlaneScale) -> Cell:
-        """Millimetres from the picture's middle; the dark side of a bright edge begins half of the edge bias later."""
+        """Millimetres from the picture's centre; half of the edge bias is added where the edge has a dark side."""
         ((x, y),) = flat
         x, y = x - scale.middle_px[0], y - scale.middle_px[1]
         away_px = x * cos(self.direction_rad) + y * sin(self.direction_rad)
@@ -90,7 +91,7 @@ class Position:
 
 @dataclass(frozen=True, slots=True)
 class Distance:
-    """How far two points on two edges are apart.
+    """Distance between two points on two edges.
 
     Parameters
     ----------
@@ -122,7 +123,7 @@ class Distance:
         return Cell(hypot(to_x - x, to_y - y), self.u_px, "px")
 
     def on_plane(self, flat: tuple[Point, ...], scale: PlaneScale) -> Cell:
-        """`(distance_px + p b) / s`, as a gap."""
+        """`(distance_px + p b) / s`, corrected for the edge bias as a gap is."""
         (x, y), (to_x, to_y) = flat
         apart_px = hypot(to_x - x, to_y - y)
         direction = atan2(to_y - y, to_x - x)
@@ -135,7 +136,7 @@ class Distance:
 
 @dataclass(frozen=True, slots=True)
 class Shift:
-    """How far a point has moved along a direction since the first frame.
+    """Displacement of a point along a direction since the first frame.
 
     Parameters
     ----------
@@ -163,7 +164,7 @@ class Shift:
         return Cell(x * cos(self.direction_rad) + y * sin(self.direction_rad), self.u_px, "px")
 
     def on_plane(self, flat: tuple[Point, ...], scale: PlaneScale) -> Cell:
-        """Millimetres; whatever bias both pictures share cancels, a registration's phase bias does not."""
+        """Millimetres; a bias common to both pictures cancels, the phase error of a registration does not."""
         (x, y), (to_x, to_y) = flat
         moved_px = (to_x - x) * cos(self.direction_rad) + (to_y - y) * sin(self.direction_rad)
         shared_px = scale.relative_u(self.from_px, self.direction_rad) * moved_px
@@ -174,7 +175,7 @@ class Shift:
 
 @dataclass(frozen=True, slots=True)
 class Angle:
-    """Direction of a line, or how far a thing has turned since the first frame.
+    """Direction of a line, or rotation of an object since the first frame.
 
     Parameters
     ----------
@@ -195,7 +196,7 @@ class Angle:
 
     @property
     def points_px(self) -> tuple[Point, ...]:
-        """Two points along the direction, and for a turn two along the x axis."""
+        """Two points along the direction, and for a rotation two more along the x axis."""
         return (*_ends(self.point_px, self.angle_rad), *(_ends(self.point_px, 0.0) if self.is_turn else ()))
 
     def in_pixels(self) -> Cell:
@@ -203,7 +204,7 @@ class Angle:
         return Cell(1e3 * self.angle_rad, 1e3 * self.u_rad, "mrad")
 
     def on_plane(self, flat: tuple[Point, ...], scale: PlaneScale) -> Cell:
-        """On the plane; the same number of turns as in the picture."""
+        """The angle in the plane, with the same number of full turns as in the picture."""
         found = _between(*flat[:2]) - (_between(*flat[2:]) if self.is_turn else 0.0)
         turned = found - self.angle_rad
         value = self.angle_rad + (turned + pi) % (2.0 * pi) - pi
@@ -222,7 +223,7 @@ def _between(first: Point, second: Point) -> float:
 
 @dataclass(frozen=True, slots=True)
 class Ready:
-    """A number that is worked out already, both ways.
+    """A quantity that is already computed, in pixels and in millimetres.
 
     Parameters
     ----------

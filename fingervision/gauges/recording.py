@@ -1,4 +1,4 @@
-"""All gauges of one recording: measured frame by frame, turned into rows, counted, drawn."""
+"""All gauges of one recording: measured frame by frame, converted to rows, counted, drawn."""
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
@@ -17,7 +17,7 @@ from fingervision.gauges.kinds import measured_together
 from fingervision.gauges.picture import picture_of
 from fingervision.gauges.plane_scale import PlaneScale
 from fingervision.gauges.quantities import Cell
-from fingervision.gauges.reading import Reading
+from fingervision.gauges.reading import Reading, unread
 from fingervision.gauges.status import GaugeStatus
 from fingervision.measuring.scale import Scale
 from fingervision.storage.gauges_csv import GaugeRow, GaugeRows, GaugesCsv
@@ -30,7 +30,7 @@ FRAMES_AT_ONCE = 64
 
 @dataclass(slots=True)
 class Tally:
-    """What is kept of one gauge until the end.
+    """Summary of one gauge, kept until the end of the recording.
 
     Parameters
     ----------
@@ -94,7 +94,7 @@ class GaugeRecording:
 
     @property
     def has_numbers(self) -> bool:
-        """Whether any gauge gave a number in any frame so far."""
+        """Whether any gauge has given a number in any frame so far."""
         pending = any(reading.quantities for _, _, readings in self._pending for reading in readings)
         return pending or any(tally.counts[GaugeStatus.OK.value] for tally in self.tallies.values())
 
@@ -116,7 +116,7 @@ class GaugeRecording:
         lost = outcome if isinstance(outcome, LostFrame) else frame
         readings: Sequence[Reading]
         if isinstance(lost, LostFrame):
-            readings = [Reading(GaugeStatus(lost.status.value), words=lost.words)] * len(self._gauges)
+            readings = unread(lost, lost.status, len(self._gauges))
         else:
             readings = measured_together(self._followers, picture_of(lost, self._settings))
         self._newest = readings
@@ -130,7 +130,7 @@ class GaugeRecording:
         draw_gauges(canvas, self._gauges, self._newest)
 
     def steps(self, frame: Frame) -> list[tuple[str, Pixels]]:
-        """The picture of this step: the newest frame with its gauges."""
+        """Picture of this processing step: the newest frame with its gauges."""
         grey = in_eight_bits(frame.pixels)
         canvas = np.array(grey if grey.ndim == 3 else np.dstack([grey] * 3), dtype=np.uint8)
         self.draw(canvas)
@@ -159,7 +159,7 @@ class GaugeRecording:
         self._table.add(rows)
 
     def in_words(self) -> dict[str, Any]:
-        """What summary.json says of every gauge."""
+        """Summary of every gauge for summary.json."""
         return {
             gauge.name: {
                 "kind": gauge.kind_name,
@@ -184,7 +184,7 @@ class GaugeRecording:
 
 
 def cells_of(quantities: Sequence[Any], plane: PlaneScale | None) -> list[Cell]:
-    """Numbers in millimetres, or in pixels where there is no scale."""
+    """Quantities in millimetres, or in pixels where there is no scale."""
     if plane is None:
         return [quantity.in_pixels() for quantity in quantities]
     points = [quantity.points_px for quantity in quantities]
@@ -199,7 +199,7 @@ def cells_of(quantities: Sequence[Any], plane: PlaneScale | None) -> list[Cell]:
 
 
 def gauge_sentence(name: str, gauge: Mapping[str, Any]) -> str:
-    """What one gauge of summary.json came to, for a person."""
+    """Summary of one gauge of summary.json in a sentence."""
     frames = sum(gauge["counts"].values())
     ranges = [
         f"{quantity} {found['least']:.4f} to {found['greatest']:.4f} {found['unit']}"

@@ -1,1 +1,1 @@
-"""What limits the measurement on this bench: one finding a file, each with its cost in micrometres and its remedy."""
+"""What limits the measurement with this set-up: one finding per file, with its cost in micrometres and its remedy."""

@@ -1,4 +1,4 @@
-"""The blocks that a picture coder leaves: steps of level at their borders."""
+"""Block artefacts of a codec: steps of level at the borders of blocks."""
 
 import numpy as np
 
@@ -15,7 +15,7 @@ BLOCKY, HEAVY = 0.3, 0.5
 
 
 def blockiness(pixels: Pixels) -> float:
-    """How much larger the steps of level across borders of blocks are than elsewhere, as a share; about 0 without.
+    """Relative excess of level steps across block borders over those elsewhere; about 0 without a codec.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Every limit that is looked for: the modules of `findings`, found by looking into that package."""
+"""All findings: the modules of the package `findings`, collected automatically."""
 
 import importlib
 import pkgutil
@@ -9,7 +9,7 @@ from fingervision.inspection.sample import Sample
 
 
 def inspect(sample: Sample) -> list[Finding]:
-    """All findings of a sample, the worst first.
+    """All findings of a sample, the most severe first.
 
     Parameters
     ----------
@@ -28,5 +28,5 @@ def to_mend(findings: list[Finding]) -> list[Finding]:
 
 
 def doubts(findings: list[Finding]) -> list[Finding]:
-    """Those that may be there, and would be worth mending if they were."""
+    """Uncertain findings that would be worth correcting if they were true."""
     return [finding for finding in findings if finding.severity is not Severity.GOOD and finding.is_doubt]

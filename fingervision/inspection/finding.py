@@ -67,14 +67,14 @@ class Finding:
 
     @property
     def rank(self) -> tuple[float, bool, float]:
-        """Larger is worse: what leaves most frames without a number, then what is sure, then doubts, each by cost."""
+        """Sort key, larger is worse: missing numbers first, then certain findings, then doubts, each by cost."""
         sure = self.severity is not Severity.GOOD and not self.is_doubt
         first = self.share_refused if self.share_refused > MOSTLY_REFUSED else 0.0
         return first, sure, self.cost_px or 0.0
 
 
 def severity_of(cost_px: float, good_px: float) -> Severity:
-    """Traffic light of a cost (pixels) where `good_px` is not worth mending."""
+    """Severity (traffic light) of a cost in pixels; costs below `good_px` are not worth correcting."""
     if cost_px <= good_px:
         return Severity.GOOD
     return Severity.FAIR if cost_px <= POOR_TIMES * good_px else Severity.POOR
@@ -90,7 +90,7 @@ def weighed(
     *,
     is_doubt: bool = False,
 ) -> Finding:
-    """Finding of a cost in pixels: its light, and its micrometres where the scale is known."""
+    """Make the finding of a cost in pixels: its severity, and its micrometres where the scale is known."""
     severity = severity_of(cost_px, sample.good_px)
     cost_um = None if sample.scale is None else 1e3 * cost_px / sample.scale.px_per_mm
     remedy = "" if severity is Severity.GOOD else remedy
@@ -98,7 +98,7 @@ def weighed(
 
 
 def refusing(sample: "Sample", name: str, statuses: tuple["Status", ...], remedy: str) -> Finding | None:
-    """Finding of frames that gave no number for one of these reasons; None where there are none to speak of."""
+    """Finding of frames that have no number for one of these reasons; None where they are too few."""
     count = sum(sample.counts[status] for status in statuses)
     if not count or count < FEW_REFUSED * sample.frames:
         return None
@@ -109,5 +109,5 @@ def refusing(sample: "Sample", name: str, statuses: tuple["Status", ...], remedy
 
 
 def without(u_px: float, mended_px: float) -> float:
-    """Standard uncertainty that goes away where `u_px` becomes `mended_px`: the quadratic difference."""
+    """Part of the standard uncertainty that is removed if `u_px` becomes `mended_px`: the quadratic difference."""
     return sqrt(max(u_px**2 - mended_px**2, 0.0))

@@ -86,7 +86,7 @@ def flank_profile(seen: Sequence[tuple[GreyImage, EdgePoints]], side: int, light
 
 
 def _one(upright: GreyImage, edges: EdgePoints, side: int) -> tuple[Floats, GreyImage, float] | None:
-    """Distances from the edge, stored levels, and a pixel's width across it."""
+    """Distances from the edge, stored levels, and a pixel's width across the edge."""
     real = np.flatnonzero(edges.lines.weight[side, :INNER] > 0)
     rows = real[real.size // 2 :]
     if rows.size < FEWEST_ROWS:

@@ -1,4 +1,4 @@
-"""The frames of a recording or camera that are looked at: those of its first seconds, and not too many."""
+"""The frames of a recording or camera that are inspected: a limited number from its first seconds."""
 
 from collections.abc import Iterator
 from time import monotonic
@@ -11,7 +11,7 @@ MOST_FRAMES = 150
 
 
 def frames_to_look_at(source: FrameSource, seconds: float, most: int = MOST_FRAMES) -> Iterator[Frame | LostFrame]:
-    """Frames of the first seconds: by their own times, and by the clock where a camera sends none.
+    """Frames of the first seconds, by their own times, or by the computer's clock where a camera sends none.
 
     Parameters
     ----------

@@ -1,7 +1,7 @@
-"""How a camera shakes: the ground above the fingers' tips registered against the first frame's.
+"""Vibration of the camera: the background above the fingers' tips registered against the first frame.
 
-The ground is registered in two halves, each by itself. A motion of the camera shifts both halves alike. A difference
-between the two shifts means that the ground has too little texture to be followed; it is the uncertainty of their mean.
+The background is registered in two halves separately. A motion of the camera shifts both halves equally. A difference
+between the two shifts means that the background has too little texture; it is the uncertainty of their mean.
 """
 
 from collections.abc import Callable
@@ -34,7 +34,7 @@ AGREE_PX = 0.3
 
 @dataclass(frozen=True, slots=True, eq=False)
 class GroundShift:
-    """Movement of the ground.
+    """Displacement of the background.
 
     Parameters
     ----------
@@ -51,7 +51,7 @@ class GroundShift:
 
 @dataclass(slots=True)
 class GroundTracker:
-    """Follows the ground from frame to frame."""
+    """Follows the background from frame to frame."""
 
     _reference: list[Floats] | None = None
     _rows: int = 0
@@ -59,7 +59,7 @@ class GroundTracker:
     _found: list[Floats] = field(default_factory=list)
 
     def add(self, frame: Frame, outcome: GapMeasurement) -> None:
-        """Look at one more frame that gave a number."""
+        """Add one more frame that gave a number."""
         if len(self._found) >= MOST_FRAMES or (self._direction not in (None, outcome.direction)):
             return
         grey = to_grey(frame.pixels)
@@ -111,7 +111,7 @@ def _registered(first: Floats, now: Floats) -> Floats:
 
 
 def _detail(levels: NDArray[np.float32]) -> Floats:
-    """Detail of a piece of ground, fading to nothing at its border."""
+    """Texture of a piece of background, tapered to zero at its border."""
     fine = cv2.GaussianBlur(levels, (0, 0), 1.0) - cv2.GaussianBlur(levels, (0, 0), COARSE_PX)
     window = np.hanning(levels.shape[0])[:, None] * np.hanning(levels.shape[1])
     return np.asarray(fine * window, dtype=np.float64)

@@ -1,4 +1,4 @@
-"""How the random uncertainty of an edge goes with noise, blur and rows: the Cramer-Rao bound, used for its ratios."""
+"""Random uncertainty of an edge against noise, blur and number of rows: the Cramer-Rao bound, used for ratios."""
 
 from math import pi, sqrt
 
@@ -10,7 +10,7 @@ REACH_BLURS, REACH_EXTRA_PX = 4.0, 4.0
 
 
 def edge_noise_px(noise: float, blur_px: float, rows: int = 1) -> float:
-    """Standard uncertainty of one edge of unknown levels and blur.
+    """Standard uncertainty of one edge of unknown levels and blur (pixels).
 
     sigma_x^2 = r^2 / (N (1 / (2 sqrt(pi) sigma_e) - 1 / W)); Gatherer, Stanford CSL-TR-93-560; Kakarala & Hero, IEEE
     PAMI 14(7), 777-781, 1992.

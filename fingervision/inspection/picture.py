@@ -1,4 +1,4 @@
-"""The picture of an inspection: what was seen, and what each limit costs."""
+"""Picture of an inspection: a measured frame, and the cost of each limit."""
 
 from pathlib import Path
 
@@ -21,7 +21,7 @@ NO_NUMBER_PX = 1.0
 
 
 def draw_inspection(path: Path, sample: Sample, findings: list[Finding]) -> None:
-    """Draw a frame as it was measured, beside a bar for every finding.
+    """Draw a measured frame beside a bar for every finding.
 
     Parameters
     ----------
@@ -34,7 +34,7 @@ def draw_inspection(path: Path, sample: Sample, findings: list[Finding]) -> None
 
     Raises
     ------
-    FingervisionError
+    OutputError
         The picture cannot be written.
     """
     figure = Figure(figsize=(12.0, 5.2), layout="constrained")

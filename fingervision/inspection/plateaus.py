@@ -1,11 +1,12 @@
-"""How bright ground and fingers are in the stored levels, and how much of them stands at the ends of the scale."""
+"""Brightness of background and fingers in stored levels, and how much of them is clipped at the ends of the scale."""
 
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fingervision.inspection.sample import Look, Sample
+from fingervision.inspection.look import Look
+from fingervision.inspection.sample import Sample
 from fingervision.vision.profile_lines import INNER
 
 Floats = NDArray[np.float64]
@@ -18,7 +19,7 @@ AT_END_SHARE = 0.25
 
 @dataclass(frozen=True, slots=True)
 class Plateaus:
-    """Levels beside the inner edges, shares of full scale.
+    """Levels beside the inner edges, as fractions of full scale.
 
     Parameters
     ----------
@@ -35,12 +36,12 @@ class Plateaus:
 
     @property
     def is_cut(self) -> bool:
-        """Whether the ground, or the finger, lies beyond the end of the scale."""
+        """Whether the background or the finger is clipped."""
         return self.at_top > AT_END_SHARE or self.at_zero > AT_END_SHARE
 
 
 def plateaus(sample: Sample) -> Plateaus:
-    """Read the plateaus beside both inner edges in every frame that was looked at closely."""
+    """Read the levels beside both inner edges in every inspected frame."""
     found = [_of(look, sample.top_level) for look in sample.looks]
     return Plateaus(*(float(np.median([each[k] for each in found])) for k in range(4)))
 

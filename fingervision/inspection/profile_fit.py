@@ -1,4 +1,4 @@
-"""The symmetric blurred step between two plateaus that may slope, fitted to the mean profile of a flank."""
+"""A symmetric blurred step between two plateaus, which may slope, fitted to the mean profile of a flank."""
 
 from dataclasses import dataclass
 
@@ -19,7 +19,7 @@ LEAST_BLUR_PX, LARGEST_BLUR_PX = 0.2, 8.0
 
 @dataclass(frozen=True, slots=True)
 class ProfileFit:
-    """Best fit of one profile.
+    """Best fit of a step to one profile.
 
     Parameters
     ----------
@@ -87,7 +87,7 @@ def _design(profile: FlankProfile, position: float, blur: float, sloping: bool) 
 
 
 def _pixel_step(away: Floats, sigma: float, pixel: float) -> Floats:
-    """A Gaussian-blurred unit step, averaged over a pixel of this width across the edge."""
+    """A Gaussian-blurred unit step, averaged over the pixel's width across the edge."""
     upper, lower = (away + 0.5 * pixel) / sigma, (away - 0.5 * pixel) / sigma
     density = (np.exp(-0.5 * upper**2) - np.exp(-0.5 * lower**2)) / np.sqrt(2.0 * np.pi)
     return np.asarray(sigma / pixel * (upper * ndtr(upper) - lower * ndtr(lower) + density))

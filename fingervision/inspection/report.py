@@ -1,4 +1,4 @@
-"""What an inspection says: to a person, and to programs."""
+"""Results of an inspection: as text, and for programs."""
 
 from dataclasses import asdict
 from typing import Any
@@ -41,7 +41,7 @@ def as_json(sample: Sample, findings: list[Finding]) -> dict[str, Any]:
 
 
 def as_text(sample: Sample, findings: list[Finding]) -> str:
-    """Inspection for a person: the worst first, each with its cost and what to change."""
+    """Inspection as text: the most severe finding first, each with its cost and what to change."""
     mend = to_mend(findings)
     lines = [_head(sample), ""]
     for number, finding in enumerate(mend, start=1):

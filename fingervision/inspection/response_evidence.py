@@ -1,8 +1,9 @@
-"""Which camera response the edges themselves speak for: optics spread an edge evenly in light, not in coded levels.
+"""Which camera response the shape of the edges supports: optics blur an edge symmetrically in light, not in levels.
 
 Both inner flanks are fitted with a symmetric step, once in the light of the assumed response and once in that of the
-other one. The likelihood ratio of the two says how likely the other one is. An aberration (coma) leans the same way on
-both fingers, and a response leans towards the dark on both, so that the two flanks together tell them apart.
+alternative. The likelihood ratio of the two fits tells how likely the alternative is. An aberration (coma) skews the
+edges of both fingers to the same side of the picture, and a response skews both towards their dark side, so that the
+two flanks together distinguish them.
 """
 
 from collections.abc import Sequence
@@ -38,7 +39,7 @@ CUT_OFF_SHARE = 0.995
 
 @dataclass(frozen=True, slots=True)
 class ResponseEvidence:
-    """What the shape of the edges says.
+    """Result of comparing two responses by the shape of the edges.
 
     Parameters
     ----------
@@ -62,7 +63,7 @@ class ResponseEvidence:
 def response_evidence(
     seen: Sequence[tuple[GreyImage, EdgePoints]], settings: Settings, shift_px: float, *, lossy: bool = False
 ) -> ResponseEvidence:
-    """Weigh the assumed response against the other one.
+    """Compare the assumed response with the alternative one.
 
     Parameters
     ----------
@@ -92,7 +93,7 @@ def _agreed(odds: list[float]) -> float:
 
 
 def _odds(seen: Sequence[tuple[GreyImage, EdgePoints]], side: int, settings: Settings, floor: float) -> float | None:
-    """Twice the logarithm of the likelihood ratio for the other response, of one flank; None where it cannot tell."""
+    """Twice the log likelihood ratio for the alternative response from one flank; None where it is undecided."""
     levels = int(np.iinfo(seen[0][0].dtype).max) + 1
     top = settings.response.top_level or top_level(seen[0][0], settings.bits)
     identity = np.arange(levels, dtype=np.float64)
@@ -124,7 +125,7 @@ def _odds(seen: Sequence[tuple[GreyImage, EdgePoints]], side: int, settings: Set
 
 
 def _pattern(stored: FlankProfile, ends: int) -> Floats:
-    """What a pattern on the finger or on the ground leaves in each bin: its scatter, where that of the two is seen."""
+    """Scatter that a pattern on the finger or on the background leaves in each bin."""
     level = stored.level
     inner, outer = float(np.median(level[:ends])), float(np.median(level[-ends:]))
     outside = np.clip((level - inner) / (outer - inner), 0.0, 1.0) if outer != inner else np.zeros_like(level)
@@ -133,7 +134,7 @@ def _pattern(stored: FlankProfile, ends: int) -> Floats:
 
 
 def _scatter(away: Floats, level: Floats) -> float:
-    """Standard deviation about a straight line; nothing where too few bins are there to tell."""
+    """Standard deviation about a straight line; zero where there are too few bins."""
     if away.size < FEWEST_FOR_SCATTER:
         return 0.0
     slope, at = np.polyfit(away, level, 1)

@@ -1,4 +1,4 @@
-"""What is looked at: some frames of a recording, measured, with what the measuring found on the way."""
+"""The inspected sample: some frames of a recording, measured, with the intermediate results of the measurement."""
 
 from __future__ import annotations
 
@@ -17,19 +17,15 @@ from fingervision.frames.source import Description
 from fingervision.inspection.blocks import BLOCKY, blockiness
 from fingervision.inspection.finding import GOOD_PX
 from fingervision.inspection.ground_shift import GroundShift, GroundTracker
-from fingervision.inspection.noise_bound import GOOD_BLUR_PX, GOOD_NOISE, edge_noise_px
+from fingervision.inspection.look import Look
+from fingervision.inspection.noise_bound import GOOD_BLUR_PX, GOOD_NOISE
 from fingervision.inspection.response_evidence import ResponseEvidence, response_evidence
 from fingervision.measuring.scale import Scale
 from fingervision.vision.binarise import binarise
 from fingervision.vision.denoise import denoise
-from fingervision.vision.edge_filters import PIXEL_VARIANCE
-from fingervision.vision.edges import EdgePoints
-from fingervision.vision.fingers import CoarseFingers
 from fingervision.vision.gap import SMEARED
-from fingervision.vision.grey import GreyImage, to_grey, top_level
+from fingervision.vision.grey import to_grey, top_level
 from fingervision.vision.pipeline import Settings, look_closely, measure_frame
-from fingervision.vision.profile_choice import WIDER
-from fingervision.vision.residuals import SHARED_POINTS
 
 Floats = NDArray[np.float64]
 
@@ -44,86 +40,8 @@ SEEING_NOISE = 2.0 * GOOD_NOISE
 STEP_OF_NOISE, LOST_NOISE = 0.954, 5.0 * GOOD_NOISE
 # The steepest of the pixels lie on edges; outlines are lost above this spread (twice what is good).
 STEEPEST, LOST_BLUR_PX = 0.995, 2.0 * GOOD_BLUR_PX
-# What a camera's own noise is taken to be where a codec has removed it (levels of 255).
-CAMERA_NOISE = 2.0
 # Fingers and gap fill a picture that they take so much of: the rest is room to move in.
 FILLED = 0.6
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Look:
-    """One frame that was looked at closely.
-
-    Parameters
-    ----------
-    frame : Frame
-        The picture.
-    upright : ndarray or None
-        Its grey levels, seen with the tips up; None where no fingers were found.
-    outcome : GapMeasurement
-        What it measured.
-    fingers : CoarseFingers
-        Where the fingers are.
-    edges : EdgePoints
-        Their outlines.
-    top_level : int
-        Full scale of the picture.
-    """
-
-    frame: Frame
-    upright: GreyImage
-    outcome: GapMeasurement
-    fingers: CoarseFingers
-    edges: EdgePoints
-    top_level: int
-
-    @property
-    def contrast(self) -> float:
-        """Levels between the plateaus of the weaker finger (in light, on the levels' own scale)."""
-        return min(abs(self.outcome.left.contrast), abs(self.outcome.right.contrast))
-
-    @property
-    def focus_blur_px(self) -> float:
-        """Spread of the optics, the pixel included: flanks or tips, whichever motion has spread less."""
-        return float(np.sqrt(self.edges.blur_px.min(axis=1).max() ** 2 + PIXEL_VARIANCE))
-
-    @property
-    def widened_px2(self) -> Floats:
-        """Variance that motion has added to each finger's flanks, shape (2,): what they have more than the tips."""
-        flanks, tips = (self.edges.blur_px[:, part] ** 2 + PIXEL_VARIANCE for part in (0, 1))
-        return np.asarray(np.where(flanks > (1.0 + WIDER) * tips, flanks - tips, 0.0))
-
-    @property
-    def flank_blur_px(self) -> float:
-        """Spread of the flanks, the pixel included."""
-        return float(np.sqrt(self.edges.blur_px[:, 0].max() ** 2 + PIXEL_VARIANCE))
-
-    @property
-    def u_camera_px(self) -> float:
-        """Random uncertainty of the gap as far as noise of the camera makes it, without what a codec shares."""
-        alone = max(self.outcome.u_gap_px**2 - self.outcome.u_coding_px**2, 0.0)
-        shared = 1.0 if self.frame.quantiser is not None else SHARED_POINTS[self.frame.coding]
-        return float(np.sqrt(alone / shared))
-
-    @property
-    def noise(self) -> float:
-        """Noise over contrast; of the flat parts beside the edges, where they are in view.
-
-        A codec leaves flat parts without any: there it is the camera's, as far as the edges do not show less.
-        """
-        flat = self.edges.noise_flat
-        if self.frame.lossy or not flat:
-            flat = min(self.edges.noise, max(flat, CAMERA_NOISE * self.top_level / 255.0))
-        return flat / max(self.contrast, 1e-9)
-
-    def u_with(self, noise: float | None = None, blur_px: float | None = None) -> float:
-        """Random uncertainty of the gap with another ratio of noise to contrast or another blur of the flanks (pixels).
-
-        The Cramer-Rao bound gives the ratio; what is stated for this frame gives the size.
-        """
-        now = edge_noise_px(self.noise, self.flank_blur_px)
-        then = edge_noise_px(self.noise if noise is None else noise, self.flank_blur_px if blur_px is None else blur_px)
-        return self.u_camera_px * then / now if now > 0.0 else 0.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -170,12 +88,12 @@ class Sample:
 
     @property
     def frames(self) -> int:
-        """Frames that were read."""
+        """Number of frames that were read."""
         return sum(self.counts.values())
 
     @property
     def top_level(self) -> int:
-        """Full scale of the pictures."""
+        """Full scale of the pictures (grey levels)."""
         if self.settings.response.top_level is not None:
             return self.settings.response.top_level
         frame = self.looks[0].frame if self.looks else self.refused_frame
@@ -183,7 +101,10 @@ class Sample:
 
     @property
     def fill(self) -> float:
-        """Share of the picture across the fingers that both fingers and the gap take; 1 where they leave it."""
+        """Fraction of the picture across the fingers that both fingers and the gap fill.
+
+        1 where they extend beyond it.
+        """
         shares = [0.0]
         for look in self.looks:
             found = [finger.outline[:, 0] for finger in (look.fingers.left, look.fingers.right)]
@@ -193,21 +114,20 @@ class Sample:
 
     @property
     def good_px(self) -> float:
-        """Cost that is not worth mending, in pixels of this picture.
+        """Cost below which correcting is not worth while, in pixels of this picture.
 
-        A picture that is not filled has larger pixels than it need have: what is good is judged by those that it could
-        have.
+        In a picture that is not filled, the pixels are larger than necessary, and the limit is lower in proportion.
         """
         return GOOD_PX * min(1.0, self.fill / FILLED) if self.looks else GOOD_PX
 
     @property
     def moves(self) -> bool:
-        """Whether most frames show flanks that motion has spread; the rest of an edge's shape cannot be told then."""
+        """Whether motion blurs the flanks in most frames; the other causes of blur then cannot be determined."""
         return self.median(float(look.widened_px2.any()) for look in self.looks) > 0.5
 
     @property
     def is_lost_in_noise(self) -> bool:
-        """Whether the first picture without a number has fingers or ground that hardly rise above its noise."""
+        """Whether the first picture without a number has fingers or background that hardly exceed its noise."""
         if self.refused_frame is None:
             return False
         grey = to_grey(self.refused_frame.pixels)
@@ -217,7 +137,10 @@ class Sample:
 
     @property
     def refused_blur_px(self) -> float:
-        """Spread of the steepest edges of the first picture without a number, roughly: contrast over steepest slope."""
+        """Approximate blur of the steepest edges of the first picture without a number (pixels).
+
+        It is the contrast divided by the steepest slope.
+        """
         if self.refused_frame is None:
             return 0.0
         grey = to_grey(self.refused_frame.pixels)
@@ -230,22 +153,22 @@ class Sample:
 
     @property
     def is_smeared(self) -> bool:
-        """Whether frames gave no number because the fingers moved too fast for the shutter."""
+        """Whether frames have no number because the fingers moved too far during the exposure."""
         return Status.BLURRED in self.refused and self.refused[Status.BLURRED].words.startswith(SMEARED)
 
     @property
     def is_lost_in_blur(self) -> bool:
-        """Whether pictures without a number are out of focus: a tip is rounded off by it until it is none."""
+        """Whether pictures without a number are out of focus: strong blur rounds a tip off until it is not found."""
         return not self.is_lost_in_noise and self.refused_blur_px > LOST_BLUR_PX
 
     @property
     def blockiness(self) -> float:
-        """How plainly a coder's blocks are seen."""
+        """Strength of a codec's block artefacts."""
         return self.median(blockiness(look.frame.pixels) for look in self.looks)
 
     @property
     def u_shift_px(self) -> float:
-        """Standard uncertainty that `measure` states for what lies beside the edges and for clipped levels."""
+        """Standard uncertainty that `measure` states for structures beside the edges and clipping (pixels)."""
         return self.median(look.outcome.u_shift_px for look in self.looks)
 
     @property
@@ -254,7 +177,7 @@ class Sample:
         return self.median(look.noise for look in self.looks) <= SEEING_NOISE
 
     def median(self, values: Iterable[float]) -> float:
-        """Median over the frames that were looked at closely; 0 where there are none."""
+        """Median over the frames inspected in detail; 0 where there are none."""
         each = list(values)
         return float(np.median(each)) if each else 0.0
 
@@ -262,7 +185,7 @@ class Sample:
 def take_sample(
     frames: Iterable[Frame | LostFrame], description: Description, settings: Settings, scale: Scale | None
 ) -> Sample:
-    """Measure frames and keep what findings are made from.
+    """Measure frames and keep what the findings need.
 
     Parameters
     ----------

@@ -9,7 +9,7 @@ from fingervision.domain.errors import ArgumentError, ArgumentTypeError, Unknown
 
 
 def number(argument: str, value: object) -> float:
-    """Take a number; whether it is one that can be meant is for its user to say.
+    """Check that an argument is a number; its caller checks the range.
 
     Raises
     ------
@@ -43,6 +43,8 @@ def one_of(argument: str, value: object, words: Iterable[str]) -> str:
 
     Raises
     ------
+    ArgumentTypeError
+        It is no text.
     UnknownNameError
         It is none of them; with the nearest.
     """
@@ -56,7 +58,7 @@ def one_of(argument: str, value: object, words: Iterable[str]) -> str:
 
 
 def path_of(argument: str, value: object, what: str) -> Path:
-    """Take the name of a file or folder; `what` says of what kind, with its article.
+    """Check the name of a file or folder; `what` names its kind with its article, such as "a video".
 
     Raises
     ------

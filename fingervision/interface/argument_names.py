@@ -45,7 +45,7 @@ def in_python(sentence: str) -> str:
 
 
 def in_command(error: ArgumentError) -> str:
-    """Say an argument's error with the option in its name's place.
+    """Return an argument's error with the argument spelt as an option of the command line.
 
     Examples
     --------
@@ -60,7 +60,7 @@ def in_command(error: ArgumentError) -> str:
 
 @contextmanager
 def command_words() -> Iterator[None]:
-    """Let errors leave a block in the words of the command line."""
+    """Within this block, errors name arguments as the options of a command."""
     before = _of_command.set(True)
     try:
         yield
@@ -73,7 +73,7 @@ def command_words() -> Iterator[None]:
 
 @contextmanager
 def python_words() -> Iterator[None]:
-    """Let the errors of this project, and those of calib, leave a block in the words of a Python call."""
+    """Within this block, errors of fingervision and calib name arguments as a Python call does."""
     from calib.errors import CalibrationError
 
     try:
@@ -88,7 +88,7 @@ def python_words() -> Iterator[None]:
 
 
 def speaks_python(function: Callable[P, R]) -> Callable[P, R]:
-    """Give a public function errors that name its arguments; see `python_words`."""
+    """Decorate a public function so that its errors name arguments as in Python; see `python_words`."""
 
     @wraps(function)
     def called(*args: P.args, **kwargs: P.kwargs) -> R:

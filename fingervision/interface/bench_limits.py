@@ -1,4 +1,4 @@
-"""Stated limits of a bench (plane, tilt, temperature), with defaults for those not stated."""
+"""Limits of the bench that enter the uncertainty (plane, tilt, temperature), with defaults for those not stated."""
 
 from collections.abc import Mapping
 
@@ -9,7 +9,7 @@ LENS_LEFT = 0.0002
 
 
 def limits_from(stated: Mapping[str, float | None], *, lens_calibrated: bool) -> tuple[Limits, frozenset[str]]:
-    """Give the limits, and the names of those that were stated.
+    """Return the limits of the bench, and the names of those that the user stated.
 
     Parameters
     ----------

@@ -86,7 +86,7 @@ def calibrate(
     ------
     ArgumentError
         An argument that cannot be meant, or is missing for this kind.
-    FingervisionError
+    DataError, InputFileError, UsageError
         A picture cannot be read, or does not show the reference.
 
     Examples

@@ -1,4 +1,4 @@
-"""`fingervision.Calibration`: a scale with its uncertainty that loads, saves, prints and checks itself."""
+"""`fingervision.Calibration`: a scale with its uncertainty, with methods to load, save, print and check it."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -62,7 +62,7 @@ class Calibration:
 
         Raises
         ------
-        FingervisionError
+        DataError, InputFileError
             There is no such file, or it is no calibration.
         """
         name = path_of("path", path, "a calibration file")
@@ -70,7 +70,7 @@ class Calibration:
 
     @speaks_python
     def save(self, path: "str | Path" = "calibration.json", *, pictures: bool = False) -> Path:
-        """Write it as `fingervision calibrate` does.
+        """Write the calibration as `fingervision calibrate` does.
 
         Parameters
         ----------
@@ -81,7 +81,7 @@ class Calibration:
 
         Raises
         ------
-        FingervisionError
+        OutputError
             It cannot be written, or another file stands there.
         """
         out = path_of("path", path, "a calibration file")
@@ -92,11 +92,11 @@ class Calibration:
         return out
 
     def save_pictures(self, path: Path) -> None:
-        """Write the pictures beside a calibration file of that name: calibration_ref5.png.
+        """Save the pictures beside a calibration file, named after it, such as calibration_ref5.png.
 
         Raises
         ------
-        FingervisionError
+        OutputError
             One cannot be written.
         """
         for name, picture in self.pictures.items():
@@ -104,7 +104,7 @@ class Calibration:
 
     @property
     def px_per_mm(self) -> float:
-        """The scale s, pixels to the millimetre."""
+        """The scale s in pixels per millimetre."""
         return self.scale.px_per_mm
 
     @property
@@ -114,7 +114,7 @@ class Calibration:
 
     @property
     def edge_bias_px(self) -> float:
-        """The edge bias b of a light gap between dark edges."""
+        """The edge bias b of a light gap between dark edges (pixels)."""
         return self.scale.edge_bias_px
 
     @property
@@ -124,7 +124,7 @@ class Calibration:
 
     @property
     def frame_size_px(self) -> tuple[int, int]:
-        """Width and height of the pictures that it holds for."""
+        """Width and height of the pictures for which the calibration is valid (pixels)."""
         return self.scale.frame_size_px
 
     @speaks_python
@@ -151,7 +151,7 @@ class Calibration:
         ------
         UsageError
             An item that cannot be meant.
-        FingervisionError
+        DataError, InputFileError
             A picture cannot be read, or is of another size than the calibration's.
         """
         from fingervision.interface.reference_pictures import known_sizes, references_of
@@ -161,7 +161,7 @@ class Calibration:
     def check_sizes(
         self, pictures: Sequence[KnownSize], region: tuple[int, int, int, int] | None
     ) -> tuple[Agreement, ...]:
-        """Measure pictures that were read already; see `check`."""
+        """Check the calibration on pictures that are already read; see `check`."""
         from dataclasses import replace
 
         height, width = pictures[0].grey.shape
@@ -179,7 +179,7 @@ class Calibration:
         )
 
     def report(self) -> str:
-        """Say scale, edge bias, what was found, and the uncertainty budget, as the command prints it."""
+        """Return scale, edge bias, measured references and uncertainty budget as the command prints them."""
         return "\n".join([*scale_lines(self.scale), *self.lines, *budget_lines(self.scale)])
 
     def __repr__(self) -> str:
@@ -190,7 +190,7 @@ class Calibration:
         )
 
     def _repr_html_(self) -> str:
-        """Show the report, and what was found in the first picture."""
+        """Show the report, and the edges found in the first picture."""
         from fingervision.interface.notebook import image_html, png_of
 
         first = next(iter(self.pictures.values()), None)

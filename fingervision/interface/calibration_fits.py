@@ -1,4 +1,4 @@
-"""Calibrate on each kind of reference: read its pictures, call calib, keep the result."""
+"""Calibrate on each kind of reference: read its pictures, call calib, and keep the result with its notes."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -27,7 +27,7 @@ Stated = Mapping[str, float | None]
 
 @dataclass(frozen=True, slots=True)
 class Noted:
-    """What is noted of a reference and its pictures.
+    """Notes that are stored with a calibration: certificate, date, camera and response.
 
     Parameters
     ----------
@@ -52,7 +52,7 @@ def on_sizes(
     limits: Stated,
     noted: Noted,
 ) -> Calibration:
-    """Calibrate on bars and slots."""
+    """Calibrate on bars and slots of known size."""
     stored = known_sizes(references, u_size_mm)
     read_with = PictureResponse.of(noted.response, files_of([each.source for each in references]))
     pictures = [replace(picture, grey=read_with.light(picture.grey)) for picture in stored]
@@ -110,7 +110,7 @@ def on_board(
     limits: Stated,
     noted: Noted,
 ) -> Calibration:
-    """Calibrate on a board."""
+    """Calibrate on a chessboard or ChArUco board."""
     bench, stated = limits_from(limits, lens_calibrated=len(sources) > 1)
     stored = read_pictures(sources)
     read_with = PictureResponse.of(noted.response, files_of(sources))
@@ -144,7 +144,7 @@ def on_lines(
     limits: Stated,
     noted: Noted,
 ) -> Calibration:
-    """Calibrate on a line scale: its pitch, and the standard uncertainties of a line and of the length."""
+    """Calibrate on a line scale, with its pitch and the standard uncertainties of a line and of the length."""
     pitch_mm, u_line_mm, u_length_mm = scale_lines
     ((name, stored),) = read_pictures([source])
     read_with = PictureResponse.of(noted.response, files_of([source]))
@@ -161,7 +161,7 @@ def on_lines(
 
 
 def _complete(scale: MeasuredScale, camera: Mapping[str, str]) -> MeasuredScale:
-    """Note the camera's settings, the date and the software."""
+    """Add the camera's settings, the date and the software version to a calibration."""
     made_at = datetime.now(UTC).isoformat(timespec="seconds")
     return replace(scale, camera=dict(camera), made_at=made_at, software=f"fingervision {__version__}")
 

@@ -18,7 +18,7 @@ TABLE_GAP_MM, TABLE_U_PX = 1.0, 0.0106
 
 
 def scale_lines(calibration: "Calibration") -> list[str]:
-    """Scale and edge bias with their expanded uncertainties."""
+    """Lines with scale and edge bias and their expanded uncertainties."""
     scale, u = calibration.px_per_mm, calibration.u_px_per_mm
     return [
         f"scale      {scale:.5f} px/mm   U = {2 * u:.5f} px/mm (k = 2), {200 * u / scale:.4f} %",
@@ -27,7 +27,7 @@ def scale_lines(calibration: "Calibration") -> list[str]:
 
 
 def budget_lines(calibration: "Calibration") -> list[str]:
-    """Where the uncertainty of a gap comes from, the largest contribution first."""
+    """Lines of the uncertainty budget of a gap, the largest contribution first."""
     width, height = calibration.frame_size_px
     half = TABLE_GAP_MM * calibration.px_per_mm / 2.0
     x, y = (width - 1) / 2.0, (height - 1) / 2.0
@@ -43,7 +43,7 @@ def budget_lines(calibration: "Calibration") -> list[str]:
 
 
 def sizes_lines(fit: "ScaleFit", edges: Sequence["ParallelEdges"]) -> list[str]:
-    """Every reference, and what the straight line leaves of it."""
+    """Lines with every reference's size and its residual from the fitted straight line."""
     lines = [
         "",
         "reference            size, mm   width, px    u, px    rows used            taper, px/row       residual, um",
@@ -82,7 +82,7 @@ def sizes_lines(fit: "ScaleFit", edges: Sequence["ParallelEdges"]) -> list[str]:
 
 
 def board_lines(fit: "BoardFit") -> list[str]:
-    """Lens, plane and straightness."""
+    """Lines about the lens, the plane, and how straight the board's rows are."""
     lines = [""]
     if fit.lens is None:
         lines.append("lens       not calibrated: one picture gives the plane alone")
@@ -100,7 +100,7 @@ def board_lines(fit: "BoardFit") -> list[str]:
 
 
 def as_json(calibration: "Calibration", more: dict[str, Any]) -> dict[str, Any]:
-    """Calibration in short, for programs."""
+    """Summary of a calibration as a dictionary, for programs."""
     return {
         "px_per_mm": calibration.px_per_mm,
         "u_px_per_mm": calibration.u_px_per_mm,
@@ -110,7 +110,7 @@ def as_json(calibration: "Calibration", more: dict[str, Any]) -> dict[str, Any]:
 
 
 def line_details(fit: "LineScaleFit", lines: "ScaleLines") -> dict[str, object]:
-    """Figures of a line scale, for programs."""
+    """Results for a line scale as a dictionary, for programs."""
     return {
         "bias_known": False,
         "lines": len(lines.at_px),
@@ -127,7 +127,7 @@ def line_details(fit: "LineScaleFit", lines: "ScaleLines") -> dict[str, object]:
 
 
 def line_lines(fit: "LineScaleFit", lines: "ScaleLines") -> list[str]:
-    """Lines, edges and residuals of a line scale."""
+    """Lines of text with the lines, edges and residuals of a line scale."""
     rising, falling = fit.by_edge
     scale = fit.calibration.px_per_mm
     tone = "dark" if lines.is_dark else "light"

@@ -20,7 +20,7 @@ DRIVE_COLUMNS = ("time_s", "input_mm")
 
 
 def drive_from_columns(table: Any) -> DriveHistory:
-    """Take columns `time_s,input_mm[,run][,force_n]` as a drive.
+    """Read columns `time_s,input_mm[,run][,force_n]` as a drive.
 
     Raises
     ------
@@ -28,7 +28,7 @@ def drive_from_columns(table: Any) -> DriveHistory:
         It holds no columns.
     ArgumentError
         A column is missing, or holds what is no number.
-    FingervisionError
+    DataError
         Times do not increase, or a run comes back after another.
     """
     columns = columns_of("drive", table, "a drive table's file name, DriveHistory, DataFrame or mapping of columns")
@@ -45,7 +45,7 @@ def drive_from_columns(table: Any) -> DriveHistory:
 
 
 def measured_from_columns(table: Any) -> MeasuredTable:
-    """Take columns `input_mm,gap_mm[,run,time_s,left_mm,right_mm,...]` as a measured table.
+    """Read columns `input_mm,gap_mm[,run,time_s,left_mm,right_mm,...]` as a measured table.
 
     Raises
     ------
@@ -53,7 +53,7 @@ def measured_from_columns(table: Any) -> MeasuredTable:
         It holds no columns.
     ArgumentError
         A column is missing, or holds what is no number.
-    FingervisionError
+    DataError
         As `fingervision.read_table`.
     """
     columns = columns_of(
@@ -70,13 +70,13 @@ def measured_from_columns(table: Any) -> MeasuredTable:
 
 
 def simulation_from_columns(columns: Mapping[str, list[Any]]) -> TableModel:
-    """Take columns `input_mm,gap_mm[,left_mm,right_mm,force_n]` as a simulation table.
+    """Read columns `input_mm,gap_mm[,left_mm,right_mm,force_n]` as a simulation table.
 
     Raises
     ------
     ArgumentError
         A column is missing, or holds what is no number.
-    FingervisionError
+    DataError
         Fewer than two rows, an input that stands twice, a gap that does not depend on the input.
     """
     for name in ("input_mm", "gap_mm"):
@@ -127,7 +127,7 @@ def _array(value: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def _is_missing(cell: Any) -> bool:
-    """Whether a cell is empty: None, pandas' NA, or NaN, which is how a DataFrame says so."""
+    """Whether a cell is empty: None, pandas' NA, or NaN, which stands for empty in a DataFrame."""
     return cell is None or type(cell).__name__ in ("NAType", "NaTType") or (isinstance(cell, float) and cell != cell)
 
 

@@ -32,7 +32,7 @@ CALL = "fingervision.compare(...) in Python"
 class Comparison:
     """Where a measurement and models disagree; made by `fingervision.compare`.
 
-    Iterating gives the models' names; indexing by one gives what was found for it. The plain properties are those of
+    Iterating gives the models' names; indexing by a name gives that model's result. The plain properties are those of
     the first model.
 
     Parameters
@@ -60,7 +60,7 @@ class Comparison:
 
     @property
     def first(self) -> OneComparison:
-        """What was found for the first model."""
+        """The result for the first model."""
         return next(iter(self.models.values()))
 
     @property
@@ -75,7 +75,7 @@ class Comparison:
 
     @property
     def places(self) -> tuple[Place, ...]:
-        """Regions that cannot be noise, largest first."""
+        """Regions in which the residual cannot be noise, largest first."""
         return self.first.places
 
     @property
@@ -90,15 +90,15 @@ class Comparison:
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What to know of table and model, in sentences."""
+        """Remarks on table and model, in sentences."""
         return (*self.first.data.notes, *self.first.data.refitted())
 
     def document(self) -> dict[str, object]:
-        """Give what compare.json holds."""
+        """Return the content of compare.json."""
         return comparison_document(self.models, self.made)
 
     def report(self) -> str:
-        """Say what was found as the command prints it."""
+        """Return the result as the command prints it."""
         lines = []
         for name, found in self.models.items():
             which = "" if len(self.models) == 1 else f"{name}: "
@@ -108,7 +108,7 @@ class Comparison:
         return "\n".join(lines)
 
     def figure(self) -> "Figure":
-        """Draw the residuals, as compare.png has them."""
+        """Draw the residuals, as in compare.png."""
         return residuals_of(self.models)
 
     def save(self, folder: "str | os.PathLike[str]") -> Path:
@@ -123,13 +123,13 @@ class Comparison:
         ------
         UsageError
             The folder holds the results of another table.
-        FingervisionError
+        OutputError
             It cannot be written.
         """
         return save_results(self, folder)
 
     def write(self, out: Path) -> None:
-        """Write the files into a folder that may be used."""
+        """Write the files into an existing folder, overwriting what is in it."""
         with out_folder(out):
             write_comparison(out, self.models, self.made, self.measured)
         mark_owner(out, self.measured)

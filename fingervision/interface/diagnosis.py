@@ -1,4 +1,4 @@
-"""`fingervision.diagnose`: which effect a model lacks beside a measured table."""
+"""`fingervision.diagnose`: name the effect that a model lacks, from a measured table."""
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
@@ -36,7 +36,7 @@ CALL = "fingervision.diagnose(...) in Python"
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Diagnosis:
-    """The answer of a diagnosis with its residuals and the corrected model; made by `fingervision.diagnose`.
+    """Result of a diagnosis with its residuals and the corrected model; made by `fingervision.diagnose`.
 
     Parameters
     ----------
@@ -60,27 +60,27 @@ class Diagnosis:
 
     @property
     def report(self) -> DiagnosisReport:
-        """The whole answer; fields as in report.json."""
+        """The result with the fields of report.json."""
         return self.found.report
 
     @property
     def verdict(self) -> Verdict:
-        """One of agrees, named, ambiguous, unknown."""
+        """The verdict: one of agrees, named, ambiguous, unknown."""
         return self.report.verdict
 
     @property
     def effects(self) -> tuple[NamedEffect, ...]:
-        """The effects of the answer with their parameters; of the best explanation where it is ambiguous."""
+        """The named effects with their parameters; those of the best explanation where the verdict is ambiguous."""
         return self.report.effects
 
     @property
     def residual_before_mm(self) -> Mapping[str, NDArray[np.float64]]:
-        """Measured minus predicted without the answer, by channel (gap, left, right, midline), each of shape (n,)."""
+        """Measured minus predicted by the given model, by channel (gap, left, right, midline), each of shape (n,)."""
         return by_channel(self.found.data, self.found.before_mm)
 
     @property
     def residual_after_mm(self) -> Mapping[str, NDArray[np.float64]]:
-        """Measured minus predicted with the answer, by channel, each of shape (n,)."""
+        """Measured minus predicted by the corrected model, by channel, each of shape (n,)."""
         return by_channel(self.found.data, self.found.after_mm)
 
     @property
@@ -90,18 +90,18 @@ class Diagnosis:
 
     @property
     def corrected_model(self) -> CorrectedModel:
-        """The model with the effects of the answer; every function that takes a model takes it."""
+        """The given model with the named effects added; every function that takes a model accepts it."""
         return corrected(self.found, self.model)
 
     def figure(self) -> "Figure":
-        """Draw the residuals before and after, as residuals.svg has them."""
+        """Draw the residuals before and after the correction, as in residuals.svg."""
         after = self.residual_after_mm if self.effects else None
         return residual_figure(
             dict(self.residual_before_mm), None if after is None else dict(after), self.found.data.chain.history
         )
 
     def sentences(self) -> str:
-        """Say the answer as the command prints it."""
+        """Return the result in the sentences that the command prints."""
         report = self.report
         lines = [f"{report.verdict}: {report.sentence}"]
         lines += [f"  note: {words}" for words in (*report.outliers, *report.notes)]
@@ -121,13 +121,13 @@ class Diagnosis:
         ------
         UsageError
             The folder holds the results of another table.
-        FingervisionError
+        OutputError
             It cannot be written.
         """
         return save_results(self, folder)
 
     def write(self, out: Path) -> dict[str, object]:
-        """Write the files into a folder that may be used, and give what report.json holds."""
+        """Write the files into an existing folder, and return the content of report.json."""
         with out_folder(out), added(self.own_effects):
             document = write_answer(out, self.found, own_base(self.model, out), self.made, self.measured)
         mark_owner(out, self.measured)
@@ -154,7 +154,7 @@ def diagnose(
     progress: Callable[[float], None] | None = None,
     call: str = CALL,
 ) -> Diagnosis:
-    """Name the effect that a model lacks beside a measured table; write nothing.
+    """Name the effect that a model lacks, from a measured table; write nothing.
 
     Parameters
     ----------

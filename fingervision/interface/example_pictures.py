@@ -1,4 +1,4 @@
-"""Pictures of calibration targets, drawn when an example is copied: they need no room in the installation."""
+"""Pictures of calibration targets, drawn when an example is copied, so that they take no room in the installation."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -60,7 +60,7 @@ def step_wedge(folder: Path) -> None:
 
 
 def micrometer(folder: Path) -> None:
-    """Draw a line scale of 0.1 mm pitch, 34 pixels apart, seen a degree off the picture's rows."""
+    """Draw a line scale of 0.1 mm pitch, 34 pixels from line to line, turned by a degree against the picture's rows."""
     import cv2
 
     rng = np.random.default_rng(SEED)
@@ -79,7 +79,7 @@ def micrometer(folder: Path) -> None:
 
 
 def _view(shape: tuple[int, ...], about_x_deg: float, about_y_deg: float) -> "NDArray[np.float64]":
-    """Homography of a drawn board seen tilted, its middle in the picture's middle."""
+    """Homography of a drawn board that is tilted and centred in the picture."""
     a, b = np.radians(about_x_deg), np.radians(about_y_deg)
     turn_x = np.array([[1.0, 0.0, 0.0], [0.0, np.cos(a), -np.sin(a)], [0.0, np.sin(a), np.cos(a)]])
     turn_y = np.array([[np.cos(b), 0.0, np.sin(b)], [0.0, 1.0, 0.0], [-np.sin(b), 0.0, np.cos(b)]])

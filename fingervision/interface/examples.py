@@ -1,4 +1,4 @@
-"""Runnable cases: the files that the examples of a command's `--help` name, copied into a folder of one's own."""
+"""Runnable examples: the files that the examples of a command's `--help` name, copied into a new folder."""
 
 import shutil
 from collections.abc import Callable, Mapping
@@ -21,7 +21,7 @@ OPENING = {"opening.mp4": "opening/opening.mp4", "calibration.json": "opening/ca
 
 @dataclass(frozen=True, slots=True)
 class Case:
-    """A folder in which the examples of a command work.
+    """A folder of files in which the examples of a command can be run.
 
     Parameters
     ----------
@@ -151,7 +151,7 @@ CASES = {
 
 
 def copy_example(name: str, folder: Path) -> Case:
-    """Copy a case into a new folder.
+    """Copy an example into a new folder.
 
     Parameters
     ----------

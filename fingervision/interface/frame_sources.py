@@ -1,4 +1,4 @@
-"""Open pictures as a recording: a file name, the number of a camera, an array, or a frame source."""
+"""Open a recording from a file name, the number of a camera, an array, or a frame source."""
 
 import os
 from collections.abc import Callable, Sequence
@@ -30,7 +30,7 @@ def recording_of(
     frames: int | None = None,
     coding: str = "lossless",
 ) -> Opener:
-    """Return a function that opens the recording anew at each call; frames of a camera are read once and kept.
+    """Return a function that opens the recording anew at each call; a camera's frames are read once and kept.
 
     Parameters
     ----------
@@ -43,7 +43,7 @@ def recording_of(
         It holds no pictures.
     UsageError
         An argument that this source has no use for.
-    FingervisionError
+    DataError, DeviceError, InputFileError
         It cannot be read.
     """
     if rate_hz is not None:
@@ -82,7 +82,7 @@ def _refuse_frames(frames: int | None) -> None:
 
 
 def _camera(source: Any, frames: int | None) -> Opener:
-    """Read so many frames of a camera and let go of it."""
+    """Read a given number of frames from a camera and close it."""
     try:
         if frames is None:
             raise ArgumentError(

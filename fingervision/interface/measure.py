@@ -62,7 +62,7 @@ def measure(
     """Measure the gap between two fingers in a picture, a recording or a camera's next frames; write nothing.
 
     The gap is the distance between the fingers' inner edges at `below_tip_mm` below their tips, with its standard
-    uncertainty. A frame that gives no number says why in its status; it raises nothing.
+    uncertainty. A frame without a gap states the reason in its status; no exception is raised for it.
 
     Parameters
     ----------
@@ -119,7 +119,7 @@ def measure(
     ------
     UsageError
         An argument that cannot be meant; as `ArgumentError` it names the argument and says what it must be.
-    FingervisionError
+    DataError, InputFileError, OpenQuestionError
         The recording, the calibration or the drive cannot be read.
 
     Examples
@@ -166,7 +166,7 @@ def measure(
 def measure_into(
     folder: Path | None, recording: str, task: Task, rate_hz: float | None, on_progress: Progress | None
 ) -> Measured:
-    """Measure a recording and write its rows as they come, so that any length fits into memory.
+    """Measure a recording and write each row as soon as it is measured, so that any length fits into memory.
 
     Parameters
     ----------
@@ -193,7 +193,7 @@ def measure_into(
 
 
 def _own_scale(source: Any) -> float:
-    """Scale of what is drawn, which nobody needs to state."""
+    """Return the scale of a drawn (rendered) source, which is known without being stated."""
     from fingervision.frames.simulated import PX_PER_MM
 
     return PX_PER_MM if isinstance(source, str) else float(source.px_per_mm)

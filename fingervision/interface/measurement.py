@@ -1,4 +1,4 @@
-"""What `fingervision.measure` gives back: the rows of gaps.csv as an object that prints, draws and saves itself."""
+"""The result of `fingervision.measure`: the rows of gaps.csv, with methods to print, draw and save them."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field
@@ -29,10 +29,10 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Measurement:
-    """The gap in every frame of a recording, with its uncertainty; or why a frame has none.
+    """The gap in every frame of a recording with its uncertainty, or the reason why a frame has none.
 
-    Made by `fingervision.measure`. Iterating gives one row a frame, with the fields of gaps.csv; None stands where
-    there is no value.
+    Made by `fingervision.measure`. Iterating gives one row per frame with the fields of gaps.csv; None stands for a
+    missing value.
 
     Parameters
     ----------
@@ -74,7 +74,7 @@ class Measurement:
 
     @property
     def rows(self) -> tuple[GapRow, ...]:
-        """One row a frame."""
+        """The rows, one per frame."""
         return self._found.rows
 
     @property
@@ -91,12 +91,12 @@ class Measurement:
 
     @property
     def u_gap_mm(self) -> NDArray[np.float64] | None:
-        """Their standard uncertainties, shape (n,); None where the scale was stated without an uncertainty."""
+        """Standard uncertainties of `gap_mm`, shape (n,); None where the scale was stated without an uncertainty."""
         return self._found.series.u_mm if self._found.series.has_budget else None
 
     @property
     def u_random_mm(self) -> NDArray[np.float64]:
-        """The random part of their standard uncertainties, from frame to frame, shape (n,)."""
+        """Random part, from frame to frame, of the standard uncertainties of `gap_mm`; shape (n,)."""
         return self._found.series.u_random_mm
 
     @property
@@ -112,7 +112,7 @@ class Measurement:
 
     @property
     def counts(self) -> dict[str, int]:
-        """Frames with each status that there is."""
+        """Number of frames by status."""
         return {status.value: count for status, count in self._found.series.counts.most_common()}
 
     @property
@@ -122,24 +122,24 @@ class Measurement:
 
     @property
     def advice(self) -> tuple[str, ...]:
-        """What to change, and what to know, in sentences; why no frame has an input stands first."""
+        """What to change about the recording, and remarks, in sentences; why no frame has an input stands first."""
         refusal = () if self.no_input is None else (self.no_input,)
         return (*refusal, *self._found.summary["advice"])
 
     @property
     def no_input(self) -> str | None:
-        """Why the drive gave no frame an input, where there is a drive and it gave none; else None.
+        """Why no frame got an input from the drive, where a drive was given and none did; else None.
 
-        The gaps are measured all the same. `measured_table()` raises the same sentence.
+        The gaps are measured nonetheless. `measured_table()` raises the same sentence.
         """
         return None if self._found.refusal is None else in_python(str(self._found.refusal))
 
     @property
     def budget(self) -> Budget:
-        """Where `u_gap_mm` comes from: every source with its standard uncertainty of each gap, shape (n,).
+        """Uncertainty budget of `gap_mm`: every source with its standard uncertainty for each gap, shape (n,).
 
-        The squares of the sources add to the square of `u_gap_mm` (JCGM 100:2008, equation 10); what is not `shared`
-        is `u_random_mm`. A scale stated without an uncertainty leaves only what the pictures themselves show.
+        The squares of the sources add to the square of `u_gap_mm` (JCGM 100:2008, equation 10); what is not `shared` is
+        `u_random_mm`. With a scale that has no stated uncertainty, only the sources within the pictures are listed.
         `print(measured.budget.table())` prints the sources of the first gap, the largest first.
 
         Raises
@@ -157,22 +157,22 @@ class Measurement:
 
     @property
     def gauge_rows(self) -> tuple[GaugeRow, ...]:
-        """What the gauges read, one row a number, as in gauges.csv; none without gauges."""
+        """Readings of the gauges, one row per value, as in gauges.csv; empty without gauges."""
         return self._found.gauge_rows
 
     @property
     def drive(self) -> DriveHistory | None:
-        """The recorded input that the frames were joined with."""
+        """The recorded input (drive) that was assigned to the frames."""
         return self._found.task.drive
 
     def measured_table(self) -> MeasuredTable:
-        """Give the frames that have a gap and an input as a measured table, with the digits that gaps.csv has.
+        """Return the frames that have a gap and an input as a measured table, rounded as in gaps.csv.
 
         Raises
         ------
         UsageError
             The measurement has no drive.
-        FingervisionError
+        DataError, NoCalibrationError
             There are too few such frames, or they do not move.
         """
         from fingervision.interface.measurement_tables import measured_table
@@ -181,7 +181,7 @@ class Measurement:
             return measured_table(self._found)
 
     def report(self) -> str:
-        """Say what was found as the command prints it."""
+        """Return the result as the command prints it."""
         lines = result_sentences(self._found.summary, self._found.series)
         return "\n".join([*lines, *([self.no_input] if self.no_input else [])])
 
@@ -189,7 +189,7 @@ class Measurement:
         return f"Measurement({in_one_line(self._found.summary, self._found.series)})"
 
     def _repr_html_(self) -> str:
-        """Show the picture: what was measured in a single frame, the gap over time in a recording."""
+        """Show the measured edges of a single frame, or the gap over time of a recording."""
         from fingervision.interface.measurement_pictures import cell_html
 
         return cell_html(self._found, self._again)
@@ -219,7 +219,7 @@ class Measurement:
     def to_dataframe(self) -> "pd.DataFrame":
         """Give the rows as a pandas DataFrame with the columns of gaps.csv.
 
-        Numbers are of pandas' nullable types (`Float64`, `Int64`): what is missing is `pandas.NA`.
+        Numbers have pandas' nullable types (`Float64`, `Int64`); a missing value is `pandas.NA`.
 
         Raises
         ------
@@ -231,10 +231,10 @@ class Measurement:
         return dataframe(self._found)
 
     def to_xarray(self) -> "xr.Dataset":
-        """Give the rows as an xarray Dataset over the dimension `frame`, with `time_s` as a coordinate.
+        """Return the rows as an xarray Dataset over the dimension `frame`, with `time_s` as a coordinate.
 
-        Every number has its unit as an attribute. xarray knows no missing number: NaN stands for it here, and `status`
-        says why.
+        Every number has its unit as an attribute. A missing value is NaN, because xarray has no other marker; `status`
+        gives the reason.
 
         Raises
         ------
@@ -284,7 +284,7 @@ class Measurement:
         ------
         UsageError
             The folder holds the results of another recording, or there is no such frame.
-        FingervisionError
+        OutputError
             It cannot be written.
         """
         from fingervision.measuring.save import save_measured

@@ -1,4 +1,4 @@
-"""A measurement as pictures: what was measured drawn into a frame, the gap over time, the cell of a notebook."""
+"""Pictures of a measurement: the measured edges drawn into a frame, the gap over time, the cell of a notebook."""
 
 from html import escape
 from typing import TYPE_CHECKING
@@ -59,7 +59,7 @@ def plotted(found: MeasuredInMemory, axes: "tuple[Axes, Axes] | None") -> "tuple
 
 
 def cell_html(found: MeasuredInMemory, again: Opener) -> str:
-    """Show what was measured in a single frame, or the gap over time in a recording, below a line of words."""
+    """Return the HTML of a notebook cell: one line of words above the marked frame or the plot of gap over time."""
     line = f"<p>{escape(in_one_line(found.summary, found.series))}</p>"
     if len(found.rows) != 1:
         drawn = clock_drawn(found.clock, found.task)

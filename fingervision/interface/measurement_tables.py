@@ -1,4 +1,4 @@
-"""A measurement as somebody's table: pandas, xarray, or the measured table that `diagnose` takes."""
+"""A measurement as a table for other software: pandas, xarray, or the measured table that `diagnose` takes."""
 
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
@@ -28,7 +28,7 @@ def columns_of(found: MeasuredInMemory) -> tuple[str, ...]:
 
 
 def measured_table(found: MeasuredInMemory) -> MeasuredTable:
-    """Give the frames that have a gap and an input as a measured table, with the digits that gaps.csv has.
+    """Return the frames that have a gap and an input as a measured table, rounded as in gaps.csv.
 
     Raises
     ------
@@ -57,7 +57,7 @@ def measured_table(found: MeasuredInMemory) -> MeasuredTable:
 
 
 def dataframe(found: MeasuredInMemory) -> "pd.DataFrame":
-    """Give the rows as a pandas DataFrame with the columns of gaps.csv; what is missing is `pandas.NA`.
+    """Return the rows as a pandas DataFrame with the columns of gaps.csv; a missing value is `pandas.NA`.
 
     Raises
     ------
@@ -78,7 +78,7 @@ def dataframe(found: MeasuredInMemory) -> "pd.DataFrame":
 
 
 def dataset(found: MeasuredInMemory) -> "xr.Dataset":
-    """Give the rows as an xarray Dataset over the dimension `frame`; NaN stands for a missing number.
+    """Return the rows as an xarray Dataset over the dimension `frame`; a missing number is NaN.
 
     Raises
     ------

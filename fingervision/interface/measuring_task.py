@@ -29,7 +29,7 @@ BITS = (8, 16)
 
 
 def scale_of(calibration: Any, px_per_mm: Any) -> tuple[Scale, Path | None]:
-    """Give the scale, and the file that it was read from.
+    """Return the scale, and the file that it was read from.
 
     Parameters
     ----------
@@ -42,7 +42,7 @@ def scale_of(calibration: Any, px_per_mm: Any) -> tuple[Scale, Path | None]:
     ------
     UsageError
         Both are given, or neither, or no camera has such a scale.
-    FingervisionError
+    DataError, InputFileError
         The calibration cannot be read.
     """
     if calibration is not None and px_per_mm is not None:
@@ -88,13 +88,13 @@ def measuring_task(
     frames: tuple[int, int] | None = None,
     gauges: Any = None,
 ) -> Task:
-    """Put options or arguments together; see `fingervision.measure`.
+    """Combine options or arguments into one task; see `fingervision.measure`.
 
     Raises
     ------
     UsageError
         An argument that cannot be meant.
-    FingervisionError
+    DataError, InputFileError, OpenQuestionError
         A file cannot be read.
     """
     from calib.camera_response import CameraResponse
@@ -127,7 +127,7 @@ def measuring_task(
 
 
 def range_of(frames: Any) -> tuple[tuple[int, int] | None, Any]:
-    """Take `frames` for a range of a recording, or else for a camera's number of frames.
+    """Interpret `frames`: the range of a recording to measure, or the number of frames to take from a camera.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""Pictures in a notebook's cell: inside the page itself, so that it may be sent to somebody else."""
+"""Pictures for a notebook cell, embedded in the page so that the notebook can be sent to others."""
 
 from base64 import b64encode
 from io import BytesIO
@@ -15,21 +15,21 @@ DOTS_PER_INCH = 80
 
 
 def png_of(picture: NDArray[np.uint8]) -> bytes:
-    """Code a picture of red, green and blue, shape (height, width, 3), as PNG."""
+    """Encode an RGB picture, shape (height, width, 3), as PNG."""
     import cv2
 
     return bytes(cv2.imencode(".png", np.ascontiguousarray(picture[:, :, ::-1]))[1].tobytes())
 
 
 def png_of_figure(figure: "Figure") -> bytes:
-    """Draw a figure of matplotlib as PNG."""
+    """Encode a matplotlib figure as PNG."""
     content = BytesIO()
     figure.savefig(content, dpi=DOTS_PER_INCH, format="png")
     return content.getvalue()
 
 
 def image_html(png: bytes) -> str:
-    """Put a PNG into a page, not wider than its column."""
+    """Embed a PNG in HTML, no wider than its column."""
     return f'<img style="max-width:100%" alt="" src="data:image/png;base64,{b64encode(png).decode()}">'
 
 

@@ -1,4 +1,4 @@
-"""`@fingervision.effect`: a function that becomes an effect of the catalogue."""
+"""`@fingervision.effect`: turns a function into an effect of the catalogue."""
 
 import inspect
 from collections.abc import Callable, Iterable, Iterator, Mapping
@@ -30,9 +30,9 @@ def effect(
     after: str | None = None,
     **needs: Any,
 ) -> Callable[[Callable[..., Any]], Effect]:
-    """Make an effect of one's own of a function, and add it to the catalogue of this process.
+    """Turn a function into an effect of one's own, and add it to the catalogue of this process.
 
-    The first sentence of the function's docstring says what happens; the rest, where there is one, is its formula.
+    The first sentence of the function's docstring describes the effect; any further text is its formula.
 
     Parameters
     ----------
@@ -122,7 +122,7 @@ def effect(
 
 @contextmanager
 def added(effects: Iterable[Effect]) -> Iterator[None]:
-    """Add effects to the catalogue for as long as a block lasts; those that stand in it stay as they are."""
+    """Add effects to the catalogue while a `with` block lasts; effects that were there before stay."""
     known = catalogue()
     new = [each for each in effects if not (each.name in known and _registered.get(each.name) is each)]
     try:
@@ -146,7 +146,7 @@ def _order(stage: Stage, after: str | None) -> float:
 
 
 def _sentences(function: Callable[..., Any]) -> tuple[str, str]:
-    """Words and formula from a docstring."""
+    """Description and formula from a docstring."""
     text = inspect.getdoc(function) or ""
     first, _, rest = text.partition("\n\n")
     words = " ".join(first.split()).rstrip(".")

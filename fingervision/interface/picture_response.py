@@ -1,4 +1,4 @@
-"""The camera response of calibration pictures, and how far another one would move their edges."""
+"""The camera response used for calibration pictures, and how far another response would move their edges."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class PictureResponse:
-    """What the pictures' levels are taken for.
+    """The response (grey level against light) with which pictures are read.
 
     Parameters
     ----------
@@ -31,7 +31,10 @@ class PictureResponse:
 
     @classmethod
     def of(cls, words: str, files: Sequence[Path]) -> "PictureResponse":
-        """Read --response; `auto` takes the first picture's own tag, and linear where there is none."""
+        """Choose the response by the option --response.
+
+        `auto` takes the first picture's own tag, or linear where it has none.
+        """
         from calib.camera_response import standard_response
         from fingervision.frames.transfer_tag import transfer_tag
         from fingervision.storage.response_csv import response_named
@@ -43,14 +46,14 @@ class PictureResponse:
 
     @classmethod
     def of_calibration(cls, calibration: "Calibration") -> "PictureResponse":
-        """Read pictures as a calibration's own were."""
+        """Use the response with which a calibration was made."""
         from calib.camera_response import standard_response
 
         response = calibration.camera_response or standard_response("linear")
         return cls(response, response, calibration.response_known)
 
     def light(self, grey: "GreyImage") -> "GreyImage":
-        """Give a picture's light; the levels themselves where they are taken as linear."""
+        """Convert a picture to light; a linear response leaves the levels unchanged."""
         return _light(self.response, grey)
 
     def shift_px(
@@ -59,7 +62,7 @@ class PictureResponse:
         edges: Sequence["ParallelEdges"],
         region: tuple[int, int, int, int] | None,
     ) -> float:
-        """How much wider a light gap is read than under the other response, on average over the pictures (pixels)."""
+        """How much wider a light gap is read with this response than with the other, mean of the pictures (pixels)."""
         from calib.errors import CalibrationError
         from calib.parallel_edges import measure_parallel_edges
 
@@ -75,7 +78,7 @@ class PictureResponse:
         return sum(shifts) / len(shifts) if shifts else 0.0
 
     def noted(self, calibration: "Calibration", shift_px: float) -> "Calibration":
-        """Write into a calibration what it was read with."""
+        """Store in a calibration the response with which its pictures were read."""
         return replace(
             calibration,
             camera_response=self.response,

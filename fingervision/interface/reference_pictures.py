@@ -1,4 +1,4 @@
-"""Pictures of references with what is known of them: files or arrays, with a size each."""
+"""Pictures of references, as files or arrays, each with its known size."""
 
 import os
 from collections.abc import Mapping, Sequence
@@ -28,7 +28,7 @@ MUST = "be a mapping of pictures to sizes in mm, or a sequence of (picture, size
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Reference:
-    """A picture with the size of what it shows.
+    """A picture with the known size of the object that it shows.
 
     Parameters
     ----------
@@ -46,7 +46,7 @@ class Reference:
 
 
 def references_of(pictures: Any, kind: str) -> list[Reference]:
-    """Take pictures with their sizes.
+    """Pair each picture with its known size.
 
     Parameters
     ----------
@@ -86,11 +86,11 @@ def references_of(pictures: Any, kind: str) -> list[Reference]:
 
 
 def known_sizes(references: Sequence[Reference], u_size_mm: float) -> list[KnownSize]:
-    """Read the picture of every reference.
+    """Read the picture of every reference, with the known size and its uncertainty.
 
     Raises
     ------
-    FingervisionError
+    DataError, InputFileError, UsageError
         One cannot be read, or is of another size.
     """
     u_mm = number("u_size_mm", u_size_mm)
@@ -107,7 +107,7 @@ def read_pictures(sources: Sequence[Any]) -> list[tuple[str, GreyImage]]:
     ------
     UsageError
         A file is named twice, or what is no picture.
-    FingervisionError
+    DataError, InputFileError
         One cannot be read, or is of another size.
     """
     paths = [Path(each) for each in sources if isinstance(each, str | os.PathLike)]
@@ -130,7 +130,7 @@ def read_pictures(sources: Sequence[Any]) -> list[tuple[str, GreyImage]]:
 
 
 def files_of(sources: Sequence[Any]) -> list[Path]:
-    """Give the files among pictures."""
+    """Return those of the pictures that are files."""
     return [Path(each) for each in sources if isinstance(each, str | os.PathLike)]
 
 

@@ -1,4 +1,4 @@
-"""Results that save themselves as the command of their name does, and show themselves in a notebook's cell."""
+"""Base of results that are saved as the command of the same name saves them, and shown in a notebook cell."""
 
 from html import escape
 from pathlib import Path
@@ -16,22 +16,22 @@ if TYPE_CHECKING:
 
 
 class Results(Protocol):
-    """What was found beside one measured table."""
+    """Results from one measured table."""
 
     @property
     def measured(self) -> Path:
-        """The table's file, or a name for what was in memory."""
+        """File of the measured table, or a name for a table in memory."""
 
     def figure(self) -> "Figure":
         """Draw the residuals."""
 
     def write(self, out: Path) -> object:
-        """Write the files into a folder that may be used."""
+        """Write the files into an existing folder."""
 
 
 @speaks_python
 def save_results(results: Results, folder: "str | os.PathLike[str]") -> Path:
-    """Write the files into a folder, unless it holds the results of another table; give the folder.
+    """Write the files into a folder, unless it holds the results of another table; return the folder.
 
     Raises
     ------
@@ -46,7 +46,7 @@ def save_results(results: Results, folder: "str | os.PathLike[str]") -> Path:
 
 
 def cell_html(results: Results, words: str) -> str:
-    """Show words and the figure of the residuals in a notebook's cell."""
+    """Return the HTML of a notebook cell: a text and the figure of the residuals."""
     return f"<pre>{escape(words)}</pre>{image_html(png_of_figure(results.figure()))}"
 
 

@@ -1,4 +1,4 @@
-"""`fingervision.simulate`: what a model, with the effects that it holds, answers to a drive."""
+"""`fingervision.simulate`: the response of a model, with its effects, to a drive."""
 
 from dataclasses import dataclass
 from html import escape
@@ -85,11 +85,11 @@ class Simulation:
 
     @property
     def force_n(self) -> NDArray[np.float64] | None:
-        """Force at the drive, shape (n,); None where the model knows none."""
+        """Force at the drive, shape (n,); None where the model predicts none."""
         return self.response.force_n
 
     def columns(self) -> dict[str, Any]:
-        """Give the columns that `save` writes, by name."""
+        """Return the columns that `save` writes, by name."""
         columns: dict[str, Any] = {}
         if self.run is not None:
             columns["run"] = list(self.run)
@@ -148,11 +148,13 @@ class Simulation:
 
     @speaks_python
     def save(self, path: "str | os.PathLike[str]") -> Path:
-        """Write the columns as CSV: a measured table for `compare` and `diagnose`, and with any order a simulation.
+        """Save the columns as CSV.
+
+        The file can be read as a measured table, or as a simulation table.
 
         Raises
         ------
-        FingervisionError
+        OutputError
             It cannot be written.
         """
         import csv
@@ -189,7 +191,7 @@ def simulate(
     kind: str = "lumped",
     columns: "str | os.PathLike[str] | None" = None,
 ) -> Simulation:
-    """Predict the gap along a drive, by a model with the effects that it holds.
+    """Predict the gap along a drive, by a model with its effects.
 
     Parameters
     ----------
@@ -259,7 +261,7 @@ def simulate(
 
 
 def _inputs(drive: Any, columns: Any) -> tuple[NDArray[np.float64] | None, NDArray[np.float64], tuple[str, ...] | None]:
-    """Times, inputs and runs of whatever holds a drive."""
+    """Times, inputs and runs of a drive, whichever type it is given as."""
     import os
     from collections.abc import Mapping
 

@@ -53,7 +53,7 @@ def read_table(
     kind: str = "measured",
     columns: "str | os.PathLike[str] | None" = None,
 ) -> MeasuredTable | DriveHistory | TableModel:
-    """Read any lab's table: its dialect, columns and units are understood, or asked for.
+    """Read a table of any laboratory: format, columns and units are recognised, or asked for.
 
     Parameters
     ----------
@@ -73,7 +73,7 @@ def read_table(
     ------
     OpenQuestionError
         The table can be read in more than one way; the sentence says how to settle it.
-    FingervisionError
+    DataError, InputFileError
         It cannot be read, or not be worked with.
 
     Examples
@@ -110,7 +110,7 @@ def read_model(
 
     Raises
     ------
-    FingervisionError
+    DataError, InputFileError, ModelError, UsageError
         It cannot be read.
 
     Examples
@@ -125,7 +125,7 @@ def read_model(
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Given:
-    """A measured table or a model that a function was given, with the file behind it.
+    """A measured table or model given as an argument, with the file it came from.
 
     Parameters
     ----------
@@ -140,13 +140,13 @@ class Given:
 
 
 def measured_given(measured: Any, columns: Any = None) -> Given:
-    """Take a measured table: its file, a measurement with a drive, a MeasuredTable, or columns.
+    """Interpret an argument as a measured table: a file, a measurement with a drive, a MeasuredTable, or columns.
 
     Raises
     ------
     ArgumentTypeError
         It holds no table.
-    FingervisionError
+    DataError, InputFileError, OpenQuestionError
         It cannot be read, or not be worked with.
     """
     if isinstance(measured, str | os.PathLike):
@@ -162,13 +162,13 @@ def measured_given(measured: Any, columns: Any = None) -> Given:
 
 
 def model_given(model: Any, kind: str, columns: Any = None) -> Given:
-    """Take a model: its file, a CorrectedModel, a diagnosis's corrected model, or columns of a simulation table.
+    """Interpret an argument as a model: a file, a CorrectedModel, a Diagnosis, or columns of a simulation table.
 
     Raises
     ------
     ArgumentTypeError
         It is no model.
-    FingervisionError
+    DataError, InputFileError, ModelError, UsageError
         It cannot be read.
     """
     if isinstance(model, str | os.PathLike):
@@ -187,7 +187,7 @@ def model_given(model: Any, kind: str, columns: Any = None) -> Given:
 
 
 def models_given(model: Any, kind: str, columns: Any = None) -> dict[str, Given]:
-    """Take one model, several in a list, or several by name; each as `model_given`.
+    """Interpret an argument as one or more models: one, a list, or a mapping by name; each as in `model_given`.
 
     Raises
     ------
@@ -206,7 +206,7 @@ def models_given(model: Any, kind: str, columns: Any = None) -> dict[str, Given]
 
 
 def told_apart(paths: list[Path]) -> list[str]:
-    """Name models by their files, with as much of the folder as tells them apart.
+    """Name models by their files, with as much of the folder's name as distinguishes them.
 
     Raises
     ------
@@ -223,7 +223,7 @@ def told_apart(paths: list[Path]) -> list[str]:
 
 
 def effect_names(argument: str, names: Any) -> frozenset[str]:
-    """Take names of effects.
+    """Check the names of effects.
 
     Raises
     ------
@@ -241,11 +241,13 @@ def effect_names(argument: str, names: Any) -> frozenset[str]:
 
 
 def own_base(model: CorrectedModel, out: Path) -> CorrectedModel:
-    """Write a simulation that is in memory as a file that a corrected model can rest on; any other stays.
+    """Save a simulation table that is in memory as a file, to which a corrected model can refer.
+
+    Other models are returned unchanged.
 
     Raises
     ------
-    FingervisionError
+    OutputError
         The file cannot be written.
     """
     if model.base_path or not isinstance(model.base, TableModel):

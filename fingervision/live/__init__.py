@@ -1,1 +1,1 @@
-"""The live view: a source that goes on, measured frame by frame, shown in a browser or a terminal, recorded."""
+"""The live view: a continuous source, measured frame by frame, shown in a browser or a terminal, and recorded."""

@@ -1,4 +1,4 @@
-"""How the page is reached: by which tokens, with which password beyond this machine, and over TLS where it can be."""
+"""Access to the page: its tokens, its password for other machines, and TLS where a certificate is given."""
 
 import ssl
 from dataclasses import dataclass
@@ -6,6 +6,7 @@ from pathlib import Path
 
 from fingervision.domain.errors import DataError, InputFileError, UsageError
 from fingervision.live.guard import LOOPBACK_NAMES
+from fingervision.storage.plain_file import plain
 
 LEAST_LETTERS = 12
 """Guesses are answered one a second (`guard.GUESS_COSTS_S`): so many letters outlast any bench."""
@@ -18,7 +19,7 @@ ENCRYPTED = "The page is served beyond this machine, over TLS: whoever has the p
 
 @dataclass(frozen=True, slots=True)
 class Access:
-    """How the page may be reached.
+    """Settings of who may reach the page, and how.
 
     Parameters
     ----------
@@ -45,20 +46,20 @@ class Access:
 
     @property
     def warning(self) -> str:
-        """What the user must know; empty on this machine alone."""
+        """Security warning for the user; empty if the page is reachable only from this machine."""
         if self.host in LOOPBACK_NAMES:
             return ""
         return PLAIN if self.certificate is None else ENCRYPTED
 
 
 def access(host: str, port: int, password_file: Path | None, certificate: Path | None, key: Path | None) -> Access:
-    """Check how the page shall be reached.
+    """Check the settings for reaching the page.
 
     Raises
     ------
     UsageError
         It would be reached from beyond this machine without a password, or only half of what TLS needs is there.
-    FingervisionError
+    DataError, InputFileError
         A file cannot be read, or the password is too short.
     """
     if (certificate is None) != (key is None):
@@ -77,7 +78,7 @@ def access(host: str, port: int, password_file: Path | None, certificate: Path |
 
 
 def _check_pair(certificate: Path, key: Path) -> None:
-    """Refuse a pair that the server could not use: it would ask for the key's password, or end without a sentence."""
+    """Refuse a certificate and key that the server could not use, such as a key with a password."""
     try:
         ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER).load_cert_chain(certificate, key, password=lambda: "")
     except (ssl.SSLError, OSError, ValueError) as error:
@@ -90,7 +91,7 @@ def _check_pair(certificate: Path, key: Path) -> None:
 
 def _password(file: Path) -> str:
     try:
-        words = file.read_text(encoding="utf-8").strip()
+        words = plain(file).read_text(encoding="utf-8").strip()
     except (OSError, UnicodeDecodeError) as error:
         raise InputFileError(f"The password cannot be read from {file}: give a text file.") from error
     if len(words) < LEAST_LETTERS:

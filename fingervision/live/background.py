@@ -1,4 +1,4 @@
-"""A command of fingervision in a process of its own, at the lowest priority: it never slows what is live."""
+"""A fingervision command in a process of its own at the lowest priority, so that it never slows the live view."""
 
 import os
 import subprocess
@@ -22,7 +22,7 @@ ONE_THREAD = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
 
 
 class BackgroundCommand:
-    """One run of the command line.
+    """One execution of the command line.
 
     Parameters
     ----------
@@ -56,22 +56,22 @@ class BackgroundCommand:
 
     @property
     def exit_code(self) -> int | None:
-        """How it ended; None as long as it runs."""
+        """Exit code; None while the command runs."""
         return self._process.poll()
 
     @property
     def output(self) -> str:
-        """What it has printed so far."""
+        """Text that the command has printed so far."""
         return self._out.read_text(encoding="utf-8")
 
     @property
     def complaint(self) -> str:
-        """Its last sentence on the error stream, without the program's name."""
+        """Last sentence on the error stream, without the program's name."""
         lines = [line for line in self._error.read_text(encoding="utf-8").splitlines() if line.strip()]
         return lines[-1].removeprefix("fingervision: ").removeprefix("Error: ") if lines else ""
 
     def stop(self) -> None:
-        """End it, if it runs."""
+        """End the command, if it runs."""
         if self._process.poll() is None:
             self._process.terminate()
             try:

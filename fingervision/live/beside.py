@@ -1,4 +1,4 @@
-"""What stands beside a live measurement: a bed, its input, a model."""
+"""Additions to a live measurement: a bed, its input, a model."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,7 +17,7 @@ from fingervision.testbed.run.run_metadata import SIMULATION, write_expected
 
 @dataclass(frozen=True, slots=True)
 class Beside:
-    """What stands beside the measurement.
+    """Options for what is added to the measurement.
 
     Parameters
     ----------
@@ -44,12 +44,14 @@ class Beside:
 
 
 def stand_beside(session: Session, beside: Beside) -> None:
-    """Put bed, input and model beside a session.
+    """Add bed, input and model to a session.
 
     Raises
     ------
+    DataError
+        The log has fewer than two rows.
     FingervisionError
-        The model or the log cannot be read.
+        The model or the log cannot be read, or the gauges are not for these frames.
     """
     model, bench = beside.model, session.capture.source
     if beside.gauges is not None:

@@ -1,4 +1,4 @@
-"""How regularly frames come: rate, jitter, and frames that are missing between two others."""
+"""Regularity of the frames: rate, jitter, and missing frames."""
 
 from collections import deque
 from itertools import pairwise
@@ -23,7 +23,7 @@ FORGIVEN_SHARE = 0.02
 
 
 class Cadence:
-    """Watches the times of frames; one thread adds, any may ask."""
+    """Statistics of the frames' times; one thread adds, any thread may read."""
 
     def __init__(self) -> None:
         self._lock = RLock()
@@ -34,7 +34,7 @@ class Cadence:
         self._due_s: float | None = None
 
     def restart(self) -> None:
-        """Forget the times before a cut, which is no drop."""
+        """Discard the times before an interruption, which is not counted as missing frames."""
         with self._lock:
             self._times_s.clear()
             self._long_s.clear()
@@ -42,7 +42,7 @@ class Cadence:
             self._due_s = None
 
     def add(self, time_s: float) -> None:
-        """Take in a frame's time."""
+        """Add a frame's time."""
         with self._lock:
             self._add(time_s)
 
@@ -77,7 +77,7 @@ class Cadence:
 
     @property
     def period_s(self) -> float | None:
-        """Usual time from frame to frame; None as long as it is not known."""
+        """Median time between frames (s); None until it is known."""
         with self._lock:
             times = tuple(self._long_s)
         stride = min(FRAMES_A_STRIDE, len(times) // 2)
@@ -88,7 +88,7 @@ class Cadence:
 
     @property
     def rate_hz(self) -> float | None:
-        """Frames in a second, over the last hundred."""
+        """Frame rate over the last hundred frames."""
         times = self._last_hundred()
         if len(times) < 2 or times[-1] <= times[0]:
             return None
@@ -96,7 +96,7 @@ class Cadence:
 
     @property
     def jitter_s(self) -> float | None:
-        """Standard deviation of the time from frame to frame, over the last hundred."""
+        """Standard deviation of the time between frames, over the last hundred frames."""
         steps = [after - before for before, after in pairwise(self._last_hundred())]
         if len(steps) < 2:
             return None

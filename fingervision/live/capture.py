@@ -1,4 +1,4 @@
-"""Frames from the source to the measurement: every one of them, and the source opened again when it is cut off."""
+"""Capture of frames for the measurement, without losing any; a source that is interrupted is opened again."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -23,7 +23,7 @@ Open = Callable[[], LiveSource]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Arrival:
-    """A frame on the live view's own time.
+    """A frame with its time in the live view.
 
     Parameters
     ----------
@@ -45,7 +45,7 @@ class Arrival:
 
 @dataclass(frozen=True, slots=True)
 class Happening:
-    """Something that the user shall know: its name, and a sentence."""
+    """An event for the user: its name, and a sentence."""
 
     name: str
     words: str
@@ -53,7 +53,7 @@ class Happening:
 
 @dataclass(frozen=True, slots=True)
 class Ended:
-    """After the last frame of a recording."""
+    """Marks the end of a recording."""
 
 
 class Capture:
@@ -78,24 +78,24 @@ class Capture:
         self._thread = Thread(target=self._read, name="capture", daemon=True)
 
     def start(self) -> None:
-        """Begin to read what comes whether it is read or not: pictures that pile up would come late and all at once."""
+        """Begin to read frames, used or not, because waiting pictures would otherwise arrive late and all at once."""
         if self._again is not None:
             self._thread.start()
 
     def begin(self) -> None:
-        """Hand over what comes from now on; a recording is read from its first frame."""
+        """Pass on the frames from now on; a recording is read from its first frame."""
         self._timeline = Timeline(monotonic())
         self._begun.set()
         if self._again is None:
             self._thread.start()
 
     def stop(self) -> None:
-        """End reading; what is waiting stays."""
+        """End reading; frames that wait are kept."""
         self._stopped.set()
         self.source.close()
 
     def next(self, timeout_s: float) -> Arrival | Happening | Ended | None:
-        """Next frame or event; None if nothing comes in time."""
+        """Return the next frame or event; None if none arrives in time."""
         try:
             return self.waiting.get(timeout=timeout_s)
         except Empty:

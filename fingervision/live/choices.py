@@ -1,4 +1,4 @@
-"""What the user chose for a live view, and may change while it runs."""
+"""Settings that the user chooses for a live view, and may change while it runs."""
 
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -18,7 +18,7 @@ ZERO_IS_OFF = "The zero is off: it was taken with another scale, height, region 
 
 @dataclass(frozen=True, slots=True)
 class Choices:
-    """Scale, height, direction and region of measuring; zero and tolerance of showing.
+    """Scale, height, direction and region of the measurement; zero and tolerance of the display.
 
     Parameters
     ----------
@@ -51,10 +51,10 @@ class Choices:
     greatest_mm: float | None = None
 
     def changed(self, **changes: Any) -> tuple["Choices", bool]:
-        """Choose otherwise; also whether that took a zero off.
+        """Change settings; return also whether that removed the zero.
 
-        A zero is a gap as it was measured with its scale, height, direction and region; after a change of these it
-        would be the gap of something else.
+        A zero is a gap measured with a certain scale, height, direction and region; after a change of these it would no
+        longer apply, and is removed.
         """
         moves_zero = bool(MOVES_ZERO & set(changes))
         if self.zero_mm and moves_zero:
@@ -64,7 +64,7 @@ class Choices:
 
     @property
     def task(self) -> Task | None:
-        """The task of measuring, once the scale is known."""
+        """Settings of the measurement, once the scale is known."""
         if self.scale is None:
             return None
         return Task(
@@ -77,13 +77,13 @@ class Choices:
         )
 
     def check(self, description: Description) -> None:
-        """Refuse what cannot be meant for these frames.
+        """Refuse settings that are impossible for these frames.
 
         Raises
         ------
         UsageError
             The region lies outside the frame, or the height is not positive.
-        FingervisionError
+        DataError
             The scale is for other frames.
         """
         width_px, height_px = description.width_px, description.height_px
@@ -113,7 +113,7 @@ class Choices:
             )
 
     def verdict(self, gap_mm: float | None, u_mm: float | None) -> str:
-        """Whether a gap is within the limits, as surely as it is known (ISO 14253-1).
+        """Whether a gap is within the limits, with regard to its uncertainty (ISO 14253-1).
 
         Parameters
         ----------

@@ -1,4 +1,4 @@
-"""Whether the light is fit for measuring: at full scale, too dark, changing."""
+"""Check whether the light is suitable for measuring: clipped, too dark, or changing."""
 
 from collections import deque
 from typing import Any
@@ -19,18 +19,19 @@ CHANGE_SHARE, FRAMES_LOOKED_AT = 0.05, 50
 
 
 class Exposure:
-    """Watches the light from frame to frame."""
+    """Checks the light from frame to frame."""
 
     def __init__(self) -> None:
         self._ground: deque[float] = deque(maxlen=FRAMES_LOOKED_AT)
         self.words = ""
 
     def add(self, frame: Frame) -> None:
-        """Take in a frame; `words` is then what is wrong, or empty."""
+        """Add a frame; `words` then states what is wrong, or is empty."""
         sparse: Any = np.ascontiguousarray(frame.pixels[::STEP_PX, ::STEP_PX])
         grey = to_grey(sparse)
         scale = full_scale(grey)
-        ground = float(np.percentile(grey, BRIGHTEST_PERCENT)) / scale
+        brightest = int((grey.size - 1) * BRIGHTEST_PERCENT / 100.0)
+        ground = float(np.partition(grey, brightest, axis=None)[brightest]) / scale
         self._ground.append(ground)
         if np.count_nonzero(grey == scale) > WHITE_SHARE * grey.size:
             self.words = "The picture is saturated: lower the exposure or the light."

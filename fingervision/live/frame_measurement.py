@@ -1,4 +1,4 @@
-"""One frame of a live view: what it says, and the row of the table that it becomes."""
+"""Measurement of one frame of a live view, and its table row."""
 
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -14,7 +14,7 @@ from fingervision.vision.pipeline import measure_frame
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Seen:
-    """The newest frame and what it says.
+    """The newest frame with its result.
 
     Parameters
     ----------
@@ -32,7 +32,7 @@ class Seen:
 
 
 class FrameMeasurement:
-    """Measures the frames of one source in order, as a recording of it is measured.
+    """Measures the frames of one source in order, in the same way as those of a recording.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""How long the disk lasts for a recording at the rate at which it has grown so far."""
+"""How long the disk space suffices for a recording at its present rate."""
 
 import shutil
 from pathlib import Path
@@ -8,7 +8,7 @@ LEAST_S, LEAST_BYTES = 2.0, 1_000_000
 
 
 def minutes_left(folder: Path, seconds: float) -> float | None:
-    """Minutes until a recording's disk is full; None as long as its rate is not known.
+    """Minutes until a recording's disk is full; None until its rate is known.
 
     Parameters
     ----------

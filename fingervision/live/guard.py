@@ -1,4 +1,4 @@
-"""Who may talk to the page's server: this machine's own pages, with the token, under the name that was bound."""
+"""Access control of the page's server: only this machine's own pages, with the token, under the bound host name."""
 
 import asyncio
 import base64
@@ -38,10 +38,10 @@ GUESS_COSTS_S = 1.0
 
 
 class Guard:
-    """Lets through what may be let through, and adds the headers that keep the page to itself.
+    """Lets allowed requests through, and adds headers that isolate the page from other sites.
 
-    The Host must be a name of this server (a foreign site cannot point its own name here), the Origin must be the same
-    (no other page may open a socket), and the token must be in the address.
+    The Host must be a name of this server (so that a foreign site cannot redirect its own name here), the Origin must
+    be the same (so that no other page may open a socket), and the token must be in the address.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Connections that ask for nothing: few at a time from one address, and none for long."""
+"""Limits for idle connections: few at a time from one address, and each only for a short time."""
 
 import asyncio
 from collections import defaultdict
@@ -11,16 +11,16 @@ HALF_OPEN_AT_ONCE, ASKS_WITHIN_S = 16, 5.0
 
 
 class PatientProtocol(H11Protocol):
-    """Uvicorn's HTTP, which lets go of who connects and then does not ask.
+    """Uvicorn's HTTP protocol, which closes connections that send no request in time.
 
-    Whoever holds connections open without asking would use up the places of those who do. If one address holds too
-    many open connections, the oldest is closed in favour of the newest.
+    Idle connections would use up the places of other clients. If one address has too many open connections, its oldest
+    is closed in favour of the newest.
     """
 
     half_open: ClassVar[defaultdict[str, dict["PatientProtocol", asyncio.TimerHandle]]] = defaultdict(dict)
 
     def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
-        """Wait for the request, but not for long."""
+        """Wait for a request, for a limited time."""
         super().connection_made(transport)
         peer = transport.get_extra_info("peername")
         self._address = str(peer[0]) if peer else ""
@@ -32,18 +32,18 @@ class PatientProtocol(H11Protocol):
             oldest.heard()
 
     def handle_events(self) -> None:
-        """Stop waiting once there is a request."""
+        """End the time limit once there is a request."""
         super().handle_events()
         if self.cycle is not None:
             self.heard()
 
     def handle_websocket_upgrade(self, event: Any) -> None:
-        """Hand over to the socket's protocol, which has its own patience."""
+        """Pass the connection on to the socket's protocol, which has its own time limit."""
         self.heard()
         super().handle_websocket_upgrade(event)
 
     def connection_lost(self, exc: Exception | None) -> None:
-        """Forget who is gone."""
+        """Remove a closed connection from the list."""
         self.heard()
         super().connection_lost(exc)
 

@@ -1,4 +1,4 @@
-"""The last minutes of the gap, in memory that never grows."""
+"""The last minutes of the gap, in a fixed amount of memory."""
 
 from collections.abc import Iterator
 from dataclasses import astuple, replace
@@ -18,7 +18,7 @@ COLUMNS_KEPT = 16
 
 
 class History:
-    """A ring of rows.
+    """A ring buffer of rows.
 
     Parameters
     ----------
@@ -33,7 +33,7 @@ class History:
         self._lock = Lock()
 
     def add(self, row: GapRow) -> None:
-        """Take in a row; the oldest leaves."""
+        """Add a row; the oldest is dropped."""
         cells = [*astuple(row)[:COLUMNS_KEPT], row.input_mm, row.force_n]
         cells[2] = STATUSES.index(row.status)
         with self._lock:
@@ -42,11 +42,11 @@ class History:
 
     @property
     def oldest(self) -> int:
-        """Number of the oldest row that is kept, counted from the first ever."""
+        """Number of the oldest kept row, counted from the first row ever."""
         return max(0, self.count - len(self._cells))
 
     def rows(self, after: int = 0, before: int | None = None) -> Iterator[GapRow]:
-        """Rows from the number `after` on and below `before`, counted from the first ever, as far as they are kept."""
+        """Kept rows with numbers from `after` up to but excluding `before`, counted from the first row ever."""
         with self._lock:
             last = self.count if before is None else min(before, self.count)
             asked = np.arange(max(after, self.count - len(self._cells)), last)

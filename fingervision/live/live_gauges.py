@@ -1,4 +1,4 @@
-"""Gauges on a source that goes on: read in every frame as it is measured, followed from where they were drawn."""
+"""Gauges on a live source: measured in every frame, followed from where they were drawn."""
 
 from collections import OrderedDict, deque
 from collections.abc import Mapping
@@ -11,8 +11,7 @@ from fingervision.domain.status import Status
 from fingervision.gauges.kinds import measured_together
 from fingervision.gauges.picture import picture_of
 from fingervision.gauges.plane_scale import PlaneScale
-from fingervision.gauges.reading import Reading
-from fingervision.gauges.status import GaugeStatus
+from fingervision.gauges.reading import unread
 from fingervision.live.playback.gauge_board import GaugeBoard
 from fingervision.live.playback.gauge_following import NO_SCALE, told
 from fingervision.live.playback.gauges_beside import GAUGES, GaugesBeside
@@ -26,10 +25,10 @@ FRAMES_COUNTED = 100
 
 
 class LiveGauges:
-    """Reads a board's gauges in the measuring thread.
+    """Measures a board's gauges in the measuring thread.
 
-    A gauge that is not changed goes on being followed where it is; one that is new or changed begins where it is drawn,
-    in the next frame. While measuring lags, frames are measured without gauges, and the page says how many.
+    An unchanged gauge continues from its present position; a new or changed one begins where it is drawn, in the next
+    frame. If the measurement lags behind, frames are measured without gauges, and the page states how many.
 
     Parameters
     ----------
@@ -50,13 +49,13 @@ class LiveGauges:
 
     @property
     def first(self) -> int | None:
-        """Every frame is as good as the first to draw in."""
+        """Number of the frame in which gauges are drawn; here any frame will do."""
         seen = self._session.seen
         return None if seen is None else seen.frame.index
 
     @property
     def trouble(self) -> str:
-        """Why there are no readings, or fewer than frames."""
+        """Reason why there are no readings, or fewer than frames."""
         if self._session.choices.task is None:
             return NO_SCALE
         if self._failure:
@@ -69,12 +68,12 @@ class LiveGauges:
         return ""
 
     def readings(self, frame: int, version: int) -> list[dict[str, Any]] | None:
-        """Give what the gauges of a version of the board said of a frame; None where that is not known."""
+        """Readings of one version of the board's gauges in a frame; None where they are unknown."""
         found = self._read.get(frame)
         return found[1] if found is not None and found[0] == version else None
 
     def see(self, item: Frame | LostFrame, row: GapRow | None) -> None:
-        """Read the gauges in the next frame; a fault of theirs ends no measurement."""
+        """Measure the gauges in the next frame; an error in a gauge does not end the measurement."""
         task = self._session.choices.task
         if task is None or not self._board.gauges:
             return
@@ -105,9 +104,9 @@ class LiveGauges:
         }
         status = row.status if row is not None else None
         if isinstance(item, LostFrame):
-            readings = [Reading(GaugeStatus(item.status.value), words=item.words)] * len(gauges)
+            readings = unread(item, item.status, len(gauges))
         elif status in (Status.DAMAGED, Status.DUPLICATE):
-            readings = [Reading(GaugeStatus(status.value))] * len(gauges)
+            readings = unread(item, status, len(gauges))
         else:
             settings, _ = task.settings_for(())
             followers = [self._followers[gauge.name][1] for gauge in gauges]
@@ -121,11 +120,11 @@ class LiveGauges:
 
 
 def put_live_gauges(session: Session, path: Path, *, is_asked_for: bool = False) -> GaugesBeside:
-    """Put gauges beside a live measurement, and begin to read them.
+    """Add gauges to a live measurement, and begin to measure them.
 
     Raises
     ------
-    FingervisionError
+    DataError, InputFileError
         The file exists and cannot be meant for these frames.
     """
     description = session.description

@@ -1,4 +1,4 @@
-"""Sentences for whoever looks at the live view: numbered, kept for a while, told to listeners at once."""
+"""Messages for users of the live view: numbered, kept for some time, sent to listeners at once."""
 
 from collections import deque
 from collections.abc import Callable
@@ -20,7 +20,7 @@ MessageListener = Callable[[Message], None]
 
 
 class Messages:
-    """What was said so far."""
+    """The messages so far."""
 
     def __init__(self) -> None:
         self.kept: deque[Message] = deque(maxlen=MESSAGES_KEPT)
@@ -28,7 +28,7 @@ class Messages:
         self._said = 0
 
     def say(self, name: str, words: str) -> None:
-        """Tell everybody who looks."""
+        """Send a message to all users."""
         self._said += 1
         message = Message(self._said, name, words)
         self.kept.append(message)

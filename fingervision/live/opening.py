@@ -1,4 +1,4 @@
-"""From a source's name to the capture: cameras and streams open again after a cut, files do not."""
+"""Open a source by name; cameras and streams are opened again after an interruption, files are not."""
 
 from typing import cast
 
@@ -16,7 +16,7 @@ def opened(name: str, wish: Wish) -> Capture:
 
     Raises
     ------
-    FingervisionError
+    DataError, DeviceError, InputFileError
         It cannot be opened.
     UsageError
         It is asked for what only a camera of this machine can do.

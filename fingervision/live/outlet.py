@@ -1,4 +1,4 @@
-"""Printing in a thread of its own: a reader that pauses, or is gone, holds up neither measuring nor recording."""
+"""Printing in a thread of its own, so that a slow or missing reader delays neither measuring nor recording."""
 
 import os
 from contextlib import suppress
@@ -34,7 +34,7 @@ class Outlet:
         self._thread.start()
 
     def put(self, text: str) -> None:
-        """Hand over what shall be printed; never waits."""
+        """Queue text for printing; never waits."""
         if self.broken:
             return
         try:
@@ -43,7 +43,7 @@ class Outlet:
             self.left_out += 1
 
     def close(self) -> None:
-        """Print what waits, as far as the reader takes it in time."""
+        """Print the queued text, as far as the reader takes it in time."""
         self._ending.set()
         self._thread.join(PATIENCE_S)
         if self._thread.is_alive():
@@ -68,7 +68,7 @@ class Outlet:
                 return
 
     def _let_go(self) -> None:
-        """Point the stream at nothing, so that Python does not fail, or wait, when it flushes it at its end."""
+        """Redirect the stream to nothing, so that Python neither fails nor waits when it flushes it at the end."""
         if self._stream is None:
             return
         with suppress(OSError, ValueError):

@@ -1,4 +1,4 @@
-"""Frames that came faster than they could be measured: counted by the capture, and said now and then."""
+"""Report frames that arrived faster than they could be measured: counted by the capture, reported at intervals."""
 
 from collections.abc import Callable
 from time import monotonic
@@ -9,7 +9,7 @@ SAID_EVERY_S = 10.0
 
 
 class OverflowReport:
-    """Says how many frames were lost since it was said last.
+    """Reports how many frames were lost since the last report.
 
     Parameters
     ----------
@@ -24,7 +24,7 @@ class OverflowReport:
         self._told, self._told_at_s = 0, float("-inf")
 
     def say(self) -> None:
-        """Report frames that were lost since the last report, if that report is long enough ago."""
+        """Report lost frames, if there are any and the last report is long enough ago."""
         lost, now_s = self._capture.overflowed, monotonic()
         if lost > self._told and now_s - self._told_at_s >= SAID_EVERY_S:
             self._told_at_s = now_s

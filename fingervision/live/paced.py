@@ -1,4 +1,4 @@
-"""A recording at its own pace, as if it came from a camera."""
+"""A recording played in real time, as if it came from a camera."""
 
 from collections.abc import Iterator
 from threading import Event
@@ -11,7 +11,7 @@ from fingervision.frames.source import Description, FrameSource
 
 
 class PacedRecording:
-    """Hands over each frame when its time has come; frames without times come as fast as they are measured.
+    """Yields each frame at its time; frames without times as fast as they are measured.
 
     Parameters
     ----------
@@ -32,7 +32,7 @@ class PacedRecording:
         return self._source.description
 
     def received(self) -> Iterator[Received]:
-        """Frames at their times, from the first to the last."""
+        """Yield the frames at their times, from the first to the last."""
         started_s = monotonic()
         first_s: float | None = None
         for item in self._source:

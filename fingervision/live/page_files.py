@@ -1,4 +1,4 @@
-"""The page's files, one script a concern; a file panel_NAME.js is a panel, loaded without being named anywhere."""
+"""Files of the page, one script per topic; a file panel_NAME.js is loaded as a panel without being listed anywhere."""
 
 from functools import cache
 from pathlib import Path
@@ -10,13 +10,13 @@ LAST = "live.js"
 
 @cache
 def files() -> frozenset[str]:
-    """Names that are served; whatever else is asked for is not there."""
+    """Names of the served files; any other name is not found."""
     return frozenset(path.name for path in PAGE.iterdir() if path.is_file() and path.name != "index.html")
 
 
 @cache
 def index() -> str:
-    """The page, with its panels' scripts in it and the one last that begins."""
+    """HTML of the page, with the scripts of its panels, and the starting script last."""
     panels = sorted(name for name in files() if name.startswith("panel_") and name.endswith(".js"))
     tags = "\n".join(f'<script type="module" src="/page/{name}"></script>' for name in (*panels, LAST))
     return (PAGE / "index.html").read_text(encoding="utf-8").replace(SCRIPTS, tags)

@@ -1,4 +1,7 @@
-"""One page's socket: the newest goes out when the page has the one before; requests come in, checked and counted."""
+"""Socket of one page: a new state is sent when the page has received the previous one.
+
+Requests are checked and counted.
+"""
 
 import asyncio
 import contextlib
@@ -14,13 +17,14 @@ from fingervision.live.commands import Answer, harmless, obey
 from fingervision.live.frame_measurement import Seen
 from fingervision.live.guard import POLICY_VIOLATION, WRITER
 from fingervision.live.pen import Pen
-from fingervision.live.preview import Known, message
+from fingervision.live.picture_watch import PictureWatch
+from fingervision.live.preview import Known, is_short, message, state_has_changed
 from fingervision.live.view import View
 
 MESSAGES_A_SECOND, MOST_DIGITS = 120, 12
 TRY_AGAIN_LATER = 1013
 # The preview is as fast as a screen needs it; without a new picture the page hears of the state so often.
-PREVIEW_EVERY_S, STATE_EVERY_S, LOOK_EVERY_S = 0.03, 0.2, 0.01
+PREVIEW_EVERY_S, STATE_EVERY_S = 0.03, 0.2
 # When measuring or the disk lags, a picture now and then must do.
 PREVIEW_IN_A_HURRY_EVERY_S = 0.5
 # A page that does not acknowledge is gone.
@@ -30,7 +34,7 @@ TAKE_OVER = "take_over"
 
 
 class PageSocket:
-    """Serves one page until either end is gone.
+    """Serves one page until either side closes the connection.
 
     Parameters
     ----------
@@ -38,20 +42,27 @@ class PageSocket:
         Not yet accepted.
     view : View
         What is shown.
+    watch : PictureWatch
+        Says when there is a new picture.
     pen : Pen
         Who may change what.
     steps : list
         Takes in the pictures of the steps that were asked for.
     """
 
-    def __init__(self, page: WebSocket, view: View, pen: Pen, steps: list[tuple[str, bytes]]) -> None:
-        self._page, self._view, self._pen, self._steps = page, view, pen, steps
+    def __init__(
+        self, page: WebSocket, view: View, watch: PictureWatch, pen: Pen, steps: list[tuple[str, bytes]]
+    ) -> None:
+        self._page, self._view, self._watch, self._pen, self._steps = page, view, watch, pen, steps
         self._is_viewer = page.scope.get("role") != WRITER
         self._acknowledged = asyncio.Event()
         self.ending = False
 
     async def serve(self) -> None:
-        """Send and receive; when either ends, however it ends, the page is let go, and connects anew if it is there."""
+        """Send and receive.
+
+        If either fails, the connection is closed, and the page connects again if it still exists.
+        """
         page = self._page
         await page.accept()
         tasks = [asyncio.create_task(self._send()), asyncio.create_task(self._receive())]
@@ -75,20 +86,21 @@ class PageSocket:
         return {"viewer": self._is_viewer, "holds_pen": not self._is_viewer and self._pen.may_write(self)}
 
     async def _send(self) -> None:
-        """Send the newest, then wait until the page has it: nothing ever queues up."""
+        """Send the newest state, then wait until the page has received it, so that nothing queues up."""
         view, known = self._view, known_by(self._page)
         shown: Seen | None = None
         pictured_s = float("-inf")
         while not self.ending:
             asked_s = monotonic()
-            while monotonic() - asked_s < STATE_EVERY_S and view.seen is shown:
-                await asyncio.sleep(LOOK_EVERY_S)
+            await self._watch.other_than(shown, STATE_EVERY_S)
             seen = view.seen
             every_s = PREVIEW_IN_A_HURRY_EVERY_S if view.in_a_hurry else 0.0
             picture = seen if seen is not shown and monotonic() - pictured_s >= every_s else None
             if picture is not None:
                 pictured_s = monotonic()
-            following = await asyncio.to_thread(message, view, known, picture, self._about())
+            what = (view, known, picture, self._about())
+            # To go to another thread and back takes longer than a short message.
+            following = message(*what) if is_short(view, known) else await asyncio.to_thread(message, *what)
             known = following.known
             shown = seen
             self._acknowledged.clear()
@@ -130,6 +142,8 @@ class PageSocket:
             answer: Answer = await asyncio.to_thread(obey, self._view, request)
         except FingervisionError as error:
             return {"refused": str(error), "do": str(name)[:40], "field": getattr(error, "field", None)}
+        finally:
+            state_has_changed()
         if answer.pictures:
             self._steps[:] = answer.pictures
         steps = [title for title, _ in answer.pictures]
@@ -137,7 +151,7 @@ class PageSocket:
 
 
 def known_by(page: WebSocket) -> Known:
-    """What a page that comes back has; numbers that are none count as nothing."""
+    """Rows and messages that a returning page has already; invalid numbers count as zero."""
     asked = page.query_params
     numbers = [asked.get(name, "") for name in ("rows", "messages")]
     if not all(number.isascii() and number.isdigit() and len(number) <= MOST_DIGITS for number in numbers):
@@ -146,7 +160,7 @@ def known_by(page: WebSocket) -> Known:
 
 
 def request_of(text: str) -> dict[str, Any]:
-    """What a message asks; what is no request asks for nothing."""
+    """Parse a message as a request; an invalid one is an empty request."""
     try:
         request = json.loads(text)
     except (ValueError, RecursionError):

@@ -1,4 +1,4 @@
-"""The token in the page's address: kept in the output folder, so that a page finds the server again after a restart."""
+"""Token in the page's address: stored in the output folder, so that a page finds the server again after a restart."""
 
 import os
 import re
@@ -13,7 +13,7 @@ BYTES = 18
 
 
 def kept_token(out: Path, file_name: str = FILE) -> str:
-    """Read a token of the folder, or make one that only this user can read.
+    """Read the folder's token, or create one that only this user can read.
 
     Parameters
     ----------
@@ -24,7 +24,7 @@ def kept_token(out: Path, file_name: str = FILE) -> str:
 
     Raises
     ------
-    FingervisionError
+    OutputError
         The folder cannot be written.
     """
     path = out / file_name

@@ -1,4 +1,4 @@
-"""One page at a time works the live view; the others of the same user look on until they take over."""
+"""Write access to the live view: one page at a time has it, the user's other pages look on until they take over."""
 
 from fingervision.domain.errors import StateError
 
@@ -6,9 +6,9 @@ HELD = "Another page works this live view: press Take over to work it here."
 
 
 class Pen:
-    """Who may change what; used by the server's one thread.
+    """Tracks which page may change settings; used only by the server's thread.
 
-    The first page that asks for something has it, until it is gone or another takes it.
+    The first page that sends a request has write access, until it closes or another page takes over.
     """
 
     def __init__(self) -> None:
@@ -19,11 +19,11 @@ class Pen:
         return self._holder is None or self._holder is page
 
     def write(self, page: object) -> None:
-        """Take the pen where nobody has it.
+        """Take write access if no other page has it.
 
         Raises
         ------
-        FingervisionError
+        StateError
             Another page has it.
         """
         if not self.may_write(page):
@@ -31,7 +31,7 @@ class Pen:
         self._holder = page
 
     def take(self, page: object) -> None:
-        """Take the pen, whoever has it."""
+        """Take write access from whichever page has it."""
         self._holder = page
 
     def let_go(self, page: object) -> None:

@@ -1,4 +1,4 @@
-"""The scale from a reference in the live picture: drag over it, say how large it is."""
+"""Calibration from a reference in the live picture: the user marks it, and states its size."""
 
 from calib.errors import CalibrationError
 from calib.known_widths import KnownSize, find_widths
@@ -14,7 +14,7 @@ NAME = "the live picture"
 
 
 def calibrated(frame: Frame, region: Region, kind: str, size_mm: float, u_size_mm: float) -> Calibration:
-    """Calibrate on one bar or slot in a part of the picture.
+    """Calibrate on one bar or slot in a rectangle of the picture.
 
     Parameters
     ----------
@@ -34,7 +34,7 @@ def calibrated(frame: Frame, region: Region, kind: str, size_mm: float, u_size_m
 
     Raises
     ------
-    FingervisionError
+    NoCalibrationError
         There is no such reference there.
     """
     try:

@@ -1,13 +1,14 @@
-"""One message to the page: what is new since the last, and the newest picture with what was measured drawn in."""
+"""One message to the page: everything new since the last one, and the newest picture with the measured edges."""
 
 import json
 import struct
 from collections.abc import Mapping
 from dataclasses import dataclass
 from threading import Lock
+from time import monotonic
 from typing import Any
 
-import cv2
+import simplejpeg
 
 from fingervision.domain.gap import NoGap
 from fingervision.domain.status import Status
@@ -18,14 +19,18 @@ from fingervision.storage.gaps_csv import GapRow
 from fingervision.vision.overlay import draw_overlay
 
 JPEG_QUALITY = 85
+# Pages that look at the same picture ask within this time of one another; the next picture comes no sooner.
+STATE_FOR_S = 0.02
 # A page gets at most so many rows in one message.
 ROWS_AT_ONCE = 3000
+# So many rows are put into words within a millisecond.
+ROWS_IN_A_MOMENT = 100
 _NOTHING = NoGap(Status.NO_FINGERS, "The scale is not known: nothing is measured yet.")
 
 
 @dataclass(frozen=True, slots=True)
 class Known:
-    """What a page has: of which count, and how many rows and messages of it.
+    """What a page has received: version, and numbers of rows and messages.
 
     Parameters
     ----------
@@ -42,14 +47,14 @@ class Known:
 
 @dataclass(frozen=True, slots=True)
 class Next:
-    """A message, and what the page then has."""
+    """A message, and what the page has after receiving it."""
 
     content: bytes
     known: Known
 
 
 def message(view: View, known: Known, seen: Seen | None, about: Mapping[str, Any] | None = None) -> Next:
-    """Put together the next message.
+    """Compose the next message.
 
     Parameters
     ----------
@@ -80,7 +85,7 @@ def message(view: View, known: Known, seen: Seen | None, about: Mapping[str, Any
         "count": count,
         "points": points(view, rows),
         "now": _now(view, seen or view.seen),
-        "state": {**view.state(), **section(view), **(about or {})},
+        "state": {**_STATES.of(view), **(about or {})},
         "messages": [[each.number, each.name, each.words] for each in said],
     }
     words = json.dumps(head, ensure_ascii=False).encode()
@@ -91,7 +96,7 @@ def message(view: View, known: Known, seen: Seen | None, about: Mapping[str, Any
 
 
 def points(view: View, rows: list[GapRow]) -> list[list[Any]]:
-    """Rows for the chart: time, gap, its standard uncertainty, frame, why there is none, and the model's gap."""
+    """Rows for the chart: time, gap, its standard uncertainty, frame, reason for a missing gap, and the model's gap."""
     model = view.features.get("model")
     predicted = [None] * len(rows) if model is None else model.predicted_mm(rows)
     return [
@@ -112,7 +117,7 @@ def _u_mm(row: GapRow) -> float | None:
 
 
 def _now(view: View, seen: Seen | None) -> dict[str, Any] | None:
-    """A picture's row in figures."""
+    """Values of the picture's row."""
     choices = view.choices
     if seen is None or seen.row is None:
         return None
@@ -140,11 +145,33 @@ def _picture(seen: Seen, zero_mm: float) -> bytes:
             less = f" less zero {zero_mm:.4f}" if zero_mm else ""
             words += f"  {row.status.value}" if row.gap_mm is None else f"  gap {row.gap_mm - zero_mm:.4f} mm{less}"
         drawn = draw_overlay(seen.frame, seen.outcome, words)
-    return cv2.imencode(".jpg", drawn[:, :, ::-1], [cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY])[1].tobytes()
+    # OpenCV would want blue first: to turn a whole picture's colours round takes twice as long as to code it.
+    return bytes(simplejpeg.encode_jpeg(drawn, JPEG_QUALITY, "RGB", "420"))
+
+
+def draw_beforehand(view: View) -> None:
+    """Draw the picture that the next messages will need, unless the measurement lags behind."""
+    seen = view.seen
+    if seen is not None and not view.in_a_hurry:
+        _PICTURES.of(seen, view.choices.zero_mm)
+
+
+def is_short(view: View, known: Known) -> bool:
+    """Whether the next message is quickly composed: few rows, and no model to evaluate."""
+    return (
+        known.identity == view.identity
+        and view.row_count - known.rows < ROWS_IN_A_MOMENT
+        and "model" not in view.features
+    )
+
+
+def state_has_changed() -> None:
+    """Make the next messages read the view's state again, after a command was executed."""
+    _STATES.forget()
 
 
 class _Pictures:
-    """The newest picture, drawn once however many pages look."""
+    """The newest picture, drawn only once for all pages."""
 
     def __init__(self) -> None:
         self._lock = Lock()
@@ -158,4 +185,24 @@ class _Pictures:
             return self._coded
 
 
-_PICTURES = _Pictures()
+class _States:
+    """State of a view, composed once for all pages that request it at about the same time."""
+
+    def __init__(self) -> None:
+        self._lock = Lock()
+        self._view: View | None = None
+        self._until_s, self._state = 0.0, dict[str, Any]()
+
+    def of(self, view: View) -> dict[str, Any]:
+        with self._lock:
+            if self._view is not view or monotonic() > self._until_s:
+                self._state = {**view.state(), **section(view)}
+                self._view, self._until_s = view, monotonic() + STATE_FOR_S
+            return self._state
+
+    def forget(self) -> None:
+        with self._lock:
+            self._view = None
+
+
+_PICTURES, _STATES = _Pictures(), _States()

@@ -1,4 +1,4 @@
-"""Numbers first, on a machine that is busy with other things."""
+"""Thread priority for the measurement, on a machine that is busy with other programs."""
 
 import os
 import sys
@@ -12,10 +12,11 @@ NICENESS = -10
 
 
 def be_prompt() -> None:
-    """Let this thread, and those that it starts, be served soon.
+    """Raise the priority of this thread, and of those that it starts.
 
-    All threads that run Python should ask for it: who waits for Python's lock waits for whoever holds it. The priority
-    is given to those alone who may ask for it (root, or a limit set with ulimit -e); others go on as they are.
+    All threads that run Python should call it, because a thread that waits for Python's lock waits for the thread that
+    holds it. Only users with permission (root, or a limit set with ulimit -e) get the priority; for others nothing
+    changes.
     """
     sys.setswitchinterval(SWITCH_S)
     with suppress(AttributeError, OSError):

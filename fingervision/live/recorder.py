@@ -1,4 +1,4 @@
-"""Recording beside measuring: a thread of its own, so that a slow disk costs no measured frame."""
+"""Recording in a thread of its own, so that a slow disk never delays the measurement."""
 
 from queue import Empty, Full, Queue
 from threading import Thread
@@ -44,7 +44,7 @@ class Recorder:
         return self._waiting.qsize() > FRAMES_UNTIL_HURRY
 
     def add(self, what: RecordedFrame | tuple[str, str]) -> None:
-        """Hand over a frame, or an event (its name and words)."""
+        """Queue a frame, or an event (its name and words)."""
         if self.failure:
             return
         try:
@@ -57,7 +57,7 @@ class Recorder:
 
         Raises
         ------
-        FingervisionError
+        OutputError
             The run could not be written to its end.
         """
         if not self.failure:
@@ -76,7 +76,7 @@ class Recorder:
         )
 
     def _look_at_the_disk(self) -> None:
-        """Notice a folder that was taken away, which no write tells, and how long the disk lasts."""
+        """Check whether the folder was deleted, which no write reports, and how long the disk space suffices."""
         if monotonic() - self._looked_s < DISK_EVERY_S:
             return
         self._looked_s = monotonic()

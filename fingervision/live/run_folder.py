@@ -1,4 +1,4 @@
-"""A run: the video, the gaps, the events and what they were measured with, in a folder that survives any end."""
+"""Folder of a run: video, gaps, events and settings, valid whenever the program ends."""
 
 from contextlib import suppress
 from dataclasses import asdict, dataclass, replace
@@ -32,10 +32,10 @@ class RecordedFrame:
 
 
 class RunFolder:
-    """Writes a run while it happens.
+    """Writes a run while it is recorded.
 
-    Every frame reaches the files when it is written, rows of the table within a second, so that a process that is
-    killed loses a second at most.
+    Every frame is passed to the system at once, and rows of the table within a second, so that a process that is killed
+    loses at most a second.
 
     Parameters
     ----------
@@ -71,11 +71,11 @@ class RunFolder:
 
     @property
     def is_there(self) -> bool:
-        """Whether what is written lies in the folder still; the system goes on writing to files that are gone."""
+        """Whether the written files still lie in the folder; the system goes on writing to deleted files."""
         return (self.path / EVENTS).exists()
 
     def add(self, frame: RecordedFrame) -> None:
-        """Write one frame: first the mark of a lost one, then its picture, then its row."""
+        """Write one frame: first the mark if it is lost, then its picture, then its row."""
         if isinstance(frame.item, LostFrame):
             lost_at_s = self._video.time_s(frame.item, frame.packets)
             if lost_at_s is not None:
@@ -92,7 +92,7 @@ class RunFolder:
         self._files.event({"time_s": round(self._last_s, 6), "event": name, "words": words})
 
     def close(self, why: str) -> None:
-        """End the run; every file is closed even where one fails, and the first failure is raised."""
+        """End the run; every file is closed even if one fails, and the first error is raised."""
         failure: FingervisionError | None = None
         with suppress(FingervisionError):
             self.event("stopped", why)
@@ -113,7 +113,7 @@ class RunFolder:
 
 
 def _new_folder(out: Path) -> Path:
-    """Make a folder that nobody has."""
+    """Make a folder with an unused name."""
     name = datetime.now(UTC).strftime("%Y-%m-%dT%H-%M-%SZ")
     for number in range(1, 1000):
         path = out / (name if number == 1 else f"{name}-{number}")
@@ -128,7 +128,9 @@ def _new_folder(out: Path) -> Path:
                 f"The folder {out} cannot be written ({error.strerror}): name another with --out."
             ) from error
         return path
-    raise OutputError(f"The folder {out} is full of runs of this second: name another with --out.")
+    raise OutputError(
+        f"The folder {out} has no free name for a run of this second: try again, or name another with --out."
+    )
 
 
 def _about(description: Description, task: Task, began: datetime) -> dict[str, Any]:

@@ -1,4 +1,4 @@
-"""A live view from its start to its end: measuring, the page or the terminal, and a clean end at any signal."""
+"""A live view from start to end: measurement, page or terminal, and an orderly end at any signal."""
 
 import signal
 import sys
@@ -52,7 +52,7 @@ class Showing:
 
 
 def look_through(recording: Recorded, out: Path, showing: Showing, beside: Beside, gauges: Path | None = None) -> None:
-    """Show a recording in the page until the user ends it; `gauges` opens the panel that draws them, on this file.
+    """Show a recording in the page until the user ends it; `gauges` names a gauge file and opens its panel.
 
     Raises
     ------
@@ -96,8 +96,10 @@ def run(capture: Capture, choices: Choices, out: Path, showing: Showing, beside:
 
     Raises
     ------
+    DeviceError
+        Nothing could be measured to the end.
     FingervisionError
-        The scale is for other frames, the port is in use, or nothing could be measured to the end.
+        The scale is for other frames, or the port is in use.
     """
     try:
         session = Session(capture, choices, out)
@@ -164,7 +166,7 @@ def _announce(page: Page, outlet: Outlet, *, browser: bool) -> None:
 
 
 def is_terminal(stream: TextIO | None) -> bool:
-    """Whether a person sits there; a stream that is closed is no terminal."""
+    """Whether a stream is a terminal with a person; a closed stream is not."""
     try:
         return stream is not None and stream.isatty()
     except ValueError:
@@ -173,7 +175,7 @@ def is_terminal(stream: TextIO | None) -> bool:
 
 @contextmanager
 def _until_signalled() -> Iterator[Event]:
-    """Turn Ctrl-C and a request to terminate into an event, so that recordings are ended properly."""
+    """Turn Ctrl-C and SIGTERM into an event, so that recordings are ended properly."""
     signalled = Event()
 
     def note(number: int, frame: FrameType | None) -> None:

@@ -1,4 +1,4 @@
-"""The gaps that the page shows, as a table."""
+"""The gaps shown in the page, saved as a table."""
 
 from pathlib import Path
 
@@ -11,11 +11,11 @@ SAVED_GAPS = "live_gaps.csv"
 
 
 def save_gaps(view: View) -> Path:
-    """Write the gaps that are kept as gaps.csv has them; of a recording, the table as `measure` wrote it.
+    """Save the kept gaps in the form of gaps.csv; of a recording, the table that `measure` wrote.
 
     Raises
     ------
-    FingervisionError
+    OutputError
         The file cannot be written.
     """
     if view.table is not None:

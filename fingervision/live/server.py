@@ -1,4 +1,4 @@
-"""The page's server: files of the page, a socket for the live view, the gaps as a file. Bound to loopback."""
+"""Server of the page: its files, a socket for the live view, and the gaps as a file. Bound to loopback."""
 
 import asyncio
 import errno
@@ -24,6 +24,7 @@ from fingervision.live.page_files import PAGE, files, index
 from fingervision.live.page_socket import TRY_AGAIN_LATER, PageSocket
 from fingervision.live.page_token import VIEWER_FILE, kept_token
 from fingervision.live.pen import Pen
+from fingervision.live.picture_watch import PictureWatch
 from fingervision.live.promptness import be_prompt
 from fingervision.live.save_gaps import save_gaps
 from fingervision.live.view import View
@@ -36,11 +37,11 @@ DOOR = ".live_page.html"
 
 
 def bound(host: str, port: int) -> socket.socket:
-    """Bind the address that the page is served at.
+    """Bind the address at which the page is served.
 
     Raises
     ------
-    FingervisionError
+    ProcessError, UsageError
         The port is in use, or the address is not of this machine.
     """
     try:
@@ -82,7 +83,7 @@ class Page:
         modules()
         self._view, self._listening = view, listening
         self._sockets: set[PageSocket] = set()
-        self._pen = Pen()
+        self._pen, self._watch = Pen(), PictureWatch(view)
         self._steps: list[tuple[str, bytes]] = []
         port = listening.getsockname()[1]
         tokens = {kept_token(view.out): WRITER, kept_token(view.out, VIEWER_FILE): VIEWER}
@@ -117,7 +118,7 @@ class Page:
         )
 
     def door(self) -> Path:
-        """Write a page that only this user can read, and that leads to the address."""
+        """Write a local page that redirects to the address, readable only by this user."""
         path = self._view.out.resolve() / DOOR
         with out_folder(self._view.out):
             path.unlink(missing_ok=True)
@@ -127,7 +128,7 @@ class Page:
         return path
 
     def serve(self, until: Event) -> None:
-        """Serve until told to end."""
+        """Serve until `until` is set."""
         thread = Thread(target=self._run, name="page", daemon=True)
         thread.start()
         while not until.wait(0.2) and thread.is_alive():
@@ -167,9 +168,10 @@ class Page:
 
     async def _socket(self, page: WebSocket) -> None:
         if len(self._sockets) >= PAGES_AT_ONCE:
+            await page.accept()  # a socket that was never open cannot say why it closes
             await page.close(TRY_AGAIN_LATER, f"At most {PAGES_AT_ONCE} pages may look at once: close one.")
             return
-        socket_of_page = PageSocket(page, self._view, self._pen, self._steps)
+        socket_of_page = PageSocket(page, self._view, self._watch, self._pen, self._steps)
         self._sockets.add(socket_of_page)
         try:
             await socket_of_page.serve()

@@ -1,4 +1,4 @@
-"""The live measurement: every frame measured as it comes, what is known of it kept for whoever looks."""
+"""The live measurement: every frame is measured as it arrives, and its result is kept for the pages."""
 
 import secrets
 from collections import Counter, deque
@@ -90,7 +90,7 @@ class Session:
                 self.say("camera", note)
 
     def start(self) -> None:
-        """Begin to measure, once the measurement is ready."""
+        """Begin to measure, once the source is ready."""
         self.capture.start()
         rehearse()
         self.capture.begin()
@@ -98,7 +98,7 @@ class Session:
         self._thread.start()
 
     def stop(self) -> None:
-        """End measuring; what is recording is ended properly."""
+        """End the measurement; a recording under way is ended properly."""
         self.capture.stop()
         self._stopped.set()
         self._thread.join()
@@ -106,7 +106,7 @@ class Session:
             self.stop_recording()
 
     def say(self, name: str, words: str) -> None:
-        """Tell everybody who looks, and the recording."""
+        """Send a message to all users, and record it."""
         recorder = self._recorder
         if recorder is not None:
             recorder.add((name, words))
@@ -116,7 +116,7 @@ class Session:
 
     @property
     def row_count(self) -> int:
-        """Rows that there have been."""
+        """Number of rows so far."""
         return self.history.count
 
     @property
@@ -126,33 +126,33 @@ class Session:
 
     @property
     def shown_from(self) -> int:
-        """A page that comes new gets the last two minutes."""
+        """Number of the first row sent to a new page: that of two minutes ago."""
         return max(self.oldest_row, self.history.count - ROWS_SHOWN)
 
     def rows(self, first: int, last: int) -> Iterator[GapRow]:
-        """Rows from one number on, before another."""
+        """Rows from number `first` up to but excluding `last`."""
         return self.history.rows(first, last)
 
     def state(self) -> dict[str, Any]:
-        """What is known of source and measurement, for the page."""
+        """State of source and measurement, for the page."""
         return state_of_session(self)
 
     @property
     def messages(self) -> deque[Message]:
-        """What was said last."""
+        """The latest messages."""
         return self._messages.kept
 
     @property
     def on_message(self) -> list[MessageListener]:
-        """Who is told what is said."""
+        """Listeners that receive every message."""
         return self._messages.listeners
 
     def choose(self, **changes: Any) -> None:
-        """Change what is measured or shown.
+        """Change settings of measurement or display.
 
         Raises
         ------
-        FingervisionError
+        StateError
             It cannot be meant for these frames, or would change a recording under way.
         """
         with self._lock:
@@ -169,8 +169,10 @@ class Session:
 
         Raises
         ------
-        FingervisionError
-            There is one already, the scale is not known, or the folder cannot be written.
+        StateError
+            There is one already, the source has ended, or the scale is not known.
+        OutputError
+            The folder cannot be written.
         """
         with self._lock:
             task = self.choices.task
@@ -196,11 +198,11 @@ class Session:
         return run.path
 
     def stop_recording(self) -> Path:
-        """End the recording; returns its folder.
+        """End the recording; return its folder.
 
         Raises
         ------
-        FingervisionError
+        StateError
             There is none, or it could not be written to its end.
         """
         with self._lock:
@@ -213,12 +215,12 @@ class Session:
 
     @property
     def recording(self) -> Recorder | None:
-        """The recording under way."""
+        """The recording under way; None without one."""
         return self._recorder
 
     @property
     def silent_s(self) -> float:
-        """How long there has been no frame; 0 while they come as usual."""
+        """Time since the last frame (s); 0 while frames arrive as usual."""
         if self.ended.is_set():
             return 0.0
         since_s = monotonic() - self._frame_at_s
@@ -227,7 +229,7 @@ class Session:
 
     @property
     def in_a_hurry(self) -> bool:
-        """Whether measuring or the disk lags, so that nobody should draw previews."""
+        """Whether measurement or disk lags behind, so that previews should not be drawn."""
         recorder = self._recorder
         lags = self.capture.waiting.qsize() > FRAMES_UNTIL_HURRY
         return lags or (recorder is not None and recorder.in_a_hurry)

@@ -1,4 +1,4 @@
-"""What the page is told of a live measurement, and of what was chosen for any."""
+"""State of a live measurement, and of any view's settings, as sent to the page."""
 
 from typing import TYPE_CHECKING, Any
 

@@ -1,4 +1,4 @@
-"""A look at the set-up: the newest frames, and what `inspect` finds in them, beside measuring that goes on."""
+"""Inspection of the set-up in a live view: `inspect` applied to the newest frames, while the measurement continues."""
 
 from threading import Thread
 from time import monotonic, sleep
@@ -42,7 +42,7 @@ class SetUp:
 
     @property
     def is_busy(self) -> bool:
-        """Whether it is looking."""
+        """Whether an inspection is under way."""
         return self._thread.is_alive()
 
     def _look(self) -> None:

@@ -1,4 +1,4 @@
-"""The live measurement in a terminal: one line in place, or one line of JSON a frame."""
+"""The live measurement in a terminal: one line that is overwritten, or one line of JSON per frame."""
 
 import json
 from dataclasses import asdict
@@ -16,7 +16,7 @@ DRIVE_COLUMNS = ("run", "input_mm", "force_n")
 
 
 class JsonLines:
-    """Writes one line a frame, with the columns of gaps.csv; null is an empty cell.
+    """Prints one line per frame, with the columns of gaps.csv; null is an empty cell.
 
     Parameters
     ----------
@@ -34,7 +34,7 @@ class JsonLines:
 
 
 class StatusLine:
-    """Prints gap, status and rate in place.
+    """Prints gap, status and rate in a line that is overwritten.
 
     Parameters
     ----------
@@ -51,7 +51,7 @@ class StatusLine:
         self._printed_at_s = float("-inf")
 
     def add(self, row: GapRow, arrived_s: float) -> None:
-        """Print the row if it is time."""
+        """Print the row if the interval has passed."""
         if monotonic() - self._printed_at_s < (EVERY_S if self._in_place else EVERY_S_ELSEWHERE):
             return
         self._printed_at_s = monotonic()
@@ -59,7 +59,7 @@ class StatusLine:
         self._outlet.put(f"{CLEARED}{line}" if self._in_place else f"{line}\n")
 
     def end(self) -> None:
-        """Leave the line that is in place."""
+        """End the line that is overwritten."""
         if self._in_place:
             self._outlet.put("\n")
 

@@ -1,4 +1,4 @@
-"""One time for everything live: the source's own steps, joined across cuts and jumps by the host's clock."""
+"""Common time of the live view: the source's time steps, joined across interruptions by the computer's clock."""
 
 from fingervision.storage.recorded_video import TICKS_PER_S
 
@@ -7,7 +7,7 @@ JUMP_S = 1.0
 
 
 class Timeline:
-    """Turns the times of a source into times since the start of the live view.
+    """Converts times of a source to times since the start of the live view.
 
     Parameters
     ----------
@@ -21,7 +21,7 @@ class Timeline:
         self._last: tuple[float, float, float] | None = None  # on the source's clock, on the host's, as given
 
     def cut(self) -> None:
-        """Note that the source was cut off: its clock may start anew."""
+        """Record an interruption of the source, after which its clock may start again."""
         self._offset_s = None
 
     def at(self, source_s: float, arrived_s: float) -> tuple[float, float]:
@@ -56,5 +56,5 @@ class Timeline:
         return time_s, jump_s
 
     def on_this(self, source_s: float) -> float:
-        """Place another time of the source, that of a packet, beside the frames."""
+        """Convert another time of the source, that of a packet, to the live view's time."""
         return round((source_s + (self._offset_s or 0.0)) * TICKS_PER_S) / TICKS_PER_S

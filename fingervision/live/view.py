@@ -1,4 +1,4 @@
-"""What the page shows: a source that goes on, or a recording that is looked through; both answer alike."""
+"""Protocol of what the page shows: a continuous source, or a recording; both have the same interface."""
 
 from collections import deque
 from collections.abc import Iterator
@@ -13,16 +13,16 @@ from fingervision.storage.gaps_csv import GapRow
 
 
 class View(Protocol):
-    """A live measurement or a recording, as the page and its commands know it.
+    """A live measurement or a recording, as used by the page and its commands.
 
     Attributes
     ----------
     out : Path
-        Folder for what the user keeps.
+        Folder for files that the user saves.
     choices : Choices
-        What the user chose.
+        Settings that the user chose.
     features : dict
-        What stands beside the measurement (a model, a bed), by name; commands of that concern find it there.
+        Additions to the measurement (a model, a bed) by name, where the commands of that topic find them.
     """
 
     out: Path
@@ -31,7 +31,7 @@ class View(Protocol):
 
     @property
     def identity(self) -> str:
-        """Changes when rows are counted anew."""
+        """A number that changes when rows are counted from the beginning."""
         ...
 
     @property
@@ -46,22 +46,22 @@ class View(Protocol):
 
     @property
     def messages(self) -> deque[Message]:
-        """What was said last."""
+        """The latest messages."""
         ...
 
     @property
     def in_a_hurry(self) -> bool:
-        """Whether nobody should draw previews now."""
+        """Whether previews should not be drawn now."""
         ...
 
     @property
     def table(self) -> Path | None:
-        """The whole table as a file, where there is one."""
+        """The complete table as a file, where there is one."""
         ...
 
     @property
     def row_count(self) -> int:
-        """Rows that there have been."""
+        """Number of rows so far."""
         ...
 
     @property
@@ -71,21 +71,21 @@ class View(Protocol):
 
     @property
     def shown_from(self) -> int:
-        """Number of the first row that a page which has none is sent."""
+        """Number of the first row sent to a page that has none."""
         ...
 
     def rows(self, first: int, last: int) -> Iterator[GapRow]:
-        """Rows from one number on, before another."""
+        """Rows from number `first` up to but excluding `last`."""
         ...
 
     def choose(self, **changes: Any) -> None:
-        """Change what is measured or shown."""
+        """Change settings of measurement or display."""
         ...
 
     def say(self, name: str, words: str) -> None:
-        """Tell everybody who looks."""
+        """Send a message to all users."""
         ...
 
     def state(self) -> dict[str, Any]:
-        """What is known of source and measurement, for the page."""
+        """State of source and measurement, for the page."""
         ...

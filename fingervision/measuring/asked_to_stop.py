@@ -9,10 +9,9 @@ from types import FrameType
 
 @contextmanager
 def asked_to_stop() -> Iterator[threading.Event]:
-    """Note a first Ctrl-C, or request to terminate, instead of raising it; a second one is raised as ever.
+    """Record a first Ctrl-C or SIGTERM instead of raising it; a second one is raised as usual.
 
-    Where the signal is not for us (another thread than the main one, or a worker that leaves it to its parent), nothing
-    is noted.
+    Nothing is recorded outside the main thread, or in a worker process that leaves the signal to its parent.
 
     Yields
     ------

@@ -1,12 +1,13 @@
 """Detect blocks with wrong content in a decoded picture, where damage of the stream went unnoticed.
 
-JPEG and H.264 code squares of 8 or 16 pixels. Damage puts wrong levels, or the right ones at a wrong place, into whole
-squares; the picture then has steps along the grid of the squares that end at its corners, where the picture before has
-none. Motion in front of the camera does not follow this grid, and optics never change an edge within a single pixel.
+JPEG and H.264 code the picture in squares of 8 or 16 pixels. Damage puts wrong content into whole squares. The picture
+then has steps along the grid of the squares that end at its corners, where the previous picture has none. Motion of
+objects does not follow this grid, and optics never change an edge within a single pixel.
 
-Method: steps across the borders of blocks against steps inside of them, as in measures of blocking (Z. Wang, H. R.
-Sheikh, A. C. Bovik, "No-reference perceptual quality assessment of JPEG compressed images", Proc. ICIP 2002,
-doi:10.1109/ICIP.2002.1038064), here of the change since another picture and of each segment by itself.
+Method: steps across the borders of blocks are compared with steps inside them, as in measures of blocking artefacts (Z.
+Wang, H. R. Sheikh, A. C. Bovik, "No-reference perceptual quality assessment of JPEG compressed images", Proc. ICIP
+2002, doi:10.1109/ICIP.2002.1038064). Here this is done for the change since another picture, and for each segment
+separately.
 """
 
 import numpy as np
@@ -26,7 +27,7 @@ Levels = NDArray[np.float32]
 
 
 def foreign_corners(picture: Levels, before: Levels, least_step: float) -> int:
-    """Count the corners of squares that are in a picture and were not in the one before.
+    """Count corners of squares that are visible in a picture and were not in the previous one.
 
     Parameters
     ----------
@@ -51,7 +52,7 @@ def foreign_corners(picture: Levels, before: Levels, least_step: float) -> int:
 
 
 def _outstanding(change: Levels, picture: Levels, before: Levels, least_step: float) -> NDArray[np.bool_]:
-    """Segments of upright borders at which the change has a step, shape (block rows, block columns - 1)."""
+    """Segments of vertical borders at which the change has a step, shape (block rows, block columns - 1)."""
     at = np.arange(SQUARE_PX - 1, change.shape[1] - 1, SQUARE_PX)
     stands_out = np.zeros((change.shape[0] // SQUARE_PX, len(at)), dtype=bool)
     for steps, least in ((_levelled, least_step), (_sized, WAVES * least_step)):
@@ -61,18 +62,19 @@ def _outstanding(change: Levels, picture: Levels, before: Levels, least_step: fl
         right = np.maximum(step[:, at + 1], step[:, at + 2])
         # A wrong level is quiet on both sides, a wrong wave on the side of the sound picture alone.
         beside = np.maximum(left, right) if steps is _levelled else np.minimum(left, right)
-        is_new = steps(picture)[:, at] > steps(before)[:, at]
-        stands_out |= (here > least) & (here > OUTSTANDING * beside) & is_new
+        alone = (here > least) & (here > OUTSTANDING * beside)
+        if alone.any():  # hardly ever in sound pictures
+            stands_out |= alone & (steps(picture)[:, at] > steps(before)[:, at])
     return stands_out
 
 
 def _levelled(levels: Levels) -> Levels:
-    """Size of the mean step from each column to the next along each block's height, shape (block rows, width - 1)."""
+    """Absolute mean step from each column to the next along each block's height, shape (block rows, width - 1)."""
     rows = levels.reshape(levels.shape[0] // SQUARE_PX, SQUARE_PX, levels.shape[1]).mean(axis=1)
     return np.asarray(np.abs(np.diff(rows, axis=1)))
 
 
 def _sized(levels: Levels) -> Levels:
-    """Mean size of the steps from each column to the next along each block's height, shape (block rows, width - 1)."""
+    """Mean absolute step from each column to the next along each block's height, shape (block rows, width - 1)."""
     steps = np.abs(np.diff(levels, axis=1))
     return np.asarray(steps.reshape(levels.shape[0] // SQUARE_PX, SQUARE_PX, -1).mean(axis=1))

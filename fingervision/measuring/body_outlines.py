@@ -1,4 +1,4 @@
-"""The outlines of a drawing's bodies, cut into chunks, and where the drawing lies in the picture."""
+"""Outlines of a drawing's bodies, divided into chunks, and the placement of the drawing in the picture."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from fingervision.models.mechanism import Mechanism
 from fingervision.models.mechanism_bodies import LinkBody, bodies_of
-from fingervision.vision.rigid_outline import REACH_PX, Chunks, FlatMap
+from fingervision.vision.outline_chunks import REACH_PX, Chunks, FlatMap
 
 Array = NDArray[np.float64]
 
@@ -21,7 +21,7 @@ BESIDE = 1e-4
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Placement:
-    """Where the drawing lies in the picture.
+    """Position, rotation and scale of the drawing in the picture.
 
     Parameters
     ----------
@@ -53,22 +53,22 @@ class Placement:
         return np.array([[c, -side * s], [s, side * c]])
 
     def to_flat_px(self, points_mm: Array) -> Array:
-        """Place points, shape (2, n), on the plane as it is seen squarely and without distortion."""
+        """Convert points of the drawing, shape (2, n), to the flat plane without perspective and distortion."""
         return np.asarray(self.origin_px[:, None] + self.px_per_mm * self.axes @ points_mm)
 
     def to_px(self, points_mm: Array) -> Array:
-        """Place points, shape (2, n), in the picture."""
+        """Convert points of the drawing, shape (2, n), to pixels of the picture."""
         flat = self.to_flat_px(points_mm)
         return flat if self.flat is None else self.flat.to_picture(flat)
 
     def to_mm(self, points_px: Array) -> Array:
-        """Transform points of the picture, shape (2, n), to the coordinates of the drawing."""
+        """Convert points of the picture, shape (2, n), to the coordinates of the drawing."""
         flat = points_px if self.flat is None else self.flat.to_flat(points_px)
         return np.asarray(self.axes.T @ (flat - self.origin_px[:, None]) / self.px_per_mm)
 
     @property
     def turn_sign(self) -> float:
-        """Sign of a rotation in the drawing by one in the picture."""
+        """Sign by which a rotation in the picture is converted to the drawing."""
         return float(np.sign(np.linalg.det(self.axes)))
 
 
@@ -89,7 +89,7 @@ class BodyOutline:
     ends_mm: Array
 
     def chunks(self, place: Placement) -> Chunks:
-        """Cut the stretches into chunks as they lie on the flat plane."""
+        """Divide the straight stretches into chunks, placed on the flat plane."""
         starts, ends = place.to_flat_px(self.starts_mm), place.to_flat_px(self.ends_mm)
         length = np.hypot(*(ends - starts))
         middles, normals = [], []
@@ -112,12 +112,12 @@ class BodyOutline:
         )
 
     def about_px(self, place: Placement) -> Array:
-        """Reference point on the flat plane."""
+        """Reference point of the body on the flat plane."""
         return np.asarray(place.to_flat_px(self.body.centroid_mm[:, None])[:, 0])
 
 
 def outlines_of(mechanism: Mechanism) -> tuple[BodyOutline, ...]:
-    """Select the straight edges of every body that the drawing states, without cuts through flexures."""
+    """Select the straight edges of every body of the drawing, without cuts through flexures."""
     region = mechanism.region
     beside = BESIDE * region.size_mm
     found = []
@@ -138,14 +138,14 @@ def outlines_of(mechanism: Mechanism) -> tuple[BodyOutline, ...]:
 
 
 def silhouette(mechanism: Mechanism, place: Placement, width_px: int, height_px: int, step_px: int) -> Array:
-    """Where the drawing covers the picture, every few pixels; shape (height / step, width / step), 0 or 1."""
+    """Mask of the drawing in the picture, one value every few pixels; shape (height / step, width / step), 0 or 1."""
     x, y = np.meshgrid(np.arange(0, width_px, step_px), np.arange(0, height_px, step_px))
     points = place.to_mm(np.stack([x.ravel(), y.ravel()]).astype(float))
     return np.asarray(mechanism.region.holds(points).reshape(x.shape), dtype=np.float64)
 
 
 def in_sight(chunks: Sequence[Chunks], width_px: int, height_px: int, flat: FlatMap | None = None) -> list[float]:
-    """Share of each body's chunks that lie in the picture."""
+    """Fraction of each body's chunks that lie in the picture."""
     shares = []
     for each in chunks:
         x, y = each.middles if flat is None else flat.to_picture(each.middles)

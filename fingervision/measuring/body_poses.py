@@ -31,18 +31,10 @@ from fingervision.measuring.scale import Scale
 from fingervision.models.mechanism import Mechanism
 from fingervision.models.mechanism_bodies import column_name
 from fingervision.storage.bodies_csv import add_channels, write_bodies
+from fingervision.vision.outline_chunks import Chunks, EdgeView, FlatMap
 from fingervision.vision.pipeline import Settings
 from fingervision.vision.response_shift import edge_shift_px
-from fingervision.vision.rigid_outline import (
-    LEAST_IN_VIEW,
-    Chunks,
-    EdgeView,
-    FlatMap,
-    RigidFit,
-    capture_rigid,
-    fit_rigid,
-    halved,
-)
+from fingervision.vision.rigid_outline import LEAST_IN_VIEW, RigidFit, capture_rigid, fit_rigid, halved
 
 Array = NDArray[np.float64]
 
@@ -58,7 +50,7 @@ LAID_BY_ALL = (
 
 @dataclass(frozen=True, slots=True, eq=False)
 class BodiesMeasured:
-    """What following the bodies of a recording left behind.
+    """Result of following the bodies of a recording.
 
     Parameters
     ----------
@@ -102,11 +94,11 @@ class BodyTracker:
         self.placed: Placed | None = None
 
     def poses(self, frames: Iterable[Frame | LostFrame]) -> Iterator[FramePoses]:
-        """Follow them; the first frame that can be read tells where the drawing lies.
+        """Yield the poses of each frame; the first readable frame determines where the drawing lies.
 
         Raises
         ------
-        FingervisionError
+        DataError, UsageError
             The drawing cannot be laid on that frame, or the scale is for frames of another size.
         """
         for item in frames:
@@ -124,12 +116,13 @@ class BodyTracker:
         return [*bodies, *(flexure.name for flexure in self.mechanism.flexures)]
 
     def _view(self, picture: Picture) -> EdgeView:
-        """How edges show: half of the edge bias widens what is dark on each of its sides."""
+        """How edges appear: edge bias widens a dark body by half of it on each side."""
         dark = self.placed is None or self.placed.body_is_dark
         outward_px = (0.5 if dark else -0.5) * self.scale.edge_bias_px
+        flat, shared_pixels = flat_map_of(self.scale), picture.shared_pixels
         if self.placed is None:
-            return EdgeView(flat_map_of(self.scale), outward_px, picture.shared_pixels)
-        return EdgeView(flat_map_of(self.scale), outward_px, picture.shared_pixels, *self._levels)
+            return EdgeView(flat, outward_px, shared_pixels)
+        return EdgeView(flat, outward_px, shared_pixels, *self._levels, *self._shared.at(picture.size_px))
 
     def _place(self, grey: Array, index: int, view: EdgeView, picture: Picture) -> None:
         height, width = grey.shape
@@ -145,7 +138,11 @@ class BodyTracker:
         if not placed.body_is_dark:
             view = replace(view, outward_px=-view.outward_px)
         self._levels = inside, ground - inside
-        view = replace(view, body_level=inside, contrast=ground - inside)
+        plane = PlaneScale(self.scale, (width, height)) if isinstance(self.scale, Calibration) else None
+        u_outward_px, u_size = SharedErrors(None, np.zeros(2), plane).at((width, height))
+        view = replace(
+            view, body_level=inside, contrast=ground - inside, u_outward_px=u_outward_px, u_size=u_size
+        )  # fmt: skip
         laid = refined(grey, self.outlines, placed.place, placed.body_is_dark, view)
         if laid is None:
             raise DataError(
@@ -154,7 +151,6 @@ class BodyTracker:
             )
         notes = placed.notes if laid.by_fixed else (*placed.notes, LAID_BY_ALL)
         self.placed = Placed(laid.place, placed.body_is_dark, notes)
-        plane = PlaneScale(self.scale, (width, height)) if isinstance(self.scale, Calibration) else None
         other, shift_px = self.settings.other_response, 0.0
         if other is not None:
             shares = (inside / picture.top, ground / picture.top)
@@ -166,8 +162,10 @@ class BodyTracker:
         self._check_size(grey, index, self._view(picture))
 
     def _check_size(self, grey: Array, index: int, view: EdgeView) -> None:
-        """Hold the sizes of the bodies against the drawing: what is off is a wrong scale, or another mechanism."""
+        """Compare the sizes of the bodies with the drawing: a difference means a wrong scale, or another mechanism."""
         fits = [self._fit(grey, [], number, view) for number in range(len(self.outlines))]
+        self._note_shadows([o.body.name for o, fit in zip(self.outlines, fits, strict=True)
+                            if fit is not None and fit.by_shadows.any()], index)  # fmt: skip
         told = [(fit.size_error, fit.u_size_error) for fit in fits if fit is not None]
         weight = sum(u**-2 for _, u in told)
         if self.placed is None or weight == 0.0:
@@ -181,14 +179,23 @@ class BodyTracker:
         )
         if abs(error) > MOST_SIZE_ERROR:
             raise DataError(
-                f"The drawing must have the size of what is seen, but on frame {index} {words}: check the scale and "
-                "the lengths of the drawing."
+                f"The drawing must have the size of the mechanism in the picture, but on frame {index} {words}: check "
+                "the scale and the lengths of the drawing."
             )
         self._shared = replace(self._shared, size_error=abs(error))
         self.placed = replace(self.placed, notes=(*self.placed.notes, f"{words}; u of the poses holds it."))
 
+    def _note_shadows(self, names: Sequence[str], index: int) -> None:
+        if self.placed is None or not names:
+            return
+        words = (
+            f"on frame {index} one side of {' and of '.join(names)} is blurred otherwise than the others: a shadow or "
+            "glare may lie along it, or the body moved; u of the poses holds it, and even light takes it away."
+        )
+        self.placed = replace(self.placed, notes=(*self.placed.notes, words))
+
     def _fit(self, grey: Array, pyramid: list[Array], number: int, view: EdgeView) -> RigidFit | None:
-        """Fit near where it was last; else from farther away."""
+        """Fit from the pose in the last frame, or else by a search from farther away."""
         dark = self.placed is not None and self.placed.body_is_dark
         chunks, about, last = self._chunks[number], self._about[number], self._last[number]
         found = fit_rigid(grey, chunks, about, dark, last, view)
@@ -235,7 +242,7 @@ class BodyTracker:
         return COVERED if inside.size and inside.mean() >= LEAST_IN_VIEW else OUT_OF_VIEW
 
     def _hinges(self, poses: Mapping[str, SeenPose], shared: Mapping[str, SharedPose]) -> dict[str, SeenPose]:
-        """Angles of hinges: how far the body beyond turned against the one before."""
+        """Angles of hinges: rotation of the body beyond a hinge against the body before it."""
         found = {}
         for flexure in self.mechanism.flexures:
             first, last = (self._joined(flexure.name, side).body.name for side in (-1.0, 1.0))
@@ -269,7 +276,7 @@ def measure_bodies(
     out: Path,
     settings: Settings | None = None,
 ) -> BodiesMeasured:
-    """Follow the bodies of a recording into bodies.csv, and add them to the rows of its gaps.csv where there is one.
+    """Measure the bodies of a recording into bodies.csv, and add them to the rows of an existing gaps.csv.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Lay a drawing on a picture: by its silhouette, or by two or three points that are given in both."""
+"""Place a drawing on a picture: by its silhouette, or by two or three points given in both."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 from fingervision.domain.errors import DataError, UsageError
 from fingervision.measuring.body_outlines import BodyOutline, Placement, in_sight, silhouette
 from fingervision.models.mechanism import Mechanism
-from fingervision.vision.rigid_outline import PLAIN, Chunks, EdgeView, FlatMap, RigidFit, capture_rigid, halved
+from fingervision.vision.outline_chunks import PLAIN, Chunks, EdgeView, FlatMap
+from fingervision.vision.rigid_outline import RigidFit, capture_rigid, halved
 
 Array = NDArray[np.float64]
 
@@ -39,7 +40,7 @@ OTHER_SCALE = 0.1
 
 @dataclass(frozen=True, slots=True)
 class GivenPoint:
-    """A point of the picture and what it is in the drawing.
+    """A point given in the picture and in the drawing.
 
     Parameters
     ----------
@@ -57,7 +58,7 @@ class GivenPoint:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Placed:
-    """A drawing on a picture.
+    """A drawing placed on a picture.
 
     Parameters
     ----------
@@ -93,7 +94,7 @@ def parse_point(text: str) -> GivenPoint:
 
 
 def by_points(points: Sequence[GivenPoint], px_per_mm: float, flat: FlatMap | None = None) -> Placement:
-    """Lay a drawing by points; two leave its front towards the camera, three tell its side.
+    """Place a drawing by points; two leave its front towards the camera, three also determine which side is seen.
 
     Raises
     ------
@@ -108,7 +109,7 @@ def by_points(points: Sequence[GivenPoint], px_per_mm: float, flat: FlatMap | No
     here, there = px - px.mean(axis=1)[:, None], mm - mm.mean(axis=1)[:, None]
     size = float(np.sqrt(np.sum(there**2)))
     if size == 0.0 or float(np.sqrt(np.sum(here**2))) == 0.0:
-        raise UsageError("--at must give points at different places, but they are one.")
+        raise UsageError("--at must give points at different places, but two of them are the same.")
     scale = float(np.sqrt(np.sum(here**2))) / size
     if abs(scale / px_per_mm - 1.0) > OTHER_SCALE:
         raise UsageError(
@@ -126,11 +127,11 @@ def by_points(points: Sequence[GivenPoint], px_per_mm: float, flat: FlatMap | No
 
 
 def by_silhouette(grey: Array, mechanism: Mechanism, px_per_mm: float, flat: FlatMap | None = None) -> Placed:
-    """Lay a drawing so that its silhouette covers what is dark, or light, in the picture.
+    """Place a drawing so that its silhouette covers what is dark, or light, in the picture.
 
     Raises
     ------
-    FingervisionError
+    DataError
         It fits nowhere, or in several ways.
     """
     height, width = grey.shape
@@ -173,7 +174,7 @@ def by_silhouette(grey: Array, mechanism: Mechanism, px_per_mm: float, flat: Fla
     size = (width, height, step)
     if any(_climbed(drawn, mechanism, entry[1], size, 0.0)[0] < ALIKE for entry in others):
         raise DataError(
-            f"The drawing {mechanism.name} lies on the picture in {1 + len(others)} ways as well as one: give --at "
+            f"The drawing {mechanism.name} fits the picture equally well in {1 + len(others)} ways: give --at "
             "X,Y=XMM,YMM for three points of it."
         )
     # A symmetric drawing: its front is towards the camera, turned as little as may be.
@@ -187,7 +188,7 @@ def by_silhouette(grey: Array, mechanism: Mechanism, px_per_mm: float, flat: Fla
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Laid:
-    """A drawing laid by edges.
+    """A drawing placed by its edges.
 
     Parameters
     ----------
@@ -210,7 +211,10 @@ class Laid:
 def refined(
     grey: Array, outlines: Sequence[BodyOutline], place: Placement, body_is_dark: bool, view: EdgeView = PLAIN
 ) -> Laid | None:
-    """Lay the drawing by the edges of its fixed bodies, or of all where none is in view; None where they are lost."""
+    """Refine the placement by the edges of the fixed bodies, or of all bodies where no fixed one is in view.
+
+    None where too few edges are found.
+    """
     height, width = grey.shape
     cut = [outline.chunks(place) for outline in outlines]
     shares = in_sight(cut, width, height, place.flat)
@@ -228,7 +232,7 @@ def refined(
 
 
 def together(parts: Sequence[Chunks]) -> Chunks:
-    """Take the chunks of several bodies as those of one."""
+    """Join the chunks of several bodies into one body."""
     return Chunks(
         np.concatenate([part.middles for part in parts], axis=1),
         np.concatenate([part.normals for part in parts], axis=1),
@@ -237,14 +241,14 @@ def together(parts: Sequence[Chunks]) -> Chunks:
 
 
 def levels_of(grey: Array, mechanism: Mechanism, place: Placement) -> tuple[float, float]:
-    """Median level of the mechanism, where it lies, and of its ground."""
+    """Median level of the mechanism, and of its background."""
     height, width = grey.shape
     step = max(1, max(width, height) // GRID)
     inside = silhouette(mechanism, place, width, height, step) > 0.5
     small = grey[::step, ::step]
     if inside.all() or not inside.any():
         raise DataError(
-            f"The drawing {mechanism.name} must lie in the picture and leave some of its ground, but covers "
+            f"The drawing {mechanism.name} must lie inside the picture and leave some background visible, but covers "
             f"{'all' if inside.any() else 'none'} of it: check --at and the scale."
         )
     return float(np.median(small[inside])), float(np.median(small[~inside]))
@@ -284,7 +288,7 @@ def _wrapped(angle: float) -> float:
 def _climbed(
     mask: NDArray[np.bool_], mechanism: Mechanism, place: Placement, size: tuple[int, int, int], overlap: float
 ) -> tuple[float, Placement]:
-    """Turn and shift a drawing as long as it covers more, in steps that are halved."""
+    """Turn and shift a drawing as long as its overlap with the mask grows, with steps that are halved."""
     width, height, step = size
     turn, shift = np.pi / TURNS, 6.0 * step
     while shift > 0.5 * step:

@@ -1,4 +1,4 @@
-"""The drive at the time of a frame."""
+"""State of the drive at the time of a frame."""
 
 from dataclasses import dataclass
 

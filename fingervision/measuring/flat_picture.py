@@ -1,4 +1,4 @@
-"""A calibration's lens and plane as a map between the picture and the plane seen squarely."""
+"""Lens and plane of a calibration, as a map between the picture and the plane without perspective and distortion."""
 
 from dataclasses import dataclass
 
@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from calib.measured_scale import Calibration
 from fingervision.measuring.scale import Scale
-from fingervision.vision.rigid_outline import FlatMap
+from fingervision.vision.outline_chunks import FlatMap
 
 Array = NDArray[np.float64]
 
@@ -18,7 +18,7 @@ NOWHERE_PX = -1e6
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FlatPicture:
-    """From pixels of the picture to pixels of the plane as a camera without distortion sees it squarely, and back.
+    """Converts pixels of the picture to pixels of the plane without perspective and distortion, and back.
 
     Parameters
     ----------
@@ -29,11 +29,11 @@ class FlatPicture:
     calibration: Calibration
 
     def to_flat(self, points: Array) -> Array:
-        """Take lens and perspective off points, shape (2, n)."""
+        """Remove lens distortion and perspective from points, shape (2, n)."""
         return self.calibration.flatten(points.T).T
 
     def to_picture(self, points: Array) -> Array:
-        """Put them on again; a point that the lens cannot show comes out far outside of the picture."""
+        """Apply lens distortion and perspective; a point that the lens cannot show is put far outside the picture."""
         seen = self.calibration.unflatten(points.T).T
         with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
             apart = np.hypot(*(self.to_flat(seen) - points))
@@ -41,7 +41,7 @@ class FlatPicture:
 
 
 def flat_map_of(scale: Scale) -> FlatMap | None:
-    """Return the map of a calibration; None where the picture is flat as it is."""
+    """Return the map of a calibration; None where the picture needs no correction."""
     if isinstance(scale, Calibration) and (scale.lens is not None or scale.plane is not None):
         return FlatPicture(scale)
     return None

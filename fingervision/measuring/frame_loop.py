@@ -1,4 +1,4 @@
-"""Every frame of a recording measured in order, and its rows handed over as they come."""
+"""Measure every frame of a recording in order, and pass on its rows as they come."""
 
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -36,7 +36,7 @@ SeeItem = Callable[[Frame | LostFrame, Result], None]
 
 @dataclass(frozen=True, slots=True)
 class Prepared:
-    """A recording with the settings of its measurement, after both were completed from each other.
+    """A recording with the settings of its measurement, each completed from the other.
 
     Parameters
     ----------
@@ -57,7 +57,7 @@ class Prepared:
 
 
 def prepared(description: Description, task: Task) -> Prepared:
-    """Put together what is known of a recording before its frames are read."""
+    """Collect what is known of a recording before its frames are read."""
     if words := other_camera(task.scale, recorded_camera(description.files)):
         description = replace(description, notes=(words, *description.notes))
     # What is stored without loss may have come compressed from the camera.
@@ -151,7 +151,7 @@ def _outcomes(
     votes: Counter[str],
     is_stopped: Callable[[], bool],
 ) -> Iterator[tuple[Frame | LostFrame, GapMeasurement | NoGap | LostFrame]]:
-    """Every frame with what it says; the decoder runs ahead and is stopped when this is."""
+    """Yield every frame with its result; the decoder runs ahead, and stops when this generator is closed."""
     pictures = SoundPictures()
     with closing(decoded_ahead(source)) as frames:
         for item, outcome in one_polarity(coded(frames, coding), settings, votes, is_stopped):
@@ -162,7 +162,7 @@ def _outcomes(
 
 
 def coded(frames: Iterable[Frame | LostFrame], coding: Coding) -> Iterator[Frame | LostFrame]:
-    """Tell frames that are stored without loss what they came from."""
+    """Attach to losslessly stored frames the coding of the pictures from which they were made."""
     for item in frames:
         if isinstance(item, Frame) and item.coding is Coding.LOSSLESS and coding is not Coding.LOSSLESS:
             yield replace(item, coding=coding)

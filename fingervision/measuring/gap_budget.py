@@ -1,4 +1,4 @@
-"""Where the uncertainty of each gap comes from: the scale's budget, and what each picture adds to it."""
+"""Uncertainty budget of each gap: the scale's contributions, and those of each picture."""
 
 from collections.abc import Sequence
 
@@ -18,10 +18,10 @@ RESPONSE = "assumed camera response"
 
 
 def gap_budget(measured: Sequence[GapMeasurement], scale: Scale) -> Budget:
-    """Every part of the standard uncertainty of each gap; its `u_mm` is `u_gap_mm` of gaps.csv.
+    """Every contribution to the standard uncertainty of each gap; its `u_mm` is `u_gap_mm` of gaps.csv.
 
-    Independent parts add in square (JCGM 100:2008, equation 10). With a bare scale, which has no uncertainty, only the
-    parts that the pictures themselves show are there, and their sum is not that of the gap.
+    Squares of independent contributions add (JCGM 100:2008, equation 10). A bare scale has no uncertainty; then only
+    the contributions of the pictures are listed, and their sum is not the uncertainty of the gap in mm.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""The gap over time with its uncertainty, as a picture."""
+"""Figure of the gap over time with its uncertainty."""
 
 from itertools import pairwise
 from pathlib import Path
@@ -31,7 +31,7 @@ def draw_gap(
 
     Raises
     ------
-    FingervisionError
+    OutputError
         The picture cannot be written.
     """
     figure = gap_figure(series, drive, clock)
@@ -51,8 +51,8 @@ def gap_figure(
 ) -> Figure:
     """Draw the gap with the band of its expanded uncertainty, and below it that uncertainty alone.
 
-    Frames without a number are marked at the lower edge. With a drive and its clock offset the input is drawn over the
-    gap, on the recording's clock, and the offset is written above.
+    Frames without a number are marked along the lower edge. With a drive and its clock offset, the input is drawn over
+    the gap on the recording's clock, and the offset is stated above.
     """
     figure = Figure(figsize=SIZE_INCHES, layout="constrained")
     upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=(3, 1))
@@ -103,7 +103,7 @@ def draw_gap_axes(
 
 
 def _draw_input(axes: Axes, drive: DriveHistory, clock: ClockOffset | float) -> None:
-    """Draw the input over the recording's times, with an axis of its own at the right, and state the offset."""
+    """Draw the input on the recording's clock, with an axis of its own at the right, and state the offset."""
     if isinstance(clock, ClockOffset):
         times = clock.recording_time_s(drive.time_s)
         said = f"clock offset {clock.offset_s:.4f} s, U = {2.0 * clock.u_offset_s:.2g} s (k = 2), found from the motion"
@@ -119,7 +119,7 @@ def _draw_input(axes: Axes, drive: DriveHistory, clock: ClockOffset | float) -> 
 
 
 def _axis(series: GapSeries) -> tuple[Floats, Floats, str]:
-    """Where frames with and without a number stand, and what the axis says."""
+    """Positions of frames with and without a number along the axis, and the axis label."""
     times = series.times_s()
     if times is not None:
         return (*times, "time (s)")
@@ -128,7 +128,7 @@ def _axis(series: GapSeries) -> tuple[Floats, Floats, str]:
 
 
 def _pieces(series: GapSeries) -> list[slice]:
-    """Give stretches of frames without a hole: no line is drawn across what was not measured."""
+    """Stretches of frames without a hole, because no line is drawn across missing frames."""
     frames, _ = series.frame_numbers()
     if not frames.size:
         return []
@@ -164,7 +164,7 @@ def _line(axes: Axes, where: Floats, gap_mm: Floats, expanded_mm: Floats, series
 
 
 def _thinned(where: Floats, values: Floats) -> tuple[Floats, Floats]:
-    """Keep the greatest value of each column of the picture."""
+    """Keep the largest value in each column of the picture."""
     if values.size <= MOST_POINTS:
         return where, values
     starts = _starts(values.size)

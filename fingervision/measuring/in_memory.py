@@ -22,7 +22,7 @@ from fingervision.storage.gauges_csv import GaugeRow, GaugeRows
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MeasuredInMemory:
-    """What a measurement found.
+    """Result of a measurement in memory.
 
     Parameters
     ----------
@@ -82,7 +82,7 @@ def measure_in_memory(source: FrameSource, task: Task, on_progress: Progress | N
     ------
     UsageError
         The region lies outside the frame.
-    FingervisionError
+    DataError, InputFileError, OutputError
         The scale is for other frames, or a gauge lies outside of them.
     """
     check_task(task, source.description)
@@ -138,7 +138,7 @@ def measure_in_memory(source: FrameSource, task: Task, on_progress: Progress | N
 
 
 def _with_drive(row: GapRow, task: Task, clock: ClockOffset) -> GapRow:
-    """Add the drive's state at a frame's time, which is read as gaps.csv holds it."""
+    """Add the drive's state at a frame's time, rounded as in gaps.csv."""
     if row.time_s is None or task.drive is None:
         return row
     found = drive_at(task.drive, clock.log_time_s(round(row.time_s, TIME_PLACES)))

@@ -1,4 +1,4 @@
-"""Frames that were lost while recording are marked as lost when the recording is measured."""
+"""Mark those frames of a recording as lost that were lost while it was recorded."""
 
 from collections import deque
 from collections.abc import Iterable, Iterator, Sequence
@@ -13,7 +13,7 @@ TICKS_AFTER = 3
 
 
 def marked(source: Iterable[Frame | LostFrame], marks: Sequence[LostFrame]) -> Iterator[Frame | LostFrame]:
-    """Put lost frames where the recording's frames have their times, or between them.
+    """Insert lost frames at the times at which they belong, or between the recording's frames.
 
     Parameters
     ----------

@@ -52,7 +52,7 @@ class Measured:
 
     @property
     def exit_code(self) -> ExitCode:
-        """How the measurement ended."""
+        """Exit code of the measurement."""
         if self.stopped or not (self.series.counts[Status.OK] or self.has_gauge_numbers):
             return ExitCode.COULD_NOT
         return ExitCode.DAMAGED_INPUT if self.series.counts[Status.DAMAGED] else ExitCode.DONE
@@ -81,7 +81,7 @@ def measure(source: FrameSource, task: Task, out: Path, on_progress: Progress | 
     ------
     UsageError
         The region lies outside the frame, or a frame is asked for that there is not.
-    FingervisionError
+    OutputError
         The results cannot be written, or the scale is for other frames. The rows until then are in gaps.csv.
     """
     refuse_camera(source)
@@ -146,7 +146,7 @@ def _measured(source: FrameSource, task: Task, out: Path, on_progress: Progress 
 
 
 def refuse_camera(source: FrameSource) -> None:
-    """Refuse what goes on for ever.
+    """Refuse a source that does not end.
 
     Raises
     ------

@@ -1,7 +1,8 @@
 """Decide once per recording whether the fingers are darker or lighter than the background.
 
-Where nobody has said, the first frames vote. A finger does not change its tone within a recording; a frame in which the
-sky left and right of something dark looks like two light fingers is no measurement of them.
+Where the user has not stated it, the first frames decide by majority. A finger does not change its tone within a
+recording. A frame in which the bright regions left and right of a dark object look like two light fingers is no
+measurement of the fingers.
 """
 
 from collections import Counter
@@ -24,7 +25,7 @@ def one_polarity(
     votes: Counter[str],
     is_stopped: Callable[[], bool] = lambda: False,
 ) -> Iterator[tuple[Frame | LostFrame, Outcome]]:
-    """Measure frames in order, all of them with the polarity that most of the first ones with a number have.
+    """Measure frames in order, all with the polarity of most of the first frames that have a number.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Check that the camera has the settings with which it was calibrated."""
+"""Check that the camera has the settings at which it was calibrated."""
 
 from collections.abc import Mapping
 
@@ -8,7 +8,7 @@ from fingervision.measuring.scale import Scale
 
 
 def other_camera(scale: Scale | None, camera: Mapping[str, str]) -> str:
-    """Say which setting differs from the calibration's.
+    """Sentence naming the settings that differ from the calibration's.
 
     Parameters
     ----------

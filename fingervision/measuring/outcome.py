@@ -1,4 +1,4 @@
-"""After the last frame: join the clock of the drive, write the summary, and say which frames have no input."""
+"""Steps after the last frame: find the drive's clock, write the summary, and explain frames without input."""
 
 from collections.abc import Set
 from dataclasses import replace
@@ -23,12 +23,12 @@ def clock_for(series: GapSeries, task: Task) -> Clock:
 
 
 def clock_drawn(clock: Clock, task: Task) -> ClockOffset | float | None:
-    """Give the clock that the figure draws the drive with: found, given, or none."""
+    """The clock with which the figure draws the drive: found, given, or none."""
     return clock if isinstance(clock, ClockOffset) else task.drive_offset_s
 
 
 def summary_of(how: Prepared, task: Task, series: GapSeries, clock: Clock, *, complete: bool) -> dict[str, Any]:
-    """Put together summary.json of a recording; `complete` tells whether it was measured to its end."""
+    """Compose summary.json of a recording; `complete` tells whether it was measured to its end."""
     description = how.description
     if isinstance(clock, ClockOffset):
         description = replace(description, notes=(*description.notes, sentence(clock), *clock.notes))
@@ -38,7 +38,7 @@ def summary_of(how: Prepared, task: Task, series: GapSeries, clock: Clock, *, co
 
 
 def undriven(task: Task, series: GapSeries, clock: Clock, driven: Set[bool], where: str) -> DataError | None:
-    """Say why a drive gave no frame an input; None where it gave some, or there is none.
+    """Sentence why the drive gave no frame an input; None where it gave some, or there is no drive.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""The folder for results: it is created, and files of other programs in it are never replaced."""
+"""The folder for results: it is created if needed, and files of other programs in it are never replaced."""
 
 import shutil
 from collections.abc import Iterator
@@ -18,7 +18,7 @@ GAUGES = "gauges.csv"
 
 @dataclass(frozen=True, slots=True)
 class OutputFolder:
-    """Where the files of one measurement are."""
+    """Paths of the files of one measurement."""
 
     path: Path
 
@@ -29,7 +29,7 @@ class OutputFolder:
 
     @property
     def gauges(self) -> Path:
-        """The table of the gauges."""
+        """Path of the table of the gauges."""
         return self.path / GAUGES
 
     @property
@@ -39,22 +39,22 @@ class OutputFolder:
 
     @property
     def figure(self) -> Path:
-        """The gap over time."""
+        """Path of the figure of the gap over time."""
         return self.path / FIGURE
 
     @property
     def overlay(self) -> Path:
-        """The video with what was measured drawn in."""
+        """Path of the overlay video."""
         return self.path / OVERLAY
 
     @property
     def steps(self) -> Path:
-        """The pictures of every step."""
+        """Folder of the pictures of every step."""
         return self.path / STEPS
 
 
 def claimed(path: Path, recording_files: tuple[Path, ...]) -> OutputFolder:
-    """Make the folder, or take one over from an earlier measurement and remove that one's files.
+    """Create the folder, or take over that of an earlier measurement and remove its files.
 
     Parameters
     ----------
@@ -65,7 +65,7 @@ def claimed(path: Path, recording_files: tuple[Path, ...]) -> OutputFolder:
 
     Raises
     ------
-    FingervisionError
+    OutputError
         The folder cannot be made or written, or holds files of these names that no measurement wrote.
     UsageError
         The folder is where the recording's images are, or the recording would be replaced.
@@ -103,7 +103,7 @@ def _is_ours(table: Path) -> bool:
 
 @contextmanager
 def held(out: Path) -> Iterator[None]:
-    """Keep other measurements out of the folder meanwhile: each would replace what the other wrote."""
+    """Lock the folder while a measurement runs, because two measurements would overwrite each other's files."""
     make_out_folder(out)
     lock = FolderLock(out)
     try:
@@ -113,7 +113,7 @@ def held(out: Path) -> Iterator[None]:
 
 
 def usual_folder(recording: str) -> Path:
-    """Give measured/<file or folder>; for a glob the folder that it looks in; with more of the path where taken."""
+    """Return measured/<file or folder>; for a glob its folder's name; with more of the path where the name is taken."""
     path = Path(recording)
     named = path.resolve() if path.exists() else path.parent.resolve()
     parts = [part for part in named.parts if part != named.anchor] or ["images"]

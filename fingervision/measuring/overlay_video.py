@@ -1,4 +1,4 @@
-"""overlay.mp4: the recording with what was measured drawn in, at the recording's own times."""
+"""overlay.mp4: the recording with the measured edges drawn in, at the recording's own times."""
 
 from collections.abc import Callable
 from fractions import Fraction
@@ -26,7 +26,7 @@ OPTIONS = {"crf": "20", "preset": "veryfast"}
 class OverlayVideo:
     """Writes the overlay frame by frame.
 
-    Frames that could not be decoded are not in it, and neither is one that comes no later than the one before.
+    Frames that could not be decoded are left out, and so is a frame whose time is not later than the previous one's.
 
     Parameters
     ----------
@@ -104,7 +104,7 @@ class OverlayVideo:
 
 
 def words_of_row(row: GapRow) -> str:
-    """Frame, time and value in a line; U = 2 u, of the random part where nothing else is known."""
+    """Frame, time and value in a line, with U = 2 u; u is the random part where no budget is known."""
     place = f"{row.frame}" if row.time_s is None else f"{row.frame}  {row.time_s:.3f} s"
     if row.gap_mm is None or row.u_random_mm is None:
         return f"{place}  {row.status.value}"

@@ -1,7 +1,8 @@
-"""Uncertainty of a body's pose: its own edges in a frame, and what all frames share.
+"""Uncertainty of a body's pose: from its own edges in each frame, and from errors common to all frames.
 
-Shared are where the drawing was laid (a fit too), the scale, the edge bias, lens and plane. A pose counts from the
-drawing, so that an error of the scale grows with the distance from what the drawing was laid by.
+Common errors are those of the drawing's placement (itself a fit), the scale, the edge bias, lens and plane. A pose is
+counted from the drawing, so that an error of the scale grows with the distance from the features by which the drawing
+was placed.
 """
 
 from dataclasses import dataclass
@@ -19,7 +20,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SharedErrors:
-    """What all frames share of the uncertainty of poses.
+    """Errors of poses that are common to all frames.
 
     Parameters
     ----------
@@ -41,8 +42,19 @@ class SharedErrors:
     u_response_px: float = 0.0
     size_error: float = 0.0
 
+    def at(self, size_px: tuple[int, int]) -> tuple[float, float]:
+        """Standard uncertainties of edges' positions (px) and of sizes (relative), in the centre of a picture."""
+        if self.plane is None:
+            return 0.0, self.size_error
+        return self.plane.u_edge_px(self.u_response_px), self._relative((0.5 * size_px[0], 0.5 * size_px[1]))
+
+    def _relative(self, at: tuple[float, float]) -> float:
+        if self.plane is None:
+            return self.size_error
+        return max(self.plane.relative_u(at, 0.0), self.plane.relative_u(at, 0.5 * pi), self.size_error)
+
     def of_pose(self, fit: RigidFit, about_px: Array, in_picture: Array) -> "SharedPose":
-        """Work out what the shared errors do to one pose.
+        """Compute the effect of the common errors on one pose.
 
         Parameters
         ----------
@@ -56,23 +68,22 @@ class SharedErrors:
         arm = about_px + fit.shift_px - self.about_px
         # A drawing that was laid off by a shift and a turn puts the body's reference point off by both.
         carried = np.array([[1.0, 0.0, -arm[1]], [0.0, 1.0, arm[0]], [0.0, 0.0, 1.0]])
-        placed = np.zeros((3, 3))
+        placed, shadows = np.zeros((3, 3)), fit.by_shadows
         outward, scale = fit.by_outward, fit.by_scale + np.array([arm[0], arm[1], 0.0])
         if self.laid is not None:
-            placed = carried @ self.laid.covariance @ carried.T
+            placed = carried @ (self.laid.covariance + self.laid.by_shadows) @ carried.T
             outward = outward - carried @ self.laid.by_outward
             scale = scale - carried @ self.laid.by_scale
         if self.plane is None:
-            return SharedPose(placed, np.zeros(3), self.size_error * scale, 0.0)
+            return SharedPose(placed, np.zeros(3), self.size_error * scale, shadows, 0.0)
         at = (float(in_picture[0]), float(in_picture[1]))
-        relative = max(self.plane.relative_u(at, 0.0), self.plane.relative_u(at, 0.5 * pi), self.size_error)
         u_edge_px = self.plane.u_edge_px(self.u_response_px)
-        return SharedPose(placed, u_edge_px * outward, relative * scale, self.plane.u_angle_rad)
+        return SharedPose(placed, u_edge_px * outward, self._relative(at) * scale, shadows, self.plane.u_angle_rad)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SharedPose:
-    """What the shared errors do to one pose, in pixels and rad.
+    """Effect of the common errors on one pose, in pixels and rad.
 
     Parameters
     ----------
@@ -80,6 +91,8 @@ class SharedPose:
         Covariance by where the drawing was laid.
     by_bias, by_scale : ndarray of float, shape (3,)
         What one standard uncertainty of the edges' bias and of the scale does.
+    by_shadows : ndarray of float, shape (3, 3)
+        Covariance by what may lie along some of the body's own edges.
     u_angle_rad : float
         What tilt and lens leave open of an angle.
     """
@@ -87,24 +100,34 @@ class SharedPose:
     placed: Array
     by_bias: Array
     by_scale: Array
+    by_shadows: Array
     u_angle_rad: float
 
     @property
     def covariance(self) -> Array:
-        """All of it, shape (3, 3)."""
-        own = self.placed + np.outer(self.by_bias, self.by_bias) + np.outer(self.by_scale, self.by_scale)
+        """Covariance of all common errors together, shape (3, 3)."""
+        own = (
+            self.placed
+            + self.by_shadows
+            + np.outer(self.by_bias, self.by_bias)
+            + np.outer(self.by_scale, self.by_scale)
+        )
         own[2, 2] += self.u_angle_rad**2
         return own
 
     def u_turn_against(self, other: "SharedPose") -> float:
-        """Standard uncertainty, shared by all frames, of the angle between two bodies: the drawing's place cancels."""
+        """Standard uncertainty, common to all frames, of the angle between two bodies (rad).
+
+        The placement's error cancels.
+        """
         bias = float(self.by_bias[2] - other.by_bias[2])
         scale = float(self.by_scale[2] - other.by_scale[2])
-        return hypot(bias, scale, max(self.u_angle_rad, other.u_angle_rad))
+        shadows = max(float(self.by_shadows[2, 2] + other.by_shadows[2, 2]), 0.0) ** 0.5
+        return hypot(bias, scale, shadows, max(self.u_angle_rad, other.u_angle_rad))
 
 
 def in_drawing(place: Placement) -> Array:
-    """Matrix that takes (x px, y px, rad) of the flat plane into (x mm, y mm, mrad) of the drawing's axes."""
+    """Matrix that converts (x px, y px, rad) of the flat plane to (x mm, y mm, mrad) of the drawing's axes."""
     into = np.zeros((3, 3))
     into[:2, :2] = place.axes.T / place.px_per_mm
     into[2, 2] = 1e3 * place.turn_sign

@@ -1,4 +1,4 @@
-"""The camera response of a recording, and the uncertainty where it is assumed and not measured."""
+"""The camera response of a recording, and the uncertainty that arises where it is assumed instead of measured."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -14,11 +14,11 @@ from fingervision.measuring.scale import Scale
 
 
 def u_response_shift_mm(measured: Sequence[GapMeasurement], scale: Scale) -> NDArray[np.float64]:
-    """Standard uncertainty of each gap because the camera's response is assumed, shape (n,).
+    """Standard uncertainty of each gap from an assumed camera response, shape (n,) (mm).
 
-    The same response moved the edges of the calibration. What it moved them by there is in the calibration's edge bias,
-    or in its budget; the difference to this recording's edges is left. A calibration that does not say is taken to have
-    been made as the recording was.
+    The same response also displaced the edges in the calibration's pictures. That displacement is contained in the
+    calibration's edge bias, or in its budget; only the difference to this recording's edges remains. A calibration that
+    does not state its response is taken to have used the response of the recording.
     """
     if not isinstance(scale, Calibration) or scale.response_shift_px is None:
         return np.zeros(len(measured))
@@ -31,10 +31,10 @@ def u_response_shift_mm(measured: Sequence[GapMeasurement], scale: Scale) -> NDA
 def choose_response(
     stated: CameraResponse | None, scale: Scale, files: tuple[Path, ...]
 ) -> tuple[CameraResponse, CameraResponse | None, str]:
-    """Choose the response of a recording, an alternative that is possible as well, and a warning if needed.
+    """Choose the response of a recording, an alternative that is also possible, and a warning if needed.
 
-    What the user states goes first, then what the calibration knows, then the recording's own tag; a recording without
-    any is taken as linear.
+    The order is: what the user states, what the calibration states, the recording's own tag; without any of these the
+    response is taken as linear.
 
     Returns
     -------

@@ -16,7 +16,7 @@ from fingervision.storage.gaps_csv import GapRow
 
 @dataclass(frozen=True, slots=True)
 class Result:
-    """What became of one frame.
+    """Result of one frame.
 
     Parameters
     ----------
@@ -34,7 +34,7 @@ class Result:
 
 
 def result_of(item: Frame | LostFrame, outcome: GapMeasurement | NoGap | LostFrame) -> Result:
-    """Keep what the table needs of a frame, and not its picture."""
+    """Keep what the table needs of a frame, without its picture."""
     return Result(item.index, item.time_s, outcome)
 
 
@@ -60,7 +60,7 @@ class RowMaker:
     drive_offset_s: float = 0.0
 
     def rows(self, results: Sequence[Result]) -> list[GapRow]:
-        """Rows in the order of the results; the scale is asked once for all of them."""
+        """Rows in the order of the results, all converted by the scale in one call."""
         measured = [result.outcome for result in results if isinstance(result.outcome, GapMeasurement)]
         millimetres = iter(self._millimetres(measured))
         return [
@@ -143,7 +143,7 @@ class RowMaker:
         )
 
     def _held(self, outcome: GapMeasurement | NoGap | LostFrame) -> tuple[float | None, float | None]:
-        """Width of a held part; what lies between dark fingers is bounded by the same edges as their gap."""
+        """Width of a held part; the part between dark fingers is bounded by the same edges as the gap."""
         held = None if isinstance(outcome, LostFrame) else outcome.held
         if held is None:
             return None, None

@@ -1,4 +1,4 @@
-"""A recording that was measured in memory, written as the command writes it."""
+"""Write a recording that was measured in memory to the files that the command writes."""
 
 from pathlib import Path
 
@@ -42,7 +42,7 @@ def save_measured(
     ------
     UsageError
         The folder holds the results of another recording, or there is no such frame.
-    FingervisionError
+    OutputError
         The folder cannot be written, or holds files that no measurement wrote.
     """
     description, task, series = found.source.description, found.task, found.series
@@ -70,7 +70,7 @@ def save_measured(
 
 
 def _draw_overlay(found: MeasuredInMemory, again: FrameSource, path: Path) -> None:
-    """Write the frames with what was measured in them; gauges, which follow what they see, are read once more."""
+    """Draw the overlay video; gauges are measured again, because they follow the frames in order."""
     description, task = found.how.description, found.task
     marks = lost_frames(found.source.description.files)
     frames = marked(again, marks) if marks else again

@@ -1,4 +1,4 @@
-"""What measuring asks of a scale: a bare number of pixels to the millimetre, or a calibration."""
+"""The scale that a measurement uses: a bare number of pixels per millimetre, or a calibration."""
 
 from typing import Protocol
 
@@ -15,7 +15,7 @@ Floats = NDArray[np.float64]
 
 
 def check_px_per_mm(px_per_mm: float) -> None:
-    """Refuse a stated scale that no camera has.
+    """Refuse a stated scale that is outside of any camera's range.
 
     Raises
     ------
@@ -34,12 +34,12 @@ class Scale(Protocol):
 
     @property
     def px_per_mm(self) -> float:
-        """Pixels to the millimetre."""
+        """Pixels per millimetre."""
         ...
 
     @property
     def edge_bias_px(self) -> float:
-        """The calibration's b: what a light gap between straight dark edges lacks in the picture."""
+        """The calibration's b: width that a light gap between straight dark edges loses in the picture (pixels)."""
         ...
 
     def distances(self, points_px: Floats, u_random_px: Floats, light_gap: NDArray[np.bool_]) -> Distances:
@@ -49,9 +49,9 @@ class Scale(Protocol):
     def positions_mm(
         self, points_px: Floats, axis: int, light_gap: NDArray[np.bool_], frame_size_px: tuple[int, int]
     ) -> Floats:
-        """Coordinates of both points of each distance along an axis, from the picture's middle, in mm."""
+        """Coordinates of both points of each distance along an axis, from the picture's centre, in mm."""
         ...
 
     def check_frame_size(self, width_px: int, height_px: int) -> None:
-        """Refuse frames that the scale was not made for."""
+        """Refuse frames of another size than those of the calibration."""
         ...

@@ -1,4 +1,4 @@
-"""The gap over time with a few numbers per frame, so that an hour of video needs a few megabytes."""
+"""The gap over time, kept as a few numbers per frame, so that an hour of video needs a few megabytes."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ class FirstBad:
 
 @dataclass(slots=True)
 class GapSeries:
-    """The gap over time, growing while a recording is measured.
+    """The gap over time, extended while a recording is measured.
 
     Parameters
     ----------
@@ -80,7 +80,7 @@ class GapSeries:
     _bad_time_s: array[float] = field(default_factory=lambda: array("d"))
 
     def add_budget(self, budget: Budget) -> None:
-        """Take in where the uncertainty of a few more gaps comes from."""
+        """Add the uncertainty budgets of more gaps."""
         for line in budget.lines:
             kind = "shared" if line.shared else "random"
             part = (line.source, kind, line.supplied)
@@ -97,7 +97,7 @@ class GapSeries:
         ]
 
     def add(self, results: Sequence[Result], rows: Sequence[GapRow]) -> None:
-        """Take in the rows of a few frames."""
+        """Add the rows of more frames."""
         for result, row in zip(results, rows, strict=True):
             self.counts[row.status] += 1
             # In memory alone: without a time a frame is drawn at its number.
@@ -122,7 +122,7 @@ class GapSeries:
 
     @property
     def frames(self) -> int:
-        """Frames so far, with a number or without."""
+        """Number of frames so far, with or without a gap."""
         return sum(self.counts.values())
 
     @property
@@ -132,27 +132,30 @@ class GapSeries:
 
     @property
     def gap_mm(self) -> NDArray[np.float64]:
-        """Gaps of the frames that have one."""
+        """Gaps of the frames that have one (mm)."""
         return np.array(self._gap_mm)
 
     @property
     def u_mm(self) -> NDArray[np.float64]:
-        """Standard uncertainty of each gap: the whole budget, or the random part where no budget is known."""
+        """Standard uncertainty of each gap (mm): the whole budget, or the random part where no budget is known."""
         return np.array(self._u_mm)
 
     @property
     def u_random_mm(self) -> NDArray[np.float64]:
-        """Random part of each gap's standard uncertainty."""
+        """Random part of each gap's standard uncertainty (mm)."""
         return np.array(self._u_random_mm)
 
     @property
     def u_gap_px(self) -> NDArray[np.float64]:
-        """Random part in pixels."""
+        """Random part of each gap's standard uncertainty (pixels)."""
         return np.array(self._u_gap_px)
 
     @property
     def response_px(self) -> NDArray[np.float64]:
-        """By how much the other response that the camera may have would move each gap; 0 where it is known."""
+        """Change of each gap if the camera's response were the alternative one (pixels).
+
+        0 where the response is known.
+        """
         return np.array(self._response_px)
 
     def times_s(self) -> tuple[NDArray[np.float64], NDArray[np.float64]] | None:
@@ -168,7 +171,7 @@ class GapSeries:
 
 
 def _beside(outcome: object) -> list[str]:
-    """Name the disturbances that a measurement found beside its edges."""
+    """Name the disturbances that were found beside the edges."""
     if not isinstance(outcome, GapMeasurement):
         return []
     seen = [outcome.beside] if outcome.beside else []

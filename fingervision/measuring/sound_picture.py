@@ -1,8 +1,9 @@
-"""Distinguish a real jump of the fingers from a damaged picture that the decoder did not report.
+"""Distinguish a real jump of the fingers from picture damage that the decoder did not report.
 
-A jump alone is no damage, since stages make steps. Visible blocks alone are no damage either, since coarse coding
-shows them. What jumps against the motion so far, and where squares of the codec's grid appear that neither the
-picture before nor that picture moved with the fingers has, is damaged; so is all that is coded as a difference to it.
+A jump alone is no damage, since stages make steps. Visible blocks alone are no damage either, since coarse coding shows
+them. A picture is taken for damaged if the measured position jumps and squares of the codec's grid appear that are
+neither in the previous picture nor in that picture moved along with the fingers. All pictures coded as differences to
+it are damaged as well.
 """
 
 from dataclasses import dataclass
@@ -37,14 +38,14 @@ Points = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Sound:
-    """A frame that was believed, what it gave, and which it was."""
+    """The last frame accepted as sound, its result and its number."""
 
     frame: Frame
     outcome: GapMeasurement
 
 
 class SoundPictures:
-    """Judges the frames of one recording in order; lossless ones have checksums, and pass."""
+    """Checks the frames of one recording in order; losslessly stored frames have checksums, and pass."""
 
     def __init__(self) -> None:
         self._last: _Sound | None = None
@@ -52,7 +53,7 @@ class SoundPictures:
         self._is_broken = False
 
     def judged(self, frame: Frame, outcome: GapMeasurement | NoGap) -> GapMeasurement | NoGap | LostFrame:
-        """Pass on what a frame gave, or say that it is damaged.
+        """Return the result of a frame, or state that it is damaged.
 
         Parameters
         ----------
@@ -80,7 +81,7 @@ class SoundPictures:
         return outcome
 
     def _jumps(self, frame: Frame, outcome: GapMeasurement | NoGap) -> bool:
-        """Whether it does not go on as the two frames before did; also where that cannot be said."""
+        """Whether a position departs from the motion of the two previous frames, or cannot be compared with it."""
         last, before = self._last, self._before
         if last is None or before is None or not isinstance(outcome, GapMeasurement):
             return True
@@ -94,7 +95,7 @@ class SoundPictures:
 
 
 def _points(outcome: GapMeasurement) -> tuple[Points, Points]:
-    """Edge and tip of both fingers, each along its own axis, and their standard uncertainties."""
+    """Edge and tip of both fingers, each along its own axis, and their standard uncertainties (pixels)."""
     sides = (outcome.left, outcome.right)
     vertical = outcome.direction.is_vertical
     across = [side.x_px if vertical else side.y_px for side in sides]
@@ -105,7 +106,7 @@ def _points(outcome: GapMeasurement) -> tuple[Points, Points]:
 
 
 def _is_foreign(frame: Frame, outcome: GapMeasurement | NoGap, last: _Sound) -> bool:
-    """Whether the picture holds squares that the last sound one, as it was and as it would be moved, has not."""
+    """Whether the picture contains squares that the last sound picture lacks, both as it was and moved."""
     if frame.pixels.shape != last.frame.pixels.shape:
         return False
     rows, columns = _part(last.outcome if isinstance(outcome, NoGap) else outcome, frame)
@@ -123,7 +124,7 @@ def _is_foreign(frame: Frame, outcome: GapMeasurement | NoGap, last: _Sound) -> 
 
 
 def _part(outcome: GapMeasurement, frame: Frame) -> tuple[slice, slice]:
-    """Region of a measurement in whole blocks of the codec's grid."""
+    """Region of a measurement, in whole blocks of the codec's grid."""
     sides = (outcome.left, outcome.right)
     vertical = outcome.direction.is_vertical
     across = [side.x_px if vertical else side.y_px for side in sides]
@@ -151,7 +152,7 @@ def _levels(pixels: NDArray[np.uint8] | NDArray[np.uint16]) -> Levels:
 
 
 def _moved(levels: Levels, before: GapMeasurement, now: GapMeasurement) -> Levels:
-    """Move each finger's half of a picture as the finger has moved."""
+    """Move each finger's half of a picture by the displacement of that finger."""
     vertical = now.direction.is_vertical
     middle = 0.5 * ((now.left.x_px + now.right.x_px) if vertical else (now.left.y_px + now.right.y_px))
     halves = []

@@ -1,4 +1,4 @@
-"""One picture for each step of vision, numbered in their order."""
+"""One picture for each processing step, numbered in order."""
 
 import re
 from collections.abc import Sequence
@@ -34,7 +34,7 @@ def write_steps(
 
     Raises
     ------
-    FingervisionError
+    OutputError
         A picture cannot be written.
     """
     written = []

@@ -1,4 +1,4 @@
-"""The summary of a measurement: counts, sizes, how surely, and what is not in that."""
+"""The summary of a measurement: counts, sizes, uncertainties, and what these do not include."""
 
 import hashlib
 from collections.abc import Mapping
@@ -124,7 +124,7 @@ def summarise(
 
 
 def _about_unseen(description: Description, series: GapSeries) -> list[str]:
-    """Say so where compression may be what hides the fingers, and light, region and focus are the wrong advice."""
+    """Warning where compression may hide the fingers, so that light, region and focus would be the wrong advice."""
     count = sum(series.counts[status] for status in HIDDEN_BY_COMPRESSION)
     pixels = series.frames * description.width_px * description.height_px
     if not (description.lossy and count and pixels):
@@ -140,7 +140,7 @@ def _about_unseen(description: Description, series: GapSeries) -> list[str]:
 
 
 def _about_fingers(series: GapSeries) -> list[str]:
-    """Say so where the frames disagree about what the fingers are."""
+    """Warning where the frames disagree about whether the fingers are dark or light."""
     if len(series.votes) < 2:
         return []
     counts = " and ".join(f"{tone} in {count}" for tone, count in series.votes.most_common())
@@ -152,7 +152,7 @@ def _about_fingers(series: GapSeries) -> list[str]:
 
 
 def about_edges(series: GapSeries) -> list[str]:
-    """Say what stood beside the edges or moved them, in how many frames, and what takes it away."""
+    """Sentences about disturbances beside the edges: which, in how many frames, and their remedy."""
     return [
         f"In {count} {'frame' if count == 1 else 'frames'} {BESIDE[what]}"
         for what, count in series.beside.most_common()
@@ -248,7 +248,10 @@ def _uncertainty(scale: Scale, settings: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _sha256(files: tuple[Path, ...]) -> str | None:
-    """Hash of one file's bytes; of several, of their names and hashes in order. None for a live source."""
+    """Hash of one file's bytes; for several files, the hash of their names and hashes in order.
+
+    None for a live source.
+    """
     if not files:
         return None
     hashes = [_hash_of(file) for file in files]

@@ -85,11 +85,11 @@ class Task:
 
     @property
     def settings(self) -> Settings:
-        """What vision needs of it, whatever the recording says of itself."""
+        """Settings for the image processing, without regard to the recording."""
         return self.settings_for(())[0]
 
     def settings_for(self, files: tuple[Path, ...]) -> tuple[Settings, str]:
-        """What vision needs of it for a recording of these files, and a warning where there is one."""
+        """Settings for the image processing of a recording made of these files, and a warning where there is one."""
         response, other, words = choose_response(self.response, self.scale, files)
         below_px = self.below_tip_mm * self.scale.px_per_mm
         settings = Settings(
@@ -113,7 +113,7 @@ class Task:
 
 
 def check_task(task: Task, description: Description) -> None:
-    """Refuse what cannot be meant for these frames.
+    """Refuse settings that are impossible for these frames.
 
     Parameters
     ----------
@@ -126,7 +126,7 @@ def check_task(task: Task, description: Description) -> None:
     ------
     UsageError
         The region lies outside the frame, or a drive is given for frames without times.
-    FingervisionError
+    DataError
         The scale is for other frames.
     """
     width_px, height_px = description.width_px, description.height_px
@@ -156,7 +156,7 @@ def check_task(task: Task, description: Description) -> None:
 
 
 def in_words(task: Task, settings: Settings) -> dict[str, Any]:
-    """Put the task as it stands in the summary."""
+    """The settings as listed in the summary."""
     region = task.region
     return {
         "below_tip_mm": task.below_tip_mm,

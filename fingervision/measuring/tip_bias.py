@@ -1,9 +1,9 @@
-"""Effect of the edge bias on a gap below round tips: smaller than on the straight edges of the calibration.
+"""Effect of the edge bias on a gap below round tips, where it is smaller than at the calibration's straight edges.
 
-Light that blooms over an outline moves all of it inwards by half of the edge bias b, the tip as well. The measuring
-point is counted from the tip and goes down with it: at an edge of slope m (movement into the gap per pixel to the
-root) it moves by (b / 2) (sqrt(1 + m^2) - m) and not by b / 2. The value is that of the calibration's formula; the
-difference is added to its uncertainty.
+Light that blooms over an outline moves the whole outline inwards by half of the edge bias b, including the tip. The
+measuring point is counted from the tip, and moves down with it. At an edge of slope m (movement into the gap per pixel
+towards the root) it moves by (b / 2) (sqrt(1 + m^2) - m) instead of b / 2. The gap follows the calibration's formula;
+this difference is added to its uncertainty.
 """
 
 from collections.abc import Sequence
@@ -15,7 +15,7 @@ from fingervision.domain.gap import GapMeasurement
 
 
 def u_tip_bias_mm(measured: Sequence[GapMeasurement], edge_bias_px: float, px_per_mm: float) -> NDArray[np.float64]:
-    """Standard uncertainty of each gap for the share of the edge bias that its tips take back, shape (n,).
+    """Standard uncertainty of each gap from the part of the edge bias that its tips compensate, shape (n,) (mm).
 
     Parameters
     ----------

@@ -12,7 +12,7 @@ COVERAGE_FACTOR = 2.0
 
 
 def result_sentences(summary: Mapping[str, Any], series: GapSeries) -> list[str]:
-    """Say how many frames gave a number, why others did not, the gap, its uncertainty, and what to change."""
+    """Sentences with the number of measured frames, why others failed, the gap, its uncertainty, and what to change."""
     gap = summary["gap"]
     lines = [f"{gap['count']} of {series.frames} frames measured."]
     lines += [
@@ -36,7 +36,7 @@ def result_sentences(summary: Mapping[str, Any], series: GapSeries) -> list[str]
 
 
 def _assumed_response(summary: Mapping[str, Any], series: GapSeries) -> list[str]:
-    """Say what an assumed response may cost, where no budget holds it and it is more than the uncertainty printed."""
+    """Sentence about the error of an assumed response, where no budget includes it and it exceeds the uncertainty."""
     gap, settings = summary["gap"], summary["settings"]
     if settings.get("response_known", True) or gap["median_u_gap_mm"] is not None:
         return []
@@ -51,7 +51,7 @@ def _assumed_response(summary: Mapping[str, Any], series: GapSeries) -> list[str
 
 
 def in_one_line(summary: Mapping[str, Any], series: GapSeries) -> str:
-    """Say it in a line: `gap 0.4021 mm, U = 1.20 µm (k = 2), 1 frame`."""
+    """The result in one line: `gap 0.4021 mm, U = 1.20 µm (k = 2), 1 frame`."""
     gap, frames = summary["gap"], series.frames
     of = f"{frames} frame{'' if frames == 1 else 's'}"
     if not gap["count"]:

@@ -1,1 +1,1 @@
-"""Gripper models, one a file: input displacement in, gap out."""
+"""Gripper models, one per file: input displacement in, gap out."""

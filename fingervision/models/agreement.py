@@ -1,4 +1,4 @@
-"""Where the kinds of model of one drawing differ by more than their own errors, and which of them to trust."""
+"""Check where different kinds of model of one drawing disagree by more than their own errors, and which to trust."""
 
 from collections.abc import Callable, Mapping
 from itertools import combinations

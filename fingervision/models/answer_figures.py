@@ -1,4 +1,4 @@
-"""The figures by which models of one gripper are put beside each other."""
+"""Figures by which several models of one gripper are compared."""
 
 from dataclasses import dataclass
 
@@ -7,7 +7,7 @@ from fingervision.domain.gripper import PointMm
 
 @dataclass(frozen=True, slots=True)
 class PeakStress:
-    """Largest stress on a notch per millimetre of input: von Mises's, or the nominal one of a model made of bars.
+    """Largest stress in a notch per millimetre of input: von Mises stress, or the nominal stress of a beam model.
 
     Parameters
     ----------
@@ -23,7 +23,7 @@ class PeakStress:
 
 @dataclass(frozen=True, slots=True)
 class LoadedState:
-    """One model's answer at one input, with all the physics that it was built with.
+    """State of one model at one input, with all the physics that the model includes.
 
     Parameters
     ----------
@@ -47,7 +47,7 @@ class LoadedState:
 
 @dataclass(frozen=True, slots=True)
 class ModelFigures:
-    """One model's row of the table; what a model does not know is None.
+    """Figures of one model for the comparison table; None for a figure that the model cannot give.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""What the flexures of a mechanism join: its bodies cut from the drawing, meshed and condensed to their frames."""
+"""Assembly of a mechanism: its bodies cut from the drawing, meshed, condensed to frames, and joined by flexures."""
 
 from dataclasses import dataclass
 
@@ -26,7 +26,7 @@ _OVER = 1.1
 
 @dataclass(frozen=True, slots=True, eq=False)
 class BodyAssembly:
-    """Bodies, and what of their frames is held or driven.
+    """The bodies, and which motions of their frames are fixed or driven.
 
     Parameters
     ----------
@@ -56,7 +56,7 @@ class BodyAssembly:
     by_input: dict[int, float]
 
     def field(self, moved: Array) -> tuple[Array, csr_matrix]:
-        """Displacement of every node of the bodies in the deformed shape, and its change by the frames' motions."""
+        """Displacement of every node of the bodies in the deformed shape, and its derivative by the frames' motions."""
         plate = self.plate
         field = np.zeros(plate.unknowns)
         slopes = lil_matrix((plate.unknowns, moved.size))
@@ -78,7 +78,7 @@ class BodyAssembly:
         return field, csr_matrix(slopes)
 
     def motion_mm(self, moved: Array, point: tuple[float, float], *, large: bool) -> tuple[float, float]:
-        """Displacement of a point of the nearest body by the frames' motions."""
+        """Displacement of a point of the nearest body, from the frames' motions."""
         nearest = int(np.argmin(np.hypot(*(self.plate.nodes_mm - np.array(point)[:, None]))))
         number = int(self.piece[nearest])
         body, turning = self.bodies[number], self.turning[number]
@@ -92,7 +92,7 @@ class BodyAssembly:
         return float(x), float(y)
 
     def _interpolated(self, field: Array, point: tuple[float, float], own: NDArray[np.bool_]) -> Array:
-        """Quadratic through the nearest nodes of one body."""
+        """Quadratic interpolation between the nearest nodes of one body."""
         plate = self.plate
         places = np.flatnonzero(own)
         x, y = plate.nodes_mm[:, places] - np.array(point)[:, None]
@@ -105,7 +105,7 @@ class BodyAssembly:
 
 
 class _Frames:
-    """Frames as they are found, each with its body and what of it is kept."""
+    """Frames in the order in which they are found, each with its body and its free motions."""
 
     def __init__(self, plate: PlaneStressPlate, mechanism: Mechanism, size_mm: float) -> None:
         self.plate, self.mechanism, self.size_mm = plate, mechanism, size_mm
@@ -117,13 +117,16 @@ class _Frames:
         self._taken: set[int] = set()
 
     def add(self, frame: Frame, body: int) -> int:
-        """Keep a frame; the first of its three motions."""
+        """Add a frame; return the index of the first of its three motions."""
         self.found.append(frame)
         self.owner.append(body)
         return 3 * len(self.found) - 3
 
     def face(self, nodes: Indices, tied: tuple[str, ...]) -> list[tuple[int, bool]]:
-        """Frames of a face, one a body that it touches: their first motions, and whether the face cannot turn."""
+        """Add the frames of a face, one per body that it touches.
+
+        Return their first motions, and whether the face cannot rotate.
+        """
         added = []
         for body in np.unique(self.piece[nodes]).tolist():
             frame, turns = face_frame(self.plate, nodes[self.piece[nodes] == body], tied, self._taken)
@@ -131,7 +134,7 @@ class _Frames:
         return added
 
     def supports(self) -> None:
-        """Fixed, driven and sliding faces."""
+        """Add the frames of fixed, driven and sliding faces."""
         mechanism = self.mechanism
         supports = supports_of(self.plate, mechanism, self.size_mm)
         for nodes in supports.fixed:
@@ -147,14 +150,14 @@ class _Frames:
                 self.held += [at + "xy".index(component)] + [at + 2] * turns
 
     def contacts(self) -> None:
-        """Keep the nodes of contact faces, so that a contact force can bend the body that the face belongs to."""
+        """Keep the nodes of contact faces, so that a contact force can bend the face's body."""
         for contact in self.mechanism.contacts:
             for face in (contact.face, contact.other):
                 if face is not None:
                     self.face(nodes_on(self.plate, face, self.mechanism, self.size_mm), ())
 
     def cuts(self, span: FlexureSpan) -> tuple[int, int]:
-        """Both ends of a flexure."""
+        """Add the frames at both ends of a flexure."""
         angle = np.radians(span.flexure.axis_deg)
         axis = np.array([np.cos(angle), np.sin(angle)])
         ends = []
@@ -172,7 +175,7 @@ def assemble_bodies(
 
     Raises
     ------
-    FingervisionError
+    ModelError
         Where a face holds nothing or a body is joined to nothing.
     """
     frames = _Frames(plate, mechanism, size_mm)

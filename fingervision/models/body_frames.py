@@ -1,4 +1,4 @@
-"""Frames that tie a few motions to a meshed body: of a cut where a beam begins, or of a face."""
+"""Frames that represent a few motions of a meshed body: at the cut where a beam begins, or at a face."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -22,7 +22,7 @@ _LEVER = 1e-6
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Frame:
-    """A place with a motion along x, along y and a rotation, tied to a body.
+    """A place with three motions (along x, along y, rotation), coupled to the nodes of a body.
 
     Parameters
     ----------
@@ -40,7 +40,7 @@ class Frame:
 
 
 def pieces_of(plate: PlaneStressPlate) -> Indices:
-    """Number the parts of a mesh that hang together; the part of every node, in the order of `nodes_mm`."""
+    """Number the connected parts of a mesh; returned is the part of every node, in the order of `nodes_mm`."""
     dofs = plate.unknowns_of_triangles[:, :6]
     place_of = np.empty(plate.unknowns, dtype=np.int64)
     place_of[plate.x_dofs] = np.arange(plate.x_dofs.size)
@@ -52,14 +52,16 @@ def pieces_of(plate: PlaneStressPlate) -> Indices:
 
 
 def nodes_of(plate: PlaneStressPlate, frame: Frame) -> Indices:
-    """Nodes whose displacements a frame ties."""
+    """Nodes whose displacements are coupled to a frame."""
     place_of = np.empty(plate.unknowns, dtype=np.int64)
     place_of[plate.x_dofs] = place_of[plate.y_dofs] = np.arange(plate.x_dofs.size)
     return np.asarray(place_of[np.unique(frame.rows.nonzero()[1])])
 
 
 def section_frame(plate: PlaneStressPlate, at_mm: Array, axis: Array, height_mm: float, near_mm: float) -> Frame:
-    """Frame of a cut square to an axis: mean motion by a beam's stress, uniform, linear and parabolic in the height.
+    """Frame of a cut perpendicular to an axis.
+
+    Its motion is the mean weighted by a beam's stress: uniform, linear and parabolic over the height.
 
     Parameters
     ----------
@@ -105,7 +107,7 @@ def _row(plate: PlaneStressPlate, x_part: Array, y_part: Array) -> Array:
 
 
 def face_frame(plate: PlaneStressPlate, nodes: Indices, tied: Sequence[str], taken: set[int]) -> tuple[Frame, bool]:
-    """Frame of a face whose nodes keep one component, or both, of a rigid motion.
+    """Frame of a face whose nodes follow one component, or both, of a rigid motion.
 
     Parameters
     ----------

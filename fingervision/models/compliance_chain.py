@@ -1,4 +1,4 @@
-"""Flexibility of a tree of members, by summing each member's compliance over the load paths that share it."""
+"""Compliance of a tree of members: the sum of each member's compliance over the load paths that contain it."""
 
 from functools import cached_property
 
@@ -12,7 +12,7 @@ Array = NDArray[np.float64]
 
 
 class ComplianceChain:
-    """The tree, clamped at its root and free everywhere else.
+    """The tree of members, clamped at its root and free elsewhere.
 
     Parameters
     ----------
@@ -25,7 +25,7 @@ class ComplianceChain:
 
     @cached_property
     def _global(self) -> list[Array]:
-        """Every member's compliance at its end in the ground's axes: equation (5)."""
+        """Compliance of every member at its end, in global axes: equation (5)."""
         turned_all = []
         for member in self.skeleton.members:
             angle = np.arctan2(member.end_mm[1] - member.start_mm[1], member.end_mm[0] - member.start_mm[0])
@@ -43,7 +43,7 @@ class ComplianceChain:
 
     @cached_property
     def _whole(self) -> Array:
-        """Motion of every member's end by a load at every other's, in blocks of 6, shape (6 members, 6 members)."""
+        """Motion of every member's end under a load at every other's, in blocks of 6, shape (6 members, 6 members)."""
         members = self.skeleton.members
         paths = [set(self.path(place)) for place in range(len(members))]
         total = np.zeros((6 * len(members), 6 * len(members)))
@@ -58,7 +58,7 @@ class ComplianceChain:
         return total
 
     def flexibility(self, moved: int, loaded: int) -> Array:
-        """Motion of one member's end by a load at another's: the sum of (12) over the members that both paths share.
+        """Motion of one member's end under a load at another's: the sum (12) over the members common to both paths.
 
         Returns
         -------

@@ -1,9 +1,9 @@
-"""Elastic bodies condensed to the frames that join them: a few nodes each, exact for loads that come through these.
+"""Elastic bodies condensed to the frames that join them: a few nodes each, exact for loads applied at the frames.
 
-The bodies are what is left of the region where the flexures are cut away. Each is meshed by quadratic triangles, and
-its stiffness and mass are condensed statically to its frames (Guyan, AIAA Journal 3 (1965) 380): mean motions of the
-cuts, weighted by a beam's own stress so that a beam meets a beam, and the
-nodes of faces that are fixed, slide or drive.
+The bodies are the parts of the region that remain when the flexures are cut away. Each body is meshed with quadratic
+triangles, and its stiffness and mass are condensed statically to its frames (Guyan, AIAA Journal 3 (1965) 380). A frame
+is the mean motion of a cut, weighted by a beam's stress so that it fits the adjoining beam, or the nodes of a face that
+is fixed, slides or is driven.
 """
 
 from collections.abc import Callable, Sequence
@@ -56,7 +56,7 @@ class CondensedBody:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class OwnModes:
-    """Vibrations of a body between its frames, normalised by mass.
+    """Vibration modes of a body with its frames fixed, normalised by mass.
 
     Parameters
     ----------
@@ -118,7 +118,7 @@ def condensed(
 
 
 def own_modes(plate: PlaneStressPlate, body: CondensedBody, count: int) -> OwnModes:
-    """Find a body's first vibrations between its frames by subspace iteration.
+    """Compute the first modes of a body with fixed frames, by subspace iteration.
 
     Source: Bathe, Finite Element Procedures, section 11.6.
     """

@@ -1,7 +1,7 @@
-"""Where two faces of a mechanism may touch, without friction: gaps of nodes from segments, and their slopes.
+"""Frictionless contact between two faces of a mechanism: gaps of nodes from segments, and their derivatives.
 
-Node to segment (Wriggers, Computational Contact Mechanics, chapter 9): every node of the one face keeps its distance
-from the nearest straight piece of the other, or from a rigid wall.
+Node to segment (Wriggers, Computational Contact Mechanics, chapter 9): the gap of every node of one face is its
+distance from the nearest straight segment of the other face, or from a rigid wall.
 """
 
 from collections.abc import Callable
@@ -29,7 +29,7 @@ _PENETRATES = 1e-6
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ContactPair:
-    """One pair of faces, or a face and a wall.
+    """A pair of faces, or a face and a wall, that may touch.
 
     Parameters
     ----------
@@ -50,7 +50,7 @@ class ContactPair:
 
     @property
     def _is_end(self) -> NDArray[np.bool_]:
-        """Whether a segment's first and second node end the face, shape (2, s)."""
+        """Whether a segment's first and second node are an end of the face, shape (2, s)."""
         if self.wall_mm is not None:
             return np.zeros((2, 1), dtype=bool)
         nodes, place, count = np.unique(self.segments, return_inverse=True, return_counts=True)
@@ -98,7 +98,7 @@ class ContactPair:
         places = np.stack([self.nodes, *segments])
 
         def combined(weights: Array, direction: Array) -> csr_matrix:
-            """Weighted motions of a node and of its segment's ends along a direction, one row a node."""
+            """Weighted motions of a node and of its segment's ends along a direction, one row per node."""
             values = weights[:, None, :] * direction[None]
             columns = np.stack([plate.x_dofs[places], plate.y_dofs[places]], axis=1)
             rows = np.broadcast_to(row, values.shape)
@@ -119,11 +119,11 @@ class ContactPair:
 
 
 def contact_pair(plate: PlaneStressPlate, contact: Contact, mechanism: Mechanism, size_mm: float) -> ContactPair:
-    """Find the nodes of a drawn contact.
+    """Find the nodes of a contact in the drawing.
 
     Raises
     ------
-    FingervisionError
+    DataError
         Where a face holds none, or the faces overlap at rest.
     """
     nodes = nodes_on(plate, contact.face, mechanism, size_mm)

@@ -1,7 +1,8 @@
-"""A condensed body in large rotation: its axes turn with its first frame, and in them it stays linear.
+"""A condensed body in large rotation: in axes that rotate with its first frame it stays linear.
 
 The corotational formulation of Crisfield (Non-linear Finite Element Analysis of Solids and Structures, volume 1,
-section 7.3) for an element of any number of nodes: energy d' K d / 2 with d the frames' motions as seen from the first.
+section 7.3) for an element with any number of nodes: the energy is d' K d / 2, with d the frames' motions relative to
+the first frame.
 """
 
 from dataclasses import dataclass
@@ -36,7 +37,7 @@ class CorotationalBody:
     stiffness_n_mm: Array
 
     def strained(self, moved: Array) -> Array:
-        """Motions of the frames as seen from the first one, shape (3 m,), by their motions."""
+        """Motions of the frames relative to the first one, shape (3 m,), from their absolute motions."""
         local = moved.reshape(-1, 3)
         at_rest = self.places_mm - self.places_mm[0]
         drift = local[:, :2] - local[0, :2]
@@ -49,32 +50,34 @@ class CorotationalBody:
         return np.column_stack([drift @ back.T + at_rest @ less.T, apart]).ravel()
 
     def slope(self, moved: Array) -> Array:
-        """Change of `strained` by the frames' motions, shape (3 m, 3 m)."""
+        """Derivative of `strained` by the frames' motions, shape (3 m, 3 m)."""
         local = moved.reshape(-1, 3)
         back = turned_axes(-float(local[0, 2]))
         chord = self.places_mm - self.places_mm[0] + local[:, :2] - local[0, :2]
-        found = np.zeros((local.size, local.size))
-        for i in range(1, len(local)):
-            at = slice(3 * i, 3 * i + 2)
-            found[at, at], found[at, 0:2] = back, -back
-            found[at, 2] = -_TURN @ back @ chord[i]
-            found[3 * i + 2, 3 * i + 2], found[3 * i + 2, 2] = 1.0, -1.0
-        return found
+        count = len(local)
+        found = np.zeros((count, 3, count, 3))
+        every = np.arange(1, count)
+        found[every, :2, every, :2] = back
+        found[every, 2, every, 2] = 1.0
+        found[1:, :2, 0, :2] = -back
+        found[1:, :2, 0, 2] = chord[1:] @ (-_TURN @ back).T
+        found[1:, 2, 0, 2] = -1.0
+        return found.reshape(local.size, local.size)
 
     def forces_n(self, moved: Array) -> tuple[Array, Array]:
-        """Tangent stiffness, shape (3 m, 3 m), and forces, shape (3 m,), at some motions of the frames."""
+        """Tangent stiffness, shape (3 m, 3 m), and forces, shape (3 m,), for given motions of the frames."""
         local = moved.reshape(-1, 3)
         loads = self.stiffness_n_mm @ self.strained(moved)
         slope = self.slope(moved)
         back = turned_axes(-float(local[0, 2]))
         chord = self.places_mm - self.places_mm[0] + local[:, :2] - local[0, :2]
+        pulls = loads.reshape(-1, 3)[1:, :2]
+        pulled = pulls @ (-_TURN @ back)
+        by_turn = np.zeros((len(local), 3))
+        by_turn[1:, :2] = pulled
+        by_turn[0, :2] = -pulled.sum(axis=0)
         bent = np.zeros_like(slope)
-        for i in range(1, len(local)):
-            at = slice(3 * i, 3 * i + 2)
-            pulled = (-_TURN @ back).T @ loads[at]
-            bent[at, 2] += pulled
-            bent[0:2, 2] -= pulled
-            bent[2, at] += pulled
-            bent[2, 0:2] -= pulled
-            bent[2, 2] -= loads[at] @ (back @ chord[i])
+        bent[:, 2] += by_turn.ravel()
+        bent[2, :] += by_turn.ravel()
+        bent[2, 2] -= float(np.sum(pulls * (chord[1:] @ back.T)))
         return slope.T @ self.stiffness_n_mm @ slope + bent, slope.T @ loads

@@ -1,8 +1,8 @@
-"""A plane frame of two-node elements that turn with the material: large rotations, small strains.
+"""A plane frame of two-node corotational elements: large rotations, small strains.
 
-Each element keeps a linear law between its lengthening and the rotations of its ends from its chord, and the forces
-that go with them; the chord may turn as far as it will. Source: Crisfield, Non-linear Finite Element Analysis of
-Solids and Structures, volume 1, section 7.3.
+Each element has a linear law between its elongation, the rotations of its ends from its chord, and the forces; the
+chord may rotate by any angle. Source: Crisfield, Non-linear Finite Element Analysis of Solids and Structures, volume 1,
+section 7.3.
 """
 
 from dataclasses import dataclass
@@ -17,7 +17,7 @@ Indices = NDArray[np.int64]
 
 @dataclass(frozen=True, eq=False)
 class CorotationalFrame:
-    """Nodes with x, y and rotation, and the elements between them.
+    """Nodes with displacements x, y and rotation, and the elements between them.
 
     Parameters
     ----------
@@ -87,7 +87,7 @@ class CorotationalFrame:
         return np.asarray(np.einsum("mij,mj->mi", self._natural, self._deformation(displacement)[0]))
 
     def _deformation(self, displacement: Array) -> tuple[Array, Array, Array, Array]:
-        """Lengthening and end rotations from the chord, shape (m, 3); the chord's cosine, sine and length."""
+        """Elongation and end rotations from the chord, shape (m, 3); the chord's cosine, sine and length."""
         local = displacement[self._dofs]
         at_rest = self.nodes_mm[self.ends[:, 1]] - self.nodes_mm[self.ends[:, 0]]
         drift = local[:, 3:5] - local[:, 0:2]
@@ -106,7 +106,7 @@ class CorotationalFrame:
         return natural, c, s, length
 
     def stiffness_n_mm(self) -> csr_matrix:
-        """Linear stiffness at rest."""
+        """Linear stiffness in the undeformed shape."""
         return self.internal_force_n(np.zeros(self.unknowns))[0]
 
     def _assembled(self, element: Array) -> csr_matrix:

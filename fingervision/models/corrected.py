@@ -1,4 +1,4 @@
-"""A model with effects added to it: what `model.toml` holds."""
+"""A model with effects added to it: the content of `model.toml`."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -9,7 +9,7 @@ from fingervision.domain.parameter import Estimate
 
 @dataclass(frozen=True, slots=True)
 class CorrectedModel:
-    """A base model and the effects that act around it, by name; the chain of the diagnosis runs them.
+    """A base model and the effects added to it, by name; the measuring chain of the diagnosis evaluates them.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""The inputs that an elastic model of a gripper is meant for."""
+"""Range of inputs for which an elastic model of a gripper is meant."""
 
 from fingervision.domain.gripper import Gripper
 
@@ -8,10 +8,10 @@ _OF_HEIGHT = 0.01
 
 
 def covered_inputs_mm(gripper: Gripper, first_touch_mm: float | None) -> tuple[float, float]:
-    """Smallest and largest input: half as far again as the first touch, and five times as far the other way.
+    """Smallest and largest input: to 1.5 times the input of first touch, and to five times it in the other direction.
 
-    For the paper's sample -0.77 to 2.6 mm, where its hinges begin to yield; the models answer beyond as well, but
-    nobody should believe them. Without a touch, a hundredth of the height either way.
+    For the published gripper this is -0.77 to 2.6 mm, where its hinges begin to yield; the models give values beyond as
+    well, which are not to be trusted. If nothing touches, it is a hundredth of the height in either direction.
     """
     if first_touch_mm is None:
         return -_OF_HEIGHT * gripper.body.height_mm, _OF_HEIGHT * gripper.body.height_mm

@@ -1,6 +1,7 @@
-"""How vibrations of the gripper die away: modal ratio, Rayleigh, loss factor, and the paper's equation (4).
+"""Damping of the gripper's vibrations: modal ratio, Rayleigh, loss factor, and equation (4) of Hricko & Havlik (2015).
 
-PA12 at room temperature loses tan d = 0.03 to 0.08, so zeta = tan d / 2 is about 0.025; static answers know no damping.
+PA12 at room temperature has a loss factor tan d = 0.03 to 0.08, so that zeta = tan d / 2 is about 0.025; static results
+do not depend on damping.
 """
 
 from dataclasses import dataclass
@@ -41,7 +42,7 @@ class LossFactor:
 
 @dataclass(frozen=True, slots=True)
 class RayleighDamping:
-    """C = a M + b K, fitted to one ratio at two frequencies; between them less, beyond them more.
+    """C = a M + b K, with equal damping ratios at two frequencies; lower ratios between them, higher ones beyond.
 
     Parameters
     ----------
@@ -74,10 +75,10 @@ class RayleighDamping:
 class PaperDamping:
     """Equation (4), evaluated mode by mode: 2 zeta w = gamma w0 c(w / w0).
 
-    The equation is the illustrative example of a theory (S. Adhikari, J. Sound Vib. 293 (2006) 156), no law of a
-    material. It adds powers of w that have units, so that radians per second and per millisecond give other physics:
-    frequencies are therefore taken relative to w0. Below w0 the damping would be negative, above a few w0 more than
-    critical. Hence w0 must not exceed the lowest mode, one factor gamma is fitted, and ratios outside (0, 0.3) refused.
+    The equation is an illustrative example of a theory (S. Adhikari, J. Sound Vib. 293 (2006) 156), not a material law.
+    It adds powers of w that have different units, so that its result would depend on the unit of time; frequencies are
+    therefore taken relative to w0. Below w0 the damping would be negative, and above a few w0 more than critical. Hence
+    w0 must not exceed the lowest mode, one factor gamma is fitted, and ratios outside (0, 0.3) are refused.
 
     Parameters
     ----------
@@ -95,7 +96,7 @@ class PaperDamping:
 
         Raises
         ------
-        FingervisionError
+        ModelError
             Where a mode lies below w0 or its ratio outside (0, 0.3).
         """
         reference_rad_s = float(rad_s.min()) if self.reference_rad_s is None else self.reference_rad_s
@@ -119,11 +120,11 @@ def paper_rate(w: float) -> float:
 
 
 def checked(ratios: Array) -> Array:
-    """Pass damping ratios that a solid can have, between 0 and 0.3.
+    """Return damping ratios unchanged if a solid can have them (between 0 and 0.3); refuse others.
 
     Raises
     ------
-    FingervisionError
+    ModelError
         For others.
     """
     if np.any(ratios <= 0.0) or np.any(ratios >= _MOST):

@@ -1,4 +1,4 @@
-"""A damping law by its short text, as `model --damping` takes it."""
+"""Short text of a damping law, as given to `model --damping`."""
 
 from math import isfinite, pi
 
@@ -10,7 +10,7 @@ _MOST = 0.3
 
 
 def parse_damping(text: str) -> Damping:
-    """Read a damping law.
+    """Parse a damping law.
 
     Parameters
     ----------

@@ -1,10 +1,10 @@
-"""A plate of any depth out of its plane: quadratic triangles in the plane, polynomials through the depth.
+"""Out-of-plane motion of a plate of any depth: quadratic triangles in the plane, polynomials through the depth.
 
-Displacements are u_i(x, y, z) = sum N_a(x, y) P_k(2 z / b) q_iak with Legendre's polynomials P_k: along the plane the
-odd ones, across it the even ones, which is what bends, twists and shears a plate that is alike on both sides of its
-middle plane. Three-dimensional elasticity is met in the limit of the order (hierarchic plate models: Babuska and Li,
-Comput. Methods Appl. Mech. Eng. 100 (1992) 249), without the assumptions of plates or beams: a neck deeper than it is
-thick twists as restrained warping lets it, and bodies bend right up to where they join.
+Displacements are u_i(x, y, z) = sum N_a(x, y) P_k(2 z / b) q_iak with Legendre polynomials P_k: odd ones for in-plane
+components, even ones for the out-of-plane component. These describe bending, torsion and shear of a plate that is
+symmetric about its middle plane. The solution converges to three-dimensional elasticity as the order grows (hierarchic
+plate models: Babuska and Li, Comput. Methods Appl. Mech. Eng. 100 (1992) 249), without the assumptions of plate or beam
+theory: torsion of a deep neck includes restrained warping, and bodies bend right up to their junctions.
 """
 
 from functools import cached_property
@@ -62,13 +62,13 @@ class DeepPlate:
         return int(self.nodes_mm.shape[1]) * sum(len(shapes) for shapes in self._shapes)
 
     def coefficients(self, nodes: Indices, component: int) -> Indices:
-        """Unknowns of one component (0 x, 1 y, 2 z) at some nodes."""
+        """Indices of the unknowns of one component (0 x, 1 y, 2 z) at some nodes."""
         count = [len(shapes) for shapes in self._shapes]
         start = self.nodes_mm.shape[1] * sum(count[:component])
         return np.asarray(start + (count[component] * nodes[:, None] + np.arange(count[component])).ravel())
 
     def _through(self, first: int, second: int, *, slopes: tuple[int, int]) -> Array:
-        """Integrals through the depth of two components' polynomials or their slopes by z."""
+        """Integrals through the depth of products of two components' polynomials, or of their derivatives by z."""
         points, weights = legendre.leggauss(2 * len(self._shapes[0]) + 2)
         values = []
         for component, order in zip((first, second), slopes, strict=True):
@@ -79,7 +79,7 @@ class DeepPlate:
 
     @cached_property
     def _plane(self) -> dict[tuple[int, int], csr_matrix]:
-        """Integrals over the plane of two shape functions, each differentiated by x (0), y (1) or not at all (2)."""
+        """Integrals over the plane of products of shape functions, differentiated by x (0), y (1) or neither (2)."""
 
         def part(shape: Any, way: int) -> Any:
             return shape if way == 2 else shape.grad[way]
@@ -117,13 +117,13 @@ class DeepPlate:
 
     @cached_property
     def lifted(self) -> Array:
-        """Coefficients of a lift of the whole plate by 1 mm."""
+        """Coefficients of a translation of the whole plate by 1 mm out of its plane."""
         lift = np.zeros(self.unknowns)
         lift[self.coefficients(np.arange(self.nodes_mm.shape[1]), 2)[:: len(self._shapes[2])]] = 1.0
         return lift
 
     def middle_mm(self, moved: Array, point: tuple[float, float]) -> float:
-        """Motion of a point of the middle plane across it, by the nearest node's tangent plane of a quadratic fit."""
+        """Out-of-plane displacement of a point of the middle plane, by a quadratic fit about the nearest node (mm)."""
         x, y = self.nodes_mm - np.array(point)[:, None]
         near = np.argsort(np.hypot(x, y))[:_NEAREST]
         x, y = x[near], y[near]
@@ -138,7 +138,7 @@ class DeepPlate:
 
 
 class SupportedPlate:
-    """A plate with some of its coefficients held.
+    """A plate with some of its coefficients fixed to zero.
 
     Parameters
     ----------
@@ -163,7 +163,7 @@ class SupportedPlate:
         return tuple((np.sqrt(np.sort(squared)) / (2.0 * np.pi)).tolist())
 
     def sag(self, gravity_mm_s2: float) -> Array:
-        """Displacements by the plate's own weight across it, shape (unknowns of the plate,)."""
+        """Displacements under the plate's own weight across its plane, shape (unknowns of the plate,)."""
         plate = self._plate
         load = gravity_mm_s2 * (plate.mass_t @ plate.lifted)
         moved = np.zeros(plate.unknowns)

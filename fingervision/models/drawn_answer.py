@@ -1,4 +1,4 @@
-"""What a law of the drawing is worked out from: the drawing, its small answer, and its body in the deformed shape."""
+"""Input of a law of the drawing: the drawing, its small-displacement response, and its body in the deformed shape."""
 
 from dataclasses import dataclass
 
@@ -10,7 +10,7 @@ from fingervision.models.small_answer import RatioCurves
 
 @dataclass(frozen=True, slots=True, eq=False)
 class DrawnAnswer:
-    """A drawing as one kind of model answers it.
+    """Response of a drawing, as computed by one kind of model.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""A mechanism drawn by bodies as a model of the diagnosis, and the seam to the places of a drawing."""
+"""A mechanism drawn by bodies as a model for the diagnosis, with access to its hinges, links and bodies."""
 
 from functools import cached_property
 from typing import Protocol, runtime_checkable
@@ -22,16 +22,16 @@ GAP = "gap"
 
 @runtime_checkable
 class DrawnMechanism(Protocol):
-    """A model whose drawing knows its hinges, links and bodies."""
+    """A model whose drawing states its hinges, links and bodies."""
 
     @property
     def places(self) -> PlaceAnswers:
-        """How it answers with one of its places changed."""
+        """Predictions with a hinge, link or body of the drawing changed."""
         ...
 
 
 class MechanismModelOfGap:
-    """A mechanism with a pair called gap, by small displacements.
+    """A mechanism with a probe pair called gap, by small displacements.
 
     Parameters
     ----------
@@ -79,12 +79,12 @@ class MechanismModelOfGap:
         self._force_n = state.force_n
 
     def respond(self, input_mm: Array) -> Response:
-        """Answer by small displacements, the gap's middle at zero at rest."""
+        """Respond by small displacements, with the midline at zero at rest."""
         u = np.asarray(input_mm, dtype=float)
         half = 0.5 * self._rest_mm
         return Response(-half + self._left * u, half + self._right * u, self._force_n * u)
 
     @cached_property
     def places(self) -> PlaceAnswers:
-        """How it answers with one of its places changed."""
+        """Predictions with a hinge, link or body of the drawing changed."""
         return PlaceAnswers(self.mechanism, self._model if isinstance(self._model, MechanismFrame) else None)

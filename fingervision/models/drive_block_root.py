@@ -1,9 +1,9 @@
-"""How the drive block yields under the shuttle bar that it carries: what the bar's own compliance leaves out.
+"""Compliance of the drive block at the root of the shuttle bar, which the bar's own compliance omits.
 
-The block is hardly larger than the bar is wide, so that no formula of a root on a half plane (O'Donnell, J. Appl. Mech.
-27 (1960) 764) holds. It is meshed with a stub of the bar, as long as Saint-Venant's principle asks, held at its drive
-face and on the symmetry axis; of the compliance at the stub's end the bar's own is taken off. That is geometry alone,
-and is computed once per block.
+The block is hardly larger than the bar is wide, so that no formula for a root on a half plane (O'Donnell, J. Appl.
+Mech. 27 (1960) 764) holds. The block is meshed with a stub of the bar, as long as Saint-Venant's principle requires,
+fixed at its drive face and on the symmetry axis; the bar's own compliance is subtracted from the compliance at the
+stub's end. The result depends on geometry only, and is computed once per block.
 """
 
 from dataclasses import dataclass
@@ -39,7 +39,7 @@ _LEAST = 1e-3
 
 @dataclass(frozen=True, slots=True)
 class BlockShape:
-    """Block and shuttle in widths of the shuttle, counted from the middle of the drive's face.
+    """Dimensions of block and shuttle divided by the shuttle's width, from the centre of the drive face.
 
     Parameters
     ----------
@@ -63,18 +63,18 @@ class BlockShape:
 
     @property
     def numbers(self) -> tuple[float, ...]:
-        """All of it, in one row."""
+        """All dimensions as one row of numbers."""
         return (self.half_width, self.low, self.high, *self.start, *self.end, self.face_half, self.poisson)
 
     @property
     def entry(self) -> PointMm:
-        """Where the shuttle's axis enters the block."""
+        """Point where the shuttle's axis enters the block."""
         (xa, ya), (xb, yb) = self.start, self.end
         return self.half_width, ya + (yb - ya) * (self.half_width - xa) / (xb - xa)
 
 
 def block_shape(gripper: Gripper) -> BlockShape:
-    """Take block and shuttle from a drawing."""
+    """Dimensions of block and shuttle from a drawing."""
     links, lever = gripper.links, gripper.lever
     width_mm, face_y_mm = links.shuttle_width_mm, lever.drive_face_y_mm
     _, half_mm, low_mm, high_mm = links.drive_block_mm
@@ -92,7 +92,7 @@ def block_shape(gripper: Gripper) -> BlockShape:
 
 
 def drive_block_compliance(gripper: Gripper, unit: Array | None = None) -> Array:
-    """Compliance that the drive block adds at the place where the shuttle's axis enters it.
+    """Compliance that the drive block adds at the point where the shuttle's axis enters it.
 
     Parameters
     ----------
@@ -113,7 +113,7 @@ def drive_block_compliance(gripper: Gripper, unit: Array | None = None) -> Array
 
 @lru_cache(maxsize=256)
 def unit_compliance(shape: BlockShape) -> Array:
-    """Compute the same by unit modulus, plate thickness and width of the shuttle; shape (3, 3)."""
+    """The same compliance for unit modulus, plate thickness and shuttle width; shape (3, 3)."""
     material = Material("unit", 1.0, shape.poisson, 1.0, 1.0)
     entry = np.array(shape.entry)
     along = np.subtract(shape.end, shape.start) / np.hypot(*np.subtract(shape.end, shape.start))

@@ -1,7 +1,8 @@
-"""Compliance of the drive block over a range of drawings: computed at a few, interpolated between them.
+"""Compliance of the drive block over a range of drawings: computed for a few, interpolated between them.
 
-The block is meshed, which costs more than all the rest of a lumped model, and hardly changes from one drawing of a grid
-to the next. Along every number that changes it Chebyshev's points are computed and a polynomial is laid through them.
+Meshing the block takes longer than the whole rest of a lumped model, and its compliance hardly changes from one drawing
+of a grid to the next. Along every dimension that changes it, the compliance is computed at Chebyshev points and
+interpolated by a polynomial.
 """
 
 from collections.abc import Callable, Sequence
@@ -27,7 +28,7 @@ Blocks = Callable[[Sequence[float]], Array | None]
 
 
 def block_compliances(drawn: Callable[[Sequence[float]], Gripper], axes: Sequence[Sequence[float]]) -> Blocks:
-    """Prepare the unit compliances of the drive blocks of a grid of drawings.
+    """Compute the unit compliances of the drive blocks for a grid of drawings.
 
     Parameters
     ----------
@@ -80,7 +81,7 @@ def block_compliances(drawn: Callable[[Sequence[float]], Gripper], axes: Sequenc
 
 
 def _changes(drawn: Callable[[Sequence[float]], Gripper], axes: Sequence[Sequence[float]], place: int) -> bool:
-    """Whether a number changes the block's shape."""
+    """Whether a dimension changes the block's shape."""
     values = [float(row[0]) for row in axes]
     shapes = []
     for value in (min(axes[place]), float(np.mean(axes[place])), max(axes[place])):
@@ -90,7 +91,7 @@ def _changes(drawn: Callable[[Sequence[float]], Gripper], axes: Sequence[Sequenc
 
 
 def _lagrange(nodes: Array, at: float) -> Array:
-    """Weights of the values at the nodes in those of their polynomial at a point."""
+    """Lagrange weights of the values at the nodes for a polynomial's value at a point."""
     apart = nodes[:, None] - nodes[None, :] + np.eye(nodes.size)
     way = np.where(np.eye(nodes.size, dtype=bool), 1.0, at - nodes[None, :])
     return np.asarray(np.prod(way / apart, axis=1))

@@ -19,13 +19,13 @@ _DENSE_BELOW = 400
 
 
 def factorised(matrix: csr_matrix) -> SuperLU:
-    """Factorise a symmetric matrix, ordered and pivoted as such: a sixth faster than SuperLU's default."""
+    """Factorise a symmetric matrix with a suitable ordering and pivoting, a sixth faster than SuperLU's default."""
     return splu(matrix.tocsc(), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Equilibrium:
-    """The body at one input.
+    """State of the body at one input.
 
     Parameters
     ----------
@@ -47,7 +47,7 @@ class Equilibrium:
 
 @dataclass(frozen=True, eq=False)
 class DrivenBody:
-    """The right half with its supports; both halves together are two of them in parallel.
+    """The right half with its supports; the gripper is two such halves in parallel.
 
     Parameters
     ----------
@@ -92,17 +92,17 @@ class DrivenBody:
     nodal_force: Callable[[Array], Array] | None = None
 
     def internal_force_n(self, displacement: Array) -> Array:
-        """Internal forces in the deformed shape, without the tangent where the body can do without."""
+        """Internal forces in the deformed shape, without the tangent matrix where the body can omit it."""
         return self.tangent(displacement)[1] if self.nodal_force is None else self.nodal_force(displacement)
 
     @cached_property
     def paths(self) -> dict[tuple[float, float, bool, int], list[Equilibrium]]:
-        """Equilibria in the deformed shape followed already, by first and last input, contact and least steps."""
+        """Cache of equilibria in the deformed shape, by first and last input, contact and number of steps."""
         return {}
 
     @cached_property
     def touches(self) -> dict[float, Equilibrium]:
-        """First touches in the deformed shape that were found already, by the guess."""
+        """Cache of first touches in the deformed shape, by the initial estimate."""
         return {}
 
     @property
@@ -120,12 +120,12 @@ class DrivenBody:
         return factorised(self.stiffness_n_mm[self.free][:, self.free])
 
     def solve_free(self, load_n: Array) -> Array:
-        """Small displacements of the free unknowns by a load on them, the drive held."""
+        """Small displacements of the free unknowns under a load on them, with the drive fixed."""
         return np.asarray(self._solver.solve(load_n))
 
     @cached_property
     def unit_displacement_mm(self) -> Array:
-        """Small displacements of the whole body by 1 mm of input."""
+        """Small displacements of the whole body per 1 mm of input."""
         moved = np.zeros(self.unknowns)
         moved[self.driven] = 1.0
         moved[self.free] = self._solver.solve(-(self.stiffness_n_mm @ moved)[self.free])
@@ -133,7 +133,10 @@ class DrivenBody:
 
     @cached_property
     def face_displacement_mm(self) -> Array:
-        """Small displacements of the whole body, drive held, by a unit force on each face point: one column each."""
+        """Small displacements of the whole body with the drive fixed, under a unit force on each face point.
+
+        One column each.
+        """
         loads = np.zeros((self.unknowns, self.face.size))
         loads[self.face, np.arange(self.face.size)] = 1.0
         moved = np.zeros_like(loads)
@@ -145,11 +148,11 @@ class DrivenBody:
         return Equilibrium(0.0, np.zeros(self.unknowns), 0.0, np.zeros(self.face.size))
 
     def face_gap_mm(self, displacement_mm: Array) -> Array:
-        """Distance of each face point from the symmetry plane."""
+        """Distance of each face point from the symmetry plane (mm)."""
         return np.asarray(self.face_rest_mm + displacement_mm[self.face])
 
     def measured_mm(self, displacement_mm: Array) -> float:
-        """Distance of the measuring point from the symmetry plane."""
+        """Distance of the measuring point from the symmetry plane (mm)."""
         return float(self.measured_rest_mm + self.weights @ displacement_mm[self.measured])
 
     def equilibrium(self, input_mm: float, *, contact: bool = False) -> Equilibrium:
@@ -165,7 +168,7 @@ class DrivenBody:
         return Equilibrium(input_mm, moved, force_n, pressed)
 
     def first_touch_mm(self) -> float | None:
-        """Input at which the first face point meets the symmetry plane; None where none moves towards it."""
+        """Input at which the first face point meets the symmetry plane (mm); None where none moves towards it."""
         slope = self.unit_displacement_mm[self.face]
         if np.all(slope <= 0.0):
             return None
@@ -195,7 +198,7 @@ class DrivenBody:
         return self._modes_among(self.unknowns_in_motion(drive_held=drive_held), count)
 
     def swaying_modes(self, *, count: int) -> tuple[Array, Array]:
-        """First antisymmetric natural modes, the drive free to go sideways; returns as `modes` does."""
+        """First antisymmetric natural modes, with the drive free to move sideways; returns as `modes` does."""
         return self._modes_among(self.swaying, count)
 
     def _modes_among(self, free: Indices, count: int) -> tuple[Array, Array]:

@@ -1,8 +1,9 @@
-"""How many cycles a flexure endures, by the S-N line that its material states.
+"""Number of cycles that a flexure endures, from the S-N line of its material.
 
-Basquin's line: log amplitude falls straight with log cycles. Cycles about a mean stress are turned into fully reversed
-ones by Soderberg's line, amplitude / (1 - mean / yield) (Shigley, Mechanical Engineering Design, chapter 6), which is
-on the safe side of Goodman's and needs no other strength than the yield stress.
+Basquin's line: the logarithm of the amplitude falls linearly with the logarithm of the number of cycles. Cycles about a
+mean stress are converted to fully reversed ones by Soderberg's line, amplitude / (1 - mean / yield) (Shigley,
+Mechanical Engineering Design, chapter 6), which is more conservative than Goodman's and needs no strength but the yield
+stress.
 """
 
 from dataclasses import dataclass
@@ -13,7 +14,7 @@ from fingervision.domain.gripper import Material, SNLine
 
 @dataclass(frozen=True, slots=True)
 class Endurance:
-    """Cycles that a flexure endures.
+    """Number of cycles that a flexure endures.
 
     Parameters
     ----------
@@ -36,7 +37,7 @@ class Endurance:
 
     @property
     def words(self) -> str:
-        """The answer in words."""
+        """The number of cycles in words."""
         if self.cycles is not None:
             return f"about {self.cycles:.2g} cycles"
         if self.at_least is not None:
@@ -45,7 +46,7 @@ class Endurance:
 
 
 def endurance(material: Material, lowest_mpa: float, highest_mpa: float) -> Endurance | None:
-    """Read the life at a stress that goes to and fro between two values off the material's S-N line.
+    """Number of cycles for a stress that alternates between two values, from the material's S-N line.
 
     Parameters
     ----------

@@ -1,11 +1,11 @@
-"""The gripper by finite elements (the paper's Comsol model): the plane body of the real outline.
+"""The gripper by finite elements (Hricko & Havlik (2015) used Comsol): the plane body of the real outline.
 
-One half is solved under the symmetry constraint: the lower face of the pillar is clamped, the symmetry axis cannot
-move across itself, the drive face moves by the input. The plate is in plane stress; its hinges lie between plane stress
-and plane strain, by their width (`width_effect`). The reference gripper in plane stress at the mesh limit: 7.7212 mm of
-gap per millimetre of input, 2.0014 N/mm, 19.07 MPa/mm; with its hinges' width 2.06 N/mm, as bricks have it. Its link
-length was chosen so that this slope is the one that the paper printed for Comsol; the two agreeing is therefore no
-validation.
+One half is solved under the symmetry constraint: the lower face of the pillar is clamped, the symmetry axis cannot move
+across itself, the drive face moves by the input. The plate is in plane stress; its hinges lie between plane stress and
+plane strain, by their width (`width_effect`). The published gripper in plane stress, for a converged mesh: 7.7212 mm of
+gap per millimetre of input, 2.0014 N/mm, 19.07 MPa/mm; including the width of its hinges 2.06 N/mm, as with
+three-dimensional bricks. Its link length was chosen so that this slope equals the one published for Comsol; their
+agreement is therefore no validation.
 """
 
 from collections.abc import Sequence
@@ -48,7 +48,7 @@ _SLOPE_ERROR, _FORCE_ERROR, _MODE_ERROR = 0.001, 0.005, 0.01
 
 
 class FiniteElementGripper:
-    """A meshed gripper, both halves alike.
+    """A meshed gripper with two identical halves.
 
     Parameters
     ----------
@@ -81,33 +81,36 @@ class FiniteElementGripper:
 
     @property
     def input_range_mm(self) -> tuple[float, float]:
-        """Smallest and largest input that the model is meant for."""
+        """Smallest and largest input for which the model is meant (mm)."""
         return covered_inputs_mm(self.gripper, self.half.first_touch_mm())
 
     @property
     def rest_gap_mm(self) -> float:
-        """The gap at input zero."""
+        """The gap at input zero (mm)."""
         return 2.0 * self.half.measured_rest_mm
 
     def respond(self, input_mm: NDArray[np.float64]) -> Response:
-        """Answer statically at each input."""
+        """Respond statically at each input."""
         return symmetric_response(self.half, self.physics, input_mm)
 
     def body_poses(self, input_mm: NDArray[np.float64]) -> dict[str, NDArray[np.float64]]:
-        """Answer the poses of the bodies at each input: x_mm, y_mm, angle_mrad, shape (n, 3) each."""
+        """Poses of the bodies at each input: x_mm, y_mm, angle_mrad, shape (n, 3) each."""
         poses = poses_of_plate(self.plate, self.gripper, large=self.physics.large_rotation)
         return gripper_poses(self.half, self.physics, poses, input_mm)
 
     def peak_stress(self) -> PeakStress:
-        """Largest von Mises stress on the notches by 1 mm of input; re-entrant corners are singular and left out."""
+        """Largest von Mises stress in the notches per 1 mm of input.
+
+        Re-entrant corners, where it is singular, are excluded.
+        """
         return PeakStress(*self._peak(self.plate.von_mises_mpa(self.half.unit_displacement_mm)))
 
     def equilibria(self, inputs_mm: Sequence[float]) -> list[Equilibrium]:
-        """Return the body at some inputs, with the physics that the model was built with."""
+        """Equilibria at the given inputs, with the physics that the model includes."""
         return equilibria(self.half, self.physics, inputs_mm)
 
     def loaded(self, inputs_mm: Sequence[float]) -> list[LoadedState]:
-        """Gap, forces and largest stress at some inputs, in the deformed shape where the model has it."""
+        """Gap, forces and largest stress at the given inputs, in the deformed shape if the model includes it."""
         return [self.stressed(state) for state in self.equilibria(inputs_mm)]
 
     def stressed(self, state: Equilibrium) -> LoadedState:
@@ -130,17 +133,17 @@ class FiniteElementGripper:
         return tuple((rad_s / (2.0 * np.pi)).tolist())
 
     def swaying_modes_hz(self, *, count: int = 1) -> tuple[float, ...]:
-        """First antisymmetric in-plane natural frequencies, the drive free to go sideways."""
+        """First antisymmetric in-plane natural frequencies, with the drive free to move sideways (Hz)."""
         rad_s, _ = self.half.swaying_modes(count=count)
         return tuple((rad_s / (2.0 * np.pi)).tolist())
 
     @cached_property
     def across_plane(self) -> OutOfPlane:
-        """First mode and sag across the plane, the drive held, in three dimensions (`deep_plate`)."""
+        """First mode and sag out of the plane, with the drive fixed, in three dimensions (`deep_plate`)."""
         return out_of_plane(half_mechanism(self.gripper))
 
     def figures(self) -> ModelFigures:
-        """Compute the model's row of the comparison."""
+        """Figures of the model for the comparison table."""
         return ModelFigures(
             gap_per_input(self.half),
             self.half.equilibrium(1.0).force_n,

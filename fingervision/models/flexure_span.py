@@ -1,8 +1,8 @@
-"""The stretch of a drawn flexure that bends as a beam: where it begins and ends, and the compliance of its segments.
+"""The stretch of a flexure that bends as a beam: where it begins and ends, and the compliance of its segments.
 
-A notch is a beam between the places where it meets its body, corrected by the hinge tables. Of a leaf and of a straight
-neck the beam ends one and a half thicknesses before the roots: by Saint-Venant's principle stress is a beam's there,
-and how the roots yield is left to the elastic bodies.
+A notch is a beam between the points where it meets its bodies, corrected by the tables for hinges. For a leaf and for a
+straight neck, the beam ends one and a half thicknesses before the roots: by Saint-Venant's principle the stress there
+is a beam's, and the compliance of the roots belongs to the elastic bodies.
 """
 
 from dataclasses import dataclass, replace
@@ -26,6 +26,8 @@ _PLANAR = np.ix_([0, 1, 5], [0, 1, 5])
 _SEGMENTS, _SEGMENTS_OF_LEAF = 10, 20
 """Of a notch, whose bending is at its neck, and of what bends all along: a chord is shorter than its arc by 1 / n^2."""
 _SAMPLES = 401
+_ROUNDS, _BETWEEN = 5, 65
+"""Each round narrows the end of the free length 64 times: to 1e-11 of the half length."""
 _BESIDE = 1e-4
 """Of the thickness: how far beside a flexure's surface material and void are looked for."""
 _SAINT_VENANT = 1.5
@@ -68,7 +70,7 @@ class FlexureSpan:
 
     @property
     def slab(self) -> Polygon:
-        """What parts the bodies on either side where it is cut away."""
+        """Region that separates the bodies on either side where the flexure is cut away."""
         (a, b), (low, high) = self.cut_mm, self.heights_mm
         corners = ((a, -0.5), (b, -0.5), (b, 0.5), (a, 0.5))
         heights = (low, high, high, low)
@@ -76,13 +78,13 @@ class FlexureSpan:
                                                                                          strict=True)))  # fmt: skip
 
     def notch(self, plate_mm: float) -> Notch:
-        """Return the notch that it is or that bends as it does."""
+        """The notch with the same bending behaviour."""
         web_mm = max(float(self.flexure.height_mm(np.array([end]))[0]) for end in self.free_mm)
         notch = self.flexure.notch(plate_mm)
         return replace(notch, web_mm=web_mm) if self.flexure.is_notch else notch
 
     def stations_mm(self, plate_mm: float) -> Array:
-        """Ends of the segments, close together where a notch bends; shape (segments + 1,)."""
+        """Ends of the segments, closer together where a notch bends; shape (segments + 1,)."""
         if not self.flexure.is_notch:
             return np.linspace(*self.cut_mm, _SEGMENTS_OF_LEAF + 1)
         # A notch may meet its bodies sooner on the one side than on the other.
@@ -117,7 +119,8 @@ def _segment(flexure: Flexure, span: tuple[float, float], plate_mm: float, mater
     E, G, b = material.youngs_modulus_mpa / held, material.shear_modulus_mpa, plate_mm
     bending = [float(np.sum(dx * arm**k * 12.0 / (E * b * h**3))) for k in range(3)]
     shear = float(_SHEAR * np.sum(dx / (G * b * h)))
-    return np.array([[float(np.sum(dx / (E * b * h))), 0.0, 0.0],
+    # Stretched, the strip is free to narrow.
+    return np.array([[float(np.sum(dx / (material.youngs_modulus_mpa * b * h))), 0.0, 0.0],
                      [0.0, bending[2] + shear, bending[1]],
                      [0.0, bending[1], bending[0]]])  # fmt: skip
 
@@ -130,9 +133,11 @@ def span_of(flexure: Flexure, region: PlanarRegion) -> FlexureSpan:
         alone = _alone(flexure, region, side * stations)
         last = len(stations) - 1 if alone.all() else int(np.argmin(alone)) - 1
         low, high = stations[max(last, 0)], stations[min(last + 1, len(stations) - 1)]
-        for _ in range(40):
-            middle = 0.5 * (low + high)
-            low, high = (middle, high) if _alone(flexure, region, np.array([side * middle]))[0] else (low, middle)
+        for _ in range(_ROUNDS):
+            between = np.linspace(low, high, _BETWEEN)
+            alone = _alone(flexure, region, side * between[1:])
+            last = between.size - 1 if alone.all() else int(np.argmin(alone))
+            low, high = between[last], between[min(last + 1, between.size - 1)]
         cut, height = _cut(flexure, region, side, float(low))
         free.append(side * float(low))
         cuts.append(side * cut)
@@ -141,7 +146,7 @@ def span_of(flexure: Flexure, region: PlanarRegion) -> FlexureSpan:
 
 
 def _alone(flexure: Flexure, region: PlanarRegion, stations: Array) -> NDArray[np.bool_]:
-    """Whether at each station the flexure's own height is all that is there: material just inside, void just beside."""
+    """Whether at each station the flexure's own height is all the material there is."""
     half = 0.5 * flexure.height_mm(stations)
     apart = _BESIDE * flexure.thickness_mm
     found = np.ones(stations.size, dtype=bool)
@@ -153,7 +158,7 @@ def _alone(flexure: Flexure, region: PlanarRegion, stations: Array) -> NDArray[n
 
 
 def _cut(flexure: Flexure, region: PlanarRegion, side: float, end_mm: float) -> tuple[float, float]:
-    """Station and height of the cut on one side."""
+    """Position and height of the cut on one side."""
     t = flexure.thickness_mm
     if not flexure.is_notch:
         straight = min(end_mm, flexure.half_length_mm - flexure.fillet_mm)

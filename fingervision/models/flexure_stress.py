@@ -1,10 +1,11 @@
-"""Nominal stress in a lumped flexure: bending and tension of the section, with the factors of a notch."""
+"""Nominal stress in a lumped flexure: bending and tension of the section, with the factors of a notch or of fillets."""
 
 import numpy as np
 from numpy.typing import NDArray
 
+from fingervision.models.fillet_stress import fillet_factors
 from fingervision.models.flexure_span import FlexureSpan
-from fingervision.models.hinge_correction import HingeTheory, plane_strain_share
+from fingervision.models.hinge_correction import HingeTheory
 from fingervision.models.hinge_stress import notch_factors
 from fingervision.models.mechanism import Mechanism
 
@@ -13,7 +14,9 @@ Array = NDArray[np.float64]
 _SAMPLES = 401
 
 
-def nominal_stress_mpa(span: FlexureSpan, end_loads: Array, mechanism: Mechanism, theory: HingeTheory) -> float:
+def nominal_stress_mpa(
+    span: FlexureSpan, end_loads: Array, mechanism: Mechanism, theory: HingeTheory, *, width_effect: bool = True
+) -> float:
     """Find the largest stress |N| / (b h) + 6 |M| / (b h^2) between the ends where the flexure meets its bodies.
 
     Parameters
@@ -25,7 +28,10 @@ def nominal_stress_mpa(span: FlexureSpan, end_loads: Array, mechanism: Mechanism
     mechanism : Mechanism
         For plate and material.
     theory : HingeTheory
-        Nominal stress of a straight bar by beam theory; with Neuber's factors and the width's share where corrected.
+        Nominal stress of a straight bar by beam theory; with Neuber's factors, or those of the fillets, and the
+        width's share where corrected.
+    width_effect : bool
+        Whether the plate's width holds the flexure back.
     """
     plate_mm = mechanism.plate_mm
     stations = span.stations_mm(plate_mm)
@@ -41,9 +47,18 @@ def nominal_stress_mpa(span: FlexureSpan, end_loads: Array, mechanism: Mechanism
     factors = (1.0, 1.0)
     held = 1.0
     if theory is HingeTheory.CORRECTED:
-        factors = notch_factors(span.notch(plate_mm)) if span.flexure.is_notch else factors
-        across = plane_strain_share(span.notch(plate_mm)) * mechanism.material.poisson_ratio
+        factors = _factors(span, plate_mm)
+        share = span.flexure.width_share(plate_mm) if width_effect else 0.0
+        across = share * mechanism.material.poisson_ratio
         held = float(np.sqrt(1.0 - across + across**2))
     stress = factors[0] * np.abs(tension) / (plate_mm * height)
     stress += factors[1] * 6.0 * np.abs(moment) / (plate_mm * height**2)
     return float(held * stress.max())
+
+
+def _factors(span: FlexureSpan, plate_mm: float) -> tuple[float, float]:
+    """Stress concentration in tension and in bending: of a notch, of a straight neck's fillets; 1 for a leaf."""
+    flexure = span.flexure
+    if flexure.is_notch:
+        return notch_factors(span.notch(plate_mm))
+    return fillet_factors(flexure.thickness_mm, flexure.fillet_mm, flexure.depth_mm)

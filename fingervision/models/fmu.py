@@ -22,7 +22,7 @@ LONGEST_STEP_S = 0.01
 
 
 def fmu_function(path: Path, names: Mapping[str, str]) -> Callable[[Array, Array], dict[str, Array]]:
-    """Make a function of an FMU.
+    """Return an FMU as a function of time.
 
     Parameters
     ----------
@@ -80,7 +80,7 @@ def _run(
     time_s: Array,
     input_mm: Array,
 ) -> dict[str, Array]:
-    """Simulate one run and read its outputs at the run's times."""
+    """Simulate one run and return its outputs at the run's times."""
     from fmpy import simulate_fmu
 
     _drive_between_steps()
@@ -120,10 +120,10 @@ def _run(
 
 
 def _drive_between_steps() -> None:
-    """Let FMPy's integrator see the input at the time that it asks for, and not that of the last step.
+    """Let FMPy's integrator read the input at each time that it evaluates, instead of that of the last step.
 
-    FMPy 0.3 sets inputs before a step and in the root function alone; over a step of CVode an input that moves then
-    lags, and the error test fails where it jumps. This holds for the process of the model, which runs nothing else.
+    FMPy 0.3 sets inputs only before a step and in the root function. Over a step of CVode a moving input then lags, and
+    the error test fails where it jumps. The change applies to the whole process of the model, which runs nothing else.
     """
     from fmpy import sundials
 
@@ -141,7 +141,7 @@ def _drive_between_steps() -> None:
 
 
 def _outputs(variables: list[Any], names: Mapping[str, str]) -> dict[str, Any]:
-    """Choose the gap, or both fingers, and the force where there is one."""
+    """Choose the output for the gap, or those of both fingers, and that of the force if there is one."""
     listed = {variable.name.lower(): variable for variable in variables if variable.causality == "output"}
     out = {name: listed[name] for name in OTHERS if name in listed}
     if not ({"left_mm", "right_mm"} <= set(out)) or "gap" in names:
@@ -151,7 +151,7 @@ def _outputs(variables: list[Any], names: Mapping[str, str]) -> dict[str, Any]:
 
 
 def _choose(variables: list[Any], causality: str, stated: str | None, usual: tuple[str, ...]) -> Any:
-    """Choose the stated variable, the one of a usual name, or the only one that there is."""
+    """Choose the stated variable, the one with a usual name, or the only one there is."""
     word = "input" if causality == "input" else "gap"
     real = [one for one in variables if one.causality == causality and one.type in ("Real", "Float64", "Float32")]
     if stated is not None:
@@ -180,7 +180,7 @@ def _listed(variables: list[Any]) -> str:
 
 
 def _mm(variable: Any) -> float:
-    """Millimetres in one unit of a variable: as it declares, by its name's ending, else taken for millimetres."""
+    """Millimetres per unit of a variable: as declared, or by the suffix of its name, or else 1."""
     unit = variable.unit or (variable.declaredType.unit if variable.declaredType is not None else None)
     if unit is None:
         ending = re.search(r"_(m|cm|mm|um|nm)$", variable.name)

@@ -1,4 +1,4 @@
-"""How a mechanism answers a drive that shakes it: amplitude and phase over frequency, small displacements."""
+"""Response of a mechanism to a vibrating drive: amplitude and phase over frequency, small displacements."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -22,7 +22,7 @@ _LEAST_ROWS = 400
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FrequencyResponse:
-    """Steady answers to a sinusoidal drive.
+    """Steady-state responses to a sinusoidal drive.
 
     Parameters
     ----------
@@ -52,9 +52,9 @@ class FrequencyResponse:
 def frequency_response(
     model: ModalModel, free: FreeModes, frequency_hz: Array, damping: Damping | None = None
 ) -> FrequencyResponse:
-    """Answer a sinusoidal drive at some frequencies.
+    """Compute the response to a sinusoidal drive at some frequencies.
 
-    Modes beyond those given are answered as if at rest, so that both curves are exact at 0 Hz.
+    Modes beyond those given contribute their static response, so that both curves are exact at 0 Hz.
 
     Parameters
     ----------
@@ -105,7 +105,7 @@ def _complex(values: Any) -> ComplexArray:
 def resolved_frequencies_hz(
     model: ModalModel, free: FreeModes, damping: Damping, first_hz: float, last_hz: float
 ) -> Array:
-    """Frequencies between two, close enough together that no resonance, drive held or free, falls between them."""
+    """Frequencies so close together that no resonance, with the drive fixed or free, falls between two of them."""
     kept, ratios = model.damped(damping)
     free_ratios = described(damping, free.rad_s)
     places = [np.linspace(first_hz, last_hz, _LEAST_ROWS)]

@@ -45,7 +45,7 @@ class FunctionModel:
     names: Mapping[str, str] = field(default_factory=lambda: MappingProxyType({}))
 
     def respond(self, input_mm: Array) -> Response:
-        """Answer at rest at each input: held there until the gap has settled; `input_mm` of shape (n,)."""
+        """Static response at each input, which is held until the gap has settled; `input_mm` of shape (n,)."""
         if np.ptp(input_mm) == 0.0:
             time_s = np.array([0.0, 0.5, 1.0]) * HOLDS_S[0]
             (held,) = self.simulate([(time_s, np.full(3, float(input_mm[0])))])
@@ -54,11 +54,11 @@ class FunctionModel:
         return self.at_rest(float(input_mm.min()), float(input_mm.max())).respond(input_mm)
 
     def at_rest(self, low_mm: float, high_mm: float) -> TableModel:
-        """Tabulate the gap at rest, as the mean of the way up and the way down.
+        """Tabulate the static gap, as the mean of increasing and decreasing input.
 
         Raises
         ------
-        FingervisionError
+        ModelError
             The model fails, or its gap does not depend on the input, or never settles.
         """
         up = np.linspace(low_mm, high_mm, STEPS)
@@ -91,7 +91,7 @@ class FunctionModel:
         return TableModel(self.path.name, up, mean(last.left_mm), mean(last.right_mm), force)
 
     def simulate(self, runs: Sequence[tuple[Array, Array]]) -> list[Response]:
-        """Drive the model in time, each run from its own start, in a process of its own.
+        """Simulate the runs, each from its own initial state, in a process of its own.
 
         Parameters
         ----------
@@ -100,7 +100,7 @@ class FunctionModel:
 
         Raises
         ------
-        FingervisionError
+        ModelError
             The file cannot be run, crashes, does not end, or answers what is no number.
         """
         with TemporaryDirectory(prefix="fingervision-") as folder:
@@ -126,7 +126,7 @@ class FunctionModel:
                 return [_response(found, k) for k in range(len(runs))]
 
     def _failure(self, code: int, stderr: bytes) -> str:
-        """Say how the process ended."""
+        """Describe how the process ended."""
         said = stderr.decode(errors="replace").strip().splitlines()
         if said and said[-1].startswith(SAYS):
             return f"{self.path} {said[-1].removeprefix(SAYS)}"

@@ -1,4 +1,4 @@
-"""The process in which a model of one's own runs: times and inputs in, the points of the fingers out."""
+"""Worker process of a user's model: it reads times and inputs, and writes the points of the fingers."""
 
 import json
 import sys
@@ -18,7 +18,7 @@ Function = Callable[[Array, Array], Answer]
 
 
 def main(arguments: list[str]) -> int:
-    """Run the model `arguments[0]` over the runs of a file, and write its answers to another."""
+    """Run the model `arguments[0]` over the runs of a file, and write its responses to another."""
     path, asked, answered, names = Path(arguments[0]), arguments[1], arguments[2], json.loads(arguments[3])
     try:
         function = fmu_function(path, names) if path.suffix.lower() == ".fmu" else _python_function(path)
@@ -62,7 +62,7 @@ def _python_function(path: Path) -> Function:
 
 
 def _points(answer: Answer, time_s: Array) -> dict[str, Array]:
-    """Turn an answer into left, right and force, and refuse what is no number for each time."""
+    """Convert a model's return value to left, right and force; refuse what is no finite number for each time."""
     out: dict[str, Array] = {}
     for name in ("gap_mm", "left_mm", "right_mm", "force_n"):
         if name not in answer:

@@ -1,7 +1,7 @@
 """Time integration of a body in large rotation and contact: the generalised-alpha method.
 
-Second order in the step, with a chosen damping of frequencies that the step cannot resolve. Source: Chung and Hulbert,
-J. Appl. Mech. 60 (1993) 371.
+Second-order accurate in the step, with adjustable damping of frequencies that the step cannot resolve. Source: Chung
+and Hulbert, J. Appl. Mech. 60 (1993) 371.
 """
 
 from collections.abc import Callable
@@ -27,7 +27,7 @@ _DENSE_BELOW = 400
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Motion:
-    """Displacements, velocities and accelerations, one row a time."""
+    """Displacements, velocities and accelerations, one row per time."""
 
     displacement: Array
     velocity: Array
@@ -45,7 +45,7 @@ def integrate(
     *,
     high_frequency_radius: float = 0.8,
 ) -> Motion:
-    """Follow M a + C v + f(u) = 0 over equal steps.
+    """Integrate M a + C v + f(u) = 0 over equal steps.
 
     Parameters
     ----------
@@ -67,7 +67,7 @@ def integrate(
 
     Raises
     ------
-    FingervisionError
+    ModelError
         Where a step does not settle.
     """
     rho = high_frequency_radius
@@ -117,7 +117,7 @@ def integrate(
 
 
 class _Factor:
-    """Factors of the free part of a matrix: dense where it is small, which is three times as fast there."""
+    """Factorisation of the free part of a matrix: dense where it is small, which is three times as fast there."""
 
     def __init__(self, matrix: csr_matrix, free: NDArray[np.int64]) -> None:
         part = matrix[free][:, free]
@@ -134,7 +134,7 @@ class _Factor:
 
 
 def _at_first(mass: csr_matrix, free: NDArray[np.int64], right: Array) -> Array:
-    """Accelerations at the start; massless unknowns have none of their own."""
+    """Accelerations at the start; massless unknowns have none."""
     part = mass[free][:, free].tocsc()
     if np.all(part.diagonal()):
         return np.asarray(splu(part).solve(right))

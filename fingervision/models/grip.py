@@ -1,8 +1,8 @@
-"""A part held between the fingers: how hard they press it, by small displacements.
+"""A part held between the fingers, and its gripping force, by small displacements.
 
-The part is a block with flat sides, of some width and stiffness, in the middle between the fingers. Each finger meets a
-plane at half the part's width that yields by its own force over twice the part's stiffness: Signorini's problem, with
-that compliance added to every pair of points on the finger's face.
+The part is a block with flat sides, of given width and stiffness, centred between the fingers. Each finger meets a
+plane at half the part's width, which yields by the finger's force over twice the part's stiffness: Signorini's contact
+problem, with that compliance added to every pair of points on the finger's face.
 """
 
 from dataclasses import dataclass
@@ -36,12 +36,12 @@ class Part:
     stiffness_n_mm: float = inf
 
     def squeezed_mm(self, grip_n: float) -> float:
-        """Width under a grip."""
+        """Width under a gripping force (mm)."""
         return self.width_mm - grip_n / self.stiffness_n_mm
 
 
 def grip_equilibrium(body: DrivenBody, input_mm: float, part: Part) -> Equilibrium:
-    """Find the small displacements with a part between the fingers.
+    """Compute the small displacements with a part between the fingers.
 
     Parameters
     ----------
@@ -70,7 +70,7 @@ def grip_equilibrium(body: DrivenBody, input_mm: float, part: Part) -> Equilibri
 
 
 def first_grip_mm(body: DrivenBody, part: Part) -> float | None:
-    """Input at which a part is first touched; None where no finger moves towards it."""
+    """Input at which the part is first touched (mm); None where no finger moves towards it."""
     slope = body.unit_displacement_mm[body.face]
     closing = slope > 0.0
     if not closing.any():
@@ -79,9 +79,9 @@ def first_grip_mm(body: DrivenBody, part: Part) -> float | None:
 
 
 def mechanical_advantage(body: DrivenBody) -> float | None:
-    """Grip of each finger by the drive's force, beyond the input at which the fingers touch each other.
+    """Gripping force of each finger per drive force, beyond the input at which the fingers touch each other.
 
-    The rest of the drive's work bends hinges and fingers; None where the fingers do not close.
+    The rest of the drive's work bends hinges and fingers. None where the fingers do not close.
     """
     touch = body.first_touch_mm()
     if touch is None:

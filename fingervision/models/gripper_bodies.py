@@ -1,4 +1,4 @@
-"""Poses of the gripper's bodies by every kind of model of a `gripper.toml`: both fingers and the drive."""
+"""Poses of the gripper's bodies (both fingers and the drive) by every kind of model of a `gripper.toml`."""
 
 from collections.abc import Callable, Mapping
 from functools import partial
@@ -34,7 +34,7 @@ _MOST_KEPT = 8
 
 
 def gripper_bodies(gripper: Gripper) -> tuple[LinkBody, ...]:
-    """Cut the right half into its bodies."""
+    """Divide the right half into its bodies."""
     outline = (gripper.hinge, gripper.lever, gripper.links)
     if outline not in _KEPT:
         while len(_KEPT) >= _MOST_KEPT:
@@ -44,14 +44,15 @@ def gripper_bodies(gripper: Gripper) -> tuple[LinkBody, ...]:
 
 
 def poses_of_plate(plate: PlaneStressPlate, gripper: Gripper, *, large: bool) -> Poses:
-    """Tell the right half's poses from the displacements of its mesh."""
+    """Poses of the right half's bodies from the displacements of its mesh."""
     return partial(plate_poses, plate, gripper_bodies(gripper), large=large)
 
 
 def poses_of_frame(gripper: Gripper, skeleton: Skeleton, *, large: bool) -> Poses:
-    """Tell the right half's poses from the motions of the nodes of its bars.
+    """Poses of the right half's bodies from the motions of the nodes of its bars.
 
-    A bar is two rows of points at its sixths across its width, whose area and second moment are the bar's.
+    A bar is represented by two rows of points at its sixths across its width, which give the bar's area and second
+    moment.
     """
     members = skeleton.members
     owners = [_owner(member.name) for member in members]
@@ -87,7 +88,7 @@ def poses_of_frame(gripper: Gripper, skeleton: Skeleton, *, large: bool) -> Pose
 
 
 def gripper_poses(half: DrivenBody, physics: Physics, poses: Poses, input_mm: Array) -> dict[str, Array]:
-    """Answer the poses of both fingers and the drive at each input.
+    """Poses of both fingers and the drive at each input.
 
     Parameters
     ----------
@@ -133,7 +134,7 @@ def _through(nodes: Array, rows: Array, inputs: Array) -> Array:
 
 
 def _owner(member: str) -> str:
-    """Body that a bar of the half belongs to; none where it is a hinge's."""
+    """Body to which a bar of the half belongs; None for a bar of a hinge."""
     if member.startswith("hinge"):
         return ""
     if member in ("shuttle", "drive block"):
@@ -142,7 +143,7 @@ def _owner(member: str) -> str:
 
 
 def _turned(arm: Array, angle: float, *, large: bool) -> Array:
-    """Motion of the end of an arm that turns."""
+    """Displacement of the end of a rotating arm."""
     if not large:
         return angle * np.array([-arm[1], arm[0]])
     c, s = np.cos(angle) - 1.0, np.sin(angle)

@@ -1,4 +1,4 @@
-"""All figures of one model of a gripper by their names: at rest, at the ends of a range of inputs, and its limits."""
+"""All figures of one model of a gripper by name: at rest, at the ends of a range of inputs, and its limits."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, fields
@@ -34,7 +34,7 @@ _ENDS: Mapping[str, str] = {"_mm": "mm", "_hz": "Hz", "_n": "N", "_mpa": "MPa", 
 def gripper_figures(
     gripper: Gripper, model: Any, inputs: Sequence[float] | NDArray[np.float64], figures: ModelFigures | None = None
 ) -> dict[str, float | None]:
-    """Compute a model's column of `models.csv`: small displacements at rest, and the loads at both ends of the inputs.
+    """Column of `models.csv` for a model: small displacements at rest, and the loads at both ends of the inputs.
 
     Parameters
     ----------
@@ -103,20 +103,23 @@ def gripper_figures(
 
 
 def life_between(gripper: Gripper, low: Sequence[float | None], high: Sequence[float | None]) -> Endurance | None:
-    """Endurance of the hinges between two loads (input, gap, force, grip, stress); the stress turns with the input."""
+    """Endurance of the hinges between two loads (input, gap, force, grip, stress).
+
+    The sign of the stress follows the input.
+    """
     ends = sorted(copysign(load[4] or 0.0, load[0] or 0.0) for load in (low, high))
     return endurance(gripper.material, ends[0], ends[1])
 
 
 def unit_of(name: str) -> str:
-    """Return the unit of a row, by its name."""
+    """Unit of a row, from its name."""
     if name.endswith("]"):
         return name[name.rindex("[") + 1 : -1]
     return _UNITS.get(name) or next((unit for end, unit in _ENDS.items() if name.endswith(end)), "1")
 
 
 def label_of(name: str) -> str:
-    """Return a row's name in words, without its unit, and the unit behind a stroke: for the axis of a figure."""
+    """Name of a row in words, without its unit, and the unit after a slash: for the axis of a figure."""
     unit = unit_of(name)
     bare = name[: name.rindex(" [")] if name.endswith("]") else name
     for end in ("_mpa_per_mm", "_n_mm", "_deg_per_mm", *_ENDS):

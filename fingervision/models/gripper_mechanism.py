@@ -1,4 +1,4 @@
-"""The gripper as a mechanism drawn by bodies: one half under its symmetry, or both, each with its own numbers."""
+"""The gripper as a mechanism drawn by bodies: one half with its symmetry, or both halves with their own dimensions."""
 
 from math import hypot
 
@@ -12,9 +12,9 @@ _FAR = 3.0
 
 
 def half_mechanism(gripper: Gripper, name: str = "gripper, right half") -> Mechanism:
-    """Draw the right half: it slides on the symmetry axis, and its tip may touch it.
+    """Draw the right half: it slides along the symmetry axis, and its tip may touch that axis.
 
-    The gap is twice the distance of the probe `tip` from the axis, and the force of both halves twice the drive's.
+    The gap is twice the distance of the probe `tip` from the axis, and the force of both halves is twice the drive's.
     """
     x0, x1, low, high = _drive_box(gripper)
     top = gripper.links.drive_block_mm[3]
@@ -76,7 +76,7 @@ def whole_mechanism(left: Gripper, right: Gripper, name: str) -> Mechanism:
 
 
 def body_names(side: str) -> tuple[str, ...]:
-    """Names of the bodies that the shapes of one half belong to, in their order."""
+    """Names of the bodies to which the shapes of one half belong, in order."""
     finger = f"{side}_finger"
     return f"{side}_pillar", "drive", "drive", finger, finger, finger
 

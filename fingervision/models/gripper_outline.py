@@ -1,6 +1,6 @@
-"""The outline of a gripper's right half, and what must be geometrically true of it.
+"""The outline of a gripper's right half, and the geometric conditions that it must meet.
 
-The half is the union of its bars and polygons, less four notch discs, less everything left of the symmetry axis.
+The half is the union of its bars and polygons, minus four notch discs, minus everything left of the symmetry axis.
 """
 
 from functools import lru_cache
@@ -38,7 +38,7 @@ def _notch_centres_mm(hinge: Hinge, lever: Lever) -> tuple[PointMm, ...]:
 
 
 def half_region(gripper: Gripper) -> PlanarRegion:
-    """Return the right half as shapes that are added and cut; its outline is computed once per drawing."""
+    """The right half as shapes that are added and cut; its outline is computed once per drawing."""
     face = (gripper.lever.drive_face_half_width_mm, gripper.lever.drive_face_y_mm)
     return _half_region(gripper.hinge, gripper.lever, gripper.links, (face,))
 
@@ -69,7 +69,7 @@ def check_outline(gripper: Gripper, origin: str = "the drawing") -> None:
 
     Raises
     ------
-    FingervisionError
+    DataError
         Where the half is not one body, a notch is a closed hole, a hinge does not hold its two sides together or does
         not part them, or the clamp, the drive face or the tip's inner face is no face of the body.
     """

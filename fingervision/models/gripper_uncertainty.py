@@ -1,4 +1,4 @@
-"""The figures of a gripper with the uncertainty that its drawing's stated numbers give them."""
+"""Uncertainty of a gripper's figures from the stated uncertainties of its dimensions."""
 
 from collections.abc import Mapping, Sequence
 from operator import attrgetter
@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from fingervision.domain.errors import FingervisionError, ModelError
 from fingervision.domain.gripper import Gripper
 from fingervision.domain.parameter import Estimate
+from fingervision.models.changed_drawings import in_ratio
 from fingervision.models.gripper_figures import gripper_figures
 from fingervision.models.gripper_outline import check_outline
 from fingervision.models.hinge_correction import HingeTheory
@@ -30,9 +31,10 @@ def gripper_uncertainty(
 ) -> dict[str, FigureUncertainty]:
     """Propagate the stated uncertainties of a drawing to every figure of `gripper_figures`.
 
-    The answers for changed drawings come from the lumped model (out of the plane from the stiffness matrix), in small
-    displacements, with contact where the physics includes it. Finite elements of every changed drawing would take
-    minutes, and an uncertainty needs two digits only. The same u is stated beside the figures of the other kinds.
+    The figures of changed drawings come from the lumped model (out of the plane from the stiffness matrix), with small
+    displacements, with contact where the physics includes it; a bar model gives their ratio to the drawing's own
+    (`changed_drawings`). Finite elements for every changed drawing would take minutes, and an uncertainty needs two
+    digits only. The same uncertainty is stated for the figures of the other kinds of model.
 
     Parameters
     ----------
@@ -48,9 +50,11 @@ def gripper_uncertainty(
     check_uncertainties(gripper)
     numbers = _numbers(gripper)
 
-    def in_plane(changes: Mapping[str, float]) -> dict[str, float | None]:
+    touching = Physics(contact=physics.contact)
+
+    def by_bars(changes: Mapping[str, float]) -> dict[str, float | None]:
         drawn = _changed(gripper, changes)
-        return gripper_figures(drawn, LumpedGripper(drawn, Physics(contact=physics.contact), theory), inputs)
+        return gripper_figures(drawn, LumpedGripper(drawn, touching, theory, bars_alone=True), inputs)
 
     def out_of_plane(changes: Mapping[str, float]) -> dict[str, float | None]:
         flat = StiffnessMatrixGripper(_changed(gripper, changes), theory)
@@ -59,15 +63,16 @@ def gripper_uncertainty(
             "sag_out_of_plane_mm": flat.gravity_sag_mm()[0],
         }
 
+    in_plane = in_ratio(by_bars, gripper_figures(gripper, LumpedGripper(gripper, touching, theory), inputs))
     return propagate(in_plane, numbers) | propagate(out_of_plane, numbers)
 
 
 def check_uncertainties(gripper: Gripper) -> None:
-    """Refuse stated uncertainties by which the drawing cannot be redrawn.
+    """Refuse stated uncertainties for which no changed drawing exists.
 
     Raises
     ------
-    FingervisionError
+    DataError, ModelError
         Where one standard uncertainty either way leaves no gripper.
     """
     for name, estimate in _numbers(gripper).items():
@@ -87,7 +92,7 @@ def _numbers(gripper: Gripper) -> dict[str, Estimate]:
 
 
 def _changed(gripper: Gripper, changes: Mapping[str, float]) -> Gripper:
-    """Redraw a gripper, and refuse numbers that no gripper has."""
+    """Return a gripper with changed dimensions; refuse dimensions that no gripper can have."""
     for name, by in changes.items():
         value = attrgetter(name)(gripper) + by
         if not name.endswith(_ANY_SIGN) and value <= 0.0:

@@ -1,13 +1,15 @@
-"""One half of the gripper as a frame: the tree's members become elements, their masses go to the nodes."""
+"""One half of the gripper as a frame: the members of the tree become elements, their masses are lumped at the nodes."""
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import csr_matrix, diags
+from scipy.sparse import coo_matrix, csr_matrix, diags
 
 from fingervision.domain.gripper import Gripper
 from fingervision.models.corotational_frame import CorotationalFrame
 from fingervision.models.driven_body import DrivenBody
+from fingervision.models.finger_body import finger_body, is_of_finger
 from fingervision.models.hinge_compliance import bar_compliance
+from fingervision.models.joined_frame import JoinedFrame
 from fingervision.models.skeleton import Skeleton
 
 Array = NDArray[np.float64]
@@ -18,7 +20,7 @@ _STIFF_JOINT = 1e-3
 
 
 def frame_of(gripper: Gripper, skeleton: Skeleton) -> CorotationalFrame:
-    """Make the elements of a tree of members."""
+    """Convert a tree of members to elements."""
     members = skeleton.members
     nodes = np.array([members[0].start_mm, *(member.end_mm for member in members)])
     ends = np.array([(member.parent + 1, place + 1) for place, member in enumerate(members)])
@@ -27,10 +29,20 @@ def frame_of(gripper: Gripper, skeleton: Skeleton) -> CorotationalFrame:
     return CorotationalFrame(nodes, ends, compliance)
 
 
-def half_frame(gripper: Gripper, skeleton: Skeleton, frame: CorotationalFrame | None = None) -> DrivenBody:
-    """Support and drive the right half's frame.
+def joined_frame_of(gripper: Gripper, skeleton: Skeleton) -> JoinedFrame:
+    """Convert a tree of members to elements, except for the finger, which is one body."""
+    body, bars = finger_body(gripper, skeleton), frame_of(gripper, skeleton)
+    places = np.array([place for place, member in enumerate(skeleton.members) if not is_of_finger(member.name)])
+    elements = CorotationalFrame(bars.nodes_mm, bars.ends[places], bars.end_compliance[places])
+    return JoinedFrame(bars.nodes_mm, bars.ends, places, elements, body)
 
-    The clamp is held, the drive point moves by the input along the axis, and can neither move across it nor turn.
+
+def half_frame(
+    gripper: Gripper, skeleton: Skeleton, frame: CorotationalFrame | JoinedFrame | None = None
+) -> DrivenBody:
+    """Support and drive the frame of the right half.
+
+    The clamp is fixed, the drive point moves by the input along the axis, and can neither move across it nor rotate.
 
     Parameters
     ----------
@@ -49,7 +61,7 @@ def half_frame(gripper: Gripper, skeleton: Skeleton, frame: CorotationalFrame | 
     face = np.array([3 * (skeleton.corner + 1), 3 * (skeleton.heel + 1)])
     return DrivenBody(
         stiffness_n_mm=frame.stiffness_n_mm(),
-        assemble_mass=lambda: _mass_t(nodes, ends, skeleton),
+        assemble_mass=lambda: _mass_t(nodes, ends, skeleton, frame),
         tangent=frame.internal_force_n,
         driven=driven,
         free=np.setdiff1d(np.arange(frame.unknowns), [*held, *driven]),
@@ -72,16 +84,27 @@ def _end_compliance(gripper: Gripper, axis_mm: Array, place: int, skeleton: Skel
     return _STIFF_JOINT * bar_compliance(length, length, gripper.body.plate_mm, gripper.material)[_PLANAR]
 
 
-def _mass_t(nodes: Array, ends: NDArray[np.int64], skeleton: Skeleton) -> csr_matrix:
-    """Half of each member's mass at each end, with the rotational inertia that a uniform bar then lacks or exceeds.
+def _mass_t(
+    nodes: Array, ends: NDArray[np.int64], skeleton: Skeleton, frame: CorotationalFrame | JoinedFrame
+) -> csr_matrix:
+    """Half of each member's mass at each end, with the correction to a uniform bar's rotational inertia.
 
-    The paper's mass matrix (2), m and I_z, node by node: I_z of a bar about its middle is m (l^2 + w^2) / 12.
+    This is the mass matrix (2) of Hricko & Havlik (2015), m and I_z, node by node: I_z of a bar about its centre is m
+    (l^2 + w^2) / 12. A body that replaces members has its own mass matrix.
     """
     mass, inertia = np.zeros(len(nodes)), np.zeros(len(nodes))
+    body = frame.body if isinstance(frame, JoinedFrame) else None
     for member, (a, b) in zip(skeleton.members, ends.tolist(), strict=True):
+        if body is not None and is_of_finger(member.name):
+            continue
         length2 = float(np.sum((nodes[b] - nodes[a]) ** 2))
         for node in (a, b):
             mass[node] += 0.5 * member.mass_t
             inertia[node] += 0.5 * member.mass_t * (length2 + member.width_mm**2) / 12.0
     columns = np.stack([mass, mass, inertia], axis=1)
-    return csr_matrix(diags(columns.ravel()))
+    whole = csr_matrix(diags(columns.ravel()))
+    if body is None:
+        return whole
+    dofs = body.unknowns
+    entries = (body.mass_t.ravel(), (np.repeat(dofs, dofs.size), np.tile(dofs, dofs.size)))
+    return csr_matrix(whole + coo_matrix(entries, shape=whole.shape))

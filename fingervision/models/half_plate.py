@@ -1,6 +1,7 @@
-"""One half of the gripper as a meshed plate: what is clamped, guided and driven, and where the gap is measured.
+"""One half of the gripper as a meshed plate: its supports, guide, drive and measuring point.
 
-The lower face of the pillar is clamped, the symmetry axis cannot move across itself, the drive face moves by the input.
+The lower face of the pillar is clamped, the symmetry axis cannot move across itself, and the drive face moves by the
+input.
 """
 
 import numpy as np
@@ -18,7 +19,7 @@ _ON_MM = 1e-7
 
 
 def half_plate(gripper: Gripper, plate: PlaneStressPlate) -> DrivenBody:
-    """Support and drive a meshed right half.
+    """Support and drive the meshed right half.
 
     Parameters
     ----------
@@ -29,7 +30,7 @@ def half_plate(gripper: Gripper, plate: PlaneStressPlate) -> DrivenBody:
 
     Raises
     ------
-    FingervisionError
+    DataError
         Where the mesh has no node on the clamp, the axis, the drive face or the tip's inner face.
     """
     links, lever = gripper.links, gripper.lever
@@ -79,7 +80,7 @@ def _inner_face(gripper: Gripper, plate: PlaneStressPlate) -> Indices:
 
 
 def _measuring_point(gripper: Gripper, plate: PlaneStressPlate, edges: Indices) -> tuple[Indices, Array]:
-    """Nodes of the edge that holds the measuring point, and the quadratic weights of their displacements."""
+    """Nodes of the edge that contains the measuring point, and the quadratic weights of their displacements."""
     y = plate.nodes_mm[1]
     y_mm = gripper.measuring_point_mm[1]
     ends = np.sort(y[edges[:2]], axis=0)

@@ -1,10 +1,10 @@
-"""Compliance of a notch hinge: beam theory integrated along the notch, all six directions.
+"""Compliance of a notch hinge: beam theory integrated along the notch, in all six directions.
 
 The load acts at the right end of the notch, x = R, the left end is fixed. Order of the components: displacements along
-x, y, z, rotations about x, y, z; x along the hinge, y across it in the plane, z out of the plane. The circular case
-is that of Paros and Weisbord (1965) and Wu and Zhou (Rev. Sci. Instrum. 73 (2002) 3101), which this reproduces to ten
-digits; being beam theory it is too stiff, the more so the thicker the hinge: at t / R = 0.25 by 5 % in bending and by
-7 % along, and too soft by 28 % in torsion, against a finite-element model. `corrected_compliance` mends that.
+x, y, z, rotations about x, y, z; x along the hinge, y across it in the plane, z out of the plane. The circular case is
+that of Paros and Weisbord (1965) and Wu and Zhou (Rev. Sci. Instrum. 73 (2002) 3101), which this reproduces to ten
+digits. Beam theory is too stiff, the more so the thicker the hinge: compared with a finite-element model at t / R =
+0.25, by 5 % in bending and 7 % in tension; in torsion it is 28 % too soft. `corrected_compliance` mends that.
 """
 
 import numpy as np
@@ -65,7 +65,10 @@ def beam_compliance(notch: Notch, material: Material, span_mm: tuple[float, floa
 
 
 def bar_compliance(length_mm: float, width_mm: float, plate_mm: float, material: Material) -> Array:
-    """Compliance of a straight bar (Timoshenko beam) at its loaded end, the other end fixed; as `beam_compliance`."""
+    """Compliance of a straight bar (Timoshenko beam) at its loaded end, with the other end fixed.
+
+    As `beam_compliance`.
+    """
     E, G = material.youngs_modulus_mpa, material.shear_modulus_mpa
     area = width_mm * plate_mm
     powers = [length_mm ** (k + 1) / (k + 1) for k in range(3)]

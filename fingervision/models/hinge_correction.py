@@ -1,11 +1,12 @@
-"""Beam theory of the notch hinge corrected by finite elements: what the models use unless told otherwise.
+"""Beam theory of the notch hinge corrected by finite elements: the default of the models.
 
-Each direction's compliance is multiplied by ratios that `tests/benchmarks/models_hinge_table.py` prints for nu = 0.34:
-plane stress between rigid end planes to beam theory; how far the width holds it back, from quadratic bricks, which
-scales with nu^2; and for a hinge in a body, elastic blocks to rigid planes, because the blocks yield where the notch
-joins them. At t / R = 0.25 and b / t = 3 bricks are 1.05 times as compliant as beams in bending, 1.08 along and 0.78 in
-torsion, where warping is restrained. Between the table's nodes ratios are interpolated over log(t / R) and log(b / t);
-beyond its ends they are held, but for torsion, whose ratio goes on falling with (t / b)^2.
+The compliance in each direction is multiplied by ratios that `tests/benchmarks/models_hinge_table.py` prints for nu =
+0.34. The first is plane stress between rigid end planes to beam theory. The second is the restraint by the width, from
+quadratic bricks, which scales with nu^2. The third, for a hinge in a body, is elastic blocks to rigid planes, because
+the blocks yield where the notch joins them. At t / R = 0.25 and b / t = 3, bricks are 1.05 times as compliant as beams
+in bending, 1.08 times in tension, and 0.78 times in torsion, where warping is restrained. Between the nodes of the
+table, ratios are interpolated over log(t / R) and log(b / t); beyond its ends they are constant, except in torsion,
+where the ratio continues to fall with (t / b)^2.
 """
 
 from enum import StrEnum
@@ -23,7 +24,7 @@ Array = NDArray[np.float64]
 
 
 class HingeTheory(StrEnum):
-    """Where a hinge's compliance comes from."""
+    """Source of a hinge's compliance: beam theory, or corrected by finite elements."""
 
     CORRECTED = "corrected"
     BEAM = "beam"
@@ -153,7 +154,7 @@ def _bricks(t_over_r: float, b_over_t: float) -> tuple[float, ...]:
 
 
 def plane_strain_share(notch: Notch) -> float:
-    """How far the width holds the notch back in bending: 0 in plane stress, 1 in plane strain."""
+    """How strongly the width restrains the notch in bending: 0 in plane stress, 1 in plane strain."""
     share = _bricks(notch.curvature_ratio, notch.plate_mm / notch.thickness_mm)[_ABOUT_Z]
     return min(max(share, 0.0), 1.0)
 
@@ -179,7 +180,7 @@ def blocks_over_planes(notch: Notch) -> Array:
 
 
 def hinge_ratio(notch: Notch, material: Material, theory: HingeTheory) -> Array:
-    """Ratio of the compliance of a notch as a part of a body to beam theory, shape (6,); ones by beam theory."""
+    """Ratio of a notch's compliance in a body to beam theory, shape (6,); ones for beam theory."""
     if theory is HingeTheory.BEAM:
         return np.ones(6)
     ratio = planes_ratio(notch, material) * blocks_over_planes(notch)
@@ -191,8 +192,8 @@ def hinge_ratio(notch: Notch, material: Material, theory: HingeTheory) -> Array:
 def corrected_compliance(notch: Notch, material: Material) -> Array:
     """Compliance of a notch between rigid end planes, corrected by finite elements.
 
-    Congruence with a diagonal keeps the matrix symmetric and positive definite; the entries that couple displacement
-    and rotation are then within 0.3 % of the bricks' own.
+    The correction multiplies the matrix by a diagonal matrix from both sides, which keeps it symmetric and positive
+    definite; the entries that couple displacement and rotation then agree with bricks within 0.3 %.
 
     Returns
     -------
@@ -203,7 +204,7 @@ def corrected_compliance(notch: Notch, material: Material) -> Array:
 
 
 def hinge_compliance(notch: Notch, material: Material, theory: HingeTheory) -> Array:
-    """Compliance of a notch as a part of a body: between elastic blocks where corrected, by beam theory where asked."""
+    """Compliance of a notch in a body: between elastic blocks if corrected, or by beam theory."""
     return _scaled(beam_compliance(notch, material), hinge_ratio(notch, material, theory))
 
 

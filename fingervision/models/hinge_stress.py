@@ -1,8 +1,8 @@
-"""Nominal stress in the hinges of a frame: bending and tension of the section that the joints' loads pass through.
+"""Nominal stress in the hinges of a frame: bending and tension of the section under the loads of the joints.
 
-At the surface of a notch the stress is a few per cent higher than in a straight bar: Neuber's factors for a deep notch
-(Kerbspannungslehre, 1937; Pilkey, Peterson's Stress Concentration Factors, charts 2.10 and 2.31). A wide plate holds
-the hinge back, and what then acts across the plate lowers von Mises's stress.
+At the surface of a notch the stress is a few per cent higher than in a straight bar, by Neuber's factors for a deep
+notch (Kerbspannungslehre, 1937; Pilkey, Peterson's Stress Concentration Factors, charts 2.10 and 2.31). A wide plate
+restrains the hinge, and the resulting stress across the plate lowers the von Mises stress.
 """
 
 from math import atan, sqrt
@@ -14,6 +14,7 @@ from fingervision.domain.gripper import Gripper
 from fingervision.models.answer_figures import PeakStress
 from fingervision.models.corotational_frame import CorotationalFrame
 from fingervision.models.hinge_correction import HingeTheory, plane_strain_share
+from fingervision.models.joined_frame import JoinedFrame
 from fingervision.models.notch import Notch, notches_of
 from fingervision.models.skeleton import Member, Skeleton
 
@@ -61,14 +62,18 @@ def peak_hinge_stress(
 
 
 def peak_in_deformed_shape(
-    gripper: Gripper, skeleton: Skeleton, frame: CorotationalFrame, displacement: Array, theory: HingeTheory
+    gripper: Gripper,
+    skeleton: Skeleton,
+    frame: CorotationalFrame | JoinedFrame,
+    displacement: Array,
+    theory: HingeTheory,
 ) -> PeakStress:
-    """Find the same in the deformed shape: the loads in axes that have turned with the material."""
+    """The same in the deformed shape, with the loads in axes that rotate with the material."""
     return _peak(gripper, skeleton, frame.end_loads(displacement) * np.array([1.0, -1.0, 1.0]), theory)
 
 
 def _peak(gripper: Gripper, skeleton: Skeleton, loads: Array, theory: HingeTheory) -> PeakStress:
-    """Largest stress by tension and the moments at the start and the end of every member, shape (members, 3)."""
+    """Largest stress from tension and the moments at both ends of every member, shape (members, 3)."""
     lever = gripper.lever
     first, second = notches_of(gripper)
     hinges = {"hinge 1": (lever.hinge1_mm, first), "hinge 2": (lever.hinge2_mm, second)}

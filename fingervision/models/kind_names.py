@@ -1,4 +1,4 @@
-"""Names of the kinds of model, without importing any of them: what `--help` lists."""
+"""Names of the kinds of model, listed by `--help` without importing any model."""
 
 import pkgutil
 from functools import cache
@@ -10,7 +10,7 @@ GROUP = "fingervision.models"
 
 @cache
 def built_in_kinds() -> tuple[str, ...]:
-    """List the modules of this package that state their own name as KIND, sorted."""
+    """List the modules of this package that state a name as KIND, sorted."""
     here = Path(__file__).parent
     return tuple(
         sorted(

@@ -1,4 +1,4 @@
-"""The parametric models there are: modules of this package that state their KIND, and those of other distributions."""
+"""The parametric models: modules of this package that state their KIND, and those of other distributions."""
 
 import importlib
 from collections.abc import Iterable
@@ -31,32 +31,33 @@ class GripperModel(Model, Protocol):
 
     @property
     def input_range_mm(self) -> tuple[float, float]:
-        """Smallest and largest input that the model is meant for."""
+        """Smallest and largest input for which the model is meant (mm)."""
         ...
 
     @property
     def rest_gap_mm(self) -> float:
-        """The gap at input zero."""
+        """The gap at input zero (mm)."""
         ...
 
     def body_poses(self, input_mm: NDArray[np.float64]) -> dict[str, NDArray[np.float64]]:
-        """Answer the poses of the bodies at each input: x_mm, y_mm, angle_mrad, shape (n, 3) each.
+        """Poses of the bodies at each input: x_mm, y_mm, angle_mrad, shape (n, 3) each.
 
-        A model from outside the package may be without.
+        A model from outside the package may lack this method.
         """
         ...
 
     def figures(self) -> ModelFigures:
-        """Compute the model's row of the comparison."""
+        """Figures of the model for the comparison table."""
         ...
 
 
 class Kind(Protocol):
     """A module, or another object, that builds a model.
 
-    It may state besides: `SMALL_DISPLACEMENTS_ALONE`, True where it knows no large rotation and no contact; `TRUST`, a
-    number (finite elements of the outline 3, bars in the plane 2, bars at small displacements 1; 0 where not stated):
-    where two kinds differ by more than their own errors, the one with more is trusted, for the reason `WHY_TRUSTED`.
+    Optional attributes are `SMALL_DISPLACEMENTS_ALONE` (True for a model without large rotation and contact) and
+    `TRUST`, a number (finite elements of the outline 3, bars in the plane 2, bars at small displacements 1; default 0).
+    Where two kinds differ by more than their own errors, the one with the larger number is trusted, for the reason
+    given in `WHY_TRUSTED`.
     """
 
     KIND: str
@@ -91,17 +92,17 @@ def kinds() -> tuple[str, ...]:
 
 
 def small_displacements_alone(kind: str) -> bool:
-    """Whether a kind knows neither large rotation nor contact."""
+    """Whether a kind models neither large rotation nor contact."""
     return bool(getattr(REGISTRY.get(kind).value, "SMALL_DISPLACEMENTS_ALONE", False))
 
 
 def by_trust(names: Iterable[str]) -> list[str]:
-    """Sort kinds, the most trusted first; names that are no kind stand last in their order."""
+    """Sort kinds, the most trusted first; names that are no kind come last in their given order."""
     return sorted(names, key=lambda name: -trust(name))
 
 
 def trust(kind: str) -> int:
-    """How much a kind is trusted beside others: how much of the outline it has."""
+    """Trust in a kind relative to others: how much of the outline it models."""
     return int(getattr(REGISTRY.get(kind).value, "TRUST", 0)) if kind in kinds() else 0
 
 
@@ -128,7 +129,7 @@ def build_model(kind: str, gripper: Gripper, physics: Physics, theory: HingeTheo
     ------
     UsageError
         Where the kind is unknown or does not know the physics asked for.
-    FingervisionError
+    PluginShapeError
         A model from outside the package fails, or answers what is no answer.
     """
     try:
@@ -145,7 +146,7 @@ def build_model(kind: str, gripper: Gripper, physics: Physics, theory: HingeTheo
 def _tried(
     kind: str, origin: Origin, builder: Kind, gripper: Gripper, physics: Physics, theory: HingeTheory
 ) -> GripperModel:
-    """Build a model from outside the package, and look at one answer."""
+    """Build a model from outside the package, and check one response."""
     who = f"The model {kind} of {origin}"
     try:
         model = builder.build(gripper, physics, theory)

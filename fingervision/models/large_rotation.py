@@ -1,26 +1,80 @@
-"""Equilibrium in the deformed shape: Newton's method on the total Lagrangian equations, with contact where asked."""
+"""Equilibrium in the deformed shape: Newton's method on the total Lagrangian equations, with contact if requested.
+
+One tangent matrix is used for many steps, along the path too, as long as the residual falls well. If the fingers may
+touch, every step is a linear complementarity problem (Signorini) with the tangent's compliance, so that touching and
+separating points are found together with the displacements (Newton's method for generalised equations: Josephy,
+Mathematics Research Center report 1965, University of Wisconsin, 1979).
+"""
+
+from math import log
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse.linalg import SuperLU
 
 from fingervision.domain.errors import ModelError
 from fingervision.models.driven_body import DrivenBody, Equilibrium, factorised
+from fingervision.models.signorini import contact_forces_n
 
-_NEWTON_STEPS = 30
+Array = NDArray[np.float64]
+
+_TANGENTS, _STEPS_EACH = 30, 12
+"""A tangent costs as much as some ten steps."""
 _SET_CHANGES = 12
-_RESIDUAL = 1e-7
+_RESIDUAL, _ROUNDING = 1e-9, 1e-7
+"""Of the largest nodal force of the small displacements. Where the residual does not fall any more, it is rounding."""
 _ON_MM = 1e-7
 _STEP_MM = 0.5
 _SCALE_MM = 1e-3
-_SLOW = 0.1
-"""A residual that falls to less than a tenth in a step needs no new tangent, which costs as much as ten steps."""
+_CURVE = 3
+"""Equilibria that a next one is extrapolated from."""
 
 
-def large_equilibrium(body: DrivenBody, input_mm: float, start: Equilibrium, *, contact: bool) -> Equilibrium:
+class _Tangent:
+    """The latest tangent matrix of a body, factorised, with the displacements by a unit force on each face point."""
+
+    def __init__(self, body: DrivenBody, *, contact: bool) -> None:
+        self.body, self.contact = body, contact
+        self._solver: SuperLU | None = None
+        self.by_force = np.zeros((body.free.size, 0))
+        self.compliance = np.zeros((0, 0))
+
+    def renew(self, moved: Array) -> SuperLU:
+        """Compute the tangent at given displacements."""
+        free = self.body.free
+        solver = factorised(self.body.tangent(moved)[0][free][:, free])
+        self._solver = solver
+        if self.contact:
+            face = np.searchsorted(free, self.body.face)
+            loads = np.zeros((free.size, face.size))
+            loads[face, np.arange(face.size)] = 1.0
+            self.by_force = np.asarray(solver.solve(loads))
+            compliance = self.by_force[face]
+            self.compliance = 0.5 * (compliance + compliance.T)
+        return solver
+
+    def step(self, moved: Array, internal_n: Array) -> tuple[Array, Array]:
+        """Displacements of all unknowns, and contact forces, that balance the internal forces by this tangent."""
+        body, step = self.body, np.zeros_like(moved)
+        solver = self._solver or self.renew(moved)
+        step[body.free] = solver.solve(-internal_n[body.free])
+        pressed = np.zeros(body.face.size)
+        if self.contact:
+            pressed = contact_forces_n(self.compliance, body.face_gap_mm(moved) + step[body.face])
+            step[body.free] += self.by_force @ pressed
+        return step, pressed
+
+
+def large_equilibrium(
+    body: DrivenBody,
+    input_mm: float,
+    start: Equilibrium,
+    *,
+    contact: bool,
+) -> Equilibrium:
     """Find the equilibrium at one input.
 
-    With contact, nodes that would pass the symmetry plane are held on it, and nodes that it would have to pull are let
-    go, until neither remains: gap >= 0, force >= 0, and one of them zero.
+    With contact, gap >= 0, force >= 0, and one of them is zero at every point of the fingers' faces.
 
     Parameters
     ----------
@@ -35,57 +89,70 @@ def large_equilibrium(body: DrivenBody, input_mm: float, start: Equilibrium, *, 
 
     Raises
     ------
-    FingervisionError
+    ModelError
         Where the iteration does not settle.
     """
-    moved = start.displacement_mm + (input_mm - start.input_mm) * body.unit_displacement_mm
-    touching = start.contact_n > 0.0
-    for _ in range(_SET_CHANGES):
-        moved, internal = _newton(body, input_mm, moved, touching)
-        reaction = np.where(touching, internal[body.face], 0.0)
-        wanted = (touching & (reaction > 0.0)) | (body.face_gap_mm(moved) < -_ON_MM) & ~touching
-        if not contact or np.array_equal(wanted, touching):
-            return Equilibrium(input_mm, moved, 2.0 * float(internal[body.driven].sum()), reaction)
-        touching = wanted
-    raise ModelError(f"The touching part of the fingers did not settle at an input of {input_mm:g} mm.")
+    return _next(_Tangent(body, contact=contact), input_mm, [start])
 
 
-def _newton(
-    body: DrivenBody, input_mm: float, moved: NDArray[np.float64], touching: NDArray[np.bool_]
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    held = body.face[touching]
-    free = np.setdiff1d(body.free, held, assume_unique=True)
+def _next(tangent: _Tangent, input_mm: float, path: list[Equilibrium]) -> Equilibrium:
+    """Find the next equilibrium of a path."""
+    body = tangent.body
+    moved = _predicted(body, input_mm, path)
+    pressed = path[-1].contact_n if tangent.contact else np.zeros(body.face.size)
     scale_n = float(np.abs(body.stiffness_n_mm @ body.unit_displacement_mm).max()) * max(abs(input_mm), _SCALE_MM)
-    solver, before = None, np.inf
-    for _ in range(_NEWTON_STEPS):
-        step = np.zeros_like(moved)
-        step[body.driven] = input_mm - moved[body.driven]
-        step[held] = -body.face_gap_mm(moved)[touching]
-        placed = np.abs(step).max() < _ON_MM
+    before, renewed, since, stepped = np.inf, 0, 0, False
+    while True:
         internal = body.internal_force_n(moved)
-        residual = float(np.abs(internal[free]).max())
-        if residual < _RESIDUAL * scale_n and placed:
-            return moved, internal
-        if solver is None or not placed or residual > _SLOW * before:
-            # A tangent serves as long as the residual falls well by it.
-            tangent, internal = body.tangent(moved)
-            solver = factorised(tangent[free][:, free])
-            step[free] = solver.solve(-(internal + tangent @ step)[free])
-        else:
-            step[free] = solver.solve(-internal[free])
-        moved, before = moved + step, residual
-    raise ModelError(
-        f"The large-rotation equilibrium at an input of {input_mm:g} mm was not found in {_NEWTON_STEPS} steps; "
-        "use a smaller drive, or leave large rotation off."
-    )
+        unbalanced = internal.copy()
+        unbalanced[body.face] -= pressed
+        residual = float(np.abs(unbalanced[body.free]).max())
+        # Complementarity holds after a step, exactly: gaps are linear in the displacements.
+        settled = residual < _RESIDUAL * scale_n or (residual < _ROUNDING * scale_n and 2.0 * residual > before)
+        if settled and (stepped or not tangent.contact):
+            return Equilibrium(input_mm, moved, 2.0 * float(internal[body.driven].sum()), pressed)
+        if _is_slow(body, residual, before, _RESIDUAL * scale_n, since):
+            if renewed == _TANGENTS or not np.isfinite(residual):
+                raise ModelError(
+                    f"The large-rotation equilibrium at an input of {input_mm:g} mm was not found in {_TANGENTS} "
+                    "steps; use a smaller drive, or leave large rotation off."
+                )
+            tangent.renew(moved)
+            renewed, since = renewed + 1, 0
+        step, pressed = tangent.step(moved, internal)
+        moved, before, since, stepped = moved + step, residual, since + 1, True
+
+
+def _is_slow(body: DrivenBody, residual: float, before: float, wanted: float, since: int) -> bool:
+    """Whether computing a new tangent takes less work than the further steps with the present one."""
+    if body.nodal_force is None:  # forces come with the tangent
+        return True
+    if not residual < before:
+        return bool(np.isfinite(before))
+    if not np.isfinite(before):
+        return False
+    return since >= _STEPS_EACH or log(wanted / residual) / log(residual / before) > _STEPS_EACH - since
+
+
+def _predicted(body: DrivenBody, input_mm: float, path: list[Equilibrium]) -> Array:
+    """Extrapolate the path; with only one equilibrium, by the small displacements."""
+    last = path[-1]
+    if len(path) == 1:
+        return last.displacement_mm + (input_mm - last.input_mm) * body.unit_displacement_mm
+    known = path[-_CURVE:]
+    moved = np.zeros_like(last.displacement_mm)
+    for state in known:
+        others = [other.input_mm for other in known if other is not state]
+        moved += np.prod([(input_mm - at) / (state.input_mm - at) for at in others]) * state.displacement_mm
+    return moved
 
 
 def large_path(
     body: DrivenBody, last_mm: float, *, start: Equilibrium | None = None, contact: bool = False, least: int = 3
 ) -> list[Equilibrium]:
-    """Follow the equilibria from a first one, or from rest, to an input in steps of at most half a millimetre.
+    """Follow the equilibria from a first one, or from rest, to an input, in steps of at most half a millimetre.
 
-    At least three of them make a curve; one is enough where the last equilibrium alone is wanted (`least`).
+    A curve needs at least three steps; one is enough where only the last equilibrium is needed (`least`).
     """
     path = [start or body.at_rest()]
     first_mm = path[0].input_mm
@@ -93,18 +160,20 @@ def large_path(
     if key in body.paths:
         return body.paths[key]
     steps = max(least, int(np.ceil(abs(last_mm - first_mm) / _STEP_MM)))
+    tangent = _Tangent(body, contact=contact)
     for step in range(1, steps + 1):
         input_mm = last_mm if step == steps else first_mm + (last_mm - first_mm) * step / steps
-        path.append(large_equilibrium(body, input_mm, path[-1], contact=contact))
+        path.append(_next(tangent, input_mm, path))
     body.paths[key] = path
     return path
 
 
 def first_touch(body: DrivenBody, guess_mm: float) -> Equilibrium:
-    """Find the input at which the first point of the inner face meets the symmetry plane, by Newton's rule."""
+    """Find the input at which the first point of the inner face meets the symmetry plane, by Newton's method."""
     if guess_mm in body.touches:
         return body.touches[guess_mm]
-    state = large_equilibrium(body, guess_mm, body.at_rest(), contact=False)
+    tangent = _Tangent(body, contact=False)
+    state = _next(tangent, guess_mm, [body.at_rest()])
     for _ in range(_SET_CHANGES):
         gaps_mm = body.face_gap_mm(state.displacement_mm)
         place = int(np.argmin(gaps_mm))
@@ -112,5 +181,5 @@ def first_touch(body: DrivenBody, guess_mm: float) -> Equilibrium:
             body.touches[guess_mm] = state
             return state
         slope = float(body.unit_displacement_mm[body.face[place]])
-        state = large_equilibrium(body, state.input_mm - float(gaps_mm[place]) / slope, state, contact=False)
+        state = _next(tangent, state.input_mm - float(gaps_mm[place]) / slope, [state])
     raise ModelError(f"The input at which the fingers first touch was not found near {guess_mm:g} mm.")

@@ -1,7 +1,7 @@
 """A planar flexure mechanism as its drawing states it: bodies, flexures, supports, drive, probes."""
 
 from dataclasses import dataclass
-from math import hypot
+from math import hypot, pi
 from typing import Literal
 
 import numpy as np
@@ -11,11 +11,15 @@ from fingervision.domain.gripper import Material, PointMm
 from fingervision.models.flexure import Flexure
 from fingervision.models.planar_region import PlanarRegion
 from fingervision.models.plane_shapes import Shape
+from fingervision.models.width_effect import force_uncertainty
+
+_SAME_AREA = 1e-2
+"""Areas are those of polygons through the arcs, good to 1e-3."""
 
 
 @dataclass(frozen=True, slots=True)
 class Face:
-    """Nodes of the outline in an upright box: x from, x to, y from, y to."""
+    """The nodes of the outline inside an upright box: x from, x to, y from, y to (mm)."""
 
     name: str
     box_mm: tuple[float, float, float, float]
@@ -108,6 +112,12 @@ class Mechanism:
     body_names: tuple[str, ...] = ()
 
     @property
+    def width_error(self) -> float:
+        """Relative uncertainty of the force by how far the plate's width holds the flexures back."""
+        doubt = max((flexure.width_doubt(self.plate_mm) for flexure in self.flexures), default=0.0)
+        return 2.0 * force_uncertainty(self.material) + self.material.poisson_ratio**2 * doubt
+
+    @property
     def region(self) -> PlanarRegion:
         """The body: shapes and flexures, with corners where faces begin and end."""
         steps = (*self.bodies, *(step for flexure in self.flexures for step in flexure.steps()))
@@ -122,7 +132,7 @@ def check_mechanism(mechanism: Mechanism, region: PlanarRegion) -> None:
 
     Raises
     ------
-    FingervisionError
+    DataError
         Where it is not one body, a flexure holds no material or its neck is no neck, or a probe lies outside.
     """
     name = mechanism.name
@@ -151,6 +161,12 @@ def check_mechanism(mechanism: Mechanism, region: PlanarRegion) -> None:
             )
         if flexure.kind == "leaf":
             _check_leaf(flexure, region, uncut, name)
+        elif flexure.is_notch and any(_is_hole(loop.area_mm2, flexure) for loop in region.loops):
+            raise DataError(
+                f"The cuts of flexure {flexure.name} of {name} must open through the faces of what they part, but a "
+                f"whole ellipse of {flexure.half_length_mm:g} by {flexure.depth_mm:g} mm is a closed hole; make it "
+                "larger, or check its unit."
+            )
     for place, flexure in enumerate(mechanism.flexures):
         for other in mechanism.flexures[:place]:
             apart = hypot(flexure.at_mm[0] - other.at_mm[0], flexure.at_mm[1] - other.at_mm[1])
@@ -168,8 +184,14 @@ def check_mechanism(mechanism: Mechanism, region: PlanarRegion) -> None:
             raise DataError(f"face {face.name} of {name} must have a box of finite size.")
 
 
+def _is_hole(area_mm2: float, flexure: Flexure) -> bool:
+    """Whether a closed part of the outline is one whole cut of a flexure."""
+    cut_mm2 = pi * flexure.half_length_mm * flexure.depth_mm
+    return area_mm2 < 0.0 and abs(area_mm2 + cut_mm2) < _SAME_AREA * cut_mm2
+
+
 def _check_leaf(flexure: Flexure, region: PlanarRegion, uncut: PlanarRegion, name: str) -> None:
-    """A leaf is free for longer than it is thick, and both its ends lie inside bodies."""
+    """Check that a leaf is free for longer than it is thick, and that both its ends lie inside bodies."""
     t, reach = flexure.thickness_mm, flexure.half_length_mm
     beside = np.array([flexure.point_mm(x * t, s * 0.501 * t) for x in (-0.5, 0.5) for s in (-1.0, 1.0)]).T
     if region.holds(beside).any():

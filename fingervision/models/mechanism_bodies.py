@@ -1,4 +1,4 @@
-"""The bodies of a mechanism: what is left of the drawing, in one piece each, where its flexures are cut away."""
+"""The bodies of a mechanism: the connected pieces of the drawing that remain when its flexures are cut away."""
 
 import re
 from collections.abc import Mapping, Sequence
@@ -49,7 +49,7 @@ class LinkBody:
     centroid_mm: Array
 
     def holds(self, points_mm: Array) -> Flags:
-        """Whether points, shape (2, n), lie in it; arcs are taken as their chords."""
+        """Whether points, shape (2, n), lie in the body; arcs are replaced by their chords."""
         inside = _polygon(self.outline).holds(points_mm)
         for hole in self.holes:
             inside = inside & ~_polygon(hole).holds(points_mm)
@@ -57,7 +57,7 @@ class LinkBody:
 
 
 def bodies_of(mechanism: Mechanism, spans: Sequence[FlexureSpan] | None = None) -> tuple[LinkBody, ...]:
-    """Cut a mechanism into its bodies.
+    """Divide a mechanism into its bodies.
 
     Parameters
     ----------
@@ -86,10 +86,10 @@ def bodies_of(mechanism: Mechanism, spans: Sequence[FlexureSpan] | None = None) 
 def plate_poses(
     plate: PlaneStressPlate, bodies: Sequence[LinkBody], moved_mm: Array, *, large: bool
 ) -> dict[str, BodyPose]:
-    """Find the pose of every body that moves from the displacements of a mesh.
+    """Pose of every moving body, from the displacements of a mesh.
 
-    The nodes at the middles of the edges stand for a third of their triangles each, which integrates the quadratic
-    displacements of a triangle exactly.
+    The midside nodes each represent a third of their triangles, which integrates the quadratic displacements of a
+    triangle exactly.
 
     Parameters
     ----------
@@ -108,7 +108,7 @@ def plate_poses(
 
 
 def body_weights(plate: PlaneStressPlate, bodies: Sequence[LinkBody]) -> Mapping[str, tuple[Array, Array]]:
-    """Return the area that each node stands for, shape (nodes,), and the centroid, of every body that moves."""
+    """Area represented by each node, shape (nodes,), and the centroid, of every moving body."""
     corners = plate.nodes_mm[:, plate.corner_triangles]
     one, two = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
     third = np.abs(one[0] * two[1] - one[1] * two[0]) / 6.0
@@ -127,12 +127,12 @@ def body_weights(plate: PlaneStressPlate, bodies: Sequence[LinkBody]) -> Mapping
 
 
 def column_name(name: str) -> str:
-    """Return a body's name as it stands in a column's name."""
+    """Body's name as used in a column's name."""
     return re.sub(r"[^0-9A-Za-z_-]+", "_", name).strip("_") or "body"
 
 
 def _names(mechanism: Mechanism, pieces: Sequence[Loop]) -> list[str]:
-    """Name every piece by the first named shape that mostly lies in it; the others are numbered."""
+    """Name every piece by the first named shape that lies mostly in it; the others are numbered."""
     names: dict[int, str] = {}
     polygons = [_polygon(loop) for loop in pieces]
     for (added, shape), name in zip(mechanism.bodies, mechanism.body_names, strict=False):
@@ -157,7 +157,7 @@ def _points_in(shape: Shape) -> Array:
 
 
 def _corners(loop: Loop) -> Array:
-    """Corners of a loop with its arcs as chords, shape (2, n)."""
+    """Corners of a loop with arcs replaced by chords, shape (2, n)."""
     return np.concatenate(
         [c.at(np.linspace(c.t0, c.t1, 2 if c.is_straight else _CHORDS))[:, :-1] for c in loop.curves], axis=1
     )
@@ -173,7 +173,7 @@ def _point(loop: Loop) -> tuple[float, float]:
 
 
 def _centroid_mm(loops: Sequence[Loop]) -> Array:
-    """Centroid of an area by Green's formula; holes run the other way and count against it."""
+    """Centroid of an area by Green's formula; holes run in the opposite direction and are subtracted."""
     area, moment = 0.0, np.zeros(2)
     for loop in loops:
         a = _corners(loop)

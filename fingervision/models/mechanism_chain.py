@@ -1,11 +1,12 @@
-"""A mechanism that is a chain by its stiffness matrix: rigid bodies, flexures' compliances carried to the drive.
+"""Stiffness-matrix model of a chain mechanism: rigid bodies, and flexures' compliances summed at the drive.
 
-The paper's equations (5) to (15) in the plane for any chain from what is fixed to what is driven: C = sum T C_i T' at
-the drive, and the stiffness that of the directions which the drive and its guides hold. A loop has no such sum, and is
-refused.
+Equations (5) to (15) of Hricko & Havlik (2015), in the plane, for any chain from a fixed to the driven body: C = sum T
+C_i T' at the drive; the stiffness is that in the directions which the drive and its guides constrain. A closed loop has
+no such sum, and is refused.
 """
 
 from dataclasses import replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,14 +18,13 @@ from fingervision.models.hinge_correction import HingeTheory
 from fingervision.models.mechanism import Face, Mechanism, check_mechanism
 from fingervision.models.mechanism_bodies import LinkBody, bodies_of
 from fingervision.models.mechanism_faces import driven_components
+from fingervision.models.mechanism_frame import MechanismFrame
 from fingervision.models.mechanism_state import MechanismState, pair_distances_mm
 from fingervision.models.planar_region import PlanarRegion
 from fingervision.models.rigid_motion import MRAD, BodyPose
 
 Array = NDArray[np.float64]
 
-_FORCE_ERROR = 0.15
-"""Of rigid bodies: the paper's sample is 10 % too stiff without its links' own compliance (mechanics.md, section 5)."""
 _SAMPLES = 65
 _ON = 1e-6
 _BESIDE = 0.05
@@ -95,9 +95,9 @@ class MechanismChain:
         return bodies.pop()
 
     def _path_from(self, ground: set[int], driven: int) -> list[int]:
-        """Flexures from the ground to the driven body, in order.
+        """Flexures from the fixed body (ground) to the driven one, in order.
 
-        A chain has one flexure less than it has bodies, the ground counted once.
+        A chain has one flexure less than it has bodies, with the ground counted as one body.
         """
         name = self.mechanism.name
         merged = [tuple(-1 if body in ground else body for body in join) for join in self._joins]
@@ -123,7 +123,7 @@ class MechanismChain:
         return reached[driven]
 
     def _support(self) -> None:
-        """Directions at the drive's middle that the drive and the guides of its body hold: x, y, rotation."""
+        """Directions at the drive's centre that the drive and the guides of its body constrain: x, y, rotation."""
         mechanism = self.mechanism
         driven = self._only(mechanism.drive.face)
         held = {"x": False, "y": False, "turn": False}
@@ -149,7 +149,7 @@ class MechanismChain:
         self._load[self._held] = np.linalg.solve(compliance[np.ix_(self._held, self._held)], motion)
 
     def compliance_at(self, point: Array, path: list[int], loaded: Array | None = None) -> Array:
-        """Motion (x, y, rotation) of a point beyond some flexures by a load at another, shape (3, 3).
+        """Motion (x, y, rotation) of a point beyond some flexures under a load at another point, shape (3, 3).
 
         Parameters
         ----------
@@ -176,20 +176,32 @@ class MechanismChain:
 
     @property
     def stiffness_n_mm(self) -> float:
-        """Force at the drive by 1 mm of input."""
+        """Force at the drive per 1 mm of input (N/mm)."""
         return float(self._load[:2] @ self.mechanism.drive.direction)
 
     @property
     def force_error(self) -> float:
-        """Relative model error of the force: of bodies that do not yield."""
-        return _FORCE_ERROR
+        """Relative error of the force from treating bodies as rigid, by comparison with the lumped model."""
+        return self._errors[0]
+
+    @property
+    def stress_error(self) -> float:
+        """Relative error of the stress in the flexures, estimated in the same way."""
+        return self._errors[1]
+
+    @cached_property
+    def _errors(self) -> tuple[float, float]:
+        elastic = MechanismFrame(self.mechanism, theory=self.theory)
+        force = abs(self.stiffness_n_mm / elastic.stiffness_n_mm - 1.0)
+        stress = abs(self.state(1.0).stress_mpa / elastic.state(1.0).stress_mpa - 1.0)
+        return force + elastic.force_error, stress + elastic.stress_error
 
     def touch_input_mm(self) -> dict[str, float]:
-        """No contact is known here."""
+        """Empty: this model does not include contact."""
         return {}
 
     def modes_hz(self, *, drive_held: bool, count: int = 3) -> tuple[float, ...]:
-        """No masses are known here."""
+        """Empty: this model has no masses."""
         del drive_held, count
         return ()
 
@@ -198,7 +210,7 @@ class MechanismChain:
 
         Raises
         ------
-        FingervisionError
+        ModelError
             Where large rotation or contact is asked for.
         """
         if large_rotation or contact:
@@ -219,7 +231,7 @@ class MechanismChain:
                               self._poses(load))  # fmt: skip
 
     def _poses(self, load: Array) -> dict[str, BodyPose]:
-        """Rigid bodies' motions by a load at the drive."""
+        """Motions of the rigid bodies under a load at the drive."""
         found = {}
         for number, body in enumerate(self.bodies):
             if not body.is_fixed:
@@ -240,11 +252,11 @@ class MechanismChain:
                     if one in self._reached and other not in self._reached:
                         self._reached[other] = [*self._reached[one], place]
             if len(self._reached) == before:
-                raise ModelError(f"A probe of {self.mechanism.name} lies on a body that hangs on nothing.")
+                raise ModelError(f"A probe of {self.mechanism.name} lies on a body that nothing holds.")
         return self._reached[body]
 
     def _inward(self, point: tuple[float, float]) -> Array:
-        """A tiny way from a point on the outline into the body."""
+        """A point slightly inside the body, from a point on its outline."""
         for angle in np.linspace(0.0, 2.0 * np.pi, 9)[:-1]:
             way = 1e-5 * self._size_mm * np.array([np.cos(angle), np.sin(angle)])
             x, y = np.array(point) + way
@@ -263,5 +275,5 @@ class MechanismChain:
 
 
 def _carried(arm: Array) -> Array:
-    """Motion at a point from the motion where the arm begins; its transpose carries loads the other way."""
+    """Motion at a point from the motion where the arm begins; the transpose transfers loads the other way."""
     return np.array([[1.0, 0.0, -arm[1]], [0.0, 1.0, arm[0]], [0.0, 0.0, 1.0]])

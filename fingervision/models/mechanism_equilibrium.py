@@ -1,4 +1,4 @@
-"""Equilibria of a driven mechanism, whatever it is made of: small or large displacements, with or without contact."""
+"""Equilibria of any kind of driven mechanism: small or large displacements, with or without contact."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -33,7 +33,7 @@ _STILL = 1e-9
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MechanismEquilibrium:
-    """A mechanism at one input.
+    """State of a mechanism at one input.
 
     Parameters
     ----------
@@ -88,11 +88,11 @@ class DrivenMechanism:
 
     @cached_property
     def unit_displacement(self) -> Array:
-        """Small displacements by 1 mm of input.
+        """Small displacements per 1 mm of input.
 
         Raises
         ------
-        FingervisionError
+        ModelError
             Where nothing holds the mechanism.
         """
         try:
@@ -106,12 +106,15 @@ class DrivenMechanism:
 
     @cached_property
     def input_stiffness_n_mm(self) -> float:
-        """Force at the drive by 1 mm of input, at rest."""
+        """Force at the drive per 1 mm of input, at rest (N/mm)."""
         moved = self.unit_displacement
         return float(moved @ (self.stiffness_n_mm @ moved))
 
     def touch_inputs_mm(self) -> list[float | None]:
-        """Input nearest to rest at which each pair first touches, in small displacements; None where it never does."""
+        """Input nearest to zero at which each pair first touches, in small displacements (mm).
+
+        None where it never does.
+        """
         found: list[float | None] = []
         for gaps in self.gaps:
             gap, slope, _ = gaps(np.zeros(self.by_input.size))
@@ -126,7 +129,7 @@ class DrivenMechanism:
 
         Raises
         ------
-        FingervisionError
+        ModelError
             Where it cannot be followed from rest.
         """
         gaps = self.gaps if contact else ()
@@ -147,7 +150,7 @@ class DrivenMechanism:
 
     @cached_property
     def _touching(self) -> tuple[Array, Array, Array]:
-        """Gaps at rest of all nodes that may touch, their slopes, and displacements by unit forces there."""
+        """Gaps at rest of all nodes that may touch, their derivatives, and displacements under unit forces there."""
         gap, sparse, _ = self._all_gaps(self.gaps, np.zeros(self.by_input.size))
         slope = np.where(np.isfinite(gap)[:, None], sparse.toarray(), 0.0)
         return gap, slope, self.motions @ self._solver.solve(np.ascontiguousarray(self.motions.T @ slope.T))
@@ -170,7 +173,7 @@ class DrivenMechanism:
         return gap, slope, bend
 
     def _followed(self, input_mm: float, pairs: Pairs) -> MechanismEquilibrium:
-        """Follow the equilibria from rest, in steps that grow while they converge and are halved where they do not."""
+        """Follow the equilibria from rest, in steps that grow with convergence and are halved without it."""
         moved = np.zeros(self.by_input.size)
         path = [(0.0, moved)]
         touching = np.zeros(self._all_gaps(pairs, moved)[0].size, dtype=bool)
@@ -193,7 +196,10 @@ class DrivenMechanism:
         return MechanismEquilibrium(moved, float(self.by_input @ loads), self._by_pair(pressed) if pairs else ())
 
     def _predicted(self, path: list[tuple[float, Array]], input_mm: float) -> Array:
-        """Extrapolate the path; small displacements at first. Slender leaves would else be stretched by every step."""
+        """Extrapolate the path; from rest, use the small displacements.
+
+        Without extrapolation, slender leaves would be stretched in every step.
+        """
         if len(path) == 1:
             return input_mm * self.unit_displacement
         inputs = [at for at, _ in path]
@@ -206,7 +212,7 @@ class DrivenMechanism:
     def _settled(
         self, moved: Array, touching: Flags, pressed: Array, input_mm: float, pairs: Pairs
     ) -> tuple[Array, Flags, Array] | None:
-        """Hold the nodes that would pass and let go those that are pulled, until neither is left."""
+        """Hold nodes that would penetrate and release nodes under tension, until none of either is left."""
         for _ in range(_SET_CHANGES):
             found = self._newton(moved, touching, pressed, input_mm, pairs)
             if found is None:
@@ -222,7 +228,7 @@ class DrivenMechanism:
     def _newton(
         self, moved: Array, touching: Flags, pressed: Array, input_mm: float, pairs: Pairs
     ) -> tuple[Array, Array] | None:
-        """Newton's method with a given set of touching nodes; None where it does not converge."""
+        """Newton's method for a given set of touching nodes; None where it does not converge."""
         motions = self.motions
         scale = float(np.abs(self.stiffness_n_mm @ self.unit_displacement).max()) * abs(input_mm)
         solver, before = None, np.inf

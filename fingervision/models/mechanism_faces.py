@@ -1,4 +1,4 @@
-"""Which nodes of a meshed mechanism are held, slide and are driven, and whether that holds it."""
+"""Nodes of a meshed mechanism that are fixed, slide or are driven, and whether these supports are sufficient."""
 
 from dataclasses import dataclass
 
@@ -20,11 +20,11 @@ _LEVER = 1e-6
 
 
 def nodes_on(plate: PlaneStressPlate, face: Face, mechanism: Mechanism, size_mm: float) -> Indices:
-    """Nodes of the outline in a face's box.
+    """Nodes of the outline inside a face's box.
 
     Raises
     ------
-    FingervisionError
+    DataError
         Where there is no part of the outline.
     """
     x, y = plate.nodes_mm
@@ -42,7 +42,7 @@ def nodes_on(plate: PlaneStressPlate, face: Face, mechanism: Mechanism, size_mm:
 
 
 def mean_weights(plate: PlaneStressPlate, nodes: Indices) -> Array:
-    """Weights of nodes in the mean motion of a face, as a uniform load has them; shape (k,), their sum 1."""
+    """Weights of nodes in the mean motion of a face, those of a uniform load; shape (k,), with sum 1."""
     edges = plate.outline_edges[:, np.all(np.isin(plate.outline_edges, nodes), axis=0)]
     x, y = plate.nodes_mm
     length = np.hypot(x[edges[1]] - x[edges[0]], y[edges[1]] - y[edges[0]])
@@ -54,9 +54,9 @@ def mean_weights(plate: PlaneStressPlate, nodes: Indices) -> Array:
 
 
 def turns_with(plate: PlaneStressPlate, nodes: Indices, component: str) -> bool:
-    """Whether a face lies along a component, so that keeping it at every node would not keep the face from turning.
+    """Whether a face is parallel to a component, so that prescribing it at every node leaves the face free to rotate.
 
-    Such a face is driven in the mean: in large rotation it would else have to stretch in order to turn.
+    Any other face is driven by its mean motion, because in large rotation it would have to stretch in order to rotate.
     """
     places = plate.nodes_mm[:, nodes]
     spread = np.ptp(places, axis=1)
@@ -64,7 +64,7 @@ def turns_with(plate: PlaneStressPlate, nodes: Indices, component: str) -> bool:
 
 
 def driven_components(mechanism: Mechanism) -> tuple[str, ...]:
-    """Components that every node of the drive's face keeps: both where it is guided, else that of its direction."""
+    """Components prescribed at every node of the drive's face: both where it is guided, else that of its direction."""
     if mechanism.drive.across == "held":
         return "x", "y"
     return ("x",) if mechanism.drive.direction[0] != 0.0 else ("y",)
@@ -94,7 +94,7 @@ def supports_of(plate: PlaneStressPlate, mechanism: Mechanism, size_mm: float) -
 
     Raises
     ------
-    FingervisionError
+    DataError
         Where a face holds none, the drive's is fixed, or nothing is.
     """
     fixed = tuple(nodes_on(plate, face, mechanism, size_mm) for face in mechanism.fixed)

@@ -1,4 +1,4 @@
-"""What a mechanism's models answer at one input, whatever their kind."""
+"""State of a mechanism at one input, as computed by every kind of model."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -13,7 +13,7 @@ from fingervision.models.rigid_motion import BodyPose
 
 @dataclass(frozen=True, slots=True)
 class MechanismState:
-    """A mechanism at one input.
+    """State of a mechanism at one input.
 
     Parameters
     ----------
@@ -47,9 +47,9 @@ class MechanismState:
 def pair_distances_mm(
     mechanism: Mechanism, probes_mm: dict[str, tuple[float, float]], *, large: bool
 ) -> dict[str, float]:
-    """Distances of the pairs of probes, negative where they have passed each other.
+    """Distances of the pairs of probes (mm), negative where the probes have passed each other.
 
-    For small displacements they are linear in these, along the line that joins the probes at rest.
+    For small displacements the distance is linear in them, along the line that joins the probes at rest.
 
     Parameters
     ----------

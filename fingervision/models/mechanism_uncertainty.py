@@ -1,4 +1,4 @@
-"""The figures of a mechanism drawn by bodies with the uncertainty that its drawing's stated numbers give them."""
+"""Uncertainty of a mechanism's figures from the stated uncertainties of its dimensions."""
 
 from collections.abc import Callable, Mapping
 
@@ -18,8 +18,8 @@ def mechanism_uncertainty(
 ) -> dict[str, FigureUncertainty]:
     """Propagate stated uncertainties to every figure of `mechanism_figures`.
 
-    Changed drawings are answered by lumped flexures, or by finite elements where the drawing has none; the same u
-    stands beside another kind's figures.
+    Changed drawings are computed by lumped flexures, or by finite elements where the drawing has none; the same
+    uncertainty is stated for the other kinds of model.
 
     Parameters
     ----------

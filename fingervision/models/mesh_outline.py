@@ -46,7 +46,7 @@ def mesh_outline(gripper: Gripper, size: ElementSize) -> PlaneMesh:
 
     Raises
     ------
-    FingervisionError
+    DataError, ModelError
         Where the notches cut the body in two, or a hinge is none.
     """
     check_outline(gripper)

@@ -1,4 +1,4 @@
-"""How large triangles may be: a share of the material's width where it is thin, and no faster growth than a slope."""
+"""Element size: a fraction of the material's width where it is thin, with limited growth from element to element."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -32,7 +32,7 @@ as elsewhere would leave the force of the paper's sample 0.1 % too high."""
 
 @dataclass(frozen=True, eq=False)
 class SizeField:
-    """Edge lengths that grow away from points of the outline.
+    """Edge lengths that grow with the distance from points of the outline.
 
     Parameters
     ----------
@@ -65,7 +65,7 @@ class SizeField:
 
 
 def size_field(region: PlanarRegion, across: float, body_mm: float) -> SizeField:
-    """Measure how wide the material is at every point of the outline, straight across, and divide it.
+    """Measure the material's width at every point of the outline, perpendicular to it, and derive element sizes.
 
     Parameters
     ----------
@@ -105,7 +105,7 @@ def size_field(region: PlanarRegion, across: float, body_mm: float) -> SizeField
 
 
 def _thinned(at: Array, edge: Array, body_mm: float) -> SizeField:
-    """Leave out what others imply."""
+    """Remove points whose edge length follows from that of others."""
     order = np.argsort(edge)
     at, edge = at[order], edge[order]
     kept = np.ones(len(edge), dtype=bool)
@@ -137,7 +137,7 @@ def _lengths(curve: Curve, t: Array) -> Array:
 
 
 def _ray_length(at: Array, towards: Array, other: Curve, least: float) -> Array:
-    """Distance from points in directions to a curve; infinite where the ray misses it."""
+    """Distance from points along directions to a curve; infinite where the ray misses it."""
     apart = at - other.origin[:, None]
     if other.v is None:
         cross = towards[0] * other.u[1] - towards[1] * other.u[0]

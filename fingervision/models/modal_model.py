@@ -1,13 +1,13 @@
-"""A driven elastic body reduced to its static shape and its natural modes: the basis of every answer in motion.
+"""A driven elastic body reduced to its static shape and its natural modes: the basis of all dynamic responses.
 
-The drive's motion u is prescribed. The body follows it by its static shape s; each mode r of the body with its drive
-held is shaken by that shape's inertia (Craig and Bampton, AIAA J. 6 (1968) 1313, with one interface unknown):
+The motion u of the drive is prescribed. The body follows it by its static shape s; each mode r of the body with fixed
+drive is excited by that shape's inertia (Craig and Bampton, AIAA J. 6 (1968) 1313, with one interface unknown):
 
     q_r'' + 2 zeta_r w_r q_r' + w_r^2 q_r = -L_r u''
     force at the drive = k u + m u'' + sum_r L_r q_r''
 
-with L_r = phi_r' M s, k = s' K s and m = s' M s. Damping acts on what moves beside the static shape. A drive that is
-free to move and pushed by a force f vibrates in other modes (those with the drive free), with d_r their motion of the
+with L_r = phi_r' M s, k = s' K s and m = s' M s. Damping acts on the motion relative to the static shape. If the drive
+is free to move and pushed by a force f, other modes vibrate (those with free drive), with d_r their motion of the
 drive:
 
     q_r'' + 2 zeta_r w_r q_r' + w_r^2 q_r = d_r f
@@ -32,7 +32,7 @@ _HALVES = 2.0
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Observable:
-    """A length that a mechanism is asked for: a gap, or a component of a probe's displacement.
+    """An output of a mechanism: a gap, or a component of a probe's displacement.
 
     Parameters
     ----------
@@ -75,12 +75,12 @@ class ModalModel:
         return self.rad_s / (2.0 * pi)
 
     def with_modes(self, count: int) -> "ModalModel":
-        """Keep the first modes; what the others would add follows the drive at once."""
+        """Keep the first modes; the contribution of the others then follows the drive without delay."""
         observed = {name: replace(seen, by_mode=seen.by_mode[:count]) for name, seen in self.observed.items()}
         return replace(self, rad_s=self.rad_s[:count], participation=self.participation[:count], observed=observed)
 
     def damped(self, damping: Damping) -> tuple["ModalModel", Array]:
-        """Keep the modes that a damping law describes, with their damping ratios; see `described`."""
+        """Keep the modes for which a damping law is valid, with their damping ratios; see `described`."""
         ratios = described(damping, self.rad_s)
         return self.with_modes(ratios.size), ratios
 
@@ -103,10 +103,10 @@ class FreeModes:
 
 
 def described(damping: Damping, rad_s: Array) -> Array:
-    """Damping ratios of the modes that a law describes, from the lowest.
+    """Damping ratios of the modes for which a law is valid, from the lowest.
 
-    A law whose ratio leaves what a solid can have, as equation (4) does a few times above its reference, describes the
-    modes below that.
+    A law whose ratio leaves the range of solids, as equation (4) does at a few times its reference frequency, is used
+    for the modes below that.
 
     Raises
     ------
@@ -122,7 +122,7 @@ def described(damping: Damping, rad_s: Array) -> Array:
 
 
 def gripper_modes(body: DrivenBody, count: int) -> ModalModel:
-    """Reduce a gripper: both halves, which mirror each other.
+    """Reduce a gripper to its modes, with both halves moving as mirror images.
 
     Parameters
     ----------
@@ -148,7 +148,7 @@ def gripper_modes(body: DrivenBody, count: int) -> ModalModel:
 
 
 def gripper_free_modes(body: DrivenBody, count: int) -> FreeModes:
-    """Return a gripper's modes with its drive free, both halves mirroring each other."""
+    """Modes of a gripper with its drive free, with both halves moving as mirror images."""
     rad_s, shapes = body.modes(drive_held=False, count=count)
     drive = shapes[body.driven[0]] / sqrt(_HALVES)
     return FreeModes(rad_s, drive, {GAP: sqrt(_HALVES) * (body.weights @ shapes[body.measured])})

@@ -1,4 +1,4 @@
-"""The motion in time of a driven mechanism, small displacements: modes on top of the static answer."""
+"""Motion of a driven mechanism in time, for small displacements: modes superposed on the static response."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -19,7 +19,7 @@ _ALIKE_S = 1e-9
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Motion:
-    """What a mechanism does over a drive history.
+    """Motion of a mechanism over a drive history.
 
     Parameters
     ----------
@@ -49,14 +49,14 @@ class Motion:
     modes_hz: Array
 
     def vibration_mm(self, name: str) -> float:
-        """Largest difference from the static answer."""
+        """Largest difference from the static response (mm)."""
         return float(np.abs(self.observed_mm[name] - self.static_mm[name]).max(initial=0.0))
 
 
 def modal_motion(model: ModalModel, drive: DriveHistory, damping: Damping | None = None) -> Motion:
-    """Follow a drive history, straight between its samples; each run begins at rest at its first input.
+    """Compute the motion over a drive history, linear between its samples; each run begins at rest at its first input.
 
-    Every step is the exact solution of the modes' equations, so that sparse samples lose nothing.
+    Every step uses the exact solution of the modes' equations, so that sparse samples cause no error.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""The natural modes of a mechanism in its plane, by families, with their shapes as lines to draw."""
+"""Natural modes of a mechanism in its plane, by families, with their shapes as lines to draw."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -23,7 +23,7 @@ _FIRST = 4
 
 @dataclass(frozen=True, slots=True)
 class ModesWanted:
-    """How many modes of each family, or up to which frequency in Hz."""
+    """Number of modes of each family, or the frequency up to which they are wanted (Hz)."""
 
     count: int | None = None
     highest_hz: float = inf
@@ -64,7 +64,7 @@ class MeshedMechanism(Protocol):
 
 
 def parse_modes(text: str) -> ModesWanted:
-    """Read how many modes are wanted: `6`, or all up to a frequency, `500Hz`.
+    """Parse how many modes are wanted: `6`, or all up to a frequency, `500Hz`.
 
     Raises
     ------
@@ -88,7 +88,7 @@ def parse_modes(text: str) -> ModesWanted:
 
 
 def gripper_mode_shapes(model: Any, wanted: ModesWanted) -> list[ModeShape]:
-    """Modes of a gripper: both halves mirroring each other, drive free or held, and both swaying the same way.
+    """Modes of a gripper: symmetric with the drive free or fixed, and antisymmetric (both halves sway the same way).
 
     Parameters
     ----------
@@ -120,7 +120,7 @@ def gripper_mode_shapes(model: Any, wanted: ModesWanted) -> list[ModeShape]:
 
 
 def mechanism_mode_shapes(model: MeshedMechanism, wanted: ModesWanted) -> list[ModeShape]:
-    """Modes of a mechanism drawn by bodies, its drive free or held."""
+    """Modes of a mechanism drawn by bodies, with the drive free or fixed."""
     lines, points = _lines_of_plate(model.plate)
     found = []
     for family, held in (("drive free", False), ("drive held", True)):
@@ -153,7 +153,7 @@ def _wanted_modes(solve: Solve, wanted: ModesWanted, unknowns: int) -> tuple[Arr
 
 
 def _lines_of_half(model: Any) -> tuple[Array, NDArray[np.int64]]:
-    """Pieces to draw, shape (n, 2, 2), and the unknowns of their ends along x and y."""
+    """Line pieces to draw, shape (n, 2, 2), and the unknowns of their ends along x and y."""
     if hasattr(model, "plate"):
         return _lines_of_plate(model.plate)
     frame = model.frame
@@ -167,7 +167,7 @@ def _lines_of_plate(plate: PlaneStressPlate) -> tuple[Array, NDArray[np.int64]]:
 
 
 def _scaled(lines: Array, shape: Array, *, mirrored: bool) -> Array:
-    """Scale a shape to be seen; mirrored halves are drawn opening, and no farther than until they meet."""
+    """Scale a shape for display; symmetric modes are drawn opening, and without letting the halves intersect."""
     scale = _SHOWN * float(np.ptp(lines[..., 1])) / float(np.hypot(shape[..., 0], shape[..., 1]).max())
     if not mirrored:
         return scale * shape
@@ -177,6 +177,6 @@ def _scaled(lines: Array, shape: Array, *, mirrored: bool) -> Array:
 
 
 def _way_to_meeting(x: Array, across: Array) -> float:
-    """How large a shape may be drawn before a point of the half meets the symmetry axis."""
+    """Largest scale at which no point of the half crosses the symmetry axis."""
     closing = (across < 0.0) & (x > 1e-9 * float(x.max()))
     return float(np.min(-x[closing] / across[closing], initial=np.inf))

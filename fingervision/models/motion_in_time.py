@@ -1,4 +1,4 @@
-"""A gripper's answer to a drive history in time, with the physics that its model was built with."""
+"""Response of a gripper to a drive history in time, with the physics that its model includes."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -68,11 +68,11 @@ class GripperMotion:
 def gripper_motion(
     model: VibratingModel, drive: DriveHistory, damping: Damping | None = None, *, modes: int = MODES
 ) -> GripperMotion:
-    """Follow a drive history; each run begins at rest at its first input.
+    """Compute the motion over a drive history; each run begins at rest at its first input.
 
-    With small displacements the modes' equations are solved exactly. With large rotation or contact a frame of bars is
-    followed step by step where that takes at most 20 000 steps; otherwise the gripper passes through its equilibria,
-    and the modes at rest vibrate about them where the fingers do not touch, which is right while they vibrate little.
+    With small displacements the modes' equations are solved exactly. With large rotation or contact, a frame of bars is
+    integrated step by step if that takes at most 20 000 steps. Otherwise the gripper follows its equilibria, and the
+    modes at rest vibrate about them while the fingers do not touch, which is valid for small vibrations.
 
     Parameters
     ----------
@@ -87,7 +87,7 @@ def gripper_motion(
 
     Raises
     ------
-    FingervisionError
+    ModelError
         Where large rotation or contact meets vibrations that neither way can follow.
     """
     law = damping or ModalDamping()
@@ -127,7 +127,7 @@ def gripper_motion(
 def about_equilibria(
     small: Motion, static_mm: Mapping[str, Array], force_n: Array, apart: NDArray[np.bool_] | None = None
 ) -> Motion:
-    """Let the modes at rest vibrate about other equilibria than those of small displacements.
+    """Superpose the vibration of the modes at rest on equilibria that include large rotation or contact.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Nodes inside a body: seeded as the size field asks, moved by forces along the edges, settled at circumcentres.
+"""Nodes inside a body: seeded by the size field, moved by forces along the edges, settled at circumcentres.
 
 Persson and Strang, A simple mesh generator in MATLAB, SIAM Review 46 (2004) 329; Alliez et al., Variational tetrahedral
 meshing, ACM Trans. Graphics 24 (2005) 617, in the plane.
@@ -29,7 +29,7 @@ _CLEAR = 0.55
 
 
 def seeded_nodes(region: PlanarRegion, field: SizeField, outline: Array) -> Array:
-    """Nodes inside: centres of squares that are divided until they are as small as the field asks."""
+    """Initial inner nodes: centres of squares that are divided until they are as small as the size field requires."""
     low, high = outline.min(axis=1), outline.max(axis=1)
     side = float(field.body_mm)
     counts = np.ceil((high - low) / side).astype(int)
@@ -64,7 +64,7 @@ def _clear_of(points: Array, outline: Array, field: SizeField) -> Array:
 
 
 def relaxed_nodes(region: PlanarRegion, field: SizeField, outline: Array, inside: Array) -> tuple[Array, Indices]:
-    """Move the nodes inside to where triangles are good; all nodes, the outline first, and triangles."""
+    """Move the inner nodes until the triangles are good; return all nodes, the outline's first, and the triangles."""
     fixed = outline.shape[1]
     points = np.concatenate([outline, inside], axis=1)
     for _ in range(_ROUNDS):
@@ -101,7 +101,7 @@ def relaxed_nodes(region: PlanarRegion, field: SizeField, outline: Array, inside
 
 
 def _mended(points: Array, bad: Indices, fixed: int) -> Array | None:
-    """Take out the inner node nearest to each flat triangle's longest side; None where there is none to take."""
+    """Remove the inner node nearest to each flat triangle's longest side; None where there is none to remove."""
     if bad.shape[1] == 0:
         return None
     inner = np.unique(bad[bad >= fixed])
@@ -117,7 +117,7 @@ def _mended(points: Array, bad: Indices, fixed: int) -> Array | None:
 
 
 def _settled(points: Array, triangles: Indices, fixed: int) -> Array:
-    """Move every inner node to the area-weighted mean of its triangles' circumcentres, held within reason."""
+    """Move every inner node to the area-weighted mean of its triangles' circumcentres, by a limited distance."""
     a, b, c = (points[:, row] for row in triangles)
     ab, ac = b - a, c - a
     twice = ab[0] * ac[1] - ab[1] * ac[0]

@@ -17,7 +17,7 @@ _FINE = 400
 
 @dataclass(frozen=True, slots=True)
 class Notch:
-    """A bar of constant depth, thinned from both sides; x along its axis from the middle.
+    """A notch in a bar of constant depth, thinned from both sides; x along the bar's axis from the middle.
 
     Parameters
     ----------
@@ -53,24 +53,24 @@ class Notch:
 
     @property
     def is_circular(self) -> bool:
-        """Whether the closed forms of circular notches hold."""
+        """Whether the closed formulas of circular notches apply."""
         return self.half_length_mm == self.depth_mm
 
     @property
     def curvature_ratio(self) -> float:
-        """Thickness over the radius of curvature at the neck: t / R of a circular notch, t c / a^2 of an elliptic."""
+        """Thickness over radius of curvature at the neck: t / R of a circular notch, t c / a^2 of an elliptic one."""
         return self.thickness_mm * self.depth_mm / self.half_length_mm**2
 
     @property
     def reach_mm(self) -> float:
-        """How far the notch extends along the bar from its middle."""
+        """Extent of the notch along the bar from its middle (mm)."""
         share = 1.0 - 0.5 * (self.web_mm - self.thickness_mm) / self.depth_mm
         return self.half_length_mm * sqrt(1.0 - max(share, 0.0) ** 2)
 
     def stations_mm(self, pieces: int) -> Array:
-        """Edges of pieces along the notch, close together where it bends; shape (pieces + 1,), odd about the middle.
+        """Ends of pieces along the notch, closer together where it bends; shape (pieces + 1,), odd about the middle.
 
-        Half of the pieces follow the share in bending, the integral of 1 / h^3, half the length.
+        Half of the pieces are spaced by their share of the bending, the integral of 1 / h^3, the other half by length.
         """
         # x = a tan-like spacing near the neck: the bending part is sqrt(t R) long, and must be sampled finely.
         fine = np.sinh(np.linspace(0.0, np.arcsinh(20.0 * self.reach_mm / self._bending_mm), _FINE))
@@ -83,12 +83,12 @@ class Notch:
 
     @property
     def _bending_mm(self) -> float:
-        """Length that bends: sqrt(t R), with the radius of curvature at the neck."""
+        """Length over which the notch bends: sqrt(t R), with R the radius of curvature at the neck (mm)."""
         return min(sqrt(self.thickness_mm * self.half_length_mm**2 / self.depth_mm), self.reach_mm)
 
     @property
     def bending_share(self) -> float:
-        """Length that bends over the half length: sqrt(t / c) of the ellipse, sqrt(t / R) of a circle; at most 1."""
+        """Bending length over half length: sqrt(t / c) for an ellipse, sqrt(t / R) for a circle; at most 1."""
         return min(sqrt(self.thickness_mm / self.depth_mm), 1.0)
 
     def height_mm(self, x_mm: Array) -> Array:
@@ -98,12 +98,12 @@ class Notch:
 
 
 def circular_notch(radius_mm: float, thickness_mm: float, plate_mm: float) -> Notch:
-    """Cut a notch with two discs."""
+    """A notch cut by two discs."""
     return Notch(thickness_mm, radius_mm, radius_mm, plate_mm)
 
 
 def notches_of(gripper: Gripper) -> tuple[Notch, Notch]:
-    """Take the notches of hinge 1, in the pillar, and hinge 2, in the shuttle."""
+    """The notches of hinge 1, in the pillar, and hinge 2, in the shuttle."""
     hinge, links = gripper.hinge, gripper.links
     x0, x1, _, _ = links.pillar_and_root_mm
     first, second = (
@@ -114,7 +114,7 @@ def notches_of(gripper: Gripper) -> tuple[Notch, Notch]:
 
 
 def masses_t(notch: Notch, material: Material, edges_mm: Array) -> Array:
-    """Masses between stations of the notch, equation (1) of the paper: density times depth times area.
+    """Masses between stations of the notch by equation (1) of Hricko & Havlik (2015): density times depth times area.
 
     The integral of h has a closed form; int sqrt(1 - s^2) ds = (s sqrt(1 - s^2) + asin s) / 2.
     """

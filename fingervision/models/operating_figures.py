@@ -1,4 +1,4 @@
-"""What a designer asks of a gripper beside gap and force: leverage, parasitic motion, limits, weight and warmth."""
+"""Figures for a designer of grippers: leverage, parasitic motion, limits, effects of weight and temperature."""
 
 from dataclasses import dataclass
 
@@ -15,7 +15,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True)
 class OperatingFigures:
-    """One gripper, small displacements.
+    """Operating figures of one gripper, for small displacements.
 
     Parameters
     ----------

@@ -1,7 +1,7 @@
-"""How a mechanism moves out of its plane with its drive held: natural modes, and the sag of a horizontal plate.
+"""Out-of-plane motion of a mechanism with its drive fixed: natural modes, and the sag of a horizontal plate.
 
-Fixed faces and the drive's face are held in all directions; a face that slides keeps its own direction, at every depth,
-which on a plane of symmetry is the mode that is alike on both sides.
+Fixed faces and the drive's face are fixed in all directions. A sliding face is fixed in its own direction at every
+depth, which on a plane of symmetry selects the symmetric modes.
 """
 
 from collections.abc import Mapping
@@ -30,7 +30,7 @@ _ACROSS, _BODY = 2.0, 0.05
 
 @dataclass(frozen=True, slots=True)
 class OutOfPlane:
-    """Motion across the plane.
+    """Results for motion out of the plane.
 
     Parameters
     ----------
@@ -47,7 +47,7 @@ class OutOfPlane:
 def out_of_plane(
     mechanism: Mechanism, count: int = 1, *, mesh: PlaneMesh | None = None, order: int | None = None
 ) -> OutOfPlane:
-    """Compute modes and sag across the plane.
+    """Compute modes and sag out of the plane.
 
     Parameters
     ----------
@@ -62,7 +62,7 @@ def out_of_plane(
 
     Raises
     ------
-    FingervisionError
+    DataError, ModelError
         Where a face holds no part of the outline.
     """
     region = mechanism.region

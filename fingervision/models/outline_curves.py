@@ -1,4 +1,4 @@
-"""Curves of a plane outline: straight segments and arcs of ellipses, with the places where one meets another."""
+"""Curves of a plane outline: straight segments and elliptic arcs, and the points where two of them meet."""
 
 from dataclasses import dataclass
 
@@ -74,11 +74,11 @@ class Curve:
         return np.asarray(np.sum(first**2, axis=0) ** 1.5 / cross)
 
     def part(self, t0: float, t1: float) -> "Curve":
-        """Return the same curve between other ends."""
+        """Return the part of the curve between two other ends."""
         return Curve(self.origin, self.u, self.v, t0, t1)
 
     def level(self, points: Array) -> Array:
-        """Zero on the endless line or the whole ellipse, of opposite signs on its two sides; shape (n,).
+        """Signed measure of the side: zero on the infinite line or the whole ellipse, shape (n,).
 
         The distance in mm from a line, the relative squared radius less 1 for an ellipse.
         """
@@ -89,7 +89,7 @@ class Curve:
         return np.asarray(np.sum(unit**2, axis=0) - 1.0)
 
     def holds(self, point: Array) -> bool:
-        """Whether a point of the endless curve lies between the ends."""
+        """Whether a point of the extended curve lies between the ends."""
         apart = point - self.origin
         if self.v is None:
             t = float(apart @ self.u / (self.u @ self.u))
@@ -101,7 +101,7 @@ class Curve:
 
 
 def crossings(curve: Curve, other: Curve) -> list[float]:
-    """Parameters of a curve, strictly between its ends, at which it meets another one or passes along its ends."""
+    """Parameters of a curve, strictly between its ends, at which it meets another curve or passes along its ends."""
     found = _meetings(curve, other)
     for corner in (other.start_mm, other.end_mm):
         # Curves that lie on each other are divided at each other's ends.
@@ -112,7 +112,7 @@ def crossings(curve: Curve, other: Curve) -> list[float]:
 
 
 def other_holds(curve: Curve, other: Curve, t: float) -> bool:
-    """Whether the point at parameter t of one curve lies between the ends of another curve."""
+    """Whether the point at parameter t of one curve lies between the ends of another."""
     return other.holds(curve.at(np.array([t]))[:, 0])
 
 

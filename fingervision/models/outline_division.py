@@ -1,4 +1,4 @@
-"""The outline of a body divided into edges as short as the size field asks."""
+"""The outline of a body divided into edges by the size field."""
 
 from dataclasses import dataclass
 from itertools import pairwise
@@ -27,7 +27,7 @@ class OutlineSide:
 
 
 def divided_outline(region: PlanarRegion, field: SizeField) -> list[OutlineSide]:
-    """Divide every loop of the outline into edges as long as the field asks."""
+    """Divide every loop of the outline into edges of the length that the size field requires."""
     sides: list[OutlineSide] = []
     count = 0
     for loop in region.loops:
@@ -41,7 +41,7 @@ def divided_outline(region: PlanarRegion, field: SizeField) -> list[OutlineSide]
 
 
 def _stations(curve: Curve, field: SizeField) -> Array:
-    """Parameters that divide a curve into edges as long as the field asks."""
+    """Parameters that divide a curve into edges of the length that the size field requires."""
     t = np.linspace(curve.t0, curve.t1, 60)
     for _ in range(2):  # the second time the samples lie as close as the edges are short
         at = curve.at(t)
@@ -62,7 +62,7 @@ def outline_points(sides: list[OutlineSide]) -> Array:
 
 
 def halved(sides: list[OutlineSide], missing: set[int]) -> list[OutlineSide]:
-    """Divide some edges of the outline in two."""
+    """Divide the given edges of the outline in two."""
     parts: list[OutlineSide] = []
     count = len(sides)
     for place, side in enumerate(sides):
@@ -77,7 +77,7 @@ def halved(sides: list[OutlineSide], missing: set[int]) -> list[OutlineSide]:
 
 
 def missing_sides(sides: list[OutlineSide], triangles: Indices) -> set[int]:
-    """Edges of the outline that are no triangle's, or that have triangles on both sides."""
+    """Edges of the outline that belong to no triangle, or that have triangles on both sides."""
     pairs = np.sort(np.hstack([triangles[[0, 1]], triangles[[1, 2]], triangles[[0, 2]]]), axis=0)
     count = int(triangles.max()) + 1
     numbers, times = np.unique(pairs[0] * count + pairs[1], return_counts=True)
@@ -87,7 +87,7 @@ def missing_sides(sides: list[OutlineSide], triangles: Indices) -> set[int]:
 
 
 def flat_sides(sides: list[OutlineSide], points: Array, triangles: Indices) -> set[int]:
-    """Longest edges of flat triangles, where they are edges of the outline."""
+    """Longest edges of flat triangles, if they are edges of the outline."""
     bad = triangles[:, triangle_quality(points, triangles) < LEAST_QUALITY]
     place_of = {frozenset((side.first, side.second)): place for place, side in enumerate(sides)}
     found = set()
@@ -100,7 +100,7 @@ def flat_sides(sides: list[OutlineSide], points: Array, triangles: Indices) -> s
 
 
 def with_middles(points: Array, triangles: Indices, sides: list[OutlineSide]) -> PlaneMesh:
-    """Number the nodes that are used and add those amid the edges, on the arcs where the outline is curved."""
+    """Renumber the nodes that are used and add midside nodes, which lie on the arcs where the outline is curved."""
     used, packed = np.unique(triangles, return_inverse=True)
     place_of = np.full(points.shape[1], -1)
     place_of[used] = np.arange(used.size)

@@ -1,4 +1,4 @@
-"""A grid over numbers of a drawing, each variant answered by the lumped model."""
+"""A grid over dimensions of a drawing: the lumped model's figures, changed by the ratio that a bar model computes."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from fingervision.domain.errors import FingervisionError, ModelError, UsageError
 from fingervision.domain.gripper import Gripper
+from fingervision.models.changed_drawings import ratios, scaled
 from fingervision.models.drive_block_sweep import block_compliances
 from fingervision.models.gripper_outline import check_outline
 from fingervision.models.hinge_correction import HingeTheory
@@ -39,7 +40,7 @@ _MOST_MECHANISMS = 400
 
 @dataclass(frozen=True, slots=True)
 class Variation:
-    """Values that one number of a drawing takes.
+    """Values of one dimension of a drawing.
 
     Parameters
     ----------
@@ -76,7 +77,7 @@ def parse_variation(text: str) -> Variation:
 
 
 def varied(gripper: Gripper, variations: Sequence[Variation], values: Sequence[float]) -> Gripper:
-    """Redraw a gripper with some numbers at given values, and all that hangs on them."""
+    """Return a gripper with some dimensions at given values, and all dependent ones adapted."""
     for variation, value in zip(variations, values, strict=True):
         try:
             now = attrgetter(variation.name)(gripper)
@@ -92,7 +93,7 @@ def varied(gripper: Gripper, variations: Sequence[Variation], values: Sequence[f
 
 
 def sweep_answers(gripper: Gripper, variations: Sequence[Variation], theory: HingeTheory) -> tuple[Array, Array]:
-    """Answer every combination of the values.
+    """Compute the responses for every combination of the values.
 
     Parameters
     ----------
@@ -112,7 +113,7 @@ def sweep_answers(gripper: Gripper, variations: Sequence[Variation], theory: Hin
 
     Raises
     ------
-    FingervisionError
+    DataError, ModelError, UsageError
         Where a corner of the grid is no gripper, or the grid is too large.
     """
     grid = list(product(*(variation.values for variation in variations)))
@@ -123,21 +124,29 @@ def sweep_answers(gripper: Gripper, variations: Sequence[Variation], theory: Hin
     rows = []
     corrected = theory is HingeTheory.CORRECTED
     blocks = block_compliances(partial(varied, gripper, variations), [v.values for v in variations])
+    by = ratios(_figures(LumpedGripper(gripper, theory=theory)),
+                _figures(LumpedGripper(gripper, theory=theory, bars_alone=True)))  # fmt: skip
     for values in grid:
         drawn = varied(gripper, variations, values)
-        model = LumpedGripper(drawn, theory=theory, block=blocks(values) if corrected else None)
-        stress, touch = model.peak_stress().mpa_per_mm, model.half.first_touch_mm()
-        force = model.half.equilibrium(1.0).force_n
-        at_yield = drawn.material.yield_mpa / stress
-        mode = model.modes_hz(drive_held=False, count=1)[0]
-        rows.append((gap_per_input(model.half), force, stress, at_yield, -np.inf if touch is None else touch, mode))
-    return np.array(grid), np.array(rows)
+        block = blocks(values) if corrected else None
+        rows.append(scaled(_figures(LumpedGripper(drawn, theory=theory, block=block, bars_alone=True)), by))
+    return np.array(grid), np.array([list(row.values()) for row in rows], dtype=float)
+
+
+def _figures(model: LumpedGripper) -> dict[str, float]:
+    """Figures of a drawing under the names of `COLUMNS`."""
+    stress, touch = model.peak_stress().mpa_per_mm, model.half.first_touch_mm()
+    at_yield = model.gripper.material.yield_mpa / stress
+    mode = model.modes_hz(drive_held=False, count=1)[0]
+    row = (gap_per_input(model.half), model.half.equilibrium(1.0).force_n, stress, at_yield,
+           -np.inf if touch is None else touch, mode)  # fmt: skip
+    return dict(zip(COLUMNS, row, strict=True))
 
 
 def mechanism_sweep_answers(
     redrawn_to: Callable[[Mapping[str, float]], Mechanism], variations: Sequence[Variation]
 ) -> tuple[Array, tuple[str, ...], Array]:
-    """Answer every combination of the values for a mechanism drawn by bodies.
+    """Compute the responses for every combination of the values, for a mechanism drawn by bodies.
 
     Parameters
     ----------
@@ -157,7 +166,7 @@ def mechanism_sweep_answers(
 
     Raises
     ------
-    FingervisionError
+    DataError, ModelError, UsageError
         Where a variant is no mechanism, or the grid is too large.
     """
     grid = list(product(*(variation.values for variation in variations)))

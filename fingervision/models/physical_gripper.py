@@ -1,7 +1,7 @@
-"""A drawn gripper for the diagnosis: its small answer, and the laws by which it obeys effects of the catalogue.
+"""A drawn gripper for the diagnosis: its small-displacement response, and the laws for effects of the catalogue.
 
-What is expensive (large rotation, contact, changed links) is worked out once and interpolated, so that a search may ask
-thousands of times.
+Expensive parts (large rotation, contact, changed links) are computed once and interpolated, so that a search may
+evaluate them thousands of times.
 """
 
 from collections.abc import Mapping
@@ -36,7 +36,7 @@ _SHORTER, _LONGER = -0.26, 0.5
 
 
 class PhysicalGripper:
-    """One kind of model of a drawing, with small displacements where no effect says otherwise.
+    """One kind of model of a drawing, with small displacements unless an effect changes that.
 
     Parameters
     ----------
@@ -59,7 +59,7 @@ class PhysicalGripper:
         self.answer = self._drawn
 
     def respond(self, input_mm: Array) -> Response:
-        """Answer by small displacements, both halves alike."""
+        """Respond by small displacements, with two identical halves."""
         answer = self.answer
         right = 0.5 * (answer.rest_gap_mm + answer.gap_per_input * np.asarray(input_mm, dtype=float))
         return Response(-right, right, answer.force_per_input_n_mm * np.asarray(input_mm, dtype=float))
@@ -81,12 +81,12 @@ class PhysicalGripper:
 
     @cached_property
     def places(self) -> PlaceAnswers:
-        """How both halves answer with one of their places changed, by condensed bodies whatever the kind."""
+        """Predictions for both halves with a hinge or link changed, by condensed bodies for every kind of model."""
         return PlaceAnswers(whole_mechanism(self.gripper, self.gripper, "gripper"))
 
     @property
     def uncertain(self) -> Mapping[str, Estimate]:
-        """Numbers of the drawing with a stated uncertainty, by dotted name; a fit may change each within it."""
+        """Dimensions of the drawing with a stated uncertainty, by dotted name; a fit may change each within it."""
         return {
             name: Estimate(attrgetter(name)(self.gripper), u)
             for name, u in self.gripper.uncertainties.items()
@@ -94,7 +94,7 @@ class PhysicalGripper:
         }
 
     def redrawn(self, changes: Mapping[str, float]) -> "PhysicalGripper":
-        """Return the gripper with some of its numbers changed; its laws stay those of the drawing."""
+        """Return the gripper with some dimensions changed; its laws stay those of the original drawing."""
         changed = copy(self)
         changed.laws = self.laws
         if not changes:

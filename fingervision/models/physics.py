@@ -1,11 +1,11 @@
-"""Which physics a model answers with beyond small displacements."""
+"""Physics that a model includes beyond small displacements."""
 
 from dataclasses import dataclass
 
 
 @dataclass(frozen=True, slots=True)
 class Physics:
-    """Switches of a mechanical model; all off is the linear model that the paper computed.
+    """Options of a mechanical model; with all of them off it is the linear model of Hricko & Havlik (2015).
 
     Parameters
     ----------

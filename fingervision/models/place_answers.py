@@ -1,7 +1,8 @@
-"""How a mechanism answers with one of its places changed: a hinge's stiffness, where a hinge sits, a pivot's slip.
+"""Response of a mechanism with one place changed: the stiffness or position of a hinge, or a slip in a pivot.
 
-Bodies keep their condensed stiffness; a flexure that sits elsewhere is joined to them by a rigid arm, and a flexure of
-another thickness keeps its ends. A changed answer then costs one small system of equations, a thousandth of a new mesh.
+Bodies keep their condensed stiffness; a displaced flexure is joined to them by a rigid arm, and a flexure of another
+thickness keeps its ends. A changed response then costs one small system of equations, a thousandth of the time for a
+new mesh.
 """
 
 from collections.abc import Mapping, Sequence
@@ -29,7 +30,7 @@ _THINNEST, _THICKEST = 0.3, 2.5
 
 @dataclass(frozen=True, slots=True)
 class PlaceChanges:
-    """What differs from the drawing.
+    """Changes of a mechanism relative to its drawing.
 
     Parameters
     ----------
@@ -51,7 +52,7 @@ AS_DRAWN = PlaceChanges({}, {}, {})
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LinearAnswer:
-    """Small displacements of a mechanism.
+    """Small-displacement response of a mechanism.
 
     Parameters
     ----------
@@ -73,7 +74,7 @@ class LinearAnswer:
 
 
 class PlaceAnswers:
-    """A mechanism of lumped flexures whose places can be changed.
+    """A mechanism of lumped flexures whose hinges and links can be changed.
 
     Parameters
     ----------
@@ -90,14 +91,14 @@ class PlaceAnswers:
 
     @cached_property
     def channels(self) -> tuple[str, ...]:
-        """Names of what is answered: poses of bodies, angles of hinges, probes, pairs, the force at the drive."""
+        """Names of the outputs: poses of bodies, angles of hinges, probes, pairs, the force at the drive."""
         bodies = [f"{name}.{part}" for name in self._weights for part in ("x_mm", "y_mm", "angle_mrad")]
         hinges = [f"{flexure.name}.angle_mrad" for flexure in self.mechanism.flexures]
         probes = [f"{name}_{axis}_mm" for name in self.mechanism.probes for axis in "xy"]
         return (*bodies, *hinges, *probes, *(f"{name}_mm" for name in self.mechanism.pairs), "force_n")
 
     def _make_observers(self) -> None:
-        """Channels as linear functionals of the motions of frames; angles of hinges follow from these."""
+        """Outputs as linear functionals of the frames' motions; angles of hinges are derived from these."""
         model, plate = self.model, self.model.plate
         self._weights = body_weights(plate, model.bodies)
         size = model.frame.unknowns
@@ -133,7 +134,7 @@ class PlaceAnswers:
             self._probe_of[name] = number, own
 
     def _turn_of(self, body: int) -> Array:
-        """Mean rotation of a body in rad, as a functional of the motions."""
+        """Mean rotation of a body in rad, as a functional of the frames' motions."""
         assembly, plate = self.model.assembly, self.model.plate
         nodes = np.flatnonzero(assembly.piece == body)
         arm = plate.nodes_mm[:, nodes] - plate.nodes_mm[:, nodes].mean(axis=1)[:, None]
@@ -149,7 +150,7 @@ class PlaceAnswers:
         return tuple(self._weights)
 
     def numbered_bodies(self) -> dict[int, LinkBody]:
-        """Return the drawing's body of every number."""
+        """Bodies of the drawing by their number."""
         model, found = self.model, {}
         for number in range(len(model.assembly.bodies)):
             nodes = np.flatnonzero(model.assembly.piece == number)
@@ -171,7 +172,7 @@ class PlaceAnswers:
         return self._probe_of[probe][0]
 
     def thickness_for(self, flexure: int, ratio: float) -> float:
-        """Thickness at which a flexure's bending stiffness is (1 + ratio) times the drawn one."""
+        """Thickness at which a flexure's bending stiffness is (1 + ratio) times the drawn one (mm)."""
         drawn = self.mechanism.flexures[flexure].thickness_mm
         softness = self._bending_compliance(flexure, drawn) / (1.0 + ratio)
         return float(brentq(lambda t: np.log(self._bending_compliance(flexure, t) / softness),
@@ -188,7 +189,7 @@ class PlaceAnswers:
         return np.asarray(own)
 
     def answer(self, changes: PlaceChanges = AS_DRAWN) -> LinearAnswer:
-        """Answer all channels with some places changed."""
+        """Compute all outputs with some places changed."""
         model, frame = self.model, self.model.frame
         size = frame.unknowns
         compliance = frame.end_compliance.copy()
@@ -225,7 +226,7 @@ class PlaceAnswers:
         return LinearAnswer(seen[:, 0], by_slip, load_by_input, slip_stiffness)
 
     def _slips(self, frame: CorotationalFrame) -> tuple[Array, Array]:
-        """Loads of a unit slip at the middle of every flexure, shape (unknowns, 2 n), and its own stiffness."""
+        """Loads of a unit slip at the middle of every flexure, shape (unknowns, 2 n), and the slip's own stiffness."""
         loads, own = [], []
         for segments in self.model.segments:
             element = segments[len(segments) // 2 - 1]
@@ -258,7 +259,7 @@ class PlaceAnswers:
 
 
 def attachments(answers: PlaceAnswers) -> Sequence[Mapping[str, PointMm]]:
-    """Points of every body at which something holds it: its flexures' middles, then supports and the drive."""
+    """Points of every body at which it is supported or driven: its flexures' middles, then supports and the drive."""
     model = answers.model
     found: list[dict[str, PointMm]] = [{} for _ in model.assembly.bodies]
     for number, flexure in enumerate(answers.mechanism.flexures):

@@ -1,11 +1,11 @@
-"""A plane body as shapes that are added and cut in turn, and its exact outline of segments and arcs.
+"""A plane body as shapes that are added and cut in sequence, with its exact outline of segments and arcs.
 
-Every shape's outline is divided where it meets another's; the pieces that have material on exactly one side are the
+Every shape's outline is divided where it meets another shape's; the pieces with material on exactly one side form the
 body's outline. Nothing is approximated: a notch stays an arc.
 """
 
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 from itertools import pairwise
 
 import numpy as np
@@ -22,6 +22,7 @@ _BESIDE = 1e-6
 _TURNS_IN = -0.2
 """Sine of the turn to the right beyond which a corner turns into the body."""
 _CHORDS = 33
+_MOST_KEPT = 64
 _SAME = 1e-8
 """Of the body's size: corners closer than this are one."""
 
@@ -42,7 +43,7 @@ class Loop:
     area_mm2: float
 
     def holds(self, point: Point) -> bool:
-        """Whether a point lies inside, arcs taken as their chords."""
+        """Whether a point lies inside, with arcs replaced by their chords."""
         along = [curve.at(np.linspace(curve.t0, curve.t1, _CHORDS))[:, :-1] for curve in self.curves]
         corners = tuple((float(x), float(y)) for x, y in np.concatenate(along, axis=1).T)
         return bool(Polygon(corners).holds(np.array(point)[:, None])[0])
@@ -50,7 +51,7 @@ class Loop:
 
 @dataclass(frozen=True, eq=False)
 class PlanarRegion:
-    """A body as steps: each adds a shape to what is there or cuts it away.
+    """A body as a sequence of steps, each of which adds or cuts a shape.
 
     Parameters
     ----------
@@ -72,7 +73,7 @@ class PlanarRegion:
 
     @cached_property
     def size_mm(self) -> float:
-        """Diagonal of the box round all that is added."""
+        """Diagonal of the bounding box of all added shapes (mm)."""
         ends = np.concatenate([c.at(np.linspace(c.t0, c.t1, 5)) for added, s in self.steps if added
                                for c in s.curves()], axis=1)  # fmt: skip
         return float(np.hypot(*(ends.max(axis=1) - ends.min(axis=1))))
@@ -83,9 +84,12 @@ class PlanarRegion:
 
         Raises
         ------
-        FingervisionError
+        DataError
             Where two parts of it touch in a point, so that the body is not defined there.
         """
+        return _loops_of(self.steps, self.marks_mm)
+
+    def _traced(self) -> tuple[Loop, ...]:
         curves = [curve for _, shape in self.steps for curve in shape.curves()]
         pieces: list[Curve] = []
         boxes = np.array([_box_mm(curve) for curve in curves])
@@ -104,7 +108,7 @@ class PlanarRegion:
         return _chained(self._on_outline(pieces), _SAME * self.size_mm)
 
     def _on_outline(self, pieces: list[Curve]) -> list[Curve]:
-        """Keep the pieces that part the body from the void, turned so that the body lies on their left."""
+        """Keep the pieces that separate the body from the void, directed so that the body lies on their left."""
         apart = _BESIDE * self.size_mm
         pieces = [p for p in pieces if np.hypot(*(p.end_mm - p.start_mm)) > 2.0 * _SAME * self.size_mm]
         middles = np.array([0.5 * (p.t0 + p.t1) for p in pieces])
@@ -123,8 +127,14 @@ class PlanarRegion:
         return kept
 
 
+@lru_cache(maxsize=_MOST_KEPT)
+def _loops_of(steps: tuple[tuple[bool, Shape], ...], marks_mm: tuple[Point, ...]) -> tuple[Loop, ...]:
+    """Outline of a body; cached, because every kind of model of a drawing uses it."""
+    return PlanarRegion(steps, marks_mm)._traced()  # noqa: SLF001 (its own class)
+
+
 def sharp_corners_mm(region: PlanarRegion) -> list[Array]:
-    """Corners that turn into the body without a radius: stress is singular there."""
+    """Re-entrant corners without a radius, at which the stress is singular (mm)."""
     found = []
     for loop in region.loops:
         for before, after in zip(loop.curves, loop.curves[1:] + loop.curves[:1], strict=True):
@@ -135,7 +145,7 @@ def sharp_corners_mm(region: PlanarRegion) -> list[Array]:
 
 
 def _box_mm(curve: Curve) -> tuple[Array, Array]:
-    """Lowest and highest corner of an upright box that holds a curve; the whole ellipse where it is an arc."""
+    """Lower and upper corner of a box that contains a curve; for an arc, that of the whole ellipse (mm)."""
     if curve.v is None:
         points = np.stack([curve.start_mm, curve.end_mm])
     else:
@@ -154,8 +164,8 @@ def _chained(pieces: list[Curve], same_mm: float) -> tuple[Loop, ...]:
             x, y = piece.end_mm
             what = "ends" if near.size == 0 else "touches itself in a point"
             raise DataError(
-                f"The outline must close and part the body everywhere, but it {what} at ({x:.6g}, {y:.6g}) mm; "
-                "let the shapes overlap there, or stay apart."
+                f"The outline must be closed and separate the body from the void everywhere, but it {what} at "
+                f"({x:.6g}, {y:.6g}) mm; let the shapes overlap there, or stay apart."
             )
         following[place] = int(near[0])
     loops = []
@@ -175,7 +185,10 @@ def _chained(pieces: list[Curve], same_mm: float) -> tuple[Loop, ...]:
 
 
 def _area_mm2(curves: tuple[Curve, ...]) -> float:
-    """Green's formula along the curves; the trapezoidal rule on an arc is good to 1e-4, and only its sign is used."""
+    """Signed area by Green's formula along the curves.
+
+    Accurate to 1e-4 on arcs, which suffices because only its sign is used.
+    """
     total = 0.0
     for curve in curves:
         x, y = curve.at(np.linspace(curve.t0, curve.t1, 2 if curve.is_straight else 65))

@@ -1,4 +1,4 @@
-"""A mesh of quadratic triangles in the plane, and how good they are."""
+"""A mesh of quadratic triangles in the plane, and the quality of its triangles."""
 
 from dataclasses import dataclass
 
@@ -31,12 +31,12 @@ class PlaneMesh:
     triangles: NDArray[np.int64]
 
     def quality(self) -> Array:
-        """Twice the inscribed over the circumscribed radius of every triangle, shape (m,)."""
+        """Twice the ratio of inscribed to circumscribed radius of every triangle, shape (m,)."""
         return triangle_quality(self.nodes_mm, self.triangles[:3])
 
 
 def inner_triangles(region: PlanarRegion, points: Array) -> Indices:
-    """Triangles of Delaunay's triangulation whose middle lies in the body, anticlockwise; shape (3, m)."""
+    """Delaunay triangles whose centroid lies in the body, anticlockwise; shape (3, m)."""
     triangles = Delaunay(points.T).simplices.T.astype(np.int64)
     middle = points[:, triangles].mean(axis=1)
     triangles = triangles[:, region.holds(middle)]
@@ -47,7 +47,7 @@ def inner_triangles(region: PlanarRegion, points: Array) -> Indices:
 
 
 def edges_of(triangles: Indices) -> Indices:
-    """List every edge of triangles once; shape (2, k)."""
+    """Every edge of the triangles, listed once; shape (2, k)."""
     pairs = np.sort(np.hstack([triangles[[0, 1]], triangles[[1, 2]], triangles[[0, 2]]]), axis=0)
     # As single numbers pairs sort ten times as fast.
     count = int(triangles.max()) + 1
@@ -55,7 +55,7 @@ def edges_of(triangles: Indices) -> Indices:
 
 
 def triangle_quality(points: Array, triangles: Indices) -> Array:
-    """Twice the inscribed over the circumscribed radius; shape (m,)."""
+    """Twice the ratio of inscribed to circumscribed radius; shape (m,)."""
     a, b, c = (points[:, row] for row in triangles)
     la, lb, lc = np.hypot(*(b - c)), np.hypot(*(c - a)), np.hypot(*(a - b))
     return np.asarray((lb + lc - la) * (lc + la - lb) * (la + lb - lc) / (la * lb * lc))

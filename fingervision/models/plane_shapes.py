@@ -1,4 +1,4 @@
-"""Plane shapes that a body is made of: polygons and ellipses, each with its outline and its inside."""
+"""Plane shapes from which a body is composed: polygons and ellipses, each with its outline and its interior."""
 
 from dataclasses import dataclass
 from itertools import pairwise
@@ -79,7 +79,7 @@ Shape = Polygon | Ellipse
 
 
 def crosses_itself(corners_mm: tuple[Point, ...]) -> bool:
-    """Whether two sides of a polygon that are no neighbours meet."""
+    """Whether two non-adjacent sides of a polygon meet."""
     sides = Polygon(corners_mm).curves()
     count = len(sides)
     return any(
@@ -91,12 +91,12 @@ def crosses_itself(corners_mm: tuple[Point, ...]) -> bool:
 
 
 def bar(x0: float, y0: float, x1: float, y1: float, width_mm: float) -> Polygon:
-    """Return a straight bar about the line between two points."""
+    """A straight bar about the line between two points."""
     length = float(np.hypot(x1 - x0, y1 - y0))
     nx, ny = -(y1 - y0) / length * width_mm / 2.0, (x1 - x0) / length * width_mm / 2.0
     return Polygon(((x0 - nx, y0 - ny), (x1 - nx, y1 - ny), (x1 + nx, y1 + ny), (x0 + nx, y0 + ny)))
 
 
 def box(x0: float, x1: float, y0: float, y1: float) -> Polygon:
-    """Return an upright rectangle."""
+    """An upright rectangle."""
     return Polygon(((x0, y0), (x1, y0), (x1, y1), (x0, y1)))

@@ -1,4 +1,4 @@
-"""A drawing with one of its numbers changed, and all that hangs on it moved along, so that the links still meet."""
+"""A drawing with one dimension changed, and all dependent ones adapted so that the links still meet."""
 
 from dataclasses import replace
 from typing import Any
@@ -8,7 +8,7 @@ from fingervision.domain.gripper import Gripper, Lever, Links, PointMm
 
 
 def redrawn(gripper: Gripper, name: str, by: float) -> Gripper:
-    """Change one number of a drawing.
+    """Change one dimension of a drawing.
 
     Parameters
     ----------
@@ -23,7 +23,7 @@ def redrawn(gripper: Gripper, name: str, by: float) -> Gripper:
 
     Raises
     ------
-    FingervisionError
+    DataError
         Where the name is not that of a number.
     """
     section, _, key = name.partition(".")

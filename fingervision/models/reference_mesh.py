@@ -1,4 +1,4 @@
-"""The packaged mesh of the reference outline, so that the paper's sample is answered half a second sooner."""
+"""The packaged mesh of the reference outline, which saves half a second for the published gripper."""
 
 from dataclasses import replace
 from importlib import resources
@@ -43,7 +43,7 @@ _BODY_PER_HEIGHT = 0.02
 
 
 def working_size(gripper: Gripper) -> ElementSize:
-    """Edge lengths that hold force within 0.02 % of the mesh limit for the reference, scaled to the drawing."""
+    """Edge lengths that give the reference's force within 0.02 % of its converged value, scaled to the drawing."""
     return ElementSize(
         _NOTCH_PER_THICKNESS * gripper.hinge.thickness_mm,
         _BODY_PER_HEIGHT * gripper.body.height_mm,
@@ -51,17 +51,17 @@ def working_size(gripper: Gripper) -> ElementSize:
 
 
 def is_reference(gripper: Gripper) -> bool:
-    """Whether a drawing's outline is that of the paper's sample; material and plate thickness may differ."""
+    """Whether a drawing has the outline of the published gripper; material and plate thickness may differ."""
     outline = (replace(gripper.hinge, web_mm=REFERENCE_HINGE.web_mm), gripper.lever, gripper.links)
     return outline == (REFERENCE_HINGE, REFERENCE_LEVER, REFERENCE_LINKS)
 
 
 def mesh_of(gripper: Gripper) -> PlaneMesh:
-    """Take the packaged mesh where the outline is the reference's, else make one.
+    """Return the packaged mesh where the outline is the reference's, else a new mesh.
 
     Raises
     ------
-    FingervisionError
+    DataError, ModelError
         Where the outline is not that of a gripper.
     """
     if not is_reference(gripper):
@@ -72,6 +72,6 @@ def mesh_of(gripper: Gripper) -> PlaneMesh:
 
 
 def write_reference_mesh(gripper: Gripper, path: str) -> None:
-    """Make the packaged mesh again from the reference gripper."""
+    """Regenerate the packaged mesh from the reference gripper."""
     mesh = mesh_outline(gripper, working_size(gripper))
     np.savez_compressed(path, nodes_mm=mesh.nodes_mm, triangles=mesh.triangles.astype(np.int32))

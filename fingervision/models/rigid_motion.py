@@ -1,4 +1,4 @@
-"""The rigid motion that comes nearest to the motion of many points of a body: its pose."""
+"""Pose of a body: the rigid motion nearest to the motion of many of its points."""
 
 from dataclasses import dataclass
 
@@ -12,7 +12,7 @@ MRAD = 1e3
 
 @dataclass(frozen=True, slots=True)
 class BodyPose:
-    """Where a body is, counted from where it lies at rest.
+    """Position and rotation of a body relative to rest.
 
     Parameters
     ----------
@@ -30,8 +30,9 @@ class BodyPose:
 def rigid_motion(places_mm: Array, moved_mm: Array, weights: Array, about_mm: Array, *, large: bool) -> BodyPose:
     """Fit the rigid motion that leaves the smallest weighted sum of squared distances.
 
-    In large displacements the rotation is that of Kabsch (1976), Acta Crystallographica A 32, 922,
-    DOI 10.1107/S0567739476001873, in the plane; in small ones its linear part, so that a pose is proportional to them.
+    In large displacements the rotation is that of Kabsch (1976), Acta Crystallographica A 32, 922, DOI
+    10.1107/S0567739476001873, in the plane. In small displacements it is the linear part of that rotation, so that the
+    pose is proportional to the displacements.
 
     Parameters
     ----------

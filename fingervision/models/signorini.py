@@ -11,7 +11,7 @@ Array = NDArray[np.float64]
 def contact_forces_n(compliance_mm_n: Array, free_gap_mm: Array) -> Array:
     """Find the forces that keep every point on its side of the plane.
 
-    Solves gap = free_gap + C force with gap >= 0, force >= 0, gap * force = 0. That is the optimum of the quadratic
+    Solves gap = free_gap + C force with gap >= 0, force >= 0, gap * force = 0. This is the optimum of the quadratic
     programme min f' C f / 2 + g' f over f >= 0, written as a non-negative least squares problem by C = L L'.
 
     Parameters

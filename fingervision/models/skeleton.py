@@ -1,9 +1,9 @@
 """The half gripper as a tree of bars, hinges and stiff joints, from the clamp to the drive and to the tip.
 
-Bars bend along their whole axes, up to where the axes meet, but for the finger within the cross bar. The drive block
-yields as a plane body does under the shuttle (`drive_block_root`); the way from a bar's axis to a point on its face is
-rigid. Against finite elements of nine held-out grippers the gap per input is within 0.41 %, the force within 1.5 %
-(`tests/benchmarks/models_held_out.py`).
+Bars bend over their whole axes, up to where the axes meet, except the finger inside the cross bar. The drive block is
+elastic under the shuttle (`drive_block_root`); the connection from a bar's axis to a point on its face is rigid.
+Compared with finite elements for nine grippers that were not used in the tuning, the gap per input agrees within 0.41
+%, the force within 1.5 % (`tests/benchmarks/models_held_out.py`).
 """
 
 from dataclasses import dataclass, replace
@@ -31,7 +31,7 @@ _LEAST_BAR = 0.01
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Member:
-    """One link of the tree: fixed to its parent's end at its start, loaded at its own end.
+    """One member of the tree: fixed to its parent's end at its start, loaded at its own end.
 
     Parameters
     ----------
@@ -102,8 +102,15 @@ class _Tree:
         return parent
 
     def hinge(self, parent: int, start: PointMm, end: PointMm, name: str, theory: HingeTheory, segments: int) -> int:
+        """Divide a notch into segments.
+
+        If another body begins before its full length, its segments are shorter there.
+        """
         material, notch = self.gripper.material, notches_of(self.gripper)[0 if name == "hinge 1" else 1]
+        centre = self.gripper.lever.hinge1_mm if name == "hinge 1" else self.gripper.lever.hinge2_mm
         edges = notch.stations_mm(max(segments, 1))
+        for side, stop in ((edges < 0.0, start), (edges > 0.0, end)):
+            edges[side] *= float(np.hypot(*np.subtract(stop, centre))) / notch.reach_mm
         masses = masses_t(notch, material, edges)
         if segments == 0:
             whole = hinge_compliance(notch, material, theory)
@@ -124,9 +131,15 @@ class _Tree:
 
 
 def skeleton_of(
-    gripper: Gripper, theory: HingeTheory, segments: int, *, rigid_links: bool = False, block: Array | None = None
+    gripper: Gripper,
+    theory: HingeTheory,
+    segments: int,
+    *,
+    rigid_links: bool = False,
+    block: Array | None = None,
+    ends_mm: tuple[float, float] | None = None,
 ) -> Skeleton:
-    """Reduce a drawing to its tree.
+    """Reduce a drawing to its tree of members.
 
     Parameters
     ----------
@@ -141,17 +154,21 @@ def skeleton_of(
         Whether only the hinges yield, as in the paper's equations.
     block : ndarray of float, shape (3, 3), or None
         `drive_block_root.unit_compliance`, where known already.
+    ends_mm : (float, float) or None
+        Ways from the middle of either hinge to where the finger begins, where that is no more than the notch's reach.
 
     Raises
     ------
-    FingervisionError
+    DataError, ModelError
         Where the members do not follow each other.
     """
     links, lever = gripper.links, gripper.lever
     first, second = notches_of(gripper)
     tree = _Tree(gripper)
-    lower1, upper1 = _hinge_ends(lever.hinge1_mm, lever.hinge1_axis_deg, first.reach_mm)
-    lower2, upper2 = _hinge_ends(lever.hinge2_mm, lever.hinge2_axis_deg, second.reach_mm)
+    reaches = first.reach_mm, second.reach_mm
+    ends = reaches if ends_mm is None else (min(reaches[0], ends_mm[0]), min(reaches[1], ends_mm[1]))
+    lower1, upper1 = _hinge_ends(lever.hinge1_mm, lever.hinge1_axis_deg, reaches[0], ends[0])
+    lower2, upper2 = _hinge_ends(lever.hinge2_mm, lever.hinge2_axis_deg, reaches[1], ends[1])
     cross_y = links.cross_bar_mm[1]
     beam_low = cross_y - links.cross_bar_width_mm / 2.0
     pillar_x = lever.hinge1_mm[0]
@@ -218,7 +235,7 @@ def skeleton_of(
 
 
 def _bending_out_of_plane(member: Member, gripper: Gripper) -> Member:
-    """Let a member bend and twist out of the plane as a bar of its own width does."""
+    """Give a member the out-of-plane bending and torsion of a bar of its own width."""
     length = float(np.hypot(*np.subtract(member.end_mm, member.start_mm)))
     bar = bar_compliance(length, member.width_mm, gripper.body.plate_mm, gripper.material)
     bar[_PLANAR] = member.compliance[_PLANAR]
@@ -226,7 +243,7 @@ def _bending_out_of_plane(member: Member, gripper: Gripper) -> Member:
 
 
 def _yielding(member: Member, at_start: Array) -> Member:
-    """Let a rigid member yield where it begins, by a compliance (x, y, rotation) in the ground's axes."""
+    """Give a rigid member an elastic joint at its start, by a compliance (x, y, rotation) in global axes."""
     way = np.subtract(member.end_mm, member.start_mm)
     c, s = way / np.hypot(*way)
     carried = np.array([[1.0, 0.0, -way[1]], [0.0, 1.0, way[0]], [0.0, 0.0, 1.0]])
@@ -236,9 +253,9 @@ def _yielding(member: Member, at_start: Array) -> Member:
     return replace(member, compliance=compliance)
 
 
-def _hinge_ends(centre: PointMm, axis_deg: float, reach: float) -> tuple[PointMm, PointMm]:
-    dx, dy = reach * cos(radians(axis_deg)), reach * sin(radians(axis_deg))
-    return (centre[0] - dx, centre[1] - dy), (centre[0] + dx, centre[1] + dy)
+def _hinge_ends(centre: PointMm, axis_deg: float, back: float, ahead: float) -> tuple[PointMm, PointMm]:
+    c, s = cos(radians(axis_deg)), sin(radians(axis_deg))
+    return (centre[0] - back * c, centre[1] - back * s), (centre[0] + ahead * c, centre[1] + ahead * s)
 
 
 def _at_height(bar: tuple[float, float, float, float], y_mm: float) -> PointMm:

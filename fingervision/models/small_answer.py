@@ -1,4 +1,4 @@
-"""The answer of a drawing's frame to small inputs: three numbers, for drawings that are changed many times over."""
+"""Small-displacement response of a drawing's frame: three numbers, for drawings that are changed many times."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -38,14 +38,14 @@ class SmallAnswer:
 
 
 def small_answer(gripper: Gripper, theory: HingeTheory) -> SmallAnswer:
-    """Answer by the frame of the lumped model, in a few milliseconds."""
+    """Compute the response by the frame of the lumped model, in a few milliseconds."""
     half = half_frame(gripper, skeleton_of(gripper, theory, _SEGMENTS))
     return SmallAnswer(2.0 * half.measured_rest_mm, gap_per_input(half), half.equilibrium(1.0).force_n)
 
 
 @dataclass(frozen=True, eq=False)
 class RatioCurves:
-    """How gap and force change, relative to the drawing, along a change of one of its numbers.
+    """Gap and force relative to the drawing, as functions of a change of one of its dimensions.
 
     Parameters
     ----------
@@ -60,7 +60,7 @@ class RatioCurves:
     force: Array
 
     def force_at_gap(self, gap_ratio: float) -> float:
-        """Force ratio of the change that gives a gap ratio; both ratios are 1 at no change."""
+        """Force ratio of the change that gives a gap ratio; both ratios are 1 without change."""
         return float(self._force(np.clip(gap_ratio, self.gap.min(), self.gap.max())))
 
     def gap_at_force(self, force_ratio: float) -> float:
@@ -80,7 +80,7 @@ class RatioCurves:
 
 def ratio_curves(gripper: Gripper, theory: HingeTheory, change: Callable[[float], Gripper], low: float, high: float,
                  ) -> RatioCurves | None:  # fmt: skip
-    """Tabulate the answers of changed drawings, as finely as a spline needs to be good to 1e-6.
+    """Tabulate the responses of changed drawings, finely enough for a spline accurate to 1e-6.
 
     Parameters
     ----------

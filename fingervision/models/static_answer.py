@@ -1,4 +1,4 @@
-"""The static answer of a driven body to a list of inputs: small or large displacements, with or without contact."""
+"""Static response of a driven body to a list of inputs: small or large displacements, with or without contact."""
 
 from collections.abc import Sequence
 
@@ -21,7 +21,7 @@ _SAMPLES_BEYOND_TOUCH = 200
 
 
 def symmetric_response(body: DrivenBody, physics: Physics, input_mm: Array) -> Response:
-    """Answer statically at each input, both halves alike.
+    """Respond statically at each input, with two identical halves.
 
     Parameters
     ----------
@@ -42,7 +42,7 @@ def gap_per_input(body: DrivenBody) -> float:
 
 
 def equilibria(body: DrivenBody, physics: Physics, inputs_mm: Sequence[float]) -> list[Equilibrium]:
-    """Return the body at some inputs, in their order, with the physics asked for."""
+    """Equilibria at the given inputs, in order, with the requested physics."""
     if not physics.large_rotation:
         return [body.equilibrium(value, contact=physics.contact) for value in inputs_mm]
     touch_mm = body.first_touch_mm() if physics.contact else None
@@ -60,7 +60,7 @@ def equilibria(body: DrivenBody, physics: Physics, inputs_mm: Sequence[float]) -
 
 
 def contact_onset_mm(body: DrivenBody, physics: Physics) -> float | None:
-    """Input at which the fingers first touch, in the deformed shape where that is asked for; None where never."""
+    """Input at which the fingers first touch, in the deformed shape if requested (mm); None where they never touch."""
     touch_mm = body.first_touch_mm()
     if touch_mm is None or not physics.large_rotation:
         return touch_mm
@@ -68,7 +68,7 @@ def contact_onset_mm(body: DrivenBody, physics: Physics) -> float | None:
 
 
 def loaded_state(body: DrivenBody, state: Equilibrium, stress_mpa: float, place_mm: PointMm) -> LoadedState:
-    """Put one equilibrium's figures together."""
+    """Collect the figures of one equilibrium."""
     gap_mm = 2.0 * body.measured_mm(state.displacement_mm)
     return LoadedState(state.input_mm, gap_mm, state.force_n, float(state.contact_n.sum()), stress_mpa, place_mm)
 
@@ -90,7 +90,7 @@ def _right_and_force(body: DrivenBody, physics: Physics, inputs: Array) -> tuple
 
 
 def _large(body: DrivenBody, inputs: Array, touch_mm: float | None) -> tuple[Array, Array]:
-    """Equilibria along the path from rest, a cubic spline between them."""
+    """Equilibria along the path from rest, with a cubic spline between them."""
     lowest = min(float(inputs.min(initial=0.0)), -_LEAST_MM)
     highest = max(float(inputs.max(initial=0.0)), _LEAST_MM)
     touching: list[Equilibrium] = []

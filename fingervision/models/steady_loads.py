@@ -1,4 +1,4 @@
-"""Small displacements of an elastic body under its own weight, and by a uniform change of temperature."""
+"""Small displacements of an elastic body under its own weight, and under a uniform change of temperature."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,7 +11,7 @@ STANDARD_GRAVITY_MM_S2 = 9806.65
 
 
 def weight_displacement_mm(body: DrivenBody, direction: tuple[float, float], *, swaying: bool = False) -> Array:
-    """Displacements by one standard gravity in the plane, the drive held.
+    """Displacements under one standard gravity in the plane, with the drive fixed.
 
     Parameters
     ----------
@@ -35,9 +35,10 @@ def weight_displacement_mm(body: DrivenBody, direction: tuple[float, float], *, 
 
 
 def thermal_displacement_mm(body: DrivenBody, strain: float, held_mm: Array) -> tuple[Array, Array]:
-    """Displacements and nodal forces by a uniform thermal strain.
+    """Displacements and nodal forces under a uniform thermal strain.
 
-    A body that is free grows by `strain` times its nodes' places, without stress: K (u - that) = 0 where nothing holds.
+    A free body expands by `strain` times its nodes' positions, without stress: K (u - strain x) = 0 where nothing is
+    fixed.
 
     Parameters
     ----------
@@ -63,24 +64,25 @@ def thermal_displacement_mm(body: DrivenBody, strain: float, held_mm: Array) -> 
 
 
 def gap_by_weight_mm(body: DrivenBody) -> float:
-    """Change of a gripper's gap when its plate stands upright, fingers up, drive held: by one standard gravity."""
+    """Change of a gripper's gap when its plate stands upright, fingers up, drive fixed: under gravity (mm)."""
     return 2.0 * (body.measured_mm(weight_displacement_mm(body, (0.0, -1.0))) - body.measured_rest_mm)
 
 
 def midline_by_weight_mm(body: DrivenBody) -> float:
-    """Shift of the middle between the fingers when the plate stands on its side: both halves sway the same way.
+    """Shift of the midline when the plate stands on its side (mm): both halves sway in the same direction.
 
-    The drive is held along its axis and free across, as the actuator guides nothing there.
+    The drive is fixed along its axis and free across it, because the actuator guides nothing there.
     """
     return body.measured_mm(weight_displacement_mm(body, (1.0, 0.0), swaying=True)) - body.measured_rest_mm
 
 
 def gap_and_force_by_strain(body: DrivenBody, drive_face_y_mm: float) -> tuple[float, float]:
-    """Change of a gripper's gap in mm, and of the force at the held drive in N, by a thermal strain of one.
+    """Change of the gap (mm), and of the force at the fixed drive (N), for a thermal strain of one.
 
-    Clamp and actuator stay where they are: the gripper grows between them. The actuator holds the drive's face; a model
-    that is driven at a point above it moves that point by what the block between them grows. A frame of bars has its
-    bars end where their axes meet, and errs by some millimetres times the strain: take finite elements.
+    Clamp and actuator stay in place: the gripper expands between them. The actuator holds the drive's face. A model
+    that is driven at a point above the face moves that point by the expansion of the block in between. In a frame of
+    bars, the bars end where their axes meet, which causes an error of some millimetres times the strain: use finite
+    elements instead.
     """
     held = np.zeros(body.unknowns)
     height = np.zeros(body.unknowns)

@@ -1,4 +1,4 @@
-"""The gripper's motion in time in the deformed shape or with contact: step by step."""
+"""Motion of the gripper in time, in the deformed shape or with contact, integrated step by step."""
 
 from math import pi
 
@@ -29,7 +29,7 @@ _RADIUS = 0.5
 
 
 def step_for(body: DrivenBody) -> float:
-    """Seconds a step: a twentieth of the shortest period that matters, the lowest mode's with the drive held."""
+    """Time step (s): a twentieth of the shortest relevant period, that of the lowest mode with the drive fixed."""
     rad_s, _ = body.modes(drive_held=True, count=1)
     return float(2.0 * pi / rad_s[0] / _A_PERIOD)
 
@@ -37,7 +37,7 @@ def step_for(body: DrivenBody) -> float:
 def stepped_motion(
     body: DrivenBody, drive: DriveHistory, physics: Physics, damping: Damping, step_s: float
 ) -> tuple[Array, Array]:
-    """Gap and force over one run, the drive's motion prescribed.
+    """Gap and force over one run, with the drive's motion prescribed.
 
     Parameters
     ----------
@@ -100,10 +100,11 @@ def stepped_motion(
 
 
 def _drag(body: DrivenBody, damping: Damping) -> csr_matrix:
-    """Damping matrix on motion beside the static shape.
+    """Damping matrix for motion relative to the static shape.
 
-    B = M Phi diag(2 zeta w) Phi' M of the modes that the law describes and the step resolves; what is left of the
-    stiffness is damped in proportion, so strongly that the other modes follow the drive at once, as in `modal_model`.
+    B = M Phi diag(2 zeta w) Phi' M for the modes that the law describes and the step resolves. The rest of the
+    stiffness is damped in proportion, so strongly that the other modes follow the drive without delay, as in
+    `modal_model`.
     """
     model, ratios = gripper_modes(body, _RESOLVED_MODES).damped(damping)
     rad_s, shapes = body.modes(drive_held=True, count=_RESOLVED_MODES + 1)

@@ -1,16 +1,16 @@
-"""The gripper by its stiffness matrix: the paper's equations (5) to (15), in six dimensions and with defects mended.
+"""The gripper by its stiffness matrix: equations (5) to (15) of Hricko & Havlik (2015) in six dimensions, corrected.
 
-Departures from the paper, each with its reason:
+Corrections of the published equations, each with its reason:
 
 * (6) is a transform of six components and (3) a planar compliance of three; here all compliances are 6 by 6.
 * (10) gives 135.15 degrees and (13) 135 degrees for what one drawing must state once; the angles come from the drawing.
 * (12) uses T_12, which is never defined; it must carry the compliance from O1 to O2, as T_O2 does.
 * (14) has C_2A on both sides; the right-hand one must be C_12.
-* (15), K = 2 C^-1, holds for the entry along the drive only while the shuttle is kept from moving sideways and turning,
-  which the other half does: 2 (C^-1)_yy, and not 2 / C_yy of a shuttle that is free.
+* (15), K = 2 C^-1, holds for the entry along the drive only while the shuttle is kept from moving sideways and
+  rotating, which the other half does: 2 (C^-1)_yy, instead of 2 / C_yy of a free shuttle.
 
-The links yield too, as Timoshenko bars; `rigid_links` gives the paper's hinges alone, with 0.9 % more slope and some
-10 % more force for the reference gripper.
+The links are elastic too, as Timoshenko bars; `rigid_links` gives the published model with elastic hinges only, which
+has 0.9 % more slope and some 10 % more force for the published gripper.
 """
 
 from functools import cached_property
@@ -48,7 +48,7 @@ low for a hinge 20 times as wide as thick to 17 % too high for a stiff variant."
 
 
 class StiffnessMatrixGripper:
-    """Two halves in parallel, small displacements, in and out of the plane.
+    """Two halves in parallel, with small displacements in and out of the plane.
 
     Parameters
     ----------
@@ -71,12 +71,12 @@ class StiffnessMatrixGripper:
 
     @property
     def input_range_mm(self) -> tuple[float, float]:
-        """Smallest and largest input that the model is meant for."""
+        """Smallest and largest input for which the model is meant (mm)."""
         return covered_inputs_mm(self.gripper, self.first_touch_mm())
 
     @property
     def rest_gap_mm(self) -> float:
-        """The gap at input zero."""
+        """The gap at input zero (mm)."""
         return 2.0 * self.gripper.measuring_point_mm[0]
 
     @cached_property
@@ -86,9 +86,9 @@ class StiffnessMatrixGripper:
 
     @cached_property
     def drive_stiffness(self) -> Array:
-        """Stiffness K_2A of both halves at O_A with every direction held, equation (15), shape (6, 6).
+        """Stiffness K_2A of both halves at O_A with every direction fixed, equation (15), shape (6, 6).
 
-        Entries that change sign in the mirror cancel between the halves.
+        Entries that change sign under reflection cancel between the halves.
         """
         mirror = np.diag([-1.0, 1.0, 1.0, 1.0, -1.0, -1.0])
         half = np.linalg.inv(self.drive_compliance)
@@ -96,7 +96,7 @@ class StiffnessMatrixGripper:
 
     @cached_property
     def _load_by_input(self) -> Array:
-        """Load of one half's drive point by 1 mm of input, sideways motion and rotation held."""
+        """Load on one half's drive point per 1 mm of input, with sideways motion and rotation fixed."""
         return np.asarray(np.linalg.inv(self.drive_compliance)[:, _Y])
 
     @cached_property
@@ -107,29 +107,29 @@ class StiffnessMatrixGripper:
 
     @property
     def input_stiffness_n_mm(self) -> float:
-        """Force at the drive per input, both halves."""
+        """Force at the drive per input, of both halves (N/mm)."""
         return float(self.drive_stiffness[_Y, _Y])
 
     def _held_flexibility(self, moved: int, loaded: int, held: tuple[int, ...]) -> Array:
-        """Flexibility with some directions of the drive point held."""
+        """Flexibility with some directions of the drive point fixed."""
         drive, chain, rows = self.skeleton.drive, self._chain, list(held)
         reaction = np.linalg.solve(self.drive_compliance[np.ix_(rows, rows)], chain.flexibility(drive, loaded)[rows])
         return chain.flexibility(moved, loaded) - chain.flexibility(moved, drive)[:, rows] @ reaction
 
     @cached_property
     def finger_stiffness_n_mm(self) -> float:
-        """Stiffness of one finger at the tip's corner across the gap, drive held: how hard it grips per millimetre."""
+        """Stiffness of one finger at the tip's corner across the gap, with the drive fixed (N/mm)."""
         corner = self.skeleton.corner
         return 1.0 / float(self._held_flexibility(corner, corner, _ALL)[_X, _X])
 
     def grip_force_n(self, input_mm: float, part: Part) -> float:
-        """Force of each finger on a part between the tips' corners; 0 where it is not touched."""
+        """Force of each finger on a part between the tips' corners (N); 0 where it is not touched."""
         corner_mm = 2.0 * self.gripper.tip_corner_mm[0] + 2.0 * self._corner_per_input * input_mm
         yielding_mm_n = 1.0 / self.finger_stiffness_n_mm + 0.5 / part.stiffness_n_mm
         return max(0.0, 0.5 * (part.width_mm - corner_mm) / yielding_mm_n)
 
     def gravity_sag_mm(self, *, drive_held: bool = True) -> tuple[float, float]:
-        """Out-of-plane sag of the measuring point in a horizontal plate, and the tip's twist about the finger (y).
+        """Out-of-plane sag of the measuring point in a horizontal plate, and the tip's rotation about the finger (y).
 
         Parameters
         ----------
@@ -155,10 +155,10 @@ class StiffnessMatrixGripper:
         return float(sag[_Z]), float(sag[_ABOUT_Y])
 
     def out_of_plane_modes_hz(self, *, count: int = 1) -> tuple[float, ...]:
-        """First natural frequencies out of the plane, the drive held.
+        """First natural frequencies out of the plane, with the drive fixed (Hz).
 
-        The eigenvalues of flexibility times mass over the members' middles are 1 / omega^2. Bars joined at points are
-        too stiff out of the plane: 72 Hz for the paper's sample, where bricks give 62.
+        The eigenvalues of flexibility times mass, over the members' centres, are 1 / omega^2. Bars joined at points are
+        too stiff out of the plane: 72 Hz for the published gripper, compared with 62 Hz for three-dimensional bricks.
         """
         heavy = [place for place, member in enumerate(self.skeleton.members) if member.mass_t > 0.0]
         flexibility = np.block([[self._held_flexibility(i, j, _ALL)[_Z:_ABOUT_Z, _Z:_ABOUT_Z] for j in heavy]
@@ -170,32 +170,32 @@ class StiffnessMatrixGripper:
         return tuple((1.0 / (2.0 * np.pi * np.sqrt(inverse))).tolist())
 
     def respond(self, input_mm: Array) -> Response:
-        """Answer statically at each input."""
+        """Respond statically at each input."""
         inputs = np.asarray(input_mm, dtype=float)
         right = 0.5 * (self.rest_gap_mm + self.gap_per_input * inputs)
         return Response(left_mm=-right, right_mm=right, force_n=self.input_stiffness_n_mm * inputs)
 
     def body_poses(self, input_mm: Array) -> dict[str, Array]:
-        """Answer the poses of the bodies at each input: x_mm, y_mm, angle_mrad, shape (n, 3) each.
+        """Poses of the bodies at each input: x_mm, y_mm, angle_mrad, shape (n, 3) each.
 
-        The matrix is condensed from the members; here the same members are kept.
+        The stiffness matrix is condensed from the members; for poses the members themselves are used.
         """
         poses = poses_of_frame(self.gripper, self.skeleton, large=False)
         return gripper_poses(half_frame(self.gripper, self.skeleton), LINEAR, poses, input_mm)
 
     @cached_property
     def _corner_per_input(self) -> float:
-        """Motion of one tip's corner across the gap by 1 mm of input."""
+        """Motion of one tip's corner across the gap per 1 mm of input."""
         flexibility = self._chain.flexibility(self.skeleton.corner, self.skeleton.drive)
         return float((flexibility @ self._load_by_input)[_X])
 
     def first_touch_mm(self) -> float | None:
-        """Input at which the tip's corner meets the symmetry plane; None where it does not move."""
+        """Input at which the tip's corner meets the symmetry plane (mm); None where the corner does not move."""
         slope = self._corner_per_input
         return -self.gripper.tip_corner_mm[0] / slope if slope > 0.0 else None
 
     def figures(self) -> ModelFigures:
-        """Compute the model's row of the comparison."""
+        """Figures of the model for the comparison table."""
         return ModelFigures(
             self.gap_per_input,
             self.input_stiffness_n_mm,
@@ -210,7 +210,10 @@ class StiffnessMatrixGripper:
 
 
 def _lifted_mass(member: Member, plate_mm: float) -> Array:
-    """Mass of a member at its end, for motion along z and turns about x and y; a bar's, turned and carried."""
+    """Mass of a member at its end, for motion along z and rotation about x and y.
+
+    A bar's mass, rotated and transferred.
+    """
     axis = np.subtract(member.end_mm, member.start_mm)
     length = float(np.hypot(*axis))
     along = axis / length

@@ -1,6 +1,7 @@
-"""A simulation table as a model: linear between its rows."""
+"""A simulation table as a model, linear between its rows."""
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -8,9 +9,9 @@ from numpy.typing import NDArray
 from fingervision.domain.response import Response
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class TableModel:
-    """Comsol, MATLAB, Ansys or anything else that gave the gap at some inputs.
+    """A table from Comsol, MATLAB, Ansys or any other source that gives the gap at some inputs.
 
     Parameters
     ----------
@@ -36,17 +37,41 @@ class TableModel:
         return float(self.input_mm[0]), float(self.input_mm[-1])
 
     def respond(self, input_mm: NDArray[np.float64]) -> Response:
-        """Interpolate; beyond an end follow the straight line through the last quarter of the rows there."""
-        force = None if self.force_n is None else self._interpolate(input_mm, self.force_n)
-        return Response(self._interpolate(input_mm, self.left_mm), self._interpolate(input_mm, self.right_mm), force)
+        """Interpolate linearly.
 
-    def _interpolate(self, input_mm: NDArray[np.float64], column: NDArray[np.float64]) -> NDArray[np.float64]:
-        inside = np.interp(input_mm, self.input_mm, column)
+        Beyond an end, extrapolate the straight line through the last quarter of the rows there.
+        """
         lowest, highest = self.input_range_mm
-        if input_mm.min() >= lowest and input_mm.max() <= highest:
-            return inside
-        rows = max(2, -(-len(column) // 4))
-        low = np.polyfit(self.input_mm[:rows], column[:rows], 1)[0]
-        high = np.polyfit(self.input_mm[-rows:], column[-rows:], 1)[0]
-        below, above = np.minimum(input_mm - lowest, 0.0), np.maximum(input_mm - highest, 0.0)
-        return np.asarray(inside + low * below + high * above, dtype=np.float64)
+        inside = input_mm.min() >= lowest and input_mm.max() <= highest
+        beyond = None if inside else (np.minimum(input_mm - lowest, 0.0), np.maximum(input_mm - highest, 0.0))
+
+        def at(name: str, column: NDArray[np.float64]) -> NDArray[np.float64]:
+            found = np.interp(input_mm, self.input_mm, column)
+            if beyond is None:
+                return found
+            low, high = self._end_slopes[name]
+            return np.asarray(found + low * beyond[0] + high * beyond[1], dtype=np.float64)
+
+        right = at("right", self.right_mm)
+        left = -right if self._symmetric else at("left", self.left_mm)
+        return Response(left, right, None if self.force_n is None else at("force", self.force_n))
+
+    @cached_property
+    def _symmetric(self) -> bool:
+        """Whether the fingers are mirror images, which is assumed where the table has the gap only."""
+        return bool(np.array_equal(self.left_mm, -self.right_mm))
+
+    @cached_property
+    def _end_slopes(self) -> dict[str, tuple[float, float]]:
+        """Slope of each column at the lower and the upper end; computed once, as a diagnosis needs it very often."""
+        columns = {"left": self.left_mm, "right": self.right_mm, "force": self.force_n}
+        rows = max(2, -(-self.input_mm.size // 4))
+
+        def slope(column: NDArray[np.float64], end: slice) -> float:
+            return float(np.polyfit(self.input_mm[end], column[end], 1)[0])
+
+        return {
+            name: (slope(column, slice(rows)), slope(column, slice(-rows, None)))
+            for name, column in columns.items()
+            if column is not None
+        }

@@ -1,9 +1,10 @@
-"""Quadratic triangles of a plane body: exact outline, Delaunay's triangulation, and nodes that push each other apart.
+"""Quadratic triangles of a plane body: exact outline, Delaunay triangulation, and nodes that repel each other.
 
-The outline is divided by the size field and stays; nodes inside start on squares as small as the field asks and move
+The outline is divided by the size field and stays fixed. Inner nodes start on squares of the required size and move
 under forces along the edges (Persson and Strang, A simple mesh generator in MATLAB, SIAM Review 46 (2004) 329), are
-triangulated anew as they go, and end at the centres of their neighbours' circumcircles, weighted by area (Alliez et
-al., Variational tetrahedral meshing, ACM Trans. Graphics 24 (2005) 617, in the plane). Midside nodes lie on the arcs.
+triangulated again as they move, and end at the area-weighted mean of their triangles' circumcentres (Alliez et al.,
+Variational tetrahedral meshing, ACM Trans. Graphics 24 (2005) 617, in the plane). Midside nodes lie on the arcs of the
+outline.
 """
 
 from fingervision.domain.errors import ModelError
@@ -41,7 +42,7 @@ def triangulate(region: PlanarRegion, across: float, body_mm: float) -> PlaneMes
 
     Raises
     ------
-    FingervisionError
+    ModelError
         Where the body is so fine beside its size that no sensible number of triangles fills it.
     """
     field = size_field(region, across, body_mm)

@@ -1,7 +1,7 @@
-"""Rigid-body transforms of compliance: equations (5) to (8) of the paper in their consistent six-dimensional form.
+"""Rigid-body transforms of compliance: equations (5) to (8) of Hricko & Havlik (2015), in six dimensions.
 
-The paper's (6), T = [[R, R P], [0, R]], is kept: R turns the axes, P is the cross-product matrix of (8) of the vector
-from the point where the motion is wanted to the point where it is known. Its (6) multiplies 6 by 6, while its (3) is
+Equation (6), T = [[R, R P], [0, R]], is kept: R rotates the axes, P is the cross-product matrix of (8) for the vector
+from the point where the motion is wanted to the point where it is known. In the publication (6) is 6 by 6, but (3) is
 planar, 3 by 3; here every compliance is 6 by 6.
 """
 
@@ -12,7 +12,7 @@ Array = NDArray[np.float64]
 
 
 def rotation_about_z(angle_rad: float) -> Array:
-    """Equation (7): from axes turned by the angle to the ground's."""
+    """Equation (7): rotation from axes turned by the angle to the global axes."""
     c, s = np.cos(angle_rad), np.sin(angle_rad)
     return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
 
@@ -42,7 +42,7 @@ def carried(arm_mm: Array) -> Array:
 
 
 def turned(angle_rad: float) -> Array:
-    """Displacements and rotations from a member's axes to the ground's, shape (6, 6)."""
+    """Displacements and rotations transformed from a member's axes to global axes, shape (6, 6)."""
     matrix = np.zeros((6, 6))
     matrix[:3, :3] = matrix[3:, 3:] = rotation_about_z(angle_rad)
     return matrix

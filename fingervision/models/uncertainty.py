@@ -1,9 +1,9 @@
-"""How uncertain figures are by the stated uncertainties of a drawing's numbers.
+"""Uncertainty of figures from the stated uncertainties of a drawing's dimensions.
 
-Linear propagation (JCGM 100:2008, 5.1) by central differences of one standard uncertainty either way. Their second
-differences tell where the figures bend: where bending would move a figure's mean by more than a tenth of its
-uncertainty, or would widen it by more than a tenth, the figure is sampled instead (JCGM 101:2008) from Sobol's points.
-The numbers are taken to be normal and independent of each other.
+Linear propagation (JCGM 100:2008, 5.1), by central differences of one standard uncertainty in either direction. The
+second differences measure the nonlinearity. If it would shift a figure's mean, or widen its uncertainty, by more than a
+tenth of the uncertainty, the figure is sampled instead (JCGM 101:2008) at Sobol points. The dimensions are assumed
+normal and independent of each other.
 """
 
 from collections.abc import Callable, Mapping
@@ -63,7 +63,7 @@ class FigureUncertainty:
 def propagate(
     evaluate: Evaluate, numbers: Mapping[str, Estimate], *, samples: int = 128, seed: int = 1
 ) -> dict[str, FigureUncertainty]:
-    """Give every figure its uncertainty.
+    """Return every figure with its uncertainty.
 
     Parameters
     ----------
@@ -83,7 +83,7 @@ def propagate(
 
     Raises
     ------
-    FingervisionError
+    ModelError
         Where a number cannot be redrawn by its uncertainty, or too many samples are no drawings.
     """
     used = {name: estimate.u or 0.0 for name, estimate in numbers.items() if estimate.u}
@@ -142,7 +142,7 @@ def _is_bent(u: float, bends: list[float], value: float) -> bool:
 def _samples(
     evaluate: Evaluate, used: Mapping[str, float], figures: list[str], count: int, seed: int
 ) -> dict[str, Array]:
-    """Figures of drawings whose numbers are drawn at random, normal and independent."""
+    """Figures of drawings whose dimensions are drawn at random, normal and independent."""
     points = qmc.Sobol(len(used), seed=seed).random(count)
     # A point far out in the first or last slice of a number would count for the whole of it: 18 % of a bent figure's u.
     normal = ndtri(np.clip(points, 0.5 / count, 1.0 - 0.5 / count))

@@ -1,8 +1,9 @@
-"""How far the width of a plate holds its flexures back: between plane stress and plane strain.
+"""Width effect: how strongly the width of a plate restrains its flexures, between plane stress and plane strain.
 
-A bar that bends narrows on its stretched side and widens on the pressed one. A flexure that is short beside its width
-cannot, because the thick material at its ends does not: it is stiffer than plane stress has it, by up to 1 / (1 - nu^2)
-in plane strain. The share w of the way from the one to the other comes from brick elements (`hinge_correction`).
+A bar in bending becomes narrower on its stretched side and wider on the compressed one. A flexure that is short
+compared with its width cannot do so, because of the thick material at its ends: it is stiffer than in plane stress, by
+up to 1 / (1 - nu^2) in plane strain. The position w between the two (0 to 1) comes from brick elements
+(`hinge_correction`).
 """
 
 from dataclasses import dataclass
@@ -25,7 +26,7 @@ SHARE_UNCERTAINTY = 0.05
 
 @dataclass(frozen=True, slots=True)
 class ConstrainedZone:
-    """A flexure as the plate sees it: an upright or turned rectangle in which the width is held back.
+    """A flexure seen in the plane of the plate: a rectangle in which lateral contraction is restrained.
 
     Parameters
     ----------
@@ -46,7 +47,7 @@ class ConstrainedZone:
     share: float
 
     def holds(self, points: Array) -> NDArray[np.bool_]:
-        """Whether points, shape (2, n), lie in it."""
+        """Whether points, shape (2, n), lie in the zone."""
         c, s = cos(radians(self.axis_deg)), sin(radians(self.axis_deg))
         x, y = points[0] - self.centre_mm[0], points[1] - self.centre_mm[1]
         return np.asarray(
@@ -55,7 +56,7 @@ class ConstrainedZone:
 
 
 def gripper_zones(gripper: Gripper) -> tuple[ConstrainedZone, ...]:
-    """Return the zones of a gripper's two hinges."""
+    """The zones of a gripper's two hinges."""
     lever = gripper.lever
     places = ((lever.hinge1_mm, lever.hinge1_axis_deg), (lever.hinge2_mm, lever.hinge2_axis_deg))
     return tuple(
@@ -77,8 +78,8 @@ def shares_at(zones: tuple[ConstrainedZone, ...], points: Array) -> Array:
 def held_moduli(material: Material, share: Array) -> tuple[Array, Array]:
     """Young's modulus and Poisson's ratio of the plane law with a share w of plane strain.
 
-    With sigma_z = w nu (sigma_x + sigma_y) Hooke's law in the plane is that of plane stress with
-    E' = E / (1 - w nu^2) and nu' = nu (1 + w nu) / (1 - w nu^2); the shear modulus stays.
+    With sigma_z = w nu (sigma_x + sigma_y), Hooke's law in the plane is that of plane stress with E' = E / (1 - w nu^2)
+    and nu' = nu (1 + w nu) / (1 - w nu^2); the shear modulus is unchanged.
     """
     E, nu = material.youngs_modulus_mpa, material.poisson_ratio
     held = 1.0 - share * nu**2
@@ -86,5 +87,5 @@ def held_moduli(material: Material, share: Array) -> tuple[Array, Array]:
 
 
 def force_uncertainty(material: Material) -> float:
-    """Relative standard uncertainty of force and frequency squared by the width effect."""
+    """Relative standard uncertainty, from the width effect, of the force and of the squared frequency."""
     return SHARE_UNCERTAINTY * material.poisson_ratio**2

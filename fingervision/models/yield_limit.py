@@ -1,4 +1,4 @@
-"""How far a gripper may be driven before its hinges yield."""
+"""Largest input of a gripper before its hinges yield."""
 
 from collections.abc import Sequence
 from typing import Protocol
@@ -14,21 +14,21 @@ _PLACES = 9
 
 
 class StressedModel(Protocol):
-    """A model that knows the stress in its hinges."""
+    """A model that computes the stress in its hinges."""
 
     physics: Physics
 
     def peak_stress(self) -> PeakStress:
-        """Largest stress by 1 mm of input, small displacements."""
+        """Largest stress per 1 mm of input, small displacements."""
         ...
 
     def loaded(self, inputs_mm: Sequence[float]) -> list[LoadedState]:
-        """Gap, forces and largest stress at some inputs."""
+        """Gap, forces and largest stress at the given inputs."""
         ...
 
 
 def opening_at_yield_mm(model: StressedModel, yield_mpa: float) -> float:
-    """Input on the side without contact at which the largest stress reaches the yield stress."""
+    """Input on the side without contact at which the largest stress reaches the yield stress (mm)."""
     travel_mm = yield_mpa / model.peak_stress().mpa_per_mm
     if model.physics.large_rotation:
         for _ in range(_REFINEMENTS):
@@ -37,7 +37,7 @@ def opening_at_yield_mm(model: StressedModel, yield_mpa: float) -> float:
 
 
 def input_at_yield_mm(model: StressedModel, end_mm: float, yield_mpa: float) -> float:
-    """Input between rest and an end that yields at which the largest stress passes the yield stress."""
+    """Input between rest and a yielding end at which the largest stress exceeds the yield stress (mm)."""
     if not model.physics.large_rotation and not (model.physics.contact and end_mm < 0.0):
         return float(np.copysign(yield_mpa / model.peak_stress().mpa_per_mm, end_mm))
     inputs = np.linspace(0.0, end_mm, _PLACES)

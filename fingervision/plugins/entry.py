@@ -1,4 +1,4 @@
-"""What a registry gives: a part with where it comes from, and a plug-in that was left out with the reason."""
+"""An entry of a registry: a part with its origin, or a plug-in that was left out with the reason."""
 
 from dataclasses import dataclass
 from typing import Generic, TypeVar
@@ -10,7 +10,7 @@ T = TypeVar("T")
 
 @dataclass(frozen=True, slots=True)
 class Entry(Generic[T]):
-    """A part with its name and where it comes from."""
+    """A part with its name and its origin."""
 
     name: str
     value: T

@@ -1,35 +1,35 @@
-"""Error classes of plug-ins; each message names the plug-in and what to do."""
+"""Error classes of plug-ins; each message names the plug-in and says what to do."""
 
 from fingervision.domain.errors import FingervisionError, UsageError
 
 
 class PluginError(FingervisionError):
-    """A plug-in cannot be used; everything else can."""
+    """A plug-in cannot be used; all other plug-ins and parts still can."""
 
 
 class PluginImportError(PluginError):
-    """It raised an exception while it was imported."""
+    """A plug-in raised an exception while it was imported."""
 
 
 class PluginTimeoutError(PluginError):
-    """It was still being imported or tried when its time was up."""
+    """A plug-in did not finish its import or trial within the time limit."""
 
 
 class PluginShapeError(PluginError):
-    """It is not what its group asks for: another type, a missing method, an array of another shape."""
+    """A plug-in is not what its group requires: another type, a missing method, or an array of another shape."""
 
 
 class PluginNameError(PluginError):
-    """Its name is taken."""
+    """The name of a plug-in is already taken."""
 
 
 class PluginVersionError(PluginError):
-    """It needs another version of fingervision than this one."""
+    """A plug-in needs another version of fingervision than this one."""
 
 
 class MisfitError(ValueError):
-    """The rest of a sentence that begins with a plug-in: `must ..., but ...`, without a point at its end."""
+    """The second part of a sentence that begins with a plug-in's name: `must ..., but ...`, without a full stop."""
 
 
 class PluginFileError(UsageError):
-    """There is no such file, or it holds nothing that can be plugged in."""
+    """The plug-in file does not exist, or holds nothing that can be plugged in."""

@@ -1,4 +1,4 @@
-"""A module from a file that the user named."""
+"""Import of a module from a file that the user named."""
 
 import hashlib
 import importlib.util
@@ -14,7 +14,7 @@ SUFFIX = ".py"
 
 
 def check_file(path: Path, what: str) -> Origin:
-    """Refuse what cannot be imported, before anything of it runs.
+    """Refuse a file that cannot be imported, before any of its code runs.
 
     Parameters
     ----------
@@ -46,16 +46,16 @@ def check_file(path: Path, what: str) -> Origin:
 
 
 def needs(who: str, specifier: str) -> str:
-    """Say that something needs another version."""
+    """Return the error for something that needs another version of fingervision."""
     from fingervision import __version__
 
     return f"{who} needs fingervision {specifier}, but this is {__version__}: install the version that it asks for."
 
 
 def load_file(path: Path) -> ModuleType:
-    """Import a file under a name of its own, so that two files of one name do not meet.
+    """Import a file under a module name of its own, so that two files of the same name do not collide.
 
-    It is imported anew where its content has changed.
+    A file whose content has changed is imported anew.
     """
     whole = path.resolve()
     digest = hashlib.sha256(f"{whole}\n".encode() + whole.read_bytes()).hexdigest()[:16]

@@ -1,4 +1,4 @@
-"""Where a part comes from: the package itself, another distribution, a file, or this session."""
+"""Origin of a part: the package itself, another distribution, a file, or this session."""
 
 from dataclasses import dataclass
 
@@ -32,10 +32,10 @@ SESSION = Origin("this session", "mend it where it is registered")
 
 
 def of_distribution(name: str, version: str) -> Origin:
-    """Give the origin of what an installed distribution brings along."""
+    """Return the origin of a part from an installed distribution."""
     return Origin(f"{name} {version}", f"ask its author, or remove it with `pip uninstall {name}`")
 
 
 def of_file(path: str) -> Origin:
-    """Give the origin of what stands in a file that the user named."""
+    """Return the origin of a part from a file that the user named."""
     return Origin(path, "mend the file, or leave it out")

@@ -1,7 +1,7 @@
 """One registry for every kind of part: built-in files, entry points of other distributions, files, this session.
 
-Built-in parts are the modules of a package. What comes from elsewhere is imported when it is first asked for, watched
-while it is, and checked; one that cannot be used is left out with a sentence and takes nothing else with it.
+Built-in parts are the modules of a package. A part from elsewhere is imported when it is first requested, under a time
+limit, and checked. One that cannot be used is left out with a sentence, and does not affect the others.
 """
 
 import logging
@@ -63,7 +63,7 @@ class Registry(Generic[T]):
         self.forget()
 
     def forget(self) -> None:
-        """Look for installed plug-ins anew when they are next asked for."""
+        """Search for installed plug-ins again at the next request."""
         self._loaded: dict[str, Entry[T]] = {}
         self._refused: dict[tuple[str, str], Refusal] = {}
         self._points: tuple[EntryPoint, ...] | None = None
@@ -71,18 +71,18 @@ class Registry(Generic[T]):
 
     @property
     def version(self) -> int:
-        """A number that changes whenever the parts may have changed."""
+        """A counter that increases whenever the parts may have changed."""
         return self._version
 
     def names(self) -> tuple[str, ...]:
-        """List the names that can be asked for: built in, installed, added. Nothing is imported."""
+        """List the names of all parts: built in, installed, added. Nothing is imported."""
         found = dict.fromkeys(
             (*self._built_in(), *(p.name for p in self._entry_points()), *(e.name for e in self._added))
         )
         return tuple(name for name in found if not any(name == refused for refused, _ in self._refused))
 
     def get(self, name: str) -> Entry[T]:
-        """Give one part; only this one is imported.
+        """Return one part; only this one is imported.
 
         Raises
         ------
@@ -105,7 +105,7 @@ class Registry(Generic[T]):
         return found
 
     def entries(self) -> tuple[Entry[T], ...]:
-        """Import all parts, and give those that can be used: built in, installed, added."""
+        """Import all parts, and return those that can be used: built in, installed, added."""
         own = [self.get(name) for name in self._built_in()]
         if importing():
             return tuple(own)
@@ -116,12 +116,12 @@ class Registry(Generic[T]):
         return (*own, *(entry for entry in installed if entry is not None), *self._added)
 
     def refusals(self) -> tuple[Refusal, ...]:
-        """List the installed plug-ins that are left out, each with its sentence; imports all."""
+        """Import all installed plug-ins, and list those that are left out, each with its sentence."""
         self.entries()
         return tuple(self._refused.values())
 
     def add(self, name: str, value: T, origin: Origin = SESSION) -> None:
-        """Add a part for this process; the same object twice counts once, another one of the session replaces it.
+        """Add a part for this process; the same object counts once, and another one of this session is replaced.
 
         Raises
         ------
@@ -141,7 +141,7 @@ class Registry(Generic[T]):
             self._version += 1
 
     def checked(self, held: object, who: str, origin: Origin) -> dict[str, T]:
-        """Give the parts that an object holds, by name, once they are checked.
+        """Return the parts that an object holds, by name, after checking them.
 
         Parameters
         ----------
@@ -160,12 +160,12 @@ class Registry(Generic[T]):
         return watched(who, origin, lambda: self._parts_of(held))
 
     def remove(self, name: str) -> None:
-        """Take back what was added; nothing happens where nothing was."""
+        """Remove a part that was added; nothing happens where there is none."""
         self._added = [entry for entry in self._added if entry.name != name]
         self._version += 1
 
     def in_file(self, path: Path) -> dict[str, T]:
-        """Import a file and give the parts that it holds, by name.
+        """Import a file and return its parts, by name.
 
         Raises
         ------
@@ -182,7 +182,7 @@ class Registry(Generic[T]):
 
     @contextmanager
     def with_files(self, paths: tuple[Path, ...]) -> Iterator[None]:
-        """Add what some files hold for as long as the block lasts."""
+        """Add the parts of some files while a `with` block lasts."""
         before = list(self._added)
         try:
             for path in {path.resolve(): path for path in reversed(paths)}.values():  # a file named twice counts once
@@ -208,7 +208,7 @@ class Registry(Generic[T]):
         return _origin(self._points_of(name)[0])
 
     def _of_points(self, points: list[EntryPoint]) -> Entry[T] | None:
-        """Give what entry points of one name stand for; None where it is left out."""
+        """Return what the entry points of one name refer to; None where it is left out."""
         name = points[0].name
         if name in self._loaded and not self._loaded[name].origin.built_in:
             return self._loaded[name]

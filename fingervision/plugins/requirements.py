@@ -11,7 +11,9 @@ SCRIPT = re.compile(r"(?m)^# /// script\s*$\s(?P<content>(?:^#(?:| .*)$\s)+?)^# 
 
 
 def unmet(requires: Iterable[str]) -> str | None:
-    """Give the requirement on fingervision that this version does not meet, as in `>=0.9`; None if it meets all.
+    """Return the first requirement on fingervision that this version does not meet, such as `>=0.9`.
+
+    None if it meets all.
 
     Parameters
     ----------
@@ -37,7 +39,7 @@ def unmet(requires: Iterable[str]) -> str | None:
 
 
 def stated_in(source: str) -> tuple[str, ...]:
-    """Read the requirements that a file's inline script metadata states; none where it has none or they are no TOML."""
+    """Read the requirements in a file's inline script metadata; empty where it has none or they are not TOML."""
     found = SCRIPT.search(source)
     if found is None:
         return ()

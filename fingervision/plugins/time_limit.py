@@ -1,4 +1,4 @@
-"""Run foreign code for at most so many seconds."""
+"""Run foreign code under a time limit."""
 
 import ctypes
 import os
@@ -19,15 +19,15 @@ LET_END_S = 0.5
 
 
 class OutOfTimeError(Exception):
-    """The code was still running when its time was up."""
+    """The code was still running at its time limit."""
 
 
 class _EndNow(BaseException):
-    """Raised inside the code that is to end; no `except Exception` holds it."""
+    """Raised inside code that exceeds its time limit; not an `Exception`, so that no `except Exception` catches it."""
 
 
 def longest_s() -> float:
-    """Read how many seconds a plug-in may take to be imported.
+    """Time limit for the import of a plug-in (seconds).
 
     Raises
     ------
@@ -47,10 +47,10 @@ def longest_s() -> float:
 
 
 def within(seconds: float, act: Callable[[], T]) -> T:
-    """Run something in a thread of its own and give its result.
+    """Run a function in a thread of its own under a time limit, and return its result.
 
-    Code that is still running at the end of its time is ended by an exception raised inside it. What waits in compiled
-    code cannot be ended so: it is left to wait in the background and does not keep the program from ending.
+    Code that still runs at its time limit is ended by an exception raised inside it. Code that waits inside a compiled
+    function cannot be ended in this way: it goes on in the background and does not keep the program from ending.
 
     Parameters
     ----------

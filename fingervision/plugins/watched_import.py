@@ -1,4 +1,4 @@
-"""Import foreign code within a time limit, and say in a sentence what it did wrong."""
+"""Import foreign code within a time limit, and report in one sentence what went wrong."""
 
 import threading
 from collections.abc import Callable
@@ -19,12 +19,12 @@ HERE = threading.local()
 
 
 def importing() -> bool:
-    """Whether this thread imports a plug-in just now: what asks for parts meanwhile sees the built-in ones alone."""
+    """Whether this thread is importing a plug-in; requests for parts then see only the built-in ones."""
     return bool(getattr(HERE, "importing", False))
 
 
 def watched(who: str, origin: Origin, act: Callable[[], T]) -> T:
-    """Run foreign code within its time, and turn whatever it does into a sentence.
+    """Run foreign code within its time limit, and turn whatever it raises into a plug-in error of one sentence.
 
     Parameters
     ----------

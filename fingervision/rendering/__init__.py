@@ -1,7 +1,7 @@
-"""Scenes drawn as frames with a truth that is known: the outline before blur, good to 0.001 px.
+"""Scenes rendered as frames whose true geometry is known: the outline before blur, accurate to 0.001 px.
 
-The names below are what most need; README.md says how the drawing is done and why it is exact. Compression lies beside
-them (`jpeg`, `clip`), because it needs OpenCV and PyAV, as do objects to calibrate with (`targets`).
+The names below serve most uses; README.md explains how scenes are rendered and why the result is exact. Compression
+(`jpeg`, `clip`) and calibration objects (`targets`) are imported separately; the former need OpenCV and PyAV.
 """
 
 from fingervision.rendering.camera import IDEAL_CAMERA, Camera

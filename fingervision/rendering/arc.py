@@ -1,4 +1,4 @@
-"""A circular piece of an outline."""
+"""A circular arc, as a piece of an outline."""
 
 from dataclasses import dataclass
 from math import atan2, ceil, cos, floor, pi, sin
@@ -11,7 +11,7 @@ from fingervision.rendering.plane import Motion, Points
 
 @dataclass(frozen=True, slots=True)
 class Arc:
-    """A circular piece about (x, y), from the angle `start_rad` on by `sweep_rad` (positive from x towards y)."""
+    """A circular arc about (x, y), from the angle `start_rad` through `sweep_rad` (positive from x towards y)."""
 
     x_px: float
     y_px: float
@@ -40,7 +40,7 @@ class Arc:
 
     @property
     def box_px(self) -> tuple[float, float, float, float]:
-        """The rectangle about the piece: least x, least y, greatest x, greatest y."""
+        """Bounding box of the piece: least x, least y, greatest x, greatest y."""
         # Besides its ends, an arc is outermost where it crosses an axis through its centre.
         quarters = sorted((self.start_rad / (pi / 2), (self.start_rad + self.sweep_rad) / (pi / 2)))
         passed = [quarter * pi / 2 for quarter in range(ceil(quarters[0]), floor(quarters[1]) + 1)]
@@ -61,22 +61,22 @@ class Arc:
         return self.start_rad + t * self.sweep_rad + quarter
 
     def part(self, t0: float, t1: float) -> "Arc":
-        """Cut out the piece between two fractions of the length."""
+        """Return the part between two fractions of the length."""
         start = self.start_rad + t0 * self.sweep_rad
         return Arc(self.x_px, self.y_px, self.radius_px, start, (t1 - t0) * self.sweep_rad)
 
     def backwards(self) -> "Arc":
-        """Run the same piece from its end."""
+        """Return the same piece with its direction reversed."""
         return Arc(self.x_px, self.y_px, self.radius_px, self.start_rad + self.sweep_rad, -self.sweep_rad)
 
     def moved(self, motion: Motion) -> "Arc":
-        """Place the piece by a rigid motion."""
+        """Return the piece after a rigid motion."""
         x, y = motion.place(self.x_px, self.y_px)
         first_x, first_y = motion.place(*self.start)
         sweep = -self.sweep_rad if motion.mirrors else self.sweep_rad
         return Arc(x, y, self.radius_px, atan2(first_y - y, first_x - x), sweep)
 
     def grown(self, by_px: float) -> "Arc":
-        """Shift the piece parallel to itself, `by_px` further out than its outline now lies."""
+        """Offset the piece parallel to itself, `by_px` further out."""
         outwards = 1.0 if self.sweep_rad >= 0.0 else -1.0
         return Arc(self.x_px, self.y_px, self.radius_px + outwards * by_px, self.start_rad, self.sweep_rad)

@@ -1,4 +1,4 @@
-"""The camera: tilt, lens, blooming, blur and noise between the ideal scene and the frame."""
+"""The camera model: tilt, lens, blooming, blur and noise between the ideal scene and the frame."""
 
 from dataclasses import dataclass
 from math import isfinite
@@ -13,7 +13,7 @@ LEAST_BLUR_PX = 0.1
 
 @dataclass(frozen=True, slots=True)
 class Camera:
-    """How the scene becomes a frame, in the order of the light's way.
+    """How the scene becomes a frame, in the order of the light's path.
 
     Parameters
     ----------
@@ -69,7 +69,7 @@ class Camera:
             raise DataError(msg)
 
     def sees(self, outlines: tuple[Outline, ...], width_px: int, height_px: int) -> tuple[Outline, ...]:
-        """Map outlines of the ideal picture into the camera's, through tilt and lens; without blooming and blur."""
+        """Map outlines from the ideal picture to the camera's picture, by tilt and lens; without blooming and blur."""
         if self.tilt is None and self.lens is None:
             return outlines
         view = View(self.lens or RadialLens(), self.tilt or Tilt(), width_px, height_px)

@@ -1,4 +1,4 @@
-"""Clips: frames with their own times, through a camera's codec into a video file."""
+"""Video clips: frames with their own times, coded by a camera's codec into a video file."""
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
@@ -62,9 +62,9 @@ Codec = H264 | Mjpeg | Ffv1
 
 
 def write_clip(path: Path, frames: Iterable[Frame], codec: Codec) -> None:
-    """Write frames with their presentation times, at any rate, also a changing one.
+    """Write frames with their presentation times, at a constant or variable rate.
 
-    Grey levels become the luma as they are (full range), so that the luma plane of the clip is the frame.
+    Grey levels are stored unchanged as full-range luma, so that the clip's luma plane is the frame.
 
     Parameters
     ----------
@@ -77,9 +77,10 @@ def write_clip(path: Path, frames: Iterable[Frame], codec: Codec) -> None:
 
     Raises
     ------
-    FingervisionError
-        The file cannot be written, times are missing or do not increase, sizes change, the clip is empty, or the
-        container or codec cannot hold the frames.
+    DataError
+        Times are missing or do not increase, sizes change, or the clip is empty.
+    OutputError
+        The file cannot be written, or the container or codec cannot hold the frames.
     """
     if path.suffix not in CONTAINERS:
         msg = f"A clip's name must end in {', '.join(CONTAINERS)}, because these keep every time, but is {path.name}."
@@ -94,7 +95,7 @@ def write_clip(path: Path, frames: Iterable[Frame], codec: Codec) -> None:
             _encode(container, first, source, codec)
     except OSError as error:
         msg = f"{path} must be a file that can be written, but it could not be: {error.strerror}."
-        raise DataError(msg) from error
+        raise OutputError(msg) from error
 
 
 def _encode(container: OutputContainer, first: Frame, others: Iterator[Frame], codec: Codec) -> None:
@@ -130,7 +131,7 @@ def _encode(container: OutputContainer, first: Frame, others: Iterator[Frame], c
 
 
 def _tick(frame: Frame, last_tick: int) -> int:
-    """Time of a frame on the clip's clock."""
+    """Time of a frame in ticks of the clip's clock."""
     if frame.time_s is None:
         msg = f"A frame of a clip must have its time, but frame {frame.index} has none."
         raise DataError(msg)
@@ -145,7 +146,7 @@ def _tick(frame: Frame, last_tick: int) -> int:
 
 
 def _pixel_format(pixels: Pixels, codec: Codec) -> str:
-    """FFmpeg's name of the layout that a codec stores such frames in."""
+    """FFmpeg's name of the pixel format in which a codec stores such frames."""
     wide, colour = pixels.dtype == np.uint16, pixels.ndim == 3
     if isinstance(codec, Ffv1):
         if colour:

@@ -1,14 +1,14 @@
-"""How much of each pixel a shape covers, seen through a Gaussian blur: exactly, as an integral along the outline.
+"""Fraction of each pixel that a shape covers, after Gaussian blur: computed exactly, as an integral along the outline.
 
 Blur and the pixel's own square act together as the kernel K(x, y) = k(x) k(y), where k is the Gaussian averaged over
-one pixel. The covered part of the pixel at p is the integral of K(p - q) over the shape; by Green's theorem this is
+one pixel. The covered fraction of the pixel at p is the integral of K(p - q) over the shape; by Green's theorem this is
 
     V(p) = integral round the outline of  k(p_x - q_x) c(p_y - q_y) dq_x,      c' = k,
 
 and k and c have closed forms (error function and its integral). The outline is cut into panels of a few sigma, each
-integrated by Gauss-Legendre: the integrand is analytic, so the error falls geometrically, without any raster. Panels
-only touch pixels within REACH_SIGMAS; what lies below them follows from a running sum down the columns, so that the
-sides of an upright finger cost nothing.
+integrated by Gauss-Legendre: the integrand is analytic, so the error falls geometrically, without any raster. A panel
+affects only pixels within REACH_SIGMAS; pixels below it follow from a running sum down the columns, so that the sides
+of an upright finger cost no time.
 """
 
 from collections.abc import Sequence
@@ -45,7 +45,7 @@ np.fill_diagonal(_DERIVATIVE, -_DERIVATIVE.sum(axis=1))
 
 
 def panels(outlines: Sequence[Outline], blur_px: float) -> Points:
-    """Cut outlines into panels and give the nodes of each.
+    """Divide outlines into panels and return the integration nodes of each.
 
     Parameters
     ----------
@@ -83,7 +83,10 @@ def panels(outlines: Sequence[Outline], blur_px: float) -> Points:
 
 
 def _fractions(rows: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Fractions of the piece at each panel's nodes, and each panel's piece; `rows` begin with the number of panels."""
+    """Fractions of the piece at each panel's nodes, and the piece of each panel.
+
+    `rows` begin with the number of panels.
+    """
     counts = rows[:, 0].astype(int)
     row = np.repeat(rows, counts, axis=0)
     place = np.arange(len(row)) - np.repeat(np.cumsum(counts) - counts, counts)
@@ -91,7 +94,7 @@ def _fractions(rows: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[
 
 
 def coverage(outlines: Sequence[Outline], blur_px: float, window: Region) -> NDArray[np.float64]:
-    """Covered part of each pixel after blur and pixel integration.
+    """Covered fraction of each pixel after blur and pixel integration.
 
     Parameters
     ----------
@@ -140,7 +143,7 @@ def coverage(outlines: Sequence[Outline], blur_px: float, window: Region) -> NDA
 
 
 def window_of(outlines: Sequence[Outline], blur_px: float, width_px: int, height_px: int) -> Region:
-    """Find the part of a frame that the outlines can darken or lighten; its sizes may be 0."""
+    """Find the part of a frame whose pixels the outlines can change; its width and height may be 0."""
     boxes = np.array([outline.box_px for outline in outlines if outline.pieces])
     if not boxes.size:
         return Region(0, 0, 0, 0)

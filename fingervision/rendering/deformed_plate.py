@@ -1,4 +1,4 @@
-"""Outlines of a plate that finite elements have deformed: quadratic edges chained to loops, as a picture shows them."""
+"""Outlines of a plate deformed in a finite-element model: quadratic edges joined to closed loops in the picture."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +13,7 @@ MOST_CHORDS = 16
 
 
 def deformed_outlines(edges: NDArray[np.int64], nodes_px: NDArray[np.float64]) -> tuple[Outline, ...]:
-    """Chain the outline's edges into loops, and each edge, a parabola through three nodes, into chords.
+    """Join the outline's edges into loops, and approximate each edge, a parabola through three nodes, by chords.
 
     Parameters
     ----------
@@ -30,7 +30,7 @@ def deformed_outlines(edges: NDArray[np.int64], nodes_px: NDArray[np.float64]) -
 
     Raises
     ------
-    FingervisionError
+    DataError
         The edges do not close.
     """
     following = {int(edge[0]): place for place, edge in enumerate(edges.T)}
@@ -70,7 +70,7 @@ def _area_px2(corners: tuple[tuple[float, float], ...]) -> float:
 def _chords(
     start: NDArray[np.float64], end: NDArray[np.float64], middle: NDArray[np.float64]
 ) -> list[tuple[float, float]]:
-    """Points of a parabola through three, its end left out."""
+    """Points on the parabola through three points, without its last point."""
     bend = start + end - 2.0 * middle
     # A parabola lies an eighth of its second difference beside each of n chords, over n squared.
     count = int(np.clip(np.ceil(np.sqrt(0.5 * float(np.hypot(*bend)) / SAGITTA_PX)), 1, MOST_CHORDS))

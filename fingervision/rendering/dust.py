@@ -21,7 +21,7 @@ def dust(
     size_px: tuple[float, float] = (1.0, 6.0),
     levels: tuple[float, ...] = (20.0, 230.0),
 ) -> tuple[Patch, ...]:
-    """Strew grains over the frame.
+    """Scatter grains over the frame.
 
     Parameters
     ----------
@@ -43,7 +43,7 @@ def dust(
 
     Raises
     ------
-    FingervisionError
+    DataError
         A grain without size, or no level to choose from.
     """
     if not (count >= 0 and 0.0 < size_px[0] <= size_px[1] and levels):

@@ -91,7 +91,7 @@ class Finger:
 
 
 def axis_motion(direction: Direction) -> Motion:
-    """From (across, towards the root) to (x, y): across is x to the right or y downwards."""
+    """Map from (across, towards the root) to (x, y): across is x to the right or y downwards."""
     match direction:
         case Direction.UP:
             return Motion()
@@ -104,7 +104,9 @@ def axis_motion(direction: Direction) -> Motion:
 
 
 def finger_shape(width_px: float, length_px: float, tip: Tip, tilt_deg: float = 0.0) -> Outline:
-    """Outline of a finger in its own coordinates: x across, y towards the root, the untilted tip's middle at (0, 0).
+    """Outline of a finger in its own coordinates: x across, y towards the root.
+
+    The middle of the untilted tip is at (0, 0).
 
     Parameters
     ----------
@@ -122,7 +124,7 @@ def finger_shape(width_px: float, length_px: float, tip: Tip, tilt_deg: float = 
 
     Raises
     ------
-    FingervisionError
+    DataError
         The tip does not fit on the finger, or it is tilted or slanted by more than STEEPEST_DEG.
     """
     half = width_px / 2

@@ -1,4 +1,4 @@
-"""A frame as it is after JPEG compression."""
+"""A frame after JPEG compression."""
 
 import cv2
 import numpy as np
@@ -8,7 +8,7 @@ from fingervision.domain.frame import Pixels
 
 
 def through_jpeg(pixels: Pixels, quality: int) -> Pixels:
-    """Compress a frame as JPEG and read it again.
+    """Compress a frame as JPEG and decode it.
 
     Parameters
     ----------
@@ -24,7 +24,7 @@ def through_jpeg(pixels: Pixels, quality: int) -> Pixels:
 
     Raises
     ------
-    FingervisionError
+    DataError
         The frame has not 8 bits, or the quality does not exist.
     """
     if pixels.dtype != np.uint8:

@@ -1,7 +1,7 @@
-"""What tilt and lens do to an outline: the perspective of a tilted plane, then radial distortion.
+"""Effect of tilt and lens on an outline: the perspective of a tilted plane, then radial distortion.
 
-Outlines are mapped, never pictures: a mapped outline is again one of lines and arcs, so it is drawn as exactly as
-any other, and the truth is read from it.
+Outlines are mapped instead of pictures: a mapped outline again consists of lines and arcs, so that it is drawn exactly
+and its true gap can be computed.
 """
 
 from dataclasses import dataclass
@@ -53,7 +53,7 @@ class RadialLens:
 
 @dataclass(frozen=True, slots=True)
 class Tilt:
-    """A plane that is not square to the optical axis; the scale at the frame's centre stays what it was.
+    """A plane that is not perpendicular to the optical axis; the scale at the frame's centre is unchanged.
 
     Parameters
     ----------
@@ -104,7 +104,7 @@ class View:
     height_px: int
 
     def points(self, ideal: Points) -> Points:
-        """Where points (..., 2) of the ideal picture lie in the camera's."""
+        """Map points (..., 2) of the ideal picture to the camera's picture."""
         centre = np.array([(self.width_px - 1) / 2, (self.height_px - 1) / 2])
         x, y = np.moveaxis(ideal - centre, -1, 0)
         ax, ay = radians(self.tilt.about_x_deg), radians(self.tilt.about_y_deg)

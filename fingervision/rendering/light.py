@@ -1,4 +1,4 @@
-"""The light on the scene: levels of the ground and the fingers, a slope across the frame, a step."""
+"""The light on the scene: levels of background and fingers, a slope across the frame, a step."""
 
 from dataclasses import dataclass
 from math import cos, hypot, radians, sin, sqrt
@@ -69,7 +69,7 @@ class Light:
             raise DataError(msg)
 
     def field(self, width_px: int, height_px: int, blur_px: float) -> NDArray[np.float64] | float:
-        """Factor on each pixel's grey level; a plain number where the light is even."""
+        """Factor on each pixel's grey level; a single number where the light is uniform."""
         field: NDArray[np.float64] | float = self.exposure
         if self.slope_x:
             field = field * (1.0 + self.slope_x * (np.arange(width_px) - (width_px - 1) / 2) / width_px)

@@ -35,7 +35,7 @@ class Line:
 
     @property
     def box_px(self) -> tuple[float, float, float, float]:
-        """The rectangle about the piece: least x, least y, greatest x, greatest y."""
+        """Bounding box of the piece: least x, least y, greatest x, greatest y."""
         (x0, y0), (x1, y1) = self.start, self.end
         return (min(x0, x1), min(y0, y1), max(x0, x1), max(y0, y1))
 
@@ -52,20 +52,20 @@ class Line:
         return atan2(self.y1_px - self.y0_px, self.x1_px - self.x0_px)
 
     def part(self, t0: float, t1: float) -> "Line":
-        """Cut out the piece between two fractions of the length."""
+        """Return the part between two fractions of the length."""
         (x0, y0), (x1, y1) = self.points(np.array([t0, t1])).tolist()
         return Line(x0, y0, x1, y1)
 
     def backwards(self) -> "Line":
-        """Run the same piece from its end."""
+        """Return the same piece with its direction reversed."""
         return Line(self.x1_px, self.y1_px, self.x0_px, self.y0_px)
 
     def moved(self, motion: Motion) -> "Line":
-        """Place the piece by a rigid motion."""
+        """Return the piece after a rigid motion."""
         return Line(*motion.place(*self.start), *motion.place(*self.end))
 
     def grown(self, by_px: float) -> "Line":
-        """Shift the piece parallel to itself, `by_px` further out than its outline now lies."""
+        """Offset the piece parallel to itself, `by_px` further out."""
         heading = self.heading_rad(0.0)
         out_x, out_y = by_px * sin(heading), -by_px * cos(heading)
         return Line(self.x0_px + out_x, self.y0_px + out_y, self.x1_px + out_x, self.y1_px + out_y)

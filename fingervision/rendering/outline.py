@@ -1,6 +1,6 @@
-"""A closed curve of straight lines and circular arcs: the geometric truth of everything that is drawn.
+"""A closed curve of straight lines and circular arcs: the exact geometry of everything that is drawn.
 
-A curve runs so that its area, the integral of x dy, is positive; a hole runs the other way.
+A solid's curve runs so that its area, the integral of x dy, is positive; a hole's curve runs the other way.
 """
 
 from dataclasses import dataclass
@@ -19,7 +19,7 @@ Piece = Line | Arc
 
 @dataclass(frozen=True, slots=True)
 class Outline:
-    """A closed curve; each piece begins where the one before ends.
+    """A closed curve; each piece begins where the previous one ends.
 
     Parameters
     ----------
@@ -57,25 +57,25 @@ class Outline:
 
     @property
     def box_px(self) -> tuple[float, float, float, float]:
-        """The rectangle about the curve: least x, least y, greatest x, greatest y."""
+        """Bounding box of the curve: least x, least y, greatest x, greatest y."""
         boxes = [piece.box_px for piece in self.pieces]
         least_x, least_y, greatest_x, greatest_y = zip(*boxes, strict=True)
         return (min(least_x), min(least_y), max(greatest_x), max(greatest_y))
 
     def backwards(self) -> "Outline":
-        """Run the curve the other way: a solid becomes a hole."""
+        """Reverse the direction of the curve: a solid becomes a hole."""
         return Outline(tuple(piece.backwards() for piece in reversed(self.pieces)))
 
     def moved(self, motion: Motion) -> "Outline":
-        """Move the curve rigidly; where the motion mirrors, the curve is reversed, so that inside stays inside."""
+        """Return the curve after a rigid motion; under a reflection it is reversed, so that inside stays inside."""
         moved = tuple(piece.moved(motion) for piece in self.pieces)
         return Outline(tuple(piece.backwards() for piece in reversed(moved))) if motion.mirrors else Outline(moved)
 
     def grown(self, by_px: float) -> "Outline":
-        """Shift every edge parallel to itself, `by_px` further out (negative: further in).
+        """Offset every edge parallel to itself, `by_px` further out (negative: further in).
 
-        Corners that open are closed by an arc about the corner, corners that close are cut where the parallels meet.
-        Where nothing is left, the outline has no pieces.
+        A corner that opens is closed by an arc about the corner; a corner that closes is cut where the parallels meet.
+        If nothing remains, the outline has no pieces.
         """
         if by_px == 0.0:
             return self
@@ -98,7 +98,7 @@ class Outline:
         return Outline(bridged(grown))
 
     def _vanishes(self, by_px: float, turns: list[float], cuts_px: list[float]) -> bool:
-        """Whether the two sides meet: the growth uses up a stretch that turns by half a turn or more."""
+        """Whether an offset makes the two sides of a curve meet, because a stretch turns by half a turn or more."""
         used = []
         for i, piece in enumerate(self.pieces):
             if isinstance(piece, Arc):
@@ -123,9 +123,10 @@ class Outline:
         return False
 
     def winding(self, points: Points) -> NDArray[np.float64]:
-        """How often the curve runs round each point: 1 inside a solid, 0 outside; shape (n,).
+        """Winding number of the curve about each point: 1 inside a solid, 0 outside; shape (n,).
 
-        The sum of the angles that the pieces' chords subtend, and a full turn for each arc that bulges past the point.
+        It is the sum of the angles subtended by the pieces' chords, plus a full turn for each arc that bulges past the
+        point.
         """
         x, y = points[..., 0], points[..., 1]
         angle = np.zeros(x.shape)
@@ -146,7 +147,7 @@ class Outline:
 
 
 def _short(piece: Piece) -> tuple[Piece, ...]:
-    """Arcs in parts of at most a quarter turn, so that each lies on one side of its chord."""
+    """Divide arcs into parts of at most a quarter turn, so that each lies on one side of its chord."""
     if isinstance(piece, Line):
         return (piece,)
     count = max(1, int(np.ceil(abs(piece.sweep_rad) / (pi / 2))))
@@ -154,7 +155,7 @@ def _short(piece: Piece) -> tuple[Piece, ...]:
 
 
 def bridged(pieces: list[Piece]) -> tuple[Piece, ...]:
-    """Close what is left open between neighbours by straight lines."""
+    """Close the openings between neighbouring pieces by straight lines."""
     closed: list[Piece] = []
     for piece, follower in zip(pieces, pieces[1:] + pieces[:1], strict=True):
         closed.append(piece)
@@ -168,7 +169,7 @@ def disc(x_px: float, y_px: float, radius_px: float) -> Outline:
 
     Raises
     ------
-    FingervisionError
+    DataError
         The radius is not positive.
     """
     if not radius_px > 0.0:

@@ -1,4 +1,4 @@
-"""The frame: composition of the scene, light, noise, and the whole numbers of a sensor."""
+"""Rendering of a frame: scene, light, noise, and rounding to the sensor's integers."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,7 +32,7 @@ def render(scene: Scene, camera: Camera, rng: np.random.Generator) -> Pixels:
 
 
 def exact_grey(scene: Scene, camera: Camera) -> NDArray[np.float64]:
-    """Grey levels before noise and rounding, shape (height_px, width_px); 255 is full scale, and not clipped."""
+    """Grey levels before noise and rounding, shape (height_px, width_px); full scale is 255, values are not clipped."""
     light = scene.light
     grey: NDArray[np.float64] = np.full((scene.height_px, scene.width_px), light.ground, dtype=np.float64)
     for patch in scene.behind:
@@ -53,7 +53,7 @@ def exact_grey(scene: Scene, camera: Camera) -> NDArray[np.float64]:
 
 
 def with_noise(grey: NDArray[np.float64], camera: Camera, rng: np.random.Generator) -> NDArray[np.float64]:
-    """Add white noise, and shot noise where the camera has it."""
+    """Add white noise, and shot noise if the camera has it."""
     if camera.shot_grey > 0.0:
         spread = np.sqrt(camera.noise_grey**2 + camera.shot_grey * np.maximum(grey, 0.0))
         return grey + spread * rng.standard_normal(grey.shape)
@@ -66,7 +66,7 @@ def with_noise(grey: NDArray[np.float64], camera: Camera, rng: np.random.Generat
 
 
 def digitised(grey: NDArray[np.float64], camera: Camera) -> Pixels:
-    """Round to the sensor's whole numbers and clip at its full scale."""
+    """Round to integers, and clip at the sensor's full scale."""
     if camera.tint is not None:
         grey = grey[..., None] * np.array(camera.tint)
     if camera.bits == 8:
@@ -77,7 +77,7 @@ def digitised(grey: NDArray[np.float64], camera: Camera) -> Pixels:
 def _paint(
     grey: NDArray[np.float64], outlines: tuple[Outline, ...], level: float, around: float, camera: Camera
 ) -> None:
-    """Cover the picture with solids of one level; `around` is the level about them, which says where light spreads."""
+    """Paint solids of one level; `around` is the level of their surroundings, which decides where light spreads."""
     part, covered = _covered(grey, outlines, level < around, camera)
     # level + (part - level) (1 - covered), in place: fresh arrays of a frame's size cost more than the sums.
     np.subtract(1.0, covered, out=covered)
@@ -89,7 +89,7 @@ def _paint(
 def _covered(
     grey: NDArray[np.float64], outlines: tuple[Outline, ...], dark: bool, camera: Camera
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Give the part of the picture that solids can change, as a view, and how much of each pixel there they cover."""
+    """Return the part of the picture that solids can change, as a view, and how much of each pixel they cover."""
     height_px, width_px = grey.shape
     spread_px = -camera.bloom_px if dark else camera.bloom_px
     grown = [outline.grown(spread_px) for outline in camera.sees(outlines, width_px, height_px)]

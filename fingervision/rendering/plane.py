@@ -1,4 +1,4 @@
-"""The plane of the picture: its points and its rigid motions.
+"""The picture plane: its points and rigid motions.
 
 Coordinates are those of the picture: x right, y down, the centre of the first pixel is (0, 0), lengths in pixels.
 """
@@ -46,5 +46,5 @@ class Motion:
         return self.xx * self.yy - self.xy * self.yx < 0.0
 
     def place(self, x_px: float, y_px: float) -> tuple[float, float]:
-        """Where a point comes to lie."""
+        """Image of a point under the motion."""
         return (self.xx * x_px + self.xy * y_px + self.x_px, self.yx * x_px + self.yy * y_px + self.y_px)

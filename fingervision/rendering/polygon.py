@@ -26,7 +26,7 @@ def polygon(corners: tuple[tuple[float, float], ...], radii_px: tuple[float, ...
 
     Raises
     ------
-    FingervisionError
+    DataError
         There are fewer than three corners, neighbours coincide, or a radius is negative or does not fit between its
         neighbours.
     """

@@ -1,4 +1,4 @@
-"""What stands before the camera: fingers, other things, dust, highlights, a bright rim, light."""
+"""The scene in front of the camera: fingers, other objects, dust, highlights, a bright rim, light."""
 
 from dataclasses import dataclass
 
@@ -10,7 +10,7 @@ from fingervision.rendering.outline import Outline
 
 @dataclass(frozen=True, slots=True)
 class Patch:
-    """Something with a grey level of its own, painted over what was there before.
+    """A shape with a grey level of its own, painted over what is below.
 
     Parameters
     ----------
@@ -52,7 +52,7 @@ class Rim:
 
 @dataclass(frozen=True, slots=True)
 class Scene:
-    """Everything that is drawn, in the ideal picture: no lens, no blur, no noise.
+    """Everything that is drawn, in the ideal picture without lens, blur or noise.
 
     Parameters
     ----------

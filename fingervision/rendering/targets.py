@@ -1,4 +1,4 @@
-"""Objects of known size to calibrate with: bars, slots, discs, chessboards, needles."""
+"""Objects of known size for calibration: bars, slots, discs, chessboards, needles."""
 
 from math import radians
 
@@ -68,7 +68,7 @@ def slot(
 
 
 def needle(diameter_px: float, *, x_px: float, end_y_px: float) -> tuple[Outline]:
-    """Needle that hangs into the frame from above, with a square end at `end_y_px`.
+    """A needle that hangs into the frame from above, with a square end at `end_y_px`.
 
     Parameters
     ----------

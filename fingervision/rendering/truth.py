@@ -1,4 +1,4 @@
-"""What the gap between two fingers truly is: from the outline before blur."""
+"""The true gap between two fingers, from their outline before blur."""
 
 from dataclasses import dataclass
 from math import hypot
@@ -25,7 +25,7 @@ FLAT_PX = 1e-6
 
 @dataclass(frozen=True, slots=True)
 class TrueEdge:
-    """A finger's measuring point and tip.
+    """True measuring point and tip of a finger.
 
     Parameters
     ----------
@@ -42,7 +42,7 @@ class TrueEdge:
 
 @dataclass(frozen=True, slots=True)
 class TrueGap:
-    """Both measuring points; `left` has the smaller coordinate across the fingers."""
+    """Both true measuring points; `left` has the smaller coordinate across the fingers."""
 
     left: TrueEdge
     right: TrueEdge
@@ -54,7 +54,7 @@ class TrueGap:
 
 
 def truth(scene: Scene, camera: Camera, below_tip_px: float) -> TrueGap | NoGap:
-    """Find the true gap of a scene, or say why there is none.
+    """Compute the true gap of a scene, or the reason why there is none.
 
     Parameters
     ----------
@@ -73,7 +73,7 @@ def truth(scene: Scene, camera: Camera, below_tip_px: float) -> TrueGap | NoGap:
 
     Raises
     ------
-    FingervisionError
+    DataError
         More than two fingers, or two that point different ways.
     """
     if len(scene.fingers) < 2:
@@ -135,7 +135,7 @@ def _along(point: tuple[float, float], direction: Direction) -> float:
 
 @dataclass(frozen=True, slots=True)
 class _Tip:
-    """Least coordinate towards the root, and where across it is reached: a flat tip reaches it over a stretch."""
+    """Least coordinate towards the root, and the range across the finger over which a flat tip reaches it."""
 
     along_px: float
     first_px: float
@@ -169,7 +169,7 @@ def _tip(outline: Outline, direction: Direction) -> _Tip:
 
 
 def _crossings(outline: Outline, direction: Direction, along_px: float) -> list[float]:
-    """Coordinates across at which the outline crosses a line across the fingers."""
+    """Coordinates across the finger at which the outline crosses the height `along_px`."""
     grid = np.linspace(0.0, 1.0, BRACKET_POINTS)
     crossings = []
     for piece, follower in zip(outline.pieces, outline.pieces[1:] + outline.pieces[:1], strict=True):
@@ -211,7 +211,7 @@ def measuring_point(shape: Outline, below_tip_px: float, side: int) -> tuple[flo
 
     Raises
     ------
-    FingervisionError
+    DataError
         The finger does not reach to that line.
     """
     tip = _tip(shape, Direction.UP).along_px

@@ -1,4 +1,4 @@
-"""The scene that everybody needs: two fingers with a given gap at the measuring height."""
+"""The standard scene: two fingers with a given gap at the measuring height."""
 
 from math import sqrt
 
@@ -76,7 +76,7 @@ def two_fingers(
 
     Raises
     ------
-    FingervisionError
+    DataError
         A size is no number, the step between the tips is greater than the gap, or the tips do not reach to the
         measuring height.
     """

@@ -1,4 +1,4 @@
-"""The outline of several solids that may overlap: two fingers that touch are one blob."""
+"""Outline of the union of several solids: two touching fingers are one object."""
 
 from collections.abc import Iterable, Sequence
 from itertools import combinations, pairwise
@@ -13,9 +13,9 @@ from fingervision.rendering.plane import SAME_POINT_PX
 
 
 def union(outlines: tuple[Outline, ...]) -> tuple[Outline, ...]:
-    """Boundary of everything that lies inside at least one of the outlines.
+    """Boundary of the region that lies inside at least one of the outlines.
 
-    Pieces are cut where outlines cross; a part stays if it lies inside no other outline.
+    Pieces are cut where outlines cross; a part is kept if it lies inside no other outline.
 
     Parameters
     ----------
@@ -46,7 +46,7 @@ def union(outlines: tuple[Outline, ...]) -> tuple[Outline, ...]:
 
 
 def _shared(part: Piece, other: Outline) -> float | None:
-    """Whether a part lies on an edge of another outline: positive if both run the same way there, else negative."""
+    """Whether a part lies on an edge of another outline: positive if both run in the same direction, else negative."""
     x, y = part.points(np.array(0.5)).tolist()
     for edge in other.pieces:
         if not _may_cross(part, edge) or not _same_track(part, edge):
@@ -82,7 +82,7 @@ def _parts(piece: Piece, others: Iterable[Outline]) -> list[Piece]:
 
 
 def _may_cross(a: Piece, b: Piece) -> bool:
-    """Whether both pieces can reach the same point: neither strays further from its start than its length."""
+    """Whether two pieces can meet: neither extends further from its start than its length."""
     reach = a.length_px + b.length_px
     return abs(a.start[0] - b.start[0]) <= reach and abs(a.start[1] - b.start[1]) <= reach
 
@@ -122,7 +122,7 @@ def _line_line(a: Line, b: Line) -> list[float]:
 
 
 def _on(t: float, piece: Piece) -> bool:
-    """Whether a fraction belongs to a piece; its ends do, however rounded, or a crossing at a joint is lost."""
+    """Whether a fraction belongs to a piece, its ends included despite rounding, so that no crossing is lost."""
     margin = SAME_POINT_PX / piece.length_px
     return -margin <= t <= 1.0 + margin
 

@@ -1,1 +1,1 @@
-"""What a stage's record says, wherever it comes from: its noise, its encoder's step and lines, the record smoothed."""
+"""Properties of a recorded stage position from any source: noise, encoder step, encoder lines, smoothed record."""

@@ -1,4 +1,4 @@
-"""The recorded input's own noise, and the encoder's step, from the record itself."""
+"""Noise of the recorded input, and the step of its encoder, estimated from the record itself."""
 
 from math import comb
 
@@ -47,10 +47,11 @@ FEWEST_SINGLE = 3
 
 
 def input_sigma(input_mm: Array, runs: tuple[slice, ...]) -> tuple[float, float]:
-    """Estimate the standard uncertainty of one recorded input and the encoder's step, from the record itself.
+    """Estimate the standard uncertainty of one recorded input, and the encoder's step, from the record itself.
 
-    Differences of high order are noise: a motion's own vanish, sooner where it is straight than where it swings, so
-    that the smallest estimate is the best. Their median resists reversals.
+    High-order differences of a smooth motion vanish, so that what they leave is noise. A straight motion vanishes at a
+    lower order than an oscillation, so the smallest estimate over the orders is used. Their median is robust against
+    reversals.
 
     Returns
     -------
@@ -71,10 +72,11 @@ def input_sigma(input_mm: Array, runs: tuple[slice, ...]) -> tuple[float, float]
 
 
 def on_lines(input_mm: Array, runs: tuple[slice, ...]) -> Array:
-    """Take the jitter out of an encoder's record: put each value on the line about which it lies.
+    """Remove the jitter from an encoder's record: replace each value by the nearest line of the encoder's scale.
 
-    The lines may lie anywhere; their distance is where the characteristic function of the values has its largest
-    peak at the lowest frequency. A record that lies about no lines, or exactly on them, comes back as it is.
+    The offset of the lines is free. Their spacing is where the characteristic function of the values has its largest
+    peak at the lowest frequency. A record whose values do not cluster about lines, or lie exactly on them, is returned
+    unchanged.
 
     Parameters
     ----------
@@ -116,10 +118,10 @@ def on_lines(input_mm: Array, runs: tuple[slice, ...]) -> Array:
 
 
 def _equal_steps(input_mm: Array, snapped_mm: Array, runs: tuple[slice, ...], step_mm: float) -> bool:
-    """Whether the lines are the rows of a motion at one speed: it goes equally many lines on from each to the next.
+    """Whether the lines only reflect a motion at constant speed, which advances by equally many lines from row to row.
 
-    About an encoder's lines most changes of the value are jitter and stay on their line, or the lines that are crossed
-    from row to row differ by one.
+    About an encoder's own lines, most changes of the value are jitter that stays on one line, or the number of lines
+    crossed from row to row varies by one.
     """
     crossed = []
     for run in runs:
@@ -141,7 +143,7 @@ def _sigma_by_differences(input_mm: Array, runs: tuple[slice, ...], order: int) 
 
 
 def _scatter(input_mm: Array, runs: tuple[slice, ...]) -> float:
-    """Give the median standard deviation about lines through `LINE` samples; 0 where no run has so many."""
+    """Median standard deviation about straight lines through `LINE` samples; 0 where no run has so many."""
     x = np.arange(LINE) - 0.5 * (LINE - 1)
     found = [np.zeros(0)]
     for run in runs:
@@ -154,7 +156,7 @@ def _scatter(input_mm: Array, runs: tuple[slice, ...]) -> float:
 
 
 def _grid(input_mm: Array) -> float:
-    """Give the distance of the lines of a grid on which all values lie; 0 where there is none."""
+    """Spacing of a grid on which all values lie; 0 where there is none."""
     steps = np.diff(np.unique(np.round(input_mm, 9)))
     # Where every sample is several lines on, the steps differ by single ones.
     lines = np.concatenate([steps, np.diff(np.unique(steps))])
@@ -164,9 +166,9 @@ def _grid(input_mm: Array) -> float:
 
 
 def _rounds(input_mm: Array, runs: tuple[slice, ...], step_mm: float) -> bool:
-    """Whether a motion was rounded to a grid: it stands still on it, or its speed seems to change by single steps.
+    """Whether a motion was rounded to a grid: it pauses on grid values, or its speed appears to vary by single steps.
 
-    Set points in round numbers lie on a grid as well, but go from one to the next in equal steps.
+    Set points in round numbers lie on a grid as well, but advance from one to the next in equal steps.
     """
     if step_mm == 0.0:
         return False

@@ -1,4 +1,4 @@
-"""The recorded input smoothed: local lines and parabolas through the record, as wide as the record allows."""
+"""Smoothing of the recorded input: local lines and parabolas, over windows as wide as the record allows."""
 
 import numpy as np
 

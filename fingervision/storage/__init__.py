@@ -1,1 +1,1 @@
-"""Every file format in one place."""
+"""Reading and writing of every file format."""

@@ -1,4 +1,4 @@
-"""The path that an axis travelled between readings at targets, from the side of approach of each."""
+"""The path that an axis travelled between readings at targets, from the direction of approach of each reading."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -19,7 +19,7 @@ no target is approached over a longer way than its neighbours."""
 
 @dataclass(frozen=True, slots=True)
 class Reading:
-    """A reading at a target: position (None: missing), side of approach (+1 from below, -1 from above), cycle, time."""
+    """A reading at a target: position (None: missing), direction (+1 from below, -1 from above), cycle, time."""
 
     target_mm: float
     position_mm: float | None
@@ -32,7 +32,7 @@ class Reading:
 
 @dataclass(frozen=True, slots=True)
 class PathRow:
-    """A row of a measured table; without a gap it belongs to the input's path alone."""
+    """A row of a measured table; a row without a gap only belongs to the path of the input."""
 
     input_mm: float
     gap_mm: float | None
@@ -42,7 +42,7 @@ class PathRow:
 
 
 def approach_path(readings: Sequence[Reading]) -> tuple[tuple[PathRow, ...], tuple[str, ...]]:
-    """Put readings into the order of travel, with a row beyond the target wherever the path must have been there.
+    """Put readings into the order of travel, with an extra row beyond the target wherever the path has been there.
 
     Parameters
     ----------
@@ -95,7 +95,7 @@ def approach_path(readings: Sequence[Reading]) -> tuple[tuple[PathRow, ...], tup
 
 
 def _against(ordered: Sequence[Reading]) -> tuple[int, int]:
-    """Moves to another target that go against the direction stated there, and all moves."""
+    """Number of moves to another target that contradict the direction stated there, and number of all moves."""
     moves = [(b.target_mm - a.target_mm) * b.side for a, b in pairwise(ordered) if a.run == b.run]
     return sum(move < 0.0 for move in moves), sum(move != 0.0 for move in moves)
 
@@ -105,7 +105,7 @@ def _time(reading: Reading) -> float:
 
 
 def _travel(reading: Reading) -> tuple[int, int, float]:
-    """Cycle, from below before from above, in the direction of travel."""
+    """Sort key: cycle, from below before from above, in the direction of travel."""
     return reading.cycle, -reading.side, reading.side * reading.target_mm
 
 

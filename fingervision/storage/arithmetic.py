@@ -1,4 +1,4 @@
-"""Arithmetic in drawings: lengths that refer to each other by name."""
+"""Arithmetic in drawings: lengths that are computed from other lengths by name."""
 
 import ast
 import math
@@ -25,7 +25,7 @@ LARGEST = 1e5
 
 
 def number(raw: Any, names: Mapping[str, float], what: str) -> float:
-    """Read a number, or a text of numbers, names, + - * / ( ), sqrt, sin_deg, cos_deg and tan_deg.
+    """Read a number, or an expression of numbers, names, + - * / ( ), sqrt, sin_deg, cos_deg and tan_deg.
 
     Parameters
     ----------
@@ -38,7 +38,7 @@ def number(raw: Any, names: Mapping[str, float], what: str) -> float:
 
     Raises
     ------
-    FingervisionError
+    DataError
         Where it is no finite number of a sensible size, or uses what is not known.
     """
     if isinstance(raw, str):

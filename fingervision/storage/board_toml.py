@@ -1,4 +1,4 @@
-"""board.toml: port, wiring and times of a board.
+"""The file board.toml: port, wiring and time limits of a board.
 
 schema = 1
 port = "/dev/ttyACM0"
@@ -37,7 +37,7 @@ def read_board(path: Path) -> BoardSettings:
 
     Raises
     ------
-    FingervisionError
+    DataError, InputFileError
         The file cannot be read, or a value in it cannot be meant; the sentence names the line.
     """
     values, text = read_document(path, "board")

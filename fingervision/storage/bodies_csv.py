@@ -1,4 +1,7 @@
-"""bodies.csv, poses of a mechanism's bodies and angles of its hinges frame by frame; and their columns in gaps.csv."""
+"""The file bodies.csv: poses of a mechanism's bodies and angles of its hinges by frame.
+
+The same columns in gaps.csv.
+"""
 
 import csv
 import os
@@ -19,7 +22,7 @@ PARTS = ("x_mm", "y_mm", "angle_mrad")
 
 
 def write_bodies(path: Path, poses: Sequence[FramePoses]) -> None:
-    """Write bodies.csv; an empty cell is no value."""
+    """Write bodies.csv; an empty cell means no value."""
     with path.open("w", encoding="utf-8", newline="") as file:
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(COLUMNS)
@@ -57,7 +60,7 @@ def add_channels(gaps: Path, poses: Sequence[FramePoses], names: Mapping[str, st
 
     Raises
     ------
-    FingervisionError
+    DataError
         The table is of another recording.
     """
     with gaps.open(encoding="utf-8", newline="") as file:

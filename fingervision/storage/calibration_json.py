@@ -1,4 +1,4 @@
-"""calibration.json: a scale with its covariance, its budget and what it was made from."""
+"""The file calibration.json: a scale with its covariance, its budget and the references from which it was made."""
 
 import json
 from collections.abc import Mapping
@@ -28,11 +28,11 @@ SAME_U = 0.01
 
 
 def write_calibration(calibration: Calibration, path: Path) -> None:
-    """Write a calibration; nothing is left behind half-written.
+    """Write a calibration; a failure leaves no incomplete file.
 
     Raises
     ------
-    FingervisionError
+    OutputError
         The file cannot be written.
     """
     limits = {
@@ -100,11 +100,11 @@ def _response_content(calibration: Calibration) -> dict[str, Any] | None:
 
 
 def read_calibration(path: Path) -> Calibration:
-    """Read a calibration and refuse what cannot be one.
+    """Read a calibration, and refuse invalid content.
 
     Raises
     ------
-    FingervisionError
+    DataError, InputFileError
         There is no such file, it is from a newer schema, or it makes no sense.
     """
     try:
@@ -123,7 +123,7 @@ def _no_constant(name: str) -> NoReturn:
 
 
 class _Reader:
-    """One file's content, and the sentence when a piece of it makes no sense."""
+    """Content of a file, with error messages for invalid parts."""
 
     def __init__(self, path: Path, content: object) -> None:
         self._path = path

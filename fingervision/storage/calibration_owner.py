@@ -1,4 +1,4 @@
-"""A calibration's file and the pictures beside it: an older calibration is replaced, anything else is not."""
+"""Ownership of a calibration's file and pictures: an older calibration is replaced, any other file is not."""
 
 import json
 from pathlib import Path
@@ -10,11 +10,11 @@ from fingervision.domain.errors import OutputError
 
 
 def refuse_foreign(out: Path) -> None:
-    """Let a calibration be overwritten, never anything else.
+    """Refuse to overwrite a file that is not a calibration.
 
     Raises
     ------
-    FingervisionError
+    OutputError
         Something else stands there.
     """
     if not out.exists():
@@ -32,7 +32,7 @@ def write_picture(out: Path, name: str, picture: NDArray[np.uint8]) -> None:
 
     Raises
     ------
-    FingervisionError
+    OutputError
         It cannot be written.
     """
     import cv2

@@ -1,4 +1,4 @@
-"""Columns of a measured table that are channels of one's own: `name_mm`, `name_mrad`, their `u_` and `u_random_`."""
+"""User-named columns (channels) of a measured table: `name_mm`, `name_mrad`, and their `u_` and `u_random_` columns."""
 
 from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
@@ -19,7 +19,7 @@ NO_CHANNELS = ("held_mm", "target_mm", "encoder_mm", "u_force_n")
 
 
 def channel_names(names: Sequence[str], taken: Collection[str]) -> list[str]:
-    """Pick the columns that are channels, and the `u_` that belong to one, out of a header's names."""
+    """Select the columns of a header that are channels, and the `u_` columns that belong to one."""
     found = [
         name
         for name in names
@@ -29,7 +29,7 @@ def channel_names(names: Sequence[str], taken: Collection[str]) -> list[str]:
 
 
 def read_channels(path: Path, taken: Collection[str]) -> tuple[dict[str, Numbers], list[str]]:
-    """Read the channels of a table in the project's own format; one that holds no numbers is left out and said.
+    """Read the channels of a table in the project's own format; one without numbers is omitted with a note.
 
     Parameters
     ----------
@@ -54,7 +54,7 @@ def read_channels(path: Path, taken: Collection[str]) -> tuple[dict[str, Numbers
 
 
 def channels_of(values: Mapping[str, Numbers], rows: np.ndarray[tuple[int], np.dtype[np.intp]]) -> dict[str, Channel]:
-    """Take the rows of channels that are kept, in their order; `u_` that are no uncertainties are left out."""
+    """Select the kept rows of channels, in order; `u_` columns that are no valid uncertainties are omitted."""
     found = {}
     for name, numbers in values.items():
         if name.startswith("u_") or not numbers.present[rows].any():

@@ -1,4 +1,4 @@
-"""Columns of a CSV table with units in their names: comma, point, `#` comments, an empty cell is no value."""
+"""Columns of a CSV table with units in their names: comma, decimal point, `#` comments, empty cells."""
 
 import csv
 import difflib
@@ -10,18 +10,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fingervision.domain.errors import DataError, InputFileError, unreadable
+from fingervision.storage.decimal_number import decimal_number
 from fingervision.storage.number_block import number_block
+from fingervision.storage.plain_file import why
 
 CHUNK_LINES = 1000
 """Lines that are taken apart at once: their cells stay in the cache. All at once take ten times the file in memory."""
 
 
 def read_columns(path: Path, required: tuple[str, ...], known: tuple[str, ...]) -> dict[str, list[str]]:
-    """Read the known columns as text, by name; others are not looked at.
+    """Read the known columns as text, by name; other columns are ignored.
 
     Raises
     ------
-    FingervisionError
+    DataError, InputFileError
         The file cannot be read, is no table, or a required column is missing: with the nearest name found.
     """
     text = _text(path)
@@ -60,7 +62,7 @@ def header_of(path: Path) -> list[str]:
 
     Raises
     ------
-    FingervisionError
+    DataError, InputFileError
         The file cannot be read.
     """
     header = next(_reader(path, _text(path)), None)
@@ -68,7 +70,7 @@ def header_of(path: Path) -> list[str]:
 
 
 def _without_quotes(text: str, names: list[str], wanted: list[str]) -> dict[str, list[str]] | None:
-    """Read the wanted columns of a table without quotes, several times faster; None where a row must be looked at."""
+    """Read columns of a table without quotes, several times faster; None where a row needs the ordinary reader."""
     if '"' in text:
         return None
     lines = text.splitlines()
@@ -87,18 +89,18 @@ def _without_quotes(text: str, names: list[str], wanted: list[str]) -> dict[str,
 
 
 def _reader(path: Path, text: str) -> Iterator[tuple[int, list[str]]]:
-    """Rows with their numbers; comments and empty rows left out."""
+    """Rows with their numbers, without comments and empty rows."""
     for number, cells in enumerate(_cells(path, text), start=1):
         if cells and not cells[0].lstrip().startswith("#") and any(map(str.strip, cells)):
             yield number, cells
 
 
 def read_block(path: Path) -> dict[str, NDArray[np.float64]] | None:
-    """Read a large table that holds nothing but numbers, by name; None where it is not quite that.
+    """Read a large table of numbers only, by name; None where it contains anything else.
 
     Raises
     ------
-    FingervisionError
+    DataError, InputFileError
         The file cannot be read.
     """
     lines = _text(path).splitlines()
@@ -117,7 +119,7 @@ def _text(path: Path) -> str:
     except FileNotFoundError:
         raise InputFileError(f"There is no table {path}.") from None
     except (OSError, UnicodeDecodeError) as error:
-        raise unreadable(error)(f"{path} must be a CSV table in UTF-8, but could not be read: {error}.") from error
+        raise unreadable(error)(f"{path} must be a CSV table in UTF-8, but could not be read: {why(error)}.") from error
 
 
 def _cells(path: Path, text: str) -> Iterator[list[str]]:
@@ -136,7 +138,7 @@ def number(path: Path, name: str, row: int, cell: str) -> float | None:
     if not cell:
         return None
     try:
-        value = float(cell)
+        value = decimal_number(cell)
     except ValueError:
         value = float("nan")
     if not isfinite(value):

@@ -1,7 +1,7 @@
-"""The numbers of a drawing's tables by their dotted names: read with their uncertainty, and changed.
+"""Numbers in a drawing's tables by dotted name: read with their uncertainty, and changed.
 
-A number may be written `{ value = 1.0, u = 0.1 }`, with its standard uncertainty, wherever a number or arithmetic may
-stand alone. Sections that repeat go by their name, or by their place from 1: `flexure.left.thickness_mm`,
+A number may be written `{ value = 1.0, u = 0.1 }`, with its standard uncertainty, wherever a number or an expression is
+allowed. Repeated sections are addressed by their name, or by their position from 1: `flexure.left.thickness_mm`,
 `body.2.width_mm`.
 """
 
@@ -18,7 +18,7 @@ _KEYS = frozenset({"value", "u"})
 
 
 def bare_tables(tables: Mapping[str, Any], origin: str) -> tuple[dict[str, Any], dict[str, float]]:
-    """Take the uncertainties out of a drawing.
+    """Return a drawing's tables without uncertainties.
 
     Parameters
     ----------
@@ -36,7 +36,7 @@ def bare_tables(tables: Mapping[str, Any], origin: str) -> tuple[dict[str, Any],
 
     Raises
     ------
-    FingervisionError
+    DataError
         Where an uncertainty is no positive number, or belongs to a list.
     """
     bare = copy.deepcopy(dict(tables))
@@ -76,7 +76,7 @@ def changed_tables(
 
     Raises
     ------
-    FingervisionError
+    DataError
         Where a name is that of no number.
     """
     changed = copy.deepcopy(dict(tables))
@@ -95,12 +95,12 @@ def changed_tables(
 
 
 def numbers_of(tables: Mapping[str, Any]) -> dict[str, float | str]:
-    """Return every bare number, or its arithmetic, by dotted name."""
+    """Return every plain number or expression, by dotted name."""
     return {name: raw if isinstance(raw, str) else float(raw) for name, _, raw in _walk(tables)}
 
 
 def _walk(tables: Mapping[str, Any]) -> Iterator[tuple[str, Path, Any]]:
-    """Every number, arithmetic or uncertain number: its dotted name, its path and what stands there."""
+    """Every number, expression or uncertain number: its dotted name, its path and its content."""
     yield from _walk_in(tables, "", ())
 
 

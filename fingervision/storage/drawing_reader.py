@@ -1,4 +1,4 @@
-"""Reading the tables of a drawing: every refusal says which number of which file, what it must be and what it is."""
+"""Reader of a drawing's tables: every error names the file and the number, what it must be and what it is."""
 
 import difflib
 from collections.abc import Mapping
@@ -9,14 +9,14 @@ from fingervision.storage.arithmetic import number
 
 
 def as_table(raw: Any, what: str) -> Mapping[str, Any]:
-    """Take a table, or refuse what is none."""
+    """Check that a value is a table."""
     if not isinstance(raw, dict):
         raise DataError(f"{what} must be a table, but is {raw!r}.")
     return raw
 
 
 class DrawingReader:
-    """Numbers of a drawing, which may refer to its [lengths], with sentences about what is wrong.
+    """Reads numbers of a drawing, which may refer to its [lengths], with errors in sentences.
 
     Parameters
     ----------
@@ -37,14 +37,14 @@ class DrawingReader:
         return [as_table(table, f"[[{name}]] in {self.origin}") for table in raw]
 
     def known(self, table: Mapping[str, Any], keys: tuple[str, ...], what: str) -> None:
-        """Refuse keys that mean nothing."""
+        """Refuse unknown keys."""
         for key in table:
             if key not in keys:
                 near = difflib.get_close_matches(key, keys, 1, cutoff=0.0)[0]
                 raise DataError(f"{what} in {self.origin} has an unknown key, {key}; did you mean {near}?")
 
     def value(self, table: Mapping[str, Any], key: str, what: str) -> float:
-        """One number or arithmetic."""
+        """One number or expression."""
         name = f"{what}.{key}" if what else key
         if key not in table:
             raise DataError(f"{self.origin} must state {name}, but does not.")
@@ -59,14 +59,17 @@ class DrawingReader:
         return value
 
     def numbers(self, table: Mapping[str, Any], key: str, count: int, what: str) -> tuple[float, ...]:
-        """A list of so many numbers."""
+        """A list of `count` numbers."""
         raw = table.get(key)
         if not isinstance(raw, list) or len(raw) != count:
             raise DataError(f"{what}.{key} in {self.origin} must be a list of {count} numbers, but is {raw!r}.")
         return tuple(number(part, self.lengths, f"{what}.{key} in {self.origin}") for part in raw)
 
     def grown(self, values: tuple[float, ...], what: str, *, flat: bool = False) -> tuple[float, float, float, float]:
-        """Take the sides of an upright box, x from, x to, y from, y to; without extent along one where `flat`."""
+        """Read the sides of an upright box (x from, x to, y from, y to).
+
+        Where `flat`, it has no extent along one axis.
+        """
         x0, x1, y0, y1 = values
         fine = x1 >= x0 and y1 >= y0 if flat else x1 > x0 and y1 > y0
         if not fine:

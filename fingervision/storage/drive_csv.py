@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from fingervision.domain.drive import DriveHistory
 from fingervision.domain.errors import DataError, FingervisionError, InputFileError
 from fingervision.storage.csv_columns import read_block
+from fingervision.storage.decimal_number import are_decimal, decimal_number
 
 COLUMNS = ("time_s", "input_mm", "force_n")
 
@@ -19,11 +20,11 @@ COLUMNS = ("time_s", "input_mm", "force_n")
 def read_drive(path: Path) -> DriveHistory:
     """Read a drive table.
 
-    Lines that start with `#` are comments; columns may stand in any order, and others than these are not looked at.
+    Lines that start with `#` are comments; the columns may be in any order, and other columns are ignored.
 
     Raises
     ------
-    FingervisionError
+    DataError, InputFileError
         The file cannot be read, a column is missing, a cell is no number, times do not increase, or a run comes back
         after another.
     """
@@ -55,7 +56,7 @@ def read_drive(path: Path) -> DriveHistory:
 def drive_rows(
     path: Path, values: Mapping[str, NDArray[np.float64]], runs: tuple[str, ...] | None, lines: Sequence[int]
 ) -> DriveHistory:
-    """Take the columns of a drive table, where their times increase and the rows of a run stand together.
+    """Select the columns of a drive table, and check that times increase and rows of a run are contiguous.
 
     Parameters
     ----------
@@ -70,7 +71,7 @@ def drive_rows(
 
     Raises
     ------
-    FingervisionError
+    DataError
         Times do not increase, or a run comes back after another.
     """
     times = values["time_s"]
@@ -94,7 +95,7 @@ def drive_rows(
 
 
 def _lines(path: Path) -> list[tuple[int, list[str]]]:
-    """Rows with their line numbers; comments and empty lines left out."""
+    """Rows with their line numbers, without comments and empty lines."""
     if path.exists() and not path.is_file():
         raise DataError(f"{path} must be a table in a file, but is a folder or a pipe: save it as a file first.")
     try:
@@ -125,7 +126,8 @@ def _lines(path: Path) -> list[tuple[int, list[str]]]:
 
 def _numbers(path: Path, lines: Sequence[int], name: str, cells: Sequence[str]) -> NDArray[np.float64]:
     try:
-        value = np.array(list(map(float, cells)), dtype=np.float64)
+        read = float if are_decimal(cells) else decimal_number
+        value = np.array(list(map(read, cells)), dtype=np.float64)
     except ValueError:
         value = np.array([np.nan])
     if not np.all(np.isfinite(value)):
@@ -135,7 +137,7 @@ def _numbers(path: Path, lines: Sequence[int], name: str, cells: Sequence[str]) 
 
 def _number(path: Path, line: int, name: str, cell: str) -> float:
     try:
-        value = float(cell)
+        value = decimal_number(cell)
     except ValueError:
         value = float("nan")
     if not isfinite(value):

@@ -1,10 +1,10 @@
-"""Whether what stands in a document is a number that can be calculated with."""
+"""Check that a value in a document is a finite number."""
 
 from math import isfinite
 
 
 def is_number(value: object) -> bool:
-    """Whether it is a whole or floating-point number that a float holds: no nan, no infinity, not 400 digits."""
+    """Whether a value is an integer or floating-point number within a float's range: no nan, no infinity."""
     if isinstance(value, bool) or not isinstance(value, int | float):
         return False
     try:

@@ -1,4 +1,4 @@
-"""One program a folder: a lock that the system lets go of when the program ends, however it does."""
+"""Lock of a folder for one program, which the system releases when the program ends in any way."""
 
 import os
 from contextlib import suppress
@@ -57,14 +57,14 @@ class FolderLock:
             return False
 
     def remove(self) -> None:
-        """Let go of it, and leave no file behind."""
+        """Release the lock, and delete its file."""
         if self._file >= 0:
             with suppress(OSError):
                 self._path.unlink()
         self.release()
 
     def release(self) -> None:
-        """Let go of it."""
+        """Release the lock."""
         if self._file >= 0:
             os.close(self._file)
             self._file = -1

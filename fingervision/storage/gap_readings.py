@@ -1,18 +1,19 @@
-"""Gaps of a gaps.csv as repeated readings of parts, for a gauge study."""
+"""Gaps in a gaps.csv as repeated readings of parts, for a gauge study (repeatability and reproducibility)."""
 
 import csv
 from math import isfinite
 from pathlib import Path
 
 from fingervision.domain.errors import DataError, unreadable
-from fingervision.storage.plain_file import plain
+from fingervision.storage.decimal_number import decimal_number
+from fingervision.storage.plain_file import plain, why
 
 # Inputs nearer than this are one part (mm): stages return to a place no better.
 SAME_INPUT_PLACES = 3
 
 
 def read_gap_readings(path: Path, by_input: bool) -> dict[float | None, list[float]]:
-    """Read the gaps of all frames that gave one.
+    """Read the gaps of all frames that have one.
 
     Parameters
     ----------
@@ -23,14 +24,14 @@ def read_gap_readings(path: Path, by_input: bool) -> dict[float | None, list[flo
 
     Raises
     ------
-    FingervisionError
+    DataError, InputFileError
         The file cannot be read or holds no gaps.
     """
     readings: dict[float | None, list[float]] = {}
     try:
         lines = [line for line in plain(path).read_text(encoding="utf-8").splitlines() if not line.startswith("#")]
     except (OSError, UnicodeDecodeError) as error:
-        raise unreadable(error)(f"The table {path} could not be read: {error}; give a gaps.csv.") from error
+        raise unreadable(error)(f"The table {path} could not be read: {why(error)}; give a gaps.csv.") from error
     table = csv.DictReader(lines)
     needed = {"gap_mm"} | ({"input_mm"} if by_input else set())
     missing = needed - set(table.fieldnames or ())
@@ -40,8 +41,8 @@ def read_gap_readings(path: Path, by_input: bool) -> dict[float | None, list[flo
         if not row["gap_mm"] or (by_input and not row["input_mm"]):
             continue
         try:
-            gap_mm = float(row["gap_mm"])
-            part = round(float(row["input_mm"]), SAME_INPUT_PLACES) if by_input else None
+            gap_mm = decimal_number(row["gap_mm"])
+            part = round(decimal_number(row["input_mm"]), SAME_INPUT_PLACES) if by_input else None
         except ValueError:
             gap_mm, part = float("nan"), None
         if not isfinite(gap_mm):

@@ -1,4 +1,4 @@
-"""gaps.csv: one row a frame, written while it is measured, valid whenever the program is stopped."""
+"""The file gaps.csv: one row per frame, written during the measurement, valid whenever the program is stopped."""
 
 import csv
 from collections.abc import Callable, Sequence
@@ -22,7 +22,7 @@ TIME_PLACES, PX_PLACES, MM_PLACES, FORCE_PLACES = 9, 5, 7, 6
 
 @dataclass(frozen=True, slots=True)
 class GapRow:
-    """One row of gaps.csv; None is an empty cell.
+    """One row of gaps.csv; None means an empty cell.
 
     Parameters
     ----------
@@ -82,7 +82,8 @@ class GapRow:
 class GapsCsv:
     """Writes gaps.csv row by row.
 
-    Whole rows reach the file at least every second. If the disk is full the file is cut back to its last whole row.
+    Complete rows are written to the file at least every second. If the disk is full, the file is truncated after its
+    last complete row.
 
     Parameters
     ----------
@@ -114,7 +115,7 @@ class GapsCsv:
         self._file.add([self._line(row) for row in rows])
 
     def close(self) -> None:
-        """Write what is pending and close; closing twice is allowed."""
+        """Write pending rows and close; closing twice is allowed."""
         self._file.close()
 
     def _line(self, row: GapRow) -> str:
@@ -148,7 +149,7 @@ class GapsCsv:
 
 
 class Driven(Protocol):
-    """What the drive did at a frame's time."""
+    """State of the drive at a frame's time."""
 
     @property
     def run(self) -> str:
@@ -160,11 +161,11 @@ class Driven(Protocol):
 
     @property
     def force_n(self) -> float | None:
-        """Force, where it was recorded."""
+        """Force (N); None where it was not recorded."""
 
 
 def with_drive(path: Path, state: Callable[[float], Driven | None], *, has_force: bool) -> None:
-    """Fill the drive's columns of a table whose rows were written without them, line by line.
+    """Fill the drive's columns of a finished table, line by line.
 
     Parameters
     ----------
@@ -177,7 +178,7 @@ def with_drive(path: Path, state: Callable[[float], Driven | None], *, has_force
 
     Raises
     ------
-    FingervisionError
+    OutputError
         The table cannot be read or written again; the old one stays.
     """
     part = path.with_name(f".{path.name}.part")

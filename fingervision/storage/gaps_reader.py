@@ -1,4 +1,4 @@
-"""gaps.csv read back, also while it is still being written."""
+"""Reader of gaps.csv, also while the file is still being written."""
 
 from dataclasses import fields
 from pathlib import Path
@@ -10,7 +10,7 @@ _NUMBERS = frozenset(each.name for each in fields(GapRow)) - {"frame", "status",
 
 
 class GapsReader:
-    """Reads the whole lines of a table that grows.
+    """Reads the complete lines of a growing table.
 
     Parameters
     ----------
@@ -24,7 +24,7 @@ class GapsReader:
         self._columns: tuple[str, ...] = ()
 
     def fresh(self) -> list[GapRow]:
-        """Rows that have come since the last time.
+        """Rows that were added since the last call.
 
         Raises
         ------

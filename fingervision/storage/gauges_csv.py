@@ -1,4 +1,4 @@
-"""gauges.csv: one row a number, frame by frame: `time_s,gauge,quantity,value,u,unit,status`."""
+"""The file gauges.csv: one row per number, frame by frame: `time_s,gauge,quantity,value,u,unit,status`."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -14,7 +14,7 @@ TIME_PLACES, PLACES = 9, 7
 
 @dataclass(frozen=True, slots=True)
 class GaugeRow:
-    """One row; None is an empty cell.
+    """One row of gauges.csv; None means an empty cell.
 
     Parameters
     ----------
@@ -40,18 +40,18 @@ class GaugeRow:
 
 
 class GaugeRows(list[GaugeRow]):
-    """Keeps the rows in memory, in the place of a file."""
+    """Collects rows in memory instead of a file."""
 
     def add(self, rows: Sequence[GaugeRow]) -> None:
         """Add rows, in order."""
         self.extend(rows)
 
     def close(self) -> None:
-        """Nothing is to be written."""
+        """Do nothing: there is no file."""
 
 
 class GaugesCsv:
-    """Writes gauges.csv row by row; whole rows reach the file at least every second.
+    """Writes gauges.csv row by row; complete rows are written to the file at least every second.
 
     Parameters
     ----------
@@ -80,7 +80,7 @@ class GaugesCsv:
         self._file.add([_line(row) for row in rows])
 
     def close(self) -> None:
-        """Write what is pending and close; closing twice is allowed."""
+        """Write pending rows and close; closing twice is allowed."""
         self._file.close()
 
 

@@ -1,4 +1,4 @@
-"""gauges.toml written: what stood in the file and is still meant stays as it was, with its comments."""
+"""Writing of gauges.toml: unchanged entries keep their text and comments."""
 
 import tomllib
 from collections.abc import Mapping, Sequence
@@ -22,7 +22,7 @@ def text_of(path: Path) -> str | None:
 
     Raises
     ------
-    FingervisionError
+    DataError, InputFileError
         It cannot be read.
     """
     try:
@@ -36,7 +36,7 @@ def text_of(path: Path) -> str | None:
 
 
 def gauges_text(tables: Tables, before: str | None, schema: int) -> str:
-    """Put gauges into the text of a file.
+    """Compose the text of a file of gauges.
 
     Parameters
     ----------
@@ -64,7 +64,7 @@ def gauges_text(tables: Tables, before: str | None, schema: int) -> str:
 
 
 def _changed(tables: Tables, before: str) -> str:
-    """Change what is otherwise, table by table, and leave the rest of the text alone."""
+    """Replace only the changed parts, table by table, and keep the rest of the text."""
     document = tomlkit.parse(before)
     old: Any = document["gauge"]
     kept = {place: table for table, place in tables if place is not None}
@@ -91,11 +91,11 @@ def _anew(meant: Mapping[str, Any]) -> str:
 
 
 def write_gauges_text(path: Path, text: str) -> None:
-    """Replace a file of gauges, when the new one is whole.
+    """Replace a file of gauges once the new one is complete.
 
     Raises
     ------
-    FingervisionError
+    OutputError
         It cannot be written; what was there stays.
     """
     part = path.with_name(f".{path.name}.part")

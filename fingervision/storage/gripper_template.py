@@ -1,4 +1,4 @@
-"""A gripper.toml as a template of a mechanism: both fingers drawn, each half with what differs in it."""
+"""A gripper.toml as a template of a mechanism: both fingers, each half with its own deviations."""
 
 from collections.abc import Mapping
 from dataclasses import replace
@@ -23,14 +23,14 @@ _SHARED = ("body.plate_mm", "material", "lever.l3_mm", "lever.drive")
 
 
 def mechanism_from_gripper(tables: Mapping[str, Any], path: Path) -> Mechanism:
-    """Build a mechanism whose [gripper] names a gripper.toml, and what differs in its left and its right half.
+    """Build a mechanism whose [gripper] section names a gripper.toml, and deviations of its left and right half.
 
     Keys of [gripper.left] and [gripper.right] are dotted names as in gripper.toml (`"lever.l2_mm"`), or hinge1 and
-    hinge2 with thickness_mm or radius_mm; `redrawn` says what else of the drawing moves with a number.
+    hinge2 with thickness_mm or radius_mm; the function `redrawn` defines which other dimensions change with a number.
 
     Raises
     ------
-    FingervisionError
+    DataError, InputFileError
         Where a key is unknown, a number is no number, or the drawing cannot be a mechanism.
     """
     origin = str(path)
@@ -70,7 +70,7 @@ def mechanism_from_gripper(tables: Mapping[str, Any], path: Path) -> Mechanism:
 
 
 def _flat(table: Mapping[str, Any]) -> dict[str, Any]:
-    """Dotted names to values, whether they are written in quotes or as tables."""
+    """Map dotted names to values, whether they are written in quotes or as tables."""
     found: dict[str, Any] = {}
     for key, value in table.items():
         if isinstance(value, dict):

@@ -1,4 +1,4 @@
-"""gripper.toml: a gripper's drawing; every number with its unit, an uncertainty beside it where one is known."""
+"""The file gripper.toml: a gripper's drawing, with every number's unit, and its uncertainty where one is known."""
 
 import difflib
 import math
@@ -23,6 +23,8 @@ _SECTIONS: Mapping[str, type] = MappingProxyType(
 _MAY_BE_ANY_SIGN = frozenset({"lever.l1_mm", "lever.l2_mm", "lever.l3_mm", "lever.l4_mm", "lever.hinge1_axis_deg",
                               "lever.hinge2_axis_deg", "lever.drive_face_y_mm",
                               "material.thermal_expansion_per_k"})  # fmt: skip
+_STATED = 1.05
+"""Of a drawn width: how far a stated one may be above it."""
 _MEET_MM = 0.02
 _METRES_BELOW_MM = 2.0
 _LEAST_DENSITY, _MOST_DENSITY = 30.0, 25000.0
@@ -54,7 +56,7 @@ def read_gripper(path: Path) -> Gripper:
 
     Raises
     ------
-    FingervisionError
+    DataError, InputFileError
         The file cannot be read, a key is missing, unknown or no number, or the drawing cannot be a gripper.
     """
     try:
@@ -193,6 +195,17 @@ def _check(gripper: Gripper, origin: str) -> None:
             f"hinge.thickness_mm in {origin} must be smaller than the web that the notches cut, {hinge.web_mm:g} mm, "
             f"but is {hinge.thickness_mm:g}; a hinge cannot be thicker than its web."
         )
+    widest_mm = max(links.pillar_and_root_mm[1] - links.pillar_and_root_mm[0], links.shuttle_width_mm)
+    if hinge.web_mm > _STATED * widest_mm:
+        raise DataError(
+            f"hinge.web_mm in {origin} must be no more than the links that the notches cut, {widest_mm:g} mm, but is "
+            f"{hinge.web_mm:g}; correct the one or the other."
+        )
+    if body.plate_mm > body.height_mm:
+        raise DataError(
+            f"body.plate_mm in {origin} must be no more than body.height_mm, {body.height_mm:g} mm, but is "
+            f"{body.plate_mm:g}; is it in micrometres?"
+        )
     drawn = (lever.hinge1_mm[0] - lever.l2_mm, lever.hinge1_mm[1] - lever.l1_mm)
     _must_meet("lever.hinge2_mm", lever.hinge2_mm, "hinge 1 less (l2, l1)", drawn, origin)
     drawn = (lever.hinge2_mm[0] - lever.l4_mm, lever.hinge2_mm[1] - lever.l3_mm)
@@ -208,13 +221,13 @@ def _check(gripper: Gripper, origin: str) -> None:
 
 
 def read_material(tables: Mapping[str, Any], origin: str) -> Material:
-    """Read the section [material], the same in every drawing."""
+    """Read the section [material], which is the same in every drawing."""
     section: Mapping[str, type] = {"material": Material}
     return _read_sections({"material": tables.get("material")}, section, origin, {})["material"]  # type: ignore[no-any-return]
 
 
 def check_material(material: Material, origin: str) -> None:
-    """Refuse Poisson's ratios that no material has, and ask about a modulus that cannot be in MPa."""
+    """Refuse impossible Poisson's ratios, and moduli that cannot be in MPa."""
     if material.poisson_ratio >= 0.5:
         raise DataError(f"material.poisson_ratio in {origin} must be below 0.5, but is {material.poisson_ratio:g}.")
     if not _LEAST_DENSITY <= material.density_kg_m3 <= _MOST_DENSITY:
@@ -235,7 +248,7 @@ def check_material(material: Material, origin: str) -> None:
 
 
 def _check_links(gripper: Gripper, origin: str) -> None:
-    """Refuse links without extent, from which no model can be made."""
+    """Refuse links without extent, for which no model can be built."""
     links = gripper.links
     for name in ("pillar_and_root_mm", "drive_block_mm"):
         x0, x1, y0, y1 = getattr(links, name)

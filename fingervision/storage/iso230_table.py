@@ -1,8 +1,8 @@
-"""A table of targets, cycles and directions (ISO 230-2) read as the rows of a measured table in the order of travel.
+"""A table of targets, cycles and directions (ISO 230-2), converted to rows of a measured table in the order of travel.
 
-Long form, a reading a row: `target_mm, cycle, direction` and one of `position_mm, position_um, deviation_mm,
-deviation_um`, with `time_s, run, u_random_mm` where there are. Matrix form, a target a row: `target_mm` and columns
-such as `up_1_deviation_um`, `down_1_deviation_um`; or `cycle_1_position_mm` beside a `direction` column.
+Long form, one row per reading: `target_mm, cycle, direction` and one of `position_mm, position_um, deviation_mm,
+deviation_um`, optionally with `time_s, run, u_random_mm`. Matrix form, one row per target: `target_mm` and columns such
+as `up_1_deviation_um`, `down_1_deviation_um`; or `cycle_1_position_mm` with a `direction` column.
 """
 
 import csv
@@ -41,13 +41,13 @@ half its travel."""
 
 @dataclass(frozen=True, slots=True)
 class Iso230Rows:
-    """Rows of a measured table, overshoots among them, and what was assumed, a sentence each."""
+    """Rows of a measured table, including overshoots, and a sentence for each assumption."""
 
     rows: tuple[PathRow, ...]
     notes: tuple[str, ...]
 
     def cells(self) -> dict[str, list[str]]:
-        """Columns `input_mm, gap_mm, time_s` and, where there are, `run, u_random_mm`, as text; a missing gap is ''."""
+        """Columns `input_mm, gap_mm, time_s` and, where present, `run, u_random_mm`, as text; a missing gap is ''."""
         out = {
             "input_mm": [repr(row.input_mm) for row in self.rows],
             "gap_mm": ["" if row.gap_mm is None else repr(row.gap_mm) for row in self.rows],
@@ -61,16 +61,16 @@ class Iso230Rows:
 
 
 def read_iso230_table(path: Path) -> Iso230Rows | None:
-    """Read a table of targets, cycles and directions; None where the file is none (no `target_mm`, or an `input_mm`).
+    """Read a table of targets, cycles and directions; None where the file is another kind of table.
 
     The gap is the position, or target + deviation. Rows are put into the order of travel: by `time_s` where every row
-    has one, else cycle by cycle, the targets approached from below in ascending order and then those from above in
-    descending order, a reading every 30 s. Where the path does not come from the stated side a row without a gap is
-    added beyond the target.
+    has one. Otherwise they follow cycle by cycle, first the targets approached from below in ascending order, then
+    those from above in descending order, with one reading every 30 s. If the path does not come from the stated side, a
+    row without a gap is added beyond the target.
 
     Raises
     ------
-    FingervisionError
+    DataError
         In a sentence: columns missing, words that are no direction, a reading that stands twice, deviations under the
         name of positions or the other way round.
     """
@@ -83,7 +83,7 @@ def read_iso230_table(path: Path) -> Iso230Rows | None:
 def iso230_rows(
     path: Path, header: Sequence[str], columns: Callable[[tuple[str, ...], tuple[str, ...]], dict[str, list[str]]]
 ) -> Iso230Rows:
-    """Take the columns of a table of targets, cycles and directions.
+    """Convert the columns of a table of targets, cycles and directions.
 
     Parameters
     ----------
@@ -96,7 +96,7 @@ def iso230_rows(
 
     Raises
     ------
-    FingervisionError
+    DataError
         As `read_iso230_table`.
     """
     blocks = {name: match for name in header if (match := MATRIX.fullmatch(name)) is not None}
@@ -138,7 +138,10 @@ def iso230_rows(
 
 
 def _header(path: Path) -> list[str]:
-    """Names in the first line that is no comment; none where the file cannot be read, which `read_columns` will say."""
+    """Names in the first line that is no comment.
+
+    None where the file cannot be read (`read_columns` reports the error).
+    """
     try:
         lines = plain(path).read_text(encoding="utf-8-sig").splitlines()
     except (OSError, UnicodeDecodeError):
@@ -149,7 +152,7 @@ def _header(path: Path) -> list[str]:
 
 @dataclass(frozen=True, slots=True)
 class _Cell:
-    """A cell with a reading: row of the table, its column, the word of its direction, its cycle ('': by order)."""
+    """A cell with a reading: row of the table, its column, the word for its direction, its cycle ('': by order)."""
 
     row: int
     column: str
@@ -158,7 +161,7 @@ class _Cell:
 
 
 def _cells(cells: dict[str, list[str]], blocks: dict[str, re.Match[str]], column: str) -> list[_Cell]:
-    """Every cell that may hold a reading, of the long form or of the matrix."""
+    """Every cell that may contain a reading, in the long form or in the matrix form."""
     directions = cells.get("direction")
     if not blocks:
         cycles = cells.get("cycle", [""] * len(cells[TARGET]))
@@ -173,7 +176,7 @@ def _cells(cells: dict[str, list[str]], blocks: dict[str, re.Match[str]], column
 def _readings(
     path: Path, listed: list[_Cell], quantity: str, cells: dict[str, list[str]]
 ) -> tuple[list[Reading], set[str]]:
-    """Readings, and the words of direction that were used."""
+    """Readings, and the words for directions that were used."""
     factor, relative = QUANTITIES[quantity], quantity.startswith("deviation")
     names = [cell.cycle for cell in listed]
     numbers = {name: k for k, name in enumerate(sorted(set(names), key=_cycle_order(names)))}
@@ -214,7 +217,7 @@ def _readings(
 
 
 def _cycle_order(names: list[str]) -> Callable[[str], float]:
-    """Cycles by their numbers; by their first row where they are no numbers."""
+    """Cycles ordered by their numbers, or by their first row where they are not numbers."""
     try:
         by_number = {name: float(name) for name in names}
     except ValueError:
@@ -223,7 +226,7 @@ def _cycle_order(names: list[str]) -> Callable[[str], float]:
 
 
 def _check_quantity(path: Path, readings: list[Reading], quantity: str) -> None:
-    """Refuse deviations under the name of positions, and the other way round."""
+    """Refuse deviations that are labelled as positions, and positions labelled as deviations."""
     known = [(r.target_mm, r.position_mm) for r in readings if r.position_mm is not None]
     if len(known) < 2 or len({target for target, _ in known}) < 2:
         return

@@ -1,4 +1,4 @@
-"""A text file that grows line by line and holds whole lines whenever the program is stopped."""
+"""A text file that grows line by line, and contains complete lines whenever the program is stopped."""
 
 import os
 from collections.abc import Sequence
@@ -16,7 +16,8 @@ FLUSH_EVERY_S = 0.5
 class LineFile:
     """Appends lines.
 
-    Whole lines reach the file at least every second. If the disk is full the file is cut back to its last whole line.
+    Complete lines are written to the file at least every second. If the disk is full, the file is truncated after its
+    last complete line.
 
     Parameters
     ----------
@@ -52,7 +53,7 @@ class LineFile:
             self._write()
 
     def close(self) -> None:
-        """Write what is pending and close; closing twice is allowed."""
+        """Write pending lines and close; closing twice is allowed."""
         if self._file.closed:
             return
         try:
@@ -84,10 +85,10 @@ class LineFile:
 
 
 def cell(value: float | None, places: int) -> str:
-    """Write a number without needless zeros, and nothing for nothing."""
+    """Format a number without trailing zeros; None gives an empty text."""
     return "" if value is None else f"{value:.{places}f}".rstrip("0").rstrip(".")
 
 
 def quoted(text: str) -> str:
-    """Text as CSV holds it (RFC 4180)."""
+    """Quote text for CSV (RFC 4180)."""
     return '"' + text.replace('"', '""') + '"' if any(mark in text for mark in ',"\n\r') else text

@@ -1,7 +1,7 @@
-"""lost.csv: frames of a run that could not be measured when they came, which its video alone no longer shows.
+"""The file lost.csv: frames of a run that could not be measured when they arrived, which its video does not show.
 
-The marks of damage (packets lost on the way, a picture that hangs on them) are the stream's and the decoder's; a video
-file holds the packets without them, and read again some would look whole.
+The marks of damage (lost packets, pictures that depend on them) come from the stream and the decoder. A video file
+contains the packets without these marks, and some damaged pictures would look sound when it is read again.
 """
 
 import json
@@ -21,7 +21,7 @@ HEADER = "time_s,status,words"
 
 
 class LostFrames:
-    """Writes lost.csv; each line reaches the file at once, before the packets that it is about.
+    """Writes lost.csv; each line is written before the packets to which it refers.
 
     Parameters
     ----------
@@ -43,7 +43,7 @@ class LostFrames:
             raise self._failed(error) from error
 
     def add(self, time_s: float, lost: LostFrame) -> None:
-        """Add a frame, at its time in the recording."""
+        """Add a lost frame, with its time in the recording."""
         try:
             self._file.write(f"{cell(time_s, TIME_PLACES)},{lost.status.value},{quoted(lost.words)}\n")
         except OSError as error:
@@ -64,7 +64,7 @@ class LostFrames:
 
 
 def lost_frames(files: Sequence[Path]) -> tuple[LostFrame, ...]:
-    """Read what was lost when a recording was made, in order of time.
+    """Read the frames that were lost when a recording was made, in order of time.
 
     Parameters
     ----------
@@ -78,7 +78,7 @@ def lost_frames(files: Sequence[Path]) -> tuple[LostFrame, ...]:
 
     Raises
     ------
-    FingervisionError
+    DataError, InputFileError
         There should be a table, and it is not there or cannot be read.
     """
     if len(files) != 1:

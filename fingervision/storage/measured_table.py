@@ -1,4 +1,4 @@
-"""A measured table: any CSV with `input_mm,gap_mm`, and what else the bench recorded (`gaps.csv` is one)."""
+"""A measured table: any CSV with `input_mm,gap_mm` and further recorded columns (`gaps.csv` is one)."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -25,11 +25,11 @@ NUMBERS = ("input_mm", "gap_mm", "time_s", "left_mm", "right_mm", "u_gap_mm", "u
 
 
 def read_measured_table(path: Path) -> MeasuredTable:
-    """Read a measured table; rows with an input and no gap are its path, rows without an input are left out.
+    """Read a measured table; rows with an input but no gap form its path, rows without an input are omitted.
 
     Raises
     ------
-    FingervisionError
+    DataError, InputFileError
         In a sentence: columns missing, cells that are no numbers, fewer than five rows, an input or a gap that
         never changes, times that repeat within a run.
     """
@@ -47,7 +47,7 @@ def read_measured_table(path: Path) -> MeasuredTable:
 
 
 def targets_as_rows(path: Path, targets: Iso230Rows, notes: Sequence[str] = ()) -> MeasuredTable:
-    """Take a table of targets, cycles and directions as the rows of a measured one."""
+    """Convert a table of targets, cycles and directions to the rows of a measured table."""
     cells = targets.cells()
     return measured_rows(path, _numbers(path, cells), cells.get("run"), (*notes, *targets.notes), count_rows=False)
 
@@ -65,7 +65,7 @@ def measured_rows(
     count_rows: bool = True,
     channels: Mapping[str, Numbers] = MappingProxyType({}),
 ) -> MeasuredTable:
-    """Put the columns of a measured table into order, and refuse what cannot be worked with.
+    """Sort the columns of a measured table, and refuse invalid values.
 
     Parameters
     ----------
@@ -84,7 +84,7 @@ def measured_rows(
 
     Raises
     ------
-    FingervisionError
+    DataError
         As `read_measured_table`.
     """
     values = dict(values)
@@ -154,7 +154,7 @@ def measured_rows(
 
 
 def _left_out(total: int, kept: int, besides: int) -> list[str]:
-    """Say how many rows have no value, and what they are good for."""
+    """Sentence on how many rows have no value, and for what they are used."""
     notes = []
     if besides:
         notes.append(f"{besides} of {total} rows have an input and no gap: they count as the input's path.")
@@ -191,7 +191,7 @@ def _path(
     names: Sequence[str],
     run_names: tuple[str, ...],
 ) -> RecordedPath:
-    """Order all rows that have an input like the measured ones; rows of runs without any gap are left out."""
+    """Sort all rows that have an input, as the measured ones; rows of runs without any gap are omitted."""
     of_run = _by_run(names, values["time_s"].value[on_path])
     rows = np.concatenate([on_path[of_run[name]] for name in run_names])
     ends = np.cumsum([of_run[name].size for name in run_names])
@@ -203,7 +203,7 @@ def _path(
 def _runs(
     inputs: NDArray[np.float64], time: NDArray[np.float64] | None, names: Sequence[str]
 ) -> tuple[NDArray[np.intp], tuple[slice, ...], tuple[str, ...]]:
-    """Order of the rows, runs by their first time (or smallest input), so that no name decides anything."""
+    """Order of the rows, with runs sorted by their first time (or smallest input), independently of their names."""
     key = inputs if time is None else time
     # Each group is sorted by its key: its first is the least.
     groups = sorted(_by_run(names, key).items(), key=lambda item: (key[item[1][0]], float(np.sum(inputs[item[1]]))))

@@ -1,4 +1,4 @@
-"""mechanism.toml: any planar flexure mechanism; its numbers may refer to [lengths] by name and arithmetic."""
+"""The file mechanism.toml: any planar flexure mechanism; its numbers may be expressions of [lengths]."""
 
 import difflib
 import tomllib
@@ -46,7 +46,7 @@ _FLEXURES = {
 
 
 def is_mechanism(path: Path) -> bool:
-    """Whether a TOML file draws a mechanism by bodies or by a template, and is not a gripper.toml itself."""
+    """Whether a TOML file defines a mechanism by bodies or by a template, and is not a gripper.toml."""
     try:
         tables = tomllib.loads(plain(path).read_text(encoding="utf-8-sig"))
     except (OSError, ValueError):
@@ -56,7 +56,7 @@ def is_mechanism(path: Path) -> bool:
 
 @dataclass(frozen=True, slots=True)
 class MechanismDrawing:
-    """A mechanism as its file draws it, and how it looks with some of its numbers changed.
+    """A mechanism as defined by its file, and with some of its dimensions changed.
 
     Parameters
     ----------
@@ -73,11 +73,11 @@ class MechanismDrawing:
     uncertainties: Mapping[str, float]
 
     def mechanism(self, changes: Mapping[str, float] = MappingProxyType({}), *, absolute: bool = False) -> Mechanism:
-        """Build and check the mechanism, some numbers changed by so much, or to so much where `absolute`.
+        """Build and check the mechanism, with some dimensions changed by given amounts, or to values if `absolute`.
 
         Raises
         ------
-        FingervisionError
+        DataError, InputFileError
             A number is unknown, or the drawing cannot be a mechanism.
         """
         tables = changed_tables(self.tables, changes, str(self.path), absolute=absolute) if changes else self.tables
@@ -87,7 +87,7 @@ class MechanismDrawing:
 
     @property
     def estimates(self) -> dict[str, Estimate]:
-        """Uncertain numbers with their values and standard uncertainties."""
+        """Uncertain dimensions with their values and standard uncertainties."""
         lengths: dict[str, float] = {}
         for name, raw in as_table(self.tables.get("lengths", {}), f"[lengths] in {self.path}").items():
             lengths[name] = number(raw, lengths, f"lengths.{name} in {self.path}")
@@ -100,11 +100,11 @@ class MechanismDrawing:
 
 
 def read_drawing(path: Path) -> MechanismDrawing:
-    """Read a mechanism's file without building it.
+    """Read a mechanism's file without building the mechanism.
 
     Raises
     ------
-    FingervisionError
+    DataError, InputFileError
         The file cannot be read, or states an uncertainty that is none.
     """
     try:
@@ -121,7 +121,7 @@ def read_mechanism(path: Path) -> Mechanism:
 
     Raises
     ------
-    FingervisionError
+    DataError, InputFileError
         The file cannot be read, a key is missing, unknown or no number, or the drawing cannot be a mechanism.
     """
     return read_drawing(path).mechanism()
@@ -187,8 +187,8 @@ class _Reader(DrawingReader):
             corners = tuple((x, y) for x, y in points)
             if len(set(corners)) < len(corners) or crosses_itself(corners):
                 raise DataError(
-                    f"{what}.polygon_mm in {self.origin} must go round without crossing itself, but does; put its "
-                    "points in order, each once."
+                    f"{what}.polygon_mm in {self.origin} must go round without crossing itself, but does not; put "
+                    "its points in order, each once."
                 )
             return Polygon(corners)
         values = self.numbers(table, key, _SHAPES[key], what)
@@ -244,7 +244,7 @@ class _Reader(DrawingReader):
         if "wall_mm" in table:
             x0, y0, x1, y1 = self.numbers(table, "wall_mm", 4, what)
             if hypot(x1 - x0, y1 - y0) == 0.0:
-                raise DataError(f"{what}.wall_mm in {self.origin} must be two points, but they are one.")
+                raise DataError(f"{what}.wall_mm in {self.origin} must be two different points, but both are the same.")
             return Contact(name, face, None, ((x0, y0), (x1, y1)))
         box_mm = self.grown(self.numbers(table, "against_box_mm", 4, what), f"{what}.against_box_mm", flat=True)
         return Contact(name, face, Face(f"{name}, other face", box_mm))

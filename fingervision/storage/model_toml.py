@@ -1,4 +1,4 @@
-"""model.toml, a corrected model; and the choice of reader for every kind of model file."""
+"""The file model.toml, a corrected model; and the choice of reader for every kind of model file."""
 
 import json
 import os
@@ -23,7 +23,7 @@ from fingervision.models.table import TableModel
 from fingervision.plugins.origin import SESSION
 from fingervision.storage.gripper_toml import read_gripper
 from fingervision.storage.mechanism_toml import is_mechanism, read_mechanism
-from fingervision.storage.plain_file import plain
+from fingervision.storage.plain_file import plain, why
 from fingervision.storage.simulation_table import read_simulation_table
 
 POINTS = "points"
@@ -53,7 +53,7 @@ def read_model(
 
     Raises
     ------
-    FingervisionError
+    DataError, InputFileError, ModelError, UsageError
         The file is neither, or its base is missing.
     """
     if path.suffix.lower() in SUFFIXES:
@@ -66,18 +66,21 @@ def read_model(
     except FileNotFoundError:
         raise InputFileError(f"There is no model {path}.") from None
     except (ValueError, RecursionError, OSError) as error:
-        raise unreadable(error)(f"{path} must be a TOML file, but could not be read: {error}.") from error
+        raise unreadable(error)(f"{path} must be a TOML file, but could not be read: {why(error)}.") from error
     if "base" not in document:
         return _gripper(path, kind)
     if document.get("schema", 1) != 1:
         raise DataError(
-            f"schema in {path} must be 1, but is {document['schema']}: a newer fingervision wrote it; use that one."
+            f"schema in {path} must be 1, but is {document['schema']!r}: a newer fingervision wrote it; use that one."
         )
     place = path.resolve()
     if place in inside:
         raise DataError(f"The base of {path} must be another model, but leads back to itself: mend `base`.")
     kind = str(document.get("kind", kind))
-    base = read_model(path.parent / str(document["base"]), kind, (*inside, place), table)
+    named = document["base"]
+    if not (isinstance(named, str) and named.strip() and named.isprintable()):
+        raise DataError(f"The base in {path} must be the name of a file, but is {named!r}: mend it.")
+    base = read_model(path.parent / named, kind, (*inside, place), table)
     names: dict[str, str] = {key: str(document[key]) for key in ("input", "gap") if key in document}
     if names and isinstance(base.base, FunctionModel):
         base = _function(base.base.path, names)
@@ -111,7 +114,7 @@ def read_model(
 
 
 def _function(path: Path, names: Mapping[str, str]) -> CorrectedModel:
-    """Take an FMU or a Python file as a model, which covers whatever it answers."""
+    """Read an FMU or a Python file as a model that accepts any input."""
     if not path.is_file():
         raise InputFileError(f"There is no model {path}.")
     everywhere = (-float("inf"), float("inf"))
@@ -119,7 +122,7 @@ def _function(path: Path, names: Mapping[str, str]) -> CorrectedModel:
 
 
 def _check(name: str, values: Mapping[str, Estimate], path: Path, origin: str) -> None:
-    """Refuse what is no effect of the catalogue, or lacks one of its parameters; `origin` is where it came from."""
+    """Refuse an unknown effect, or one with a missing parameter; `origin` is where it came from."""
     if name not in catalogue() and origin:
         advice = f"add `--effects {origin}`" if origin.endswith(".py") else f"install {origin}"
         if origin == str(SESSION):
@@ -152,7 +155,7 @@ def _check(name: str, values: Mapping[str, Estimate], path: Path, origin: str) -
 
 
 def _check_curve(name: str, values: Mapping[str, Estimate], path: Path) -> None:
-    """Refuse a curve whose points are no numbers, too few, or not in the order of their inputs."""
+    """Refuse a curve whose points are not numbers, too few, or not in the order of their inputs."""
     inputs, errors = curve_points({key: estimate.value for key, estimate in values.items()})
     if inputs.size and not (
         inputs.size > 1
@@ -167,7 +170,7 @@ def _check_curve(name: str, values: Mapping[str, Estimate], path: Path) -> None:
 
 
 def _gripper(path: Path, kind: str) -> CorrectedModel:
-    """Build a gripper whose effects are its own physics."""
+    """Build a gripper that computes mechanism effects by its own physics."""
     if kind not in kinds():
         raise DataError(f"The kind of model for {path} must be one of {', '.join(kinds())}, but is {kind}: choose one.")
     if is_mechanism(path):
@@ -180,7 +183,7 @@ def _gripper(path: Path, kind: str) -> CorrectedModel:
 def write_model(
     path: Path, base_path: Path, effects: Mapping[str, Mapping[str, Estimate]], kind: str | None = None
 ) -> None:
-    """Write a corrected model; the base is named relative to the file."""
+    """Write a corrected model; the base model's path is relative to the file."""
     base = Path(os.path.relpath(base_path.resolve(), path.parent.resolve())).as_posix()
     lines = ["schema = 1", f"base = {json.dumps(base, ensure_ascii=False)}", *([f'kind = "{kind}"'] if kind else [])]
     for name, parameters in effects.items():

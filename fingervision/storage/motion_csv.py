@@ -1,4 +1,4 @@
-"""A motion in time as a table, `[run,]time_s,input_mm[,gap_mm,left_mm,right_mm],...,force_n`: a measured table too."""
+"""A motion in time as a measured table: `[run,]time_s,input_mm[,gap_mm,left_mm,right_mm],...,force_n`."""
 
 import csv
 from collections.abc import Mapping
@@ -20,7 +20,7 @@ def write_motion(
     *,
     symmetric: bool = False,
 ) -> None:
-    """Write one row a sample of the drive.
+    """Write one row per sample of the drive.
 
     Parameters
     ----------

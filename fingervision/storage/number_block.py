@@ -1,4 +1,4 @@
-"""A large table of nothing but numbers, read at once."""
+"""A large table of numbers only, read in one call."""
 
 from collections.abc import Sequence
 
@@ -10,7 +10,7 @@ FEWEST_LINES = 2000
 
 
 def number_block(lines: Sequence[str], separator: str | None, wide: int) -> NDArray[np.float64] | None:
-    """Read lines of numbers in one go; None where that cannot be done, and each cell must be looked at.
+    """Read lines of numbers in one call; None where each cell must be read separately.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Columns of numbers as a table holds them: values, and where a cell is empty."""
+"""Columns of numbers in a table: values, and which cells are empty."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fingervision.storage.csv_columns import number
+from fingervision.storage.decimal_number import are_decimal, decimal_number
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -27,7 +28,7 @@ class Numbers:
 
     @classmethod
     def whole(cls, value: NDArray[np.float64]) -> "Numbers":
-        """Take a column without empty cells."""
+        """Convert a column without empty cells."""
         return cls(value, np.ones(value.size, dtype=np.bool_))
 
     @property
@@ -37,20 +38,21 @@ class Numbers:
 
 
 def numbers_in(path: Path, name: str, cells: Sequence[str]) -> Numbers:
-    """Read cells as finite numbers; an empty cell is no value.
+    """Read cells as finite numbers; an empty cell means no value.
 
     Raises
     ------
-    FingervisionError
+    DataError
         A cell is no finite number; the first is named with its data row.
     """
     try:
-        value = np.array(list(map(float, cells)), dtype=np.float64)
+        read = float if are_decimal(cells) else decimal_number
+        value = np.array(list(map(read, cells)), dtype=np.float64)
         present = np.ones(value.size, dtype=np.bool_)
     except ValueError:
         present = np.array([bool(cell) for cell in cells], dtype=np.bool_)
         try:
-            value = np.array([float(cell) if cell else 0.0 for cell in cells], dtype=np.float64)
+            value = np.array([decimal_number(cell) if cell else 0.0 for cell in cells], dtype=np.float64)
         except ValueError:
             value = np.full(len(cells), np.nan)
     if not np.all(np.isfinite(value)):

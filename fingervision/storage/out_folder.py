@@ -1,4 +1,4 @@
-"""Make the folder that `--out` names; a refusal of the system becomes a sentence."""
+"""The folder named by `--out`: it is created, and system errors become sentences."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -9,11 +9,11 @@ from fingervision.domain.errors import OutputError
 
 @contextmanager
 def out_folder(path: Path) -> Iterator[None]:
-    """Make a folder, unless it is there, and take it for the cause of what the system refuses in the block.
+    """Create a folder if needed, and name it in errors of the system raised in the block.
 
     Raises
     ------
-    FingervisionError
+    OutputError
         It cannot be made or written.
     """
     try:
@@ -30,14 +30,14 @@ def out_folder(path: Path) -> Iterator[None]:
 
 
 def make_out_folder(path: Path) -> None:
-    """Make it before a long work begins, which would be lost where it cannot be made."""
+    """Create the folder before a long computation, whose result would be lost if that failed at the end."""
     with out_folder(path):
         pass
 
 
 @contextmanager
 def new_out_folder(path: Path) -> Iterator[None]:
-    """Make it before the block's long work, and take it away again where that fails and leaves it empty."""
+    """Create the folder before a long computation, and remove it if the computation fails and leaves it empty."""
     was_there = path.exists()
     make_out_folder(path)
     try:

@@ -1,11 +1,11 @@
-"""A pipe or a device is no document: reading it waits for somebody to write, or never ends."""
+"""Refuse pipes and devices as documents: reading them would wait for a writer, or never end."""
 
 import errno
 from pathlib import Path
 
 
 def plain(path: Path) -> Path:
-    """Pass on the path of what can be read to its end.
+    """Return the path if it can be read to its end.
 
     Parameters
     ----------
@@ -25,3 +25,8 @@ def plain(path: Path) -> Path:
     if path.exists() and not (path.is_file() or path.is_dir()):
         raise OSError(errno.ESPIPE, "it is a pipe or a device: save it as a file first", str(path))
     return path
+
+
+def why(error: Exception) -> str:
+    """Reason of a system error, without its number and path, for a sentence that names the file itself."""
+    return (error.strerror or str(error)) if isinstance(error, OSError) else str(error)

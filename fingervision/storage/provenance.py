@@ -1,4 +1,4 @@
-"""Where a result comes from: its files with their hashes, the command, the versions, the time."""
+"""Origin of a result: its files with their hashes, the command, the versions, the time."""
 
 import hashlib
 import platform
@@ -15,7 +15,7 @@ LIBRARIES = ("numpy", "scipy", "opencv-python-headless", "av")
 
 @dataclass(frozen=True, slots=True)
 class SourceFile:
-    """A file that a result was made from: what it was used as, its name, size and SHA-256."""
+    """A file from which a result was made: its role, name, size and SHA-256."""
 
     role: str
     name: str
@@ -45,12 +45,12 @@ class Provenance:
     made_at: str
 
     def document(self) -> dict[str, object]:
-        """Lay it out for programs."""
+        """The origin as a document for programs."""
         return asdict(self)
 
 
 def provenance(files: Mapping[str, Path], command: str | None = None) -> Provenance:
-    """Tell where a result comes from.
+    """Collect the origin of a result.
 
     Parameters
     ----------

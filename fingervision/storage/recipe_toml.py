@@ -1,4 +1,4 @@
-"""A recipe: what the test bed is to run, step by step."""
+"""A recipe: the steps that the test bed executes."""
 
 import json
 from collections.abc import Mapping, Sequence
@@ -12,11 +12,11 @@ BELOW_FORCE_N = 5.0
 
 
 def read_recipe(path: Path) -> Recipe[Section]:
-    """Read a recipe; the steps' own keys are for their kinds to read.
+    """Read a recipe; the keys of a step are read by its kind.
 
     Raises
     ------
-    FingervisionError
+    DataError, InputFileError
         There is no such file, it is no TOML, it is from a newer schema, it has no step, or a key is unknown.
     """
     document, text = read_document(path, "recipe")
@@ -34,7 +34,7 @@ def read_recipe(path: Path) -> Recipe[Section]:
 def write_recipe(
     path: Path, name: str, steps: Sequence[Mapping[str, object]], below_force_n: float = BELOW_FORCE_N
 ) -> None:
-    """Write a recipe of the given steps; keys and kinds are those of the design."""
+    """Write a recipe with the given steps."""
     lines = [f"schema = {SCHEMA}", f"name = {json.dumps(name, ensure_ascii=False)}", f"below_force_n = {below_force_n}"]
     for step in steps:
         lines += ["", "[[step]]"]

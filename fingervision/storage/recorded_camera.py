@@ -8,7 +8,7 @@ from fingervision.storage.run_files import RUN
 
 
 def recorded_camera(files: Sequence[Path]) -> Mapping[str, str]:
-    """Read how the camera was set when a recording was made.
+    """Read the camera's settings at the time of a recording.
 
     Parameters
     ----------

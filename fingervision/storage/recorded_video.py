@@ -1,4 +1,4 @@
-"""The recording's video: the camera's own packets, or FFV1, at true times, whole whenever it ends."""
+"""Video of a recording: the camera's own packets, or FFV1, with true times, complete whenever it ends."""
 
 from fractions import Fraction
 from pathlib import Path
@@ -9,6 +9,7 @@ import numpy as np
 
 from fingervision.domain.errors import DataError, FingervisionError, OutputError
 from fingervision.domain.frame import Frame, LostFrame
+from fingervision.frames.missing_references import OWN_RECORDING
 from fingervision.frames.received import OwnPacket
 from fingervision.vision.grey import to_grey
 
@@ -23,9 +24,9 @@ GREY_FORMATS = {"uint8": "gray", "uint16": "gray16le"}
 
 
 class RecordedVideo:
-    """Writes frames as they were measured.
+    """Writes frames as they are measured.
 
-    Frames are numbered and timed from the recording's first, which is the first whose picture hangs on no other.
+    Frames are numbered and timed from the first frame whose picture depends on no other.
 
     Parameters
     ----------
@@ -52,6 +53,7 @@ class RecordedVideo:
         place = path.with_name(f".{path.name}.part") if keep else path
         try:
             self._container = av.open(f"file:{place}", "w", format="mp4", options=dict(CONTAINER))
+            self._container.metadata["comment"] = OWN_RECORDING
             if keep:
                 self._keep(keep)
                 place.replace(path)
@@ -68,7 +70,7 @@ class RecordedVideo:
 
         Raises
         ------
-        FingervisionError
+        OutputError
             The file cannot be written.
         """
         self._begin(item, packets)
@@ -91,13 +93,13 @@ class RecordedVideo:
         return tick / TICKS_PER_S
 
     def time_s(self, lost: LostFrame, packets: tuple[OwnPacket, ...]) -> float | None:
-        """Time in the recording that a lost frame, not yet added, will have; None before the recording begins."""
+        """Time in the recording that a lost frame, not yet added, will have (s); None before the recording begins."""
         self._begin(lost, packets)
         tick = self._tick(lost)
         return None if tick is None or tick < 0 else tick / TICKS_PER_S
 
     def close(self) -> None:
-        """Write what is held back and close."""
+        """Write pending packets and close."""
         try:
             if self._stream is not None and self._template is None:
                 self._container.mux(self._stream.encode(None))
@@ -141,7 +143,7 @@ class RecordedVideo:
     def _copy(self, packets: tuple[OwnPacket, ...]) -> None:
         assert self._first_s is not None  # noqa: S101 - set by the caller
         if self._stream is None and self._template is not None:
-            self._stream = self._container.add_stream_from_template(self._template)
+            self._stream = self._container.add_stream_from_template(self._template, opaque=True)
             self._stream.time_base = TIME_BASE
         for own in packets:
             packet = own.packet
@@ -180,7 +182,7 @@ class RecordedVideo:
 
 
 def frames_in(path: Path) -> int:
-    """Count the whole frames of a recording that may have broken off; 0 where there is none."""
+    """Number of complete frames of a recording that may have been interrupted; 0 where there is none."""
     count = 0
     try:
         with av.open(f"file:{path}") as container:

@@ -1,4 +1,4 @@
-"""Reference slots of a run on the bed, as its run.json keeps them beside the table."""
+"""Reference slots measured in a run on the bed, from the run.json beside the table."""
 
 import json
 from pathlib import Path
@@ -10,7 +10,7 @@ KEY = "reference_slots"
 
 
 def slots_beside(table: Path) -> tuple[ReferenceSlot, ...]:
-    """Read the slots of the run that a table belongs to; none where it is not that of a run, or no slot was measured.
+    """Read the slots of the run to which a table belongs; none where there is no run, or no slot was measured.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""report.json of a diagnosis, as the design lays it down."""
+"""The file report.json of a diagnosis."""
 
 import json
 from dataclasses import asdict
@@ -8,7 +8,7 @@ from fingervision.domain.report import DiagnosisReport, NamedEffect
 
 
 def report_document(report: DiagnosisReport, model_path: str | None, recipe_path: str | None) -> dict[str, object]:
-    """Lay the report out for programs; paths are relative to the report."""
+    """Compose the document for programs; paths are relative to the report."""
     run = report.next_run
     return {
         "schema": 1,
@@ -54,7 +54,7 @@ def report_document(report: DiagnosisReport, model_path: str | None, recipe_path
 
 
 def _effect(effect: NamedEffect) -> dict[str, object]:
-    """An effect for programs; points stand there where it has a curve, and place and end where it has a place."""
+    """An effect for programs; with the points of its curve, if any, and its place and end, if any."""
     document = asdict(effect)
     points = document.pop("points")
     for name in ("place", "end"):
@@ -64,5 +64,5 @@ def _effect(effect: NamedEffect) -> dict[str, object]:
 
 
 def write_report(path: Path, document: dict[str, object]) -> None:
-    """Write the document; no NaN ever stands in it."""
+    """Write the document, which never contains NaN."""
     path.write_text(json.dumps(document, indent=2, allow_nan=False) + "\n", encoding="utf-8")

@@ -1,4 +1,4 @@
-"""A camera's response as a file: `level,light`, one row a level, from 0 to the depth's full scale."""
+"""A camera's response as a file: `level,light`, one row per level, from 0 to the full scale."""
 
 import csv
 from pathlib import Path
@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 from calib.camera_response import CURVES, CameraResponse, standard_response
 from calib.errors import CalibrationError
 from fingervision.domain.errors import DataError, OutputError, UsageError, unreadable
-from fingervision.storage.plain_file import plain
+from fingervision.storage.decimal_number import decimal_number
+from fingervision.storage.plain_file import plain, why
 
 COLUMNS = ("level", "light")
 # Full scales that pictures have.
@@ -17,13 +18,13 @@ TOP_LEVELS = (255, 1023, 4095, 16383, 65535)
 
 
 def response_named(name: str) -> CameraResponse | None:
-    """What --response names: a standard curve or a file; None for auto.
+    """Response named by --response: a standard curve or a file; None for auto.
 
     Raises
     ------
     UsageError
         It is neither.
-    FingervisionError
+    DataError
         The file is no response.
     """
     if name == "auto":
@@ -43,18 +44,18 @@ def read_response(path: Path) -> CameraResponse:
 
     Raises
     ------
-    FingervisionError
+    DataError, InputFileError
         The file cannot be read, or is no response.
     """
     try:
         with plain(path).open(newline="", encoding="utf-8-sig") as file:
             rows = list(csv.reader(line for line in file if not line.startswith("#")))
     except (OSError, UnicodeDecodeError) as error:
-        raise unreadable(error)(f"The camera response {path} could not be read: {error}.") from error
+        raise unreadable(error)(f"The camera response {path} could not be read: {why(error)}.") from error
     if not rows or tuple(cell.strip() for cell in rows[0]) != COLUMNS:
         raise DataError(f"{path} must begin with the line {','.join(COLUMNS)}, but does not.")
     try:
-        level, light = np.array([[float(cell) for cell in row] for row in rows[1:] if row]).reshape(-1, 2).T
+        level, light = np.array([[decimal_number(cell) for cell in row] for row in rows[1:] if row]).reshape(-1, 2).T
     except ValueError as error:
         raise DataError(f"Every row of {path} must be two numbers, level and light ({error}).") from error
     top = level[-1] if level.size else 0.0
@@ -79,7 +80,7 @@ def write_response(response: CameraResponse, path: Path) -> None:
 
     Raises
     ------
-    FingervisionError
+    OutputError
         The file cannot be written.
     """
     top = response.top_level or 255

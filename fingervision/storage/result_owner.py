@@ -1,4 +1,4 @@
-"""Which input the results in a folder are of, so that no call replaces those of another."""
+"""Ownership of results in a folder, so that no command replaces the results of another input."""
 
 import json
 import os
@@ -14,7 +14,7 @@ MOST_NAMES = 10_000
 
 
 def own_folder(out: Path, source: Path, *, named: bool) -> Path:
-    """Give the folder for the results of an input.
+    """Return the folder for the results of an input.
 
     Parameters
     ----------
@@ -48,11 +48,11 @@ def own_folder(out: Path, source: Path, *, named: bool) -> Path:
 
 
 def mark_owner(out: Path, source: Path) -> None:
-    """Say in a folder whose results it holds; the path is relative, so that both may move together.
+    """Store in a folder to which input its results belong; the path is relative, so that both may be moved together.
 
     Raises
     ------
-    FingervisionError
+    OutputError
         The folder cannot be written.
     """
     with out_folder(out):
@@ -61,11 +61,11 @@ def mark_owner(out: Path, source: Path) -> None:
 
 
 def began_in(out: Path) -> int | None:
-    """Note the time before anything is written to a folder of ours, by the clock of its disk (ns); None elsewhere.
+    """Time before anything is written to an own result folder, by the clock of its disk (ns); None for other folders.
 
     Raises
     ------
-    FingervisionError
+    OutputError
         The folder cannot be written.
     """
     if _owner(out) is None:
@@ -79,7 +79,7 @@ def began_in(out: Path) -> int | None:
 
 
 def finish_in(out: Path, source: Path, names: Iterable[str], began_ns: int | None) -> None:
-    """Mark the results in a folder as complete, and remove files that an earlier call of the same command left there.
+    """Mark the results in a folder as complete, and remove files left by an earlier call of the same command.
 
     Parameters
     ----------
@@ -94,7 +94,7 @@ def finish_in(out: Path, source: Path, names: Iterable[str], began_ns: int | Non
 
     Raises
     ------
-    FingervisionError
+    OutputError
         The folder cannot be written.
     """
     mark_owner(out, source)
@@ -119,7 +119,7 @@ def _owner(out: Path) -> str | None:
 
 
 def _of_another(out: Path, source: Path) -> str | None:
-    """Name the other input whose results a folder holds; None where it holds none, or ours."""
+    """Name of the other input to which a folder's results belong; None where it has none, or this input's."""
     owner = _owner(out)
     if owner is None or (out / owner).resolve() == source.resolve():
         return None

@@ -1,4 +1,4 @@
-"""What every run folder has: run.json, events.jsonl, a video; each whole at any moment."""
+"""Files of every run folder: run.json, events.jsonl, a video; each is complete at any time."""
 
 import hashlib
 import json
@@ -13,7 +13,7 @@ SCHEMA = 1
 
 
 class RunFiles:
-    """Writes what is said of a run, and what happens in it.
+    """Writes the metadata and the events of a run.
 
     Parameters
     ----------
@@ -34,7 +34,7 @@ class RunFiles:
             raise self.failed(error) from error
 
     def write_about(self, about: Mapping[str, Any], *, complete: bool) -> None:
-        """Write run.json, or replace it by a whole new one."""
+        """Write run.json, replacing an older one only when complete."""
         part = self.path / f".{RUN}.part"
         try:
             part.write_text(json.dumps({**about, "complete": complete}, indent=2) + "\n", encoding="utf-8")
@@ -50,7 +50,7 @@ class RunFiles:
             raise self.failed(error) from error
 
     def sha256(self, name: str) -> str:
-        """Digest of one of the run's files."""
+        """SHA-256 hash of one of the run's files."""
         try:
             with (self.path / name).open("rb") as file:
                 return hashlib.file_digest(file, "sha256").hexdigest()
@@ -65,7 +65,7 @@ class RunFiles:
             raise self.failed(error) from error
 
     def failed(self, error: OSError) -> FingervisionError:
-        """Say that the run could not be written."""
+        """Return the error that the run could not be written."""
         return OutputError(
             f"The run {self.path} could not be written any further ({error.strerror}); what was recorded until then is "
             "in it: make room, or name another --out."

@@ -1,4 +1,4 @@
-"""Where the samples are: inside the installed package, or beside it in the source tree."""
+"""Location of the samples: inside the installed package, or beside it in the source tree."""
 
 from pathlib import Path
 
@@ -9,11 +9,11 @@ NAME = "sample_frames"
 
 
 def sample_folder() -> Path:
-    """Give the folder of the samples.
+    """Return the folder of the samples.
 
     Raises
     ------
-    FingervisionError
+    InstallationError
         The installation lacks them.
     """
     package = Path(fingervision.__file__).parent

@@ -1,4 +1,4 @@
-"""samples.csv of a run on the bed: a measured table, with what else is known of each row."""
+"""The file samples.csv of a run on the bed: a measured table with further columns for each row."""
 
 import csv
 from collections.abc import Sequence
@@ -20,7 +20,7 @@ TIME_PLACES, MM_PLACES, FORCE_PLACES = 6, 7, 6
 
 @dataclass(frozen=True, slots=True)
 class SampleRow:
-    """One row of samples.csv; None is an empty cell.
+    """One row of samples.csv; None means an empty cell.
 
     Parameters
     ----------
@@ -65,7 +65,7 @@ class SampleRow:
     arrived_s: float
 
     def line(self) -> str:
-        """Write it as the file holds it."""
+        """The row as a line of the file."""
         mm = (self.input_mm, self.gap_mm, self.left_mm, self.right_mm, self.u_gap_mm, self.u_random_mm)
         return ",".join(
             [
@@ -102,16 +102,16 @@ class SamplesCsv:
         self._file.add([row.line() for row in rows])
 
     def close(self) -> None:
-        """Write what is pending and close."""
+        """Write pending rows and close."""
         self._file.close()
 
 
 def read_samples(path: Path) -> list[SampleRow]:
-    """Read the whole rows of a run that may have broken off, and cut what is no whole row off the file.
+    """Read the complete rows of an interrupted run, and remove an incomplete last row from the file.
 
     Raises
     ------
-    FingervisionError
+    DataError
         The file is not one of a run on the bed.
     """
     try:
@@ -135,7 +135,7 @@ def read_samples(path: Path) -> list[SampleRow]:
 
 
 def write_rows(path: Path, rows: Sequence[SampleRow]) -> None:
-    """Replace the table by one of these rows, whole at any moment."""
+    """Replace the table by one with these rows; it is complete at any time."""
     part = path.with_name(f".{path.name}.part")
     part.write_text("\n".join((COLUMNS, *(row.line() for row in rows))) + "\n", encoding="utf-8")
     part.replace(path)

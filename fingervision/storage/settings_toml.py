@@ -1,4 +1,4 @@
-"""Settings of a bench in a file: what the page saves, and the commands take with `--settings`."""
+"""Settings of a bench in a file, which the page saves and commands read by `--settings`."""
 
 import json
 import os
@@ -19,7 +19,7 @@ CAMERA_KEYS = (*CAMERA_NUMBERS, "size", "pixel_format")
 
 
 def read_settings(path: Path) -> dict[str, Any]:
-    """Read settings as the options of the commands, by their names.
+    """Read settings as options of the commands, by name.
 
     Parameters
     ----------
@@ -34,7 +34,7 @@ def read_settings(path: Path) -> dict[str, Any]:
 
     Raises
     ------
-    FingervisionError
+    DataError, InputFileError
         It cannot be read, or a key is unknown or has no such value.
     """
     values, text = read_document(path, "settings")
@@ -69,7 +69,7 @@ def read_settings(path: Path) -> dict[str, Any]:
 
 
 def write_settings(path: Path, settings: Mapping[str, Any]) -> None:
-    """Write settings; what is None is left out.
+    """Write settings, omitting those that are None.
 
     Parameters
     ----------
@@ -80,7 +80,7 @@ def write_settings(path: Path, settings: Mapping[str, Any]) -> None:
 
     Raises
     ------
-    FingervisionError
+    OutputError
         It cannot be written.
     """
     lines = [

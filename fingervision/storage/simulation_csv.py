@@ -1,4 +1,4 @@
-"""Write a simulation table, `input_mm,gap_mm,left_mm,right_mm[,force_n]` and poses of bodies, from a model's answer."""
+"""Write a simulation table, `input_mm,gap_mm,left_mm,right_mm[,force_n]` and poses of bodies, from a model."""
 
 import csv
 from collections.abc import Mapping
@@ -15,7 +15,7 @@ POSE = ("x_mm", "y_mm", "angle_mrad")
 
 
 def pose_columns(bodies: Mapping[str, NDArray[np.float64]]) -> dict[str, NDArray[np.float64]]:
-    """Name the columns of poses, `body.x_mm`, `body.y_mm`, `body.angle_mrad`, body by body.
+    """Names of the columns of poses, `body.x_mm`, `body.y_mm`, `body.angle_mrad`, body by body.
 
     Parameters
     ----------
@@ -31,7 +31,7 @@ def write_simulation(
     response: Response,
     bodies: Mapping[str, NDArray[np.float64]] = MappingProxyType({}),
 ) -> None:
-    """Write one row an input; `fingervision.storage.simulation_table` reads it.
+    """Write one row per input; `fingervision.storage.simulation_table` reads it.
 
     Parameters
     ----------

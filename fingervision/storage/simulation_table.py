@@ -16,7 +16,7 @@ def read_simulation_table(path: Path) -> TableModel:
 
     Raises
     ------
-    FingervisionError
+    DataError, InputFileError
         In a sentence: columns missing, empty cells, fewer than two rows, an input that stands twice, a gap that
         does not depend on the input at all.
     """
@@ -25,7 +25,7 @@ def read_simulation_table(path: Path) -> TableModel:
 
 
 def simulation_rows(path: Path, columns: Mapping[str, Numbers]) -> TableModel:
-    """Take the columns of a simulation table as a model.
+    """Convert the columns of a simulation table to a model.
 
     Parameters
     ----------
@@ -36,7 +36,7 @@ def simulation_rows(path: Path, columns: Mapping[str, Numbers]) -> TableModel:
 
     Raises
     ------
-    FingervisionError
+    DataError
         As `read_simulation_table`.
     """
     for name, each in columns.items():

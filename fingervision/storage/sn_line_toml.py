@@ -1,4 +1,4 @@
-"""A material's S-N line in a drawing.
+"""S-N line (fatigue strength) of a material in a drawing.
 
 `sn_line = { cycles = [1e4, 1e6], amplitude_mpa = [28.0, 16.0], stress_ratio = -1.0 }`
 """
@@ -26,7 +26,7 @@ def read_sn_line(raw: Any, name: str, origin: str) -> SNLine:
 
     Raises
     ------
-    FingervisionError
+    DataError
         Where it is no falling line of positive amplitudes over rising cycles.
     """
     what = f"{name} in {origin}"
@@ -51,7 +51,7 @@ def read_sn_line(raw: Any, name: str, origin: str) -> SNLine:
 
 
 def check_below_yield(line: SNLine, yield_mpa: float, origin: str) -> None:
-    """Refuse a line whose cycles, with the mean stress that they were measured at, reach the yield stress."""
+    """Refuse a line whose stress amplitudes, plus the mean stress of the tests, reach the yield stress."""
     mean = abs(line.amplitude_mpa[0] * (1.0 + line.stress_ratio) / (1.0 - line.stress_ratio))
     if mean + line.amplitude_mpa[0] > yield_mpa * (1.0 + 1e-9):
         raise DataError(

@@ -1,4 +1,4 @@
-"""steps.toml: the step data of a motor controller.
+"""The file steps.toml: step data of a motor controller.
 
 schema = 1
 name = "open and push"
@@ -38,7 +38,7 @@ def read_steps(path: Path) -> StepData:
 
     Raises
     ------
-    FingervisionError
+    DataError, InputFileError
         The file cannot be read, or a value in it cannot be meant; the sentence names the line.
     """
     values, text = read_document(path, "step data")
@@ -106,7 +106,7 @@ def _entry(section: Section) -> CycleTime | SpeedEntry:
 
 
 def write_steps(path: Path, data: StepData) -> None:
-    """Write step data, so that reading gives them back exactly."""
+    """Write step data, so that reading returns them exactly."""
     lines = [
         f"schema = {SCHEMA}", f"name = {_text(data.name)}", f"start_mm = {data.start_mm!r}",
         f"sequence = {list(data.sequence)}",
@@ -130,7 +130,7 @@ def write_steps(path: Path, data: StepData) -> None:
 
 
 def _text(words: str) -> str:
-    """A TOML string: JSON's escapes are among TOML's, but for the control character DEL."""
+    """A TOML string: JSON's escapes are valid in TOML, except for the control character DEL."""
     import json
 
     return json.dumps(words, ensure_ascii=False).replace("\x7f", "\\u007f")

@@ -1,4 +1,4 @@
-"""summary.json: what was measured, on what, with what, and how surely."""
+"""The file summary.json: input, settings, results and uncertainties of a measurement."""
 
 import json
 from collections.abc import Mapping
@@ -13,7 +13,7 @@ SCHEMA = 1
 
 
 def write_summary(path: Path, summary: Mapping[str, Any]) -> None:
-    """Write the summary; an older one stays whole until the new one is complete.
+    """Write the summary; an older one stays complete until the new one is complete.
 
     Parameters
     ----------
@@ -24,7 +24,7 @@ def write_summary(path: Path, summary: Mapping[str, Any]) -> None:
 
     Raises
     ------
-    FingervisionError
+    OutputError
         The file cannot be written.
     """
     part = path.with_name(f".{path.name}.part")
@@ -40,12 +40,12 @@ def write_summary(path: Path, summary: Mapping[str, Any]) -> None:
 
 
 def summary_text(summary: Mapping[str, Any]) -> str:
-    """Give the summary as the file holds it."""
+    """Text of the summary's file."""
     return json.dumps({"schema": SCHEMA, **summary}, indent=2, allow_nan=False, ensure_ascii=False) + "\n"
 
 
 def recording_of(folder: Path) -> str | None:
-    """Name of the recording that the results in a folder are of; None where no summary says so."""
+    """Name of the recording to which a folder's results belong; None where there is no summary."""
     try:
         name = json.loads((folder / SUMMARY).read_bytes())["recording"]["name"]
     except (OSError, ValueError, LookupError, TypeError):
@@ -54,7 +54,7 @@ def recording_of(folder: Path) -> str | None:
 
 
 def refuse_other_recording(folder: Path, recording: str) -> None:
-    """Refuse a folder that holds the results of another recording.
+    """Refuse a folder with the results of another recording.
 
     Parameters
     ----------
@@ -78,7 +78,7 @@ def refuse_other_recording(folder: Path, recording: str) -> None:
 
 
 def u_clock_beside(table: Path) -> float:
-    """Uncertainty of the clock offset that was found for a gaps.csv, from the summary beside it; in s.
+    """Uncertainty of the clock offset of a gaps.csv, from the summary beside it (s).
 
     Parameters
     ----------

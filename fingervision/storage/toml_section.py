@@ -1,4 +1,4 @@
-"""A table of a TOML file, read key by key, with the file, the line and the key in every sentence."""
+"""A table of a TOML file, read key by key, with file, line and key in every error message."""
 
 import difflib
 import re
@@ -30,7 +30,7 @@ def read_document(path: Path, what: str) -> tuple[dict[str, Any], str]:
 
     Raises
     ------
-    FingervisionError
+    DataError, InputFileError
         There is no such file, or it is not TOML.
     """
     try:
@@ -47,9 +47,9 @@ def read_document(path: Path, what: str) -> tuple[dict[str, Any], str]:
 
 
 def line_of(text: str, header: str, place: int = 0, key: str | None = None) -> int:
-    """Line, from 1, of the nth `[header]` or `[[header]]` of a file, or of a key below it.
+    """Line number, from 1, of the nth `[header]` or `[[header]]` of a file, or of a key below it.
 
-    tomllib tells no lines; headers are looked for as they are usually written, and 1 is said where none is found.
+    tomllib reports no lines; headers are searched for in their usual spelling, and 1 is returned where none is found.
     """
     lines = text.splitlines()
     pattern = re.compile(rf"^\s*\[\[?\s*{re.escape(header)}\s*\]\]?")
@@ -92,18 +92,18 @@ class Section:
     place: int = 0
 
     def at(self, key: str | None = None) -> str:
-        """Say where a key stands: `line 12 of recipe.toml`."""
+        """Location of a key: `line 12 of recipe.toml`."""
         return f"line {line_of(self.text, self.header, self.place, key)} of {self.path}"
 
     def refuse(self, key: str | None, words: str) -> NoReturn:
-        """Raise a sentence that begins with the key and says where it stands."""
+        """Raise an error that begins with the key and states its location."""
         if key is None and not self.header:
             raise DataError(f"{self.path} {words}")
         name = key if key is not None else f"[{self.header}]"
         raise DataError(f"{name} in {self.at(key)} {words}")
 
     def only(self, keys: Iterable[str]) -> None:
-        """Refuse keys other than these, with the nearest."""
+        """Refuse unknown keys, naming the nearest known one."""
         known = list(keys)
         for key in self.values:
             if key not in known:
@@ -115,7 +115,7 @@ class Section:
         self, key: str, default: float | None = None, *, low: float = -float("inf"), high: float = float("inf"),
         above: float | None = None,
     ) -> float:  # fmt: skip
-        """Read a finite number between limits (`above`: greater than); without a default it must be there."""
+        """Read a finite number between limits (`above`: greater than); without a default the key is required."""
         value = self.values.get(key, default)
         if value is None:
             self.refuse(None, f"must state {key}, but does not: add it.")
@@ -138,7 +138,7 @@ class Section:
         return int(value)
 
     def word(self, key: str, default: str | None = None, *, of: Iterable[str] | None = None) -> str:
-        """Read a text, one of some where `of` is given."""
+        """Read a text; where `of` is given, one of its words."""
         value = self.values.get(key, default)
         if value is None:
             self.refuse(None, f"must state {key}, but does not: add it.")

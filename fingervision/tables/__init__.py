@@ -1,1 +1,4 @@
-"""Any lab's table in: dialect, columns and units of a foreign table, and from them a measured table, drive or model."""
+"""Reading of any laboratory's tables: format, columns and units are recognised.
+
+The result is a table, drive or model.
+"""

@@ -1,4 +1,4 @@
-"""An account of a table: what it was understood as, for a person, for a program, and for columns.toml."""
+"""Report on how a table was interpreted: for a person, for a program, and for columns.toml."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
@@ -25,7 +25,7 @@ from fingervision.tables.understanding import Taken, Understood, understand
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Account:
-    """What a table was understood as.
+    """Interpretation of a table.
 
     Parameters
     ----------
@@ -73,7 +73,7 @@ class Account:
     channels: BodyChannels = field(default_factory=BodyChannels)
 
     def curve(self) -> tuple[str, NDArray[np.float64], str, NDArray[np.float64]] | None:
-        """What to plot: the gap against the input, or the input over time; None where there is too little."""
+        """Data to plot: the gap against the input, or the input over time; None where there is too little."""
         names = ("input", "gap") if "gap" in self.columns else ("time", "input")
         if not all(name in self.columns for name in names):
             return None
@@ -125,7 +125,7 @@ class Account:
 
 
 def account(path: Path, kind: str | None, given: Mapping[str, Entry]) -> Account:
-    """Understand a table, as one kind or as the kind that leaves the least open.
+    """Interpret a table as a given kind, or as the kind that leaves the fewest open questions.
 
     Parameters
     ----------
@@ -138,7 +138,7 @@ def account(path: Path, kind: str | None, given: Mapping[str, Entry]) -> Account
 
     Raises
     ------
-    FingervisionError
+    DataError, InputFileError, OpenQuestionError
         No table can be read at all.
     """
     kinds = KINDS if kind is None else (kind,)
@@ -156,7 +156,7 @@ def account(path: Path, kind: str | None, given: Mapping[str, Entry]) -> Account
 
 
 def _open_columns(table: Understood) -> int:
-    """How far a table is from a kind: twice the columns that it must have and has not, and those that are open."""
+    """Number of unresolved columns for a kind: missing required columns count twice."""
     missing = sum(question.key.startswith("columns.") for question in table.questions)
     missing += sum(bool(question.missing) for question in table.questions)
     # A column called after a program's model holds no measurement.
@@ -192,7 +192,7 @@ def _account(table: Understood, given: Entry, raw: RawTable) -> Account:
 
 
 def _entry(taken: tuple[Taken, ...], given: Entry, raw: RawTable) -> Entry:
-    """Write down everything that was found."""
+    """Entry for columns.toml with everything that was recognised."""
     names = [column.name for column in raw.columns]
     columns = {
         each.role: given.columns.get(each.role)
@@ -205,12 +205,12 @@ def _entry(taken: tuple[Taken, ...], given: Entry, raw: RawTable) -> Entry:
 
 
 def _dialect(raw: RawTable) -> dict[str, str]:
-    """Keys of the dialect that was found, or of the part that was taken."""
+    """Keys for the recognised text format, or for the selected part of a file."""
     return {key: str(raw.settings[key]) for key in ("separator", "decimal", "part") if key in raw.settings}
 
 
 def _rate(time: Numbers | None) -> float | None:
-    """Median rate of the rows."""
+    """Median rate of the rows (Hz)."""
     if time is None:
         return None
     steps = np.diff(time.value[time.present])
@@ -219,7 +219,7 @@ def _rate(time: Numbers | None) -> float | None:
 
 
 def _targets(raw: RawTable, given: Entry) -> Account | None:
-    """Account of a table of targets, cycles and directions; None where it is none."""
+    """Report for a table of targets, cycles and directions; None where it is none."""
     question = None
     try:
         rows = iso230_rows_of(raw, given)
@@ -241,7 +241,7 @@ def _targets(raw: RawTable, given: Entry) -> Account | None:
 
 
 def _own(path: Path, kind: str) -> Account:
-    """Account of a table in the project's own format, read to the letter."""
+    """Report for a table in the project's own format, which is read literally."""
     question = None
     notes: tuple[str, ...] = ()
     columns: dict[str, Numbers] = {}

@@ -1,4 +1,4 @@
-"""Channels of one's own in a foreign table: places and angles of bodies, `link 2.x [µm]`, with their `u_`."""
+"""User-named channels in a foreign table: positions and angles of bodies, `link 2.x [µm]`, with their `u_` columns."""
 
 from collections.abc import Collection
 from dataclasses import dataclass, field
@@ -27,7 +27,7 @@ BARE = frozenset({"mm", "um", "nm", "mrad", "urad", "µrad", "rad", "deg", "mdeg
 
 @dataclass(frozen=True, slots=True)
 class BodyChannels:
-    """Channels that a table holds beside its gap.
+    """Channels of a table in addition to its gap.
 
     Parameters
     ----------
@@ -45,7 +45,7 @@ class BodyChannels:
 
 
 def channels_in(raw: RawTable, used: Collection[int], decimal: str) -> BodyChannels:
-    """Take the columns that have a unit of length or angle, and no role, for channels.
+    """Treat columns with a unit of length or angle, and without a role, as channels.
 
     Parameters
     ----------
@@ -89,7 +89,7 @@ def _numbers(column: RawColumn, decimal: str) -> tuple[Numbers, int]:
 
 
 def _channel(column: RawColumn) -> tuple[str, float] | None:
-    """Name of the channel that a column is, and the factor to its unit; None where it is none."""
+    """Name of the channel in a column, and the factor for its unit; None where it is no channel."""
     text = column.name.strip().strip('"').strip()
     if text in NO_CHANNELS or column.since:
         return None
@@ -107,7 +107,7 @@ def _channel(column: RawColumn) -> tuple[str, float] | None:
 
 
 def _apart(text: str) -> tuple[str, str]:
-    """Take a name and its unit apart."""
+    """Split a text into a name and its unit."""
     if (match := BRACKETS.match(text)) is not None:
         unit = next(part for part in match.group("a", "b", "c", "d") if part is not None)
         return match["base"].strip(), spelled(unit)
@@ -117,7 +117,7 @@ def _apart(text: str) -> tuple[str, str]:
 
 
 def _size(unit: str) -> tuple[str, float] | None:
-    """`mm` or `mrad`, and the factor to it."""
+    """`mm` or `mrad`, and the factor to convert to it."""
     if (angle := MRAD.get(unit.lower())) is not None and unit != "Mrad":
         return "mrad", angle
     length = factor(unit, "length") if known_unit(unit) else None

@@ -1,4 +1,4 @@
-"""Cells of text to numbers, in the dialect of their table."""
+"""Convert cells of text to numbers, with the decimal mark of their table."""
 
 from collections.abc import Sequence
 from math import isfinite

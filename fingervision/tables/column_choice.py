@@ -1,4 +1,4 @@
-"""Which column of a table has which role: by the user's word, else by the columns' names."""
+"""Assign roles to the columns of a table: as the user states, else by the columns' names."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -27,7 +27,7 @@ CANONICAL = {role: f"{role}_{UNIT[dimension]}" for role, dimension in DIMENSION.
 
 @dataclass(slots=True)
 class Findings:
-    """What gathers while a table is looked at."""
+    """Collects what is found while a table is examined."""
 
     questions: list[Question] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
@@ -35,7 +35,7 @@ class Findings:
 
 
 def choose(raw: RawTable, names: Sequence[ColumnName], kind: str, given: Entry, about: Findings) -> dict[str, int]:
-    """Give the column of each role; what is open is put into `about`.
+    """Return the column of each role; open questions are added to `about`.
 
     Parameters
     ----------
@@ -99,7 +99,7 @@ def choose(raw: RawTable, names: Sequence[ColumnName], kind: str, given: Entry, 
 def _one_clock(
     raw: RawTable, names: Sequence[ColumnName], times: list[int], dates: list[int], about: Findings
 ) -> list[int]:
-    """Take the elapsed time where a date stands beside it; a date alone is a time."""
+    """Use the elapsed time where there is a date as well; a date alone is used as the time."""
     both = times + [k for k in dates if _is_dated(raw.columns[k])]
     elapsed = [k for k in times if not _is_dated(raw.columns[k])]
     if len(both) > 1 and len(elapsed) == 1:

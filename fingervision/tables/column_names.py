@@ -1,4 +1,4 @@
-"""A column's name taken apart into what it is called and its unit."""
+"""Split a column's name into a name and a unit."""
 
 import re
 from dataclasses import dataclass
@@ -12,7 +12,7 @@ BESIDE = re.compile(r"^(?P<base>.+?)\s*(?:/|,|\bin\b|:|\s|_|-|\.)\s*(?P<unit>[^\
 
 @dataclass(frozen=True, slots=True)
 class ColumnName:
-    """What a column's name says.
+    """Parts of a column's name.
 
     Parameters
     ----------
@@ -30,17 +30,17 @@ class ColumnName:
 
     @property
     def role(self) -> str | None:
-        """Role that the name stands for, if any."""
+        """Role that the name denotes, if any."""
         return role_of(self.base)
 
     @property
     def source(self) -> str | None:
-        """`measured` or `simulation` where the name says no more than where the values come from."""
+        """`measured` or `simulation` where the name only states the source of the values."""
         return source_of(self.base)
 
 
 def column_name(text: str) -> ColumnName:
-    """Take a name apart.
+    """Split a column's name into its parts.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""Separator and decimal mark of a text table, from its lines."""
+"""Text format (dialect) of a table: separator and decimal mark, found from its lines."""
 
 import csv
 import re
@@ -33,7 +33,7 @@ SAMPLE_LINES = 2000
 
 @dataclass(frozen=True, slots=True)
 class Dialect:
-    """How a text table is written.
+    """Separator and decimal mark of a text table.
 
     Parameters
     ----------
@@ -59,7 +59,7 @@ class Dialect:
 
 
 def split(line: str, separator: str | None) -> list[str]:
-    """Cells of a line, quotes taken off."""
+    """Cells of a line, without quotes."""
     if separator is None:
         return line.split()
     if '"' in line:
@@ -71,23 +71,23 @@ def split(line: str, separator: str | None) -> list[str]:
 
 
 def is_comment(line: str) -> bool:
-    """Whether a line is set apart as a comment."""
+    """Whether a line is marked as a comment."""
     return line.lstrip().startswith(COMMENT_MARKS)
 
 
 def is_number(cell: str, decimal: str) -> bool:
-    """Whether a cell holds a number as the dialect writes it."""
+    """Whether a cell is a number in the given dialect."""
     cell = cell.translate(MINUS)
     return NUMBER[decimal].fullmatch(cell) is not None or GROUPED[decimal].fullmatch(cell) is not None
 
 
 def is_value(cell: str, decimal: str) -> bool:
-    """Whether a cell may stand below a header: a number, none, or a date."""
+    """Whether a cell is a valid entry below a header: a number, empty, or a date."""
     return cell.lower() in MISSING or is_number(cell, decimal) or DATE_LIKE.fullmatch(cell) is not None
 
 
 def find_dialect(lines: Sequence[str], separator: str = "", decimal: str = "") -> Dialect | None:
-    """Find what explains the most cells of the most lines as numbers; None where no line holds two cells.
+    """Find the dialect in which most cells of most lines are numbers; None where no line has two cells.
 
     Parameters
     ----------
@@ -117,7 +117,7 @@ def find_dialect(lines: Sequence[str], separator: str = "", decimal: str = "") -
 
 
 def _explained(rows: Sequence[Sequence[str]], decimal: str) -> tuple[float, int] | None:
-    """Share of the cells that are values, in rows of the usual length; and that length."""
+    """Fraction of the cells that are values, in rows of the most frequent length; and that length."""
     numeric = [(len(row), sum(is_number(cell, decimal) for cell in row), row) for row in rows]
     lengths = Counter(length for length, numbers, _ in numeric if length > 1 and numbers)
     if not lengths:
@@ -129,9 +129,10 @@ def _explained(rows: Sequence[Sequence[str]], decimal: str) -> tuple[float, int]
 
 
 def _either_way(cells: Sequence[str], dialect: Dialect) -> bool:
-    """Whether all numbers with a mark look like whole ones with thousands set apart, as well as like decimal ones.
+    """Whether all numbers with a mark could be integers with a thousands separator as well as decimal numbers.
 
-    A point is asked about only between semicolons, where programs that write decimal commas put it.
+    A point is questioned only where semicolons separate the cells, because programs with decimal commas use it for
+    thousands.
     """
     numbers = [cell.translate(MINUS) for cell in cells if is_number(cell, dialect.decimal)]
     marks = {mark for mark in ".," if any(mark in number for number in numbers)}

@@ -1,6 +1,6 @@
-"""What cannot be right in a foreign table, or hardly: asked about, not taken.
+"""Doubts about a foreign table: values that are impossible or improbable, which the user is asked about.
 
-Each has a name that the key `accept` takes; a unit that the user has stated in columns.toml is not doubted.
+Each doubt has a name, which the key `accept` in columns.toml takes; a unit stated there by the user is not doubted.
 """
 
 from collections.abc import Mapping
@@ -33,7 +33,7 @@ EPSILON_MM = 1e-9
 def doubts(
     columns: Mapping[str, Numbers], given: Entry, kind: str, runs: NDArray[np.intp] | None, *, dated: bool = False
 ) -> list[Question]:
-    """List what cannot be right.
+    """List the impossible or improbable values.
 
     Parameters
     ----------
@@ -67,7 +67,7 @@ def doubts(
 
 
 def _overlap(columns: Mapping[str, Numbers]) -> list[Question]:
-    """Doubt an input that is missing where most of the gaps are."""
+    """Doubt an input that is missing in most rows with a gap."""
     sides = [columns[name].present for name in ("left", "right") if name in columns]
     measured = columns["gap"].present if "gap" in columns else np.logical_and.reduce(sides)
     total = int(np.count_nonzero(measured))

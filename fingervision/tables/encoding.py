@@ -1,4 +1,4 @@
-"""Bytes of a text table to text: byte-order marks, UTF-8, UTF-16 without a mark, and the older encodings."""
+"""Text encoding of a table: byte-order marks, UTF-8, UTF-16 without a mark, and older encodings."""
 
 import codecs
 
@@ -36,7 +36,7 @@ def decode(content: bytes, given: str | None = None) -> tuple[str, str]:
 
     Raises
     ------
-    FingervisionError
+    DataError
         The stated encoding does not fit, or none does.
     """
     if given is not None:
@@ -62,7 +62,7 @@ def decode(content: bytes, given: str | None = None) -> tuple[str, str]:
 
 
 def _utf16_without_mark(sample: bytes) -> str | None:
-    """Tell UTF-16 by its zeros: ASCII has one in every second byte."""
+    """Recognise UTF-16 by its zero bytes: ASCII text has one in every second byte."""
     if len(sample) < 4:
         return None
     zeros = [sample[start::2].count(0) / len(sample[start::2]) for start in (0, 1)]
@@ -73,10 +73,10 @@ def _utf16_without_mark(sample: bytes) -> str | None:
 
 
 def _older(content: bytes) -> tuple[str, str]:
-    """Decode an 8-bit encoding: the Western one where all its characters are usual, else what charset-normalizer says.
+    """Decode an 8-bit encoding: the Western one if all its characters are usual, else the guess of charset-normalizer.
 
-    On the few odd bytes of a header the statistics of charset-normalizer have too little to go by, so the usual case is
-    decided by rule.
+    The few non-ASCII bytes of a header are too few for the statistics of charset-normalizer, so the usual case is
+    decided by a rule.
     """
     try:
         text = content.decode("cp1252")

@@ -1,4 +1,4 @@
-"""Foreign tables of targets, cycles and directions (ISO 230-2), brought into the names of the project's own."""
+"""Foreign tables of targets, cycles and directions (ISO 230-2), converted to the project's column names."""
 
 import re
 from collections.abc import Sequence
@@ -40,7 +40,7 @@ ARROWS = {"↑": " up ", "↓": " down ", "→": " up ", "←": " down "}
 
 @dataclass(frozen=True, slots=True)
 class _Block:
-    """A column of a matrix: its place, side, cycle, and `position` or `deviation` where the name says so."""
+    """A column of a matrix: its index, direction, cycle, and `position` or `deviation` where the name states it."""
 
     place: int
     side: str
@@ -60,7 +60,7 @@ def iso230_rows_of(raw: RawTable, given: Entry) -> Iso230Rows | None:
 
     Raises
     ------
-    FingervisionError
+    DataError
         As `storage.iso230_table.read_iso230_table`.
     OpenQuestionError
         A unit is open, or whether the readings are positions or deviations.
@@ -106,7 +106,7 @@ def iso230_rows_of(raw: RawTable, given: Entry) -> Iso230Rows | None:
 
 
 def _places(names: Sequence[ColumnName], role: str, given: Entry) -> list[int]:
-    """Columns of a role: the one that the user names, else those whose names say it."""
+    """Columns of a role: the one that the user names, else those recognised by name."""
     stated = given.columns.get(role)
     if stated is not None:
         found = [k for k, name in enumerate(names) if stated in (name.text, name.base, str(k + 1))]
@@ -120,7 +120,7 @@ def _places(names: Sequence[ColumnName], role: str, given: Entry) -> list[int]:
 
 
 def _side(word: str) -> str:
-    """Bring a word of direction into the project's own; words that are none stay, and are refused there."""
+    """Translate a word for a direction to the project's own; unknown words are kept, and refused later."""
     for arrow, side in ARROWS.items():
         word = word.replace(arrow, side)
     plain = " ".join(tokens(word)) or word.strip()
@@ -128,7 +128,7 @@ def _side(word: str) -> str:
 
 
 def _block(place: int, name: ColumnName) -> _Block | None:
-    """Take a name such as `1↑`, `up 2 [µm]`, `Abweichung vorwärts 3`, `+1` as a column of a matrix."""
+    """Interpret a name such as `1↑`, `up 2 [µm]`, `Abweichung vorwärts 3`, `+1` as a column of a matrix."""
     text = name.base
     if (signed := re.fullmatch(r"\s*(?:(\d+)\s*([+-])|([+-])\s*(\d+))\s*", text)) is not None:
         sign, cycle = signed[2] or signed[3], signed[1] or signed[4]
@@ -174,7 +174,7 @@ def _long_form(raw: RawTable, names: Sequence[ColumnName], given: Entry) -> int:
 def _quantity(
     raw: RawTable, names: Sequence[ColumnName], place: int, target_mm: Numbers, given: Entry, questions: list[Question]
 ) -> str:
-    """Whether readings are positions or deviations: as stated, as called, or as their range tells."""
+    """Whether readings are positions or deviations: as stated, by name, or by their range."""
     for role in ("position", "deviation"):
         if role in given.columns or role in given.units:
             return role
@@ -226,7 +226,7 @@ def _plain(raw: RawTable, place: int) -> Numbers:
 
 
 def _time(raw: RawTable, names: Sequence[ColumnName], place: int, given: Entry, questions: list[Question]) -> Numbers:
-    """Times of a long form, in s."""
+    """Times of a long form (s)."""
     content = raw.columns[place].content
     if not isinstance(content, Numbers) and looks_like_time(content):
         return seconds_of(content, given.words.get("date_order", "")).numbers

@@ -1,4 +1,4 @@
-"""columns.toml: what the user has decided about foreign tables."""
+"""The file columns.toml: the user's decisions about foreign tables."""
 
 import fnmatch
 import os
@@ -31,7 +31,7 @@ KEYS = ("file", "as", "columns", "units", *WORDS, *TEXTS, "header_line", "accept
 
 @dataclass(frozen=True, slots=True)
 class Entry:
-    """What is decided about one table.
+    """Decisions about one table.
 
     Parameters
     ----------
@@ -58,11 +58,11 @@ class Entry:
 
     @property
     def says_nothing(self) -> bool:
-        """Whether nothing is decided."""
+        """Whether the entry decides nothing."""
         return self.source is None
 
     def over(self, other: "Entry") -> "Entry":
-        """Put this entry's keys over another's."""
+        """Combine two entries; keys of this one override those of the other."""
         return Entry(
             {**other.columns, **self.columns},
             {**other.units, **self.units},
@@ -74,7 +74,7 @@ class Entry:
 
 
 def entry_for(table: Path, kind: str | None, columns: Path | None = None) -> Entry:
-    """Collect what is decided about a table: by `--columns`, else by a columns.toml in the table's own folder.
+    """Collect the decisions about a table: from `--columns`, else from a columns.toml in the table's own folder.
 
     Parameters
     ----------
@@ -87,7 +87,7 @@ def entry_for(table: Path, kind: str | None, columns: Path | None = None) -> Ent
 
     Raises
     ------
-    FingervisionError
+    DataError, InputFileError
         The named file is not there, or a key is wrong.
     """
     path = columns if columns is not None else table.parent / NAME
@@ -110,7 +110,7 @@ def entry_for(table: Path, kind: str | None, columns: Path | None = None) -> Ent
 
 
 def _matches(table: Path, pattern: str, folder: Path) -> bool:
-    """Whether a pattern means a table: its name alone, or its path from the folder of columns.toml."""
+    """Whether a pattern matches a table: its name alone, or its path relative to the folder of columns.toml."""
     relative = Path(os.path.relpath(table.resolve(), folder.resolve())).as_posix()
     return any(name == pattern or fnmatch.fnmatchcase(name, pattern) for name in (table.name, relative))
 
@@ -140,7 +140,7 @@ def entry_of_settings(settings: Sequence[str], source: Path) -> Entry:
 
     Raises
     ------
-    FingervisionError
+    DataError
         One is no key, or has no value.
     """
     document: dict[str, Any] = {}
@@ -163,7 +163,7 @@ def entry_of_settings(settings: Sequence[str], source: Path) -> Entry:
 
 
 def entry_text(table: str, kind: str | None, entry: Entry) -> str:
-    """Write an entry as a table of columns.toml."""
+    """Format an entry as a table of columns.toml."""
     lines = ["[[table]]", f"file = {_text(table)}"]
     if kind is not None:
         lines.append(f'as = "{kind}"')
@@ -178,13 +178,13 @@ def entry_text(table: str, kind: str | None, entry: Entry) -> str:
 
 
 def _text(words: str) -> str:
-    """Write a text as TOML does."""
+    """Quote a text for TOML."""
     marked = words.replace("\\", "\\\\").replace('"', '\\"').replace("\t", "\\t")
     return '"' + re.sub(r"[\x00-\x1f\x7f]", lambda mark: f"\\u{ord(mark[0]):04x}", marked) + '"'
 
 
 def write_entry(path: Path, table: str, kind: str | None, entry: Entry) -> bool:
-    """Put an entry into columns.toml; the entries of other tables, and comments above them, stay as they are.
+    """Write an entry into columns.toml; entries of other tables, and comments above them, stay unchanged.
 
     Returns
     -------
@@ -193,7 +193,7 @@ def write_entry(path: Path, table: str, kind: str | None, entry: Entry) -> bool:
 
     Raises
     ------
-    FingervisionError
+    OutputError
         It cannot be read or written.
     """
     block = entry_text(table, kind, entry)
@@ -216,7 +216,7 @@ def write_entry(path: Path, table: str, kind: str | None, entry: Entry) -> bool:
 
 
 def _is_of(part: str, ours: Sequence[str]) -> bool:
-    """Whether a part of columns.toml is the entry of the same file and kind."""
+    """Whether a part of columns.toml is the entry for the same file and kind."""
     lines = [re.sub(r"\s*=\s*", " = ", line.strip()) for line in part.splitlines()]
     kinds = [line for line in lines if line.startswith("as = ")]
     return all(line in lines for line in ours) and (len(ours) == 3 or not kinds)

@@ -1,4 +1,4 @@
-"""Libraries of the extra `formats`: imported where a file needs them, with a sentence where they are missing."""
+"""Libraries of the extra `formats`: imported when a file needs them, with an error message where they are missing."""
 
 import importlib
 from pathlib import Path
@@ -21,7 +21,7 @@ def needed_library(name: str, path: Path, what: str) -> Any:
 
     Raises
     ------
-    FingervisionError
+    MissingLibraryError
         It is not installed.
     """
     try:

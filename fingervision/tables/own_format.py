@@ -1,4 +1,4 @@
-"""Which tables are the project's own, and are read to the letter."""
+"""Tables in the project's own format, which are read literally."""
 
 from pathlib import Path
 
@@ -10,9 +10,9 @@ HEAD_BYTES = 100_000
 
 
 def is_own(path: Path, kind: str, given: Entry) -> bool:
-    """Whether a table is in the project's own format, as its header line says; what cannot be read is taken for such.
+    """Whether a table is in the project's own format, judged by its header line; an unreadable file counts as such.
 
-    A table that columns.toml speaks of is read as that says.
+    A table with an entry in columns.toml is read as that entry states.
     """
     if not given.says_nothing:
         return False

@@ -1,4 +1,4 @@
-"""Files that hold several tables (sheets, groups, structures): which one is meant."""
+"""Files with several tables (sheets, groups, structures): choice of the table to read."""
 
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
@@ -10,7 +10,7 @@ from fingervision.tables.questions import OpenQuestionError, Question
 
 
 def chosen_part(path: Path, names: Mapping[str, Sequence[str]], given: Entry, what: str) -> str:
-    """Name the part that is meant: the stated one, the only one, or the only one with columns that say what they are.
+    """Name of the table to read: the stated one, the only one, or the only one with recognisable columns.
 
     Parameters
     ----------
@@ -25,7 +25,7 @@ def chosen_part(path: Path, names: Mapping[str, Sequence[str]], given: Entry, wh
 
     Raises
     ------
-    FingervisionError
+    DataError
         There is none, or not the stated one.
     OpenQuestionError
         Several may be meant.

@@ -1,4 +1,4 @@
-"""What a table leaves open, and the one key of columns.toml that decides it."""
+"""Open questions about a table, each with the key of columns.toml that answers it."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -27,7 +27,7 @@ class Question:
 
 
 class OpenQuestionError(FingervisionError):
-    """A table can be read in more than one way; the message names the key that decides.
+    """A table can be read in more than one way; the message names the key of columns.toml that decides.
 
     Parameters
     ----------
@@ -54,7 +54,7 @@ class OpenQuestionError(FingervisionError):
 
 
 def _quoted(words: str) -> str:
-    """Write a word as a shell takes it."""
+    """Quote a word for the shell."""
     from shlex import quote
 
     return quote(words)

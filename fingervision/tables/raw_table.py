@@ -1,4 +1,4 @@
-"""A table as a file holds it, before anyone says what its columns mean."""
+"""A table as stored in a file, before its columns are interpreted."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -37,7 +37,7 @@ class RawColumn:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RawTable:
-    """All columns of one table, of one length.
+    """All columns of one table, with equal length.
 
     Parameters
     ----------
@@ -77,5 +77,5 @@ class RawTable:
         return len(self.columns[0]) if self.columns else 0
 
     def place(self, row: int) -> str:
-        """Say where a row stands."""
+        """Location of a row in the file."""
         return f"line {self.lines[row]}" if len(self.lines) else f"row {row + 1}"

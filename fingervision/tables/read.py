@@ -1,4 +1,4 @@
-"""The front door: any table as a measured table, a drive or a simulation."""
+"""Entry points for reading any table as a measured table, a drive or a simulation."""
 
 from collections.abc import Callable
 from functools import partial
@@ -38,7 +38,7 @@ def read_measured_table(path: Path, columns: Path | None = None) -> MeasuredTabl
 
     Raises
     ------
-    FingervisionError
+    DataError, InputFileError
         It cannot be read, or not be worked with.
     OpenQuestionError
         It can be read in more than one way.
@@ -71,7 +71,7 @@ def read_drive(path: Path, columns: Path | None = None) -> DriveHistory:
 
     Raises
     ------
-    FingervisionError
+    DataError, InputFileError
         It cannot be read, or not be worked with.
     OpenQuestionError
         It can be read in more than one way.
@@ -83,7 +83,7 @@ def read_drive(path: Path, columns: Path | None = None) -> DriveHistory:
 
 
 def drive_of(table: Understood, given: Entry) -> DriveHistory:
-    """Take a table that is understood as a drive."""
+    """Interpret a table as a drive."""
     path = table.path
     kept = np.flatnonzero(table.columns["time"].present & table.columns["input"].present)
     if not kept.size:
@@ -128,7 +128,7 @@ def read_simulation_table(path: Path, columns: Path | None = None) -> TableModel
 
     Raises
     ------
-    FingervisionError
+    DataError, InputFileError
         It cannot be read, or not be worked with.
     OpenQuestionError
         It can be read in more than one way.
@@ -182,7 +182,7 @@ def read_model(path: Path, kind: str = "lumped", columns: Path | None = None) ->
 
     Raises
     ------
-    FingervisionError
+    DataError, InputFileError, ModelError, UsageError
         As `storage.model_toml.read_model` and `read_simulation_table`.
     """
     reader: Callable[[Path], TableModel] = partial(_table_or_no_model, columns=columns)
@@ -197,6 +197,6 @@ def _said(table: Understood, given: Entry) -> list[str]:
 
 
 def said(given: Entry, what: str, notes: tuple[str, ...], left_out: tuple[str, ...]) -> list[str]:
-    """Say how a foreign table was read."""
+    """Sentence on how a foreign table was read."""
     how = f" with {given.source}" if given.source is not None else ""
     return [f"Read as {what}{how}.", *notes, *(f"Left out: {words}." for words in left_out)]

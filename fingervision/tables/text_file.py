@@ -1,4 +1,4 @@
-"""Lines of a text file, of a size that memory holds."""
+"""Lines of a text file, with a limit on its size."""
 
 from pathlib import Path
 
@@ -21,7 +21,7 @@ def lines_of(path: Path, encoding: str | None) -> tuple[list[str], str]:
 
     Raises
     ------
-    FingervisionError
+    DataError, InputFileError
         The file cannot be read, is too large, is no text, or has a line without end.
     """
     try:

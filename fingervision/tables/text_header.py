@@ -1,4 +1,4 @@
-"""What stands above the rows of a text table: the names of its columns, and their units."""
+"""Header of a text table: the names of its columns, and their units."""
 
 import re
 from collections.abc import Sequence
@@ -26,7 +26,7 @@ ONE_A_LINE = re.compile(r"\W*NAME(\d+)\s*=\s*(.*\S)\s*")
 
 @dataclass(frozen=True, slots=True)
 class Header:
-    """What stands above the numbers.
+    """The lines above the numbers.
 
     Parameters
     ----------
@@ -48,7 +48,7 @@ def _is_row(cells: Sequence[str], dialect: Dialect) -> bool:
 
 
 def first_row(lines: Sequence[str], dialect: Dialect, given: Entry) -> int:
-    """Line of the first row of numbers, from 0."""
+    """Line number of the first row of numbers, from 0."""
     start = 0 if given.header_line is None else min(given.header_line, len(lines))
     named = given.header_line is None
     poor: int | None = None
@@ -121,7 +121,7 @@ def find_header(lines: Sequence[str], first: int, dialect: Dialect, given: Entry
 
 
 def _labelled(line: str, dialect: Dialect) -> tuple[str, tuple[str, ...]]:
-    """Label in the first column of a worksheet's header row, in small letters, and what it gives to each column."""
+    """Label in the first column of a worksheet's header row, in lower case, and its value for each column."""
     label, *cells = [cell.strip() for cell in line.split("\t")]
     if len(cells) == dialect.wide - 1:
         cells = ["", *cells]
@@ -129,7 +129,7 @@ def _labelled(line: str, dialect: Dialect) -> tuple[str, tuple[str, ...]]:
 
 
 def _one_a_line(lines: Sequence[str], wide: int) -> Header | None:
-    """Names that stand in a line each, numbered from 0; None where not every column has one."""
+    """Names that are listed one per line; None where not every column has one."""
     matches = [(at, ONE_A_LINE.fullmatch(line)) for at, line in enumerate(lines)]
     found = {int(match[1]): (match[2], at) for at, match in matches if match is not None}
     if sorted(found) != list(range(wide)):
@@ -138,13 +138,13 @@ def _one_a_line(lines: Sequence[str], wide: int) -> Header | None:
 
 
 def _all_units(cells: Sequence[str]) -> bool:
-    """Whether a line holds nothing but units, and some."""
+    """Whether a line contains only units, and at least one."""
     # `t` is a name and a tonne, `s` a second: a word of a role is a name only beside others that are.
     return any(cells) and all(is_unit(cell) for cell in cells) and sum(role_of(cell) is not None for cell in cells) == 0
 
 
 def names_in(line: str, dialect: Dialect) -> tuple[str, ...] | None:
-    """Take a line as names of all columns; None where it does not have as many."""
+    """Interpret a line as the names of all columns; None where the number of names differs."""
     text = re.sub(r"^\s*(#+|%+|//+|!+)\s*", "", line).strip()
     if dialect.separator is not None:
         text = re.sub(r"^\s*(#+|%+|//+|!+)\s*", "", line).rstrip("\r\n")
@@ -161,7 +161,7 @@ def names_in(line: str, dialect: Dialect) -> tuple[str, ...] | None:
 
 
 def _splits(text: str, dialect: Dialect) -> list[list[str]]:
-    """Ways to take a line of names apart, likeliest first."""
+    """Ways to split a line into names, the most probable first."""
     ways = [split(text, dialect.separator)]
     if dialect.separator is None:
         ways.append([cell.strip() for cell in re.split(r"\t+|\s{2,}", text) if cell.strip()])

@@ -1,4 +1,4 @@
-"""Lines of text to a raw table: header, row of units, comments, repeated headers and rows that are no rows."""
+"""Convert lines of text to a raw table: header, units, comments, repeated headers, and lines that are no rows."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -29,7 +29,7 @@ MOST_ODD = 0.05
 
 
 def table_of_lines(path: Path, lines: Sequence[str], given: Entry, encoding: str) -> RawTable:
-    """Find header and rows among lines, and read the rows.
+    """Find header and rows among the lines, and read the rows.
 
     Parameters
     ----------
@@ -44,7 +44,7 @@ def table_of_lines(path: Path, lines: Sequence[str], given: Entry, encoding: str
 
     Raises
     ------
-    FingervisionError
+    DataError
         There is no table, or too many rows are none.
     OpenQuestionError
         A mark may be a decimal comma or set thousands apart.
@@ -91,7 +91,7 @@ def _settings(dialect: Dialect, header: Header) -> dict[str, str | int]:
 
 
 def _check_commas(path: Path, lines: Sequence[str], first: int, dialect: Dialect) -> None:
-    """Refuse rows with twice as many cells between commas as there are names above."""
+    """Refuse rows with twice as many comma-separated cells as there are names above (decimal commas)."""
     if dialect.separator != ",":
         return
     for line in lines[max(0, first - HEADER_LINES) : first]:
@@ -104,7 +104,7 @@ def _check_commas(path: Path, lines: Sequence[str], first: int, dialect: Dialect
 
 
 def _marked(lines: Sequence[str], dialect: Dialect) -> str:
-    """First number with a mark."""
+    """First number with a decimal or thousands mark."""
     for line in lines:
         for cell in split(line, dialect.separator):
             if ("," in cell or "." in cell) and is_number(cell, dialect.decimal) and not is_comment(line):
@@ -113,7 +113,7 @@ def _marked(lines: Sequence[str], dialect: Dialect) -> str:
 
 
 class _Rows:
-    """Reads what stands below the header."""
+    """Reads the lines below the header."""
 
     def __init__(self, path: Path, dialect: Dialect, header: Header, first: int) -> None:
         self._path, self._dialect, self._header, self._first = path, dialect, header, first
@@ -121,7 +121,7 @@ class _Rows:
         self._units = header.units or ("",) * dialect.wide
 
     def read(self, lines: Sequence[str]) -> tuple[list[RawColumn], Sequence[int], list[str], list[int]]:
-        """Give columns, lines of the rows, what was left out, and rows before which the header stood again."""
+        """Return columns, line numbers of the rows, omitted lines, and rows before which the header was repeated."""
         end = len(lines)
         while end > self._first and not lines[end - 1].strip():
             end -= 1
@@ -196,7 +196,7 @@ class _Rows:
         return columns, numbers, left_out, sorted({row for row in restarts if 0 < row < len(rows)})
 
     def _is_header(self, cells: Sequence[str], names: Sequence[str], units: Sequence[str]) -> bool:
-        """Whether a row repeats the header, also in another spelling, or the row of units."""
+        """Whether a row repeats the header, even in another spelling, or the row of units."""
         cells = [cell.strip() for cell in cells]
         if cells in (names, units):
             return True

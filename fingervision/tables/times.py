@@ -1,4 +1,4 @@
-"""Dates and times of day, as programs write them, to seconds from the first."""
+"""Convert dates and times of day, in the spelling of common programs, to seconds since the first."""
 
 import re
 from collections.abc import Sequence
@@ -58,8 +58,8 @@ def looks_like_time(cells: Sequence[str]) -> bool:
 def seconds_of(cells: Sequence[str], date_order: str = "") -> Seconds:
     """Read dates and times of day.
 
-    Times of day that fall by more than half a day have passed midnight, once each time. An offset from UTC is taken
-    off; without one, clocks are taken as they stand.
+    A time of day that falls by more than half a day has passed midnight, once each time. An offset from UTC is
+    subtracted; times without an offset are used as they are.
 
     Parameters
     ----------
@@ -96,7 +96,7 @@ def seconds_of(cells: Sequence[str], date_order: str = "") -> Seconds:
 def _taken_apart(
     cells: Sequence[str],
 ) -> tuple[NDArray[np.float64], NDArray[np.bool_], NDArray[np.intp], list[str]]:
-    """Seconds of the day of each cell, whether it is a time, the number of its day's word (-1: none), and the words."""
+    """Seconds of the day of each cell, whether it is a time, the index of its day's word (-1: none), and the words."""
     clock_s, present = np.zeros(len(cells)), np.zeros(len(cells), dtype=np.bool_)
     codes = np.full(len(cells), -1, dtype=np.intp)
     number: dict[str, int] = {}
@@ -115,7 +115,7 @@ def _taken_apart(
 
 
 def _one(text: str) -> tuple[str, float | None]:
-    """Word of the day ('' for none) and seconds of it; None where a cell is no time."""
+    """Word for the day ('' for none) and seconds of the day; None where a cell is no time."""
     offset = 0.0
     if (zone := ZONE.search(text)) is not None and ":" in text[: zone.start()]:
         offset = _offset(zone[0])
@@ -129,7 +129,10 @@ def _one(text: str) -> tuple[str, float | None]:
 
 
 def _days(words: Sequence[str], order: str) -> NDArray[np.float64] | None:
-    """Days from the first of each word (one zero where there is none); None where one does not exist in this order."""
+    """Days since the first, for each word (one zero where there is none).
+
+    None where a date does not exist in this order.
+    """
     numbers = [_ordinal(word, order) for word in words]
     if None in numbers:
         return None
@@ -151,7 +154,7 @@ def _clock(text: str) -> float | None:
 
 
 def _offset(zone: str) -> float:
-    """Seconds that a clock of a zone is ahead of UTC."""
+    """Seconds by which a time zone is ahead of UTC."""
     if zone == "Z":
         return 0.0
     sign = -1.0 if zone[0] == "-" else 1.0
@@ -159,7 +162,7 @@ def _offset(zone: str) -> float:
 
 
 def _ordinal(text: str, order: str) -> int | None:
-    """Number of a day; None where there is no such day. Dates before 1970 are days like others."""
+    """Number of a day; None where no such day exists. Dates before 1970 are accepted."""
     match = DAY.fullmatch(text)
     if match is None:
         return None
@@ -179,7 +182,7 @@ def _ordinal(text: str, order: str) -> int | None:
 
 
 def is_epoch(first: float) -> str:
-    """Name the clock that a large number of seconds counts on; empty where it is none that is known.
+    """Name of the epoch from which a large number of seconds is counted; empty where it is none of the known ones.
 
     Examples
     --------

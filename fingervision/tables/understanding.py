@@ -1,4 +1,4 @@
-"""A raw table understood: which column is what, in which unit, and what remains open."""
+"""Interpretation of a raw table: role and unit of each column, and what remains open."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -27,7 +27,7 @@ MOST_UNREAD = 0.05
 
 @dataclass(frozen=True, slots=True)
 class Taken:
-    """What a column was taken for.
+    """Interpretation of one column.
 
     Parameters
     ----------
@@ -46,7 +46,7 @@ class Taken:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Understood:
-    """A table whose columns have a meaning.
+    """A table whose columns are interpreted.
 
     Parameters
     ----------
@@ -86,7 +86,7 @@ class Understood:
         return self.raw.path
 
     def decided(self) -> "Understood":
-        """Give the table itself, where nothing is open.
+        """Return the table itself, if nothing is open.
 
         Raises
         ------
@@ -99,7 +99,7 @@ class Understood:
 
 
 def understand(raw: RawTable, kind: str, given: Entry) -> Understood:
-    """Say what each column is.
+    """Interpret each column.
 
     Parameters
     ----------
@@ -112,7 +112,7 @@ def understand(raw: RawTable, kind: str, given: Entry) -> Understood:
 
     Raises
     ------
-    FingervisionError
+    DataError
         What the user has decided does not fit the table.
     """
     about = Findings(notes=list(raw.notes), left_out=list(raw.left_out))
@@ -162,7 +162,7 @@ def understand(raw: RawTable, kind: str, given: Entry) -> Understood:
 
 
 def _unit(column: RawColumn, name: ColumnName, role: str, kind: str, given: Entry, about: Findings) -> str | None:
-    """Unit of a column as stated by the user, beside the name, or in it; None where it is open, or not needed."""
+    """Unit of a column as stated by the user, beside its name, or in it; None where it is open, or not needed."""
     if role in given.units:
         return given.units[role]
     stated = [unit for unit in (spelled(column.unit), name.unit) if unit and unit != "-"]
@@ -192,7 +192,7 @@ def _wrong_unit(column: RawColumn, role: str, unit: str) -> Question:
 
 
 def _numbers(raw: RawTable, column: RawColumn, decimal: str, given: Entry, about: Findings) -> Numbers:
-    """Read a column's cells; those that are no numbers are told."""
+    """Read a column's cells; cells that are no numbers are reported."""
     if isinstance(column.content, Numbers):
         return column.content
     values, odd = to_numbers(column.content, decimal)
@@ -209,7 +209,7 @@ def _numbers(raw: RawTable, column: RawColumn, decimal: str, given: Entry, about
 
 
 def _dated(raw: RawTable, chosen: Mapping[str, int], given: Entry, about: Findings) -> Numbers | None:
-    """Time from dates and times of day; None where the column holds numbers."""
+    """Time from dates and times of day; None where the column contains numbers."""
     column = raw.columns[chosen["time"]]
     if isinstance(column.content, Numbers) or "time" in given.units or not looks_like_time(column.content):
         return None
@@ -235,7 +235,7 @@ def _dated(raw: RawTable, chosen: Mapping[str, int], given: Entry, about: Findin
 
 
 def _from_epoch(values: Numbers, column: RawColumn, about: Findings) -> Numbers:
-    """Count from the first row where a clock counts from 1970 or 1904: such numbers are never a recording's time."""
+    """Subtract the first time where a clock counts from 1970 or 1904: no recording has such times."""
     if not values.present.any():
         return values
     first = float(values.value[int(np.argmax(values.present))])
@@ -249,7 +249,7 @@ def _from_epoch(values: Numbers, column: RawColumn, about: Findings) -> Numbers:
 def _runs(
     raw: RawTable, chosen: Mapping[str, int], columns: Mapping[str, Numbers], given: Entry, about: Findings
 ) -> tuple[str, ...] | None:
-    """Name of each row's run: its own column, or the restarts that the user has said to be runs."""
+    """Name of each row's run: from its own column, or from restarts of the time that the user declared to be runs."""
     if (place := chosen.get("run")) is not None:
         content = raw.columns[place].content
         if isinstance(content, Numbers):

@@ -1,4 +1,4 @@
-"""Units as tables write them, and their factors to mm, s and N."""
+"""Units as written in tables, and their factors to mm, s and N."""
 
 from functools import cache
 from typing import TYPE_CHECKING, Any
@@ -43,21 +43,21 @@ NO_UNIT = frozenset({"", "-", "1", "[-]", "\u2013", "none", "n/a"})
 
 @cache
 def registry() -> "UnitRegistry[Any]":
-    """Load the library of units, once and only where a foreign table is read."""
+    """Load the units library, once and only when a foreign table is read."""
     from pint import UnitRegistry
 
     return UnitRegistry(cache_folder=None)
 
 
 def spelled(text: str) -> str:
-    """Bring a unit's text into one spelling: one micro sign, no brackets."""
+    """Normalise the spelling of a unit: one micro sign, no brackets."""
     text = text.strip().strip("[](){}<>").strip().rstrip(".")
     return text.replace("\u03bc", "µ").replace("Âµ", "µ").replace("Î¼", "µ")
 
 
 @cache
 def known_unit(text: str) -> str | None:
-    """Name of a unit of length, time or force that is written with a word or sign; None where it is none."""
+    """Name of a unit of length, time or force from its word or symbol; None where it is unknown."""
     text = spelled(text)
     if text in CASE_TELLS:
         return CASE_TELLS[text]
@@ -66,11 +66,11 @@ def known_unit(text: str) -> str | None:
 
 @cache
 def factor(text: str, dimension: str) -> float | None:
-    """Factor from a unit, or a multiple of one such as `0.1 µm`, to mm, s or N; None where it is of no such dimension.
+    """Factor from a unit, or a multiple such as `0.1 µm`, to mm, s or N; None where the dimension differs.
 
     Raises
     ------
-    FingervisionError
+    InstallationError
         The pint library is not there.
     """
     try:
@@ -98,7 +98,7 @@ def factor(text: str, dimension: str) -> float | None:
 
 @cache
 def is_unit(text: str) -> bool:
-    """Whether a cell of a row of units may be one: of any dimension, or nothing."""
+    """Whether a cell may belong to a row of units: a unit of any dimension, or empty."""
     words = spelled(text)
     if words.lower() in NO_UNIT or known_unit(words) is not None or words in {"%", "°", "°C", "C", "V", "A", "Hz"}:
         return True

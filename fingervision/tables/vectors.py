@@ -1,4 +1,4 @@
-"""Named vectors and matrices of a file (MATLAB, TDMS) to the columns of tables."""
+"""Convert named vectors and matrices of a file (MATLAB, TDMS) to columns of tables."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -14,19 +14,19 @@ WIDEST = 200
 
 
 def is_numeric(value: Any) -> bool:
-    """Whether it is an array of real numbers."""
+    """Whether a value is an array of real numbers."""
     return isinstance(value, np.ndarray) and value.dtype.kind in "fiub"
 
 
 def numbers(value: NDArray[Any]) -> Numbers:
-    """Take an array of real numbers; what is not finite is no value."""
+    """Convert an array of real numbers; values that are not finite become missing."""
     plain = np.asarray(value, dtype=np.float64).ravel()
     usable = np.isfinite(plain)
     return Numbers(np.where(usable, plain, 0.0), usable)
 
 
 def tables_of(values: Mapping[str, Any]) -> dict[str, list[RawColumn]]:
-    """Put vectors of one length together; each matrix, and each structure, is a table of its own.
+    """Combine vectors of equal length; each matrix, and each structure, is a table of its own.
 
     Parameters
     ----------

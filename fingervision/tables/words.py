@@ -1,4 +1,4 @@
-"""What columns are called in seven European languages, and which role each word stands for."""
+"""Words for columns in seven European languages, with the role of each word."""
 
 import re
 import unicodedata
@@ -54,7 +54,7 @@ BY_TOKEN = {word: role for role, words in ROLES.items() for word in words.split(
 
 
 def tokens(name: str) -> tuple[str, ...]:
-    """Words of a name: small letters without accents; camelCase is taken apart.
+    """Words of a name: lower case without accents; camelCase is split.
 
     Examples
     --------
@@ -72,10 +72,10 @@ def tokens(name: str) -> tuple[str, ...]:
 
 
 def role_of(name: str) -> str | None:
-    """Role that a name without its unit stands for; None where it is no known word, or says two things.
+    """Role denoted by a name without its unit; None where it is unknown, or ambiguous.
 
-    A name has a role where one of its words has, and every other word is filler. `time stamp` and `start time` differ
-    in that only.
+    A name has a role if one of its words has, and all its other words are filler words. In `time stamp` the other word
+    is a filler, in `start time` it is not.
 
     Examples
     --------
@@ -117,7 +117,7 @@ def role_of(name: str) -> str | None:
 
 
 def source_of(name: str) -> str | None:
-    """`measured` or `simulation` where a column is called after where its values come from, and after nothing else.
+    """`measured` or `simulation` where a column's name states the source of its values and nothing else.
 
     Examples
     --------

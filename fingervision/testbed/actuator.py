@@ -8,7 +8,7 @@ from fingervision.testbed.reading import Reading
 
 @dataclass(frozen=True, slots=True)
 class StageLimits:
-    """What an actuator can do; nothing beyond is ever asked of it.
+    """Capabilities and accuracy of an actuator; no command exceeds these limits.
 
     Parameters
     ----------
@@ -40,35 +40,40 @@ class StageLimits:
 
 @dataclass(frozen=True, slots=True)
 class Alarm:
-    """Why an actuator refuses to move: its own code, and a sentence."""
+    """Reason why an actuator refuses to move: its own code, and a sentence."""
 
     code: str
     words: str
 
 
 class MoveCheck(Protocol):
-    """What an actuator can do, as far as its configuration tells: enough to check a plan away from the bed.
+    """Limits of an actuator as far as its configuration states them: enough to check a plan without the bed.
 
-    A kind of actuator whose `build` opens hardware gives one by `without_hardware(section, folder)`.
+    A kind of actuator whose `build` opens hardware provides it by `without_hardware(section, folder)`.
     """
 
     @property
     def limits(self) -> StageLimits:
-        """What it can do."""
+        """The limits of the actuator."""
         ...
 
     @property
     def has_steps(self) -> bool:
-        """Whether it keeps step data, so that `run_step` is possible and it goes only where they lead."""
+        """Whether the actuator keeps step data.
+
+        Then `run_step` is possible, and it can reach only the ends of steps.
+        """
         ...
 
     def check(self, from_mm: float, to_mm: float, speed_mm_s: float) -> None:
-        """Raise the sentence with which it would refuse to go from one position to another."""
+        """Raise an error if the actuator would refuse to go from one position to another."""
         ...
 
 
 class Actuator(MoveCheck, Protocol):
-    """A linear stage. Motions begin at once and end by themselves; `busy` says whether one is under way.
+    """A linear stage. An actuator whose motions begin at once and end by themselves.
+
+    `busy` tells whether one is under way.
 
     Every method raises `FingervisionError` with a sentence if the connection is lost or the motion was refused (beyond
     the limits, alarm, still busy); a refused motion has not begun.
@@ -76,7 +81,7 @@ class Actuator(MoveCheck, Protocol):
 
     @property
     def name(self) -> str:
-        """What it is, for run.json: kind, port, firmware."""
+        """Name for run.json: kind, port, firmware."""
         ...
 
     @property
@@ -86,11 +91,11 @@ class Actuator(MoveCheck, Protocol):
 
     @property
     def alarm(self) -> Alarm | None:
-        """Why it refuses to move; None if it does not."""
+        """Reason why the actuator refuses to move; None if it does not."""
         ...
 
     def home(self) -> None:
-        """Go to the reference and make it position 0."""
+        """Go to the reference and define it as position 0."""
         ...
 
     def move(self, to_mm: float, speed_mm_s: float) -> None:
@@ -106,13 +111,13 @@ class Actuator(MoveCheck, Protocol):
         ...
 
     def stop(self) -> None:
-        """Stop at once, from any thread, whatever else is under way; never raises while the connection stands."""
+        """Stop at once, from any thread, whatever command is under way; never raises while the connection lasts."""
         ...
 
     def readings(self) -> tuple[Reading, ...]:
-        """Positions in mm since the last call, oldest first, the newest as of now: at least one."""
+        """Positions in mm since the last call, oldest first, the newest read now; at least one."""
         ...
 
     def close(self) -> None:
-        """Stop and let go of the hardware; closing twice is allowed."""
+        """Stop and release the hardware; closing twice is allowed."""
         ...

@@ -1,4 +1,4 @@
-"""The bed: its parts, put together."""
+"""The test bed: actuator, force sensor, camera and clock of one experiment."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -16,7 +16,7 @@ from fingervision.testbed.operators.operator import Operator
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Bed:
-    """One experiment's parts; any may be real while the rest is simulated.
+    """The parts of one experiment; any of them may be real while the rest is simulated.
 
     Parameters
     ----------
@@ -57,7 +57,7 @@ class Bed:
     about: Mapping[str, Any] = field(default_factory=dict)
 
     def close(self) -> None:
-        """Stop the motor first, then let go of everything."""
+        """Stop the motor first, then release all hardware."""
         self.actuator.close()
         if self.force_sensor is not None:
             self.force_sensor.close()

@@ -44,7 +44,7 @@ def open_bed(
     seed: int | None = None,
     earlier_s: tuple[float, float] | None = None,
 ) -> Bed:
-    """Put a bed together.
+    """Build a bed and open its parts.
 
     Parameters
     ----------
@@ -62,7 +62,7 @@ def open_bed(
 
     Raises
     ------
-    FingervisionError
+    DataError, InputFileError, UsageError
         The configuration makes no sense, or a part cannot be opened; what was open by then is closed.
     """
     top = read_configuration(name)
@@ -144,11 +144,11 @@ def _built(
 
 
 def read_configuration(name: str) -> Section:
-    """Read what a bed is made of, without opening anything.
+    """Read the configuration of a bed, without opening anything.
 
     Raises
     ------
-    FingervisionError
+    DataError, InputFileError, UsageError
         There is no such file, or it is no bed's.
     """
     if name == SIMULATED:
@@ -183,7 +183,7 @@ def stated_limits(section: Section) -> SoftLimits:
 
 
 def limits_within(limits: SoftLimits, able: StageLimits, section: Section) -> SoftLimits:
-    """Limit the bed further to what its actuator can do."""
+    """Narrow the bed's limits to those of its actuator."""
     within = limits.within(able)
     if not within.lower_mm < within.upper_mm:
         section.refuse(
@@ -194,7 +194,7 @@ def limits_within(limits: SoftLimits, able: StageLimits, section: Section) -> So
 
 
 def stated_scale(section: Section, folder: Path) -> Scale | None:
-    """Read the camera's scale that a configuration states; None where it states none."""
+    """Read the camera's scale from a configuration; None where it states none."""
     section.only(("px_per_mm", "calibration"))
     if "calibration" in section.values:
         return read_calibration(folder / section.word("calibration"))
@@ -204,7 +204,7 @@ def stated_scale(section: Section, folder: Path) -> Scale | None:
 
 
 def gripper_model(section: Section, folder: Path) -> Model:
-    """Read the gripper that simulated parts push and see, and that limits of gap and force are foretold by."""
+    """Read the gripper that simulated parts use, and from which limits of gap and force are predicted."""
     section.only(("file", "columns", "kind", "large_rotation", "contact"))
     if "file" in section.values:
         path = folder / section.word("file")

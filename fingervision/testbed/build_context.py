@@ -1,4 +1,4 @@
-"""What the builders of a bed's devices share while the bed is built."""
+"""Information shared by the builders of a bed's devices while the bed is built."""
 
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -13,7 +13,7 @@ from fingervision.testbed.simulation.injected_effects import Hidden
 
 @dataclass(slots=True)
 class BuildContext:
-    """The bed while it is being put together: actuator first, then gripper, force sensor and camera.
+    """The bed under construction: actuator first, then gripper, force sensor and camera.
 
     Parameters
     ----------

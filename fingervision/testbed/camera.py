@@ -1,4 +1,4 @@
-"""Protocol of a bed's camera: frames, each with the time at which it was exposed."""
+"""Protocol of a bed's camera: frames, each with the time of its exposure."""
 
 from dataclasses import dataclass
 from typing import Protocol
@@ -8,11 +8,11 @@ from fingervision.frames.source import Description
 
 
 class Shot(Protocol):
-    """One frame as it came."""
+    """One frame as delivered by the camera."""
 
     @property
     def index(self) -> int:
-        """Place in the camera's stream, from 0 without holes."""
+        """Frame number in the camera's stream, from 0 without holes."""
         ...
 
     @property
@@ -22,17 +22,17 @@ class Shot(Protocol):
 
     @property
     def arrived_s(self) -> float:
-        """When the host had it, on the bed's clock."""
+        """Arrival time at the host, on the bed's clock."""
         ...
 
     def item(self) -> Frame | LostFrame:
-        """Give the picture; a simulated one is drawn when it is asked for. `time_s` is `device_s`."""
+        """Return the picture; a simulated one is drawn at this call. `time_s` is `device_s`."""
         ...
 
 
 @dataclass(frozen=True, slots=True)
 class Latency:
-    """What is known of the time from exposure to arrival: least value and its standard uncertainty.
+    """Latency from exposure to arrival: its least value, and that value's standard uncertainty.
 
     Parameters
     ----------
@@ -49,12 +49,12 @@ class BedCamera(Protocol):
 
     @property
     def description(self) -> Description:
-        """Description of its frames: size, rate, coding."""
+        """Description of the camera's frames: size, rate, coding."""
         ...
 
     @property
     def latency(self) -> Latency:
-        """From exposure to arrival, as far as it is known."""
+        """Latency from exposure to arrival, as far as it is known."""
         ...
 
     def next(self) -> Shot:
@@ -62,11 +62,11 @@ class BedCamera(Protocol):
 
         Raises
         ------
-        FingervisionError
+        DeviceError
             The camera is stale: no frame came within its patience; or it was cut off.
         """
         ...
 
     def close(self) -> None:
-        """Let go of the camera; closing twice is allowed."""
+        """Release the camera; closing twice is allowed."""
         ...

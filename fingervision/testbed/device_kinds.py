@@ -1,4 +1,4 @@
-"""The kinds of devices that there are: modules of three packages, plug-ins of other distributions, and files."""
+"""Kinds of devices: modules of three packages, plug-ins of other distributions, and files."""
 
 import importlib
 import pkgutil
@@ -25,8 +25,8 @@ FILE = ".py"
 class Kind(Protocol):
     """A module, or another object, that builds one kind of device.
 
-    `KEYS` are the keys that its section may have besides `kind`; `SIMULATED` says whether it needs no hardware, so that
-    a bed made of such devices alone runs in virtual time.
+    `KEYS` are the keys that its section may have besides `kind`. `SIMULATED` states that it needs no hardware, so that
+    a bed of such devices only runs in virtual time.
     """
 
     KEYS: tuple[str, ...]
@@ -38,7 +38,7 @@ class Kind(Protocol):
 
 
 class PluggedKind:
-    """A kind from outside the package: what it builds is looked at, and its faults become sentences.
+    """A kind from outside the package: the device that it builds is checked, and its faults become sentences.
 
     Parameters
     ----------
@@ -60,7 +60,7 @@ class PluggedKind:
 
         Raises
         ------
-        FingervisionError
+        PluginShapeError
             It could not be built, or lacks what its protocol asks for.
         """
         name = "" if str(self._entry.origin) == self._entry.name else f"{self._entry.name} of "
@@ -79,7 +79,7 @@ def kinds(part: str) -> tuple[str, ...]:
 
 
 def kind_of(part: str, section: Section) -> Kind:
-    """Find what builds a device as its section says, and refuse keys that it does not know.
+    """Find the kind that a section names, and refuse keys that this kind does not know.
 
     Raises
     ------
@@ -114,7 +114,7 @@ def _registry(part: str) -> Registry[Kind]:
 
 
 def _held(part: str, held: object) -> dict[str, Kind]:
-    """Give what builds the device: the module or object itself, or what it holds as ACTUATOR, CAMERA, FORCE_SENSOR."""
+    """Return what builds the device: the module or object itself, or its ACTUATOR, CAMERA or FORCE_SENSOR."""
     held = getattr(held, part.upper(), held)
     lacks = [name for name in ("KEYS", "SIMULATED") if not hasattr(held, name)]
     lacks += [] if callable(getattr(held, "build", None)) else ["build"]

@@ -18,13 +18,13 @@ class ForceSensor(Protocol):
 
     @property
     def full_scale_n(self) -> float:
-        """Largest force that it can measure."""
+        """Largest force that the sensor can measure (N)."""
         ...
 
     def readings(self) -> tuple[Reading, ...]:
-        """Forces in newton since the last call, oldest first, the newest as of now: at least one."""
+        """Forces in newtons since the last call, oldest first, the newest read now; at least one."""
         ...
 
     def close(self) -> None:
-        """Let go of the hardware; closing twice is allowed."""
+        """Release the hardware; closing twice is allowed."""
         ...

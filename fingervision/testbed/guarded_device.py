@@ -1,4 +1,4 @@
-"""A device from outside the package: looked at once it is built, and whatever it raises is said by its name."""
+"""Wrapper for a device from outside the package: it is checked after it is built, and its errors name it."""
 
 from collections.abc import Callable
 from contextlib import suppress
@@ -31,7 +31,7 @@ def guarded(build: Callable[[], Any], protocol: type, who: str, origin: Origin) 
 
     Raises
     ------
-    FingervisionError
+    PluginShapeError
         It could not be built, or is not what the protocol asks for; it is closed then.
     """
     try:

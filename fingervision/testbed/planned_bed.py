@@ -1,4 +1,4 @@
-"""A bed as the check of a recipe needs it: limits, model, camera and possible moves. No port or camera is opened."""
+"""A bed as needed for checking a recipe: limits, model, camera and possible motions. No port or camera is opened."""
 
 from dataclasses import dataclass
 
@@ -24,7 +24,7 @@ CAMERA_PX, CAMERA_HZ = (640, 480), 25.0
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PlannedBed:
-    """What a recipe is checked against.
+    """The bed against which a recipe is checked.
 
     Parameters
     ----------
@@ -54,7 +54,7 @@ class PlannedBed:
 
     @property
     def view_mm(self) -> float:
-        """Width of what the camera sees; without end where its scale is not known."""
+        """Width of the camera's view (mm); infinite where its scale is unknown."""
         return float("inf") if self.px_per_mm is None else self.size_px[0] / self.px_per_mm
 
 
@@ -68,7 +68,7 @@ def planned_bed(name: str) -> PlannedBed:
 
     Raises
     ------
-    FingervisionError
+    DataError, InputFileError, UsageError
         The configuration makes no sense, or its kind of actuator says nothing about itself without its hardware.
     """
     top = read_configuration(name)

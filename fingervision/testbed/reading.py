@@ -1,11 +1,11 @@
-"""One reading of an instrument: its value, its own clock's time, and two bounds in the host's time."""
+"""One reading of an instrument: its value, its time on the instrument's clock, and two bounds in host time."""
 
 from dataclasses import dataclass
 
 
 @dataclass(frozen=True, slots=True)
 class Reading:
-    """What an instrument said when it was asked.
+    """The answer of an instrument to one request.
 
     Parameters
     ----------

@@ -15,8 +15,8 @@ LOOK_EVERY_S = 0.2
 class Terminal:
     """Keyboard and screen of the person at the bed.
 
-    Two readers of one keyboard would take each other's lines; here a line is an answer if a question stands, and a
-    letter of its own otherwise.
+    Two readers of one keyboard would take each other's lines. Here a line is an answer if a question was asked, and a
+    single letter otherwise.
 
     Parameters
     ----------
@@ -37,7 +37,7 @@ class Terminal:
 
         Raises
         ------
-        FingervisionError
+        StateError
             The run was stopped while the question stood.
         """
         # Before the words are seen: an answer may come at once.
@@ -61,7 +61,7 @@ class Terminal:
 
     @contextmanager
     def listening(self, unasked: Callable[[str], None], ended: Callable[[], bool]) -> Iterator[None]:
-        """Take letters too, if somebody is at the keyboard.
+        """Receive single letters too, if a person is at the keyboard.
 
         Parameters
         ----------

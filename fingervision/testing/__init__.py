@@ -1,4 +1,4 @@
-"""The contract tests that every part passes, for authors of plug-ins: the package's own parts pass the same.
+"""The contract tests that every part passes, for authors of plug-ins: the package's own parts pass the same tests.
 
 Derive a class whose name begins with `Test`, say what is to be tested, and run pytest; each method is one test, and a
 failure is a sentence that says what the part must do and what it does::
@@ -21,8 +21,8 @@ failure is a sentence that says what the part must do and what it does::
 | camera | `CameraContract` | `open_bed()`: a bed that has it |
 
 A bed is most easily opened from its file: `open_bed = lambda self: fingervision.testing.bed_at("bed.toml")`. Nothing
-here imports pytest; without it, `run(EffectContract, effect=EFFECT)` runs all tests and gives the sentences of those
-that fail. `diagnosed(effect, values)` hides an effect in made-up data, diagnoses them, and gives the report.
+here imports pytest. Without it, `run(EffectContract, effect=EFFECT)` runs all tests and returns a sentence for each one
+that fails. `diagnosed(effect, values)` simulates data with an effect, diagnoses them, and returns the report.
 """
 
 from fingervision.testing.bed_contract import ActuatorContract, CameraContract, ForceSensorContract, bed_at

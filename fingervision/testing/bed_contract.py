@@ -1,4 +1,4 @@
-"""Contract tests of actuators, force sensors and cameras, run through a bed that has them."""
+"""Contract tests of actuators, force sensors and cameras, run through a test bed that contains them."""
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -25,22 +25,22 @@ encoder_step_mm, repeatability_mm and settling_s."""
 
 
 def bed_at(path: str | Path) -> Bed:
-    """Open the bed that a file describes; in it, `kind` may be a plug-in's name or a file."""
+    """Open the bed that a file describes; its `kind` entries may name a plug-in or a file."""
     return bed_factory.open_bed(str(path))
 
 
 class _BedContract:
-    """Tests of a part through its bed: give `open_bed`, or an open bed by `of`."""
+    """Tests of a part through its bed; define `open_bed`, or pass an open bed with `of`."""
 
     _open: Bed | None = None
 
     def open_bed(self) -> Bed:
-        """Open a bed that has the part; its contract overrides this."""
+        """Open a bed that contains the part; the subclass defines this."""
         raise NotImplementedError
 
     @classmethod
     def of(cls, bed: Bed) -> Self:
-        """Test the parts of a bed that is open, and stays so."""
+        """Return tests of a bed that is already open, which stays open afterwards."""
         contract = cls()
         contract._open = bed
         return contract
@@ -56,20 +56,21 @@ class _BedContract:
 
 
 class ActuatorContract(_BedContract):
-    """Tests of an actuator; give `open_bed()`.
+    """Tests of an actuator; define `open_bed()`.
 
-    The motor moves by up to a millimetre, and once towards 5 mm until it is stopped: see that nothing is in its way.
-    How exactly it must do so is what its `limits` declare. One that declares nothing must stand within a nanometre, and
-    take the time of its way within two readings (20 ms); see `StageLimits` for accuracy_mm, encoder_step_mm,
-    repeatability_mm (readings at rest, and the reference) and settling_s (ramps and coming to rest).
+    The motor moves by up to a millimetre, and once towards 5 mm until it is stopped: make sure that nothing is in its
+    way. The tolerances follow from what the actuator's `limits` declare. An actuator that declares nothing must stop
+    within a nanometre of its target, and the motion must take its nominal time within two readings (20 ms); see
+    `StageLimits` for accuracy_mm, encoder_step_mm, repeatability_mm (readings at rest, and the reference) and
+    settling_s (ramps and coming to rest).
 
-    `has_motor` is False for what moves otherwise than at the speed that it is told, such as a screw turned by hand.
+    `has_motor` is False for an actuator that does not move at a commanded speed, such as a screw turned by hand.
     """
 
     has_motor = True
 
     def test_it_goes_where_it_is_sent(self) -> None:
-        """It comes to a stand within its accuracy and its encoder's step."""
+        """The stage stops within its accuracy, plus one encoder step, of its target."""
         with self._bed() as bed:
             for share in (0.5, -0.2, 0.0):
                 to_mm = _place_mm(bed, share)
@@ -82,7 +83,7 @@ class ActuatorContract(_BedContract):
                 )
 
     def test_a_motion_takes_the_time_that_its_speed_says(self) -> None:
-        """Within the accuracy at either end, by its own clock."""
+        """The duration of a motion agrees with its speed within the accuracy at either end, by the actuator's clock."""
         self._needs_motor()
         with self._bed() as bed:
             before = bed.actuator.readings()[-1:]
@@ -110,7 +111,7 @@ class ActuatorContract(_BedContract):
             )
 
     def test_a_jog_ends_with_a_stop(self) -> None:
-        """A jog goes on at its speed until stopped, and then the stage stands."""
+        """A jog runs at its speed until it is stopped, and then the stage stands still."""
         self._needs_motor()
         with self._bed() as bed:
             before = bed.actuator.readings()[-1:]
@@ -144,13 +145,13 @@ class ActuatorContract(_BedContract):
             )
 
     def test_readings_come_in_order_and_between_question_and_answer(self) -> None:
-        """Each call gives the newest as of now, with bounds in the bed's time."""
+        """Each call returns readings up to the present, in order, with time bounds on the bed's clock."""
         with self._bed() as bed:
             bed.actuator.move(_place_mm(bed, 0.5), _speed_mm_s(bed, 1.0))
             _check_order(bed, bed.actuator.readings, bed.actuator.name)
 
     def test_beyond_its_limits_nothing_moves(self) -> None:
-        """A place or speed beyond the limits is refused with a sentence, and the stage stands."""
+        """A target or speed beyond the limits is refused with a sentence, and the stage stands still."""
         with self._bed() as bed:
             limits, before_mm = bed.actuator.limits, bed.actuator.readings()[-1].value
             speed_mm_s = _speed_mm_s(bed, 1.0)
@@ -169,7 +170,7 @@ class ActuatorContract(_BedContract):
             )
 
     def test_a_busy_actuator_refuses_another_motion(self) -> None:
-        """A motion under way is stopped before another begins."""
+        """A second motion is refused while one is under way; after a stop the next one is accepted."""
         self._needs_motor()
         with self._bed() as bed:
             bed.actuator.move(_place_mm(bed, FAR_MM), _speed_mm_s(bed, SLOW_MM_S))
@@ -177,7 +178,7 @@ class ActuatorContract(_BedContract):
             bed.actuator.stop()
 
     def test_closing_twice_is_allowed(self) -> None:
-        """The second time does nothing."""
+        """Closing twice is allowed: the second time does nothing."""
         with self._bed() as bed:
             bed.close()
             bed.close()
@@ -188,10 +189,10 @@ class ActuatorContract(_BedContract):
 
 
 class ForceSensorContract(_BedContract):
-    """Tests of a force sensor; give `open_bed()`."""
+    """Tests of a force sensor; define `open_bed()`."""
 
     def test_forces_come_in_order_and_within_the_full_scale(self) -> None:
-        """Each call gives the newest as of now; no force is beyond the full scale."""
+        """Each call returns forces up to the present, in order; no force is beyond the full scale."""
         with self._bed() as bed:
             sensor = bed.force_sensor
             if sensor is None:
@@ -205,10 +206,10 @@ class ForceSensorContract(_BedContract):
 
 
 class CameraContract(_BedContract):
-    """Tests of a camera; give `open_bed()`."""
+    """Tests of a camera; define `open_bed()`."""
 
     def test_frames_come_in_order_after_their_exposure(self) -> None:
-        """Indices without holes, rising times, and pictures as described."""
+        """Frame numbers have no holes, times rise, and pictures are as the camera describes them."""
         with self._bed() as bed:
             camera = bed.camera
             if camera is None:
@@ -239,7 +240,7 @@ class CameraContract(_BedContract):
 
 
 def _place_mm(bed: Bed, by_mm: float) -> float:
-    """A place so far from 0, within the limits of the bed."""
+    """The position `by_mm` from 0, brought within the limits of the bed (mm)."""
     low, high = bed.limits.lower_mm, bed.limits.upper_mm
     middle = min(max(0.0, low), high)
     return min(max(middle + by_mm, low), high)
@@ -255,14 +256,14 @@ def _near_mm(bed: Bed) -> float:
 
 
 def _still_mm(bed: Bed) -> float:
-    """How far two readings at rest may be apart, and a reading at the reference from 0."""
+    """Allowed difference of two readings at rest, and of a reading at the reference from 0 (mm)."""
     return bed.actuator.limits.repeatability_mm + ROUNDING_MM
 
 
 def _known_mm(bed: Bed, speed_mm_s: float) -> float:
-    """How well readings tell the way of a motion: by the encoder's steps, by what they stray, and by their times.
+    """Uncertainty of a motion's length from readings: encoder steps, scatter, and uncertain times (mm).
 
-    Two readings bound its beginning and its end; ramps and coming to rest add what the stage declares.
+    The beginning and the end of a motion lie between two readings each; ramps and settling add what the stage declares.
     """
     limits = bed.actuator.limits
     return limits.encoder_step_mm + 2.0 * limits.repeatability_mm + (2.0 * WAIT_S + limits.settling_s) * speed_mm_s
@@ -273,7 +274,7 @@ def _wait(bed: Bed, seconds: float) -> None:
 
 
 def _until_rest(bed: Bed) -> tuple[Reading, ...]:
-    """Readings up to the end of the motion, the last of them at rest."""
+    """Readings up to the end of the motion; the last of them is at rest."""
     until_s = bed.clock.now_s() + PATIENCE_S
     seen: list[Reading] = []
     while bed.actuator.busy:
@@ -286,7 +287,7 @@ def _until_rest(bed: Bed) -> tuple[Reading, ...]:
 
 
 def _watched(bed: Bed, seconds: float) -> tuple[Reading, ...]:
-    """Readings during some time: what does not stream is asked often."""
+    """Readings during some seconds; an actuator that does not stream is asked often."""
     seen: list[Reading] = []
     until_s = bed.clock.now_s() + seconds
     while bed.clock.now_s() < until_s:
@@ -296,7 +297,7 @@ def _watched(bed: Bed, seconds: float) -> tuple[Reading, ...]:
 
 
 def _moved_s(readings: tuple[Reading, ...], still_mm: float) -> float:
-    """How long it moved, by the actuator's own clock: a busy machine looks late, but the readings bear their times."""
+    """Duration of the motion by the actuator's own clock, which a slow computer does not change (seconds)."""
     first, last = readings[0].value, readings[-1].value
     began_s = max(each.device_s for each in readings if abs(each.value - first) <= still_mm)
     ended_s = min(each.device_s for each in readings if abs(each.value - last) <= still_mm)
@@ -306,7 +307,10 @@ def _moved_s(readings: tuple[Reading, ...], still_mm: float) -> float:
 def _check_order(
     bed: Bed, readings: Callable[[], tuple[Reading, ...]], name: str, *, asked: bool = True
 ) -> list[Reading]:
-    """Look at some readings; `asked`: the newest is taken when it is asked for, not streamed before."""
+    """Check the order of readings.
+
+    With `asked` the newest reading is taken at the request; otherwise it was streamed before.
+    """
     seen: list[Reading] = []
     for _ in range(5):
         _wait(bed, 0.04)

@@ -1,19 +1,19 @@
-"""Common parts of the contracts: a failure is a sentence; a test that does not apply to a part says so."""
+"""Common parts of the contracts: a failure is reported as a sentence; a test may declare that it does not apply."""
 
 from typing import Any
 from unittest import SkipTest
 
 
 class ContractError(AssertionError):
-    """A part does not keep its contract: the sentence says what it must do, and what it does."""
+    """A part breaks its contract; the sentence says what it must do, and what it does."""
 
 
 class NotApplicable(SkipTest):
-    """A test that does not concern this part, with the reason."""
+    """The test does not apply to the part, for the stated reason."""
 
 
 def hold(kept: bool, sentence: str) -> None:
-    """Raise the sentence unless the contract is kept."""
+    """Raise a ContractError with the sentence unless the condition is true."""
     if not kept:
         raise ContractError(sentence)
 

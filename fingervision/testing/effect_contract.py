@@ -1,4 +1,4 @@
-"""Contract tests of effects: neutral at zero, at rest at the start, symmetric, with stated needs and finite answers."""
+"""Contract tests of effects: neutral at zero, at rest at the start, symmetric, with finite results."""
 
 from dataclasses import replace
 
@@ -24,7 +24,7 @@ MODEL = TableModel("straight", INPUT_MM, -0.5 * GAP_MM, 0.5 * GAP_MM, 2.0 * INPU
 
 
 def bench() -> History:
-    """Give two runs, each there, held, and back; the second at half the speed."""
+    """Sample data of two runs, each out, held, and back; the second at half the speed."""
     up = np.linspace(-0.4, 1.4, 120)
     run = np.concatenate([up, np.full(40, 1.4), up[::-1]])
     return History(
@@ -41,7 +41,7 @@ def bench() -> History:
 
 
 def neutral_values(effect: Effect, history: History) -> dict[str, float]:
-    """Values at which the effect must change nothing: the neutral ones; where none is stated, shapes as they start."""
+    """Parameter values at which the effect must change nothing: its neutral ones, or else the starting ones."""
     return {
         p.name: 0.0 if p.run is not None else float(p.starting_values()[0]) if p.neutral is None else p.neutral
         for p in _searched(effect, history)
@@ -49,7 +49,7 @@ def neutral_values(effect: Effect, history: History) -> dict[str, float]:
 
 
 def usual_values(effect: Effect, history: History) -> dict[str, float]:
-    """Values at which the effect must show: three tenths of the way to the upper bound, or half-way down from it."""
+    """Values at which the effect must be visible: three tenths of the way to the upper bound, or half-way below it."""
     out = {}
     for p in _searched(effect, history):
         if p.run is not None:
@@ -69,14 +69,14 @@ class EffectContract:
     effect: Effect
 
     def test_it_states_what_it_is(self) -> None:
-        """Name, stage, words, formula, source, residual and parameters are there, and it answers on a trial."""
+        """Name, stage, words, formula, source, residual and parameters are declared, and a trial response is valid."""
         try:
             try_effect(self.effect)
         except MisfitError as error:
             hold(False, f"The effect {getattr(self.effect, 'name', self.effect)} {error}.")
 
     def test_neutral_parameters_change_nothing(self) -> None:
-        """At its neutral values, or with all of them 0, left and right are those of the model."""
+        """At its neutral values, or with all of them 0, the positions of both fingers are those of the model."""
         bare = self._chain().respond({})
         moved_mm = []
         neutral = neutral_values(self.effect, bench())
@@ -106,7 +106,7 @@ class EffectContract:
         )
 
     def test_it_answers_at_its_bounds(self) -> None:
-        """At either bound of every parameter, the others as usual, the answer is finite and of the shape given."""
+        """With each parameter at either bound and the others as usual, the response is finite."""
         usual = usual_values(self.effect, bench())
         for p in _searched(self.effect, bench()):
             for bound in (p.lower, p.upper):
@@ -128,7 +128,7 @@ class EffectContract:
         )
 
     def test_memory_starts_each_run_at_rest(self) -> None:
-        """What remembers the past has none at the first sample of a run."""
+        """An effect with memory has none at the first sample of a run."""
         if not self.effect.memory:
             raise NotApplicable(f"{self.effect.name} has no memory")
         bare = self._chain().respond({})
@@ -142,7 +142,7 @@ class EffectContract:
             )
 
     def test_a_mirrored_picture_mirrors_the_answer(self) -> None:
-        """Left and right change places and signs, once the parameters stated as odd have changed theirs."""
+        """In a mirrored picture, left and right exchange and change sign; parameters declared as odd change sign."""
         values = usual_values(self.effect, bench())
         seen = self._chain().respond({self.effect.name: values})
         values |= {name: -values[name] for name in self.effect.odd}
@@ -158,7 +158,7 @@ class EffectContract:
         )
 
     def test_without_the_data_that_it_needs_it_is_excluded(self) -> None:
-        """A table without times, edges, force or a shared clock excludes it with the reason."""
+        """A table without the times, edges, force or shared clock that an effect needs excludes it, with the reason."""
         needs = (
             (self.effect.needs_times, replace(bench(), time_s=None), "times"),
             (self.effect.needs_shared_clock, replace(bench(), shared_clock=False), "a shared clock"),
@@ -173,7 +173,7 @@ class EffectContract:
             )
 
     def test_without_times_it_works_unless_it_says_that_it_needs_them(self) -> None:
-        """An effect that reads times states `needs_times`."""
+        """An effect that reads times declares `needs_times`."""
         if self.effect.needs_times or self.effect.needs_shared_clock:
             raise NotApplicable(f"{self.effect.name} says that it needs times")
         chain = MeasuringChain(MODEL, replace(bench(), time_s=None), {}, MIDLINE_MM)
@@ -185,7 +185,7 @@ class EffectContract:
             hold(False, f"The effect {self.effect.name} must state needs_times, as it reads times ({error}).")
 
     def test_along_curves_a_sine_is_late_as_a_whole(self) -> None:
-        """A delay that knows curves between the samples delays a sine better than straight lines do."""
+        """A delay that interpolates along curves delays a sine more exactly than one along straight lines."""
         if not (isinstance(self.effect, DriveEffect | PointEffect) and self.effect.act_curved is not None):
             raise NotApplicable(f"{self.effect.name} makes no difference between curves and lines")
         time_s = np.arange(0.0, 20.0, 0.2)
@@ -212,7 +212,7 @@ class EffectContract:
 
 
 class _ChainOf:
-    """A measuring chain in which one effect may act, whether the catalogue has it or not."""
+    """A measuring chain in which one given effect acts, whether it is in the catalogue or not."""
 
     def __init__(self, effect: Effect, chain: MeasuringChain) -> None:
         assert isinstance(effect, DriveEffect | PointEffect)  # noqa: S101 - as its contract says

@@ -1,4 +1,4 @@
-"""Simulate data with an effect and diagnose them: every effect must be found again."""
+"""Simulate data with an effect and diagnose them: the diagnosis must find the effect again."""
 
 from collections.abc import Mapping
 
@@ -24,7 +24,7 @@ the middle (at the golden section), where the only value that is tried by defaul
 
 
 def made_up_history() -> History:
-    """Give the motion of the made-up data: two runs there and back, 400 samples in 16 s."""
+    """Motion of the simulated data: two runs out and back, 400 samples in 16 s."""
     up = np.linspace(-0.45, 1.45, 100)
     run = np.concatenate([up, up[::-1]])
     u = np.concatenate([run, run])
@@ -34,7 +34,7 @@ def made_up_history() -> History:
 
 
 def diagnosed(name: str, values: Mapping[str, float], *, seed: int = 1) -> DiagnosisReport:
-    """Hide an effect of the catalogue in two runs there and back, with noise, and diagnose them.
+    """Simulate two noisy runs out and back with an effect of the catalogue, and diagnose them.
 
     Parameters
     ----------
@@ -60,7 +60,7 @@ def diagnosed(name: str, values: Mapping[str, float], *, seed: int = 1) -> Diagn
 
 
 def hidden_values(effect: Effect, history: History) -> dict[str, float]:
-    """Values under which the effect is hidden, away from where a search begins.
+    """Parameter values for the hidden effect, chosen away from where a search starts.
 
     Raises
     ------
@@ -84,16 +84,18 @@ def _hidden(parameter: Parameter) -> float:
 
 
 class HiddenEffectContract:
-    """Test that the diagnosis finds an effect again; give it as `effect`, and where you know better, its `values`.
+    """Test that the diagnosis finds an effect again.
 
-    It takes some seconds: the whole diagnosis runs.
+    Give it as `effect`, and its `values` where the defaults do not suit it.
+
+    It takes some seconds, because the whole diagnosis runs.
     """
 
     effect: Effect
     values: Mapping[str, float] | None = None
 
     def test_the_diagnosis_finds_it_again(self) -> None:
-        """Hidden in two runs with ordinary noise, it is the answer, or one of those that cannot be told apart."""
+        """Hidden in two runs with ordinary noise, the effect is named, alone or with indistinguishable ones."""
         effect = self.effect
         values = hidden_values(effect, made_up_history()) if self.values is None else dict(self.values)
         with added([] if effect.name in catalogue() else [effect]):

@@ -1,4 +1,4 @@
-"""Contract tests of models of a drawn gripper."""
+"""Contract tests of models of a gripper that is given by its drawing."""
 
 import numpy as np
 
@@ -13,7 +13,7 @@ RELATIVE = 1e-6
 
 
 class ModelContract:
-    """Tests of one kind of model, on the drawing of the paper's sample; give it as `kind`."""
+    """Tests of one kind of model, on the drawing of the published gripper; give the class as `kind`."""
 
     kind: Kind
 
@@ -27,7 +27,7 @@ class ModelContract:
         hold(name == self.kind.KIND, f"The model must be named {self.kind.KIND}, as its KIND, but is named {name}.")
 
     def test_its_gap_at_input_zero_is_the_rest_gap(self) -> None:
-        """The answer at 0 is `rest_gap_mm`, and 0 lies in the range of inputs."""
+        """The gap at input 0 is `rest_gap_mm`, and 0 lies in the range of inputs."""
         model = self.model()
         low, high = model.input_range_mm
         hold(low < 0.0 < high, f"The inputs of {self.kind.KIND} must reach from below 0 to above, but are {low, high}.")
@@ -38,7 +38,7 @@ class ModelContract:
         )
 
     def test_the_gap_opens_with_the_input_and_both_fingers_alike(self) -> None:
-        """A symmetric drawing opens symmetrically, the more the farther it is driven."""
+        """A symmetric drawing opens symmetrically, and farther for a larger input."""
         model = self.model()
         low, high = model.input_range_mm
         answer = model.respond(np.linspace(low, high, 7))
@@ -50,7 +50,7 @@ class ModelContract:
         )
 
     def test_its_figures_are_those_of_its_answer(self) -> None:
-        """Gap per input and stiffness are the slopes of the answer."""
+        """Gap per input and stiffness agree with the slopes of the model's response."""
         model, figures = self.model(), self.model().figures()
         low, high = model.input_range_mm
         answer = model.respond(np.array([low, 0.0, 0.5 * high]))

@@ -1,8 +1,9 @@
-"""Fit the edges again after subtracting a shadow or glare beside them from each line.
+"""Fit the edges again after the shadow or glare beside them has been subtracted from each line.
 
-What the mean profile of the flanks has told (breadth, size, blur) holds all around a finger, at the same distance from
-its edge. On a slanted line it is stretched as the edge is. Taking it off and fitting the step again leaves no line with
-a window that holds more of it than another one's.
+The mean profile of the flanks gives breadth, size and blur of the shadow or glare, which hold all around a finger at
+the same distance from its edge. On a slanted line the shadow or glare is stretched in the same ratio as the edge. After
+subtraction and a new fit of the step, every line is free of the disturbance, however much of it lay within the line's
+window.
 """
 
 from dataclasses import replace
@@ -33,7 +34,7 @@ _take_off = loop("beside_edge_without")
 def without_additions(
     upright: GreyImage, edges: EdgePoints, light: Floats, kind: int, fits: list[ProfileFit]
 ) -> EdgePoints:
-    """The edges of both fingers, each without the addition that its own mean profile shows.
+    """Return the edges of both fingers, fitted without the shadow or glare that each mean profile shows.
 
     Parameters
     ----------
@@ -44,7 +45,7 @@ def without_additions(
     light : ndarray of float, shape (levels,)
         Light of every grey level.
     kind : int
-        What it is: SHADOW or GLARE.
+        What it is: SHADOW, FADING or GLARE.
     fits : list of ProfileFit
         The mean profile of the left and of the right finger.
     """

@@ -1,4 +1,7 @@
-"""Step 3, black and white: which pixels are dark. The binary image finds; it measures nothing."""
+"""Step 3, thresholding: which pixels are dark. The binary image serves to find the fingers.
+
+Nothing is measured in it.
+"""
 
 from dataclasses import dataclass, replace
 
@@ -45,10 +48,11 @@ class Binary:
 
 
 def binarise(denoised: GreyImage, top_level: int | None = None) -> Binary:
-    """Split the picture in two by Otsu's threshold (IEEE Trans. SMC 9(1), 1979, 62-66).
+    """Split the picture into dark and light by Otsu's threshold (IEEE Trans. SMC 9(1), 1979, 62-66).
 
-    Every pixel has its say in the threshold, so that a picture which is turned, mirrored or shifted is split alike. One
-    histogram gives the threshold and how far the classes stand apart. No level lies above `top_level`, full scale.
+    Every pixel counts for the threshold, so that a turned, mirrored or shifted picture is split in the same way. One
+    histogram gives the threshold and the separation of the two classes. `top_level` is the full scale, which no level
+    exceeds.
     """
     histogram = _histogram(denoised, (full_scale(denoised) if top_level is None else top_level) + 1)
     threshold, contrast, separation = _otsu(histogram)
@@ -59,9 +63,10 @@ def binarise(denoised: GreyImage, top_level: int | None = None) -> Binary:
 
 
 def binarise_local(denoised: GreyImage) -> Binary:
-    """Split the picture against its own light, for light so uneven that no single threshold serves.
+    """Split the picture by its difference from the local mean, for light too uneven for one threshold.
 
-    The light is the mean over an eighth of the picture's longer side to every side; what is left is split as before.
+    The local mean extends an eighth of the picture's longer side in each direction; the difference is split by Otsu's
+    threshold.
     """
     side = max(denoised.shape) // 8
     light = cv2.blur(denoised.astype(np.float32), (2 * side + 1, 2 * side + 1), borderType=cv2.BORDER_REPLICATE)
@@ -71,13 +76,13 @@ def binarise_local(denoised: GreyImage) -> Binary:
 
 
 def split_at(denoised: GreyImage, otsu: Binary, threshold: int) -> Binary:
-    """The same picture split at another threshold, where Otsu's had a third tone on its wrong side."""
+    """Return the picture split at another threshold, where Otsu's put a third tone into the wrong class."""
     _, dark = cv2.threshold(denoised, threshold, 255, cv2.THRESH_BINARY_INV)
     return replace(otsu, dark=dark.astype(np.uint8, copy=False), threshold=threshold)
 
 
 def _histogram(grey: GreyImage, levels: int) -> NDArray[np.int64]:
-    """Pixels with each grey level."""
+    """Number of pixels with each grey level."""
     count = np.empty(levels, dtype=np.int64)
     _count(grey, count)
     return count

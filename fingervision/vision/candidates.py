@@ -1,4 +1,4 @@
-"""Where the fingers may be: in the darker or in the lighter class of a picture, split once or against its own light."""
+"""Candidates for the two fingers: in the darker or lighter class of a picture, by one threshold or by local mean."""
 
 from collections.abc import Iterator
 
@@ -33,7 +33,7 @@ REACH_BELOW_PX, REACH_BELOW_HEIGHTS = 45.0, 1.5
 def candidates(
     denoised: GreyImage, binary: Binary, settings: Settings
 ) -> Iterator[tuple[Binary, CoarseFingers | NoGap, bool]]:
-    """Where the fingers may be, the likeliest first: darker or lighter than the border, then against uneven light."""
+    """Candidate pairs of fingers, the likeliest first: darker or lighter than the border, then by the local mean."""
     directions = tuple(Direction) if settings.direction is None else (settings.direction,)
     clear = False
     for is_local in (False, True):
@@ -73,9 +73,9 @@ def candidates(
 def found(
     split: Binary, light_gap: bool, directions: tuple[Direction, ...], settings: Settings, *, has_parts: bool = True
 ) -> CoarseFingers | NoGap:
-    """The fingers in one class of a binary picture, also with a part between them.
+    """Fingers found in one class of a binary picture, also with a part between them.
 
-    A picture that is split against its local mean has hollow things in it, whose rooms are no room between fingers.
+    In a picture split by its local mean, objects have hollows, which are no gap between fingers.
     """
     below = settings.below_tip_px
     reach = below + max(REACH_BELOW_PX, REACH_BELOW_HEIGHTS * below)
@@ -100,7 +100,7 @@ def has_edges(denoised: GreyImage, split: Binary, contrast: float) -> bool:
 
 
 def _border_is_light(binary: Binary) -> bool:
-    """Whether most of the picture's border is ground of the light kind."""
+    """Whether most of the picture's border is light background."""
     dark = binary.dark
     border = (dark[0], dark[-1], dark[:, 0], dark[:, -1])
     return sum(int(np.count_nonzero(side)) for side in border) < 0.5 * sum(side.size for side in border)

@@ -1,8 +1,8 @@
-"""Ground between two straight sides: the room between the fingers, wherever a part between them leaves it open.
+"""Find the background channel between two straight sides: the space between the fingers, where no part fills it.
 
-Seen with the tips up, every row of a binary picture has runs of ground pixels between runs of finger or part pixels.
-Runs of ground in successive rows, with hardly any step between their ends, form a channel. A gripper that holds a part
-shows a channel above the part, a channel below it, or both, between the same two straight lines.
+With the tips up, each row of a binary picture has runs of background pixels between runs of finger or part pixels. Runs
+of background in successive rows, whose ends differ by hardly a pixel, form a channel. A gripper that holds a part shows
+a channel above the part, a channel below it, or both, between the same two straight lines.
 """
 
 from dataclasses import dataclass
@@ -40,7 +40,7 @@ _find_runs = loop("channels_runs")
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Channel:
-    """The room between two fingers: a line on either side, across = c + m along, at their last pixels.
+    """The space between two fingers: a straight line on either side, across = c + m along, through their last pixels.
 
     Parameters
     ----------
@@ -61,16 +61,16 @@ class Channel:
     rows: int
 
     def left(self, row: float) -> float:
-        """Last pixel of the left finger."""
+        """Last pixel of the left finger in a row."""
         return self.left_c + self.left_m * row
 
     def right(self, row: float) -> float:
-        """First pixel of the right finger."""
+        """First pixel of the right finger in a row."""
         return self.right_c + self.right_m * row
 
 
 def find_channel(upright: Mask, below_tip_px: float) -> Channel | None:
-    """The longest channel between two things that are alike in width, or None.
+    """Find the longest channel between two objects of similar width; None where there is none.
 
     Parameters
     ----------
@@ -113,7 +113,7 @@ def _is_same(channel: Channel, other: Channel) -> bool:
 
 
 def _straight(chain: Ints) -> Channel | None:
-    """Lines through the two sides of a chain of runs; None where they are not straight."""
+    """Straight lines through the two sides of a chain of runs; None where the sides are not straight."""
     row = chain[:, 0].astype(float)
     fitted = [_line(row, chain[:, side].astype(float)) for side in (1, 2)]
     if any(share < ON_LINE_SHARE or abs(m) > STEEPEST for _, m, share in fitted):
@@ -123,7 +123,7 @@ def _straight(chain: Ints) -> Channel | None:
 
 
 def _beside(upright: Mask, channel: Channel) -> tuple[Build, Build]:
-    """Breadth of what bounds a channel on its left and on its right."""
+    """Width of the objects to the left and to the right of a channel (pixels)."""
     sides = (channel.left_c, channel.left_m, channel.right_c, channel.right_m)
     widths = _beside_lines(upright, *sides, channel.first_row, channel.last_row)
     last = upright.shape[1] - 1
@@ -136,7 +136,7 @@ def _beside(upright: Mask, channel: Channel) -> tuple[Build, Build]:
 
 
 def _chains(upright: Mask, shortest: int) -> list[Ints]:
-    """Chains of runs: (row, last pixel on the left, first pixel on the right), at least so many rows each."""
+    """Chains of runs with at least `shortest` rows: (row, last pixel on the left, first pixel on the right)."""
     runs, previous, length, has_next = _runs(np.ascontiguousarray(upright))
     ends = np.flatnonzero(~has_next & (length >= shortest))
     ends = ends[np.argsort(-length[ends], kind="stable")][: 4 * MOST_CHANNELS]
@@ -150,7 +150,7 @@ def _chain(runs: Ints, previous: Ints, end: int, length: int) -> Ints:
 
 
 def _runs(upright: Mask) -> tuple[Ints, Ints, Ints, NDArray[np.bool_]]:
-    """All bounded runs of ground; the run below that each goes on from, its place in its chain, and which go on."""
+    """All runs of background between objects, linked into chains from row to row."""
     runs, has_next = np.empty((MOST_RUNS, 3), dtype=np.int64), np.empty(MOST_RUNS, dtype=np.bool_)
     previous, length = np.empty((2, MOST_RUNS), dtype=np.int64)
     count = _find_runs(upright, runs, previous, length, has_next)

@@ -1,8 +1,8 @@
 """A blurred disc in a picture: maximum-likelihood centre and diameter from all pixels about its outline.
 
-The light is `plane + (A + plane) S(r0 - r)`, with `S` the integral over the pixel of a Gaussian-blurred step across the
-outline. Blur moves the half-level of a curved edge to the inside by `sigma^2 / 2R` (to second order in sigma / R); the
-radius that is reported is that of the disc before the blur.
+The light level is `plane + (A + plane) S(r0 - r)`, with `S` the integral over the pixel of a Gaussian-blurred step
+across the outline. Blur moves the half-level of a curved edge to the inside by `sigma^2 / 2R` (to second order in sigma
+/ R); the radius that is reported is that of the disc before the blur.
 """
 
 from dataclasses import dataclass
@@ -134,7 +134,7 @@ def fit_circle(
 
 
 def _columns(x: Floats, y: Floats, p: Floats) -> tuple[Floats, Floats]:
-    """Linear columns, and changes of the unit step with x, y, radius and blur."""
+    """Linear columns of the fit, and derivatives of the unit step with respect to x, y, radius and blur."""
     dx, dy = x - p[0], y - p[1]
     r = np.maximum(np.hypot(dx, dy), 1e-9)
     cosine, sine = np.abs(dx) / r, np.abs(dy) / r

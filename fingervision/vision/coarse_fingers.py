@@ -1,4 +1,4 @@
-"""The two fingers of a picture, to a pixel."""
+"""The two fingers of a picture, located to one pixel."""
 
 from dataclasses import dataclass, field
 
@@ -14,7 +14,7 @@ NOTHING_HIDDEN: NDArray[np.int64] = np.empty(0, dtype=np.int64)
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CoarseFinger:
-    """A finger's outline to a pixel, in order from its inner side over the tip to its outer side.
+    """A finger's outline to one pixel, ordered from its inner side over the tip to its outer side.
 
     Parameters
     ----------
@@ -35,13 +35,13 @@ class CoarseFinger:
 
     @property
     def top_along_px(self) -> int:
-        """The outermost pixel along the fingers."""
+        """Coordinate of the outermost pixel along the fingers."""
         return self.top.along_px
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CoarseFingers:
-    """The two fingers, to a pixel.
+    """The two fingers, located to one pixel.
 
     Parameters
     ----------
@@ -69,10 +69,10 @@ class CoarseFingers:
 
     @property
     def is_joined(self) -> bool:
-        """Whether a base in view joins them."""
+        """Whether a common base of the two fingers is in view."""
         return self.left.top.outline is self.right.top.outline
 
 
 def is_hidden(finger: CoarseFinger, along: float) -> bool:
-    """Whether a part hides a finger's inner edge at a place along the fingers."""
+    """Whether a part hides a finger's inner edge at a height along the fingers."""
     return bool(finger.hidden.size) and bool(np.isin(round(along), finger.hidden))

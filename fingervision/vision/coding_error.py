@@ -1,9 +1,9 @@
-"""How far a codec may have displaced an edge as a whole, from the step of its quantiser.
+"""Displacement of a whole edge that a codec may have caused, estimated from its quantiser step.
 
-An edge that runs along a codec's blocks gets one error in all its rows, which the scatter of the rows about a line does
-not show; a block that is copied from an earlier picture is displaced as a whole, and nothing in the picture shows that
-either. What bounds the error is the quantiser: a coder corrects what is more than a part of its step. For an edge of
-contrast A the coefficients change by some A per pixel of displacement, so that the displacement is a fixed share of
+An edge along the codec's blocks gets one common error in all its rows, which the scatter of the rows about a line does
+not show. A block copied from an earlier picture is displaced as a whole, and nothing in the picture shows that either.
+The quantiser bounds this error: a coder corrects every difference larger than a fraction of its step. For an edge of
+contrast A the coefficients change by about A per pixel of displacement, so that the displacement is a fixed fraction of
 `step / A`.
 """
 
@@ -36,7 +36,7 @@ EIGHT_BITS = 255.0
 
 
 def displaced_px(step: float, contrast: float) -> float:
-    """Standard uncertainty of an edge's place for what a codec does to all of it alike (pixels).
+    """Standard uncertainty of an edge's position from a codec error common to the whole edge (pixels).
 
     Parameters
     ----------
@@ -51,7 +51,7 @@ def displaced_px(step: float, contrast: float) -> float:
 def with_coding_error(
     found: GapMeasurement, quantiser: Quantiser, inside: tuple[float, float], light: Floats, top_level: int
 ) -> GapMeasurement:
-    """The same measurement, less sure by what the codec may have done to either edge.
+    """Return the measurement with its uncertainty increased by what the codec may have done to either edge.
 
     Parameters
     ----------
@@ -78,7 +78,7 @@ def with_coding_error(
 
 
 def with_shared_shift(found: GapMeasurement, shared_px: float, coding: Coding) -> GapMeasurement:
-    """The same for a codec whose quantiser is not known.
+    """Return the measurement with its uncertainty increased, for a codec whose quantiser is not known.
 
     Parameters
     ----------

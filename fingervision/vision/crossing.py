@@ -1,7 +1,7 @@
-"""Something that lies across the fingers, a cable or a strap, and cuts their ends off in the binary picture.
+"""Detection of an object across the fingers, such as a cable, which hides their ends in the binary picture.
 
-What then looks like a tip is the edge of the thing that crosses. Beyond a tip there is ground, or something else; a
-piece of the same breadth that goes on in the same two lines is the finger itself.
+The apparent tip is then the edge of the crossing object. Beyond a true tip there is background or some other object; a
+piece of the same width that continues along the same two lines is the finger itself.
 """
 
 import numpy as np
@@ -28,7 +28,7 @@ _rows_beyond = loop("crossing_rows_beyond")
 
 
 def is_crossed(mask: NDArray[np.uint8], fingers: CoarseFingers, below_tip_px: float) -> bool:
-    """Whether either finger goes on beyond what was taken for its tip.
+    """Whether either finger continues beyond its apparent tip.
 
     Parameters
     ----------

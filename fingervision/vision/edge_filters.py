@@ -1,9 +1,9 @@
-"""The maximum-likelihood position of a blurred edge as linear filters, one for every blur and sub-pixel offset.
+"""Maximum-likelihood position of a blurred edge by linear filters, one for every blur and sub-pixel offset.
 
 Near a known offset the best estimates of an edge's shift, contrast and blur under white noise are linear in the grey
-levels: rows of the pseudo-inverse of the edge model (Kay, Estimation Theory, 1993, section 8.9). They depend on nothing
-but the blur, the offset and the length of the window, so they are made once; a Gauss-Newton step of a whole outline is
-then a table look-up and a scalar product.
+levels: rows of the pseudo-inverse of the edge model (Kay, Estimation Theory, 1993, section 8.9). The filters depend
+only on the blur, the offset and the length of the window, so that they are computed once; a Gauss-Newton step for a
+whole outline is then a table look-up and a scalar product.
 """
 
 from dataclasses import dataclass
@@ -92,11 +92,11 @@ class EdgeFilters:
         return Look(position, contrast, blur, sigma, row, column)
 
     def middle(self, sigma_px: float) -> tuple[int, int]:
-        """Row and column of the filters for an edge of this blur in the middle of the window."""
+        """Row and column of the filters for an edge of this blur in the centre of the window."""
         return _row(sigma_px, self.sigmas_px.size), _column(0.0)
 
     def mean_square(self, levels: Floats, look: "Look") -> tuple[Floats, Floats]:
-        """What a look leaves of each line: mean square residual and the position's gain, shape (n,) each."""
+        """Mean squared residual of each line after a look-up, and the gain of the position; shape (n,) each."""
         mean_square, gain = np.empty((2, len(levels)))
         table = (self.step, self.offsets_px, self.shift_gain)
         _mean_square(levels, look.position, look.contrast, look.row, look.column, *table, mean_square, gain)
@@ -104,7 +104,7 @@ class EdgeFilters:
 
 
 class Lines(NamedTuple):
-    """Lines that share blurs.
+    """Lines across an outline that share their blurs.
 
     Parameters
     ----------
@@ -123,7 +123,7 @@ class Lines(NamedTuple):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Look:
-    """Where a look at the table has found the edges; arrays of shape (n,) unless said otherwise.
+    """Result of one look-up of all edges; arrays of shape (n,) unless said otherwise.
 
     Parameters
     ----------
@@ -154,7 +154,7 @@ def reach_for(sigma_px: float) -> int:
 
 
 def blurred_step(borders: Floats, sigma: Floats) -> tuple[Floats, Floats, Floats]:
-    """Pixel integrals of a Gaussian-blurred unit step at zero, and their derivatives by position and by sigma.
+    """Pixel integrals of a Gaussian-blurred unit step at zero, and their derivatives by position and sigma.
 
     Parameters
     ----------

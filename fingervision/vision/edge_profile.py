@@ -1,8 +1,8 @@
 """Deviations of a finger's flank from a blurred step: a bright rim, or clipped levels.
 
-Either moves the edge that is fitted, the same way in every row, and leaves its own mark in what the fit does not
-explain. The mark says how far the edge may have moved, which goes into the uncertainty; the edge itself stays, because
-real optics leave marks of their own, and a shift taken from them is not steady from frame to frame.
+Either of them moves the fitted edge by the same amount in every row, and leaves a pattern in the residuals of the fit.
+The pattern tells how far the edge may have moved, which is added to the uncertainty. The edge itself is not corrected,
+because real optics leave patterns of their own, and a correction from them would not be steady from frame to frame.
 """
 
 from typing import NamedTuple
@@ -39,7 +39,7 @@ _edge_mark = loop("edge_profile_edge_mark")
 
 
 class EdgeMark(NamedTuple):
-    """How one flank's profile departs from a blurred step; zero where the departure is not significant.
+    """Deviation of one flank's profile from a blurred step; zero where it is not significant.
 
     Parameters
     ----------
@@ -65,7 +65,7 @@ def edge_mark(
     noise: float,
     top_level: float,
 ) -> EdgeMark:
-    """Find a mark in one flank.
+    """Estimate the deviation of one flank from a blurred step.
 
     Parameters
     ----------

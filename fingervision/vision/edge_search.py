@@ -1,10 +1,13 @@
-"""Where steps of light may be along a direction: the mean profile of a zone and the lobes of its derivative."""
+"""Find candidate edges along a direction: lobes of the derivative of a zone's mean profile."""
 
 from dataclasses import dataclass
 from functools import lru_cache
+from math import sqrt
 
 import numpy as np
 from numpy.typing import NDArray
+
+from fingervision.domain.loops import loop
 
 Floats = NDArray[np.float64]
 
@@ -17,11 +20,15 @@ LEAST_STEEPNESS = 0.05
 VALLEY_SHARE = 0.6
 # A lobe ends where the derivative has fallen to this share of its maximum.
 LOBE_SHARE = 0.15
+NO_LIGHT: Floats = np.empty(0)
+
+_profile = loop("edge_search_profile")
+_steps = loop("edge_search_steps")
 
 
 @dataclass(frozen=True, slots=True)
 class StepCandidate:
-    """A step along the zone's direction.
+    """A candidate edge along the zone's direction.
 
     Parameters
     ----------
@@ -45,6 +52,8 @@ class _Bins:
     half: int
     count: Floats
     usual: float
+    radius_x: int
+    radius_y: int
 
 
 @lru_cache(maxsize=512)
@@ -60,7 +69,11 @@ def _bins(direction_rad: float, slope: float, length_px: float, half: int) -> _B
     rows, columns = np.nonzero(kept)
     chosen, share = strip[kept], (t - np.floor(t))[kept]
     count = _summed(chosen, share, np.ones(chosen.size), 2 * half + 1)
-    return _Bins(rows - radius, columns - radius, chosen, share, 2 * half + 1, half, count, float(np.median(count)))
+    rows, columns = rows - radius, columns - radius
+    return _Bins(
+        rows, columns, chosen, share, 2 * half + 1, half, count, float(np.median(count)),
+        int(np.abs(columns).max()), int(np.abs(rows).max()),
+    )  # fmt: skip
 
 
 def _summed(strip: NDArray[np.intp], share: Floats, values: Floats, size: int) -> Floats:
@@ -120,75 +133,32 @@ def profile(
         Strips to either side.
     """
     bins = _bins(direction_rad, round(slope, 2), length_px, half)
-    rows, columns = bins.rows + at_px[1], bins.columns + at_px[0]
-    strip, share, count = bins.strip, bins.share, bins.count
     height, width = grey.shape
-    radius_x, radius_y = int(np.abs(bins.columns).max()), int(np.abs(bins.rows).max())
-    if (
-        at_px[0] < radius_x or at_px[1] < radius_y or at_px[0] + radius_x >= width or at_px[1] + radius_y >= height
-    ):  # a part lies outside of the picture
-        inside = (rows >= 0) & (rows < height) & (columns >= 0) & (columns < width)
-        rows, columns, strip, share = rows[inside], columns[inside], strip[inside], share[inside]
-        count = _summed(strip, share, np.ones(strip.size), bins.size)
-    stored = grey[rows, columns]
-    levels = stored.astype(np.float64) if light is None else light[stored]
-    total = _summed(strip, share, levels, bins.size)
-    squares = _summed(strip, share, levels * levels, bins.size)
-    safe = np.maximum(count, 1.0)
-    mean = total / safe
-    inner = np.maximum(squares - total * mean, 0.0)
-    full = count > 1.0
-    # Strips that an edge lies in spread more, however the edge leans: the middle strip tells what the others do.
-    ordered = np.sort(inner[full] / (count[full] - 1.0))
-    variance = float(ordered[ordered.size // 2]) if ordered.size else 0.0
+    is_whole = (
+        at_px[0] >= bins.radius_x
+        and at_px[1] >= bins.radius_y
+        and at_px[0] + bins.radius_x < width
+        and at_px[1] + bins.radius_y < height
+    )
+    mean, count = np.empty(bins.size), np.empty(bins.size)
+    variance = _profile(
+        grey, NO_LIGHT if light is None else light, bins.rows, bins.columns, bins.strip, bins.share, bins.count,
+        *at_px, is_whole, mean, count,
+    )  # fmt: skip
     return Profile(mean, count / np.maximum(bins.count, 1.0), variance, bins.usual, half)
 
 
 def candidates(found: Profile) -> list[StepCandidate]:
-    """Steps in a profile, in order of position."""
-    level, half = found.level, found.half
+    """Candidate edges in a profile, in order of position."""
+    level = found.level
     if level.size < 5:
         return []
-    seen = found.weight > 0.5
-    slope = np.where(seen[1:] & seen[:-1], np.diff(level), 0.0)
-    smooth = np.zeros_like(slope)
-    smooth[1:-1] = 0.25 * slope[:-2] + 0.5 * slope[1:-1] + 0.25 * slope[2:]
     # Of this difference of strips under independent noise: weights 1/4, 1/4, -1/4, -1/4.
-    floor = SIGNIFICANT * 0.5 * np.sqrt((found.variance + 1.0 / 12.0) / max(found.strip_px, 1.0))
-    steps: list[StepCandidate] = []
-    for sign in (1.0, -1.0):
-        steps += _lobes(sign * smooth, sign * slope, sign, floor, half)
+    floor = SIGNIFICANT * 0.5 * sqrt((found.variance + 1.0 / 12.0) / max(found.strip_px, 1.0))
+    place, contrast = np.empty(level.size), np.empty(level.size)
+    _, count = _steps(level, found.weight, floor, place, contrast)
+    steps = [
+        StepCandidate(at - found.half, size)
+        for at, size in zip(place[:count].tolist(), contrast[:count].tolist(), strict=True)
+    ]
     return sorted(steps, key=lambda step: step.position_px)
-
-
-def _lobes(smooth: Floats, slope: Floats, sign: float, floor: float, half: int) -> list[StepCandidate]:
-    peaks: list[int] = []
-    is_peak = (smooth[1:-1] >= smooth[:-2]) & (smooth[1:-1] > smooth[2:]) & (smooth[1:-1] > floor)
-    for i in (np.flatnonzero(is_peak) + 1).tolist():
-        if peaks:
-            lower = min(smooth[peaks[-1]], smooth[i])
-            if smooth[peaks[-1] : i].min() > VALLEY_SHARE * lower:
-                if smooth[i] > smooth[peaks[-1]]:
-                    peaks[-1] = i
-                continue
-        peaks.append(i)
-    found = []
-    for number, i in enumerate(peaks):
-        first, last, limit = i, i, LOBE_SHARE * smooth[i]
-        low = peaks[number - 1] if number else 0
-        high = peaks[number + 1] if number + 1 < len(peaks) else slope.size - 1
-        while first > low and smooth[first - 1] > limit and not (number and smooth[first - 1] > smooth[first]):
-            first -= 1
-        while (
-            last < high
-            and smooth[last + 1] > limit
-            and not (number + 1 < len(peaks) and smooth[last + 1] > smooth[last])
-        ):
-            last += 1
-        part = smooth[first : last + 1]
-        size = float(slope[first : last + 1].sum())
-        if size <= 0.0 or smooth[i] < LEAST_STEEPNESS * size:
-            continue
-        centre = float((np.arange(first, last + 1) * part).sum() / part.sum())
-        found.append(StepCandidate(centre + 0.5 - half, sign * size))
-    return found

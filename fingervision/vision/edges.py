@@ -1,9 +1,9 @@
-"""Step 5, the edges: where the grey level passes from finger to ground, in every row and column of the outline.
+"""Step 5, the edges: sub-pixel position of the transition from finger to background in every row and column.
 
-Each row across a flank, and each column across a tip, holds one edge: a step between two levels of its own, spread by
-a Gaussian and integrated over the pixel. The position is the maximum-likelihood one under white noise, so its variance
-is the Cramer-Rao bound. What all rows share is the spread, one for the flanks and one for the tip of each finger
-(motion spreads a flank more than a tip). Nothing is resampled.
+Each row across a flank, and each column across a tip, contains one edge: a step between two levels, blurred by a
+Gaussian and integrated over the pixel. The position is the maximum-likelihood one under white noise, so its variance is
+the Cramer-Rao bound. All rows share one blur for the flanks and one for the tip of each finger, because motion blurs a
+flank more than a tip. Nothing is resampled.
 """
 
 from dataclasses import dataclass
@@ -196,10 +196,10 @@ def _fit(
 
 
 def _along_axes(blur: Floats, lines: ProfileLines) -> Floats:
-    """Blur across the fingers and along them, from what lines over flanks and tips see of both.
+    """Blur across the fingers and along them, from the fitted blurs of the flanks' rows and the tips' columns.
 
-    A line that meets the edge at a slant m sees some of the other axis' blur: a share of m^2 / (1 + m^2). Where the
-    fingers moved across during the exposure, a round tip looks blurred along them, though it is not.
+    A line that crosses an edge of slope m also sees a share m^2 / (1 + m^2) of the other axis' blur. If the fingers
+    moved sideways during the exposure, a round tip would otherwise appear blurred along the fingers.
     """
     out = blur.copy()
     for k in range(2):

@@ -1,4 +1,4 @@
-"""Pairs of edges so close that one search window contains both."""
+"""Pairs of edges so close together that one search window contains both."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,7 +24,10 @@ def facing_lines(lines: ProfileLines, reach: int) -> Facing | None:
 def without_the_other(
     values: Floats, lines: ProfileLines, facing: Facing, position: Floats, contrast: Floats, sigma: Floats
 ) -> Floats:
-    """Grey levels without the other finger, where it reaches into the window: the ground between is a stripe."""
+    """Subtract the other finger's edge from lines whose window contains both.
+
+    The background between is then a stripe.
+    """
     levels, reach = values.copy(), values.shape[-1] // 2
     edge = lines.coarse + lines.outward * position
     borders = np.arange(-reach - 0.5, reach + 1.0)

@@ -1,4 +1,4 @@
-"""The shape of a finger's end: three straight sides joined by two round corners, and where a point lies on it."""
+"""Shape of a finger's end, three straight sides joined by two round corners, and the position of a point on it."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -56,12 +56,12 @@ def on_flanks(p: Floats, origin: Floats, x: Floats, y: Floats) -> Flags:
 
 
 def corner_tops(p: Floats, origin: Floats) -> tuple[float, float, float, float]:
-    """Where the inner and then the outer fillet is outermost along the axis: x, y, x, y."""
+    """Outermost points of the inner and the outer fillet along the axis, as x, y, x, y."""
     inner_x, inner_y, outer_x, outer_y = _corner_tops(p, origin)
     return inner_x, inner_y, outer_x, outer_y
 
 
 def inner_edge(p: Floats, origin: Floats, y: float) -> tuple[float, float]:
-    """Where the inner side of the outline crosses a height, and its change there per pixel towards the root."""
+    """Position of the outline's inner side at a height, and its slope there per pixel towards the root."""
     edge, slope = _inner_edge(p, origin, y)
     return edge, slope

@@ -1,9 +1,9 @@
-"""Step 4, the boundary of the fingers: which two of everything in view they are, and where they point.
+"""Step 4, finding the fingers: which two objects in view are the fingers, and where they point.
 
-A finger is a place where the outline, followed from the tips' side of the picture, begins: a local top that goes on
-downwards for some way before it ends or meets another (topographic prominence). Two fingers that touch are one blob
-with two tops and a notch between them, and are found in the same way. What begins at the picture's own border has its
-tip out of view. Between the two there is nothing but ground, and no third thing stands beside them like a finger.
+A tip is a local maximum of an outline towards the tips' side of the picture, whose depth (topographic prominence) is
+large enough. Two touching fingers are one object with two local maxima and a notch between them, and are found in the
+same way. An object that begins at the picture's border has its tip out of view. Only background lies between the two
+fingers, and no third object stands beside them like a finger.
 """
 
 from collections.abc import Sequence
@@ -164,12 +164,12 @@ def _best_pair(
 
 
 def _has_company(own: Outline, outlines: Outlines) -> bool:
-    """Whether something else of about this size lies in view, as letters and the like do."""
+    """Whether other objects of a similar size are in view, as with letters of a text."""
     return bool(np.count_nonzero(outlines.lengths > COMPANY_SHARE * len(own)) > 2)
 
 
 def _is_third(top: Top, fingers: CoarseFingers, below_tip_px: float) -> bool:
-    """Whether a third thing may be meant as well as either of two fingers."""
+    """Whether a third object could be a finger as well as either of the two."""
     two = (fingers.left, fingers.right)
     lower = min((finger.top for finger in two), key=lambda finger: finger.prominence_px)
     if (
@@ -190,7 +190,7 @@ def _is_third(top: Top, fingers: CoarseFingers, below_tip_px: float) -> bool:
 
 
 def _has_second_pair(tops: list[Top], two: tuple[Top, Top], fingers: CoarseFingers, below_tip_px: float) -> bool:
-    """Whether two further things that come in from the border are as much like two fingers, of another breadth."""
+    """Whether a second pair of objects of another width, coming in from the border, looks as much like two fingers."""
     lower = min(top.prominence_px for top in two)
     others = [
         top
@@ -212,7 +212,7 @@ def _has_second_pair(tops: list[Top], two: tuple[Top, Top], fingers: CoarseFinge
 
 
 def _standing(tops: list[Top], below_tip_px: float) -> list[Top]:
-    """What comes in from the border like a finger."""
+    """Objects that come in from the border like a finger."""
     return [
         top
         for top in tops
@@ -223,7 +223,7 @@ def _standing(tops: list[Top], below_tip_px: float) -> list[Top]:
 
 
 def _why_none(tops: list[Top], below_tip_px: float) -> NoGap:
-    """Say what is missing."""
+    """Reason why no two fingers were found."""
     standing = _standing(tops, below_tip_px)
     if len(standing) > 2:
         return MORE_THAN_TWO
@@ -236,20 +236,20 @@ def _why_none(tops: list[Top], below_tip_px: float) -> NoGap:
 
 
 def _end_alike(first: Top, second: Top, below_tip_px: float, builds: tuple[Build, Build] | None = None) -> bool:
-    """Whether two tips are about equally high."""
+    """Whether two tips are at about the same height."""
     left, right = (first, second) if first.across_px <= second.across_px else (second, first)
     step_px, apart_px = right.along_px - left.along_px, right.across_px - left.across_px
     return end_alike(step_px, apart_px, below_tip_px, builds)
 
 
 def _stand_side_by_side(left: Top, right: Top, below_tip_px: float) -> bool:
-    """Whether each is there at the other's measuring height: things one behind the other are no fingers."""
+    """Whether each finger extends to the other's measuring height; objects one above the other are no fingers."""
     deepest = max(left.along_px, right.along_px) + below_tip_px
     return deepest <= min(left.along_px + left.prominence_px, right.along_px + right.prominence_px)
 
 
 def _follow(top: Top, inner_sign: int, below_tip_px: float, reach_px: float) -> CoarseFinger | None:
-    """The outline from the inner side over the top to the outer side, as far down as `reach_px` or as it goes."""
+    """Outline from the inner side over the tip to the outer side, down to `reach_px` or as far as it goes."""
     start, stop = (follow_down(top.outline, top.index, step, top.along_px + reach_px) for step in (-1, 1))
     piece = top.outline[start : stop + 1]
     if inner_sign * (piece[0, 0] - piece[-1, 0]) < 0:
@@ -267,10 +267,10 @@ def _is_open(
     below_tip_px: float,
     builds: tuple[Build, Build],
 ) -> bool:
-    """Whether next to nothing lies on the way from one measuring point to the other.
+    """Whether next to nothing lies on the straight path between the two measuring points.
 
-    Where a turned camera shows one finger's top from the side, its own corner lies on that way: there the way is
-    level, at the lower of the two measuring heights.
+    If the camera is turned, a corner of one finger may lie on that path; then the path is taken level, at the lower of
+    the two measuring heights.
     """
     heights = [finger.top_along_px + below_tip_px for finger in (left, right)]
     if is_free(mask, *_inner_places(left, right, orientation, heights)):
@@ -283,7 +283,7 @@ def _is_open(
 def _inner_places(
     left: CoarseFinger, right: CoarseFinger, orientation: Orientation, heights: list[float]
 ) -> tuple[Place, Place]:
-    """Where the two inner sides cross a height each, to a pixel, in the picture."""
+    """Positions in the picture where the two inner sides have the given heights, to one pixel."""
     first, second = (
         orientation.to_pixels(*inner_crossing(finger.outline, height))
         for finger, height in zip((left, right), heights, strict=True)

@@ -1,4 +1,4 @@
-"""A first guess of a finger's end from its points: a line through each side, and the corners' radii."""
+"""Initial estimate of a finger's end from its points: a line through each side, and the corners' radii."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,7 +33,7 @@ _line = loop("first_guess_line")
 
 
 def first_guess(points: OutlinePoints, below_tip_px: float) -> tuple[Floats, Floats, Floats]:
-    """Start of the fit of a finger's end.
+    """Starting values for the fit of a finger's end.
 
     Parameters
     ----------
@@ -53,6 +53,6 @@ def first_guess(points: OutlinePoints, below_tip_px: float) -> tuple[Floats, Flo
 
 
 def line(t: Floats, v: Floats) -> tuple[float, float]:
-    """Least-squares line v = c + m t, as (c, m); level where the points do not spread."""
+    """Least-squares line v = c + m t, as (c, m); slope 0 where all t are equal."""
     c, m = _line(np.ascontiguousarray(t), np.ascontiguousarray(v))
     return c, m

@@ -1,4 +1,4 @@
-"""The flanks of a thing, to a pixel: whether they are straight for a good part of their length, as a finger's are."""
+"""Flanks of an object to one pixel: whether they are straight over a sufficient length, as a finger's are."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,9 +23,9 @@ _has_straight_stretch = loop("flanks_has_straight_stretch")
 
 
 def has_straight_flanks(top: Top, below_tip_px: float, steepest: float = STEEPEST) -> bool:
-    """Whether what begins at a top goes down between straight flanks.
+    """Whether the object below a local maximum has straight flanks.
 
-    A side that ends in a notch before it is as long as is asked speaks neither for nor against it.
+    A side that ends in a notch before the required length counts neither for nor against it.
 
     Parameters
     ----------
@@ -43,13 +43,13 @@ def has_straight_flanks(top: Top, below_tip_px: float, steepest: float = STEEPES
 
 
 def follow_down(outline: Outline, top: int, step: int, limit: float) -> int:
-    """Where the outline, followed from its top, has gone down to `limit`, or was lowest before it turned back up."""
+    """Index at which the outline, followed from its tip, reaches `limit`, or its lowest point before it rises again."""
     end, _ = _follow_down(outline, top, step, limit)
     return int(end)
 
 
 def across_by_row(outline: Outline, top: int, step: int) -> NDArray[np.float64]:
-    """Where the outline, followed down from its top, last crosses every row, from the top's own on."""
+    """Position across the finger at each row, where the outline followed down from its tip last crosses that row."""
     end, deep = _follow_down(outline, top, step, np.inf)
     across = np.empty(deep + 1)
     _across_by_row(outline, top, step, end, across)

@@ -1,4 +1,4 @@
-"""Step 1, grey scale: one number a pixel, as close to the sensor as the source allows, and where its scale ends."""
+"""Step 1, grey scale: one number per pixel, as close to the sensor as the source allows, and its full scale."""
 
 import cv2
 import numpy as np
@@ -15,8 +15,8 @@ SENSOR_BITS = (10, 12, 14, 16)
 def to_grey(pixels: Pixels) -> GreyImage:
     """Grey levels of a picture, at its own bit depth.
 
-    A grey picture passes untouched. Colour becomes the luma of ITU-R BT.601, whose weights add up to one, so that a
-    grey picture stored as colour gives back its own levels.
+    A grey picture is returned unchanged. Colour becomes the luma of ITU-R BT.601, whose weights add up to one, so that
+    a grey picture stored as colour gives back its own levels.
 
     Parameters
     ----------
@@ -39,10 +39,10 @@ def full_scale(grey: GreyImage) -> int:
 
 
 def top_level(grey: GreyImage, bits: int | None = None) -> int:
-    """Level at which the sensor's scale ends.
+    """Level at which the sensor saturates.
 
-    Cameras store 10, 12 or 14 bits in 16, at their lower or at their upper end. The bits that are set anywhere in the
-    picture show which: none above the depth, or none below it.
+    Cameras store 10, 12 or 14 bits in 16-bit words, in their lower or in their upper bits. The bits that are set in any
+    pixel show which: none above the depth, or none below it.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Search lines that a held part leaves visible, and the width of the part."""
+"""Rows that a held part leaves visible, and the width of the part."""
 
 import numpy as np
 
@@ -18,7 +18,7 @@ U_ALONG_PX = 1.0
 
 
 def visible_lines(lines: ProfileLines, fingers: CoarseFingers) -> ProfileLines:
-    """The lines on which a finger's own edge is seen; those of each side move together."""
+    """Rows in which a finger's own edge is visible; all rows of one side move together."""
     pair = (fingers.left, fingers.right)
     if not any(finger.hidden.size for finger in pair):
         return lines
@@ -41,7 +41,7 @@ def visible_lines(lines: ProfileLines, fingers: CoarseFingers) -> ProfileLines:
 
 
 def _inner_across(finger: CoarseFinger) -> int:
-    """The innermost pixel of the finger's top."""
+    """The innermost pixel of the finger's tip."""
     near = finger.outline[finger.outline[:, 1] <= finger.top_along_px + 2 * BESIDE_TIP_PX, 0]
     return int(near.max() if finger.inner_sign > 0 else near.min())
 
@@ -49,7 +49,7 @@ def _inner_across(finger: CoarseFinger) -> int:
 def held_part(
     fingers: CoarseFingers, ends: tuple[FingerEnd, FingerEnd], spread: tuple[float, float], light_gap: bool
 ) -> HeldPart | None:
-    """Width of a held part: how far the two inner flanks are apart where they hold it.
+    """Width of a held part: distance between the two inner flanks where they touch it.
 
     Parameters
     ----------
@@ -86,7 +86,7 @@ def held_part(
 
 
 def _flank(end: FingerEnd, height: float) -> tuple[float, float]:
-    """The straight inner flank at a height, also where a fillet begins above it, and its variance."""
+    """Position and variance of the straight inner flank at a height, extrapolated where a fillet begins above it."""
     arm = height - float(end.origin[1])
     edge = end.parameters[INNER_C] + end.parameters[INNER_M] * arm
     c = end.covariance

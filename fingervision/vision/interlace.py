@@ -1,8 +1,8 @@
-"""Interlaced pictures: even and odd rows were seen at two times, and a finger that moves shows it as a comb.
+"""Interlaced pictures: even and odd rows were exposed at two times, so that a moving finger shows as a comb.
 
-The flanks of each finger say how far apart the two fields see it: a row against the line between its neighbours of the
-other field, over all rows. Every row is then moved half-way to the other field, so that both speak of the time in the
-middle. Colour sensors leave such combs as well, smaller ones, which are none of motion and go the same way.
+The displacement between the two fields is measured on the flanks: each row against the line between its neighbours of
+the other field, over all rows. Every row is then moved half-way towards the other field, so that both represent the
+mean time. Colour sensors leave similar, smaller combs, which are not due to motion and are removed in the same way.
 """
 
 from dataclasses import replace
@@ -31,7 +31,7 @@ _apart = loop("interlace_apart")
 
 
 def at_half_way(edges: EdgePoints) -> tuple[EdgePoints, float]:
-    """The same edges half-way between the two fields, and how far these see the faster finger apart (pixels).
+    """Return the edges half-way between the two fields, and the faster finger's displacement between them (pixels).
 
     The picture's rows must be rows of `edges`, which they are where the tips point up or down.
     """

@@ -1,7 +1,7 @@
 """Test whether two objects can be the fingers of one gripper: similar height and width, parallel.
 
-A camera that is turned against the gripper shows its tips at different heights, and both fingers lean by as much; a
-finger beside a wire, a housing or the edge of a table is unlike it in width.
+A camera that is turned against the gripper shows its tips at different heights, and both fingers tilted by the same
+angle; a wire, a housing or the edge of a table beside a finger has another width.
 """
 
 from collections.abc import Sequence
@@ -37,7 +37,7 @@ _build = loop("likeness_build")
 
 @dataclass(frozen=True, slots=True)
 class Build:
-    """How wide a thing is and how it leans.
+    """Width and tilt of an object.
 
     Parameters
     ----------
@@ -55,7 +55,10 @@ class Build:
 
 
 def build(top: Top, inner_sign: int, across_size: int) -> Build:
-    """Breadth and lean of what begins at a top, as deep as both its sides go; its inner side lies towards the sign."""
+    """Width and tilt of the object below a tip, down to where both its sides end.
+
+    Its inner side lies towards the sign.
+    """
     first, second = (across_by_row(top.outline, top.index, step) for step in (-1, 1))
     inner, outer = (second, first) if inner_sign * (second[-1] - first[-1]) > 0 else (first, second)
     width, lean, cut = _build(inner, outer, across_size)
@@ -63,7 +66,7 @@ def build(top: Top, inner_sign: int, across_size: int) -> Build:
 
 
 def are_alike(first: Build, second: Build) -> bool:
-    """Whether two things are about equally wide, as far as the picture shows them."""
+    """Whether two objects have about the same width, as far as the picture shows them."""
     narrow, wide = sorted((first, second), key=lambda one: one.width_px)
     if narrow.width_px <= 0.0 or (narrow.is_cut and wide.is_cut):
         return True
@@ -72,7 +75,7 @@ def are_alike(first: Build, second: Build) -> bool:
 
 
 def end_alike(step_px: float, apart_px: float, below_tip_px: float, builds: tuple[Build, Build] | None = None) -> bool:
-    """Whether two tips are about equally high, as those of one gripper are, also where the camera is turned.
+    """Whether two tips are at about the same height, as those of one gripper are, allowing for a turned camera.
 
     Parameters
     ----------
@@ -99,6 +102,6 @@ def end_alike(step_px: float, apart_px: float, below_tip_px: float, builds: tupl
 
 
 def common_turn(leans: Sequence[float]) -> float:
-    """Slope by which both fingers lean, 0 where they do not lean alike or hardly lean."""
+    """Slope by which both fingers tilt; 0 where their tilts differ or are negligible."""
     turn = 0.5 * sum(leans)
     return turn if abs(leans[0] - leans[1]) <= LEANS_ALIKE and abs(turn) > LEAST_TURN else 0.0

@@ -1,4 +1,4 @@
-"""The light along every line across an outline, and a first look at the edges there."""
+"""Light along every line across an outline, and an initial estimate of the edges there."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,7 +31,7 @@ def line_levels(upright: GreyImage, lines: ProfileLines, light: Floats, reach: i
 
 
 def first_blur(upright: GreyImage, lines: ProfileLines, light: Floats) -> float:
-    """Blur of the edges from the steepest place of some of the flanks' rows, robustly."""
+    """Robust initial blur of the edges, from the steepest slope in some of the flanks' rows."""
     some = slice(0, INNER, FIRST_LOOK)
     levels = np.empty((len(lines.fixed), len(IS_ROW[some]), 2 * FIRST_REACH_PX + 1))
     flanks = (np.ascontiguousarray(a[:, :INNER]) for a in (lines.fixed, lines.coarse, lines.outward))
@@ -46,7 +46,7 @@ def first_blur(upright: GreyImage, lines: ProfileLines, light: Floats) -> float:
 
 
 def first_position(levels: Floats) -> Floats:
-    """Where an edge between the window's two end levels would have the same mean level as the window."""
+    """Position of a step between the window's two end levels that has the window's mean level."""
     position = np.empty(levels.shape[:2])
     _first_position(levels, position)
     return position

@@ -1,9 +1,9 @@
-"""Step 6 for shapes of any other kind: the outline near one point as a polynomial in the direction of its tangent.
+"""Step 6 for any other shape: the outline near one point as a polynomial about its tangent.
 
-Drops, ellipses and worn tips are not three straight sides. Near the tip and near the measuring point any smooth
-outline is a low polynomial; its reach is as long as the residuals allow (Lepski's principle: the longest window whose
-spread is still that of the shortest). Weights taper off smoothly (Cleveland, JASA 74, 1979), so that a shift by part of
-a pixel changes nothing by a jump.
+Drops, ellipses and worn tips do not consist of three straight sides. Near the tip and near the measuring point any
+smooth outline is a polynomial of low degree; it is fitted as far as the residuals allow (Lepski's principle: the
+longest window whose scatter is still that of the shortest). Weights fall off smoothly (Cleveland, JASA 74, 1979), so
+that a shift by a fraction of a pixel never causes a jump.
 """
 
 from dataclasses import dataclass
@@ -94,7 +94,7 @@ def outline_near(
 
 
 def local_tip(points: OutlinePoints, x: float, y: float, blur_px: float) -> LocalOutline | None:
-    """The outermost point of a smooth outline near a first guess."""
+    """The outermost point of a smooth outline, from an initial estimate."""
     for _step in range(3):
         fit = outline_near(points, (x, y), (0.0, -1.0), blur_px)
         if fit is None:
@@ -115,7 +115,7 @@ def local_tip(points: OutlinePoints, x: float, y: float, blur_px: float) -> Loca
 def local_edge(
     points: OutlinePoints, x: float, y: float, slope: float, blur_px: float
 ) -> tuple[LocalOutline, float] | None:
-    """Where a smooth inner edge crosses the height `y`, and its slope there, from a first guess."""
+    """Position and slope of a smooth inner edge at the height `y`, from an initial estimate."""
     for _step in range(3):
         length = hypot(1.0, slope)
         nx, ny = 1.0 / length, -slope / length
@@ -145,7 +145,7 @@ def _value_and_slope(c: list[float], s: float) -> tuple[float, float]:
 
 
 def local_measuring_point(points: OutlinePoints, below_tip_px: float, shared: float) -> MeasuringPoint | None:
-    """Tip and edge of a finger of any smooth shape; None where there is none.
+    """Tip and edge of a finger of any smooth shape; None where the outline is not smooth.
 
     Parameters
     ----------

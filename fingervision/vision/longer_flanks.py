@@ -1,8 +1,8 @@
 """Measure rough flanks over a longer stretch, so that long-wave roughness averages out.
 
-A finger's flank is straight near its tip; farther down it may bend or end. So the longer flank counts only where it
-says the same, surely enough, as the near part (Hausman, Econometrica 46, 1978, 1251: the difference of a surer and a
-less sure estimate has the difference of their variances).
+A finger's flank is straight near its tip; farther down it may bend or end. The longer flank is therefore used only if
+it agrees with the near part and is more certain (Hausman, Econometrica 46, 1978, 1251: the difference of a more and a
+less certain estimate has the difference of their variances).
 """
 
 from dataclasses import replace
@@ -21,7 +21,7 @@ AGREES = 2.5
 
 
 def with_longer_flanks(fingers: CoarseFingers, below_tip_px: float) -> CoarseFingers:
-    """The same fingers, their outlines as far down as a long flank goes; one that holds a part stays as it is."""
+    """Return the fingers with their outlines extended downwards; a finger that holds a part stays as it is."""
     left, right = (
         finger if finger.hidden.size else _longer(finger, below_tip_px + LONG_PX)
         for finger in (fingers.left, fingers.right)
@@ -30,7 +30,7 @@ def with_longer_flanks(fingers: CoarseFingers, below_tip_px: float) -> CoarseFin
 
 
 def is_surer(longer: GapMeasurement | NoGap, near: GapMeasurement) -> bool:
-    """Whether longer flanks say the same as the near ones, and say it more surely."""
+    """Whether longer flanks agree with the near ones and have a smaller uncertainty."""
     if not isinstance(longer, GapMeasurement) or longer.u_gap_px >= near.u_gap_px:
         return False
     return abs(longer.gap_px - near.gap_px) <= AGREES * sqrt(near.u_gap_px**2 - longer.u_gap_px**2)

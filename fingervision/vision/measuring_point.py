@@ -1,4 +1,4 @@
-"""Step 7, the measuring point: the tip and the inner edge below it, read off the fitted end of a finger."""
+"""Step 7, the measuring point: the tip and the inner edge below it, from the fitted end of a finger."""
 
 from dataclasses import dataclass
 
@@ -52,11 +52,11 @@ class MeasuringPoint:
 
 
 def squared(end: FingerEnd) -> FingerEnd:
-    """The same end, its top square to its flanks wherever the points do not speak against it.
+    """Return the fitted end with its top made perpendicular to its flanks, unless the points contradict it.
 
-    A finger that is cut straight has its top square to its flanks, which are long and know the tilt far better than a
-    short top does. Where the two agree within their uncertainty they are joined (a Kalman update); a slanted tip stays
-    slanted.
+    The top of a finger that is cut straight is perpendicular to its flanks, which are long and determine the tilt far
+    better than the short top. Where top and flanks agree within their uncertainty they are combined (a Kalman update);
+    a slanted top stays slanted.
     """
     parameters, covariance = np.empty_like(end.parameters), np.empty_like(end.covariance)
     _squared(end.parameters, end.covariance, end.misfit, parameters, covariance)
@@ -64,10 +64,10 @@ def squared(end: FingerEnd) -> FingerEnd:
 
 
 def measuring_point(end: FingerEnd, below_tip_px: float, blur_px: float) -> MeasuringPoint:
-    """Tip and inner edge of a fitted shape, with their covariance by the parameters' own.
+    """Tip and inner edge of a fitted shape, with their covariance from that of the parameters.
 
-    The tip is the higher of the two corners. Where noise alone decides which that is, the higher of two would be too
-    high on average: a top that is level within twice its uncertainty counts as level.
+    The tip is the higher of the two corners of the top. If noise alone decided which corner is the higher, the tip
+    would be too high on average: a top that is level within twice its uncertainty counts as level.
     """
     covariance = np.empty((2, 2))
     shape = (end.parameters, end.covariance, end.misfit, end.origin)

@@ -1,9 +1,9 @@
-"""How far the noise of neighbouring pixels is shared, from the flat parts of the picture beside the edges.
+"""Correlation of the noise of neighbouring pixels, from the flat parts of the picture beside the edges.
 
 A digital zoom, a colour sensor's demosaicing, denoising and compression spread noise over neighbours. Points of an
-outline then share their errors, and many of them know less than they seem to. The autocovariance of the noise says how
-much less: the variance of a mean of many lines, each weighted along itself by the edge's own filter, over what it would
-be if every line's noise were its own.
+outline then share their errors, so that the mean of many has a larger variance than independent points would give. The
+autocovariance of the noise gives the factor: the variance of a mean over many lines, each weighted by the edge's
+filter, divided by its value for independent lines.
 """
 
 import numpy as np
@@ -42,7 +42,7 @@ def flat_noise(
     row: int,
     column: int,
 ) -> tuple[float, float]:
-    """Neighbouring lines that share their noise (1 where every line's noise is its own), and that noise.
+    """Number of neighbouring lines that share their noise (1 for independent lines), and that noise.
 
     Parameters
     ----------
@@ -88,7 +88,7 @@ def flat_noise(
 
 
 def _is_any(covariance: Floats, limit: float) -> bool:
-    """Whether a pixel has a covariance beyond this with any of those beside it."""
+    """Whether a pixel's covariance with any of its neighbours exceeds `limit`."""
     beside = ((LAGS + 1, LAGS), (LAGS, LAGS + 1), (LAGS + 1, LAGS + 1), (LAGS - 1, LAGS + 1))
     return any(abs(covariance[place]) > limit for place in beside)
 
@@ -96,10 +96,10 @@ def _is_any(covariance: Floats, limit: float) -> bool:
 def _autocovariance(
     upright: GreyImage, light: Floats, corners: NDArray[np.int64], side: int, farthest: int
 ) -> tuple[Floats, float]:
-    """Sum of one side's squares' autocovariances, each without its plane of light; and how many pixels they hold.
+    """Sum of the autocovariances of one side's squares, each without its plane of light, and their number of pixels.
 
-    Only lags up to `farthest` are summed; the others are left at zero. The first index is the lag along a row plus
-    `LAGS`, the second that from row to row.
+    Only lags up to `farthest` are computed; the others stay zero. The first index is the lag along a row plus `LAGS`,
+    the second is the lag in rows.
     """
     covariance = np.empty((2 * LAGS + 1, 2 * LAGS + 1))
     return covariance, _sum_of_lags(upright, light, corners, side, farthest, covariance)

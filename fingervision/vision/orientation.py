@@ -1,8 +1,8 @@
-"""The fingers' own axes: every direction is measured as if the tips pointed up.
+"""The fingers' axes: every position is expressed as if the tips pointed up.
 
 `across` grows to the image's right for tips up or down, and downwards for tips left or right. `along` grows from the
-tips towards the roots. A picture is turned by a view of its memory, never by copying or resampling, so a recording
-that is turned or mirrored gives the same numbers.
+tips towards the roots. A picture is turned by a view of its memory, never by copying or resampling, so that a turned or
+mirrored recording gives the same numbers.
 """
 
 from dataclasses import dataclass
@@ -17,7 +17,7 @@ from fingervision.vision.grey import GreyImage
 
 @dataclass(frozen=True, slots=True)
 class Orientation:
-    """The map between a picture's pixels and the fingers' axes.
+    """The transformation between a picture's pixels and the fingers' axes.
 
     Parameters
     ----------
@@ -33,17 +33,17 @@ class Orientation:
 
     @property
     def across_size(self) -> int:
-        """Pixels across the fingers."""
+        """Size of the picture across the fingers (pixels)."""
         return self.width_px if self.direction.is_vertical else self.height_px
 
     @property
     def along_size(self) -> int:
-        """Pixels along the fingers."""
+        """Size of the picture along the fingers (pixels)."""
         return self.height_px if self.direction.is_vertical else self.width_px
 
     @property
     def is_flipped(self) -> bool:
-        """Whether the fingers' axis runs against the picture's."""
+        """Whether the fingers' axis runs against the picture's axis."""
         return self.direction in (Direction.DOWN, Direction.RIGHT)
 
     def view(self, image: GreyImage) -> GreyImage:
@@ -52,16 +52,19 @@ class Orientation:
         return upright[::-1] if self.is_flipped else upright
 
     def upright(self, mask: NDArray[np.uint8]) -> NDArray[np.uint8]:
-        """The same of a mask, row after row in memory: faster than NumPy's copy of a transposed view."""
+        """Return a mask as if the tips pointed up, contiguous in memory.
+
+        Faster than NumPy's copy of a transposed view.
+        """
         turned = mask if self.direction.is_vertical else cv2.transpose(mask)
         return np.ascontiguousarray(cv2.flip(turned, 0) if self.is_flipped else turned, dtype=np.uint8)
 
     def to_pixels(self, across: float, along: float) -> tuple[float, float]:
-        """(across, along) to pixel coordinates (x, y)."""
+        """Convert (across, along) to pixel coordinates (x, y)."""
         if self.is_flipped:
             along = self.along_size - 1 - along
         return (across, along) if self.direction.is_vertical else (along, across)
 
     def along_to_pixels(self, along: float) -> float:
-        """A coordinate along the fingers to the picture's coordinate on the same axis."""
+        """Convert a coordinate along the fingers to the picture's coordinate on the same axis."""
         return self.along_size - 1 - along if self.is_flipped else along

@@ -7,12 +7,12 @@ Floats = NDArray[np.float64]
 
 
 def curvature_gain(slope: Floats, reach_sigmas: Floats) -> Floats:
-    """What a fit with two free levels makes of an edge whose distance along the line is not quite straight.
+    """Position error, per unit of curvature bias, of a fit with two free levels across a slanted curved edge.
 
     Along a line that meets a curved edge at a slant of slope m, the distance to the edge is t + kappa m^2 t^2 / (2 (1 +
-    m^2)^(1/2)). Projected on the fit's own directions over a window of w standard deviations this moves the position by
-    m^2 c sigma^2 kappa / 2 across the edge, c = (1 / (4 sqrt pi) - 1 / 2w) / (1 / (2 sqrt pi) - 1 / 2w); the half-level
-    itself is moved by sigma^2 kappa / 2.
+    m^2)^(1/2)). Projected on the parameters of the fit over a window of w standard deviations, this moves the position
+    by m^2 c sigma^2 kappa / 2 across the edge, c = (1 / (4 sqrt pi) - 1 / 2w) / (1 / (2 sqrt pi) - 1 / 2w); the
+    half-level itself is moved by sigma^2 kappa / 2.
     """
     level = 0.5 / np.maximum(reach_sigmas, 2.5)
     root = 0.5 / np.sqrt(np.pi)

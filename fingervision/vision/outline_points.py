@@ -1,4 +1,4 @@
-"""The sub-pixel outline of one finger, seen from the finger itself."""
+"""The sub-pixel outline of one finger, in that finger's own axes."""
 
 from dataclasses import dataclass
 
@@ -45,17 +45,17 @@ class OutlinePoints:
 
     @property
     def is_row(self) -> NDArray[np.bool_]:
-        """Whether the point was found on a row."""
+        """Whether the point was found on a row across the flank (otherwise on a column across the tip)."""
         return np.asarray(self.side != TIP_SIDE)
 
 
 def finger_origin(finger: CoarseFinger) -> tuple[int, int]:
-    """Where a finger's own axes begin, (across, along) in the picture."""
+    """Origin of a finger's own axes, (across, along) in the picture."""
     return int(finger.outline[0, 0]), finger.top_along_px
 
 
 def outline_points(fingers: CoarseFingers, edges: EdgePoints) -> tuple[OutlinePoints, OutlinePoints]:
-    """Points of the left and of the right finger, each in its own axes."""
+    """Points of the left and of the right finger, each in that finger's own axes."""
     lines = edges.lines
     least = LEAST_CONTRAST * middle(np.abs(edges.contrast[lines.weight > 0]))
     seen = (SIDE, lines.weight, edges.contrast, lines.fixed, edges.position, edges.u_position, lines.slope)

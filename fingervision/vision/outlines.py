@@ -1,4 +1,4 @@
-"""The outlines of everything in a binary picture, to a pixel, seen in the fingers' axes."""
+"""Outlines of all objects in a binary picture, to one pixel, in the fingers' axes."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -22,7 +22,7 @@ _from_lowest, _largest_extents = loop("outlines_from_lowest"), loop("outlines_la
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Outlines:
-    """The outlines of everything in a binary picture, one behind the other.
+    """The outlines of all objects in a binary picture, one after another in one array.
 
     Parameters
     ----------
@@ -43,12 +43,12 @@ class Outlines:
 
     @property
     def lengths(self) -> NDArray[np.int64]:
-        """Points of each, shape (m,)."""
+        """Number of points of each outline, shape (m,)."""
         return np.diff(self.starts)
 
 
 def find_outlines(mask: NDArray[np.uint8]) -> Outlines:
-    """Outlines (x, y) of everything set in a mask, holes included, but for specks."""
+    """Outlines (x, y) of all objects in a mask, holes included, specks excluded."""
     found, _ = cv2.findContours(mask, cv2.RETR_LIST, cv2.CHAIN_APPROX_NONE)
     long = [outline for outline in found if len(outline) > SHORTEST_OUTLINE_PX]
     points = np.concatenate(long)[:, 0] if long else np.empty((0, 2))
@@ -58,14 +58,14 @@ def find_outlines(mask: NDArray[np.uint8]) -> Outlines:
 
 
 def longest_first(outlines: Outlines, directions: Sequence[Direction]) -> list[tuple[Direction, int]]:
-    """Directions with the extent of the longest outline along them (pixels), the greatest first."""
+    """Directions with the extent of the longest outline along each (pixels), the largest first."""
     widest, tallest = _largest_extents(outlines.points, outlines.starts)
     sizes = [(direction, tallest if direction.is_vertical else widest) for direction in directions]
     return sorted(sizes, key=lambda size: -size[1])
 
 
 def in_axes(pixels: Outline, orientation: Orientation) -> Outline:
-    """A closed outline (x, y) in the fingers' axes, from its lowest point on: it rises and falls back to it."""
+    """A closed outline (x, y) in the fingers' axes, starting at its lowest point."""
     pixels = np.ascontiguousarray(pixels, dtype=np.int32)
     outline = np.empty_like(pixels)
     is_vertical, size = orientation.direction.is_vertical, orientation.along_size

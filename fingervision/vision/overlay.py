@@ -34,7 +34,7 @@ Canvas = NDArray[np.uint8]
 
 
 def draw_overlay(frame: Frame, outcome: GapMeasurement | NoGap, words: str) -> Canvas:
-    """Draw edges, tips, measuring points, the distance between these, a held part's width, and a line of text.
+    """Draw edges, tips, measuring points, their distance, a held part's width, and a line of text.
 
     Parameters
     ----------
@@ -91,7 +91,7 @@ def draw_edge_points(frame: Frame, fingers: CoarseFingers | None, edges: EdgePoi
 
 
 def in_eight_bits(grey: Pixels) -> Canvas:
-    """Grey levels for a screen."""
+    """Convert grey levels to eight bits for display."""
     if grey.dtype != np.uint16:
         return np.ascontiguousarray(grey)
     return np.ascontiguousarray((grey >> (top_level(grey).bit_length() - 8)).astype(np.uint8))
@@ -103,7 +103,7 @@ def _polyline(canvas: Canvas, outline: NDArray[np.float64], orientation: Orienta
 
 
 def _as_colour(frame: Frame) -> Canvas:
-    """Eight bits, three colours, memory of its own."""
+    """Copy a frame as an eight-bit colour picture."""
     pixels = frame.pixels
     levels = in_eight_bits(pixels)
     if levels.ndim == 3:
@@ -112,7 +112,7 @@ def _as_colour(frame: Frame) -> Canvas:
 
 
 def _draw_finger(canvas: Canvas, edge: FingerEdge, direction: Direction, size: float) -> None:
-    """Draw the edge's tangent at the measuring point, and the tip's line across the fingers."""
+    """Draw the edge's tangent at the measuring point, and a line across the finger at its tip."""
     root = 1.0 if direction in (Direction.UP, Direction.LEFT) else -1.0
     steepness = float(np.hypot(1.0, edge.slope))
     along, across = EDGE_LENGTH_PX * size / steepness * root, EDGE_LENGTH_PX * size / steepness * edge.slope
@@ -142,7 +142,7 @@ def _line(
 
 
 def _write(canvas: Canvas, words: str, colour: tuple[int, int, int], size: float) -> None:
-    """Text at the lower left, on a dark ground so that it can be read on any picture."""
+    """Write text at the lower left, on a dark background so that it is legible on any picture."""
     font, letter = cv2.FONT_HERSHEY_SIMPLEX, 0.5 * size
     (width, height), below = cv2.getTextSize(words, font, letter, max(1, round(size)))
     letter *= min(1.0, 0.96 * canvas.shape[1] / max(width, 1))

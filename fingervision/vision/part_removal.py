@@ -1,8 +1,8 @@
 """Remove a held part from the binary picture, and record which stretches of the fingers it hides.
 
-Where the room between the fingers is bounded by two straight lines, whatever else lies between these lines is a part:
-held by both fingers, stuck to one of them, or free. Without it the two fingers are found as ever, and the rows in which
-it touches an inner edge are left out of the measurement.
+In the space between the fingers, bounded by two straight lines, any other object is a part: held by both fingers, stuck
+to one of them, or free. With the part removed the two fingers are found as usual; the rows in which it touches an inner
+edge are left out of the measurement.
 """
 
 from dataclasses import replace
@@ -47,7 +47,7 @@ _clear = loop("part_removal_clear")
 def without_part(
     mask: Mask, directions: tuple[Direction, ...], below_tip_px: float, reach_px: float
 ) -> CoarseFingers | None:
-    """The two fingers of a gripper with something between them, or None where there is no such thing.
+    """Find the two fingers of a gripper with a part between them; None where there is no part.
 
     Parameters
     ----------
@@ -74,7 +74,7 @@ def without_part(
 
 
 def looks_parted(fingers: CoarseFingers, below_tip_px: float, reach_px: float) -> bool:
-    """Whether the two inner sides show a part: a floor between them, or a step out of one of them.
+    """Whether the two inner sides show a part: a floor between them, or a step out of one side.
 
     Parameters
     ----------
@@ -99,7 +99,7 @@ def looks_parted(fingers: CoarseFingers, below_tip_px: float, reach_px: float) -
 
 
 def is_likelier(parted: CoarseFingers, below_tip_px: float) -> bool:
-    """Whether a part was found, and not the shape of both fingers alike, as a nose at either tip is."""
+    """Whether a part was found, rather than a feature of both fingers' shape such as a nose at either tip."""
     hides = [is_hidden(finger, finger.top_along_px + below_tip_px) for finger in (parted.left, parted.right)]
     return parted.held_along_px is not None or not all(hides)
 
@@ -138,11 +138,11 @@ def _found_without(
 
 
 def _is_on_side(finger: CoarseFinger, across: float, reach_px: float) -> bool:
-    """Whether the finger that was found is the one that bounds the channel."""
+    """Whether the finger that was found is the one that bounds the channel on this side."""
     found, along = inner_crossing(finger.outline, finger.top_along_px + reach_px)
     return abs(found - across) <= ON_SIDE_PX + abs(along - finger.top_along_px - reach_px)
 
 
 def _widened(rows: Ints) -> Ints:
-    """Rows and their neighbours."""
+    """Add the neighbouring rows to a set of rows."""
     return np.unique((rows[:, None] + np.arange(-BEYOND_PX, BEYOND_PX + 1)).ravel())

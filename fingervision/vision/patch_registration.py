@@ -1,10 +1,10 @@
-"""How far a textured piece of surface has moved and turned: registration of patches against a reference picture.
+"""Translation and rotation of a textured surface: registration of patches against a reference picture.
 
 Inverse-compositional Gauss-Newton of the zero-normalised sum of squared differences over translation and rotation
 (Baker & Matthews, Int. J. Computer Vision 56(3), 2004, doi:10.1023/B:VISI.0000011205.11775.fd; Pan, Li & Tong,
 Experimental Mechanics 53(7), 2013, doi:10.1007/s11340-013-9717-6). A linear gradient of light and a gain are removed
-from both pictures. Both are smoothed alike and interpolated by cubic B-splines (`spline_interpolation`). Many patches
-of one size are registered together.
+from both pictures. Both pictures are smoothed in the same way and interpolated by cubic B-splines
+(`spline_interpolation`). Many patches of one size are registered together.
 """
 
 from dataclasses import dataclass
@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import correlate1d
 
+from fingervision.domain.loops import loop
 from fingervision.vision.spline_interpolation import (
     KERNEL_REACH,
     SPLINE_REACH,
@@ -22,7 +23,6 @@ from fingervision.vision.spline_interpolation import (
     gaussian,
     levels_and_derivatives,
     phase_power,
-    sampled,
 )
 
 Floats = NDArray[np.float32]
@@ -47,6 +47,8 @@ LEAST_INFORMATION = 0.02
 NOISE_MARGIN = 1.4
 # Variance of rounding to whole grey levels: no noise is smaller.
 ROUNDING = 1.0 / 12.0
+
+_settled = loop("patch_registration_settled")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -92,7 +94,7 @@ class PatchReference:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Registered:
-    """Where patches lie in another picture; arrays over the k patches.
+    """Positions and rotations of patches in another picture; arrays over the k patches.
 
     Parameters
     ----------
@@ -119,12 +121,19 @@ class Registered:
 
 @cache
 def _grid(half_width: int, half_height: int) -> tuple[Floats, Floats, Doubles]:
-    """Columns and rows from the middle, and an orthonormal basis of planes, shape (3, n)."""
+    """Columns and rows counted from the centre, and an orthonormal basis of planes, shape (3, n)."""
     y, x = np.mgrid[-half_height : half_height + 1, -half_width : half_width + 1]
     dx, dy = x.ravel().astype(np.float64), y.ravel().astype(np.float64)
     basis = np.stack((np.ones_like(dx), dx, dy))
     basis /= np.sqrt((basis**2).sum(axis=1))[:, None]
     return dx.astype(np.float32), dy.astype(np.float32), basis
+
+
+@cache
+def _extent(half_width: int, half_height: int) -> tuple[int, float]:
+    """Number of pixels of a patch, and the sum of their squared distances from its centre."""
+    dx, dy, _ = _grid(half_width, half_height)
+    return dx.size, float((dx.astype(np.float64) ** 2 + dy.astype(np.float64) ** 2).sum())
 
 
 def patch_reference(levels: Floats, column: int, row: int, half_width: int, half_height: int) -> PatchReference:
@@ -198,99 +207,58 @@ def register(
         In the order of the references.
     """
     first = references[0]
-    dx, dy, basis = _grid(first.half_width_px, first.half_height_px)
-    basis32 = basis.astype(np.float32)
-    height, width = parts[0].shape
-    count = len(references)
-    flat = np.concatenate([coefficients(part, SMOOTHING_PX).ravel() for part in parts])
-    begin = np.arange(count, dtype=np.intp) * (height * width)
-    own = np.stack([reference.levels for reference in references])
-    jacobian = np.stack([reference.jacobian for reference in references])
     hessian = np.stack([reference.hessian for reference in references])
     hessian += 1e-6 * np.trace(hessian, axis1=1, axis2=2)[:, None, None] * np.eye(3) + 1e-12 * np.eye(3)
     inverse = np.linalg.inv(hessian)
-    rim = max(first.half_width_px, first.half_height_px)
-    x, y, turn = (start[:, i] - (origins_px[:, i] if i < 2 else 0.0) for i in range(3))
-    settled, inside = np.zeros(count, dtype=bool), np.ones(count, dtype=bool)
-    residual, gain = np.zeros_like(own), np.ones(count, dtype=np.float64)
-    correlation = np.zeros(count)
-    at = np.arange(count)
-    for _iteration in range(ITERATIONS):
-        cosine, sine = np.cos(turn[at]), np.sin(turn[at])
-        c32, s32 = cosine.astype(np.float32)[:, None], sine.astype(np.float32)[:, None]
-        px = c32 * dx - s32 * dy + x[at].astype(np.float32)[:, None]
-        py = s32 * dx + c32 * dy + y[at].astype(np.float32)[:, None]
-        fits = (px.min(1) >= 1) & (py.min(1) >= 1) & (px.max(1) < width - 2) & (py.max(1) < height - 2)
-        inside[at[~fits]] = False
-        at, px, py, cosine, sine = at[fits], px[fits], py[fits], cosine[fits], sine[fits]
-        if not at.size:
-            break
-        seen = sampled(flat, begin[at], width, px, py)
-        seen -= (seen @ basis32.T) @ basis32
-        power = np.einsum("ij,ij->i", seen, seen).astype(np.float64)
-        common = np.einsum("ij,ij->i", seen, own[at]).astype(np.float64)
-        gain[at] = common / np.maximum(power, 1e-12)
-        own_power = np.einsum("ij,ij->i", own[at], own[at]).astype(np.float64)
-        correlation[at] = common / np.sqrt(np.maximum(power * own_power, 1e-12))
-        left = gain[at].astype(np.float32)[:, None] * seen - own[at]
-        residual[at] = left
-        score = np.einsum("kij,kj->ki", jacobian[at], left).astype(np.float64)
-        step = np.einsum("kij,kj->ki", inverse[at], score)
-        size = np.hypot(step[:, 0], step[:, 1])
-        limit = np.minimum(1.0, 1.0 / np.maximum(np.maximum(size, rim * np.abs(step[:, 2])), 1e-12))
-        step *= limit[:, None]
-        # The warp is composed with the inverse of the step: x -> R (R_s^T (x - t_s)) + t.
-        new_turn = turn[at] - step[:, 2]
-        cosine, sine = np.cos(new_turn), np.sin(new_turn)
-        x[at] -= cosine * step[:, 0] - sine * step[:, 1]
-        y[at] -= sine * step[:, 0] + cosine * step[:, 1]
-        turn[at] = new_turn
-        done = np.maximum(size, rim * np.abs(step[:, 2])) < SETTLED_PX
-        settled[at[done]] = True
-        at = at[~done]
-        if not at.size:
-            break
-    settled &= inside
+    found = [
+        _settled(
+            coefficients(part, SMOOTHING_PX), reference.levels, reference.jacobian, own,
+            first.half_width_px, first.half_height_px, x - left, y - top, turn,
+        )
+        for reference, part, own, (left, top), (x, y, turn) in zip(
+            references, parts, inverse, origins_px.tolist(), start.tolist(), strict=True
+        )
+    ]  # fmt: skip
+    x, y, turn, gain, correlation, squares = np.array([of[:6] for of in found]).T
+    settled = np.array([of[6] for of in found], dtype=bool)
     score = np.stack([reference.score for reference in references])
-    covariance, noise = _covariance(hessian, score, residual, gain, x, y, dx, dy, shared_pixels)
+    size = (first.half_width_px, first.half_height_px)
+    covariance, noise = _covariance(hessian, score, squares, gain, x, y, size, shared_pixels)
     return Registered(x + origins_px[:, 0], y + origins_px[:, 1], turn, covariance, correlation, noise, settled)
 
 
 def _covariance(
     hessian: Doubles,
     score: Doubles,
-    residual: Floats,
+    squares: Doubles,
     gain: Doubles,
     x: Doubles,
     y: Doubles,
-    dx: Floats,
-    dy: Floats,
+    half_size: tuple[int, int],
     shared_pixels: float,
 ) -> tuple[Doubles, Doubles]:
-    """Covariance of x, y and turn from what is left, and the noise of one picture.
+    """Covariance of x, y and rotation from the residuals, and the noise of one picture.
 
-    Both pictures have noise. Smoothed and interpolated levels have less of it than pixels, so the residuals show
-    `sigma^2 (k_0 + g^2 k)` with `k` by the phase; the estimate feels the noise of the pixels through the smoothing
-    alone, because the texture is coarser than the pixels: `2 sigma^2` times the Gram matrix of the gradients smoothed
-    once more. The gradients of the reference hold noise as well, which adds to their Gram matrix and is taken off it
-    (errors in variables): covariance = sigma_r^2 H^-1 S_seen H^-1.
+    Both pictures have noise. Smoothed and interpolated levels have less noise than pixels, so that the residuals have
+    the variance `sigma^2 (k_0 + g^2 k)`, where `k` depends on the sub-pixel phase. The estimate is affected by the
+    pixels' noise after smoothing only, because the texture is coarser than the pixels: `2 sigma^2` times the Gram
+    matrix of the gradients smoothed once more. The noise in the gradients of the reference increases their Gram matrix
+    and is subtracted from it (errors in variables): covariance = sigma_r^2 H^-1 S_seen H^-1.
     """
-    count, n = residual.shape
+    count, (n, turned) = squares.size, _extent(*half_size)
     table = phase_power(SMOOTHING_PX)
     places = [np.floor((v - np.floor(v)) * table.size).astype(np.intp) % table.size for v in (x, y)]
     power = table[places[0]] * table[places[1]]
-    squares = np.einsum("ij,ij->i", residual, residual).astype(np.float64) / max(n - 7, 1)
-    one = np.maximum(squares / (table[0] ** 2 + gain**2 * power), ROUNDING)
+    one = np.maximum(squares / max(n - 7, 1) / (table[0] ** 2 + gain**2 * power), ROUNDING)
     spread = one * (1.0 + gain**2) * shared_pixels
     noisy = np.zeros((count, 3, 3))
-    turned = float((dx.astype(np.float64) ** 2 + dy.astype(np.float64) ** 2).sum())
     noisy[:, 0, 0] = noisy[:, 1, 1] = one * n * derivative_power(SMOOTHING_PX)
     noisy[:, 2, 2] = one * turned * derivative_power(SMOOTHING_PX)
     return _propagated(hessian, score, noisy, spread), np.sqrt(one)
 
 
 def _propagated(hessian: Doubles, score: Doubles, noisy: Doubles, spread: Doubles) -> Doubles:
-    """Covariances of k patches, shape (k, 3, 3); infinite where gradients are those of noise or of one direction."""
+    """Covariances of k patches, shape (k, 3, 3); infinite for gradients of noise only, or of one direction only."""
     true = hessian - noisy
     size = np.sqrt(np.maximum(np.einsum("kii->ki", hessian), 1e-30))
     surely = hessian - NOISE_MARGIN * noisy
@@ -302,9 +270,9 @@ def _propagated(hessian: Doubles, score: Doubles, noisy: Doubles, spread: Double
 
 
 def reference_covariance(reference: PatchReference, noise: float) -> Doubles:
-    """Covariance of x, y and turn that a registration of this patch will have, shape (3, 3).
+    """Predicted covariance of x, y and rotation for a registration of this patch, shape (3, 3).
 
-    Infinite where its gradients are no more than those of the noise, or lie in one direction alone.
+    Infinite where the gradients do not exceed those of the noise, or have one direction only.
 
     Parameters
     ----------
@@ -313,10 +281,9 @@ def reference_covariance(reference: PatchReference, noise: float) -> Doubles:
     noise : float
         Standard deviation of the noise of one picture.
     """
-    dx, dy, _ = _grid(reference.half_width_px, reference.half_height_px)
     variance = max(noise**2, ROUNDING)
-    turned = float((dx.astype(np.float64) ** 2 + dy.astype(np.float64) ** 2).sum())
-    noisy = variance * derivative_power(SMOOTHING_PX) * np.diag([dx.size, dx.size, turned])
+    pixels, turned = _extent(reference.half_width_px, reference.half_height_px)
+    noisy = variance * derivative_power(SMOOTHING_PX) * np.diag([pixels, pixels, turned])
     return np.asarray(
         _propagated(reference.hessian[None], reference.score[None], noisy[None], np.array([2.0 * variance]))[0]
     )

@@ -54,8 +54,8 @@ UNIFORM = NoGap(Status.LOW_CONTRAST, "The picture is uniform: nothing in it diff
 def measure_frame(frame: Frame, settings: Settings) -> GapMeasurement | NoGap:
     """Measure one frame, without any memory of earlier ones.
 
-    OpenCV is held to one thread in this process from then on: its others wait busily from frame to frame, two thirds of
-    a second core for no gain at this size, and the decoder needs that core.
+    From then on OpenCV uses one thread in this process: its other threads would wait busily between frames, which costs
+    two thirds of a core at no gain, and the decoder needs that core.
 
     Parameters
     ----------
@@ -78,7 +78,7 @@ def measure_frame(frame: Frame, settings: Settings) -> GapMeasurement | NoGap:
 def look_closely(
     frame: Frame, settings: Settings
 ) -> tuple[GapMeasurement | NoGap, CoarseFingers | None, EdgePoints | None]:
-    """Measure one frame and keep what was found on the way, for whoever asks what limits the measurement.
+    """Measure one frame and keep the intermediate results, for reports on what limits the measurement.
 
     Parameters
     ----------
@@ -101,7 +101,7 @@ def look_closely(
 
 
 def steps(frame: Frame, settings: Settings) -> list[tuple[str, Pixels]]:
-    """Picture of every step of one frame, in order, each as large as what is looked at.
+    """Pictures of every step of one frame, in order, each as large as the region that is measured.
 
     Parameters
     ----------
@@ -140,7 +140,7 @@ def _part(grey: GreyImage, region: Region | None) -> GreyImage:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Coded:
-    """What a codec has done to the part of the picture that is looked at."""
+    """What a codec did to the measured region of the picture."""
 
     coding: Coding
     quantiser: Quantiser | None
@@ -156,7 +156,7 @@ def _coded(frame: Frame, settings: Settings) -> _Coded:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Attempt:
-    """How far a frame was understood: the binary picture, the fingers in it, their edges, and what came out."""
+    """How far the analysis of a frame got: the binary picture, the fingers in it, their edges, and the result."""
 
     outcome: GapMeasurement | NoGap
     binary: Binary | None = None
@@ -200,7 +200,7 @@ def _measured(
     coded: _Coded,
     scale: int,
 ) -> _Attempt:
-    """Measure two fingers that were found; rough ones over longer flanks where that is surer."""
+    """Measure two fingers that were found; rough fingers over longer flanks where that is more certain."""
     upright = fingers.orientation.view(grey)
     how = (settings, scale, light_gap, coded)
     edges, outcome = _edges_and_gap(upright, fingers, *how)
@@ -218,7 +218,7 @@ def _measured(
 def _edges_and_gap(
     upright: GreyImage, fingers: CoarseFingers, settings: Settings, scale: int, light_gap: bool, coded: _Coded
 ) -> tuple[EdgePoints, GapMeasurement | NoGap]:
-    """Edges of fingers that were found, and what they say."""
+    """Fit the edges of the fingers that were found, and derive the result."""
     light = _light(settings.response, scale, int(np.iinfo(upright.dtype).max) + 1)
     lines = visible_lines(profile_lines((fingers.left, fingers.right)), fingers)
     edges, apart_px = fit_edges(upright, lines, light, scale), 0.0
@@ -252,7 +252,7 @@ def _with_two_tones(
     coded: _Coded,
     scale: int,
 ) -> _Attempt:
-    """The same attempt, or one with another threshold where a shadow or pad was taken for the wrong class."""
+    """Return the attempt, or one with another threshold where a shadow or pad was put into the wrong class."""
     if not isinstance(attempt.outcome, GapMeasurement) or attempt.fingers is None or attempt.edges is None:
         return attempt
     upright = attempt.fingers.orientation.view(grey)
@@ -273,7 +273,7 @@ def _with_two_tones(
 
 
 def _scale(grey: GreyImage, settings: Settings) -> int:
-    """End of the scale: a response that was measured knows its depth."""
+    """Full scale of the light; a measured response states its own."""
     known = settings.response.top_level
     bits = settings.bits if known is None or grey.dtype == np.uint8 else known.bit_length()
     found = top_level(grey, bits)
@@ -292,7 +292,7 @@ def _light(response: CameraResponse, scale: int, levels: int) -> NDArray[np.floa
 
 
 def _shifted(measured: GapMeasurement | NoGap, region: Region | None) -> GapMeasurement | NoGap:
-    """From the region's pixels to the full frame's."""
+    """Shift a result from the region's pixel coordinates to those of the full frame."""
     if region is None:
         return measured
     return measured.shifted(region.x_px, region.y_px)

@@ -1,14 +1,15 @@
-"""Select the model of the mean profile across a flank, and from it the position of the finger's edge.
+"""Select the model of the mean profile across a flank, which gives the position of the finger's edge.
 
-A shadow, a wall and a line of glare each leave their own mean profile. Some of them cannot be told apart on one flank
-alone: a wall half as light as the ground looks like motion during the exposure, and glare like a wall on the other side
-of the edge. A wall is seen on the inner flank only, because the camera looks between the fingers; motion spreads both
-flanks and no tip; glare and shadow go all around.
+A shadow, a side wall and a line of glare each leave a characteristic mean profile. Some of these are indistinguishable
+on one flank alone: a wall half as light as the background looks like motion blur, and glare like a wall on the other
+side of the edge. A wall is visible on the inner flank only, because the camera looks into the gap from its middle;
+motion blurs both flanks and no tip; glare and shadow surround the finger.
 """
 
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.polynomial import Polynomial
 from numpy.typing import NDArray
 
 from fingervision.vision.beside_edge import without_additions
@@ -19,8 +20,9 @@ from fingervision.vision.first_guess import line
 from fingervision.vision.grey import GreyImage
 from fingervision.vision.median import median
 from fingervision.vision.profile_lines import INNER, IS_INNER, IS_ROW, ROWS
-from fingervision.vision.profile_models import GLARE, SHADOW, STARTS_PX, STEP, WALL, ProfileFit, fit_profile
+from fingervision.vision.profile_models import FADING, GLARE, SHADOW, STARTS_PX, STEP, WALL, ProfileFit, fit_profile
 from fingervision.vision.sharpening import U_SHIFT, Profile, is_curved, sharpening
+from fingervision.vision.symmetric_spread import symmetric_squares
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int_]
@@ -31,8 +33,10 @@ UNEXPLAINED = 1.2
 REACH_PX, BIN_PX, FEWEST_IN_BIN = 16, 0.5, 4
 # Rows are left out on purpose where their neighbours lie so many times as far apart as usual.
 LEFT_OUT = 4.0
-# A flank is straight where its rows lie this near to a line (pixels, standard deviation), over so many of them.
+# A flank is known where its rows lie this near to a line (pixels, standard deviation), over so many of them; an inner
+# one also where they lie so near to a curve. The degrees that are tried:
 STRAIGHT_PX, FEWEST_ROWS = 0.3, 6
+STRAIGHT_ONLY, STRAIGHT_OR_ROUND = (1,), (1, 4)
 # A model explains a profile that it leaves with so many times the noise, or with this part of what a step leaves; a
 # step does with half of that, or with so many times what the best model leaves. A wall improves it by so much in
 # chi-square.
@@ -40,6 +44,9 @@ MODEL_LEAVES, MODEL_TIMES, STEP_TIMES, SIGNIFICANT = 4.0, 10.0, 3.0, 30.0
 # One model is clearly better than another that leaves so much more chi-square, in units of what its own bins leave
 # (odds of e^8 to one).
 CLEARLY = 16.0
+# The integral of what a Gaussian step leaves of a disc of defocus, squared, is at most 0.0017 contrast^2 blur (of a box
+# 0.0038): what leaves more than this is two steps, or a line between them, even where it is alike to both sides.
+DISC_LEAVES = 0.002
 # What stands beside an edge makes this share of the contrast: less is texture, more is no finger's edge.
 SHARES = (0.05, 0.85)
 # Levels within so many standard deviations of the end of the scale are cut off now and then.
@@ -67,7 +74,7 @@ U_SHADOW, U_WALL, U_GLARE = 0.1, 0.1, 0.35
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Profile:
-    """Mean light across a flank: places outwards from the single step, light, and how many pixels."""
+    """Mean light across a flank: distances outwards from the fitted step, light, and numbers of pixels."""
 
     t: Floats
     light: Floats
@@ -77,7 +84,7 @@ class _Profile:
 def with_profile(
     upright: GreyImage, edges: EdgePoints, light: Floats, top_level: int, is_outline: bool = False
 ) -> EdgePoints:
-    """The same points, moved to the finger's own edge where something beside it has drawn the fitted step away.
+    """Return the points moved to the finger's own edge where a structure beside it has displaced the fitted step.
 
     Parameters
     ----------
@@ -97,7 +104,9 @@ def with_profile(
     if edges.noise_flat <= 0.0 or not (is_unlike_tip or edges.noise**2 > UNEXPLAINED * edges.noise_flat**2):
         return edges
     room = _room(edges)
-    inner = [_profile(upright, edges, light, k, slice(0, INNER), room) for k in range(2)]
+    # Round flanks cost ten times as much to look at: only where nothing says yet how far their edges may have moved.
+    curves = STRAIGHT_ONLY if any(mark.shift_px for mark in edges.marks) else STRAIGHT_OR_ROUND
+    inner = [_profile(upright, edges, light, k, slice(0, INNER), room, curves) for k in range(2)]
     if inner[0] is None or inner[1] is None:
         return edges
     if any(p.light.max() > top_level - CUT_OFF_SIGMAS * edges.noise or p.light.min() <= 0.0 for p in inner if p):
@@ -108,6 +117,7 @@ def with_profile(
     blur = [float(np.hypot(edges.blur_px[k, 0], np.sqrt(PIXEL_VARIANCE))) for k in range(2)]
     fits = [[_best(STEP, profile, weight, blur[k])] for k, profile in enumerate(inner) if profile]
     bins = sum(profile.t.size for profile in inner if profile)
+    profiles = [(profile, weight, blur[k]) for k, profile in enumerate(inner) if profile]
     if sum(each[STEP].squares for each in fits) < 0.5 * MODEL_LEAVES * bins:
         # A step explains both, whatever the others would: only how wide it is is still to be asked.
         fits = [[each[STEP]] * 4 for each in fits]
@@ -123,19 +133,27 @@ def with_profile(
     shadow, wall, glare = ([each[kind] for each in fits] for kind in (SHADOW, WALL, GLARE))
     all_around = np.hypot(1.0, edges.lines.slope)
     margin = CLEARLY * np.maximum(left / bins, 1.0)
+    # Optics of any shape that spread light alike to both sides (a disc of defocus, a halo) are no shadow and no glare.
+    is_lopsided = not is_step and not _is_symmetric(profiles, [each[STEP] for each in fits])
     is_shadow = left[SHADOW] < enough and left[SHADOW] + margin[SHADOW] < min(left[WALL], left[GLARE])
-    if not is_step and is_shadow and _are_of_size(shadow, -1.0):
-        moved = _moved(edges, shadow, U_SHADOW, all_around, "shadow")
-        return without_additions(upright, moved, light, SHADOW, shadow)
-    if not is_step and left[GLARE] < enough and left[GLARE] + margin[GLARE] < left[WALL] and _are_of_size(glare, 1.0):
+    if is_lopsided and is_shadow and _are_of_size(shadow, -1.0):
+        return _without_shadow(upright, edges, light, shadow, [_best(FADING, *seen) for seen in profiles], bins)
+    if is_lopsided and left[GLARE] < enough and left[GLARE] + margin[GLARE] < left[WALL] and _are_of_size(glare, 1.0):
         moved = _moved(edges, glare, U_GLARE, all_around, "glare")
         return without_additions(upright, moved, light, GLARE, glare)
     outer = [_profile(upright, edges, light, k, slice(INNER, ROWS), REACH_PX) for k in range(2)]
     if outer[0] is None or outer[1] is None:
         is_wall = not is_step and left[WALL] < enough and _are_of_size(wall, -1.0)
+        if not is_wall and is_unlike_tip:
+            # Flanks that are broader than the tips: by a wall, or by motion, and nothing here tells which.
+            wall = [
+                _best(WALL, *seen[:2], float(np.hypot(tip, np.sqrt(PIXEL_VARIANCE))), True)
+                for seen, tip in zip(profiles, edges.blur_px[:, 1], strict=True)
+            ]
+            is_wall = sum(fit.squares for fit in wall) < left[STEP] - SIGNIFICANT and _are_of_size(wall, -1.0)
         chosen = [_beyond_wall(fit) for fit in wall] if is_outline else wall
         return _unsure(edges, [abs(fit.position) for fit in chosen], "wall") if is_wall else edges
-    if not is_step and left[SHADOW] < enough:
+    if is_lopsided and left[SHADOW] < enough:
         # A shadow that the inner flanks alone cannot tell from a wall falls on the outer side as well.
         beyond = np.array(
             [[_best(kind, p, weight, blur[k]).squares for kind in range(3)] for k, p in enumerate(outer) if p]
@@ -143,8 +161,7 @@ def with_profile(
         both = left[:3] + beyond.sum(axis=0)
         is_likelier = both[SHADOW] + margin[SHADOW] < both[WALL] and both[SHADOW] < both[STEP] / MODEL_TIMES
         if is_likelier and _are_of_size(shadow, -1.0):
-            moved = _moved(edges, shadow, U_SHADOW, all_around, "shadow")
-            return without_additions(upright, moved, light, SHADOW, shadow)
+            return _without_shadow(upright, edges, light, shadow, [_best(FADING, *seen) for seen in profiles], bins)
     widths = [_best(STEP, profile, weight, blur[k]).blur for k, profile in enumerate(outer) if profile]
     is_one_sided = [
         each[STEP].blur ** 2 > width**2 + max(ONE_SIDED * width**2, ONE_SIDED_PX**2)
@@ -165,7 +182,7 @@ def with_profile(
     if any(widened):
         return _unsure(edges, [0.5 * more / MOTION_RADIUS_PX for more in widened], "motion")
     is_resolved = all(fit.breadth > RESOLVED_BLURS * fit.blur for fit in wall)
-    if is_step or left[GLARE] > enough or not is_resolved or not _are_of_size(glare, 1.0):
+    if not is_lopsided or left[GLARE] > enough or not is_resolved or not _are_of_size(glare, 1.0):
         return edges
     # Glare on the finger, or a bevel around it: the outline is in between.
     bevel = [abs(w.position + w.breadth - g.position) / np.sqrt(3.0) for w, g in zip(wall, glare, strict=True)]
@@ -174,8 +191,32 @@ def with_profile(
     return replace(moved, marks=_stated(moved, [max(m.shift_px, u) for m, u in zip(moved.marks, bevel, strict=True)]))
 
 
+def _without_shadow(
+    upright: GreyImage, edges: EdgePoints, light: Floats, ramps: list[ProfileFit], fading: list[ProfileFit], bins: int
+) -> EdgePoints:
+    """Edges corrected for a soft shadow, whose light recovers between linearly and exponentially.
+
+    The edge lies between the positions of these two models, weighted by the squares that each leaves beyond chance. Its
+    displacement towards the model that leaves more is taken as its own standard uncertainty.
+    """
+    squares = [sum(fit.squares for fit in fits) for fits in (ramps, fading)]
+    if squares[0] <= squares[1] or not _are_of_size(fading, -1.0):
+        kind, fits, others = SHADOW, ramps, fading
+    else:
+        kind, fits, others = FADING, fading, ramps
+    beyond = [max(each - bins, np.sqrt(2.0 * bins)) for each in squares]
+    share = min(beyond) / sum(beyond) if _are_of_size(others, -1.0) else 0.0
+    towards = [share * (other.position - fit.position) for fit, other in zip(fits, others, strict=True)]
+    by_pixel = np.hypot(1.0, edges.lines.slope)
+    moved = without_additions(upright, _moved(edges, fits, U_SHADOW, by_pixel, "shadow"), light, kind, fits)
+    further = np.array(towards)[:, None] * np.hypot(1.0, moved.lines.slope)
+    u_px = [float(np.hypot(mark.shift_px, by)) for mark, by in zip(moved.marks, towards, strict=True)]
+    position = moved.position + moved.lines.outward * further
+    return replace(moved, position=position, marks=_stated(moved, u_px))
+
+
 def _sharpened(upright: GreyImage, edges: EdgePoints, light: Floats, top_level: int, room: int) -> EdgePoints | None:
-    """The same points without what sharpening of the stored levels has moved them by; None where there is none."""
+    """Return the points corrected for sharpening of the stored levels; None where there is no sharpening."""
     stored = np.arange(float(light.size))
     left, right = (_profile(upright, edges, stored, k, slice(0, INNER), room) for k in range(2))
     if left is None or right is None:
@@ -192,13 +233,25 @@ def _sharpened(upright: GreyImage, edges: EdgePoints, light: Floats, top_level: 
     return replace(moved, marks=_stated(moved, u_px), beside="sharpening")
 
 
+def _is_symmetric(flanks: list[tuple[_Profile, float, float]], steps: list[ProfileFit]) -> bool:
+    """Whether the profiles of both flanks could come from optics that spread light symmetrically."""
+    squares = left = 0.0
+    for (profile, weight, blur), step in zip(flanks, steps, strict=True):
+        contrast = float(np.ptp(profile.light))
+        by_noise = weight * float(profile.count.mean()) * contrast**2 * step.blur
+        left += BIN_PX * max(step.squares - profile.t.size, 0.0) / by_noise / len(flanks)
+        squares += symmetric_squares(profile.t, profile.light, weight * profile.count, blur)
+    bins = sum(profile.t.size for profile, _, _ in flanks)
+    return squares < 0.5 * MODEL_LEAVES * bins and left < DISC_LEAVES
+
+
 def _are_of_size(fits: list[ProfileFit], sign: float) -> bool:
-    """Whether what stands beside a dark finger's edge has the sign that it must have, and the size of such things."""
+    """Whether the structure beside a dark finger's edge has a plausible sign and size."""
     return all(SHARES[0] < sign * fit.share < SHARES[1] for fit in fits)
 
 
 def _room(edges: EdgePoints) -> int:
-    """How far the window may reach before it meets the other finger (pixels)."""
+    """How far a window may extend before it meets the other finger (pixels)."""
     real = [edges.position[k, :INNER][edges.lines.weight[k, :INNER] > 0] for k in range(2)]
     if not (real[0].size and real[1].size):
         return 0
@@ -213,7 +266,7 @@ def _best(
     is_blur_known: bool = False,
     too_many: float = np.inf,
 ) -> ProfileFit:
-    """The best fit of a model from any of its starts."""
+    """The best fit of a model among all starting values."""
     weights = profile.count * weight
     blurs = (blur,) if is_blur_known or kind == STEP else (blur, OWN_BLUR * blur)
     return min(
@@ -226,26 +279,40 @@ def _best(
     )
 
 
-def _profile(upright: GreyImage, edges: EdgePoints, light: Floats, k: int, part: slice, room: int) -> _Profile | None:
-    """Mean profile of the half of a flank that is farther from the tip; None where it is short or not straight."""
+def _profile(
+    upright: GreyImage,
+    edges: EdgePoints,
+    light: Floats,
+    k: int,
+    part: slice,
+    room: int,
+    curves: tuple[int, ...] = STRAIGHT_ONLY,
+) -> _Profile | None:
+    """Mean profile of the half of a flank farther from the tip; None where it is short or not smooth."""
     real = np.flatnonzero(edges.lines.weight[k, part] > 0)
     rows = real[real.size // 2 :]
     if rows.size < FEWEST_ROWS or room < REACH_PX // 2:
         return None
     fixed, found = edges.lines.fixed[k, part][rows], edges.position[k, part][rows]
     outward = int(edges.lines.outward[k, part][0])
-    keep = np.ones(rows.size, dtype=bool)
-    for _look in range(3):
-        at, slope = line(fixed[keep].astype(np.float64), found[keep])
-        away = found - at - slope * fixed
-        spread = 1.4826 * median(np.abs(away[keep]))
-        keep = np.abs(away) < 3.0 * spread + 1e-3
-        if np.count_nonzero(keep) < FEWEST_ROWS:
-            return None
-    if spread > STRAIGHT_PX:
+    for degree in curves:
+        keep = np.ones(rows.size, dtype=bool)
+        for _look in range(3):
+            if degree == 1:  # a hundred times faster
+                curve = Polynomial(line(fixed[keep].astype(np.float64), found[keep]))
+            else:
+                curve = Polynomial.fit(fixed[keep], found[keep], degree)
+            away = found - curve(fixed)
+            spread = 1.4826 * median(np.abs(away[keep]))
+            keep = np.abs(away) < 3.0 * spread + 1e-3
+            if np.count_nonzero(keep) < FEWEST_ROWS + degree - 1:
+                return None
+        if spread <= STRAIGHT_PX:
+            break
+    else:
         return None
     fixed = _rows_between(fixed[keep])
-    edge = at + slope * fixed
+    edge, slope = curve(fixed), curve.deriv()(fixed)[:, None]
     columns = np.rint(edge).astype(int)[:, None] + outward * np.arange(-REACH_PX, room + 1)
     is_in = (columns >= 0) & (columns < upright.shape[1])
     values = light[upright[np.broadcast_to(fixed[:, None], columns.shape)[is_in], columns[is_in]]]
@@ -258,9 +325,9 @@ def _profile(upright: GreyImage, edges: EdgePoints, light: Floats, k: int, part:
 
 
 def _rows_between(looked_at: Ints) -> Ints:
-    """Every row between the first and the last that were looked at, also where lines were thinned out.
+    """Every row between the first and the last searched one, also where lines were thinned out.
 
-    Where many in succession were left out, a part hides the edge there.
+    Where many successive rows were left out, a part hides the edge there.
     """
     looked_at = np.sort(looked_at)
     rows, steps = np.arange(looked_at[0], looked_at[-1] + 1), np.diff(looked_at).astype(np.float64)
@@ -273,18 +340,18 @@ def _rows_between(looked_at: Ints) -> Ints:
 
 
 def _across(edges: EdgePoints) -> Floats:
-    """Movement along every line for one pixel across the picture: a wall is the outline seen again beside itself."""
+    """Movement along every line per pixel of movement across the picture: a wall repeats the outline beside itself."""
     towards_gap = edges.lines.outward[:, :1] * edges.lines.slope
     return np.where(IS_INNER, 1.0, np.where(IS_ROW, 0.0, np.maximum(towards_gap, 0.0)))
 
 
 def _beyond_wall(fit: ProfileFit) -> ProfileFit:
-    """The far edge of a wall, where the near one was found."""
+    """The far edge of a wall, where the fit found the near one."""
     return fit._replace(position=fit.position + fit.breadth)
 
 
 def _moved(edges: EdgePoints, fits: list[ProfileFit], u_relative: float, by_pixel: Floats, beside: str) -> EdgePoints:
-    """Edges at the place that a model gives; what is not known of it is stated."""
+    """Move the edges to the positions that a model gives, and state the remaining uncertainty."""
     moves = np.array([fit.position for fit in fits])[:, None] * by_pixel
     u_px = [float(np.hypot(fit.u_position, u_relative * fit.position)) for fit in fits]
     position = edges.position + edges.lines.outward * moves
@@ -292,7 +359,7 @@ def _moved(edges: EdgePoints, fits: list[ProfileFit], u_relative: float, by_pixe
 
 
 def _with_blur(edges: EdgePoints, widths: list[float]) -> EdgePoints:
-    """Edges whose inner flanks are blurred as the outer ones are: a wall is no blur."""
+    """Give the inner flanks the blur of the outer ones: a wall is not blur."""
     blur_px = edges.blur_px.copy()
     blur_px[:, 0] = [np.sqrt(max(width**2 - PIXEL_VARIANCE, 0.0)) for width in widths]
     blur_px[:, 1] = np.minimum(blur_px[:, 0], blur_px[:, 1])
@@ -300,12 +367,12 @@ def _with_blur(edges: EdgePoints, widths: list[float]) -> EdgePoints:
 
 
 def _unsure(edges: EdgePoints, limit_px: list[float], beside: str) -> EdgePoints:
-    """Edges that stay, with what nobody can tell: anywhere up to the limit."""
+    """Leave the edges in place, with an uncertainty of up to the limit because the cause is undecided."""
     u_px = [max(abs(m.shift_px), limit / np.sqrt(3.0)) for m, limit in zip(edges.marks, limit_px, strict=True)]
     return replace(edges, marks=_stated(edges, u_px), beside=beside)
 
 
 def _stated(edges: EdgePoints, u_px: list[float]) -> tuple[EdgeMark, EdgeMark]:
-    """Marks that hold these uncertainties; both edges err alike."""
+    """Marks with the given uncertainties; both edges have the same error."""
     left, right = (EdgeMark(u, mark.beyond) for u, mark in zip(u_px, edges.marks, strict=True))
     return left, right

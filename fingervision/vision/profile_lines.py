@@ -1,7 +1,7 @@
-"""Where to look for edges: a row across a flank, a column across a tip, for every pixel of the coarse outline.
+"""Search lines for edges: a row across a flank, a column across a tip, for every pixel of the coarse outline.
 
-Each finger has the same number of places for lines, so that the lines of many fingers are one array: rows across the
-inner flank, rows across the outer flank, columns across the tip. A place that nothing fills has no weight.
+Each finger has the same number of places for lines, so that the lines of several fingers fit into one array: rows
+across the inner flank, rows across the outer flank, columns across the tip. An unused place has weight zero.
 """
 
 from collections.abc import Sequence

@@ -1,4 +1,4 @@
-"""Residuals of the fitted shape of a finger's end: its uncertainty, and whether the shape is rejected."""
+"""Residuals of the fitted shape of a finger's end: the uncertainty they give, and whether the shape is rejected."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,6 +34,9 @@ MOST_REJECTED, LEAST_COUNTED = 0.5, 0.05
 # Where most of the points within so many pixels above or below the measuring point are rejected, they may be the
 # finger's own edge (a corner that is cut off, a bend) and not dust.
 BESIDE_PX = 4.0
+# Blur draws a sharp corner back from its vertex by 0.77 sigma, and 1.1 sigma at a turn of 120 degrees: a tip that lies
+# higher above every point than that and half a pixel is none.
+TIP_BEYOND_IN_BLURS, TIP_BEYOND_PX = 1.5, 0.5
 # A measuring point farther from every point of the outline would be extrapolated (pixels).
 FARTHEST_POINT_PX = 2.5
 
@@ -46,7 +49,7 @@ _distance_in_spacings = loop("residuals_distance_in_spacings")
 
 
 def spread(end: FingerEnd) -> float:
-    """Variance of the residuals in units of what the points' own uncertainties explain."""
+    """Ratio of the residuals' variance to the points' own variances."""
     free = max(float(end.robust.sum()) - PARAMETERS, 1.0)
     return max(float(end.robust @ end.residual**2) / free / BIWEIGHT_SPREAD, 0.5)
 
@@ -54,9 +57,10 @@ def spread(end: FingerEnd) -> float:
 def shared_points(
     points: tuple[OutlinePoints, OutlinePoints], ends: tuple[FingerEnd, FingerEnd], coding: Coding
 ) -> float:
-    """Neighbouring points that share their errors, in both fingers alike.
+    """Number of neighbouring points that share their errors, the same for both fingers.
 
-    What a codec does to a whole block the fit takes for shape: the residuals do not show it, the block's side does.
+    The fit takes a codec's error of a whole block for shape: the residuals do not show it, so that the block's size is
+    used.
     """
     seen: list[float] = [_shared(end.residual, end.robust, p.side) for p, end in zip(points, ends, strict=True)]
     return max(0.5 * sum(seen), SHARED_POINTS[coding])
@@ -65,7 +69,7 @@ def shared_points(
 def shape_holds(
     points: OutlinePoints, end: FingerEnd, found: MeasuringPoint, below_tip_px: float, stray: float = 1.0
 ) -> bool:
-    """Whether the three-sided shape leaves nothing systematic near the measuring point and near the tip.
+    """Whether the three-sided shape leaves no systematic residuals near the measuring point and near the tip.
 
     Parameters
     ----------
@@ -78,6 +82,8 @@ def shape_holds(
     """
     if np.count_nonzero(end.robust) < PARAMETERS or not is_on_outline(points, found.edge, found.tip + below_tip_px):
         return False
+    if found.tip < points.y.min() - TIP_BEYOND_PX - TIP_BEYOND_IN_BLURS * float(points.blur.max()):
+        return False
     if _rejected(points.x, points.y, end.robust, found.edge, found.tip, below_tip_px) > MOST_REJECTED:
         return False
     limit = max(_roughness(end.residual, end.robust), 1.0) * np.sqrt(stray)
@@ -86,16 +92,17 @@ def shape_holds(
 
 
 def set_aside_variance(points: OutlinePoints, end: FingerEnd, edge: float, height: float) -> float:
-    """Variance of the edge for what the fit took for dust beside the measuring point (pixels squared).
+    """Variance of the edge from points beside the measuring point that the fit rejected as dust (pixels squared).
 
-    The edge lies anywhere between the shape and the farthest of these points, a rectangular distribution, and both
-    fingers alike: twice the variance of either holds the sum of both (JCGM 100:2008, 4.3.7 and 5.2.2).
+    The edge lies anywhere between the shape and the farthest of these points, a rectangular distribution. Both fingers
+    have the same error, so that twice the variance of either covers the variance of the sum (JCGM 100:2008, 4.3.7 and
+    5.2.2).
     """
     return float(2.0 / 3.0 * _set_aside(points.x, points.y, points.u, end.residual, end.robust, edge, height) ** 2)
 
 
 def has_flanks(points: OutlinePoints, end: FingerEnd, turn: float = 0.0) -> bool:
-    """Whether enough of the outline that was fitted belongs to flanks that stand nearly along the axis.
+    """Whether enough of the fitted outline belongs to flanks nearly parallel to the axis.
 
     Parameters
     ----------
@@ -114,5 +121,5 @@ def has_flanks(points: OutlinePoints, end: FingerEnd, turn: float = 0.0) -> bool
 
 
 def is_on_outline(points: OutlinePoints, edge: float, height: float) -> bool:
-    """Whether a measuring point has points of the outline beside it: nothing is ever extrapolated."""
+    """Whether a measuring point has outline points beside it, because nothing is extrapolated."""
     return float(_distance_in_spacings(points.x, points.y, edge, height)) < FARTHEST_POINT_PX

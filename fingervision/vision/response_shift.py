@@ -26,7 +26,7 @@ STEPS = 4096
 def edge_shift_px(
     assumed: CameraResponse, other: CameraResponse, inside: float, outside: float, blur_px: float
 ) -> float:
-    """Error of an edge that is fitted under one response while another one is true, from the finger outwards (pixels).
+    """Error of an edge fitted under an assumed response if another one is true, outwards from the finger (pixels).
 
     Parameters
     ----------
@@ -47,7 +47,8 @@ def gap_shift_px(
 ) -> float:
     """How much larger a measured gap is than it would be if the other response were the true one (pixels).
 
-    A finger's whole outline moves, the tip as well: where the edge is slanted the measuring point goes down with it.
+    A finger's whole outline moves, including the tip; where the edge is slanted, the measuring height moves with the
+    tip.
     """
     total = 0.0
     for k, (finger, slope) in enumerate(
@@ -61,7 +62,7 @@ def gap_shift_px(
 
 @lru_cache(maxsize=4096)
 def _shift(assumed: str, other: str, inside: int, outside: int, blur: int) -> float:
-    """Fit a step of the other response's light, seen through the assumed one; the responses are the standards'."""
+    """Fit a step of light that has one standard response, read through another standard response."""
     sigma = BLUR_RATIO**blur
     shares = np.linspace(0.0, 1.0, STEPS)
     assumed_light, other_light = (

@@ -1,11 +1,11 @@
-"""Roughness and printed texture: how far an edge strays from its mean line, and over which length along itself.
+"""Roughness and printed texture: deviation of an edge from its mean line, and its correlation length.
 
-Neighbouring points of a rough edge err together, so that many of them know less than they seem to. The flanks say how
-far and over which length: about a parabola of its own, each flank is white noise of the points plus a stationary
-process (Matern, smoothness 5/2: its tails are a little longer than a Gaussian's, so rather too wide than too narrow),
-whose standard deviation and length have the restricted likelihood of Patterson and Thompson (Biometrika 58, 1971, 545):
-what the parabola takes up of a long wave is accounted for. The covariance is the mean over that likelihood and not its
-maximum: a few waves do not tell their length.
+Neighbouring points of a rough edge have correlated errors, so that the mean of many has a larger variance than
+independent points would give. Both are estimated from the flanks. About a parabola of its own, each flank is white
+noise of the points plus a stationary process (Matern, smoothness 5/2: its tails are a little longer than a Gaussian's,
+so rather too wide than too narrow). Its standard deviation and length have the restricted likelihood of Patterson and
+Thompson (Biometrika 58, 1971, 545), which accounts for what the parabola removes of a long wave. The covariance is the
+mean over that likelihood, not its value at the maximum, because a few waves do not determine their length.
 """
 
 from dataclasses import dataclass
@@ -40,7 +40,7 @@ _errors = loop("roughness_errors")
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Roughness:
-    """How an edge strays from its mean line.
+    """Deviation of an edge from its mean line.
 
     Parameters
     ----------
@@ -57,12 +57,12 @@ class Roughness:
 
     @property
     def shared_px(self) -> float:
-        """Length of edge that counts as one independent point: the integral of the correlation."""
+        """Length of edge that counts as one independent point: the integral of the correlation (pixels)."""
         return float((2.0 * self.covariance.sum() - self.covariance[0]) / self.covariance[0])
 
 
 def roughness(points: tuple[OutlinePoints, OutlinePoints], ends: tuple[FingerEnd, FingerEnd]) -> Roughness | None:
-    """What the flanks of both fingers show of it; None where they show nothing.
+    """Estimate the roughness from the flanks of both fingers; None where they show none.
 
     Parameters
     ----------
@@ -103,7 +103,7 @@ def roughness(points: tuple[OutlinePoints, OutlinePoints], ends: tuple[FingerEnd
 
 
 def with_roughness(points: OutlinePoints, found: Roughness) -> OutlinePoints:
-    """The same points, each as unsure of the mean line as the edge strays from it."""
+    """Return the points with their variances increased by the edge's deviation from its mean line."""
     u = np.hypot(points.u, found.deviation_px)
     return OutlinePoints(points.x, points.y, u, points.side, points.blur)
 

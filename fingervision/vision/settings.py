@@ -1,4 +1,4 @@
-"""Settings of a measurement as vision needs them."""
+"""Settings of a measurement as far as image processing needs them."""
 
 from dataclasses import dataclass
 
@@ -12,7 +12,7 @@ LINEAR, SRGB = standard_response("linear"), standard_response("srgb")
 
 @dataclass(frozen=True, slots=True)
 class Settings:
-    """What the user chose.
+    """What the user chose for the measurement.
 
     Parameters
     ----------

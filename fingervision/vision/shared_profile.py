@@ -1,9 +1,10 @@
-"""What all rows of a flank share of their residuals: how far something may have displaced the flank as a whole.
+"""Mean residual over all rows of a flank: how far something may have displaced the flank as a whole.
 
-Where a codec, an interpolation or a filter treats all rows alike, the mean of their residuals over the rows does not
-average out. Along the window across the edge the mean residual has one part that the fit takes for a displacement, and
-others that it cannot take up; these are seen, and the first is about as large as they are. A displacement is even about
-the edge, and optics that spread light alike to both sides leave an odd profile only, whatever their shape.
+Where a codec, an interpolation or a filter affects all rows in the same way, their mean residual does not average out.
+Across the edge, one component of the mean residual is absorbed by the fit as a displacement and cannot be seen; the
+other components are visible, and the first is assumed to be about as large as they are. A displacement leaves a profile
+that is even about the edge. Optics that spread light equally to both sides leave an odd profile only, whatever their
+shape.
 """
 
 from typing import NamedTuple
@@ -93,7 +94,9 @@ def flanks(upright: GreyImage, edges: EdgePoints, light: Floats) -> list[Flank]:
 
 
 def shared_shift_px(found: list[Flank]) -> float:
-    """Standard uncertainty of one flank's place for what its rows share beyond chance (pixels); 0 where they do not.
+    """Standard uncertainty of one flank's position from its rows' significant mean residual (pixels).
+
+    0 if there is none.
 
     Parameters
     ----------
@@ -105,7 +108,7 @@ def shared_shift_px(found: list[Flank]) -> float:
 
 
 def even_shift_px(found: list[Flank]) -> float:
-    """The same from the even part of the profile alone; 0 where chance would show as much.
+    """The same from the even part of the profile alone; 0 where noise would explain it.
 
     Parameters
     ----------
@@ -122,14 +125,14 @@ def even_shift_px(found: list[Flank]) -> float:
 
 
 def _whole(flank: Flank) -> float:
-    """Variance of a pixel's mean, by all that the fit has left of the profile."""
+    """Variance of a pixel's mean, from all residuals of the profile."""
     return float(flank.mean @ flank.mean) / (flank.mean.size - FITTED)
 
 
 def _even(flank: Flank) -> float:
-    """Variance of a pixel's mean, by what the fit has left of the even part of the profile.
+    """Variance of a pixel's mean, from the residuals of the even part of the profile.
 
-    Light that falls off over the window, on either side of the edge, is no matter of the edge and is left out as well.
+    Light that falls off over the window, on either side of the edge, is not part of the edge and is excluded too.
     """
     half = 0.5 * flank.mean.size
     away = np.arange(flank.mean.size) + 0.5 - half - flank.offset_px

@@ -1,9 +1,10 @@
-"""Sharpening inside a camera with a curved response: it works on stored levels, and so moves the edge in light.
+"""Sharpening inside a camera with a curved response: it acts on stored levels, and so displaces the edge in light.
 
-An unsharp mask adds as much to the light side of an edge as it takes from the dark side, in levels. Seen in light the
-two are unlike, and a step that is fitted there lies off the edge. The mean profile of a flank, in levels, shows the
-mask: it is fitted as a blurred step of light, coded by the response, plus a share of what a blur leaves of it. The
-same profile, decoded, tells where the step that was fitted in light lies. The difference is taken off all around.
+In stored levels, an unsharp mask adds as much to the light side of an edge as it takes from the dark side. Converted to
+light the two amounts differ, so that a step fitted there is displaced from the edge. The mask is visible in the mean
+profile of a flank in stored levels, which is fitted as a blurred step of light, coded by the response, plus a fraction
+of its difference from a blurred copy. The same fitted profile, converted to light, gives the position at which the
+light's step was fitted. The difference is the correction, applied to the whole outline.
 """
 
 from collections.abc import Callable
@@ -56,7 +57,7 @@ class Sharpening:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Profile:
-    """Mean stored level across a flank: places outwards from the step that was fitted in light, and their pixels."""
+    """Mean stored level across a flank: distances outwards from the step fitted in light, and numbers of pixels."""
 
     t: Floats
     level: Floats
@@ -64,12 +65,12 @@ class Profile:
 
 
 def is_curved(light: Floats, top_level: int) -> bool:
-    """Whether levels are not in proportion to light."""
+    """Whether stored levels are not proportional to light."""
     return abs(float(light[top_level // 2]) / float(light[top_level]) - 0.5) > CURVED
 
 
 def sharpening(profiles: tuple[Profile, Profile], light: Floats, top_level: int, blur_px: float) -> Sharpening | None:
-    """What the mean profiles of both inner flanks show of an unsharp mask; None where they show nothing.
+    """Estimate an unsharp mask from the mean profiles of both inner flanks; None where there is none.
 
     Parameters
     ----------
@@ -145,7 +146,7 @@ def _fitted(residuals: Callable[[Floats], Floats], start: Floats, free: int) -> 
 
 
 def _adjusted(model: Floats, level: Floats, root: Floats) -> Floats:
-    """Weighted residuals with the offset and the size of the model at their best."""
+    """Weighted residuals with offset and scale of the model at their best values."""
     basis = np.column_stack((root, root * model))
     seen = root * level
     return np.asarray(basis @ np.linalg.solve(basis.T @ basis, basis.T @ seen) - seen)

@@ -1,7 +1,7 @@
-"""Levels of a picture between its pixels by cubic B-splines, and what interpolation does to their noise.
+"""Interpolation of a picture between its pixels by cubic B-splines, and its effect on the noise.
 
-Unser, IEEE Signal Processing Magazine 16(6), 1999, doi:10.1109/79.799930. A Gaussian before it costs nothing, as it is
-part of the spline's own filter.
+Unser, IEEE Signal Processing Magazine 16(6), 1999, doi:10.1109/79.799930. A Gaussian smoothing before it costs no time,
+as it is part of the spline's prefilter.
 """
 
 from functools import cache
@@ -19,7 +19,7 @@ KERNEL_REACH, SPLINE_REACH = 8, 2
 
 @cache
 def gaussian(sigma_px: float) -> Doubles:
-    """Sampled Gaussian of sum 1 over five standard deviations on either side; of 0 px it is 1."""
+    """Sampled Gaussian with sum 1 over five standard deviations on either side; for 0 px it is 1."""
     reach = int(np.ceil(5.0 * sigma_px))
     k = np.arange(-reach, reach + 1)
     kernel = np.exp(-0.5 * (k / sigma_px) ** 2) if sigma_px > 0.0 else np.ones(1)
@@ -28,7 +28,7 @@ def gaussian(sigma_px: float) -> Doubles:
 
 @cache
 def _prefilter(sigma_px: float) -> Floats:
-    """Interpolation's inverse filter after a Gaussian, truncated: coefficients of the cubic B-spline."""
+    """Prefilter of the interpolation after a Gaussian, truncated: it gives the coefficients of the cubic B-spline."""
     z = np.sqrt(3.0) - 2.0
     k = np.arange(-2 * KERNEL_REACH, 2 * KERNEL_REACH + 1)
     kernel = np.convolve(z ** np.abs(k), gaussian(sigma_px), mode="same")[KERNEL_REACH:-KERNEL_REACH]
@@ -59,7 +59,7 @@ def interpolated_power(place_px: float) -> float:
 
 
 def weights(fraction: NDArray[np.floating]) -> tuple[NDArray[np.floating], ...]:
-    """Cubic B-spline's weights of the four pixels about a place."""
+    """Weights of the cubic B-spline for the four pixels about a position."""
     f, g = fraction, 1.0 - fraction
     f2, g2 = f * f, g * g
     first, last = g2 * g / 6.0, f2 * f / 6.0
@@ -74,7 +74,7 @@ def coefficients(levels: Floats, sigma_px: float = 0.0) -> Floats:
 
 
 def levels_and_derivatives(c: Floats) -> tuple[Floats, Floats, Floats]:
-    """Spline's levels at the pixels themselves and their derivatives by x and by y; borders wrap."""
+    """Values of the spline at the pixels, and its derivatives with respect to x and y; borders wrap."""
 
     def mean(of: Floats, axis: int) -> Floats:
         return (np.roll(of, 1, axis) + 4 * of + np.roll(of, -1, axis)) / 6.0
@@ -86,7 +86,7 @@ def levels_and_derivatives(c: Floats) -> tuple[Floats, Floats, Floats]:
 
 
 def sampled(flat: Floats, start: NDArray[np.intp], stride: int, x: Floats, y: Floats) -> Floats:
-    """Spline's levels at places of several coefficient images that lie one after another in memory.
+    """Values of the spline at positions in several coefficient images that are stored one after another.
 
     Parameters
     ----------

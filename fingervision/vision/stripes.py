@@ -1,7 +1,7 @@
 """Fit a gap narrower than the blur, in which the light never reaches the level of the background.
 
-Its contrast cannot be told from its width in the row itself, so the contrast is taken from the tips, where the same
-ground lies open, and both edges of a row are fitted together.
+The contrast of such a gap cannot be separated from its width in the row itself. The contrast is therefore taken from
+the tips, where the same background is in full view, and both edges of a row are fitted together.
 """
 
 from dataclasses import dataclass, replace
@@ -30,7 +30,7 @@ CLOSING_SLOPE, NOTCH_SIGMAS = 0.1, 3.0
 
 @dataclass(frozen=True, slots=True, eq=False)
 class StripeEdges:
-    """Both edges of a stripe in every row; arrays of shape (n,).
+    """Both edges of a narrow gap (a stripe) in every row; arrays of shape (n,).
 
     Parameters
     ----------
@@ -49,7 +49,7 @@ class StripeEdges:
 
 
 def with_stripes(upright: GreyImage, edges: EdgePoints, light: Floats) -> EdgePoints:
-    """The same points, but where the fingers nearly touch both edges of a row are fitted as one stripe."""
+    """Return the points, with both edges of a row fitted as one stripe where the fingers nearly touch."""
     lines, reach = edges.lines, edges.reach_px
     facing = facing_lines(lines, reach)
     if facing is None:

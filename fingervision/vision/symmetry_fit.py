@@ -1,10 +1,9 @@
-"""The middle of a mark that looks the same when it is turned by half a turn: dots, crosses, corners of a chessboard.
+"""Centre of a mark with two-fold rotational symmetry: dots, crosses, corners of a chessboard.
 
-The picture is compared with itself reflected through a point, `I(c + x) - I(c - x)`; the point is the one that makes
-the sum of squares least (Gauss-Newton). Nothing but the symmetry is assumed: not the mark's size, blur or tone. Each
-pixel and its reflection change by twice the gradient, and their difference has twice the variance of the noise: the
-variance is that of a fit with the mark's shape known, `sigma^2 (sum g g')^-1`, the Cramer-Rao bound. A plane of light
-is taken off.
+The picture is compared with its reflection through a point, `I(c + x) - I(c - x)`; the centre is the point with the
+least sum of squares (Gauss-Newton). Only the symmetry is assumed, not the mark's size, blur or tone. The variance is
+that of a fit with known shape of the mark, `sigma^2 (sum g g')^-1`, the Cramer-Rao bound: the gradient of the
+difference is doubled, and the variance of its noise is doubled too. A plane of light is subtracted.
 """
 
 from dataclasses import dataclass
@@ -27,7 +26,7 @@ RIM, DIFFERENCE_POWER = 2, 130.0 / 144.0
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Symmetric:
-    """The middle of a point-symmetric mark.
+    """Centre of a point-symmetric mark.
 
     Parameters
     ----------
@@ -55,11 +54,11 @@ class Symmetric:
 
 
 class NoSymmetryError(ValueError):
-    """There is no such middle near the first guess."""
+    """There is no centre of symmetry near the initial estimate."""
 
 
 def fit_symmetry(part: Floats, start: tuple[float, float], half_px: int, shared_pixels: float = 1.0) -> Symmetric:
-    """Find the middle of a point-symmetric mark.
+    """Find the centre of a point-symmetric mark.
 
     Parameters
     ----------
@@ -154,7 +153,7 @@ def _judged(
 
 
 def _derivative(seen: Floats) -> Doubles:
-    """Change of each row's levels from column to column, without the two columns at either end."""
+    """Derivative of each row's levels along the row, without the two columns at either end."""
     levels = seen.astype(np.float64)
     return (8.0 * (levels[:, 3:-1] - levels[:, 1:-3]) - levels[:, 4:] + levels[:, :-4]) / 12.0
 

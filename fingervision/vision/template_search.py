@@ -1,10 +1,12 @@
-"""Where in a picture something looks like a template (zero-normalised correlation), and whether only there."""
+"""Find a template in a picture by zero-normalised correlation, and check that the match is unique."""
 
 from dataclasses import dataclass
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
+
+from fingervision.domain.loops import loop
 
 Floats = NDArray[np.float32]
 
@@ -17,10 +19,12 @@ CHANCE_SIGMAS, FEWEST_INDEPENDENT = 4.5, 4.0
 # of a texture of 4 px.
 BEYOND_PX = 5
 
+_best = loop("template_search_best")
+
 
 @dataclass(frozen=True, slots=True)
 class Match:
-    """The best place of a template.
+    """The best match of a template.
 
     Parameters
     ----------
@@ -38,50 +42,51 @@ class Match:
     is_alone: bool
 
 
-def best_match(part: Floats, template: Floats, beyond_px: int = BEYOND_PX) -> Match:
-    """Find a template in a part of a picture.
+class Template:
+    """A template, prepared for repeated searches.
 
     Parameters
     ----------
-    part, template : ndarray of float32, shape (height, width)
-        Light; the part is larger than the template to every side by how far the thing may be away and `beyond_px`.
-    beyond_px : int
-        Places so near the border of the search are looked at only to see whether the best one's lobe ends.
+    levels : ndarray of float32, shape (height, width)
+        Light.
     """
-    seen = np.asarray(cv2.matchTemplate(part, template, cv2.TM_CCOEFF_NORMED), dtype=np.float32)
-    # A part without any contrast has no correlation.
-    np.clip(seen, -1.0, 1.0, out=seen)
-    inner = seen[beyond_px : seen.shape[0] - beyond_px, beyond_px : seen.shape[1] - beyond_px]
-    _, best, _, (column, row) = cv2.minMaxLoc(inner)
-    column, row = column + beyond_px, row + beyond_px
-    x, y = float(column), float(row)
-    if beyond_px:
-        x += _vertex(seen[row, column - 1], seen[row, column], seen[row, column + 1])
-        y += _vertex(seen[row - 1, column], seen[row, column], seen[row + 1, column])
-    return Match(
-        x + 0.5 * (template.shape[1] - 1),
-        y + 0.5 * (template.shape[0] - 1),
-        float(best),
-        best > 0.0 and _is_alone(np.asarray(seen, dtype=np.float32), column, row, float(best), beyond_px),
-    )
 
+    def __init__(self, levels: Floats) -> None:
+        self.levels = levels
+        self._centred = np.asarray(levels - levels.mean(dtype=np.float64), dtype=np.float32)
+        self._norm = float(np.linalg.norm(self._centred.astype(np.float64)))
+        self._spectra: dict[tuple[int, ...], Floats] = {}
 
-def _is_alone(seen: Floats, column: int, row: int, best: float, beyond_px: int) -> bool:
-    alike = (seen >= ALIKE_SHARE * best).astype(np.uint8)
-    # The lobe of the best place, as far as it hangs together.
-    _, _, _, (left, top, width, height) = cv2.floodFill(alike, None, (column, row), 2)
-    slides = left == 0 or top == 0 or left + width == seen.shape[1] or top + height == seen.shape[0]
-    inner = alike[beyond_px : seen.shape[0] - beyond_px, beyond_px : seen.shape[1] - beyond_px]
-    return not slides and not np.any(inner == 1)
+    def best_match(self, part: Floats, beyond_px: int = BEYOND_PX) -> Match:
+        """Find the template in a part of a picture.
 
+        Parameters
+        ----------
+        part : ndarray of float32, shape (height, width)
+            Light; larger than the template to every side by how far the thing may be away and `beyond_px`.
+        beyond_px : int
+            Places so near the border of the search are looked at only to see whether the best one's lobe ends.
+        """
+        height, width = part.shape
+        rows, columns = self.levels.shape
+        centred = part - part.mean()
+        size = (cv2.getOptimalDFTSize(height), cv2.getOptimalDFTSize(width))
+        padded = cv2.copyMakeBorder(centred, 0, size[0] - height, 0, size[1] - width, cv2.BORDER_CONSTANT)
+        seen = cv2.mulSpectrums(cv2.dft(padded), self._spectrum(size), 0, conjB=True)
+        product = cv2.dft(seen, flags=cv2.DFT_INVERSE | cv2.DFT_SCALE | cv2.DFT_REAL_OUTPUT)
+        x, y, correlation, is_alone = _best(centred, product, columns, rows, self._norm, beyond_px)
+        return Match(x + 0.5 * (columns - 1), y + 0.5 * (rows - 1), correlation, is_alone)
 
-def _vertex(before: float, middle: float, after: float) -> float:
-    bend = float(before) - 2.0 * float(middle) + float(after)
-    return 0.5 * (float(before) - float(after)) / bend if bend < 0.0 else 0.0
+    def _spectrum(self, size: tuple[int, int]) -> Floats:
+        if size not in self._spectra:
+            padded = np.zeros(size, dtype=np.float32)
+            padded[: self.levels.shape[0], : self.levels.shape[1]] = self._centred
+            self._spectra[size] = np.asarray(cv2.dft(padded), dtype=np.float32)
+        return self._spectra[size]
 
 
 def independent_pixels(template: Floats) -> float:
-    """How many independent pixels a texture has: their number over the area of its squared autocorrelation."""
+    """Number of independent pixels in a texture: its pixels divided by the area of its squared autocorrelation."""
     levels = template.astype(np.float64) - template.mean()
     spectrum = np.abs(np.fft.fft2(levels, [2 * size for size in levels.shape])) ** 2
     correlation = np.fft.ifft2(spectrum).real
@@ -91,12 +96,12 @@ def independent_pixels(template: Floats) -> float:
 
 
 def chance_correlation(template: Floats) -> float:
-    """Correlation that another texture as coarse as this one may reach somewhere in a search."""
+    """Correlation that an unrelated texture of the same coarseness may reach by chance somewhere in a search."""
     return float(np.tanh(CHANCE_SIGMAS / np.sqrt(max(independent_pixels(template), FEWEST_INDEPENDENT) - 3.0)))
 
 
 def high_pass_noise(levels: Floats) -> float:
-    """Standard deviation of white noise from differences of second differences.
+    """Standard deviation of white noise, from a high-pass filter (a second difference along each axis).
 
     Immerkaer, Computer Vision and Image Understanding 64(2), 1996, doi:10.1006/cviu.1996.0060.
     """

@@ -1,9 +1,9 @@
 """A strip of a third tone along the fingers' sides: a drop shadow with a hard edge, or a pad.
 
-One threshold puts such a strip either with the fingers or with the ground, and then the outline that is measured may
-be the shadow's, or that of the finger behind its pad. A shadow lies on the same side of both fingers; pads face each
-other. So a strip that belongs to the fingers' class on one inner side only is a shadow, and one that belongs to the
-ground's class on both inner sides, and on no outer one, is a pair of pads: the threshold was on its wrong side.
+One threshold puts such a strip either with the fingers or with the background, and then the measured outline may be
+that of the shadow, or that of the finger behind its pad. A shadow lies on the same side of both fingers; pads face each
+other. A strip that belongs to the fingers' class on one inner side only is therefore a shadow. One that belongs to the
+background's class on both inner sides, and on no outer one, is a pair of pads. In both cases the threshold was wrong.
 """
 
 import numpy as np
@@ -36,7 +36,7 @@ _strips = loop("third_tone_strips")
 
 
 def other_threshold(upright: GreyImage, edges: EdgePoints) -> float | None:
-    """The threshold that has a strip of a third tone on its right side; None where the fingers have none on the wrong.
+    """Threshold that puts a strip of a third tone into its right class; None where no strip is in the wrong one.
 
     Parameters
     ----------
@@ -64,7 +64,7 @@ def other_threshold(upright: GreyImage, edges: EdgePoints) -> float | None:
 
 
 def _room(edges: EdgePoints) -> int:
-    """Half of the way from one inner edge to the other (pixels)."""
+    """Half of the distance between the inner edges (pixels)."""
     inner = [edges.position[j, :INNER][edges.lines.weight[j, :INNER] > 0] for j in range(2)]
     if min(inner[0].size, inner[1].size) == 0:
         return 0

@@ -19,7 +19,7 @@ _find_tops = loop("tops_find")
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Top:
-    """A place where something begins, seen from the tips' side.
+    """A local maximum of an outline towards the tips' side.
 
     Parameters
     ----------
@@ -50,7 +50,7 @@ class Top:
 
 
 def find_tops(mask: NDArray[np.uint8], outlines: Outlines, orientation: Orientation) -> list[Top]:
-    """The most prominent tops of all outlines, at most `MOST_TOPS`, the most prominent first."""
+    """The tops of all outlines with the largest prominence, in its order, at most `MOST_TOPS`."""
     outline, index, prominence = np.empty((3, MOST_TOPS), dtype=np.int64)
     is_rooted = np.empty(MOST_TOPS, dtype=np.bool_)
     way = (orientation.direction.is_vertical, orientation.is_flipped, orientation.along_size)

@@ -3,10 +3,10 @@
     PYTHONPATH=. python -m tests.benchmarks.absolute_poses --cases 60
 
 The scenes share nothing with the product: a body is boxes, a box seen through a Gaussian blur is the product of two
-differences of error functions in its own axes, exactly; a pixel is the mean of 4 x 4 points of it. Every case draws
-where the mechanism lies (mirrored in every fourth), how each body moved, blur, noise, and with `calibrated` the true
-scale and edge bias out of the calibration's own uncertainty, with `lens` a distortion and a perspective that the
-calibration knows. With `lossy` the pictures are JPEG of quality 85.
+differences of error functions in its own axes, exactly; a pixel is the mean of it by Gauss and Legendre's points.
+Every case draws where the mechanism lies (mirrored in every fourth), how each body moved, blur, noise, and with
+`calibrated` the true scale and edge bias out of the calibration's own uncertainty, with `lens` a distortion and a
+perspective that the calibration knows. With `lossy` the pictures are JPEG of quality 85.
 """
 
 import argparse
@@ -45,7 +45,8 @@ NECKS = ((34.6, 35.4, 31, 37), (17.6, 18.4, 31, 37))
 KNOWN_LIGHT = Settings(below_tip_px=1.0, other_response=None)
 """The pictures' levels are light, and that is known."""
 MIDDLE_MM = np.array([24.5, 45.0])
-SUB = (np.arange(4) + 0.5) / 4.0 - 0.5
+SUB = np.array([-0.5, 0.5]) / 3.0**0.5
+"""Gauss and Legendre's two points of a pixel: the mean of what is of third order in it."""
 
 
 @dataclass(frozen=True)

@@ -1,9 +1,10 @@
 """Files with faults: what is read as `ok` is what the undamaged file says at that time, or it is no number.
 
 Run as `python tests/benchmarks/damaged_files.py [--files 500] [--seed 1] [--only ffv1.mkv] [--verbose]` from the top.
-A film of two moving fingers is coded with FFV1, Motion JPEG and H.264 into MP4, Matroska, AVI and MPEG-TS. Every file
-then gets 1 to 20 faults of one kind: flipped bits, bytes missing, bytes zeroed, bursts of random bytes, MPEG-TS packets
-lost. Each is measured, and every `ok` row is held against the undamaged file's gap at the row's own time (linear
+A film of two moving fingers is coded with FFV1, Motion JPEG, H.264, MPEG-4 part 2, VP8, VP9 and AV1 into MP4, Matroska,
+AVI and MPEG-TS. Every file then gets 1 to 20 faults of one kind: flipped bits, bytes missing, bytes zeroed, bursts of
+random bytes, MPEG-TS packets lost; or 1 to 12 of its coded pictures are left out whole, in a container without a fault.
+Each is measured, and every `ok` row is held against the undamaged file's gap at the row's own time (linear
 between its frames): wrong is what differs by more than three standard uncertainties beyond what the undamaged
 neighbours do. Printed for each kind of file: files, refused files, rows, `ok` rows, and wrong ones.
 """
@@ -32,6 +33,8 @@ FFV1 = ("ffv1", "gray", {"level": "3", "slicecrc": "1", "g": "12"})
 EVERY_FFV1 = ("ffv1", "gray", {"level": "3", "slicecrc": "1", "g": "1"})
 MJPEG = ("mjpeg", "yuvj420p", {"qmin": "3", "qmax": "3"})
 H264 = ("libx264", "yuv420p", {"crf": "18", "g": "25"})
+MPEG4 = ("mpeg4", "yuv420p", {"qmin": "3", "qmax": "3", "g": "25", "bf": "0"})
+REALTIME = {"g": "25", "b": "2M", "deadline": "realtime", "cpu-used": "8"}
 KINDS = {
     "ffv1.mkv": FFV1,
     "ffv1.avi": FFV1,
@@ -43,6 +46,10 @@ KINDS = {
     "h264.mkv": H264,
     "h264.avi": (*H264[:2], {**H264[2], "bf": "0"}),
     "h264.ts": H264,
+    "mpeg4.mp4": MPEG4,
+    "vp8.webm": ("libvpx", "yuv420p", {**REALTIME, "lag-in-frames": "0"}),
+    "vp9.mkv": ("libvpx-vp9", "yuv420p", {**REALTIME, "error-resilient": "1"}),
+    "av1.mp4": ("libsvtav1", "yuv420p", {"crf": "30", "g": "25", "preset": "10"}),
 }
 """Coder, format of the pixels and options; the suffix names the container. AVI holds no frames out of order."""
 SETTINGS = Settings(BELOW_TIP_PX)
@@ -98,9 +105,29 @@ def rows(path: Path) -> list[Row]:
     return found
 
 
-def damaged(content: bytes, kind: str, rng: np.random.Generator) -> tuple[bytes, str]:
-    """Put 1 to 20 faults of one kind somewhere behind the head."""
-    what = str(rng.choice(["flips", "missing", "zeros", "burst"] + (["packets"] if kind.endswith(".ts") else [])))
+def without_pictures(path: Path, rng: np.random.Generator) -> tuple[bytes, str]:
+    """Leave 1 to 12 coded pictures out, as a program does that did not get them; the first and the last stay."""
+    fewer = path.with_name(f"fewer{path.suffix}")
+    with av.open(str(path)) as whole, av.open(str(fewer), "w") as container:
+        packets = [packet for packet in whole.demux(video=0) if packet.size]
+        copied = container.add_stream_from_template(whole.streams.video[0], opaque=True)
+        between = np.arange(1, len(packets) - 1)
+        gone = set(rng.choice(between, int(rng.integers(1, 13)), replace=False).tolist())
+        for number, packet in enumerate(packets):
+            if number not in gone:
+                packet.stream = copied
+                container.mux(packet)
+    return fewer.read_bytes(), f"{len(gone)} pictures"
+
+
+def damaged(path: Path, content: bytes, kind: str, rng: np.random.Generator) -> tuple[bytes, str]:
+    """Put 1 to 20 faults of one kind somewhere behind the head, or leave coded pictures out."""
+    kinds = ["flips", "missing", "zeros", "burst"] + (["packets"] if kind.endswith(".ts") else [])
+    # AVI counts its frames: what is not there was never taken.
+    kinds += [] if kind.endswith(".avi") else ["pictures"]
+    what = str(rng.choice(kinds))
+    if what == "pictures":
+        return without_pictures(path, rng)
     faults = int(rng.integers(1, 21))
     changed = bytearray(content)
     head = min(2000, len(content) // 4)
@@ -162,7 +189,7 @@ def main() -> None:
             kind = kinds[number % len(kinds)]
             path_suffix = Path(kind).suffix
             content, times_s, gaps_px = originals[kind]
-            changed, words = damaged(content, kind, rng)
+            changed, words = damaged(Path(folder) / kind, content, kind, rng)
             path = Path(folder) / f"damaged{path_suffix}"
             if chosen.one is not None:
                 if number != chosen.one:

@@ -52,6 +52,33 @@ def test_a_drift_from_cycle_to_cycle_is_told_and_taken_out(drift: object) -> Non
     assert sd == pytest.approx(SCATTER_MM, rel=2 * KNOWN)
 
 
+@pytest.mark.parametrize("drifting", ["places", "sides"])
+def test_places_or_sides_that_drift_apart_are_no_scatter(drifting: str) -> None:
+    path, rows = cycles(0.5)
+    rng = np.random.default_rng(8)
+    t = np.linspace(0.0, 1.0, rows.size)
+    side = np.sign(np.diff(path, prepend=path[0] - 1.0))[rows]
+    apart = 0.03 * t * path[rows] / 20.0 if drifting == "places" else 0.04 * side * np.exp(-t / 0.3)
+    label = visits(path, (slice(0, path.size),), rows)
+    none = np.zeros(rows.size, dtype=bool)
+    found = pure_error(apart + SCATTER_MM * rng.standard_normal(rows.size), 28.0 * t, label, none, path[rows])
+    assert found is not None
+    assert found.has_trend
+    assert found.sd_mm == pytest.approx(SCATTER_MM, rel=2 * KNOWN)
+
+
+def test_zeros_of_runs_are_no_scatter() -> None:
+    path, rows = cycles(0.5)
+    rng = np.random.default_rng(9)
+    half = path.size // 2
+    values = np.where(rows < half, 0.0, 0.012) + SCATTER_MM * rng.standard_normal(rows.size)
+    runs = (slice(0, int(np.sum(rows < half))), slice(int(np.sum(rows < half)), rows.size))
+    label = visits(path, (slice(0, half), slice(half, path.size)), rows)
+    found = pure_error(values, 1.0 * np.arange(rows.size), label, np.zeros(rows.size, dtype=bool), path[rows], runs)
+    assert found is not None
+    assert found.sd_mm == pytest.approx(SCATTER_MM, rel=KNOWN)
+
+
 def test_the_overshoot_tells_from_which_side_an_end_was_approached() -> None:
     path, rows = cycles(0.5)
     label = visits(path, (slice(0, path.size),), rows)

@@ -61,7 +61,7 @@ def without(path: Path, gone: set[int]) -> Path:
     fewer = path.with_name(f"fewer{path.suffix}")
     with av.open(str(path)) as whole, av.open(str(fewer), "w") as container:
         stream = whole.streams.video[0]
-        copied = container.add_stream_from_template(stream)
+        copied = container.add_stream_from_template(stream, opaque=True)
         packets = [packet for packet in whole.demux(stream) if packet.size]
         for number, packet in enumerate(packets):
             if number not in gone:

@@ -6,6 +6,7 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import suppress
 from pathlib import Path
+from socket import create_connection
 from threading import Event, Thread
 from typing import Any
 from urllib.error import HTTPError
@@ -17,9 +18,11 @@ from websockets.sync.client import ClientConnection, connect
 
 from calib.calibration import BareScale
 from fingervision.frames.source import Wish
+from fingervision.live import server
 from fingervision.live.choices import Choices
 from fingervision.live.opening import opened as opened_source
 from fingervision.live.page_files import PAGE, files, index
+from fingervision.live.page_token import kept_token
 from fingervision.live.server import Page, bound
 from fingervision.live.session import Session
 from tests.live.browser import browser, needs_chromium, opened, shown
@@ -135,6 +138,44 @@ def test_the_token_is_in_no_log_file_and_no_referrer(page: Page, session: Sessio
     assert not any(token in each.words for each in session.messages)
 
 
+def test_a_token_is_its_users_alone_and_one_that_others_could_read_is_not_taken_again(
+    page: Page, session: Session
+) -> None:
+    names = (".live_token", ".live_viewer_token")
+    for name in names:
+        assert (session.out / name).stat().st_mode & 0o077 == 0
+    before = [(session.out / name).read_text() for name in names]
+    assert [kept_token(session.out, name) + "\n" for name in names] == before
+    (session.out / names[0]).chmod(0o644)
+    assert kept_token(session.out, names[0]) + "\n" != before[0]
+    assert (session.out / names[0]).stat().st_mode & 0o077 == 0
+
+
+def test_pages_and_connections_are_limited(session: Session, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(server, "PAGES_AT_ONCE", 1)
+    monkeypatch.setattr(server, "CONNECTIONS_AT_ONCE", 4)
+    ending = Event()
+    page = Page(session, bound("127.0.0.1", 0))
+    thread = Thread(target=page.serve, args=(ending,))
+    thread.start()
+    try:
+        with socket_of(page.address) as first:
+            with socket_of(page.address) as second:
+                assert closing_code(second) == 1013
+            assert "refused" in reply(first, {"do": "nothing"})
+            port = int(page.address.split(":")[2].split("/")[0])
+            head = f"GET /?token=x HTTP/1.1\r\nHost: 127.0.0.1:{port}\r\n\r\n".encode()
+            held = [create_connection(("127.0.0.1", port), timeout=10.0) for _ in range(4)]
+            for each in held:
+                each.sendall(head)
+            assert any(b" 503 " in each.recv(100) for each in held)
+            for each in held:
+                each.close()
+    finally:
+        ending.set()
+        thread.join()
+
+
 def test_no_name_leads_out_of_the_pages_folder(page: Page) -> None:
     origin, token = parts(page.address)
     for name in (
@@ -213,7 +254,18 @@ def test_the_page_has_no_script_of_its_own_and_the_policy_lets_none_in() -> None
     assert all("src=" in attributes and not body.strip() for attributes, body in scripts)
     assert not re.search(r"\son\w+\s*=|javascript:|\sstyle\s*=", index())
     assert "unsafe" not in POLICY
-    assert "default-src 'none'" in POLICY
+    stated = dict(part.strip().split(" ", 1) for part in POLICY.split(";"))
+    assert stated == {
+        "default-src": "'none'",
+        "script-src": "'self'",
+        "style-src": "'self'",
+        "img-src": "'self' blob:",
+        "connect-src": "'self'",
+        # These three do not fall back to default-src (W3C, Content Security Policy Level 3, 6).
+        "base-uri": "'none'",
+        "form-action": "'none'",
+        "frame-ancestors": "'none'",
+    }
     for name in files():
         if name.endswith(".js") and name != "uPlot.iife.min.js":
             source = (PAGE / name).read_text(encoding="utf-8")

@@ -69,6 +69,8 @@ def test_every_answer_keeps_the_page_to_itself(page: server.Page) -> None:
     assert headers["X-Frame-Options"] == "DENY"
     assert headers["X-Content-Type-Options"] == "nosniff"
     assert headers["Cache-Control"] == "no-store"
+    assert headers["Cross-Origin-Opener-Policy"] == "same-origin"
+    assert headers["Cross-Origin-Resource-Policy"] == "same-origin"
 
 
 def test_who_never_asks_is_let_go(page: server.Page, monkeypatch: pytest.MonkeyPatch) -> None:

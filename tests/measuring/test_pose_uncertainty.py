@@ -1,5 +1,7 @@
 """What all frames share of a pose's uncertainty: the drawing's place, scale and bias, lens and plane."""
 
+from dataclasses import replace
+
 import cv2
 import numpy as np
 import pytest
@@ -14,15 +16,17 @@ from fingervision.gauges.plane_scale import PlaneScale
 from fingervision.measuring.body_poses import BodyTracker
 from fingervision.measuring.flat_picture import NOWHERE_PX, FlatPicture
 from fingervision.measuring.pose_uncertainty import SharedErrors
-from fingervision.vision.rigid_outline import RigidFit
+from fingervision.vision.outline_chunks import EdgeView
+from fingervision.vision.rigid_outline import RigidFit, fit_rigid
 from tests.benchmarks import absolute_poses as scene
+from tests.vision import test_rigid_outline as outline
 
 ABOUT = np.array([100.0, 50.0])
 ZERO = np.zeros(3)
 
 
 def fit(covariance: np.ndarray, shift: tuple[float, float] = (0.0, 0.0)) -> RigidFit:
-    return RigidFit(np.array(shift), 0.0, covariance, 10, 10, 10, 1.0, ZERO, ZERO)
+    return RigidFit(np.array(shift), 0.0, covariance, 10, 10, 10, 1.0, ZERO, ZERO, np.zeros((3, 3)))
 
 
 def test_a_turn_of_the_laid_drawing_puts_a_far_body_off_by_its_distance() -> None:
@@ -47,6 +51,23 @@ def test_two_bodies_share_the_drawings_place_and_their_angle_does_not() -> None:
     shared = SharedErrors(fit(np.diag([0.0, 0.0, 1e-4])), ABOUT, None)
     one, two = (shared.of_pose(fit(np.eye(3)), np.add(ABOUT, (reach, 0.0)), ABOUT) for reach in (50.0, 300.0))
     assert one.u_turn_against(two) == 0.0
+
+
+def test_what_the_edge_bias_scatters_the_edges_by_is_not_counted_twice() -> None:
+    rng = np.random.default_rng(9)
+    bias_px = 0.05
+    grey = outline.picture(outline.ABOUT, 0.0, rng)
+    whole = outline.chunks()
+    # Every edge of the body is seen 0.05 px too far out, ten times its noise.
+    grown = replace(whole, middles=whole.middles - bias_px * whole.normals)
+    fits = [
+        fit_rigid(grey, grown, outline.ABOUT, True, (np.zeros(2), 0.0), EdgeView(u_outward_px=u))
+        for u in (0.0, bias_px)
+    ]
+    exact = fit_rigid(grey, whole, outline.ABOUT, True, (np.zeros(2), 0.0))
+    unknown, known, none = (np.sqrt(np.diag(fit.covariance)) for fit in (*fits, exact))
+    assert np.all(unknown > 1.5 * none)
+    assert np.allclose(known, none, rtol=0.2)
 
 
 def test_lens_and_plane_come_off_and_on_again_and_what_folds_is_nowhere() -> None:

@@ -1,12 +1,15 @@
-"""Contact of the fingers pressed hard together, against a penalty solution with a solver of its own."""
+"""Contact of the fingers pressed hard together, against penalty solutions with solvers of their own."""
 
 import numpy as np
 import pytest
+import skfem
 from scipy.sparse import diags
 from scipy.sparse.linalg import spsolve
+from skfem.helpers import ddot, eye, grad, mul, trace, transpose
 
 from fingervision.domain.gripper import Gripper
 from fingervision.models.finite_element import FiniteElementGripper
+from fingervision.models.mesh_outline import ElementSize, mesh_outline
 from fingervision.models.physics import Physics
 
 PENALTY_N_MM = 1e6
@@ -43,3 +46,52 @@ def test_force_grip_and_stress_at_two_millimetres_of_closing(gripper: Gripper) -
     pressed = model.equilibria([-2.0])[0].displacement_mm
     inner = model.plate.nodes_mm[0] + pressed[model.plate.x_dofs]
     assert inner.min() > -1e-6
+
+
+@pytest.mark.slow
+def test_the_same_in_the_deformed_shape(gripper: Gripper) -> None:
+    """Elements, assembly and load steps of scikit-fem's own, a penalty for the axis; only the coarse mesh is shared."""
+    mesh = mesh_outline(gripper, ElementSize(1.0, 9.0))
+    model = FiniteElementGripper(gripper, Physics(large_rotation=True, contact=True), mesh=mesh, width_effect=False)
+    half, material = model.half, gripper.material
+    E, nu = material.youngs_modulus_mpa, material.poisson_ratio
+    tri = skfem.MeshTri2(mesh.nodes_mm, mesh.triangles)
+    basis = skfem.Basis(tri, skfem.ElementVector(skfem.ElementTriP2()), intorder=4)
+
+    def law(strain: np.ndarray) -> np.ndarray:
+        return E / (1.0 + nu) * strain + E * nu / (1.0 - nu**2) * eye(trace(strain), 2)
+
+    def strained(slope: np.ndarray) -> np.ndarray:
+        return 0.5 * (slope + transpose(slope) + mul(transpose(slope), slope))
+
+    @skfem.LinearForm
+    def forces(v, w):  # type: ignore[no-untyped-def]
+        F = grad(w["u"]) + eye(np.ones(w.x.shape[1:]), 2)
+        return gripper.body.plate_mm * ddot(mul(F, law(strained(grad(w["u"])))), grad(v))
+
+    @skfem.BilinearForm
+    def slopes(d, v, w):  # type: ignore[no-untyped-def]
+        F, stress = grad(w["u"]) + eye(np.ones(w.x.shape[1:]), 2), law(strained(grad(w["u"])))
+        change = mul(transpose(F), grad(d))
+        bent = mul(F, law(0.5 * (change + transpose(change)))) + mul(grad(d), stress)
+        return gripper.body.plate_mm * ddot(bent, grad(v))
+
+    moved = np.zeros(basis.N)
+    for step in range(1, 4):
+        moved[half.driven] = -2.0 * step / 3.0
+        for _ in range(40):
+            u = basis.interpolate(moved)
+            through = np.minimum(half.face_rest_mm + moved[half.face], 0.0)
+            residual, springs = forces.assemble(basis, u=u), np.zeros(basis.N)
+            residual[half.face] += PENALTY_N_MM * through
+            springs[half.face] = PENALTY_N_MM * (through < 0.0)
+            if np.abs(residual[half.free]).max() < 1e-7:
+                break
+            tangent = (slopes.assemble(basis, u=u) + diags(springs)).tocsr()[half.free][:, half.free]
+            moved[half.free] -= spsolve(tangent.tocsc(), residual[half.free])
+        else:
+            pytest.fail(f"step {step} did not settle")
+    state = model.loaded([-2.0])[0]
+    assert state.force_n == pytest.approx(2.0 * float(forces.assemble(basis, u=u)[half.driven].sum()), rel=WITHIN)
+    assert state.grip_n == pytest.approx(-PENALTY_N_MM * float(through.sum()), rel=WITHIN)
+    assert state.gap_mm == pytest.approx(2.0 * half.measured_mm(moved), abs=WITHIN)

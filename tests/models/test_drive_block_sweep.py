@@ -8,8 +8,8 @@ from fingervision.models.lumped import LumpedGripper
 from fingervision.models.parameter_sweep import parse_variation, sweep_answers, varied
 from fingervision.models.static_answer import gap_per_input
 
-SAME = 1e-4
-"""The mesh of a block leaves 0.01 % of the gap per input."""
+SAME = {0: 3e-4, 1: 2e-3, 2: 2e-3}
+"""Gap per input, force, stress: the sweep changes the meshed finger's answers in the ratio in which its bars change."""
 
 
 def test_a_sweep_of_a_block_s_length_is_that_of_its_drawings(gripper: Gripper) -> None:
@@ -17,6 +17,6 @@ def test_a_sweep_of_a_block_s_length_is_that_of_its_drawings(gripper: Gripper) -
     values, answers = sweep_answers(gripper, variations, HingeTheory.CORRECTED)
     for row in (1, 7):
         own = LumpedGripper(varied(gripper, variations, values[row]))
-        assert answers[row, 0] == pytest.approx(gap_per_input(own.half), rel=SAME)
-        assert answers[row, 1] == pytest.approx(own.half.equilibrium(1.0).force_n, rel=SAME)
-        assert answers[row, 2] == pytest.approx(own.peak_stress().mpa_per_mm, rel=SAME)
+        assert answers[row, 0] == pytest.approx(gap_per_input(own.half), rel=SAME[0])
+        assert answers[row, 1] == pytest.approx(own.half.equilibrium(1.0).force_n, rel=SAME[1])
+        assert answers[row, 2] == pytest.approx(own.peak_stress().mpa_per_mm, rel=SAME[2])

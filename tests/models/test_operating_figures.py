@@ -41,8 +41,20 @@ def test_grip_is_the_least_energy(lumped: LumpedGripper, stiffness: float) -> No
     assert grip_equilibrium(half, 0.0, Part(width)).contact_n.sum() == 0.0
 
 
-def test_kinds_grip_alike(gripper: Gripper, lumped: LumpedGripper) -> None:
-    """One corner touches: the stiffness matrix's finger and the frame's are the same bars."""
+@pytest.mark.parametrize("cross_bar_mm", [8.0, 5.0])
+def test_grip_is_that_of_finite_elements(gripper: Gripper, cross_bar_mm: float) -> None:
+    drawn = replace(gripper, links=replace(gripper.links, cross_bar_width_mm=cross_bar_mm))
+    part = Part(2.0, 50.0)
+    grips = []
+    for model in (LumpedGripper(drawn), FiniteElementGripper(drawn)):
+        touch = first_grip_mm(model.half, part) or 0.0
+        grips.append(float(grip_equilibrium(model.half, touch - 0.2, part).contact_n.sum()))
+    assert grips[0] == pytest.approx(grips[1], rel=0.005)
+
+
+def test_kinds_grip_alike(gripper: Gripper) -> None:
+    """One corner touches: the stiffness matrix's finger and that of bars alone are the same bars."""
+    lumped = LumpedGripper(gripper, bars_alone=True)
     for part in (Part(3.0), Part(3.0, 20.0)):
         by_matrix = StiffnessMatrixGripper(gripper).grip_force_n(-0.2, part)
         assert float(grip_equilibrium(lumped.half, -0.2, part).contact_n.sum()) == pytest.approx(by_matrix, rel=0.01)

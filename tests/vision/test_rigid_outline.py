@@ -1,11 +1,13 @@
 """Rigid motions from edges: against exact pictures, with coverage, covered edges, and things that are not there."""
 
+import cv2
 import numpy as np
 import pytest
 
 from fingervision.rendering import Camera, Patch, Scene, render
 from fingervision.rendering.polygon import polygon
-from fingervision.vision.rigid_outline import Chunks, capture_rigid, fit_rigid, halved
+from fingervision.vision.outline_chunks import Chunks
+from fingervision.vision.rigid_outline import capture_rigid, fit_rigid, halved
 
 LONG, WIDE = 300.0, 90.0
 ABOUT = np.array([200.0, 110.0])
@@ -99,3 +101,44 @@ def test_edges_all_one_way_do_not_hold_a_body() -> None:
     upright = chunks().normals[0] == 0.0
     own = Chunks(chunks().middles[:, upright], chunks().normals[:, upright], 12.0)
     assert fit_rigid(picture(ABOUT, 0.0, rng), own, ABOUT, True, (np.zeros(2), 0.0)) is None
+
+
+def one_end_only() -> Chunks:
+    """Both long sides and one end: a single edge holds x."""
+    whole = chunks()
+    kept = whole.normals[0] >= 0.0
+    return Chunks(whole.middles[:, kept], whole.normals[:, kept], whole.half_length)
+
+
+def contact_shadow(width: float, level: float) -> Patch:
+    x = ABOUT[0] + 0.5 * LONG
+    y = ABOUT[1] + np.array([-0.5, 0.5]) * WIDE
+    return Patch((polygon(((x, y[0]), (x + width, y[0]), (x + width, y[1]), (x, y[1]))),), level)
+
+
+@pytest.mark.parametrize("width", [1.0, 2.0, 3.0])
+@pytest.mark.parametrize("share", [0.3, 0.5, 0.8])
+def test_a_shadow_along_the_only_edge_of_a_direction_is_in_u_or_there_is_no_number(width: float, share: float) -> None:
+    rng = np.random.default_rng(7)
+    ground = 200.0
+    grey = picture(ABOUT, 0.0, rng, cover=(contact_shadow(width, ground - share * (ground - 50.0)),))
+    found = fit_rigid(grey, one_end_only(), ABOUT, True, (np.zeros(2), 0.0))
+    if found is None:
+        return
+    # What was stated before: 0.01 px, with errors of 0.3 to 2 px.
+    u = np.sqrt(np.diag(found.covariance + found.by_shadows))
+    assert abs(found.shift_px[0]) < 2.0 * u[0]
+    assert u[0] < 3.0
+    assert abs(found.shift_px[1]) < 2.0 * u[1] + 0.02
+
+
+def test_without_a_shadow_one_edge_is_as_sure_as_its_noise_and_motion_is_none() -> None:
+    rng = np.random.default_rng(8)
+    still = picture(ABOUT, 0.0, rng)
+    moved = cv2.blur(picture(ABOUT, 0.0, rng), (1, 4), borderType=cv2.BORDER_REPLICATE)
+    for grey in (still, moved):
+        found = fit_rigid(grey, one_end_only(), ABOUT, True, (np.zeros(2), 0.0))
+        assert found is not None
+        assert np.sqrt(found.covariance[0, 0]) < 0.02
+        assert not found.by_shadows.any()
+        assert abs(found.shift_px[0]) < 0.05

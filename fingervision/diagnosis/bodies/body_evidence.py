@@ -1,4 +1,4 @@
-"""Measured poses, gap and force as channels of one problem, with what the drawing predicts for each."""
+"""Measured poses, gap and force as channels of one fit, each with the prediction of the drawing."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -27,7 +27,7 @@ LEAST_PRESENT = 0.5
 
 @dataclass(frozen=True, slots=True, eq=False)
 class BodyEvidence:
-    """What the channels of a table say.
+    """What the measured channels show beside the drawing.
 
     Parameters
     ----------
@@ -48,7 +48,7 @@ class BodyEvidence:
 
 
 def drawing_of(model: CorrectedModel) -> PlaceAnswers | None:
-    """Return the answers of a model's drawing; None where the model has none."""
+    """Return the predictions of a model's drawing; None where the model has no drawing."""
     # isinstance would work the answers out to look for them.
     return cast(DrawnMechanism, model.base).places if hasattr(type(model.base), "places") else None
 
@@ -56,7 +56,7 @@ def drawing_of(model: CorrectedModel) -> PlaceAnswers | None:
 def body_evidence(
     table: MeasuredTable, answers: PlaceAnswers, input_mm: Array, rng: np.random.Generator
 ) -> tuple[BodyEvidence | None, tuple[str, ...]]:
-    """Search for the place that explains a table's channels.
+    """Search for the hinge, link or pivot that explains a table's channels.
 
     Parameters
     ----------
@@ -116,7 +116,7 @@ def body_evidence(
 
 
 def _floor(values: Array, u: Array | None, rows: NDArray[np.intp]) -> float:
-    """Least noise of a channel: what was stated, or its last digit."""
+    """Smallest noise that is assumed for a channel: its stated uncertainty, or its last digit."""
     digit = resolution(values) / float(np.sqrt(12.0))
     return max(digit, 0.0 if u is None else float(np.median(u[rows])))
 
@@ -127,7 +127,9 @@ def _runs_among(runs: tuple[slice, ...], rows: NDArray[np.intp]) -> tuple[slice,
 
 
 def added_everywhere(answers: PlaceAnswers, input_mm: Array, sizes: Mapping[str, float]) -> dict[str, Array] | None:
-    """What explanations add to every channel of a drawing, by their full keys; None where one is not known to it.
+    """Changes that explanations make to every channel of a drawing, by full key.
+
+    None where the drawing lacks one of them.
 
     Parameters
     ----------

@@ -22,7 +22,7 @@ FORCE = "force_n"
 
 @dataclass(frozen=True, eq=False)
 class BodyPrediction:
-    """A drawing's answer over the inputs of a table, in the channels that were measured.
+    """Prediction of a drawing at the inputs of a table, in the measured channels.
 
     Parameters
     ----------
@@ -44,7 +44,7 @@ class BodyPrediction:
         return [self.answers.channels.index(name) for name in self.channels]
 
     def linear(self, changes: PlaceChanges = AS_DRAWN) -> LinearAnswer:
-        """Answer of all channels with some places changed; kept, for a search asks for the same ones again."""
+        """Small-displacement prediction of all channels with some hinges or links changed; cached."""
         key = (
             tuple(sorted(changes.stiffness.items())),
             tuple(sorted(changes.moved_mm.items())),
@@ -56,16 +56,19 @@ class BodyPrediction:
 
     @cached_property
     def drawn(self) -> Array:
-        """As drawn, by small displacements; shape (n, channels)."""
+        """Prediction of the unchanged drawing, by small displacements; shape (n, channels)."""
         return np.outer(self.input_mm, self.linear().by_input[self._places])
 
     def changed(self, changes: PlaceChanges) -> Array:
-        """Change of the prediction by changed hinges and links, shape (n, channels)."""
+        """Change of the prediction caused by changed hinges and links, shape (n, channels)."""
         return np.outer(self.input_mm, (self.linear(changes).by_input - self.linear().by_input)[self._places])
 
     @cached_property
     def bent(self) -> Array:
-        """What equilibrium in the deformed shape adds, shape (n, channels); a polynomial of order 2 to 4."""
+        """Change of the prediction by equilibrium in the deformed shape, shape (n, channels).
+
+        A polynomial of order 2 to 4.
+        """
         model, names = self.answers.model, self.answers.channels
         reach = float(np.abs(self.input_mm).max())
         low = float(np.clip(-self.input_mm.min() / reach, 0.0, 1.0))
@@ -98,7 +101,7 @@ class BodyPrediction:
         return np.asarray(np.stack([w**2, w**3, w**4], axis=1)[:, : shape.shape[0]] @ shape)
 
     def _angle_of(self, found: dict[str, float], body: int) -> float:
-        """Rotation of a body by its number; what is fixed stands."""
+        """Rotation of a body by its number; a fixed body does not rotate."""
         assembly = self.answers.model.assembly
         nodes = np.flatnonzero(assembly.piece == body)
         middle = assembly.plate.nodes_mm[:, nodes].mean(axis=1)
@@ -107,12 +110,12 @@ class BodyPrediction:
         return found.get(f"{nearest.name}.angle_mrad", 0.0)
 
     def slipped(self, flexure: int, play_mm: float) -> Array:
-        """Change of the prediction by the play of a pivot, shape (n, channels); see `slip_mm`."""
+        """Change of the prediction by play in a pivot, shape (n, channels); see `slip_mm`."""
         slip = slip_mm(self.linear(), flexure, self.input_mm, play_mm)
         return np.asarray(slip @ self.linear().by_slip[flexure][self._places].T)
 
     def turned(self) -> Array:
-        """What a drawing that is turned in the picture adds by 1 rad, shape (n, channels)."""
+        """Change of the prediction per 1 rad of rotation of the drawing in the picture, shape (n, channels)."""
         out = np.zeros_like(self.drawn)
         for place, name in enumerate(self.channels):
             for own, other, sign in ((".x_mm", ".y_mm", -1.0), (".y_mm", ".x_mm", 1.0)):
@@ -123,12 +126,13 @@ class BodyPrediction:
 
 
 def slip_mm(answer: LinearAnswer, flexure: int, input_mm: Array, play_mm: float) -> Array:
-    """Work out how far a pivot with play slips, along x and y, without friction; shape (n, 2).
+    """Displacement of a pin in a pivot with play, along x and y, without friction; shape (n, 2).
 
-    The pin finds the place in its hole where the elastic energy is least: with the force F on it by the input u and
-    the stiffness S against a slip s, s S s / 2 - u F s in the disc of half the play (a trust-region problem: More and
-    Sorensen (1983), SIAM Journal on Scientific and Statistical Computing 4, 553, DOI 10.1137/0904038). Around zero it
-    follows the load; beyond, it stands at the edge, on the side to which the load points.
+    The pin goes to the place in its hole with the least elastic energy: with the force F on it per unit of input u, and
+    the stiffness S against a displacement s, the energy s S s / 2 - u F s is minimised over the disc of half the play
+    (a trust-region problem: More and Sorensen (1983), SIAM Journal on Scientific and Statistical Computing 4, 553, DOI
+    10.1137/0904038). Near zero load the pin follows the load; under larger loads it lies against the hole, on the side
+    to which the load points.
 
     Parameters
     ----------
@@ -169,11 +173,11 @@ def slip_mm(answer: LinearAnswer, flexure: int, input_mm: Array, play_mm: float)
 
 
 def known_channels(answers: PlaceAnswers, measured: Sequence[str]) -> dict[str, str]:
-    """Find what the drawing calls the channels of a table: letters, digits and `_` of a name count alone."""
+    """Match the channels of a table to names in the drawing; only letters, digits and `_` of a name count."""
     own = {column_name(name): name for name in answers.channels}
     return {name: own[column_name(name)] for name in measured if column_name(name) in own}
 
 
 def answers_of(mechanism: Mechanism) -> PlaceAnswers:
-    """Build the answers of a drawing."""
+    """Build the predictions of a drawing."""
     return PlaceAnswers(mechanism)

@@ -1,4 +1,4 @@
-"""Noise of many channels at once: what they share (the input's error, a shaken camera) and what follows from before."""
+"""Noise of many channels at once: its common part (error of the input, camera shake) and its correlation in time."""
 
 from dataclasses import dataclass
 
@@ -21,7 +21,7 @@ _RANK = 1e-9
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ChannelNoise:
-    """Whitening of all channels: noise of unit variance, independent from channel to channel.
+    """Whitening of all channels: afterwards the noise has unit variance and is independent between channels.
 
     Parameters
     ----------
@@ -72,7 +72,7 @@ class ChannelNoise:
 def channel_noise(
     residual: Array, input_mm: Array, runs: tuple[slice, ...], floors: Array, *, timed: bool
 ) -> ChannelNoise:
-    """Estimate the noise of all channels from what no smooth curve over the input follows.
+    """Estimate the noise of all channels from what remains after fitting smooth curves over the input.
 
     Parameters
     ----------
@@ -122,7 +122,7 @@ def channel_noise(
 
 
 def _curves(input_mm: Array, runs: tuple[slice, ...], *, timed: bool) -> Array:
-    """Cubic splines over the input, a constant a run, and the direction of motion."""
+    """Cubic splines over the input, one constant per run, and the direction of motion."""
     low, high = float(input_mm.min()), float(input_mm.max())
     pieces = int(np.clip(input_mm.size // _FEWEST_A_PIECE, 1, _KNOTS))
     inner = np.linspace(low, high, pieces + 1)

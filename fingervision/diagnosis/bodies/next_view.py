@@ -22,7 +22,7 @@ MOST_MEMBERS = 6
 
 @dataclass(frozen=True, slots=True)
 class NextView:
-    """A view that would tell places apart.
+    """A further view that would distinguish explanations.
 
     Parameters
     ----------
@@ -43,11 +43,11 @@ class NextView:
 
 
 def next_view(evidence: BodyEvidence, answers: PlaceAnswers) -> NextView | None:
-    """Choose the view that separates the members of a set best; None where none separates any.
+    """Choose the view that best separates the members of an ambiguity set; None where no view separates any.
 
-    Each view is judged by the squared whitened distance that it adds between the best explanation at its size and
-    every other one at the size that comes nearest in that view and in what was measured, constants free (T-optimality:
-    Atkinson and Fedorov (1975), Biometrika 62, 57, DOI 10.1093/biomet/62.1.57).
+    The criterion is the squared whitened distance that a view adds between the best explanation and every other one.
+    The other's size is refitted to the view and the measured data together, with free constants (T-optimality: Atkinson
+    and Fedorov (1975), Biometrika 62, 57, DOI 10.1093/biomet/62.1.57).
 
     Parameters
     ----------
@@ -92,7 +92,7 @@ def _distinct(members: Sequence[Fitted]) -> list[Fitted]:
 
 
 def _expected(best: Fitted, other: Fitted, one: Array, two: Array) -> float:
-    """Distance in what was measured and in the new view together, the other's size refitted."""
+    """Distance in the measured data and the new view together, with the other explanation's size refitted."""
     norm = float(other.signature @ other.signature + two @ two)
     shared = float(best.signature @ other.signature + one @ two)
     total = float(best.signature @ best.signature + one @ one)
@@ -100,7 +100,7 @@ def _expected(best: Fitted, other: Fitted, one: Array, two: Array) -> float:
 
 
 def _views(answers: PlaceAnswers, evidence: BodyEvidence) -> list[tuple[str, tuple[str, ...]]]:
-    """Bodies whose pose, and points whose motion, was not measured; the force."""
+    """Views that were not measured: poses of bodies, displacements of points, and the force."""
     measured = set(evidence.prediction.channels)
     views: list[tuple[str, tuple[str, ...]]] = []
     for body in answers.moving_bodies:
@@ -116,7 +116,7 @@ def _views(answers: PlaceAnswers, evidence: BodyEvidence) -> list[tuple[str, tup
 
 
 def _sigma(channel: str, evidence: BodyEvidence) -> float:
-    """Noise of a view: the median of what was measured in that unit."""
+    """Noise of a view: the median noise of the measured channels with the same unit."""
     sd = [float(own) for own, name in zip(evidence.findings.noise.sd, evidence.prediction.channels, strict=True)
           if name[-4:] == channel[-4:] and name != GAP]  # fmt: skip
     return float(np.median(sd)) if sd else next(value for end, value in ASSUMED.items() if channel.endswith(end))

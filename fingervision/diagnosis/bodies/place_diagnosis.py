@@ -1,4 +1,4 @@
-"""Diagnose a table with poses of bodies: first the faulty hinge or link, then the effects that the gap shows."""
+"""Diagnose a table with poses of bodies: first the faulty hinge or link, then the effects visible in the gap."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import replace
@@ -35,16 +35,13 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 Explain = Callable[[MeasuredTable, CorrectedModel], "Diagnosis"]
 
-ONLY_SLOPES = ("input_scale", "input_offset")
-"""Effects of the drive that look like one of the mechanism over any input: poses are to decide on them."""
-
 
 def without_places(table: MeasuredTable, model: CorrectedModel) -> tuple[MeasuredTable, CorrectedModel]:
-    """Take the effects with a place that a corrected model has out of the table; itself where it has none.
+    """Subtract from a table the effects of a corrected model that have a place; unchanged where there are none.
 
     Raises
     ------
-    FingervisionError
+    DataError
         A place is not one of the drawing's.
     """
     placed = {key: next(iter(values.values())).value for key, values in model.effects.items() if split_key(key)[1]}
@@ -64,7 +61,7 @@ def without_places(table: MeasuredTable, model: CorrectedModel) -> tuple[Measure
 def diagnose_with_bodies(
     table: MeasuredTable, model: CorrectedModel, explain: Explain, rng: np.random.Generator
 ) -> "Diagnosis":
-    """Explain a table with channels of its own.
+    """Explain a table that has user-named channels.
 
     Parameters
     ----------
@@ -106,7 +103,7 @@ def diagnose_with_bodies(
 
 
 def _place_alone(done: "Diagnosis") -> "Diagnosis":
-    """Name nothing beside the place."""
+    """Return a diagnosis that names the faulty place only."""
     d = done.report.disagreement
     report = replace(
         done.report,
@@ -122,7 +119,7 @@ def _place_alone(done: "Diagnosis") -> "Diagnosis":
 
 
 def _beside_condensed(table: MeasuredTable, model: CorrectedModel, answers: PlaceAnswers) -> MeasuredTable:
-    """Hold a gap against the drawing's condensed bodies: bars joined at points differ from them by some 0.1 %."""
+    """Compare the gap with condensed bodies, from which a model of bars joined at points differs by some 0.1 %."""
     u = np.array([0.0, 1.0])
     bare = model.base.respond(u)
     drawn = answers.answer().by_input
@@ -136,19 +133,19 @@ def _beside_condensed(table: MeasuredTable, model: CorrectedModel, answers: Plac
 
 
 def _driven_input(done: "Diagnosis") -> Array:
-    """What the mechanism received: the recorded input behind what the gap says of the drive, but for its scale."""
+    """Input that the mechanism receives: the recorded input after the drive effects that poses do not decide on."""
     chain = done.data.chain
     history = chain.history if chain.path is None else chain.path.history
     input_mm = history.input_mm
     values = {**chain.fixed, **{e.name: {n: p.value for n, p in e.parameters.items()} for e in done.report.effects}}
     for name, effect in chain.effects.items():
-        if name in values and isinstance(effect, DriveEffect) and name not in ONLY_SLOPES and not effect.curve:
+        if name in values and isinstance(effect, DriveEffect) and not effect.curve and effect.in_drawing is None:
             input_mm = effect.act(input_mm, history, values[name])
     return np.asarray(input_mm if chain.path is None else input_mm[chain.path.rows])
 
 
 def _less(table: MeasuredTable, added: Mapping[str, Array], answers: PlaceAnswers) -> MeasuredTable:
-    """Take what an explanation adds out of a table."""
+    """Subtract the contribution of an explanation from a table."""
     changes: dict[str, object] = {"gap_mm": table.gap_mm - added[GAP]}
     if table.midline_mm is not None:
         first, last = answers.mechanism.pairs[GAP_PAIR]
@@ -190,7 +187,7 @@ def _where(report: DiagnosisReport, evidence: BodyEvidence, answers: PlaceAnswer
 
 
 def _measured_bodies(done: "Diagnosis", evidence: BodyEvidence) -> "Diagnosis":
-    """Add what the channels say to the tables of a report: disagreement by channel, detection limits by place."""
+    """Add the results of the channels to the tables of a report: disagreement by channel, detection limits by place."""
     report, findings = done.report, evidence.findings
     channels: dict[str, Mapping[str, float]] = dict(report.disagreement.by_channel)
     for place, name in enumerate(evidence.names):
@@ -212,7 +209,7 @@ def _measured_bodies(done: "Diagnosis", evidence: BodyEvidence) -> "Diagnosis":
 def _composed(
     first: "Diagnosis", second: "Diagnosis", evidence: BodyEvidence, answers: PlaceAnswers, notes: tuple[str, ...]
 ) -> "Diagnosis":
-    """Combine the diagnosis of the poses and that of the gap into one report."""
+    """Combine the diagnosis from the poses and that from the gap into one report."""
     members, rest = evidence.findings.members, second.report
     best = members[0]
     keys = list(dict.fromkeys(member.candidate.key for member in members))

@@ -1,4 +1,4 @@
-"""Search the hinge, link or pivot that explains poses and gap, and its ambiguity set."""
+"""Search for the hinge, link or pivot that explains poses and gap, with its ambiguity set."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -10,7 +10,8 @@ from scipy.stats import chi2
 
 from fingervision.diagnosis.bodies.body_prediction import FORCE, BodyPrediction
 from fingervision.diagnosis.bodies.channel_noise import ChannelNoise, channel_noise
-from fingervision.diagnosis.bodies.place_candidates import Candidate, candidates_of, mirror_of, mirrored_channels
+from fingervision.diagnosis.bodies.place_candidates import PAIRS, Candidate, candidates_of, mirror_of, mirrored_channels
+from fingervision.domain.drawing_form import DrawnPart
 
 Array = NDArray[np.float64]
 
@@ -48,7 +49,7 @@ STEPS = 4
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Fitted:
-    """A candidate with its size.
+    """A candidate with its fitted size.
 
     Parameters
     ----------
@@ -70,7 +71,7 @@ class Fitted:
 
     @property
     def u_stated(self) -> float:
-        """Standard uncertainty of the size with that of the explanation's form."""
+        """Standard uncertainty of the size, including that of the explanation's formula."""
         return hypot(self.u, FORM_ERROR * self.size)
 
 
@@ -104,7 +105,7 @@ class PlaceFindings:
 
 
 class PlaceSearch:
-    """Poses, and whatever else the drawing foretells, beside the drawing.
+    """Poses and other measured channels compared with the drawing, and the fits of candidates to the difference.
 
     Parameters
     ----------
@@ -131,7 +132,7 @@ class PlaceSearch:
         self._left = self._beside(self.noise.whitened(self.residual))
 
     def _nuisances(self) -> None:
-        """Columns of what nobody knows, and how far each may go: infinite where nothing is known of it."""
+        """Columns of the nuisance parameters, with their prior standard deviations; infinite where nothing is known."""
         prediction, columns, spread = self.prediction, [], []
         n, count = self.residual.shape
         slopes = prediction.linear().by_input[[prediction.answers.channels.index(c) for c in prediction.channels]]
@@ -163,7 +164,7 @@ class PlaceSearch:
             columns.append(turned)
             spread.append(np.inf)
         mirrored = mirror_of(prediction)
-        hinges = {c.place: c.added(c.reference) / c.reference for c in self.candidates if c.part == "hinge"}
+        hinges = {c.place: c.added(c.reference) / c.reference for c in self.candidates if c.part is DrawnPart.HINGE}
         for hinge, own in hinges.items():
             twin = mirrored(hinge)
             if twin != hinge and twin in hinges:
@@ -183,14 +184,16 @@ class PlaceSearch:
         self._rows = whitened.shape[0]
 
     def _beside(self, signal: Array) -> Array:
-        """What is left of a whitened signal beside what nobody knows."""
+        """Project a whitened signal on the space orthogonal to the nuisance parameters."""
         padded = np.concatenate([signal, np.zeros(self._basis.shape[0] - signal.size)])
         return np.asarray(padded - self._basis @ (self._basis.T @ padded))
 
     def _unknown_part(self, rows: Array) -> Array:
-        """Fit what nobody knows to a residual, and give its free part: constants, turn and bend; shape (n, channels).
+        """Fit the nuisance parameters to a residual, and return their unconstrained part: constants, rotation and bend.
 
-        Errors that the model may have are fitted beside them and stay in the residual: they may be the disagreement.
+        Shape (n, channels).
+
+        Errors that the model may have are fitted too, but stay in the residual, because they may be the disagreement.
         """
         padded = np.concatenate([self.noise.whitened(rows), np.zeros(self._basis.shape[0] - self._rows)])
         shares = np.linalg.lstsq(self._triangle, self._basis.T @ padded, rcond=None)[0] / self._unit
@@ -198,13 +201,13 @@ class PlaceSearch:
         return np.asarray(np.sum(free, axis=0))
 
     def signature(self, candidate: Candidate, size: float) -> Array:
-        """What a candidate of a size adds, whitened, beside what nobody knows."""
+        """Change of the prediction by a candidate of a given size, whitened, orthogonal to the nuisance parameters."""
         return self._beside(self.noise.whitened(candidate.added(size)))
 
     def fit(self, candidate: Candidate) -> Fitted:
-        """Fit a candidate's size to what is left, at first by its signature at the reference size."""
+        """Fit a candidate's size to the residual, using its signature at the reference size."""
         left = self._left
-        if candidate.name == "hinge_play":
+        if candidate.part is DrawnPart.PIVOT:
             return self._fit_play(candidate)
         unit = self.signature(candidate, candidate.reference) / candidate.reference
         return self._fitted(candidate, unit, left)
@@ -220,7 +223,7 @@ class PlaceSearch:
         return Fitted(candidate, size, norm**-0.5, max(gain, 0.0), signature)
 
     def _fit_play(self, candidate: Candidate) -> Fitted:
-        """Scan the play: where it is taken up depends on its width."""
+        """Scan the size of a play, because its width decides where it is taken up."""
         left, found = self._left, []
         for play_mm in PLAYS_MM:
             unit = self.signature(candidate, float(play_mm)) / play_mm
@@ -242,8 +245,8 @@ class PlaceSearch:
         return Fitted(candidate, size, max(norm, 1e-300) ** -0.5, max(gain, 0.0), signature)
 
     def refined(self, fitted: Fitted) -> Fitted:
-        """Fit again by the signature at the size that was found, until that changes nothing."""
-        if fitted.candidate.name == "hinge_play":
+        """Refit with the signature at the fitted size, until the size no longer changes."""
+        if fitted.candidate.part is DrawnPart.PIVOT:
             return fitted
         for _ in range(STEPS):
             if fitted.size == 0.0:
@@ -257,7 +260,7 @@ class PlaceSearch:
         return fitted
 
     def limit(self, rng: np.random.Generator, first: Sequence[Fitted]) -> float:
-        """Fall of chi-square that the best of all candidates exceeds seldom in noise alone."""
+        """Fall of chi-square that the best of all candidates rarely exceeds in noise alone."""
         units = np.array([f.signature / np.linalg.norm(f.signature) for f in first if np.any(f.signature)])
         if not units.size:
             return float("inf")
@@ -269,7 +272,7 @@ class PlaceSearch:
         return float(quantile * degrees / max(degrees - count - 1, 1))
 
     def structure(self, left: Array) -> float:
-        """Chi-square of generic shapes (bends, kinks and directions of every channel) in what is left."""
+        """Chi-square of generic shapes (bends, kinks and directions of every channel) in the residual."""
         u = self.prediction.input_mm
         reach = max(float(np.abs(u).max()), 1e-12)
         shapes = [u / reach, (u / reach) ** 2, np.abs(u) / reach, np.tanh(8.0 * u / reach)]
@@ -293,7 +296,7 @@ class PlaceSearch:
         best = max(looked, key=lambda f: f.gain)
         smallest = _smallest(looked, limit)
         claims = best.gain > limit
-        singles = [f for f in looked if f.candidate.part != "pair"]
+        singles = [f for f in looked if f.candidate.part not in PAIRS]
         # Two links that are off together must gain more than chance over every single place.
         one = max(singles, key=lambda f: f.gain)
         best = one if best.gain - one.gain < NOT_REFUTED else best
@@ -313,14 +316,14 @@ class PlaceSearch:
         )
 
     def _alike(self, best: Fitted, other: Fitted) -> bool:
-        """Whether these data cannot tell two explanations apart."""
+        """Whether these data cannot distinguish two explanations."""
         if best.gain - other.gain < NOT_REFUTED:
             return True
         return other.gain > best.gain / 3.0 and min(apart(best, other), apart(other, best)) < ALIKE
 
 
 def apart(truth: Fitted, other: Fitted) -> float:
-    """Squared whitened distance of an explanation from another one of any size."""
+    """Squared whitened distance of an explanation from another one, minimised over the other's size."""
     norm = float(other.signature @ other.signature)
     if norm <= 0.0:
         return float(truth.signature @ truth.signature)

@@ -5,7 +5,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from fingervision.diagnosis.bodies.body_evidence import BodyEvidence
+from fingervision.diagnosis.bodies.place_candidates import PAIRS
 from fingervision.diagnosis.bodies.place_search import Fitted
+from fingervision.domain.drawing_form import DrawnPart
 from fingervision.domain.report import Place
 from fingervision.models.place_answers import PlaceAnswers
 
@@ -19,25 +21,25 @@ MOST = 6
 
 
 def fitted_words(fitted: Fitted) -> str:
-    """Say what differs where: `right hinge 2: 14 +- 3 % too soft`."""
+    """Sentence on what differs where: `right hinge 2: 14 +- 3 % too soft`."""
     candidate, size, u = fitted.candidate, fitted.size, COVER * fitted.u_stated
     where = candidate.place or candidate.name
-    if candidate.parameter.name == "play_mm":
+    if candidate.part is DrawnPart.PIVOT:
         return f"{where}: {1e3 * size:.3g} +- {1e3 * u:.2g} um of play"
     share = f"{100.0 * abs(size):.3g} +- {100.0 * u:.2g} %"
-    if candidate.part == "hinge":
+    if candidate.part is DrawnPart.HINGE:
         return f"{where}: {share} too {'stiff' if size > 0.0 else 'soft'}"
-    if candidate.part == "link":
+    if candidate.part is DrawnPart.LINK:
         return f"{where}: {share} too {'long' if size > 0.0 else 'short'}, {candidate.detail}"
-    if candidate.part == "pair":
-        way = "alike" if candidate.name == "lever_ratio_error" else "oppositely"
-        what = "the opening is" if candidate.name == "lever_ratio_error" else "the right finger's share is"
+    if candidate.part in PAIRS:
+        alike = candidate.part is DrawnPart.LINKS_ALIKE
+        way, what = ("alike", "the opening is") if alike else ("oppositely", "the right finger's share is")
         return f"{where}, off {way}: {what} {share} too {'large' if size > 0.0 else 'small'}, {candidate.detail}"
     return f"{candidate.name}: {100.0 * size:+.3g} +- {100.0 * u:.2g} %"
 
 
 def set_words(members: Sequence[Fitted]) -> str:
-    """Say the answer: one place, or the set of those that these data cannot tell apart."""
+    """Sentence with the answer: one place, or the set of places that these data cannot distinguish."""
     keys = list(dict.fromkeys(member.candidate.key for member in members))
     if len(keys) == 1:
         return fitted_words(members[0])
@@ -46,7 +48,7 @@ def set_words(members: Sequence[Fitted]) -> str:
 
 
 def body_places(evidence: BodyEvidence, answers: PlaceAnswers) -> tuple[Place, ...]:
-    """Find the parts of the input's range where a body's pose cannot be noise, the sharpest of every channel."""
+    """Find the ranges of input in which a body's pose cannot be noise, the most significant one for each channel."""
     prediction, findings = evidence.prediction, evidence.findings
     u, kept = prediction.input_mm, findings.noise.kept
     found = []
@@ -72,7 +74,7 @@ def body_places(evidence: BodyEvidence, answers: PlaceAnswers) -> tuple[Place, .
 
 
 def _joined(channel: str, answers: PlaceAnswers) -> str:
-    """Say which hinges hold the body of a channel."""
+    """Names of the hinges at the body of a channel."""
     body = channel.rpartition(".")[0]
     numbers = {each.name: number for number, each in answers.numbered_bodies().items()}
     if body not in numbers:

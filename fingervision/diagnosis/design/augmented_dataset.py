@@ -24,7 +24,7 @@ Settings = Mapping[str, Mapping[str, float]]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class AugmentedDataset:
-    """The measured data, followed by a proposed run that has not been driven yet.
+    """The measured data, followed by a proposed run that has not been executed yet.
 
     Parameters
     ----------
@@ -45,7 +45,7 @@ class AugmentedDataset:
 
     @classmethod
     def of(cls, data: Observations, first: Problem, input_mm: Array, *, rezeroed: bool = False) -> "AugmentedDataset":
-        """Put a run behind the data: same noise, later on the same clock; the stage may be re-zeroed before it."""
+        """Append a run to the data: same noise, later on the same clock; the stage may be re-zeroed before it."""
         old = data.chain.history
         n, more = old.input_mm.size, input_mm.size
         time = float(old.times.max()) + PAUSE_S + old.sample_time_s * np.arange(more)
@@ -82,11 +82,11 @@ class AugmentedDataset:
 
     @property
     def input_mm(self) -> Array:
-        """Input of the run alone."""
+        """Input of the appended run alone (mm)."""
         return self.both.chain.history.input_mm[self.first.chain.history.input_mm.size :]
 
     def moved(self, names: tuple[str, ...], values: Settings) -> Point:
-        """Values within the bounds of both: a stop that was not seen lies at the range's end, wherever that is."""
+        """Values for both runs together: a stop that was not seen lies at the end of the range, also of a wider one."""
         out: Point = {name: dict(values[name]) for name in names}
         before = {(name, parameter.name): parameter for name, parameter in self.first.parameters(names)}
         for name, now in self.both.parameters(names):
@@ -110,13 +110,13 @@ class AugmentedDataset:
         sigma_mm: tuple[float, ...] | None = None,
         iterations: int = REFITTED,
     ) -> float:
-        """D_jk with both runs: a prediction against the rival, offsets of the runs profiled or of a given spread."""
+        """D_jk with both runs: squared whitened distance of a prediction from the refitted rival."""
         target = self.both.whitened(self.moved(tuple(truth), truth))
         start = self.moved(rival.names, rival.values)
         return fit(self.both, rival.names, start, target=target, sigma_mm=sigma_mm, iterations=iterations).score
 
     def expected(self, truth: Settings) -> Array:
-        """The data as they were measured, and behind them what the run would show without noise; whitened."""
+        """The data as measured, followed by the noiseless prediction for the appended run; whitened."""
         shown = self.both.chain.stacked(self.moved(tuple(truth), truth)).reshape(self.channels, -1)
         new = shown[:, self.data_mm.size // self.channels :]
         return self.both.whitener.one(_behind(self.data_mm, new.ravel(), self.channels))
@@ -124,7 +124,10 @@ class AugmentedDataset:
     def score(
         self, target: Array, explanation: Explanation, starts: Sequence[Settings], sigma_mm: tuple[float, ...] | None
     ) -> float:
-        """Chi-square of an explanation refitted to a target, the best of several searches; offsets as in `distance`."""
+        """Chi-square of an explanation refitted to a target, the best of several searches.
+
+        Run offsets as in `distance`.
+        """
         names = explanation.names
         begins = [self.moved(names, start) for start in starts]
         tries = [
@@ -134,12 +137,12 @@ class AugmentedDataset:
 
 
 def _behind(old: Array, new: Array, channels: int) -> Array:
-    """Put the channels of a run behind those of the data; each stacked, shape (channels * n,)."""
+    """Append the channels of a run to those of the data; both stacked, shape (channels * n,)."""
     return np.concatenate([old.reshape(channels, -1), new.reshape(channels, -1)], axis=1).ravel()
 
 
 def _longer(path: InputPath | None, history: History, first_rows: int) -> InputPath | None:
-    """Put the rows of a second run behind a path; `history` holds the rows of both."""
+    """Append the rows of a second run to a path; `history` holds the rows of both."""
     if path is None:
         return None
     old, new = path.history, slice(first_rows, history.input_mm.size)

@@ -32,10 +32,10 @@ MODERATE, SURELY = 75.0, 0.8
 
 @dataclass(frozen=True, slots=True)
 class ExpectedGain:
-    """A run's gain in chi-square: the one most likely to be kept, the interval that holds what comes, that likelihood.
+    """Predicted chi-square gain of a run: its most probable value, an interval, and the probability of that value.
 
-    Either explanation may be true, and often the two foretell different gains: a median would lie between them, where
-    nothing comes. `modest` is the most likely one below `MODERATE`.
+    Either explanation may be true, and the two often predict different gains; their median would lie between the two,
+    where hardly any gain occurs. `modest` is the most probable gain below `MODERATE`.
     """
 
     gain: float
@@ -45,12 +45,12 @@ class ExpectedGain:
 
     @property
     def sound(self) -> bool:
-        """Whether the promise is moderate, or else likely to be kept."""
+        """Whether the predicted gain is moderate, or else probably reached."""
         return self.gain < MODERATE or self.kept >= SURELY
 
     @property
     def stated(self) -> float:
-        """What may be relied on."""
+        """The gain that can be relied on."""
         return self.gain if self.sound else self.modest
 
 
@@ -65,11 +65,11 @@ def expected_gain(
     *,
     rezeroed: bool = False,
 ) -> ExpectedGain:
-    """Foretell the gain from the data as they were measured: the posterior's predictive distribution.
+    """Predict the gain of a run from its posterior predictive distribution given the measured data.
 
-    A truth and a noise are drawn from what the data leave open, the run is driven with it, and both explanations are
-    refitted to the data and the run together. The run's own noise adds 2 sqrt(gain) to the difference of two
-    chi-squares.
+    For each draw, a true explanation and noise are drawn from the posterior, the run is simulated with them, and both
+    explanations are refitted to the data and the run together. The run's own noise gives the difference of two
+    chi-squares a standard deviation of 2 sqrt(gain).
 
     Parameters
     ----------
@@ -112,7 +112,10 @@ def expected_gain(
 
 
 def surest(come: Array, below: float = np.inf) -> tuple[float, float]:
-    """The gain, below a limit, that most of what comes is near to, and how much of it; the median where none comes."""
+    """The gain, below a limit, near which most draws lie, and their fraction.
+
+    The median where no draw is below the limit.
+    """
     come = np.sort(come)
     named = come[(come > 0.0) & (come < below)]
     if named.size == 0:
@@ -123,10 +126,11 @@ def surest(come: Array, below: float = np.inf) -> tuple[float, float]:
 
 
 def _offsets(problem: Problem, explanation: Explanation, rng: np.random.Generator) -> tuple[float, ...]:
-    """Spread of the runs' offsets, one a channel: where there is one run only, a draw from its prior.
+    """Draw the spread of the runs' offsets, one per channel; from its prior where there is only one run.
 
-    None at all in half of the draws, for nothing need be re-zeroed before the run; else the half-Cauchy prior by which
-    a diagnosis of both runs will judge them (`RunOffsets.spread`). Where there are more, a draw from what they say.
+    The prior is zero in half of the draws, because the stage need not be re-zeroed before the run, and otherwise the
+    half-Cauchy prior with which a diagnosis of both runs judges the offsets (`RunOffsets.spread`). With several runs,
+    the spread is drawn from what they show.
     """
     if problem.offsets.runs > 1:
         return problem.offsets.drawn_spread(problem.measured - problem.whitened(explanation.values), rng)
@@ -135,12 +139,15 @@ def _offsets(problem: Problem, explanation: Explanation, rng: np.random.Generato
 
 
 def _score(problem: Problem, explanation: Explanation, sigma_mm: tuple[float, ...] | None) -> float:
-    """Chi-square of an explanation refitted to the data alone, with its own spread of the runs unless one is given."""
+    """Chi-square of an explanation refitted to the data alone.
+
+    Run offsets with their own fitted spread unless one is given.
+    """
     sigma = explanation.sigma_mm if sigma_mm is None else sigma_mm
     return fit(problem, explanation.names, explanation.values, sigma_mm=sigma, iterations=REFITTED).score
 
 
 def _spread(points: Sequence[Point], count: int) -> Sequence[Point]:
-    """Pick so many, evenly from a walk."""
+    """Pick `count` evenly spaced points of a Markov chain."""
     step = max(1, len(points) // count)
     return points[step // 2 :: step]

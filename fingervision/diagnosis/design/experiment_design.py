@@ -1,4 +1,4 @@
-"""Choose the next run: the protocol that separates most pairs of explanations per minute of bench time."""
+"""Choose the next run: the protocol that separates most pairs of explanations per minute on the bench."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -47,7 +47,7 @@ ALIKE = 0.03
 
 @dataclass(frozen=True, slots=True, eq=False)
 class OpenSet:
-    """What the data cannot tell apart.
+    """The explanations that the data cannot distinguish.
 
     Parameters
     ----------
@@ -65,13 +65,13 @@ class OpenSet:
 
     @property
     def truths(self) -> int:
-        """How many members the run is chosen for, each as the truth."""
+        """Number of members that are taken as the truth when a run is chosen."""
         return len(self.before)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RunPlan:
-    """A run with what it adds to the distance of each truth to each member."""
+    """A proposed run, with the chi-square distance that it adds between each assumed truth and each member."""
 
     name: str
     steps: list[Step]
@@ -82,15 +82,15 @@ class RunPlan:
 
     @property
     def uneven(self) -> float:
-        """How much more is gained where one of two explanations is true than where the other is, at the worst.
+        """Largest ratio of the gains of a pair when one or the other of the two is true.
 
-        Such a gain could only be promised with so wide an interval.
+        The larger this ratio, the wider the interval of the predicted gain.
         """
         ahead, back = (np.maximum(g, 1.0) for g in (self.gains[0, 1 : self.gains.shape[0]], self.gains[1:, 0]))
         return float(np.max(np.maximum(ahead / back, back / ahead), initial=1.0))
 
     def apart(self, j: int, k: int) -> float:
-        """Gain between two members, the first a truth: of the two that might be true, the one that shows less."""
+        """Gain between two members, the first an assumed truth; the smaller one if either may be true."""
         back = self.gains[k, j] if k < len(self.gains) else np.inf
         return float(min(self.gains[j, k], back))
 
@@ -108,7 +108,7 @@ class RunPlan:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RunChoice:
-    """Proposes runs for a table and what it leaves open."""
+    """Proposes runs that separate the explanations which a table leaves open."""
 
     data: Observations
     problem: Problem
@@ -120,7 +120,7 @@ class RunChoice:
         return self.data.chain.history.sample_time_s
 
     def planned(self, name: str, steps: list[Step], iterations: int, times: int = 1) -> RunPlan | None:
-        """Judge a run; None where it is too long."""
+        """Evaluate a run; None where it takes too long."""
         history = self.data.chain.history
         inputs = driven(steps, self.step_s, rounding_s(self.data.table.input_mm, self.step_s, history.runs))
         if inputs.size > MOST_SAMPLES:
@@ -137,13 +137,13 @@ class RunChoice:
         return RunPlan(name, steps, times, inputs, gains, minutes)
 
     def settled(self, gains: Array, needed: float = NEEDED) -> float:
-        """Share of what is open that gains settle, each truth by its odds."""
+        """Fraction of the open pairs that given gains decide, each assumed truth weighted by its odds."""
         part = np.where(np.isfinite(gains), np.minimum(gains / needed, 1.0), 0.0)
         odds = self.open.odds[: self.open.truths]
         return float(odds @ part.sum(axis=1) / odds.sum() / max(1, len(self.open.members) - 1))
 
     def shown(self, run: RunPlan, second: AugmentedDataset, j: int, k: int) -> float:
-        """Gain to expect between two members, the likelier one true, where runs are not offset against each other."""
+        """Expected gain between two members if the more probable one is true and no run has an offset."""
         if REZERO in run.steps:
             return run.apart(j, k)
         true, other = (j, k) if self.open.odds[j] >= self.open.odds[k] or k >= self.open.truths else (k, j)
@@ -151,10 +151,10 @@ class RunChoice:
         return second.distance(truth.values, rival, sigma_mm=rival.sigma_mm) - float(self.open.before[true, other])
 
     def least(self, run: RunPlan) -> tuple[float, tuple[int, int]] | None:
-        """Find the pair that gains least of those that are told apart, and what it gains; None without any.
+        """The separated pair with the smallest gain, and that gain; None without any.
 
-        Pairs that are told apart within the run come first: what rests on the run's offset against the data may be
-        taken for a re-zeroing.
+        Pairs separated within the run come first, because a separation by the run's offset against the data may be
+        mistaken for a re-zeroing.
         """
         second = AugmentedDataset.of(self.data, self.problem, run.input_mm, rezeroed=REZERO in run.steps)
         found = [(self.shown(run, second, *pair), pair) for pair in run.pairs()[:COMPARED]]
@@ -162,7 +162,7 @@ class RunChoice:
         return min(within or found, default=None)
 
     def best(self, ends: tuple[float, float]) -> RunPlan | None:
-        """Choose the protocol, and how often it is driven, that settles most; of alike ones the cheapest."""
+        """Choose the protocol, and its number of repetitions, that decides most pairs; of equal ones the cheapest."""
         found: list[tuple[float, float, int, RunPlan]] = []
         for name, steps in protocols(*ends, self.step_s):
             once = self.planned(name, steps, SCREENED)
@@ -178,10 +178,10 @@ class RunChoice:
         return self.planned(once.name, repeated(once.steps, times), REFITTED, times)
 
     def smaller(self, plan: RunPlan) -> Iterator[RunPlan]:
-        """Drive the same less often, then over less of the range and with fewer samples, while it settles what it did.
+        """Reduce repetitions, then range and samples, as long as the run still decides the same pairs.
 
-        Small motions are kinder to the gripper, and what a large one gains beyond need rests on the explanations' forms
-        more than on what was measured.
+        Small motions spare the gripper, and any further gain of a large one depends more on the explanations' formulas
+        than on what was measured.
         """
         low, high = float(plan.input_mm.min()), float(plan.input_mm.max())
         half, middle = 0.5 * (high - low), 0.5 * (low + high)
@@ -197,7 +197,7 @@ class RunChoice:
 
 
 def open_set(problem: Problem, members: list[Explanation]) -> OpenSet:
-    """Order the members by what the data say of them; the leading one stays first."""
+    """Order the members by their probability given the data; the best one stays first."""
     rows = max(2, int(problem.measured.size - problem.whitener.aside.sum()))
     cost = {id(e): e.bic(rows) + surprise(problem, e) for e in members}
     best, others = members[0], sorted(members[1:], key=lambda e: cost[id(e)])[:MOST_RIVALS]

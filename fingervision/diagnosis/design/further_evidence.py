@@ -1,6 +1,7 @@
-"""What tells look-alikes apart that no motion of the stage does: a sentence of advice a pair, without a promised gain.
+"""Evidence other than stage motion that distinguishes explanations: one sentence of advice per pair.
 
-Each effect states which checks it shows in and which it stays out of; a check tells two apart where they differ.
+Each effect states in which checks it is visible and in which it is not; a check distinguishes two effects that differ
+in this.
 """
 
 from fingervision.diagnosis.inference.hypothesis import Explanation
@@ -9,7 +10,7 @@ from fingervision.effects import catalogue
 
 
 def further_evidence(alternatives: tuple[Explanation, ...]) -> tuple[str, ...]:
-    """Say what else would tell explanations apart that differ by one effect each; a sentence a pair of effects.
+    """Advise what else would distinguish explanations that differ by one effect each; one sentence per pair of effects.
 
     Parameters
     ----------
@@ -26,6 +27,6 @@ def further_evidence(alternatives: tuple[Explanation, ...]) -> tuple[str, ...]:
 
 
 def checks_between(one: str, other: str) -> tuple[FurtherCheck, ...]:
-    """Give the checks in which one effect shows and the other stays out."""
+    """Checks in which one effect is visible and the other is not."""
     first, second = (catalogue()[name].checks for name in (one, other))
     return tuple(check for check in FurtherCheck if {first.get(check), second.get(check)} == {True, False})

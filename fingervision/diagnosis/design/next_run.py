@@ -19,10 +19,10 @@ def next_run(
     found: tuple[Point, ...],
     rng: np.random.Generator,
 ) -> NextRun | None:
-    """Choose the run that settles most of what is open, in the least of the rig's time.
+    """Choose the run that decides most of the open pairs in the least bench time.
 
-    Runs within the range that was measured come first: beyond it an explanation's form is not proven, and neither is
-    a promise that rests on it. The promise is for the pair that the run separates least.
+    Runs within the measured range are tried first: beyond it an explanation's formula is not verified, and neither is a
+    gain that depends on it. The stated gain is that of the pair that the run separates least.
 
     Parameters
     ----------
@@ -55,7 +55,7 @@ def next_run(
 def _promised(
     choose: RunChoice, plan: RunPlan, members: list[Explanation], found: tuple[Point, ...], rng: np.random.Generator
 ) -> NextRun | None:
-    """State what a run will gain, and make it smaller where nobody could rely on so large a promise."""
+    """Predict the gain of a run, and reduce the run where so large a predicted gain would be unreliable."""
     listed, odds = choose.open.members, choose.open.odds
     walks: dict[int, tuple[Point, ...]] = {0: found}
 

@@ -1,4 +1,4 @@
-"""Runs that a test bed can drive to tell explanations apart, as the steps of a recipe and as samples of the input."""
+"""Runs that a test bed can execute to distinguish explanations, as steps of a recipe and as samples of the input."""
 
 import numpy as np
 
@@ -25,7 +25,7 @@ def _ramp(start: float, end: float, speed_mm_s: float, step_s: float) -> Array:
 
 
 def _driven(step: Step, start: float, step_s: float) -> Array:
-    """Where the stage is at each sample of a step, shape (k,)."""
+    """Position of the stage at each sample of a step (mm), shape (k,)."""
     parts: list[Array] = []
     at = start
 
@@ -54,10 +54,10 @@ def _driven(step: Step, start: float, step_s: float) -> Array:
 
 
 def rounding_s(input_mm: Array, step_s: float, runs: tuple[slice, ...]) -> float:
-    """Estimate how long the stage takes to reverse, from the sharpest corner that a record shows.
+    """Time that the stage takes to reverse (s), from the sharpest reversal in a record.
 
-    A reversal from speed v spread over T seconds has the acceleration 2 v / T. A record without one says nothing:
-    then an ordinary stage's third of a second.
+    A reversal from speed v spread over T seconds has the acceleration 2 v / T. A record without reversals gives no
+    information; then the value of an ordinary stage, a third of a second, is used.
     """
     speeds = np.concatenate([np.diff(input_mm[run]) for run in runs]) / step_s
     bends = np.concatenate([np.abs(np.diff(input_mm[run], 2)) for run in runs]) / step_s**2
@@ -68,7 +68,7 @@ def rounding_s(input_mm: Array, step_s: float, runs: tuple[slice, ...]) -> float
 
 
 def driven(steps: list[Step], step_s: float, round_s: float) -> Array:
-    """Sample the input that a recipe's moving steps drive, beginning at rest where the first of them begins.
+    """Input samples of a recipe's moving steps, starting at rest where the first step starts.
 
     Parameters
     ----------
@@ -96,9 +96,9 @@ def driven(steps: list[Step], step_s: float, round_s: float) -> Array:
 
 
 def measured_ends(input_mm: Array, within_mm: tuple[float, float]) -> tuple[float, float]:
-    """Take the range that was measured, but so that a run begins or turns at the stage's zero where that is near.
+    """The measured range, extended so that a run begins or turns at the stage's zero where that is near.
 
-    After a way of a step or two of the encoder from where the stage stands, its place is hardly known.
+    After a motion of only one or two encoder steps the position is poorly known.
 
     Parameters
     ----------
@@ -117,7 +117,7 @@ def measured_ends(input_mm: Array, within_mm: tuple[float, float]) -> tuple[floa
 
 
 def repeated(steps: list[Step], times: int) -> list[Step]:
-    """Drive the same so many times in one run: triangles in more cycles, anything else from the beginning again."""
+    """Repeat a protocol within one run: triangles by more cycles, any other from its beginning."""
     if all(step["kind"] in ("triangle", "rezero") for step in steps):
         return [
             {**step, "cycles": times * int(_number(step, "cycles"))} if "cycles" in step else step for step in steps
@@ -128,7 +128,7 @@ def repeated(steps: list[Step], times: int) -> list[Step]:
 def protocols(
     low_mm: float, high_mm: float, step_s: float, stroke_samples: int = SAMPLES_A_STROKE
 ) -> list[tuple[str, list[Step]]]:
-    """List runs within a range of the input, each with its name.
+    """List protocols within a range of the input, each with its name.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Next runs that need no other motion: a stage re-zeroed, a slot of known width before the camera."""
+"""Next steps that need no other motion: re-zeroing the stage, or a slot of known width in front of the camera."""
 
 import numpy as np
 
@@ -20,10 +20,10 @@ SLOT_FRAMES, SLOT_U_MM = 10, 0.002
 
 
 def static_check(data: Observations, problem: Problem, best: Explanation, rivals: list[Explanation]) -> NextRun | None:
-    """Propose what needs no other motion, for the first rival that it separates.
+    """Propose a check without other motion, for the first rival that it separates.
 
-    Without times no motion can be judged by the memory of its samples, and a re-zeroing stands here; with them it is a
-    protocol among the others.
+    Without times no motion can be evaluated for effects with memory, and re-zeroing is proposed here; with times it is
+    one of the protocols.
     """
     for rival in rivals:
         pair = (best, rival)
@@ -39,7 +39,7 @@ def _one_shows(check: FurtherCheck, pair: tuple[Explanation, Explanation]) -> bo
 
 
 def _rezeroed(data: Observations, problem: Problem, pair: tuple[Explanation, Explanation]) -> NextRun | None:
-    """Re-zero the stage: an offset of the input is gone after it, an offset of the gap stays."""
+    """Re-zero the stage: an offset of the input disappears, an offset of the gap remains."""
     zeroed = that_show(FurtherCheck.REZERO)
     offset = next(e for e in pair if not set(e.names).isdisjoint(zeroed))
     history, offsets = data.chain.history, problem.offsets
@@ -57,7 +57,7 @@ def _rezeroed(data: Observations, problem: Problem, pair: tuple[Explanation, Exp
 
 
 def _slot(data: Observations, problem: Problem, pair: tuple[Explanation, Explanation]) -> NextRun | None:
-    """Measure a slot of known width: what the camera adds to a gap it adds to the slot, the gripper adds nothing."""
+    """Measure a slot of known width: a camera error changes gap and slot, a gripper error only the gap."""
     slot = np.full(1, round(data.chain.history.rest_gap_mm, 1))
     response = Response(-0.5 * slot, 0.5 * slot)
     for name in that_show(FurtherCheck.SLOT):
@@ -74,7 +74,7 @@ def _slot(data: Observations, problem: Problem, pair: tuple[Explanation, Explana
 def _still(
     name: str, steps: list[Step], size: float, spread: float, pair: tuple[Explanation, Explanation]
 ) -> NextRun | None:
-    """Proposal whose worth is one number, known to `spread`: the rival has no parameter that could follow it."""
+    """Proposal whose result is one number with uncertainty `spread`, which no parameter of the rival can match."""
     gain = (size / spread) ** 2
     if gain <= WORTH:
         return None

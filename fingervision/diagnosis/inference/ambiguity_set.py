@@ -29,7 +29,7 @@ PLAIN = 50.0
 def ambiguity_set(
     problem: Problem, best: Explanation, nothing: Explanation, pool: list[Explanation], pairs: list[Explanation]
 ) -> tuple[list[Explanation], dict[tuple[str, ...], float]]:
-    """Collect every minimal explanation that cannot be told apart from the best."""
+    """Collect every minimal explanation that is indistinguishable from the best."""
     members, distances = [best], {}
     target = problem.whitened(best.values)
     metric = problem.offsets.metric(best.sigma_mm)
@@ -76,15 +76,15 @@ def ambiguity_set(
 
 
 def _net(nothing: Explanation, explanation: Explanation) -> float:
-    """Gain beyond what its free parameters take from noise."""
+    """Gain in chi-square beyond what its free parameters gain from noise."""
     return nothing.score - explanation.score - 2.0 * explanation.free
 
 
 def _simpler_form(problem: Problem, nothing: Explanation, best: Explanation, other: Explanation) -> bool:
-    """Whether the best may owe its lead to its richer form alone, which contains what the other predicts.
+    """Whether the best may lead only because its richer formula contains the other's prediction.
 
-    A delay's form fails where the stage turns between two samples, and a resonance that is damped well rounds corners
-    as well. Forms deviate by so much; where the lead is plain, the richer form is seen for what it is.
+    The formula of a delay is inexact where the stage turns between two samples, and a well-damped resonance rounds
+    corners as well. Formulas deviate by about that much; a larger lead is counted as evidence for the richer one.
     """
     worse = other.score - best.score
     return (
@@ -96,27 +96,28 @@ def _simpler_form(problem: Problem, nothing: Explanation, best: Explanation, oth
 
 
 def _least_refuted(distance: float) -> float:
-    """Chi-square by which an explanation must come out worse than another before the data refute that it is true.
+    """Chi-square by which an explanation must be worse than another before the data refute it.
 
-    If it is, the other leaves `distance` more than it, with a standard deviation of 2 sqrt(distance) (Cox 1961). Two
-    that these data could tell apart are both kept where the data happen to speak for neither.
+    If it is true, the other leaves `distance` more than it, with a standard deviation of 2 sqrt(distance) (Cox 1961).
+    Two explanations that such data could distinguish are both kept if these data favour neither.
     """
     return -distance + SURELY * 2.0 * float(np.sqrt(distance)) + SPARE
 
 
 def _imitation(problem: Problem, truth: Explanation, other: Explanation, sigma_mm: tuple[float, ...]) -> Explanation:
-    """Fit one explanation to what another predicts; the score is D_jk, the squared whitened distance that remains.
+    """Fit one explanation to the prediction of another; the score is D_jk, the remaining squared whitened distance.
 
-    Both directions count run offsets with the best explanation's spread: a worse one would hide its fault in them.
+    In both directions run offsets have the spread of the best explanation, because a worse one would hide its misfit in
+    them.
     """
     target = problem.whitened(truth.values)
     return fit(problem, other.names, other.values, target=target, sigma_mm=sigma_mm, iterations=12)
 
 
 def beside_foretold(problem: Problem, members: list[Explanation]) -> list[Explanation]:
-    """Drop what only imitates an effect that came just as the drawing foretells it: that would be a coincidence.
+    """Drop what only imitates an effect predicted by the drawing and found as predicted: that would be a coincidence.
 
-    An end stop at the very input at which the drawn fingers meet is the drawn fingers' contact.
+    Example: an end stop at exactly the input at which the drawn fingers meet is the drawn fingers' contact.
     """
 
     def foretold(explanation: Explanation, name: str) -> bool:
@@ -136,21 +137,21 @@ def beside_foretold(problem: Problem, members: list[Explanation]) -> list[Explan
 
 
 def odds(problem: Problem, explanation: Explanation, rows: int) -> float:
-    """-2 log of the posterior odds: BIC, the parameters' surprise, and the price of having had a choice."""
+    """-2 log of the posterior odds: BIC, prior density of the parameters, and prior of the number of alternatives."""
     return explanation.bic(rows) + surprise(problem, explanation) + choices(problem, explanation)
 
 
 def choices(problem: Problem, explanation: Explanation) -> float:
-    """-2 log of the prior share of one explanation among all of as many effects.
+    """-2 log of the prior probability of one explanation among all with the same number of effects.
 
-    There are so many more pairs than single effects that some pair fits well by chance; all numbers of effects are
-    taken for equally likely beforehand (extended BIC, Chen & Chen 2008).
+    There are so many more pairs than single effects that some pair fits well by chance; all numbers of effects have
+    equal prior probability (extended BIC, Chen & Chen 2008).
     """
     return 2.0 * float(np.log(comb(len(problem.effects), len(explanation.names))))
 
 
 def surprise(problem: Problem, explanation: Explanation) -> float:
-    """-2 log of the physical priors' density at the parameters over that at their middle."""
+    """-2 log of the ratio of the parameters' prior density to its value at the prior's centre."""
     return sum(
         (FREEDOM + 1.0) * float(np.log1p(((value - (p.neutral or 0.0)) / p.typical) ** 2 / FREEDOM))
         for name, p in problem.parameters(explanation.names)

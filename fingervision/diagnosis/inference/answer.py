@@ -1,4 +1,4 @@
-"""Judge the answer of a search by the share of the disagreement that it explains."""
+"""Judge the result of a search by the fraction of the disagreement that it explains."""
 
 from dataclasses import dataclass, replace
 
@@ -14,7 +14,7 @@ from fingervision.domain.effect import Array
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Answer:
-    """What was found, and what stands with it.
+    """The result of a search, with the residual that remains.
 
     Parameters
     ----------
@@ -35,12 +35,12 @@ class Answer:
     stands: Standing
 
     def values(self) -> Settings:
-        """Everything that was found: the effects, and the curve of a map."""
+        """Parameters of all that was found: of the effects, and of the map's curve."""
         return _values(self.data, self.found)
 
 
 def judged(data: Observations, found: Findings) -> Answer:
-    """Put what was found beside the disagreement; names that leave it larger are taken back.
+    """Compare the result with the disagreement; names that increase the disagreement are withdrawn.
 
     Parameters
     ----------
@@ -64,7 +64,7 @@ def judged(data: Observations, found: Findings) -> Answer:
 
 
 def without_names(data: Observations, found: Findings, unknown: str | None) -> tuple[Observations, Findings]:
-    """Take every name back, the map's too.
+    """Withdraw every name, including that of the map.
 
     Parameters
     ----------
@@ -78,7 +78,7 @@ def without_names(data: Observations, found: Findings, unknown: str | None) -> t
 
 
 def _values(data: Observations, found: Findings) -> Settings:
-    """Everything that was found: the effects, and the curve of a map."""
+    """Parameters of all that was found: of the effects, and of the map's curve."""
     if data.position_map is None:
         return found.best.values
     return {**found.best.values, NAME: data.position_map.values()}

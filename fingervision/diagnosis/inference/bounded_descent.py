@@ -17,7 +17,7 @@ SMALLEST_GAIN, SMALLEST_GAIN_SHARE = 0.02, 1e-5
 
 
 class LeastSquares(Protocol):
-    """What is minimised: a weighted sum of squares whose weights may follow the residual."""
+    """Protocol of what is minimised: a weighted sum of squares whose weights may depend on the residual."""
 
     def residual(self, x: Array) -> Array:
         """Target minus prediction, shape (m,), at parameters of shape (p,)."""
@@ -26,10 +26,10 @@ class LeastSquares(Protocol):
         """Weighted sum of squares of a residual."""
 
     def linearised(self, x: Array, residual: Array) -> tuple[Array, Array]:
-        """Normal matrix, shape (p, p), and what pulls the parameters, shape (p,)."""
+        """Normal matrix, shape (p, p), and gradient of the sum of squares, shape (p,)."""
 
     def reweighted(self, residual: Array) -> Self:
-        """Take the weights that suit a residual."""
+        """Choose the weights that suit a residual."""
 
 
 Weighted = TypeVar("Weighted", bound=LeastSquares)
@@ -72,7 +72,7 @@ class Descent(Generic[Weighted]):
 
 
 def descend(squares: Weighted, start: Array, lower: Array, upper: Array, iterations: int) -> Descent[Weighted]:
-    """Lower a sum of squares between bounds.
+    """Reduce a sum of squares within bounds.
 
     Parameters
     ----------
@@ -115,10 +115,10 @@ def descend(squares: Weighted, start: Array, lower: Array, upper: Array, iterati
 
 
 def bounded_step(matrix: Array, pull: Array, bounds: tuple[Array, Array]) -> Array:
-    """Minimise a quadratic form within bounds, to the accuracy that a step of a search needs.
+    """Minimise a quadratic form within bounds, to the accuracy that a search step needs.
 
-    What would go beyond its bound is held there and the others are solved again beside it: clipped alone it would
-    leave them where they suit a step that was never made.
+    A parameter that would exceed its bound is fixed there and the others are solved again. If it were only clipped, the
+    others would keep values that suit a step which is not made.
 
     Parameters
     ----------
@@ -134,7 +134,10 @@ def bounded_step(matrix: Array, pull: Array, bounds: tuple[Array, Array]) -> Arr
     ndarray of float, shape (p,)
         The step.
     """
-    step, held = np.zeros(pull.size), np.zeros(pull.size, dtype=bool)
+    step: Array = np.asarray(np.linalg.lstsq(matrix, pull, rcond=1e-12)[0], dtype=np.float64)
+    held = np.zeros(pull.size, dtype=bool)
+    if not np.any((step < bounds[0]) | (step > bounds[1])):
+        return step
     for _ in range(pull.size):
         loose = ~held
         rest = pull[loose] - matrix[np.ix_(loose, held)] @ step[held]
@@ -150,16 +153,17 @@ def bounded_step(matrix: Array, pull: Array, bounds: tuple[Array, Array]) -> Arr
 
 
 def _free(x: Array, pull: Array, normal: Array, lower: Array, upper: Array) -> NDArray[np.bool_]:
-    """Which parameters may move: no bound stands in the way, and the data know of them."""
+    """Which parameters may move: those that no bound blocks and that the data determine."""
     near = AT_BOUND * (upper - lower)
     held = ((x <= lower + near) & (pull <= 0.0)) | ((x >= upper - near) & (pull >= 0.0))
     return np.asarray(~held & (np.diag(normal) > 1e-12), dtype=bool)
 
 
 def _in_own_units(normal: Array, free: NDArray[np.bool_]) -> tuple[Array, Array]:
-    """Scale the free part so that each parameter counts in units of its own precision.
+    """Scale the free part of the normal matrix so that each parameter is in units of its own precision.
 
-    A time constant in hours beside micrometres is then no singular matrix.
+    Without scaling, a time constant in hours beside micrometres would make the matrix singular.
     """
-    scale = 1.0 / np.sqrt(np.maximum(np.diag(normal)[free], 1e-300))
-    return scale[:, None] * normal[np.ix_(free, free)] * scale, scale
+    part = normal if free.all() else normal[np.ix_(free, free)]
+    scale = 1.0 / np.sqrt(np.maximum(np.diag(part), 1e-300))
+    return scale[:, None] * part * scale, scale

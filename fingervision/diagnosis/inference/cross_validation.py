@@ -1,4 +1,4 @@
-"""Cross-validation: residual on the run left out of a fit, and on the runs that were fitted."""
+"""Cross-validation: residual on a run left out of the fit, and on the fitted runs."""
 
 from dataclasses import replace
 
@@ -12,7 +12,7 @@ from fingervision.domain.effect import Array
 
 
 def rms_mm(residual_mm: Array, samples: int, edges: bool) -> float:
-    """RMS over left and right where both exist, else over the gap; the midline's constant removed.
+    """RMS over left and right where both exist, else over the gap; the constant of the midline removed (mm).
 
     Parameters
     ----------
@@ -32,7 +32,7 @@ def rms_mm(residual_mm: Array, samples: int, edges: bool) -> float:
 
 
 def left_out_rms_mm(data: Observations, problem: Problem, best: Explanation) -> tuple[float | None, float | None]:
-    """Leave each run out of the fit in turn and predict it; before and after, None with one run."""
+    """Leave each run out of the fit in turn and predict it; RMS before and after, None with one run."""
     history = data.chain.history
     n, channels = history.input_mm.size, len(data.channels)
     if len(history.runs) < 2:

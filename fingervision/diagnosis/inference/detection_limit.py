@@ -1,4 +1,4 @@
-"""Detection limit of each effect: the smallest size that these data would have revealed."""
+"""Detection limit of each effect: the smallest size that these data would have shown."""
 
 from collections.abc import Mapping
 
@@ -14,7 +14,7 @@ SEEN_SIGMAS = 1.645
 def detection_limits(
     problem: Problem, atoms: Signatures, nothing: Explanation, thresholds: Mapping[str, float]
 ) -> dict[str, dict[str, object]]:
-    """State the size of each effect that this data would have shown."""
+    """Compute the detection limit of each effect."""
     metric = problem.offsets.metric(nothing.sigma_mm)
     shared = problem.offsets.design.T @ atoms.columns
     norm = np.einsum("ij,ij->j", atoms.columns, atoms.columns) - np.einsum("ij,ij->j", shared, metric @ shared)

@@ -10,6 +10,7 @@ from fingervision.diagnosis.inference.null_bootstrap import LONG
 from fingervision.diagnosis.inference.signatures import Signatures, tangents
 from fingervision.diagnosis.input.input_uncertainty import below_the_input
 from fingervision.domain.effect import Array
+from fingervision.domain.parameter import Parameter
 
 Progress = Callable[[float], None]
 SCANNED = 6
@@ -23,6 +24,10 @@ ALIKE = 12.0
 """Squared whitened distance within which two predictions are one, as in the ambiguity set."""
 STEPS_HIDDEN = 1.0
 """Steps of the encoder within which an effect is not told from its roundings."""
+FINEST, COARSEST = 0.003, 0.02
+"""Relative distance of the sizes of a jump that are tried alone: two thousand at most, and no fewer than signatures."""
+FINE_VALUES = 4_000_000
+"""Values that such predictions may have in all: 32 MB."""
 SWAPS_REFITTED = 24
 """Partners refitted beside the halves of the best pair: each half has at most 26."""
 
@@ -38,16 +43,33 @@ def single_effects(problem: Problem, atoms: Signatures, iterations: int) -> list
         if not mine.size:
             continue
         mine = mine[np.argsort(-gain[mine])]
-        tries = [fit(problem, (name,), {name: atoms.begin(k, coefficient[k])}, iterations=5) for k in mine[:4]]
+        begins = [atoms.begin(k, coefficient[k]) for k in mine[:4]]
+        listed = [parameter for _, parameter in problem.parameters((name,)) if parameter.run is None]
+        if len(listed) == 1 and listed[0].rugged and listed[0].logarithmic and 2.0 * gain[mine[0]] > np.max(gain):
+            between = [{listed[0].name: value} for value in _finely(problem, listed[0]).tolist()]
+            begins.append(scan(problem, nothing, name, between)[0])
+        tries = [fit(problem, (name,), {name: begin}, iterations=5) for begin in begins]
         best = min(tries, key=lambda explanation: explanation.score)
         found.append(fit(problem, (name,), best.values, iterations=iterations))
     return sorted(found, key=lambda explanation: explanation.score)
 
 
+def _finely(problem: Problem, parameter: Parameter) -> Array:
+    """Sizes of a jump so near to each other that a stroke's last jump moves by one sample; shape (k,)."""
+    history = problem.chain.history
+    steps = np.concatenate([np.diff(history.input_mm[run]) for run in history.runs])
+    moving = np.abs(steps[np.abs(steps) > 0.0])
+    # A stroke is at most the range, and a jump comes at a sample.
+    apart = float(np.clip(np.median(moving) / max(history.input_span_mm, 1e-300), FINEST, COARSEST))
+    begins = parameter.starting_values()
+    count = int(float(np.log(begins[-1] / begins[0])) / apart) + 1
+    return np.geomspace(begins[0], begins[-1], max(1, min(count, FINE_VALUES // problem.measured.size)))
+
+
 def extended(
     problem: Problem, atoms: Signatures, bases: list[Explanation], most: int, progress: Progress
 ) -> list[Explanation]:
-    """Add each effect to each base: starts from signatures on what the base leaves, then joint refits."""
+    """Add each effect to each base explanation: start from signatures in the base's residual, then refit jointly."""
     owner = np.array(atoms.names)
     planned: list[tuple[float, Explanation, str, dict[str, float]]] = []
     scanned = SCANNED if problem.chain.history.input_mm.size <= LONG else 1
@@ -80,10 +102,10 @@ def extended(
 
 
 def swapped(problem: Problem, atoms: Signatures, pairs: list[Explanation]) -> list[Explanation]:
-    """Try every other effect in the place of each of the best explanation's, the others where they were put.
+    """Replace each effect of the best explanation by every other effect, the rest starting at their fitted values.
 
-    Alone it had stood elsewhere: fitted to what two effects do, it ends far out in a valley out of which no joint
-    search finds its way.
+    Fitted alone, the other effect absorbed the action of two effects, and its parameters end far out in a valley from
+    which no joint search returns.
     """
     if not pairs:
         return pairs
@@ -98,7 +120,7 @@ def swapped(problem: Problem, atoms: Signatures, pairs: list[Explanation]) -> li
 
 
 def different(problem: Problem, explanations: list[Explanation], most: int) -> list[Explanation]:
-    """Keep the best of those that predict the same: an offset of the input, of the gap and of an edge often do."""
+    """Keep the best of several explanations with equal predictions, such as offsets of input, gap and edge."""
     found, predicted = list[Explanation](), list[Array]()
     for explanation in explanations:
         curve = problem.whitened(explanation.values)
@@ -112,7 +134,7 @@ def different(problem: Problem, explanations: list[Explanation], most: int) -> l
 
 
 def added_share(problem: Problem, smaller: Explanation, larger: Explanation) -> float:
-    """Size of what the larger explanation adds, as a share of all that it changes in the prediction, in mm."""
+    """Size of what the larger explanation adds, as a fraction of its whole change of the prediction in mm."""
     bare, before, after = (problem.chain.stacked(values) for values in ({}, smaller.values, larger.values))
     if below_the_input(problem, float(np.sqrt(np.mean((after - before) ** 2)))):
         return 0.0
@@ -120,7 +142,7 @@ def added_share(problem: Problem, smaller: Explanation, larger: Explanation) -> 
 
 
 def within_a_step(problem: Problem, explanation: Explanation) -> bool:
-    """Whether an effect in it acts by less than an encoder's step, on a few rows or at the ends: as roundings do."""
+    """Whether one of its effects acts by less than an encoder step, on few rows or at the ends, as rounding does."""
     history = problem.chain.history
     if history.input_step_mm == 0.0:
         return False
@@ -146,10 +168,10 @@ def likeliest(candidates: list[Explanation], samples: int) -> Explanation:
 
 
 def simplest(singles: list[Explanation], samples: int, nothing: Explanation) -> Explanation:
-    """Choose one effect, the simpler form where the richer one gains no more than forms deviate.
+    """Choose one effect; a simpler formula is preferred if the richer one gains no more than formulas deviate.
 
-    Such a difference is the forms' own fault, and no reason to choose a resonance for a delay that falls between two
-    samples.
+    Such a difference is due to the formulas' inexactness, and no reason to prefer a resonance to a delay that falls
+    between two samples.
     """
     best = likeliest(singles, samples)
     within = FORM_SHARE**2 * (nothing.score - best.score)

@@ -1,4 +1,4 @@
-"""Harmonics: a screw's error has harmonics, which the catalogue's sine has not; small ones are no second name."""
+"""Harmonics: a screw's cyclic error has harmonics that the catalogue's sine lacks; small ones need no second name."""
 
 from dataclasses import dataclass
 
@@ -16,7 +16,7 @@ LARGEST = 0.25
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Harmonics:
-    """Harmonics of a named cyclic error, and what they explain of the residual.
+    """Harmonics of a named cyclic error, and the residual that they explain.
 
     Parameters
     ----------
@@ -34,7 +34,7 @@ class Harmonics:
 
 
 def harmonics(problem: Problem, best: Explanation) -> Harmonics:
-    """Fit the harmonics of a named cyclic error; none where they are too large to be its own.
+    """Fit the harmonics of a named cyclic error; none where they are too large to belong to it.
 
     Parameters
     ----------

@@ -21,7 +21,7 @@ SMALL_SHARE = 0.05
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Explanation:
-    """Effects with their parameters, and how well they explain a target.
+    """A set of effects with their fitted parameters, and how well they explain a target.
 
     Parameters
     ----------
@@ -53,13 +53,13 @@ class Explanation:
     starts_price: float = 0.0
 
     def bic(self, samples: int) -> float:
-        """Schwarz's criterion: score plus the price of the free parameters and start states."""
+        """Schwarz's criterion: score plus penalty for the free parameters and start states."""
         return self.score + self.free * float(np.log(samples)) + self.starts_price
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Problem:
-    """Everything an explanation is judged by.
+    """Everything that the score of an explanation depends on: data, chain, noise and offsets.
 
     Parameters
     ----------
@@ -89,7 +89,7 @@ class Problem:
     mapped: float = 0.0
 
     def parameters(self, names: tuple[str, ...]) -> list[tuple[str, Parameter]]:
-        """List the parameters of some effects with the bounds that the data leave."""
+        """Parameters of some effects, with bounds narrowed to what the data can show."""
         found: list[tuple[str, Parameter]] = []
         for name in names:
             searched = self.effects[name].search(self.whitener.history)
@@ -97,7 +97,7 @@ class Problem:
         return found
 
     def only_run(self, column: Array, run: int | None) -> Array:
-        """Keep the rows of one run of a column of shape (m,) or all where `run` is None."""
+        """Keep the rows of one run of a column of shape (m,), or all rows where `run` is None."""
         if run is None or len(self.chain.history.runs) == 1:
             return column
         rows = self.chain.history.runs[run]
@@ -112,20 +112,20 @@ class Problem:
         return self.whitener.one(self.chain.stacked(settings))
 
     def score(self, settings: Mapping[str, Mapping[str, float]]) -> float:
-        """Judge parameters as they are: chi-square with the best run offsets, plus those offsets' penalty."""
+        """Score of given parameter values: chi-square with the best run offsets, plus the penalty of these offsets."""
         residual = self.measured - self.whitened(settings)
         sigma, penalty = self.offsets.spread(residual)
         return self.offsets.squared(residual, self.offsets.metric(sigma)) + penalty
 
     def cost(self, settings: Mapping[str, Mapping[str, float]]) -> float:
-        """-2 log of the posterior, up to a constant: the score over all spreads of the runs instead of at the best."""
+        """-2 log of the posterior up to a constant, integrated over the spreads of the run offsets."""
         residual = self.measured - self.whitened(settings)
         sigma, penalty = self.offsets.spread(residual)
         metric = self.offsets.metric(sigma)
         return self.offsets.squared(residual, metric) + penalty + self.offsets.doubt(residual)
 
     def nothing(self) -> Explanation:
-        """Judge the model as it is."""
+        """Score of the model without any effect."""
         residual = self.measured - self.whitened({})
         sigma, penalty = self.offsets.spread(residual)
         score = self.offsets.squared(residual, self.offsets.metric(sigma)) + penalty

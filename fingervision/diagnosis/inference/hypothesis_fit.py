@@ -19,7 +19,7 @@ MANY_STEPS = 20
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _JointSquares:
-    """Chi-square of some effects' parameters, with the run offsets allowed for.
+    """Chi-square of some effects' parameters, with run offsets allowed.
 
     Parameters
     ----------
@@ -45,7 +45,7 @@ class _JointSquares:
     sigma_mm: tuple[float, ...] | None
 
     def settings(self, x: Array) -> Point:
-        """Name the parameters, shape (p,)."""
+        """Parameter values by name, from a vector of shape (p,)."""
         out: Point = {name: {} for name in self.order}
         for (name, parameter), value in zip(self.listed, x, strict=True):
             out[name][parameter.name] = float(value)
@@ -56,17 +56,17 @@ class _JointSquares:
         return self.aim - self.problem.whitened(self.settings(x))
 
     def squared(self, residual: Array) -> float:
-        """Chi-square with the best offsets."""
+        """Chi-square with the best run offsets."""
         return self.problem.offsets.squared(residual, self.metric)
 
     def reweighted(self, residual: Array) -> "_JointSquares":
-        """Let the spread of the offsets follow the residual, unless it was given."""
+        """Adapt the spread of the offsets to the residual, unless it is given."""
         offsets = self.problem.offsets
         spread = self.sigma_mm if self.sigma_mm is not None else offsets.spread(residual)[0]
         return replace(self, metric=offsets.metric(spread))
 
     def linearised(self, x: Array, residual: Array) -> tuple[Array, Array]:
-        """Differentiate the prediction by steps that stay within the bounds."""
+        """Linearise the prediction by finite differences that stay within the bounds."""
         offsets = self.problem.offsets
         jacobian = self.problem.whitener.columns(self._derivatives(x))[0]
         shared = offsets.design.T @ jacobian
@@ -99,7 +99,7 @@ def fit(
     sigma_mm: tuple[float, ...] | None = None,
     iterations: int = 12,
 ) -> Explanation:
-    """Fit effects jointly by a search between their bounds.
+    """Fit effects jointly, by a search within their bounds.
 
     Parameters
     ----------
@@ -145,7 +145,7 @@ def fit(
 
 
 def _scanned(found: Descent[_JointSquares], lower: Array, upper: Array, *, thorough: bool) -> Descent[_JointSquares]:
-    """Scan around the fitted values of parameters in which the prediction is discontinuous."""
+    """Scan around the fitted values of parameters on which the prediction depends discontinuously."""
     x, residual, cost = found.x, found.residual, found.cost
     for i, (_, parameter) in enumerate(found.squares.listed):
         for width, count in SCANS[not thorough :] if parameter.rugged else ():
@@ -165,7 +165,7 @@ def _bounds(listed: list[tuple[str, Parameter]]) -> tuple[Array, Array]:
 
 
 def _together(listed: list[tuple[str, Parameter]]) -> list[list[int]]:
-    """Group parameters whose derivatives one prediction gives: starts of different runs touch different rows."""
+    """Group parameters whose derivatives one prediction gives: start states of different runs affect different rows."""
     groups: dict[object, list[int]] = {}
     for i, (name, parameter) in enumerate(listed):
         groups.setdefault(i if parameter.run is None else name, []).append(i)
@@ -175,7 +175,7 @@ def _together(listed: list[tuple[str, Parameter]]) -> list[list[int]]:
 def scan(
     problem: Problem, base: Explanation, name: str, starts: Sequence[Mapping[str, float]]
 ) -> tuple[dict[str, float], float]:
-    """Try one more effect beside an explanation as it stands.
+    """Try one more effect added to a fixed explanation.
 
     Returns
     -------

@@ -1,7 +1,7 @@
-"""Effects that a map of position errors can stand for: functions of the place alone, beyond a straight line.
+"""Effects that a map of position errors can represent: functions of position alone, beyond a straight line.
 
-Where a map is fitted as well, no data can distinguish them from it, whatever their size. Effects with reversal,
-memory or time can be distinguished.
+If a map is fitted too, no data can distinguish such an effect from the map, whatever its size. Effects with reversal,
+memory or dependence on time can be distinguished.
 """
 
 from dataclasses import replace
@@ -22,7 +22,7 @@ amplitude, less than which the forms of effects are off on real rigs (ISO 230-2 
 
 
 def imitating_effects(problem: Problem, position_map: PositionMap) -> dict[str, str]:
-    """Find effects that act like a map whatever their parameters are.
+    """Find effects that act like a map for all values of their parameters.
 
     Parameters
     ----------
@@ -50,9 +50,9 @@ def imitating_effects(problem: Problem, position_map: PositionMap) -> dict[str, 
 
 
 def imitating_parts(problem: Problem, position_map: PositionMap, explanation: Explanation) -> dict[str, str]:
-    """Find effects of an explanation that act like a map with the parameters that they have there.
+    """Find effects of an explanation that act like a map at their fitted parameters.
 
-    A cyclic error with a period of half the range is one: a map can follow so smooth a curve.
+    An example is a cyclic error with a period of half the range, because a map can follow so smooth a curve.
 
     Parameters
     ----------
@@ -93,7 +93,7 @@ def _reason(problem: Problem) -> str:
 
 
 def _held(problem: Problem, position_map: PositionMap, columns: Array) -> tuple[Flags, Flags]:
-    """Whether a straight line holds each whitened column, and whether a map's curve holds what the line leaves."""
+    """Whether a straight line represents each whitened column, and whether a map's curve represents the rest."""
     nodes_mm = position_map.nodes_mm
     raw = map_columns(problem.chain, nodes_mm)
     line = np.stack([np.ones_like(nodes_mm), nodes_mm - nodes_mm.mean()], axis=1)
@@ -101,7 +101,7 @@ def _held(problem: Problem, position_map: PositionMap, columns: Array) -> tuple[
     offsets, metric = problem.offsets, problem.offsets.metric(problem.nothing().sigma_mm)
 
     def left(beside: Array) -> Array:
-        """Squared lengths once the offsets and the columns beside are taken out; shape (k,)."""
+        """Squared lengths after projection on offsets and the columns `beside`; shape (k,)."""
         moved = beside - offsets.design @ (metric @ (offsets.design.T @ beside))
         rest = columns - beside @ (np.linalg.pinv(beside.T @ moved) @ (moved.T @ columns))
         shared = offsets.design.T @ rest

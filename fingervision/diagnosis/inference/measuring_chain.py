@@ -17,7 +17,7 @@ Settings = Mapping[str, Values]
 
 @dataclass(frozen=True, eq=False)
 class MeasuringChain:
-    """A model with its history; effects switched on act in the catalogue's order.
+    """A model with its history; enabled effects act in the catalogue's order.
 
     Parameters
     ----------
@@ -51,13 +51,23 @@ class MeasuringChain:
 
     @cached_property
     def effects(self) -> Mapping[str, Effect]:
-        """The catalogue in its order, as this model obeys it."""
+        """The effects of the catalogue in order, each as this model computes it."""
         laws = own_laws(self.model)
         effects = {name: obeyed(effect, laws.get(name)) for name, effect in catalogue().items()}
         return {name: _along_curves(effect) for name, effect in effects.items()} if self.curved else effects
 
+    @cached_property
+    def _stages(self) -> tuple[tuple[DriveEffect, ...], tuple[PointEffect, ...]]:
+        """Effects of the drive, and effects of mechanism and camera, each in the catalogue's order."""
+        effects = self.effects.values()
+        drives = tuple(effect for effect in effects if isinstance(effect, DriveEffect))
+        return drives, tuple(effect for effect in effects if isinstance(effect, PointEffect))
+
     def with_input(self, input_mm: Array) -> "MeasuringChain":
-        """Give the measured rows another input, and the points of the path that repeat it; `input_mm` of shape (n,)."""
+        """Replace the input of the measured rows, and of the points of the path that repeat it.
+
+        `input_mm` of shape (n,).
+        """
         path = None if self.path is None else self.path.moved(input_mm - self.history.input_mm)
         return replace(self, history=replace(self.history, input_mm=input_mm), path=path)
 
@@ -69,13 +79,13 @@ class MeasuringChain:
         return replace(self, history=replace(self.history, rest_gap_mm=rest_gap_mm), path=path)
 
     def respond(self, settings: Settings) -> Response:
-        """Run the chain along the path, and give the points at the measured rows.
+        """Evaluate the chain along the path, and return the measuring points at the measured rows.
 
-        An effect named in `settings` replaces a fixed one of the same name.
+        An effect named in `settings` replaces a fixed effect of the same name.
         """
         acting = {**self.fixed, **settings}
         history = self.history if self.path is None else self.path.history
-        points = [e for name, e in self.effects.items() if name in acting and isinstance(e, PointEffect)]
+        points = [effect for effect in self._stages[1] if effect.name in acting]
         response = self.model.respond(self._driven_mm(acting))
         if self.dynamics is not None and self.dynamics[0] is history.time_s:
             response = response.plus(self.dynamics[1])
@@ -85,7 +95,7 @@ class MeasuringChain:
                 response = effect.act(response, history, acting[effect.name])
 
         def seen(midline_mm: float) -> Response:
-            picture = response.shifted(midline_mm)
+            picture = response.shifted(midline_mm) if midline_mm else response
             for effect in cameras:
                 picture = effect.act(picture, history, acting[effect.name])
             return picture if self.path is None else picture.at(self.path.rows)
@@ -96,20 +106,20 @@ class MeasuringChain:
         return seen(self.midline_mm + self.seen_midline_mm - float(np.median(first.midline_mm)))
 
     def driven_mm(self, settings: Settings) -> Array:
-        """Input that the mechanism receives at the measured rows, behind the effects of the drive; shape (n,)."""
+        """Input that the mechanism receives at the measured rows, after the drive effects; shape (n,) (mm)."""
         along = self._driven_mm({**self.fixed, **settings})
         return along if self.path is None else along[self.path.rows]
 
     def _driven_mm(self, acting: Settings) -> Array:
         history = self.history if self.path is None else self.path.history
         input_mm = history.input_mm
-        for name, effect in self.effects.items():
-            if name in acting and isinstance(effect, DriveEffect):
-                input_mm = effect.act(input_mm, history, acting[name])
+        for effect in self._stages[0]:
+            if effect.name in acting:
+                input_mm = effect.act(input_mm, history, acting[effect.name])
         return input_mm
 
     def stacked(self, settings: Settings) -> Array:
-        """Gap, and where they were measured midline and force, one after the other; shape (channels * n,)."""
+        """Gap, and midline and force where they were measured, one after another; shape (channels * n,)."""
         response = self.respond(settings)
         parts = [response.gap_mm]
         if self.history.both_edges:
@@ -120,12 +130,12 @@ class MeasuringChain:
 
 
 def own_laws(model: Model) -> Mapping[str, PhysicalLaw]:
-    """Laws by the effect's name: a drawn gripper obeys its own physics, a table has none."""
+    """Formulas for effects by name: a drawn gripper has its own physics for some effects, a table has none."""
     return model.laws if isinstance(model, PhysicalModel) else {}
 
 
 def obeyed(effect: Effect, law: PhysicalLaw | None) -> Effect:
-    """Return the effect as a model obeys it: by its own law, or without one by the catalogue's form."""
+    """Return the effect as a model computes it: by the model's own law, else by the catalogue's formula."""
     if law is None or not isinstance(effect, PointEffect):
         return effect
 
@@ -147,7 +157,7 @@ def _along_curves(effect: Effect) -> Effect:
 def admissible(
     effects: Mapping[str, Effect], history: History, without: frozenset[str]
 ) -> tuple[dict[str, Effect], dict[str, str]]:
-    """Effects that these data can show, and the reasons for leaving out the others."""
+    """Effects that these data can show, and the reasons for excluding the others."""
     able: dict[str, Effect] = {}
     excluded: dict[str, str] = {}
     for name, effect in effects.items():

@@ -1,4 +1,7 @@
-"""Model adequacy: a test for structure in the residual of the best explanation, which makes it *unknown*."""
+"""Model adequacy: a test for structure in the residual of the best explanation.
+
+Structure gives the verdict *unknown*.
+"""
 
 from dataclasses import dataclass
 
@@ -26,14 +29,14 @@ STAND_INS = 2
 
 
 def shapes_of(problem: Problem) -> Probes:
-    """Build the probes for a problem; fewer for a long record."""
+    """Probes for a problem; fewer of them for a long record."""
     history = problem.chain.history
     return probes(history, problem.whitener, 2400 if history.input_mm.size <= LONG else 800)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Basis:
-    """Whitened columns, shape (m, k), with their squared lengths and what run offsets share with them."""
+    """Whitened columns, shape (m, k), with their squared lengths and their overlap with run offsets."""
 
     columns: Array
     squares: Array
@@ -45,12 +48,12 @@ class _Basis:
         return cls(columns, np.einsum("ij,ij->j", columns, columns), problem.offsets.design.T @ columns)
 
     def beside_offsets(self, metric: Array) -> Array:
-        """Squared lengths once the offsets of a metric are allowed; shape (k,)."""
+        """Squared lengths after projection on the offsets that a metric allows; shape (k,)."""
         return np.asarray(self.squares - np.einsum("ij,ij->j", self.shared, metric @ self.shared))
 
 
 def _gains(problem: Problem, basis: _Basis, found: Explanation, taken: Array) -> tuple[Array, Array, Array]:
-    """Chi-square that each column takes from what an explanation and the columns already taken leave.
+    """Fall of chi-square by each column, in the residual of an explanation and the columns already taken.
 
     Returns
     -------
@@ -74,16 +77,16 @@ def _gains(problem: Problem, basis: _Basis, found: Explanation, taken: Array) ->
 
 
 def _explained(problem: Problem, found: Explanation) -> float:
-    """Squared whitened length of what an explanation changes; what offsets of the runs undo again does not count."""
+    """Squared whitened length of an explanation's change of the prediction, except what run offsets compensate."""
     changed = problem.whitened(found.values) - problem.whitened({})
     return problem.offsets.squared(changed, problem.offsets.metric(found.sigma_mm))
 
 
 def imitated(problem: Problem, shapes: Probes, found: Explanation, fewer: list[Explanation]) -> str | None:
-    """What effects only imitate, in words; None where they are the reason themselves.
+    """Sentence naming generic shapes that effects only imitate; None where the effects themselves are the cause.
 
-    Three effects bend to almost anything, and have to explain the data far better than generic shapes do; one or two
-    are imitations only where the shapes are far better, by more than their own form may be off.
+    Three effects fit almost any shape, and must explain the data far better than generic shapes do. One or two effects
+    are imitations only where the shapes are far better, by more than the inexactness of the effects' formulas.
 
     Parameters
     ----------
@@ -119,11 +122,11 @@ def imitated(problem: Problem, shapes: Probes, found: Explanation, fewer: list[E
 
 
 def _is_an_effect_itself(problem: Problem, found: Explanation, basis: _Basis) -> Flags:
-    """Mark probes that are the very shape that one of the effects has, beside those that are lines; shape (k,).
+    """Mark probes that have the shape of one of the effects, and straight lines; shape (k,).
 
-    Of readings at rest a play is nothing but a difference between the directions: such a probe explains nothing else.
-    With an offset beside it a ramp over time is the shape of a warming, and beside a map of position errors every
-    function of the place is a line.
+    Example: in readings at rest, play is a mere difference between the two directions, and the probe of that shape is
+    no other explanation. A ramp over time beside an offset has the shape of a warming; beside a map of position errors
+    every function of position counts as a line.
     """
     metric, design = problem.offsets.metric(found.sigma_mm), problem.offsets.design
     norm = np.maximum(basis.beside_offsets(metric), 1e-12)
@@ -141,19 +144,22 @@ def _is_an_effect_itself(problem: Problem, found: Explanation, basis: _Basis) ->
 
 
 def _beside(design: Array, metric: Array, columns: Array) -> Array:
-    """Whitened columns with what the runs' offsets and other random effects take of them taken out."""
+    """Whitened columns after projection on the runs' offsets and other random effects."""
     return np.asarray(columns - design @ (metric @ (design.T @ columns)), dtype=np.float64)
 
 
 def own_shapes(problem: Problem, explanation: Explanation) -> list[Array]:
-    """What each effect of an explanation changes in the whitened prediction beside the others; each of shape (m,)."""
+    """Change of the whitened prediction by each effect of an explanation, with the others present.
+
+    Each of shape (m,).
+    """
     whole, values = problem.whitened(explanation.values), explanation.values
     others = [{other: values[other] for other in explanation.names if other != name} for name in explanation.names]
     return [whole - problem.whitened(rest) for rest in others]
 
 
 def is_a_line(problem: Problem, shape: Array) -> bool:
-    """Whether a whitened shape is a straight line over the input, in every channel."""
+    """Whether a whitened shape is a straight line over the input in every channel."""
     input_mm = problem.chain.history.input_mm
     line = np.stack([np.ones_like(input_mm), input_mm - input_mm.mean()], axis=1)
     lines = problem.whitener.columns(np.kron(np.eye(shape.size // input_mm.size), line))[0]
@@ -162,7 +168,7 @@ def is_a_line(problem: Problem, shape: Array) -> bool:
 
 
 def _of_jumps_astray(problem: Problem, columns: Array, best: Explanation, rng: np.random.Generator) -> float:
-    """Largest gain of a probe that errors of the recorded input alone produce at jumps."""
+    """Largest gain of a probe that errors of the recorded input alone cause at jumps."""
     most, basis = [], _Basis.of(problem, columns)
     for _ in range(FEWEST):
         shaken, target = noise_alone(problem, best, rng)
@@ -175,7 +181,7 @@ def _of_jumps_astray(problem: Problem, columns: Array, best: Explanation, rng: n
 def remaining_structure(
     problem: Problem, shapes: Probes, best: Explanation, rng: np.random.Generator
 ) -> tuple[str | None, str | None]:
-    """Test the largest of many probes; returns what is unknown, or what is left over but small."""
+    """Test the largest of many probes; return unknown structure, or structure that remains but is small."""
     own = harmonics(problem, best)
     gain, dot, norm = _gains(problem, _Basis.of(problem, shapes.columns), best, own.columns)
     usable = norm > 0.0

@@ -32,11 +32,11 @@ GUMBEL = float(-np.log(-np.log(QUANTILE)) - np.euler_gamma) * float(np.sqrt(6.0)
 
 
 def noise_doubt(problem: Problem) -> float:
-    """Relative standard uncertainty of the noise's power where it is slow, of the channel that is known worst.
+    """Relative standard uncertainty of the noise power at low frequency, of the channel where it is largest.
 
-    The power at zero frequency goes with (1 + rho) / (1 - rho), and an autoregression knows rho to
-    sqrt((1 - rho^2) / n): together 2 / sqrt((1 - rho^2) n). A spectrum that is fitted without its slowest part knows
-    the power there worse (`noise_by_spectrum`).
+    The power at zero frequency is proportional to (1 + rho) / (1 - rho), and an autoregression determines rho with
+    standard uncertainty sqrt((1 - rho^2) / n): together 2 / sqrt((1 - rho^2) n). A spectrum fitted without its slowest
+    part determines the power there less well (`noise_by_spectrum`).
     """
     rows = max(2, problem.chain.history.input_mm.size - 2)
     parts = []
@@ -50,11 +50,11 @@ def noise_doubt(problem: Problem) -> float:
 def linear_thresholds(
     problem: Problem, names: tuple[str, ...], columns: Array, sigma: tuple[float, ...], rng: np.random.Generator
 ) -> dict[str, float]:
-    """Gains above which noise alone lifts any family's best column once in so many tables.
+    """Gains that the best column of a family exceeds in noise alone only with a small fixed probability.
 
-    A family of many shapes takes more from noise than a single column does; under one threshold for all it would be
-    raised for all. So each family is measured against its own upper tail, and the largest excess of all is what must be
-    rare: the families have equal shares in the false claims (Beran 1988).
+    A family of many shapes gains more from noise than a single column does; one common threshold would be that of the
+    largest family. Therefore each family is compared with its own upper tail, and the largest excess over all families
+    must be rare: the families have equal shares of the false positives (Beran 1988).
 
     Parameters
     ----------
@@ -96,7 +96,7 @@ def linear_thresholds(
 
 
 def noise_alone(problem: Problem, base: Explanation, rng: np.random.Generator) -> tuple[Problem, Array]:
-    """Draw a measurement in which `base` is the whole truth.
+    """Simulate a measurement in which `base` is the whole truth.
 
     Returns
     -------
@@ -128,18 +128,18 @@ def noise_alone(problem: Problem, base: Explanation, rng: np.random.Generator) -
 
 
 def jumps_astray(problem: Problem, names: tuple[str, ...]) -> bool:
-    """Whether an explanation jumps at inputs that are not known well: one jump moves, and with it all that follow."""
+    """Whether an explanation jumps at inputs that are poorly known: if one jump moves, all later ones move."""
     unsure = problem.whitener.passing_mm.any() or problem.whitener.input_mm.any()
     return bool(unsure) and any(parameter.rugged for _, parameter in problem.parameters(names))
 
 
 def rare(values: Sequence[float]) -> float:
-    """Estimate the quantile of a maximum that is exceeded once in 50 draws, from a few."""
+    """Estimate from a few draws the quantile of a maximum that is exceeded once in 50 draws."""
     return float(np.mean(values)) + GUMBEL * float(np.std(values))
 
 
 def _of_pictures(problem: Problem, rng: np.random.Generator) -> Array:
-    """Draw the noise of the pictures alone, channels stacked; shape (m,), in mm."""
+    """Simulate the noise of the pictures alone, channels stacked; shape (m,), in mm."""
     out = []
     for noise in problem.whitener.noises:
         for run in problem.chain.history.runs:
@@ -157,7 +157,10 @@ def _autoregression(phi: float, count: int, rng: np.random.Generator) -> Array:
 
 
 def price(thresholds: Mapping[str, float], base: Explanation, names: tuple[str, ...]) -> float:
-    """What more effects than `base` has must gain at least; what offsets of the runs imitate wholly never can."""
+    """Smallest gain required of effects in addition to those of `base`.
+
+    Infinite for effects that run offsets imitate fully.
+    """
     return max(thresholds.get(name, np.inf) for name in names if name not in base.names)
 
 
@@ -170,12 +173,12 @@ def exceeds_noise(
     suspects: list[dict[str, Mapping[str, float]]],
     rng: np.random.Generator,
 ) -> bool:
-    """Whether an excess over the thresholds is above the quantile of what any further effect has where there is none.
+    """Whether an excess over the thresholds is above the quantile for a further effect in noise alone.
 
-    Linear signatures on their grid of shapes take less from noise than the refitted effects do: a period finds its
-    best place between two of the grid, an end stop the samples that it suits. So each draw is fitted with `base`,
-    extended by the likeliest effects, and refitted, as the measurement was. `suspects` are what the measurement itself
-    speaks for, with parameters: they are tried on every draw.
+    Linear signatures on their grid of shapes gain less from noise than refitted effects do, because a fit finds the
+    best period between two grid values, or the best samples for an end stop. Each draw is therefore fitted like the
+    measurement: with `base`, extended by the likeliest effects, and refitted. `suspects` are effects with parameters
+    that the measurement favours; they are tried on every draw.
     """
     owner = np.array(atoms.names)
     asking = np.array([thresholds.get(name, np.inf) for name in atoms.names])

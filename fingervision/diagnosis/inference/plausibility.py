@@ -1,4 +1,4 @@
-"""Plausibility checks for mistakes in a table: a mirrored or rescaled column, swapped directions."""
+"""Plausibility checks for mistakes in a table: a mirrored or rescaled column, exchanged directions."""
 
 from dataclasses import dataclass
 
@@ -32,14 +32,14 @@ WIDTHS = 25
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """A mistake that was found, in a sentence; `blocks` where no name can be given until it is mended."""
+    """A mistake that was found, in a sentence; with `blocks` no effect can be named until it is corrected."""
 
     words: str
     blocks: bool
 
 
 def gross_mistake(data: Observations) -> Finding | None:
-    """Compare the measured motion with the predicted one as a whole: sign, unit, and whether they have to do at all."""
+    """Compare the measured motion with the predicted one as a whole: sign, unit, and any relation at all."""
     gap, predicted = data.table.gap_mm, data.chain.respond({}).gap_mm
     if np.ptp(predicted) == 0.0:
         return None
@@ -69,7 +69,7 @@ def gross_mistake(data: Observations) -> Finding | None:
 
 
 def swapped_directions(data: Observations, problem: Problem) -> Finding | None:
-    """Look for a play with the wrong sign: at reversals the gap leads the input instead of lagging behind it."""
+    """Check for play of the wrong sign: at reversals the gap leads the input instead of lagging behind it."""
     history = data.chain.history if data.chain.path is None else data.chain.path.history
     rows = np.arange(history.input_mm.size) if data.chain.path is None else data.chain.path.rows
     if history.time_s is None:
@@ -114,13 +114,13 @@ def swapped_directions(data: Observations, problem: Problem) -> Finding | None:
 
 
 def _without(values: Array, columns: Array, offsets: RunOffsets, metric: Array) -> Array:
-    """Take columns out of whitened values; shape as given."""
+    """Project whitened values on the complement of columns; shape as given."""
     moved = columns - offsets.design @ (metric @ (offsets.design.T @ columns))
     return np.asarray(values - columns @ np.linalg.lstsq(moved.T @ columns, moved.T @ values, rcond=1e-10)[0])
 
 
 def _later(data: Observations) -> list[Array]:
-    """Predicted gap for a stage that follows at once, and by up to a second later."""
+    """Predicted gap for a stage without delay, and for delays up to a second."""
     late = [name for name, effect in data.effects.items() if isinstance(effect, DriveEffect) and effect.act_curved]
     if not late:
         return [data.chain.respond({}).gap_mm]

@@ -1,7 +1,8 @@
-"""A map of position errors beside an explanation: a Gaussian process over the input, judged by marginal likelihood.
+"""A map of position errors added to an explanation: a Gaussian process judged by its marginal likelihood.
 
-The map is a random effect (Rasmussen & Williams 2006, chapter 2): its curve is integrated out, and the logarithm of
-the determinant is the price of its freedom. Mean and straight line are taken out of it: offsets and ratios have names.
+The map is a random effect (Rasmussen & Williams 2006, chapter 2): its curve is integrated out, and the log determinant
+penalises its freedom. Mean and straight line are removed from it, because offsets and ratios are effects of the
+catalogue.
 """
 
 from dataclasses import dataclass, replace
@@ -64,7 +65,7 @@ class PositionMap:
 
     @property
     def fitted_mm(self) -> Array:
-        """What the estimated curve does to the prediction, to first order; shape (channels * n,)."""
+        """Change of the prediction by the estimated curve, to first order; shape (channels * n,)."""
         return np.asarray(self.columns_mm @ self.coefficients, dtype=np.float64)
 
     @property
@@ -73,17 +74,17 @@ class PositionMap:
         return np.asarray(self.root_mm @ self.coefficients, dtype=np.float64)
 
     def values(self) -> dict[str, float]:
-        """Values of the effect: size, length and points."""
+        """Parameter values of the effect: RMS size, correlation length and points of the curve."""
         described = {"rms_mm": self.rms_mm.value, "length_mm": self.length_mm.value}
         return described | curve_values(self.nodes_mm.tolist(), self.curve_mm.tolist())
 
     def is_like(self, other: "PositionMap") -> bool:
-        """Whether size and length are within what either leaves open."""
+        """Whether size and length agree with another map's within the uncertainty of either."""
         pairs = ((self.rms_mm, other.rms_mm), (self.length_mm, other.length_mm))
         return all(abs(np.log(one.value / two.value)) < max(one.u or 0.0, 1e-12) / one.value for one, two in pairs)
 
     def refitted(self, problem: Problem, explanation: Explanation, behind: int) -> "PositionMap":
-        """Estimate the curve beside an explanation; `behind` random effects stand behind the map's in the problem."""
+        """Estimate the curve for an explanation; `behind` random effects follow the map's in the problem."""
         best, covariance_of_best = estimated_coefficients(problem, explanation, self.coefficients.size, behind)
         curve = self.root_mm @ best
         rms = float(np.sqrt(np.mean(curve**2)))
@@ -94,7 +95,7 @@ class PositionMap:
 
 
 def why_no_map(history: History, path: InputPath | None) -> str | None:
-    """Say why these data can show no map that repeats; None where they can."""
+    """Reason why these data cannot show a repeatable map; None where they can."""
     history = history if path is None else path.history
     narrowed = EFFECT.search(history)
     if isinstance(narrowed, str):
@@ -108,7 +109,7 @@ def why_no_map(history: History, path: InputPath | None) -> str | None:
 
 
 def likeliest_map(problem: Problem, explanation: Explanation) -> tuple[PositionMap, float]:
-    """Find size and length of a map beside an explanation.
+    """Find the most probable RMS size and correlation length of a map for an explanation.
 
     Parameters
     ----------
@@ -166,7 +167,7 @@ def likeliest_map(problem: Problem, explanation: Explanation) -> tuple[PositionM
 
 
 def _estimate(value: float, logarithms: Array, weight: Array) -> Estimate:
-    """A likeliest value with its posterior standard deviation, which is no smaller than the grid is fine."""
+    """The most probable value with its posterior standard deviation, which is at least the grid's spacing."""
     mean = float(weight @ logarithms)
     spread = float(np.sqrt(weight @ (logarithms - mean) ** 2 + np.diff(logarithms)[0] ** 2 / 12.0))
     return Estimate(value, value * spread, "mm")
@@ -192,12 +193,12 @@ def map_columns(chain: MeasuringChain, nodes_mm: Array) -> Array:
 
 
 def _basis(nodes_mm: Array, inputs_mm: Array) -> Array:
-    """Share of each node's error in the stage's error at some inputs; shape (n, k)."""
+    """Share of each node's error in the stage's error at given inputs; shape (n, k)."""
     return np.asarray(CubicSpline(nodes_mm, np.eye(nodes_mm.size))(inputs_mm), dtype=np.float64)
 
 
 def _places(history: History, nodes_mm: Array) -> Array | None:
-    """Places over which a map has neither mean nor line: the set-points, or all of a range that is passed through."""
+    """Positions over which a map has zero mean and slope: the set-points, or the whole range of a continuous motion."""
     if nodes_mm.size != NODES and history.dwell_s > 0.0:
         return None
     return _basis(nodes_mm, np.linspace(nodes_mm[0], nodes_mm[-1], EVENLY))

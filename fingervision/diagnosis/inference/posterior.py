@@ -29,9 +29,9 @@ JUMPS = 0.01
 
 @dataclass(frozen=True, slots=True)
 class _Coordinates:
-    """Coordinates of the sampler: reciprocals of reaches and periods, logarithms of times, else the parameters.
+    """Coordinates of the sampler: reciprocals of corner radii and periods, logarithms of times, else the parameters.
 
-    In these a likelihood that is long and bent in the parameters is nearly a parabola.
+    In these coordinates, a likelihood that is long and curved in the parameters is nearly parabolic.
     """
 
     listed: tuple[tuple[str, Parameter], ...]
@@ -39,7 +39,7 @@ class _Coordinates:
 
     @classmethod
     def about(cls, problem: Problem, explanation: Explanation) -> "_Coordinates":
-        """Walk over the effects' own parameters; the start states stay (`beside_starts` leaves them open)."""
+        """Sample the effects' own parameters; the start states stay fixed (`beside_starts` leaves them open)."""
         listed = problem.parameters(explanation.names)
         starts: dict[str, dict[str, float]] = {}
         for name, parameter in listed:
@@ -48,11 +48,11 @@ class _Coordinates:
         return cls(tuple(entry for entry in listed if entry[1].run is None), starts)
 
     def of(self, values: Mapping[str, Mapping[str, float]]) -> Array:
-        """Parameters to coordinates; shape (p,)."""
+        """Convert parameters to coordinates; shape (p,)."""
         return np.array([_forth(parameter, values[name][parameter.name]) for name, parameter in self.listed])
 
     def at(self, coordinates: Array) -> Point:
-        """Coordinates to parameters, held within the bounds."""
+        """Convert coordinates to parameters, clipped to the bounds."""
         out: Point = {name: dict(values) for name, values in self.starts.items()}
         for (name, parameter), x in zip(self.listed, coordinates, strict=True):
             value = _back(parameter, float(x))
@@ -61,7 +61,7 @@ class _Coordinates:
 
     @property
     def bounds(self) -> tuple[Array, Array]:
-        """Lower and upper, each of shape (p,)."""
+        """Lower and upper bounds, each of shape (p,)."""
         ends = [sorted((_forth(p, p.lower), _forth(p, p.upper))) for _, p in self.listed]
         return np.array([low for low, _ in ends]), np.array([high for _, high in ends])
 
@@ -83,7 +83,7 @@ def _back(parameter: Parameter, x: float) -> float:
 
 
 def _curvature(problem: Problem, explanation: Explanation, walk: _Coordinates, best: Array, step: Array) -> Array:
-    """Half the score's second derivatives, shape (p, p), from differences of the prediction over `step`."""
+    """Half of the score's second derivatives, shape (p, p), from differences of the prediction over `step`."""
     upper = walk.bounds[1]
     base = problem.whitened(explanation.values)
     columns = []
@@ -97,7 +97,7 @@ def _curvature(problem: Problem, explanation: Explanation, walk: _Coordinates, b
 
 
 def _widths(problem: Problem, explanation: Explanation, walk: _Coordinates, best: Array) -> Array:
-    """Covariance of the curvature within the bounds, shape (p, p): the scale of the walk's steps."""
+    """Covariance from the curvature within the bounds, shape (p, p): the scale of the sampler's steps."""
     lower, upper = walk.bounds
     span = upper - lower
     rugged = np.array([parameter.rugged for _, parameter in walk.listed])
@@ -116,13 +116,12 @@ def _widths(problem: Problem, explanation: Explanation, walk: _Coordinates, best
 
 
 def draws(problem: Problem, explanation: Explanation, rng: np.random.Generator) -> tuple[Point, ...]:
-    """Walk through the posterior under flat priors within the bounds (Metropolis et al. 1953; Tierney 1994).
+    """Sample the posterior under flat priors within the bounds (Metropolis et al. 1953; Tierney 1994).
 
-    Curvature at the best fit knows neither the bounds nor likelihoods that are not parabolas: a fraction at zero is
-    not known exactly, and the size of a jump has no derivative at all. Independent proposals from the curvature take
-    turns with local steps of several sizes, so that either kind is reached. The walk goes over all spreads of the runs'
-    offsets, and over all levels of the noise, which is no better known than `noise_doubt` says: that gives the
-    posterior Student's tails (Box & Tiao 1973).
+    The curvature at the best fit ignores bounds and non-parabolic likelihoods: a fraction estimated as zero is still
+    uncertain, and the size of a jump has no derivative at all. Independent proposals from the curvature alternate with
+    local steps of several sizes, so that either kind of posterior is reached. All spreads of the runs' offsets, and all
+    noise levels within `noise_doubt`, are sampled too; this gives the posterior Student's tails (Box & Tiao 1973).
 
     Returns
     -------
@@ -137,7 +136,7 @@ def draws(problem: Problem, explanation: Explanation, rng: np.random.Generator) 
     inverse = np.linalg.inv(root)
 
     def far(at: Array) -> float:
-        """Log of the independent proposals' density, up to a constant."""
+        """Log density of the independent proposals, up to a constant."""
         z = inverse @ (at - best)
         return -0.5 * (FREEDOM + best.size) * float(np.log1p(z @ z / FREEDOM))
 
@@ -169,9 +168,9 @@ def draws(problem: Problem, explanation: Explanation, rng: np.random.Generator) 
 
 
 def beside_starts(problem: Problem, explanation: Explanation) -> Problem:
-    """Leave the start states of an explanation open: random effects about where they were fitted.
+    """Treat the start states of an explanation as random effects around their fitted values.
 
-    A start at an end of its bounds stays there: what lies beyond is impossible.
+    A start state at a bound stays there, because values beyond are impossible.
     """
     base = problem.chain.stacked(explanation.values)
     columns = []
@@ -193,9 +192,9 @@ def beside_starts(problem: Problem, explanation: Explanation) -> Problem:
 def settled(
     problem: Problem, explanation: Explanation, rng: np.random.Generator
 ) -> tuple[Explanation, tuple[Point, ...]]:
-    """Give an explanation the spread of its posterior, and where the best fit lies at a bound also its middle.
+    """Give an explanation the spread of its posterior, and at a bound also the posterior mean.
 
-    A best fit at a bound is a corner of what the data allow: the middle predicts better.
+    A best fit at a bound is a corner of the region that the data allow; the posterior mean predicts better.
 
     Returns
     -------

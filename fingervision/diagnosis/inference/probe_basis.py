@@ -1,4 +1,4 @@
-"""Probes: generic shapes that no catalogue names, for structure that no effect explains."""
+"""Probes: generic shapes that are no effect of the catalogue, for structure that no effect explains."""
 
 from dataclasses import dataclass
 
@@ -13,7 +13,7 @@ SPAN = 5
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Probes:
-    """Whitened unit shapes and what each would be called; columns of shape (m, k), RMS before whitening."""
+    """Whitened unit shapes and their descriptions; columns of shape (m, k), RMS before whitening."""
 
     words: tuple[str, ...]
     columns: Array
@@ -21,7 +21,7 @@ class Probes:
 
 
 def _speed(input_mm: Array, time_s: Array) -> Array:
-    """Slope over `SPAN` samples: neighbours' differences hold the input's errors, which the residual holds too."""
+    """Speed as the slope over `SPAN` samples: differences of neighbours contain the input's errors."""
     if input_mm.size <= SPAN:
         return np.full(input_mm.size, float(np.ptp(input_mm)) / max(float(np.ptp(time_s)), 1e-9))
     ahead = np.minimum(np.arange(input_mm.size) + SPAN // 2 + 1, input_mm.size - 1)
@@ -32,7 +32,7 @@ def _speed(input_mm: Array, time_s: Array) -> Array:
 
 
 def probes(history: History, whitener: Whitener, most: int) -> Probes:
-    """Build steps, bumps, waves and slopes over time and input, direction and run; in gap, midline, left and right.
+    """Make steps, bumps, waves and slopes over time, input, direction and run; in gap, midline, left and right.
 
     Parameters
     ----------

@@ -15,7 +15,7 @@ doi:10.1080/01621459.1995.10476572): what a random effect must gain beyond its p
 
 
 def normal_equations(problem: Problem, explanation: Explanation, raw_mm: Array) -> tuple[Array, Array]:
-    """Normal equations of columns beside an explanation, the runs' offsets integrated out.
+    """Normal equations of columns in addition to an explanation, the runs' offsets integrated out.
 
     Parameters
     ----------
@@ -40,7 +40,7 @@ def normal_equations(problem: Problem, explanation: Explanation, raw_mm: Array) 
 
 
 def estimated_coefficients(problem: Problem, explanation: Explanation, count: int, behind: int) -> tuple[Array, Array]:
-    """Estimate a random effect's coefficients beside an explanation.
+    """Estimate the coefficients of a random effect in addition to an explanation.
 
     Parameters
     ----------

@@ -1,7 +1,7 @@
-"""Reference slots measured beside a run: a camera error acts on slot and gap, a gripper error on the gap alone.
+"""Reference slots measured during a run: a camera error acts on slot and gap, a gripper error on the gap alone.
 
-A gap alone cannot tell a wrong scale from a wrong lever ratio, nor a threshold's bias from a wrong rest gap; a width
-that is known can.
+The gap alone cannot distinguish a wrong scale from a wrong lever ratio, nor an edge bias from a wrong rest gap; an
+opening of known width can.
 """
 
 from collections.abc import Mapping
@@ -27,9 +27,9 @@ Values = Mapping[str, Mapping[str, float]]
 
 
 def consistent_with_gauges(data: Observations, found: Findings) -> tuple[Findings, tuple[str, ...]]:
-    """Drop the explanations that a reference slot contradicts, and say what the slots showed.
+    """Drop the explanations that a reference slot contradicts, and report what the slots showed.
 
-    Where all are contradicted none is dropped: then something else is wrong, and the sentence says so.
+    If all are contradicted none is dropped: then something else is wrong, and the sentence says so.
 
     Returns
     -------
@@ -58,7 +58,7 @@ def consistent_with_gauges(data: Observations, found: Findings) -> tuple[Finding
 
 
 def seen_mm(data: Observations, values: Values, size_mm: float) -> float:
-    """Width at which a slot is measured if an explanation is true."""
+    """Width that would be measured for a slot if an explanation is true (mm)."""
     half = np.full(1, 0.5 * size_mm)
     response, acting = Response(-half, half), {**data.chain.fixed, **values}
     for name in that_show(FurtherCheck.SLOT):
@@ -75,7 +75,7 @@ def _surprise(data: Observations, explanation: Explanation, slot: ReferenceSlot)
 
 
 def _u_mm(data: Observations, explanation: Explanation, slot: ReferenceSlot) -> float:
-    """Standard uncertainty of the difference: of the slot, of its picture, and of the explanation's parameters."""
+    """Standard uncertainty of the difference (mm): from the slot, its picture, and the explanation's parameters."""
     values = {name: dict(given) for name, given in explanation.values.items()}
     listed = [(name, key) for name in explanation.names for key in values[name]]
     slopes = np.zeros(len(listed))

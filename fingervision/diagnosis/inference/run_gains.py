@@ -1,8 +1,8 @@
-"""Gains that differ from run to run: a random effect on the ratio, beside every explanation.
+"""Gains that differ from run to run: a random effect on the ratio of gap to input, added to every explanation.
 
-A part that was clamped anew, or a polymer at another temperature, moves a little more or less in each run. Like the
-runs' offsets these gains are zero-mean random effects (Laird & Ware 1982, doi:10.2307/2529876): their common mean is
-a ratio, which has a name in the catalogue.
+A part that was clamped anew, or a polymer at another temperature, moves slightly more or less in each run. Like the
+runs' offsets, these gains are zero-mean random effects (Laird & Ware 1982, doi:10.2307/2529876), because their common
+mean is a ratio error, which is an effect of the catalogue.
 """
 
 from dataclasses import dataclass, replace
@@ -42,22 +42,22 @@ class RunGains:
 
     @property
     def fitted_mm(self) -> Array:
-        """What the estimated gains do to the prediction; shape (channels * n,)."""
+        """Change of the prediction by the estimated gains; shape (channels * n,)."""
         return np.asarray(self.columns_mm @ self.coefficients, dtype=np.float64)
 
     @property
     def scatter_mm(self) -> Array:
-        """The same of the gains' departures from their mean: what all runs share is no scatter."""
+        """Change of the prediction by the gains' departures from their mean."""
         return np.asarray(self.columns_mm @ (self.coefficients - self.coefficients.mean()), dtype=np.float64)
 
     def without_mean(self) -> "RunGains":
-        """Leave their common mean to the effects that have a name for it."""
+        """Remove the gains' common mean, which is left to the effects of the catalogue."""
         shared = np.full((self.coefficients.size,) * 2, 1.0 / self.coefficients.size)
         return replace(self, columns_mm=self.columns_mm - self.columns_mm @ shared)
 
     @property
     def words(self) -> str:
-        """What was found, as a sentence."""
+        """The result as a sentence."""
         each = ", ".join(f"{100.0 * self.sd * number:+.2g}" for number in self.coefficients - self.coefficients.mean())
         return (
             f"the gain differs from run to run (by {each} %): taken as the runs' own scatter, like their offsets, and "
@@ -65,14 +65,14 @@ class RunGains:
         )
 
     def refitted(self, problem: Problem, explanation: Explanation, behind: int) -> "RunGains":
-        """Estimate the gains beside an explanation; `behind` random effects stand behind them in the problem."""
+        """Estimate the gains for an explanation; `behind` random effects follow them in the problem."""
         return replace(
             self, coefficients=estimated_coefficients(problem, explanation, self.coefficients.size, behind)[0]
         )
 
 
 def likeliest_gains(problem: Problem, explanation: Explanation) -> tuple[RunGains, float]:
-    """Find how much the runs' gains scatter beside an explanation.
+    """Estimate the scatter of the runs' gains for an explanation.
 
     Parameters
     ----------

@@ -49,7 +49,7 @@ SHORT = 100
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Findings:
-    """Result of a search, explanations in descending order of their score."""
+    """Result of a search; explanations in descending order of their score."""
 
     best: Explanation
     alternatives: tuple[Explanation, ...]
@@ -63,11 +63,11 @@ class Findings:
 
 
 def _completes(state: "_State", smaller: Explanation, larger: Explanation) -> bool:
-    """Whether the larger explanation takes nearly all that the smaller one left, as a true one does.
+    """Whether the larger explanation removes nearly all of the residual of the smaller one, as a true one does.
 
-    What the smaller one leaves must be plainly more than the noise, and more than its form may be off. An effect that
-    joins it bends to what its form leaves over, however much that is; others in its place that leave noise alone owe
-    it less.
+    The residual of the smaller one must clearly exceed the noise and the inexactness of its formula. An effect that is
+    added fits part of that inexactness, however large the residual is; other effects in its place that leave noise
+    alone depend less on it.
     """
     rows = state.values - int(state.problem.whitener.aside.sum())
     stands = smaller.score - rows
@@ -84,9 +84,9 @@ def search(
     progress: Progress,
     known: Explanation | None = None,
 ) -> Findings:
-    """Find the explanation, the others that cannot be told apart from it, and what remains.
+    """Find the best explanation, those indistinguishable from it, and the remaining structure.
 
-    The stages are one effect, two, three, the gate of *unknown*, the ambiguity set; each returns a new state.
+    The stages are one effect, two, three, the test for *unknown*, the ambiguity set; each returns a new state.
 
     Parameters
     ----------
@@ -150,7 +150,7 @@ class _State:
 
     @property
     def values(self) -> int:
-        """Values that were measured, at least 2."""
+        """Number of measured values, at least 2."""
         return max(2, int(self.problem.measured.size))
 
     def speaks_for(self, found: list[Explanation], base: Explanation) -> bool:
@@ -159,7 +159,7 @@ class _State:
 
 
 def _noise_known(problem_beside: Callable[[Explanation | None], Problem], known: Explanation | None) -> _State:
-    """Estimate the noise beside what is known, or beside the likeliest explanation of a first, rough search."""
+    """Estimate the noise with the known effects removed, or with those of a rough first search."""
     if known is not None:
         problem = problem_beside(known)
         nothing = problem.nothing()
@@ -179,7 +179,7 @@ def _noise_known(problem_beside: Callable[[Explanation | None], Problem], known:
 
 
 def _one_effect(state: _State, rng: np.random.Generator, forced: frozenset[str]) -> _State:
-    """Fit every effect alone; the simplest that is as good as the best stands, if noise would not give so much."""
+    """Fit every effect alone; the simplest one that is as good as the best is kept, if its gain is significant."""
     problem = state.problem
     singles = [e for e in single_effects(problem, state.atoms, 20) if not within_a_step(problem, e)]
     evidence = Evidence.of(state.problem, state.atoms, state.nothing, rng)
@@ -196,7 +196,7 @@ def _one_effect(state: _State, rng: np.random.Generator, forced: frozenset[str])
 
 
 def _two_effects(state: _State, progress: Progress) -> _State:
-    """Fit pairs from the single effects, and once more from where the best pair puts each of its halves."""
+    """Fit pairs built from the single effects, then again from each half's place in the best pair."""
     if not state.best.names:
         return state
     problem, singles = state.problem, state.singles
@@ -213,7 +213,7 @@ def _two_effects(state: _State, progress: Progress) -> _State:
 
 
 def _three_effects(state: _State, progress: Progress) -> _State:
-    """Fit triples, unless one or two probes beside fewer effects do as well."""
+    """Fit triples, unless one or two probes with fewer effects do as well."""
     if len(state.best.names) != 2:
         return state
     problem, pairs = state.problem, state.pairs
@@ -235,7 +235,7 @@ def _three_effects(state: _State, progress: Progress) -> _State:
 
 
 def _without_imitations(state: _State) -> _State:
-    """Look whether one or two effects only stand in for a shape that no catalogue names."""
+    """Check whether one or two effects only imitate a shape that is not in the catalogue."""
     best, singles = state.best, state.singles
     if not best.names or len(best.names) > 2:
         return state
@@ -245,7 +245,7 @@ def _without_imitations(state: _State) -> _State:
 
 
 def _gated(state: _State, rng: np.random.Generator) -> _State:
-    """Test what the best explanation leaves with generic probes."""
+    """Test the residual of the best explanation with generic probes."""
     unknown, left_over = remaining_structure(state.problem, state.shapes, state.best, rng)
     # What is small beside all that was explained is left over, whether probes found it or a third effect.
     if unknown is None and left_over is None:
@@ -254,7 +254,7 @@ def _gated(state: _State, rng: np.random.Generator) -> _State:
 
 
 def _findings(state: _State, forced: frozenset[str]) -> Findings:
-    """Collect what cannot be told apart from the best; of what is unknown, only a part that explains much is kept."""
+    """Collect what is indistinguishable from the best; of an unknown residual, keep a part only if it explains much."""
     problem, best, nothing = state.problem, state.best, state.nothing
     alternatives, distances = [best], dict[tuple[str, ...], float]()
     if best.names and not forced:
@@ -285,7 +285,7 @@ def _findings(state: _State, forced: frozenset[str]) -> Findings:
 
 
 def _insisted(state: _State, forced: frozenset[str]) -> _State:
-    """Choose the best explanation that holds every effect on which the user insists."""
+    """Choose the best explanation that contains every effect that the user requires."""
     problem = state.problem
     able = forced & set(problem.effects)
     holding = [explanation for explanation in [*state.singles, *state.pairs] if able <= set(explanation.names)]

@@ -1,4 +1,4 @@
-"""Signatures: the change of the prediction by each effect at each of its starting values."""
+"""Signatures: change of the prediction by each effect at each of its starting values."""
 
 from dataclasses import dataclass
 from itertools import product
@@ -15,7 +15,7 @@ START_MOVES = 1e-3
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Signatures:
-    """Whitened columns with the parameters that made them.
+    """Whitened columns with the parameters that produced them.
 
     Parameters
     ----------
@@ -37,7 +37,7 @@ class Signatures:
     def gains(
         self, residual: Array, offsets: RunOffsets, metric: Array, along: Array | None = None
     ) -> tuple[Array, Array]:
-        """Chi-square that each column alone would take from a residual, and its coefficient; shape (k,).
+        """Fall of chi-square that each column alone achieves in a residual, and its coefficient; shape (k,).
 
         Parameters
         ----------
@@ -74,7 +74,7 @@ class Signatures:
         return out
 
     def begin(self, index: int, coefficient: float) -> dict[str, float]:
-        """Parameters to start a search from, the amplitude scaled by the coefficient."""
+        """Parameters from which to start a search, with the amplitude scaled by the coefficient."""
         start, grow = dict(self.starts[index]), self.grows[index]
         if grow is not None:
             name, neutral, step, lower, upper = grow
@@ -83,7 +83,7 @@ class Signatures:
 
 
 def signatures(problem: Problem) -> Signatures:
-    """Switch every effect on at every starting value, in the real chain."""
+    """Enable every effect at every starting value, in the complete chain."""
     bare = problem.chain.stacked({})
     names, starts, grows, columns = [], [], [], []
     for name in problem.effects:
@@ -113,7 +113,7 @@ def signatures(problem: Problem) -> Signatures:
 
 
 def start_patterns(history: History) -> tuple[dict[str, float], ...]:
-    """Start states to set out from: in the middle, where the first motion had left them, and at the other end."""
+    """Start states from which to search: in the middle, as the first motion would leave them, and at the other end."""
     first = []
     for run in history.runs:
         moves = np.diff(history.input_mm[run])
@@ -123,7 +123,7 @@ def start_patterns(history: History) -> tuple[dict[str, float], ...]:
 
 
 def tangents(problem: Problem, explanation: Explanation) -> Array:
-    """Directions in which an explanation's parameters move its whitened prediction, of unit length; shape (m, p)."""
+    """Derivatives of the whitened prediction by an explanation's parameters, scaled to unit length; shape (m, p)."""
     base = problem.chain.stacked(explanation.values)
     columns = []
     for name, parameter in problem.parameters(explanation.names):

@@ -17,7 +17,7 @@ CLEARLY = 2.5
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Evidence:
-    """What gains are judged by.
+    """Thresholds and simulations by which gains are judged.
 
     Parameters
     ----------
@@ -36,7 +36,7 @@ class Evidence:
 
     @classmethod
     def of(cls, problem: Problem, atoms: Signatures, nothing: Explanation, rng: np.random.Generator) -> "Evidence":
-        """Take the thresholds from noise alone."""
+        """Compute the thresholds from simulated noise."""
         columns, sigma = atoms.columns, nothing.sigma_mm
         return cls(problem, atoms, linear_thresholds(problem, atoms.names, columns, sigma, rng), rng)
 

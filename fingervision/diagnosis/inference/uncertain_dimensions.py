@@ -25,7 +25,7 @@ BENT = 1.0
 
 @dataclass(frozen=True, slots=True, eq=False)
 class DrawingRefit:
-    """What the drawing's uncertain numbers do to the prediction.
+    """Change of the prediction by the drawing's uncertain dimensions.
 
     Parameters
     ----------
@@ -43,12 +43,12 @@ class DrawingRefit:
 
     @property
     def shift(self) -> Array:
-        """What the refit added to the prediction, along the tangent; shape (m,)."""
+        """Change of the prediction by the refit, by its tangent; shape (m,)."""
         return np.asarray(self.columns @ np.array(list(self.moved.values())), dtype=np.float64)
 
 
 def tangent(chain: MeasuringChain, drawn: PhysicalModel, moved: Mapping[str, float]) -> DrawingRefit:
-    """Differentiate the prediction by the drawing's uncertain numbers, where these stand now.
+    """Differentiate the prediction by the drawing's uncertain dimensions, at their present values.
 
     Parameters
     ----------
@@ -75,14 +75,14 @@ def tangent(chain: MeasuringChain, drawn: PhysicalModel, moved: Mapping[str, flo
 
 
 def with_moved(drawn: PhysicalModel, moved: Mapping[str, float]) -> PhysicalModel:
-    """Redraw the gripper, each number by so many of its standard uncertainties."""
+    """Return the gripper with each dimension moved by the given number of its standard uncertainties."""
     return drawn.redrawn({name: by * (drawn.uncertain[name].u or 0.0) for name, by in moved.items()})
 
 
 def estimated(
     refit: DrawingRefit, problem: Problem, explanation: Explanation
 ) -> tuple[dict[str, float], dict[str, float]]:
-    """Estimate where the numbers stand beside an explanation, and what is left of their uncertainty.
+    """Estimate the dimensions for an explanation, and their remaining uncertainty.
 
     Returns
     -------

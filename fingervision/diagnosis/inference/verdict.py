@@ -12,6 +12,7 @@ from fingervision.diagnosis.inference.search import Findings
 from fingervision.diagnosis.input.observations import Observations
 from fingervision.diagnosis.input.recorded_input import scatter_in_holds
 from fingervision.diagnosis.noise.replicates import resolution
+from fingervision.diagnosis.noise.residual_scatter import most_noise
 from fingervision.domain.effect import Array
 from fingervision.domain.report import Verdict
 
@@ -19,8 +20,6 @@ STANDING_SHARE = 0.05
 """Share of the disagreement, as RMS, that a named explanation may leave: the catalogue's forms are off by that much."""
 STANDING_NOISES = 3.0
 """Standard deviations of the noise that it may leave in any case: less hardly shows to the eye."""
-CORRELATED = 10.0
-"""Times the scatter from sample to sample that noise may have in all: an autoregression of 0.95 has six times it."""
 TRUSTED = 10.0
 """Times the measurement's own random uncertainty that noise may have: more is structure that looks like noise."""
 NEEDED = 1.1
@@ -30,16 +29,18 @@ AS_MUCH = 2.0**0.5
 that structure bends the richer form as it does the noise."""
 MANY_ASIDE = 0.1
 """Share of the rows that may be gross errors beside a model that agrees: of more, something is the cause."""
+COMMON = 2.0
+"""Standard errors from zero from which on the mean of the runs' offsets is a constant that they share."""
 LACK_OF_FIT = 1e-3
 """Significance of the F ratio of lack of fit to pure error, above which nothing is to be explained."""
 
 
 @dataclass(frozen=True, slots=True)
 class Standing:
-    """Share of the disagreement that an explanation leaves unexplained.
+    """Fraction of the disagreement that an explanation leaves unexplained.
 
-    All as RMS over left and right where both exist, else over the gap; the midline's constant, the runs' departure
-    from their common mean and outliers taken out.
+    All values are RMS over left and right where both exist, else over the gap; the midline's constant, the runs'
+    deviations from their common mean and outliers are removed.
 
     Parameters
     ----------
@@ -72,17 +73,17 @@ class Standing:
 
     @property
     def share(self) -> float:
-        """Share of the disagreement that stands, as a ratio of RMS, from 0 to 1."""
+        """Ratio of the RMS after the explanation to that before it, from 0 to 1."""
         return float(min(1.0, self.after_mm / max(self.before_mm, 1e-300)))
 
     @property
     def is_little(self) -> bool:
-        """Whether what stands is noise, or a small part of the disagreement."""
+        """Whether the remaining residual is noise, or a small part of the disagreement."""
         return self.after_mm <= max(STANDING_SHARE * self.before_mm, STANDING_NOISES * self.noise_mm)
 
     @property
     def is_noise(self) -> bool:
-        """Whether what stands is no more than repeats scatter, than rounding makes, or than the noise may be."""
+        """Whether the remaining residual is within the scatter of repeats, the rounding, or the possible noise."""
         if self.after_mm <= self.rounding_mm:
             return True
         ratio = (self.after_mm / max(self.noise_mm, 1e-300)) ** 2
@@ -92,11 +93,11 @@ class Standing:
 
 
 def standing(data: Observations, problem: Problem, before_mm: Array, after_mm: Array) -> Standing:
-    """Judge residuals; `before_mm` and `after_mm` of shape (channels * n,)."""
+    """Compute the unexplained fraction; `before_mm` and `after_mm` of shape (channels * n,)."""
     if data.run_gains is not None:
         after_mm = after_mm - data.run_gains.scatter_mm
     history = data.chain.history
-    n, both = history.input_mm.size, history.both_edges
+    n, both, runs = history.input_mm.size, history.both_edges, history.runs
     aside = problem.whitener.aside[:n]
     noises = [noise.total_mm for noise in problem.whitener.noises]
     if history.commanded:
@@ -109,7 +110,7 @@ def standing(data: Observations, problem: Problem, before_mm: Array, after_mm: A
         # Slow structure passes for correlated noise, which leaves traces in what changes from sample to sample.
         parts = np.split(after_mm, len(data.channels))
         digits = resolution(data.table.gap_mm) / float(np.sqrt(12.0))
-        most = [CORRELATED * max(short_scatter(part, history.runs), digits) for part in parts]
+        most = [most_noise(part, runs, digits) for part in parts]
         noises = [min(noise, limit or noise) for noise, limit in zip(noises, most, strict=True)]
     if data.table.u_random_mm is not None:
         stated = TRUSTED * float(np.median(data.table.u_random_mm))
@@ -132,24 +133,23 @@ def standing(data: Observations, problem: Problem, before_mm: Array, after_mm: A
     return Standing(rms(before_mm), rms(after_mm), noise, kept, degrees, rounding_mm, gross)
 
 
-def short_scatter(residual_mm: Array, runs: tuple[slice, ...]) -> float:
-    """Standard deviation of white noise with the median third difference of a residual; 0 in runs of a few samples."""
-    differences = np.concatenate([np.diff(residual_mm[run], 3) for run in runs])
-    # Third differences of white noise have 1 + 9 + 9 + 1 times its variance; 0.6745 is the normal median.
-    return float(np.median(np.abs(differences))) / 0.6745 / float(np.sqrt(20.0)) if differences.size else 0.0
-
-
 def _without_scatter(values: Array, runs: tuple[slice, ...]) -> Array:
-    """Subtract each run's deviation from the mean of all runs; a common constant remains."""
+    """Subtract each run's deviation from the mean of all runs; a common constant remains, if it is one.
+
+    If runs were zeroed at random, their mean differs from zero by an amount that their scatter allows.
+    """
     means = np.array([values[run].mean() for run in runs])
+    common = float(means.mean())
+    if len(runs) > 1 and abs(common) < COMMON * float(np.std(means, ddof=1)) / len(runs) ** 0.5:
+        common = 0.0
     out = values.copy()
     for run, mean in zip(runs, means, strict=True):
-        out[run] -= mean - means.mean()
+        out[run] -= mean - common
     return out
 
 
 def standing_of(data: Observations, found: Findings) -> Standing:
-    """Judge what a search leaves, a map of position errors taken out to first order."""
+    """Unexplained fraction after a search, with a map of position errors subtracted to first order."""
     before = data.stacked_mm - data.chain.stacked({})
     left = before if not found.best.names else data.stacked_mm - data.chain.stacked(found.best.values)
     if data.position_map is not None:
@@ -160,9 +160,9 @@ def standing_of(data: Observations, found: Findings) -> Standing:
 
 
 def without_unneeded_effects(data: Observations, found: Findings) -> Findings:
-    """Drop effects that explain less than what still stands: such an effect may only imitate a part of it.
+    """Drop effects that explain less than the remaining residual: such an effect may only imitate a part of it.
 
-    Where structure remains beside several effects, a further one is fitted to that structure as well as to its own.
+    Where structure remains beside several effects, each further one is fitted to that structure as well as to its own.
     """
     rows = int(found.problem.measured.size - found.problem.whitener.aside.sum())
     while len(found.best.names) > 1 and (found.unknown is not None or found.left_over is not None):
@@ -177,10 +177,10 @@ def without_unneeded_effects(data: Observations, found: Findings) -> Findings:
 
 
 def with_simpler_parts(data: Observations, found: Findings) -> Findings:
-    """Beside unknown structure, take a straight line for an effect where it leaves about as much standing.
+    """With unknown structure, replace an effect by a straight line where the line leaves about as much residual.
 
-    The richer form gains by bending to what nothing explains: a warming of two seconds, where an offset and one odd
-    stretch of the record are all that there is.
+    A richer formula gains by fitting unexplained structure: an apparent warming within two seconds may be only an
+    offset and one odd stretch of the record.
     """
     most_mm = AS_MUCH * standing_of(data, found).after_mm if found.unknown is not None else 0.0
     while found.unknown is not None:
@@ -193,7 +193,7 @@ def with_simpler_parts(data: Observations, found: Findings) -> Findings:
 
 
 def _with_a_line(found: Findings) -> list[Explanation]:
-    """Explanations with one curved effect of the best exchanged for one that is a straight line over the input."""
+    """Explanations in which one curved effect of the best is replaced by a straight line over the input."""
     best, problem = found.best, found.problem
     curved = [n for n, s in zip(best.names, own_shapes(problem, best), strict=True) if not is_a_line(problem, s)]
     out = []
@@ -222,7 +222,7 @@ def _without(found: Findings, name: str) -> Explanation:
 
 
 def verdict(found: Findings, *, mapped: bool, stands: Standing) -> tuple[Verdict, str | None]:
-    """Give the verdict that equals its residual, and where it is *unknown* what the structure looks like."""
+    """Return the verdict that follows from the residual, and describe any *unknown* structure."""
     named = bool(found.best.names) or mapped
     remains = (
         f"{1e3 * stands.after_mm:.3g} um RMS remain where {1e3 * stands.noise_mm:.2g} um are noise, "

@@ -12,7 +12,7 @@ count them twice and state a play that is entangled with the offset too surely."
 
 
 def clock_columns(chain: MeasuringChain, u_clock_s: float) -> Array:
-    """Change of the stacked prediction by one standard deviation of the offset's prior; shape (m, 1), or (m, 0).
+    """Change of the stacked prediction per standard deviation of the clock offset's prior; shape (m, 1), or (m, 0).
 
     Parameters
     ----------
@@ -31,7 +31,7 @@ def clock_columns(chain: MeasuringChain, u_clock_s: float) -> Array:
 
 
 def _moved(chain: MeasuringChain, by_s: float) -> Array:
-    """The recorded input so much later, run by run."""
+    """Delay the recorded input by `by_s`, run by run."""
     history = chain.history
     out = np.empty_like(history.input_mm)
     for run in history.runs:

@@ -1,4 +1,4 @@
-"""Step commands told from encoders: a command stands exactly and jumps, and so does an encoder in a slow motion."""
+"""Distinguish step commands from encoder readings: both stay constant and jump while the stage moves slowly."""
 
 from itertools import pairwise
 
@@ -19,10 +19,10 @@ FOLLOWS = 0.5
 
 
 def is_commanded(input_mm: Array, runs: tuple[slice, ...], gap_of_input: Array, gap_mm: Array) -> bool:
-    """Whether the input is a command that keeps its value until it jumps.
+    """Whether the input is a command, which keeps its value until it jumps.
 
-    An encoder of coarse step stands and jumps as well while the stage moves slowly. Then the gap moves on while the
-    record stands, and under a command it stands too.
+    A coarse encoder also stays constant and jumps while the stage moves slowly. In that case the gap moves while the
+    record is constant; under a command the gap is constant too.
 
     Parameters
     ----------

@@ -1,8 +1,8 @@
-"""A dynamic model along a measured path: its static answer, and the dynamic remainder.
+"""A dynamic model along a measured path, split into its static response and a dynamic remainder.
 
-The chain of effects runs thousands of times and a function of time costs seconds. It is therefore split into its
-static answer, a table that drive effects act on, and a dynamic remainder computed once along the driven path. The
-remainder is computed again along the path that the effects found have changed.
+The chain of effects is evaluated thousands of times, and a function of time takes seconds. It is therefore split into
+its static response, a table on which drive effects act, and a dynamic remainder computed once along the driven path.
+The remainder is computed again along the path that the effects found have changed.
 """
 
 from dataclasses import replace
@@ -22,11 +22,11 @@ PREPARED_S = HOLDS_S[0]
 
 
 def at_rest_beside(table: MeasuredTable, model: CorrectedModel) -> tuple[CorrectedModel, FunctionModel | None]:
-    """Put the static answer in the place of a function of time, over the inputs of a table.
+    """Replace a function of time by its static response, over the inputs of a table.
 
     Raises
     ------
-    FingervisionError
+    DataError
         The table has no times.
     """
     if not isinstance(model.base, FunctionModel):
@@ -42,7 +42,7 @@ def at_rest_beside(table: MeasuredTable, model: CorrectedModel) -> tuple[Correct
 
 
 def with_dynamics(chain: MeasuringChain, function: FunctionModel, settings: Settings) -> MeasuringChain:
-    """Add what the function gives beyond its answer at rest, along the path behind the drive effects of `settings`."""
+    """Add the function's difference from its static response, along the path after the drive effects of `settings`."""
     history = chain.history if chain.path is None else chain.path.history
     driven_mm = _behind_drive(chain, history, {**chain.fixed, **settings})
     jobs = []
@@ -71,5 +71,5 @@ def _behind_drive(chain: MeasuringChain, history: History, acting: Settings) -> 
 
 
 def _rising(time_s: Array) -> Array:
-    """Times that repeat are moved apart by a nanosecond: a function of time wants them to rise."""
+    """Separate equal times by a nanosecond, because a function of time needs increasing times."""
     return np.asarray(np.maximum.accumulate(time_s) + 1e-9 * np.arange(1, time_s.size + 1))

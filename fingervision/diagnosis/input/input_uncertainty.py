@@ -1,4 +1,4 @@
-"""Systematic error of the recorded input: changes of the path below it are not significant."""
+"""Systematic error of the recorded input: changes of the path smaller than this error are not significant."""
 
 import numpy as np
 
@@ -9,7 +9,7 @@ OF_ROUNDING, OF_NOISE = 0.5, 0.1
 
 
 def below_the_input(problem: Problem, size_mm: float) -> bool:
-    """Whether a change of the gap is smaller than what stays of the input's error, or of its encoder's step."""
+    """Whether a change of the gap is smaller than the input's remaining error or its encoder's step would cause."""
     history = problem.chain.history
     gap = problem.chain.stacked({})[: history.input_mm.size]
     slope = float(np.ptp(gap)) / history.input_span_mm

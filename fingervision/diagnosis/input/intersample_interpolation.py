@@ -1,4 +1,4 @@
-"""Interpolate the input between two samples, which a delay makes visible."""
+"""Interpolation of the input between two samples, which matters for delays."""
 
 from dataclasses import replace
 
@@ -13,11 +13,11 @@ CLEARLY = 10.0
 
 
 def likelier_interpolation(data: Observations, problem: Problem, best: Explanation) -> Observations:
-    """Read the record along curves where a delay then explains the data better than along straight lines.
+    """Interpolate the record by curves where a delay then explains the data better than with straight lines.
 
-    A stage that turns within half a second goes along a curve between samples that are an eighth of a second apart.
-    Cut straight, its corners are sharper than the delayed ones that were measured, and a resonance that is damped well
-    rounds them.
+    A stage that reverses within half a second moves along a curve between samples an eighth of a second apart. With
+    straight lines, its reversals are sharper than the delayed ones that were measured, and a well-damped resonance
+    would explain the rounding.
 
     Parameters
     ----------
@@ -52,12 +52,12 @@ def _score(problem: Problem, best: Explanation, fixed: bool) -> float:
 
 
 def delays() -> tuple[str, ...]:
-    """Name the effects that are a delay, in the catalogue's order."""
+    """Names of the effects that are a delay, in the catalogue's order."""
     return tuple(name for name, effect in catalogue().items() if is_delay(effect))
 
 
 def is_delay(effect: Effect) -> bool:
-    """Whether an effect is a delay: only then do curves between the samples make a difference."""
+    """Whether an effect is a delay; only for delays does interpolation by curves matter."""
     return isinstance(effect, DriveEffect | PointEffect) and effect.act_curved is not None
 
 
@@ -66,7 +66,7 @@ def _like_delays() -> frozenset[str]:
 
 
 def _delay_s(best: Explanation) -> float:
-    """Delay that an explanation has, or else that another effect of it imitates."""
+    """Delay of an explanation, or the delay that another of its effects imitates (s)."""
     effects = [effect for name, effect in catalogue().items() if name in best.names and effect.delay_s is not None]
     for effect in sorted(effects, key=lambda effect: not is_delay(effect)):
         assert effect.delay_s is not None  # noqa: S101 - chosen so above

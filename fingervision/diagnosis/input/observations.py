@@ -1,4 +1,4 @@
-"""Prepare the measurement: smooth the input, set outliers aside, estimate the noise, whiten."""
+"""Prepare the measurement: smooth the input, exclude outliers, estimate the noise, whiten."""
 
 from dataclasses import dataclass, replace
 
@@ -40,7 +40,7 @@ OUTLIER_SIGMAS, RAW_SIGMAS = 4.5, 7.0
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Observations:
-    """A measured table beside a model.
+    """A measured table compared with a model.
 
     Parameters
     ----------
@@ -87,7 +87,7 @@ class Observations:
 
     @property
     def aim_mm(self) -> Array:
-        """What an explanation's prediction is fitted to: the measurement, seen from the drawn numbers; shape (m,)."""
+        """Target of the fit: the measurement, corrected for the refit of the drawing's dimensions; shape (m,) (mm)."""
         return np.asarray(self.stacked_mm + self.refit.shift)
 
     @property
@@ -98,25 +98,25 @@ class Observations:
 
     @property
     def random_effects_mm(self) -> tuple[tuple[object, Array], ...]:
-        """Random effects beside every explanation, each with its columns, in the order in which a problem has them."""
+        """Random effects added to every explanation, each with its columns, in the order used by a problem."""
         own = [(one, one.columns_mm) for one in (self.position_map, self.run_gains) if one is not None]
         clock = [] if self.clock is None or not self.clock.shape[1] else [("clock", self.clock)]
         drawing = [("drawing", self.refit.columns)] if self.refit.moved else []
         return (*own, *clock, *drawing)
 
     def behind(self, effect: object) -> int:
-        """Columns that stand behind those of one of the random effects."""
+        """Number of columns that follow those of one of the random effects."""
         order = [one for one, _ in self.random_effects_mm]
         return sum(columns.shape[1] for _, columns in self.random_effects_mm[order.index(effect) + 1 :])
 
     @property
     def stalled(self) -> frozenset[str]:
-        """Effects for which readings that stand at an end of the range speak."""
+        """Effects that are suggested by readings that stay constant at an end of the range."""
         history = self.chain.history
         return stalled_ends(history.input_mm, self.chain.respond({}).gap_mm, self.table.gap_mm)
 
     def problem(self, residual_mm: Array, degrees: int, *, explained: bool) -> Problem:
-        """Estimate outliers and noise from a residual and whiten the measurement with them."""
+        """Estimate outliers and noise from a residual, and whiten the measurement with them."""
         history = self.chain.history
         for nuisance in (self.position_map, self.run_gains):
             if nuisance is not None:
@@ -168,18 +168,24 @@ class Observations:
         )
 
     def measured_pure_errors(self, aside: list[Flags]) -> list[PureError] | None:
-        """Scatter of repeats of each channel, of readings at rest; None where too little repeats."""
+        """Repeatability of each channel from readings at rest; None where too little repeats."""
         history = self.chain.history
         if self.repeats is None or history.time_s is None:
             return None
         parts = np.split(self.stacked_mm - self.chain.stacked({}), len(self.channels))
         clock = history.clock_s if history.shared_clock else np.arange(history.input_mm.size, dtype=np.float64)
-        found = [pure_error(part, clock, self.repeats, out) for part, out in zip(parts, aside, strict=True)]
+        found = [
+            pure_error(part, clock, self.repeats, out, history.input_mm, history.runs)
+            for part, out in zip(parts, aside, strict=True)
+        ]
         kept = [error for error in found if error is not None]
         return kept if len(kept) == len(found) else None
 
     def with_overshoots(self) -> "Observations":
-        """Let the stage run over where it turned between two readings of the same target; itself where it did not."""
+        """Return the observations with an overshoot wherever two readings of one target show a reversal.
+
+        Else unchanged.
+        """
         if not turning_readings(self.table).size:
             return self
         along_mm, commanded = self.recorded.along_mm, self.recorded.commanded
@@ -191,7 +197,7 @@ class Observations:
         return replace(self, chain=replace(self.chain, path=path), notes=(*self.notes, said))
 
     def redrawn(self, problem: Problem, explanation: Explanation) -> "Observations":
-        """Refit the drawing's uncertain numbers beside an explanation, and predict with them from now on."""
+        """Refit the drawing's uncertain dimensions for an explanation, and use them in all further predictions."""
         drawn = self.model.base
         if not (self.refit.moved and isinstance(drawn, PhysicalModel)):
             return self
@@ -202,7 +208,10 @@ class Observations:
         return replace(self, chain=chain, refit=replace(tangent(chain, drawn, moved), known=known))
 
     def driven_again(self, explanation: Explanation, noise_mm: float) -> "Observations | None":
-        """Drive a function of time along the path behind an explanation; None where that changes nothing of weight."""
+        """Recompute a function of time along the path of an explanation.
+
+        None where that changes nothing significant.
+        """
         if self.function is None or self.chain.dynamics is None:
             return None
         chain = with_dynamics(self.chain, self.function, explanation.values)
@@ -210,7 +219,7 @@ class Observations:
         return replace(self, chain=chain) if float(np.sqrt(np.mean(changed**2))) > OF_NOISE * noise_mm else None
 
     def straight(self, drawn: "Observations", problem: Problem) -> bool:
-        """Whether the tangent at other numbers of the drawing foretold this prediction, to within the noise."""
+        """Whether the tangent, at other dimensions, predicted this prediction to within the noise."""
         bent = self.chain.stacked({}) - drawn.chain.stacked({})
         bent -= drawn.refit.columns @ (
             np.array(list(self.refit.moved.values())) - np.array(list(drawn.refit.moved.values()))
@@ -219,7 +228,7 @@ class Observations:
         return float(missed @ missed) < BENT
 
     def refitted(self) -> tuple[str, ...]:
-        """Say which numbers of the drawing were refitted, and to what; a sentence each."""
+        """Sentences on which dimensions of the drawing were refitted, and to what."""
         drawn = self.model.base
         if not isinstance(drawn, PhysicalModel):
             return ()

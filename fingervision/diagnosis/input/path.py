@@ -1,4 +1,4 @@
-"""The input's path: rows without a gap, readings taken at rest, and commands that hold until they jump."""
+"""Path of the input: rows without a gap, readings taken at rest, and commands that hold until they jump."""
 
 from dataclasses import replace
 
@@ -26,7 +26,7 @@ FINE_S = 1.5
 
 
 def readings_at_rest(table: MeasuredTable) -> Flags:
-    """Tell where the stage moved, arrived and waited before a row was read, instead of being read on its way.
+    """Whether the stage moved, arrived and waited before each row was read, instead of being read in motion.
 
     Returns
     -------
@@ -44,7 +44,7 @@ def readings_at_rest(table: MeasuredTable) -> Flags:
 
 
 def recorded(table: MeasuredTable) -> tuple[Array, Array | None, tuple[slice, ...]]:
-    """All rows that have an input: input and time, each of shape (m,), and the runs."""
+    """All rows with an input: input and time, each of shape (m,), and the runs."""
     along = table.path
     if along is None:
         return table.input_mm, table.time_s, table.runs
@@ -52,17 +52,17 @@ def recorded(table: MeasuredTable) -> tuple[Array, Array | None, tuple[slice, ..
 
 
 def _revisits(input_mm: Array, runs: tuple[slice, ...]) -> bool:
-    """Whether most rows come back to an input at which the stage was before; a row that only waits does not count."""
+    """Whether most rows return to an earlier input of the stage; a row that only waits does not count."""
     visits = np.concatenate([input_mm[run][np.flatnonzero(np.diff(input_mm[run], prepend=np.inf))] for run in runs])
     _, counts = np.unique(visits, return_counts=True)
     return float(np.sum(counts[counts > 1])) > REVISITED_SHARE * visits.size
 
 
 def turning_readings(table: MeasuredTable) -> NDArray[np.intp]:
-    """Rows of the path that were read at rest at the input of the row before, where the stage turns back.
+    """Rows of the path that were read at rest at the previous row's input, where the stage reverses.
 
-    ISO 230-2 cycles read the outermost target twice: the stage runs over beyond it in between, and comes back from
-    the other side.
+    ISO 230-2 cycles read the outermost target twice: in between the stage overshoots it and returns from the other
+    side.
     """
     input_mm, _, runs = recorded(table)
     rest = readings_at_rest(table)
@@ -79,7 +79,7 @@ def turning_readings(table: MeasuredTable) -> NDArray[np.intp]:
 def input_path(
     table: MeasuredTable, history: History, along_mm: Array, *, commanded: bool, overshoots: bool = False
 ) -> InputPath | None:
-    """Lay out the path that effects with memory follow.
+    """Build the path that effects with memory follow.
 
     Parameters
     ----------
@@ -145,7 +145,7 @@ def input_path(
 
 
 def dwell_s(table: MeasuredTable) -> float:
-    """Shortest time for which the stage stood before a reading, in s; 0 where any row was read on its way."""
+    """Shortest time for which the stage was at rest before a reading (s); 0 where any row was read in motion."""
     _, time_s, runs = recorded(table)
     rest = readings_at_rest(table)
     firsts = np.array([run.start for run in runs])

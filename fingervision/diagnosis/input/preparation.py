@@ -29,7 +29,7 @@ tenth of the range at least, and within one unit none covers three hundred times
 
 
 def prepare(table: MeasuredTable, model: CorrectedModel, without: frozenset[str] = frozenset()) -> Observations:
-    """Put a measured table beside a model.
+    """Combine a measured table with a model.
 
     Raises
     ------
@@ -69,7 +69,7 @@ def prepare(table: MeasuredTable, model: CorrectedModel, without: frozenset[str]
 
 
 def _refuse_other_inputs(input_mm: Array, range_mm: tuple[float, float]) -> None:
-    """Refuse inputs in another unit, or outside what the model covers."""
+    """Refuse inputs in another unit, or outside the range of the model."""
     (low, high), span = range_mm, float(np.ptp(input_mm))
     for factor, unit in ((1e3, "micrometres"), (1e-3, "metres")):
         if UNIT_SHARES[0] < span / (high - low) / factor < UNIT_SHARES[1]:
@@ -86,7 +86,7 @@ def _refuse_other_inputs(input_mm: Array, range_mm: tuple[float, float]) -> None
 
 
 def _history(table: MeasuredTable, model: CorrectedModel, recorded: RecordedInput) -> History:
-    """State what the effects may know of the runs."""
+    """State what the effects may know about the runs."""
     rest = model.base.respond(np.zeros(1))
     zero_mm = float(rest.gap_mm[0])
     opening_mm = model.base.respond(table.input_mm).gap_mm - zero_mm
@@ -109,7 +109,7 @@ def _history(table: MeasuredTable, model: CorrectedModel, recorded: RecordedInpu
 
 
 def _seen(table: MeasuredTable, chain: MeasuringChain) -> tuple[MeasuringChain, Array]:
-    """Put the chain where the camera sees the fingers, and stack what was measured: gap, midline, force."""
+    """Set the chain's midline to the measured one, and stack the measured gap, midline and force."""
     stacked = [table.gap_mm]
     if table.midline_mm is not None:
         bare: Response = chain.respond({})
@@ -124,7 +124,7 @@ def _seen(table: MeasuredTable, chain: MeasuringChain) -> tuple[MeasuringChain, 
 
 
 def _visits(table: MeasuredTable) -> NDArray[np.intp] | None:
-    """Number the visits of the same places where most readings were taken at rest."""
+    """Number the visits of each target where most readings were taken at rest."""
     if np.mean(readings_at_rest(table)) <= AT_REST_SHARE:
         return None
     rows = np.arange(table.input_mm.size) if table.path is None else table.path.rows
@@ -152,7 +152,7 @@ def _notes_on_clock(table: MeasuredTable) -> tuple[str, ...]:
 
 
 def _with_starts(chain: MeasuringChain, stacked_mm: Array) -> MeasuringChain:
-    """Let the effects that the model has begin each run where that suits the measurement best: nobody stated it."""
+    """Fit the start states of the model's own effects in each run, because nobody stated them."""
     catalogued = chain.effects
     for name in [name for name in chain.fixed if catalogued[name].start]:
         tried = [
@@ -164,6 +164,9 @@ def _with_starts(chain: MeasuringChain, stacked_mm: Array) -> MeasuringChain:
 
 
 def _rezeroed(table: MeasuredTable) -> tuple[bool, ...]:
-    """Which runs came after a re-zeroing, told by their names; empty where all did: none shows the earlier zero."""
+    """Runs after a re-zeroing, recognised by their names.
+
+    Empty where all were, because no run shows the earlier zero.
+    """
     flags = tuple(REZEROED in name.split() for name in table.run_names)
     return flags if any(flags) and not all(flags) else ()

@@ -28,7 +28,7 @@ SURELY = 3.0
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RecordedInput:
-    """What is known of the input.
+    """The recorded input, smoothed, with its uncertainty.
 
     Parameters
     ----------
@@ -62,14 +62,14 @@ class RecordedInput:
 
     @classmethod
     def exact(cls, table: MeasuredTable, *, is_motion: bool = False, commanded: bool = False) -> "RecordedInput":
-        """Take a table's record as it stands."""
+        """Take a table's record as it is, without smoothing."""
         u, along_mm = table.input_mm, recorded(table)[0]
         still = np.zeros(u.size, dtype=bool)
         return cls(u, along_mm, 0.0, 0.0, np.zeros(u.size), still, 1.0, is_motion, commanded)
 
     @classmethod
     def of(cls, table: MeasuredTable, model: CorrectedModel) -> "RecordedInput":
-        """Smooth a table's record, unless it is one of commands or set-points, or the gap follows its unrest."""
+        """Smooth a table's record, unless it consists of commands or set-points or the gap follows its fluctuations."""
         along_mm, time_s, runs = recorded(table)
         if time_s is None or np.mean(readings_at_rest(table)) > AT_REST_SHARE:
             return cls.exact(table)
@@ -99,7 +99,7 @@ class RecordedInput:
 
 
 def standing_still(history: History) -> tuple[slice, ...]:
-    """Stretches of at least `LEAST_RUN` samples in which the stage stands, to within the recorded input's error."""
+    """Stretches of at least `LEAST_RUN` samples in which the stage stands still, within the recorded input's error."""
     reach = max(3.0 * history.input_sigma_mm, STANDING_SHARE * history.input_span_mm)
     found: list[slice] = []
     for run in history.runs:
@@ -114,7 +114,7 @@ def standing_still(history: History) -> tuple[slice, ...]:
 
 
 def scatter_in_holds(history: History, residual_mm: Array) -> float:
-    """Standard deviation of a residual within the second halves of holds, when the stage has settled; in mm.
+    """Standard deviation of a residual in the second halves of stops, when the stage has settled (mm).
 
     Parameters
     ----------
@@ -135,7 +135,7 @@ def scatter_in_holds(history: History, residual_mm: Array) -> float:
 
 
 def _within(input_mm: Array, runs: tuple[slice, ...], samples: int, reach_mm: float) -> Flags:
-    """Mark the samples about which the input stays within a reach for a number of samples; none if the reach is 0."""
+    """Mark the samples around which the input stays within `reach_mm` for some samples; none if `reach_mm` is 0."""
     out = np.zeros(input_mm.size, dtype=bool)
     for run in runs:
         if reach_mm > 0.0 and run.stop - run.start > samples:
@@ -145,7 +145,7 @@ def _within(input_mm: Array, runs: tuple[slice, ...], samples: int, reach_mm: fl
 
 
 def _is_motion(table: MeasuredTable, model: CorrectedModel, smooth: Array) -> bool:
-    """Whether the gap follows the input's unrest: the regression's slope is then one, otherwise zero."""
+    """Whether the gap follows the input's fluctuations: the slope of the regression is then one, otherwise zero."""
     expected = model.base.respond(table.input_mm).gap_mm - model.base.respond(smooth).gap_mm
     residual = table.gap_mm - model.base.respond(smooth).gap_mm
     a = np.concatenate([np.diff(expected[run]) for run in table.runs])

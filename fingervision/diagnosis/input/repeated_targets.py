@@ -1,4 +1,4 @@
-"""Recognise repeated visits of targets (an ISO 230-2 cycle and its kin) in the path of a measured table."""
+"""Recognise repeated visits of target positions (such as an ISO 230-2 cycle) in the path of a measured table."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -32,7 +32,7 @@ LEAST_SHARE = 0.5
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RepeatedTargets:
-    """Target, side of approach and visit of each measured row.
+    """Target, direction of approach and visit number of each measured row.
 
     Parameters
     ----------
@@ -54,7 +54,7 @@ class RepeatedTargets:
 
 @dataclass(frozen=True, slots=True)
 class NoRepeatedTargets:
-    """Why a table has no repeated visits of targets, as the end of a sentence."""
+    """Reason why a table has no repeated visits of targets, as the end of a sentence."""
 
     reason: str
 
@@ -63,7 +63,7 @@ class NoRepeatedTargets:
 class _Visit:
     """Consecutive rows of the path at one target: rows with a reading, and the inputs before and after (None: none).
 
-    `places` are all rows, with those whose reading is missing.
+    `places` are all of these rows, including those whose reading is missing.
     """
 
     target: int
@@ -77,12 +77,12 @@ class _Visit:
 def repeated_targets(
     input_mm: Array, measured: Flags, runs: Sequence[slice], time_s: Array | None = None
 ) -> RepeatedTargets | NoRepeatedTargets:
-    """Find targets, sides of approach and cycles in a path.
+    """Find targets, directions of approach and cycles in a path.
 
-    The side of approach of a visit is where the path came from: the last row elsewhere, with a reading or without (an
-    overshoot, an approach). Two things are assumed where the table leaves them out, and said: a pair of readings at an
-    end of the range, where all other targets have one, is a turn with an overshoot between the two; and a run that
-    begins at an end of the range in such a table, or in one whose runs all go one way, came from beyond that end.
+    A visit's direction of approach is given by the last earlier row at another place, with or without a reading (an
+    overshoot, an approach). Two assumptions are made, and reported, where the table omits the rows. A pair of readings
+    at an end of the range, where all other targets have one, is a reversal with an overshoot between the two. A run
+    that begins at an end of the range, in such a table or in one whose runs all go one way, came from beyond that end.
 
     Parameters
     ----------
@@ -136,7 +136,7 @@ def repeated_targets(
 
 
 def _targets(inputs: Array) -> tuple[Array, float] | NoRepeatedTargets:
-    """Targets in ascending order, and the distance from its target within which an input is at it."""
+    """Targets in ascending order, and the distance within which an input counts as at its target."""
     ordered = np.sort(inputs)
     if ordered.size < 4 or ordered[0] == ordered[-1]:
         return NoRepeatedTargets("there are fewer than four readings, or the input never changes")
@@ -164,7 +164,7 @@ def _targets(inputs: Array) -> tuple[Array, float] | NoRepeatedTargets:
 
 
 def _visits(input_mm: Array, measured: Flags, run: slice, centres: Array, halfwidth: float) -> list[_Visit]:
-    """Visits of a run in the order of travel; those without a reading are counted too."""
+    """Visits of a run in the order of travel, including those without a reading."""
     path = input_mm[run]
     nearest = np.clip(np.searchsorted((centres[1:] + centres[:-1]) / 2.0, path), 0, centres.size - 1)
     at = np.where(np.abs(path - centres[nearest]) <= halfwidth, nearest, -1)
@@ -185,7 +185,7 @@ def _visits(input_mm: Array, measured: Flags, run: slice, centres: Array, halfwi
 
 
 def _seconds_between(visits: Sequence[_Visit], time_s: Array, runs: Sequence[slice]) -> float | None:
-    """Median time from the first reading of a visit to that of the next within a run."""
+    """Median time from the first reading of a visit to that of the next one within a run (s)."""
     first = np.array([visit.rows[0] for visit in visits if visit.rows])
     steps = [np.diff(time_s[first[(first >= run.start) & (first < run.stop)]]) for run in runs]
     together = np.concatenate(steps) if steps else np.empty(0)
@@ -193,7 +193,7 @@ def _seconds_between(visits: Sequence[_Visit], time_s: Array, runs: Sequence[sli
 
 
 def _ends(visits: list[_Visit], centres: Array) -> tuple[list[_Visit], tuple[str, ...]]:
-    """Split the pairs of readings at the ends of the range, and give runs that begin there their side."""
+    """Split the pairs of readings at the ends of the range, and assign a direction to runs that begin there."""
     last = centres.size - 1
     inner = [len(visit.places) for visit in visits if 0 < visit.target < last]
     usual = int(np.median(inner)) if inner else 0
@@ -237,7 +237,7 @@ def _ends(visits: list[_Visit], centres: Array) -> tuple[list[_Visit], tuple[str
 
 
 def _goes_back(visit: _Visit, centre: float) -> bool:
-    """Whether the path leaves a target to the side from which it came."""
+    """Whether the path leaves a target on the side from which it came."""
     if visit.before_mm is None or visit.after_mm is None:
         return False
     return bool(np.sign(visit.before_mm - centre) == np.sign(visit.after_mm - centre))

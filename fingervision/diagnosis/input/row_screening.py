@@ -1,4 +1,4 @@
-"""Screen rows that carry no information: a zero that was set and not measured, a simulated value off its line."""
+"""Exclude rows without information: a zero that was set instead of measured, a simulated value off its line."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +15,10 @@ OFF_LINE = 0.01
 
 
 def screened_rows(table: MeasuredTable, model: Model, rest_gap_mm: float) -> tuple[NDArray[np.bool_], list[str]]:
-    """Mark the rows, shape (n,), and say why in sentences. Only tables without times are that small and hand-made."""
+    """Mark the excluded rows, shape (n,), and give the reasons in sentences.
+
+    Only tables without times are so small and hand-made.
+    """
     out = np.zeros(table.input_mm.size, dtype=bool)
     notes: list[str] = []
     if table.time_s is not None:

@@ -1,4 +1,4 @@
-"""Ends of the range at which the reading stands while the command moves on: a stop or a contact, whatever the noise."""
+"""Ends of the range at which the reading stays constant while the command moves on: a stop or a contact."""
 
 from itertools import pairwise
 
@@ -17,10 +17,10 @@ LEAST_DIGITS = 5.0
 
 
 def stalled_ends(input_mm: Array, predicted_mm: Array, gap_mm: Array) -> frozenset[str]:
-    """Effects that would make the reading stand at an end of the range, where it stands there.
+    """Effects that would make the reading constant at an end of the range, where it is constant there.
 
-    Noise of any colour changes a reading from row to row; equal readings over many rows, while the model moves on by
-    many digits, have another cause.
+    Noise changes a reading from row to row; readings that are equal over many rows, while the model moves by many
+    digits, have another cause.
 
     Parameters
     ----------

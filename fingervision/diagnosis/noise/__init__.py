@@ -1,1 +1,1 @@
-"""Random noise of the measurement: its model, its estimation from replicates and spectra, whitening."""
+"""Random noise of the measurement: noise model, estimation from replicates and spectra, whitening."""

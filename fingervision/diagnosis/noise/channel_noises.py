@@ -1,4 +1,4 @@
-"""Noise of every channel, estimated from replicates, from holds, or from the spectrum of the residual."""
+"""Noise of every channel, estimated from replicates, from stops of the stage, or from the residual's spectrum."""
 
 import numpy as np
 
@@ -62,9 +62,9 @@ def channel_noises(
 
 
 def noises_of_repeats(errors: list[PureError], floors: list[float]) -> tuple[Noise, ...]:
-    """Take the scatter of repeats for the noise: readings seconds apart are no samples of one fast process.
+    """Use the scatter of repeats as the noise, because readings seconds apart are no samples of one fast process.
 
-    The doubt of a standard deviation's square is sqrt(2 / degrees).
+    The relative standard uncertainty of the variance is sqrt(2 / degrees).
     """
     found = []
     for error, floor in zip(errors, floors, strict=True):

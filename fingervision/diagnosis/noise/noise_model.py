@@ -22,7 +22,7 @@ BY_CHANCE = 2e-3
 class Noise:
     """Standard deviations of the white and the correlated part, and the correlation of neighbouring samples.
 
-    `slow_doubt` is the standard uncertainty of the logarithm of the power where it is slow.
+    `slow_doubt` is the standard uncertainty of the logarithm of the power at low frequency.
     """
 
     white_mm: float
@@ -32,15 +32,15 @@ class Noise:
 
     @property
     def total_mm(self) -> float:
-        """Standard deviation of one sample."""
+        """Standard deviation of one sample (mm)."""
         return float(np.hypot(self.white_mm, self.correlated_mm))
 
 
 def gate(residual: Array, input_mm: Array, runs: tuple[slice, ...], ordered: bool, sigmas: float | None) -> Flags:
-    """Mark outliers against a running median; shape (n,), True where a value is to be set aside.
+    """Mark outliers against a running median; shape (n,), True where a value is to be excluded.
 
-    Without an order (no times) the median of all stands for the running one. `sigmas` is the limit; None sets nothing
-    aside: in a short record an effect that acts on a few samples looks like outliers until it is explained.
+    Without times there is no order, and the median of all values replaces the running one. `sigmas` is the limit; None
+    excludes nothing: in a short record an effect that acts on a few samples looks like outliers until it is explained.
     """
     out = np.zeros(residual.size, dtype=bool)
     if sigmas is None:
@@ -70,7 +70,7 @@ def gate(residual: Array, input_mm: Array, runs: tuple[slice, ...], ordered: boo
 
 
 def _recurring(out: Flags, parts: list[NDArray[np.intp]]) -> Flags:
-    """Where more samples are off than gross errors would be, which come at any input and any time."""
+    """Where more samples are off than gross errors would explain, which occur at any input and any time."""
     there = np.zeros(out.size, dtype=bool)
     for part in parts:
         by_chance = hypergeom.sf(out[part].sum() - 1, out.size, int(out.sum()), part.size)
@@ -79,14 +79,14 @@ def _recurring(out: Flags, parts: list[NDArray[np.intp]]) -> Flags:
 
 
 def _places(input_mm: Array) -> list[NDArray[np.intp]]:
-    """Samples near the same input, and at the ends of its range: where a contact or a stop acts."""
+    """Samples near the same input, and at the ends of its range, where a contact or a stop acts."""
     order = np.argsort(input_mm, kind="stable")
     ends = [part for count in ENDS for part in (order[:count], order[-count:])]
     return [*np.array_split(order, min(PLACES, order.size)), *ends]
 
 
 def _after_steps(input_mm: Array, runs: tuple[slice, ...]) -> list[NDArray[np.intp]]:
-    """Samples that come equally long after steps of a held input: there a stage is still on its way."""
+    """Samples at equal times after steps of a held input, when the stage is still moving."""
     steps = np.concatenate([run.start + 1 + np.flatnonzero(np.diff(input_mm[run])) for run in runs])
     if not 0 < steps.size <= input_mm.size // (2 * AFTER_A_STEP):
         return []
@@ -95,7 +95,7 @@ def _after_steps(input_mm: Array, runs: tuple[slice, ...]) -> list[NDArray[np.in
 
 
 def white_noise(residual: Array, aside: Flags, floor_mm: float, degrees: int) -> Noise:
-    """Take the scatter about the median for white noise: without times nothing else can be known.
+    """Treat the scatter about the median as white noise, because without times nothing else can be estimated.
 
     Parameters
     ----------
@@ -114,7 +114,7 @@ def white_noise(residual: Array, aside: Flags, floor_mm: float, degrees: int) ->
 
 
 def without_input(noise: Noise, input_mm: Array) -> Noise:
-    """Take out what the input's passing errors added, which the residual held too.
+    """Subtract the contribution of the input's random errors, which the residual contains too.
 
     Parameters
     ----------

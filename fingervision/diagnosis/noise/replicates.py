@@ -17,6 +17,10 @@ one table in a hundred without one."""
 TREND_DEGREE = 3
 """Degree of the polynomial in time that takes a drift or a run-in out of the repeats: it follows either over some
 cycles."""
+APART = 0.25
+"""Share of the scatter's power that may be left once places or sides drift apart, or runs have zeros of their own, for
+that to be believed: these are many coefficients for a few dozen repeats, and without them the noise is too large by a
+factor of 2 at most."""
 OFF_GRID = 0.02
 """Steps by which a difference may miss a multiple of the smallest one: the last digits that are written are rounded."""
 BY_ACCIDENT = 1e-3
@@ -55,7 +59,7 @@ class PureError:
 
     @property
     def has_trend(self) -> bool:
-        """Whether the repeats drift or run in."""
+        """Whether the repeats show a drift or a run-in."""
         return self.trend_sigmas > TREND_SIGMAS
 
 
@@ -95,7 +99,14 @@ def visits(path_mm: Array, runs: tuple[slice, ...], rows: NDArray[np.intp]) -> N
     return np.where((side != 0) & new, label, -1)[rows]
 
 
-def pure_error(values: Array, time_s: Array, label: NDArray[np.intp], aside: Flags) -> PureError | None:
+def pure_error(
+    values: Array,
+    time_s: Array,
+    label: NDArray[np.intp],
+    aside: Flags,
+    place_mm: Array | None = None,
+    runs: tuple[slice, ...] = (),
+) -> PureError | None:
     """Estimate the scatter of repeats; None where too little repeats.
 
     Parameters
@@ -108,32 +119,67 @@ def pure_error(values: Array, time_s: Array, label: NDArray[np.intp], aside: Fla
         As `visits` gives it.
     aside : ndarray of bool, shape (n,)
         Values that do not count.
+    place_mm : ndarray of float, shape (n,), or None
+        Recorded input of each, by which places may drift apart; None to leave that out.
+    runs : tuple of slice
+        Rows of each run, whose offsets are no scatter of readings; empty to leave that out.
     """
     numbers, counts = np.unique(label[(label >= 0) & ~aside], return_counts=True)
     groups = [np.flatnonzero((label == number) & ~aside) for number in numbers[counts > 1]]
     groups = [group[np.argsort(time_s[group], kind="stable")] for group in groups]
     degrees = sum(group.size - 1 for group in groups)
+    values, zeroings = _without_run_offsets(values, groups, runs)
+    degrees -= zeroings
     if degrees < FEWEST_DEGREES:
         return None
     rest = np.concatenate([values[group] - values[group].mean() for group in groups])
     pooled = float(rest @ rest) / degrees
     trend = _trend_sigmas([values[group] for group in groups], pooled)
     rows = np.concatenate(groups)
-    straight = _without_trend(rest, groups, time_s)
+    straight, taken = _without_trend(rest, groups, time_s), TREND_DEGREE
+    if place_mm is not None and degrees - 3 * TREND_DEGREE >= FEWEST_DEGREES:
+        ends = np.cumsum([group.size for group in groups])[:-1]
+        left = float(straight @ straight) / (degrees - TREND_DEGREE)
+        if _trend_sigmas(np.split(straight, ends), left) > TREND_SIGMAS:
+            # Places that drift apart, as a gain does, or sides that do, as a play that runs in.
+            centred = (place_mm - place_mm.mean()) / max(float(np.ptp(place_mm)), 1e-300)
+            apart = _without_trend(rest, groups, time_s, centred, np.where(label % 2, 0.5, -0.5))
+            if float(apart @ apart) / (degrees - 3 * TREND_DEGREE) < APART * left:
+                straight, taken = apart, 3 * TREND_DEGREE
     if trend <= TREND_SIGMAS and degrees - TREND_DEGREE >= FEWEST_DEGREES:
         trend = max(trend, _drift_sigmas(rest, straight, rows))
-    if trend <= TREND_SIGMAS or degrees - TREND_DEGREE < FEWEST_DEGREES:
+    if trend <= TREND_SIGMAS or degrees - taken < FEWEST_DEGREES:
         return PureError(_without_gross_errors(rest, degrees), degrees, trend, _wandering(rest, rows))
-    sd_mm = _without_gross_errors(straight, degrees - TREND_DEGREE)
-    return PureError(sd_mm, degrees - TREND_DEGREE, trend, _wandering(straight, rows))
+    sd_mm = _without_gross_errors(straight, degrees - taken)
+    return PureError(sd_mm, degrees - taken, trend, _wandering(straight, rows))
+
+
+def _without_run_offsets(values: Array, groups: list[NDArray[np.intp]], runs: tuple[slice, ...]) -> tuple[Array, int]:
+    """Subtract each run's own zero where it is most of the scatter; return also how many zeros were estimated."""
+    if len(runs) < 2 or not groups:
+        return values, 0
+    number = np.zeros(values.size, dtype=np.intp)
+    for index, run in enumerate(runs):
+        number[run] = index
+    own = (number[:, None] == np.arange(1, len(runs))).astype(np.float64)
+    rows = np.concatenate(groups)
+    rest = np.concatenate([values[group] - values[group].mean() for group in groups])
+    design = np.concatenate([own[group] - own[group].mean(axis=0) for group in groups])
+    zeros, _, rank, _ = np.linalg.lstsq(design, rest, rcond=1e-9)
+    left, degrees = rest - design @ zeros, sum(group.size - 1 for group in groups)
+    if rank >= degrees or float(left @ left) / (degrees - rank) >= APART * float(rest @ rest) / degrees:
+        return values, 0
+    out = values.copy()
+    out[rows] -= own[rows] @ zeros
+    return out, int(rank)
 
 
 def _drift_sigmas(rest: Array, straight: Array, rows: NDArray[np.intp]) -> float:
-    """Standard deviations by which readings that follow one another are alike, where that is a drift; else 0.
+    """Significance of the likeness of successive readings, in standard deviations, where it is a drift; else 0.
 
-    A smooth curve in time and a reading noise that wanders both make neighbours alike, wherever they were taken. The
-    likelier one is the reason, each at the price of its parameters (Schwarz 1978): the logarithm of what is left by
-    the curve, or by predicting each reading from the one before.
+    A drift (a smooth curve in time) and correlated reading noise both make successive readings alike, wherever they
+    were taken. The more probable of the two is taken as the cause, each with the penalty of its parameters (Schwarz
+    1978): the log variance left by the curve, or by predicting each reading from the previous one.
     """
     share, sigmas = _follows_sigmas(rest, rows)
     if sigmas <= TREND_SIGMAS:
@@ -145,10 +191,12 @@ def _drift_sigmas(rest: Array, straight: Array, rows: NDArray[np.intp]) -> float
     return sigmas if drifts < wanders else 0.0
 
 
-def _without_trend(rest: Array, groups: list[NDArray[np.intp]], time_s: Array) -> Array:
-    """Take a polynomial in time out of what repeats leave, which all groups share."""
+def _without_trend(rest: Array, groups: list[NDArray[np.intp]], time_s: Array, *shares: Array) -> Array:
+    """Subtract from the repeats' residuals a polynomial in time common to all groups, and one for each of `shares`."""
     at = np.concatenate([time_s[group] for group in groups])
     powers = np.vander((at - at.mean()) / max(float(np.ptp(at)), 1e-300), TREND_DEGREE + 1)[:, :-1]
+    own_rows = np.concatenate(groups)
+    powers = np.hstack([powers, *(powers * share[own_rows, None] for share in shares)])
     begin = 0
     for group in groups:
         own = slice(begin, begin + group.size)
@@ -158,15 +206,15 @@ def _without_trend(rest: Array, groups: list[NDArray[np.intp]], time_s: Array) -
 
 
 def _wandering(rest: Array, rows: NDArray[np.intp]) -> float:
-    """Correlation of what repeats leave in consecutive rows; 0 where independent readings would show as much."""
+    """Correlation of the repeats' residuals in successive rows; 0 where independent readings would show as much."""
     share, sigmas = _follows_sigmas(rest, rows)
     return min(share, MOST_WANDERING) if sigmas > TREND_SIGMAS else 0.0
 
 
 def _follows_sigmas(rest: Array, rows: NDArray[np.intp]) -> tuple[float, float]:
-    """Correlation of what repeats leave in consecutive rows, and how many standard deviations that is.
+    """Correlation of the repeats' residuals in successive rows, and its value in standard deviations.
 
-    Of k independent pairs it has a standard deviation of 1 / sqrt(k) (Bartlett 1946, doi:10.2307/2983611).
+    For k independent pairs its standard deviation is 1 / sqrt(k) (Bartlett 1946, doi:10.2307/2983611).
     """
     ordered = rest[np.argsort(rows)]
     follows = np.diff(np.sort(rows)) == 1
@@ -185,7 +233,7 @@ def _without_gross_errors(rest: Array, degrees: int) -> float:
 
 
 def _trend_sigmas(groups: list[Array], pooled: float) -> float:
-    """Von Neumann's ratio over all groups, as standard deviations below its expectation (von Neumann 1941)."""
+    """Von Neumann's ratio over all groups, in standard deviations below its expectation (von Neumann 1941)."""
     if pooled <= 0.0:
         return 0.0
     neighbours = sum(float(np.sum(np.diff(group) ** 2)) for group in groups)
@@ -197,9 +245,9 @@ def _trend_sigmas(groups: list[Array], pooled: float) -> float:
 
 
 def resolution(values: Array) -> float:
-    """Smallest difference of values that all lie on one grid, as a reading of few digits gives them; 0 without one.
+    """Spacing of the grid on which all values lie, as readings of few digits do; 0 without such a grid.
 
-    From few distinct values no step can be estimated: a 12-bit reading over their range is assumed.
+    From few distinct values no spacing can be estimated: a 12-bit reading over their range is assumed.
     """
     steps = np.diff(np.unique(np.round(values, 10)))
     steps = steps[steps > 1e-9]

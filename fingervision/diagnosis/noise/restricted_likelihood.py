@@ -13,7 +13,7 @@ WHITE = 0.5
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Likelihood:
-    """Restricted likelihood of autoregressions.
+    """Restricted likelihood of first-order autoregressions, tabulated over their correlation.
 
     Parameters
     ----------
@@ -34,7 +34,7 @@ class _Likelihood:
 
 
 def _likelihood(residuals_mm: list[Array], runs: tuple[slice, ...], aside: list[Flags]) -> _Likelihood:
-    """Take a straight line out of each run, and try every correlation."""
+    """Subtract a straight line from each run, and evaluate every correlation."""
     grid = np.linspace(0.0, 0.95, 39)
     cost = np.empty((len(residuals_mm), grid.size))
     spread = np.empty_like(cost)
@@ -66,11 +66,12 @@ def _likelihood(residuals_mm: list[Array], runs: tuple[slice, ...], aside: list[
 def noise_of_short_runs(
     residuals_mm: list[Array], runs: tuple[slice, ...], aside: list[Flags], floors_mm: list[float], *, explained: bool
 ) -> tuple[Noise, ...]:
-    """Fit channels that share one correlation, each at its own level.
+    """Fit channels that share one correlation, each with its own level.
 
-    Too few samples for a spectrum, and taken for white they would let every slow effect claim what is noise. The
-    channels are drawn from the same pictures, so one correlation serves them all: its posterior mean under a flat
-    prior. Before anything is explained, the channel that is correlated least gives it, since an effect can only add.
+    The samples are too few for a spectrum. If they were treated as white noise, every slow effect would seem
+    significant. All channels come from the same pictures, so that one correlation serves them all: its posterior mean
+    under a flat prior. Before anything is explained, the channel with the smallest correlation determines it, because
+    an effect can only increase it.
 
     Parameters
     ----------
@@ -98,10 +99,10 @@ def noise_of_short_runs(
 def drawn_noises(
     residuals_mm: list[Array], runs: tuple[slice, ...], aside: list[Flags], count: int, rng: np.random.Generator
 ) -> list[tuple[Noise, ...]]:
-    """Draw what the noise of short runs may be, from its posterior; a noise a channel, `count` times.
+    """Draw the noise of short runs from its posterior; one noise per channel, `count` times.
 
-    The channels share one correlation, which is none at all with a probability of `WHITE` before the data are seen; the
-    level follows the scaled inverse chi-square distribution of a variance.
+    The channels share one correlation, which is zero with prior probability `WHITE`; the level follows the scaled
+    inverse chi-square distribution of a variance.
     """
     known = _likelihood(residuals_mm, runs, aside)
     cost = known.cost.sum(axis=0)

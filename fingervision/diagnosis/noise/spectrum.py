@@ -1,4 +1,4 @@
-"""The noise of long records by Whittle's likelihood (Whittle 1953), where slow structure cannot reach it."""
+"""Noise of long records by Whittle's likelihood (Whittle 1953), from frequencies above those of slow structure."""
 
 import numpy as np
 
@@ -28,7 +28,7 @@ def noise_by_spectrum(
     *,
     explained: bool,
 ) -> tuple[Noise, ...]:
-    """Fit channels that share one spectrum's shape, each at its own level.
+    """Fit channels that share the shape of one spectrum, each with its own level.
 
     Parameters
     ----------
@@ -69,7 +69,7 @@ def _angles(count: int, slow: float) -> Array:
 
 
 def _powers(residual: Array, runs: tuple[slice, ...], aside: Flags, slow: float) -> Array:
-    """Periodogram of each run, one after the other, a straight line taken out; outliers are bridged."""
+    """Periodogram of each run after subtraction of a straight line, one after another; outliers are interpolated."""
     powers = []
     for run in runs:
         values, bad = residual[run].copy(), aside[run]
@@ -86,7 +86,10 @@ def _powers(residual: Array, runs: tuple[slice, ...], aside: Flags, slow: float)
 
 
 def _shape(angle: Array, share: float, phi: float) -> Array:
-    """Spectrum of unit variance, `share` of it correlated by `phi` from sample to sample; shape (m,)."""
+    """Spectrum of unit variance, of which the fraction `share` is correlated by `phi` from sample to sample.
+
+    Shape (m,).
+    """
     correlated = (1.0 - phi**2) / (1.0 + phi**2 - 2.0 * phi * np.cos(angle))
     return np.asarray(1.0 - share + share * correlated, dtype=np.float64)
 
@@ -94,9 +97,9 @@ def _shape(angle: Array, share: float, phi: float) -> Array:
 def _likeliest(angle: Array, powers: list[Array], use: list[Flags]) -> tuple[list[float], float, float, float]:
     """Weigh white noise, an autoregression, and both together against each other.
 
-    A mixture fitted where there is none finds correlation below the frequencies that are used, and with it noise
-    three times too large for whatever is slow; so the three kinds are equally likely beforehand, and the likeliest
-    kind answers with its posterior mean.
+    A mixture that is fitted to white noise finds correlation below the frequencies that are used, and then overstates
+    the slow noise three times. The three kinds therefore have equal prior probabilities, and the posterior mean of the
+    most probable kind is returned.
 
     Returns
     -------

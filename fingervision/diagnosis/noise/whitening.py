@@ -1,6 +1,6 @@
-"""Whitening: correlated, unequal noise turned into unit white noise by a Kalman filter's innovations (Kalman 1960)."""
+"""Whitening: correlated noise of unequal variance converted to unit white noise, by a Kalman filter (Kalman 1960)."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -19,7 +19,7 @@ _filter = loop("whitening_innovations")
 def _innovations(
     columns: Array, time: Array, white: Array, p1: float, lag1: float, h: Array, p2: float, lag2: float
 ) -> tuple[Array, float]:
-    """Innovations of columns, shape (n, k), and the logarithm of their covariance's determinant."""
+    """Innovations of columns, shape (n, k), and the log determinant of their covariance."""
     whole = np.ascontiguousarray(columns, dtype=np.float64)
     time, white, h = (np.ascontiguousarray(a, dtype=np.float64) for a in (time, white, h))
     out = np.empty_like(whole)
@@ -28,7 +28,7 @@ def _innovations(
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Whitener:
-    """The observation model's covariance, ready to be divided out; channels are stacked gap, midline, force.
+    """Covariance of the observations, with the operation of whitening; channels are stacked gap, midline, force.
 
     Parameters
     ----------
@@ -60,7 +60,7 @@ class Whitener:
     runs_scatter_mm: float = np.inf
 
     def columns(self, columns: Array) -> tuple[Array, float]:
-        """Whiten columns of shape (channels * n, k); also the logarithm of the covariance's determinant."""
+        """Whiten columns of shape (channels * n, k), and return also the log determinant of the covariance."""
         n = self.history.input_mm.size
         clock = self.history.time_s
         step = 1.0 if clock is None else max(self.history.sample_time_s, 1e-9)
@@ -95,10 +95,10 @@ class Whitener:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RunOffsets:
-    """What is refitted beside every explanation: re-zeroing between runs, the midline's constant, the drawing.
+    """Nuisance parameters of every explanation: re-zeroing between runs, constant of the midline, the drawing.
 
-    Re-zeroing is a zero-mean random effect per channel; the constant is free; an uncertain number of the drawing is a
-    random effect of its own uncertainty.
+    Re-zeroing is a zero-mean random effect per channel; the constant is free; an uncertain dimension of the drawing is
+    a random effect with its own uncertainty.
 
     Parameters
     ----------
@@ -126,6 +126,7 @@ class RunOffsets:
     scales_mm: tuple[float, ...]
     drawn: int = 0
     most_mm: float = np.inf
+    _metrics: dict[tuple[float, ...], Array] = field(default_factory=dict, init=False, repr=False)
 
     @classmethod
     def of(cls, whitener: Whitener) -> "RunOffsets":
@@ -147,21 +148,28 @@ class RunOffsets:
         return cls(design, design.T @ design, channels, runs, bool(free), scales, drawn, whitener.runs_scatter_mm)
 
     def metric(self, sigma_mm: tuple[float, ...]) -> Array:
-        """Return G with r^T r - (Z^T r)^T G (Z^T r) the squared length once offsets of these spreads are allowed."""
+        """Return G: r^T r - (Z^T r)^T G (Z^T r) is the squared length with offsets of these spreads allowed."""
+        known = self._metrics.get(sigma_mm)
+        if known is not None:
+            return known
         prior = [max(sigma_mm[channel], 1e-9) for channel in range(self.channels) for _ in range(self.runs)]
         prior += [MIDLINE_FREE_MM] * int(self.midline) + [1.0] * self.drawn
-        return np.asarray(np.linalg.inv(self.gram + np.diag(1.0 / np.array(prior) ** 2)), dtype=np.float64)
+        found = np.asarray(np.linalg.inv(self.gram + np.diag(1.0 / np.array(prior) ** 2)), dtype=np.float64)
+        # Spreads come from a grid, and with one run there is only one: the searches ask for the same again and again.
+        found.setflags(write=False)
+        self._metrics[sigma_mm] = found
+        return found
 
     def squared(self, whitened: Array, metric: Array) -> float:
-        """Squared length of a whitened column once the offsets of a metric are allowed."""
+        """Squared length of a whitened column with the offsets of a metric allowed."""
         shared = self.design.T @ whitened
         return float(whitened @ whitened - shared @ metric @ shared)
 
     def spread(self, residual: Array) -> tuple[tuple[float, ...], float]:
         """Estimate the spreads from a whitened residual by marginal likelihood.
 
-        A half-Cauchy prior of one edge noise's scale (Gelman 2006) keeps two runs from turning every common offset
-        into scatter. With one run the spread is zero.
+        A half-Cauchy prior with the scale of one edge's noise (Gelman 2006) keeps two runs from turning every common
+        offset into scatter. With one run the spread is zero.
 
         Returns
         -------
@@ -180,9 +188,11 @@ class RunOffsets:
         return tuple(out), total
 
     def doubt(self, residual: Array) -> float:
-        """-2 log of how much more probable a residual is over all spreads than at the best of them, to be added.
+        """-2 log of the ratio of a residual's probability over all spreads to that at the best spread.
 
-        A few runs hardly tell their spread: parameters that act like an offset are known with Student's tails only.
+        It is added to a score.
+
+        A few runs hardly determine the spread: parameters that act like an offset then have Student's tails.
         """
         if self.runs == 1:
             return 0.0
@@ -194,7 +204,10 @@ class RunOffsets:
         return total
 
     def drawn_spread(self, residual: Array, rng: np.random.Generator) -> tuple[float, ...]:
-        """Draw the spreads from what a residual leaves open; one a channel, in mm. A few runs leave much open."""
+        """Draw the spreads from their posterior given a residual; one per channel, in mm.
+
+        A few runs leave the spread very uncertain.
+        """
         width = np.gradient(SPREADS)
         out = []
         for scale, determinant, gain in self._tried(residual):
@@ -204,7 +217,7 @@ class RunOffsets:
         return tuple(out)
 
     def _tried(self, residual: Array) -> list[tuple[float, Array, Array]]:
-        """For each channel its scale, and at all spreads the penalty and the chi-square that offsets take."""
+        """Scale of each channel, and at all spreads the penalty and the fall of chi-square due to offsets."""
         shares = self.design.T @ residual
         if self.drawn:
             # What the drawing's numbers explain is no scatter between runs.

@@ -1,1 +1,1 @@
-"""The answer for readers: where measurement and simulation differ, figures, the page, the files."""
+"""The result for readers: where measurement and simulation differ, figures, the page, the files."""

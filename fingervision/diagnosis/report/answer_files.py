@@ -1,4 +1,4 @@
-"""The files of an answer: the page, the report, its figures, the corrected model, the next run."""
+"""The files of a result: the page, the report, its figures, the corrected model, the next run."""
 
 from collections.abc import Mapping
 from dataclasses import replace
@@ -24,7 +24,7 @@ PAGE, REPORT, MODEL, NEXT_RUN = "report.html", "report.json", "model.toml", "nex
 
 
 def write_answer(out: Path, done: Diagnosis, model: CorrectedModel, made: Provenance, table: Path) -> dict[str, object]:
-    """Write them into a folder, in the place of an earlier answer's, and give what report.json holds.
+    """Write the files into a folder, replacing those of an earlier result, and return the content of report.json.
 
     Parameters
     ----------
@@ -57,7 +57,7 @@ def write_answer(out: Path, done: Diagnosis, model: CorrectedModel, made: Proven
 
 
 def corrected(done: Diagnosis, model: CorrectedModel) -> CorrectedModel:
-    """Add the effects of an answer to the model that was diagnosed."""
+    """Add the named effects to the model that was diagnosed."""
     effects: dict[str, Mapping[str, Estimate]] = dict(model.effects)
     for effect in done.report.effects:
         curve = curve_values([at for at, _ in effect.points], [error for _, error in effect.points])

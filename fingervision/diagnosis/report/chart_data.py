@@ -1,4 +1,4 @@
-"""What the charts of a report's page show, as JSON for the script beside them."""
+"""Data of the charts on a report's page, as JSON for the page's script."""
 
 import json
 
@@ -17,7 +17,7 @@ Chart = dict[str, object]
 
 
 def charts_of(curves: GapCurves, residual_mm: dict[str, Array]) -> list[Chart]:
-    """Lay out the charts: gap and residual over the input, and over time where the runs share a clock.
+    """Compose the charts: gap and residual over the input, and over time where the runs share a clock.
 
     Parameters
     ----------
@@ -36,12 +36,12 @@ def charts_of(curves: GapCurves, residual_mm: dict[str, Array]) -> list[Chart]:
 
 
 def charts_json(charts: list[Chart]) -> str:
-    """Write the charts so that no name in them can end the script element."""
+    """Encode the charts so that no name in them can end the script element."""
     return json.dumps(charts, allow_nan=False, separators=(",", ":")).replace("<", "\\u003c")
 
 
 def _shown(x: Array) -> tuple[NDArray[np.intp], str]:
-    """Rows in ascending order of `x`, thinned evenly; and a remark where some are left out."""
+    """Rows in ascending order of `x`, thinned evenly, with a remark where some are omitted."""
     step = max(1, -(-x.size // MOST_ROWS))
     rows = np.arange(0, x.size, step)
     return rows[np.argsort(x[rows], kind="stable")], "" if step == 1 else f" (each {step}th row)"

@@ -1,4 +1,4 @@
-"""The files of a comparison: one page, one table and one figure for all models compared."""
+"""The files of a comparison: one page, one table and one figure for all compared models."""
 
 import json
 from collections.abc import Mapping
@@ -21,7 +21,7 @@ PAGE, COMPARISON, PICTURE = "compare.html", "compare.json", "compare.png"
 
 
 def comparison_document(found: Mapping[str, Comparison], made: Provenance) -> dict[str, object]:
-    """Lay comparisons out for programs: the first model's at the top, all of them in `models`.
+    """Compose compare.json: the first model's result at the top level, all of them in `models`.
 
     Parameters
     ----------
@@ -36,9 +36,9 @@ def comparison_document(found: Mapping[str, Comparison], made: Provenance) -> di
 
 
 def write_comparison(out: Path, found: Mapping[str, Comparison], made: Provenance, measured: Path) -> dict[str, object]:
-    """Write page, figures and compare.json into a folder that is there, and give what compare.json holds.
+    """Write page, figures and compare.json into an existing folder, and return the content of compare.json.
 
-    The recording behind the table `measured` is looked for beside it.
+    The recording from which the table `measured` was made is searched for beside it.
     """
     document = comparison_document(found, made)
     (out / COMPARISON).write_text(json.dumps(document, indent=2, allow_nan=False) + "\n", encoding="utf-8")

@@ -1,4 +1,4 @@
-"""The report of a diagnosis, written from its answer."""
+"""The report of a diagnosis, composed from its result."""
 
 import time
 
@@ -32,7 +32,7 @@ RUNNERS_UP = 8
 def diagnosis_report(
     answered: Answer, posterior: tuple[Point, ...], mistake: Finding | None, rng: np.random.Generator, begin_s: float
 ) -> DiagnosisReport:
-    """Write the answer down with its evidence and the next run.
+    """Compose the report of a result, with its evidence and the next run.
 
     Parameters
     ----------
@@ -96,7 +96,7 @@ def diagnosis_report(
 
 
 def _disagreement(answered: Answer) -> Disagreement:
-    """State the disagreement without and with the answer, in all and by channel."""
+    """The disagreement without and with the named effects, in total and by channel."""
     data, found = answered.data, answered.found
     before, after = answered.before_mm, answered.after_mm
     n, edges = data.chain.history.input_mm.size, data.chain.history.both_edges
@@ -118,7 +118,7 @@ def _with_map(names: tuple[str, ...], *, mapped: bool) -> tuple[str, ...]:
 
 
 def _trend(errors: list[PureError] | None) -> tuple[str, ...]:
-    """Say that repeats follow one another closer than they scatter: a drift, or a run-in."""
+    """Sentence that successive repeats are more alike than their scatter: a drift, or a run-in."""
     if errors is None or not errors[0].has_trend:
         return ()
     return (

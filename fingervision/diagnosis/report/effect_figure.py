@@ -1,4 +1,4 @@
-"""How an effect looks in a residual: a made-up straight gripper, opened, held and closed, with and without it."""
+"""How an effect looks in a residual: an ideal linear gripper, opened, held and closed, with and without the effect."""
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -14,7 +14,7 @@ SHOWN_SHARE = 0.2
 
 
 def effect_figure(name: str) -> Figure:
-    """Draw the residual that an effect leaves."""
+    """Draw the residual that an effect causes."""
     effect = catalogue()[name]
     input_mm = np.array([-0.6, 1.6])
     gap_mm = 4.0 + 7.7 * input_mm

@@ -12,7 +12,7 @@ INPUT, TIME, RESIDUALS = "gap_against_input", "gap_over_time", "residuals"
 
 
 def write_figures(out: Path, curves: GapCurves, residuals: Figure, title: str) -> tuple[Path, ...]:
-    """Write the figures into a folder, in the place of earlier ones.
+    """Write the figures into a folder, replacing earlier ones.
 
     Parameters
     ----------

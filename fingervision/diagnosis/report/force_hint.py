@@ -13,7 +13,7 @@ SEEN = 0.002
 
 
 def force_hint(data: Observations, alternatives: tuple[Explanation, ...]) -> tuple[str, ...]:
-    """Say which explanations of the same gap differ in force, where the force was not measured.
+    """Name the explanations with equal gap that differ in force, where the force was not measured.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Frames at the turning points of a recording, with what was measured there drawn in."""
+"""Frames at the reversals of a recording, with the measured edges drawn in."""
 
 import base64
 import csv
@@ -28,7 +28,7 @@ MARK = (64, 255, 96)
 
 @dataclass(frozen=True, slots=True)
 class Turn:
-    """A measured row at which the input turned, with its picture.
+    """A measured row at which the input reversed, with its picture.
 
     Parameters
     ----------
@@ -51,7 +51,7 @@ class Turn:
 
 
 def strip_html(table: Path) -> str:
-    """Lay out the frames at the turning points of the recording behind a gaps.csv; why there is none, otherwise."""
+    """HTML of the frames at the reversals of the recording behind a gaps.csv, or the reason why there is none."""
     recording = _recording_of(table)
     if recording is None:
         return (
@@ -70,7 +70,7 @@ def strip_html(table: Path) -> str:
 
 
 def turning_rows(table: Path) -> tuple[Turn, ...]:
-    """Find the rows of a gaps.csv at which the input turned, the first one included; none without their columns."""
+    """Find the rows of a gaps.csv at which the input reversed, and the first row; none without the needed columns."""
     with table.open(encoding="utf-8", newline="") as file:
         rows = list(csv.DictReader(line for line in file if not line.startswith("#")))
     found: list[Turn] = []
@@ -100,7 +100,7 @@ def turning_rows(table: Path) -> tuple[Turn, ...]:
 
 
 def _recording_of(table: Path) -> Path | None:
-    """The file that a gaps.csv was measured on, known by its hash; None where it is not near."""
+    """The file from which a gaps.csv was measured, recognised by its hash; None where it is not found nearby."""
     try:
         recording = json.loads((table.parent / SUMMARY).read_bytes())["recording"]
         name, sha256 = recording["name"], recording["sha256"]
@@ -118,7 +118,7 @@ def _recording_of(table: Path) -> Path | None:
 
 
 def _decoded(recording: Path, turns: tuple[Turn, ...]) -> tuple[Turn, ...]:
-    """Decode the frames of turning points, and draw what was measured."""
+    """Decode the frames at the reversals, and draw the measured edges into them."""
     wanted = {turn.frame: turn for turn in turns}
     last = max(wanted, default=-1)
     found: list[Turn] = []

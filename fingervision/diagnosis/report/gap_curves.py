@@ -15,7 +15,7 @@ STANDS = 1e-4
 
 @dataclass(frozen=True, slots=True, eq=False)
 class GapCurves:
-    """A measurement and what models predict for it, row by row.
+    """A measurement and the predictions of models, row by row.
 
     Parameters
     ----------
@@ -43,7 +43,7 @@ class GapCurves:
 
 
 def gap_curves(data: Observations, noise_mm: float, predictions: Mapping[str, Array]) -> GapCurves:
-    """Put predictions beside a measurement.
+    """Combine a measurement with predictions.
 
     Parameters
     ----------
@@ -69,7 +69,10 @@ def gap_curves(data: Observations, noise_mm: float, predictions: Mapping[str, Ar
 
 
 def _opens(input_mm: Array, runs: tuple[slice, ...]) -> Flags:
-    """Mark rows to which the input rose; a row at rest keeps the direction of the move before, or of the one after."""
+    """Mark rows at which the input had increased.
+
+    A row at rest takes the direction of the previous or the next motion.
+    """
     out = np.zeros(input_mm.size, dtype=bool)
     least_mm = STANDS * max(float(np.ptp(input_mm)), 1e-300)
     for run in runs:

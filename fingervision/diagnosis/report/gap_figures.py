@@ -1,4 +1,4 @@
-"""The paper's figure of gap against input, and the same over time: measurement, simulation, corrected model."""
+"""Figures of gap against input, and of gap over time: measurement, simulation, corrected model."""
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -16,7 +16,7 @@ FEW_ROWS = 80
 
 
 def gap_against_input(curves: GapCurves, title: str) -> Figure:
-    """Draw the gap over the recorded input, opening and closing told apart (Figure 9 of the paper)."""
+    """Draw the gap over the recorded input, opening and closing distinguished (Hricko & Havlik, 2015, figure 9)."""
     with plain_style():
         figure = Figure(figsize=(6.3, 4.2), layout="constrained")
         axes = figure.subplots()
@@ -36,7 +36,7 @@ def gap_against_input(curves: GapCurves, title: str) -> Figure:
 
 
 def gap_over_time(curves: GapCurves, title: str) -> Figure | None:
-    """Draw the same over time; None where the runs share no clock."""
+    """Draw the gap over time; None where the runs share no clock."""
     if curves.time_s is None:
         return None
     with plain_style():

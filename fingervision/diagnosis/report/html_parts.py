@@ -1,4 +1,4 @@
-"""Pieces of a report's page: tables, lists, numbers that a program finds again, charts that need no network."""
+"""Parts of a report's page: tables, lists, numbers that a program can read, charts that need no network."""
 
 import math
 from collections.abc import Sequence
@@ -17,19 +17,19 @@ HINT = "Drag to zoom, double-click to see all; with the keyboard: arrows read va
 
 
 def table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    """Lay out cells that are HTML already; wide tables scroll by themselves."""
+    """Table of cells that are already HTML; wide tables scroll by themselves."""
     top = "".join(f'<th scope="col">{escape(cell)}</th>' for cell in head)
     body = "".join("<tr>" + "".join(f"<td>{cell}</td>" for cell in row) + "</tr>" for row in rows)
     return f'<div class="scroll" tabindex="0" role="group"><table><tr>{top}</tr>{body}</table></div>'
 
 
 def bullets(items: Sequence[str]) -> str:
-    """List sentences; none at all is said."""
+    """List of sentences; an empty list is stated in words."""
     return "<ul>" + "".join(f"<li>{escape(item)}</li>" for item in items) + "</ul>" if items else "<p>Nothing.</p>"
 
 
 def number(value: float | None, unit: str = "mm", digits: int = 4) -> str:
-    """Write a number for a reader, with its full value for a program (HTML's `data` element)."""
+    """A number for a reader, with its full value for a program (HTML's `data` element)."""
     if value is None:
         return "-"
     return f'<data value="{value!r}">{value:.{digits}g}</data> {escape(unit)}'.rstrip()
@@ -50,7 +50,7 @@ def with_uncertainty(e: Estimate) -> list[str]:
 
 
 def chart(found: Chart, words: str) -> str:
-    """Leave the room for a chart that the script draws, with its value read out below."""
+    """Placeholder for a chart that the script draws, with the value under the cursor below it."""
     name = escape(str(found["id"]), quote=True)
     return (
         f'<div class="chart" id="{name}" tabindex="0" role="group" aria-label="{escape(words, quote=True)}. '
@@ -59,7 +59,7 @@ def chart(found: Chart, words: str) -> str:
 
 
 def provenance_html(made: Provenance) -> str:
-    """Say which files, which command and which versions a result comes from."""
+    """HTML with the files, the command and the versions from which a result comes."""
     files = table(
         ["used as", "file", "bytes", "SHA-256"],
         [
@@ -72,7 +72,7 @@ def provenance_html(made: Provenance) -> str:
 
 
 def page(title: str, heading: str, verdict: str, sections: Sequence[tuple[str, str]], charts: list[Chart]) -> str:
-    """Put a whole page together: styles, charts and data stand in it, so that it opens without a network."""
+    """Compose a whole page that contains styles, charts and data, so that it opens without a network."""
     style = (CHARTS / "uPlot.min.css").read_text(encoding="utf-8") + (PAGE / "report.css").read_text(encoding="utf-8")
     library = (CHARTS / "uPlot.iife.min.js").read_text(encoding="utf-8")
     script = (PAGE / "charts.js").read_text(encoding="utf-8")

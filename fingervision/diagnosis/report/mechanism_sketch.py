@@ -1,4 +1,4 @@
-"""The mechanism on the page: every body as predicted and as measured, its difference magnified, by a slider."""
+"""Sketch of the mechanism on the page: every body as predicted and as measured, with the difference magnified."""
 
 import json
 from collections.abc import Sequence
@@ -97,7 +97,10 @@ def sketch_html(evidence: BodyEvidence, answers: PlaceAnswers) -> str:
 
 
 def _differences(name: str, evidence: BodyEvidence, parts: Sequence[NDArray[np.intp]]) -> tuple[Array, Array]:
-    """Mean of measured minus predicted of a body in every part, shape (parts, 3), and its largest significance."""
+    """Mean of measured minus predicted pose of a body in every part of the range, shape (parts, 3).
+
+    The second value is its largest significance.
+    """
     means, sigma = np.zeros((len(parts), 3)), np.zeros(len(parts))
     for k, part in enumerate(PARTS):
         channel = f"{name}.{part}"

@@ -1,9 +1,9 @@
 """Positioning accuracy and repeatability of an axis from repeated visits of targets, as ISO 230-2:2014 defines them.
 
-Published reports differ from the standard in three ways, which the tests hold against readings of real stages:
-`forward` may mean the approach from above, so that the reversal has the other sign; R may be max(R_up, R_down), while
-the standard's R is a bidirectional figure with the reversal in it; E may be that of one direction alone. All of those
-stand among the figures here: compare R with R_up and R_down, E with E_up and E_down.
+Published reports deviate from the standard in three ways, which the tests check with readings of real stages. `forward`
+may mean the approach from above, so that the reversal has the other sign. R may be max(R_up, R_down), whereas the
+standard's R is bidirectional and includes the reversal. E may be that of one direction only. All of these are among the
+figures here: compare R with R_up and R_down, E with E_up and E_down.
 """
 
 from collections.abc import Callable, Sequence
@@ -32,7 +32,7 @@ Integers = NDArray[np.intp]
 def positioning_accuracy(
     target_mm: ArrayLike, deviation_mm: ArrayLike, direction: ArrayLike, cycle: ArrayLike
 ) -> PositioningAccuracy:
-    """Reversal, repeatability, systematic deviation and accuracy of an axis.
+    """Compute reversal, repeatability, systematic deviation and accuracy of an axis.
 
     Parameters
     ----------
@@ -100,7 +100,7 @@ class _Side:
 
 
 def _checked(*given: ArrayLike) -> tuple[Array, Array, Integers, Integers]:
-    """Four columns of one length, the first two finite, the directions known."""
+    """Check four columns: equal lengths, the first two finite, known directions."""
     target, deviation, side, number = (np.atleast_1d(np.asarray(column, dtype=np.float64)) for column in given)
     names = ("target_mm", "deviation_mm", "direction", "cycle")
     for name, column in zip(names, (target, deviation, side, number), strict=True):
@@ -118,7 +118,7 @@ def _checked(*given: ArrayLike) -> tuple[Array, Array, Integers, Integers]:
 
 
 def _by_visit(deviation: Array, number: Integers, chosen: NDArray[np.bool_]) -> dict[int, float]:
-    """Mean deviation of each visit among the chosen readings."""
+    """Mean deviation of each visit among the selected readings."""
     return {int(visit): float(np.mean(deviation[chosen & (number == visit)])) for visit in np.unique(number[chosen])}
 
 
@@ -130,7 +130,7 @@ def _visits(readings: dict[int, float]) -> Visits | None:
 
 
 def _target(place: float, up: dict[int, float], down: dict[int, float]) -> Target:
-    """Statistics of a target; the reversal's uncertainty from like-numbered visits, or from both scatters."""
+    """Statistics of a target; the reversal's uncertainty from visits of equal number, or from both scatters."""
     above, below = _visits(down), _visits(up)
     if above is None or below is None:
         return Target(place, below, above, None, None)
@@ -152,7 +152,7 @@ def _side(visits: Sequence[Visits | None], words: str) -> _Side:
 
 
 def _repeatability(sides: Sequence[_Side]) -> float:
-    """R of the sides' targets: 4 s of one side; the reversal joins where there are two."""
+    """Repeatability R of the targets: 4 s for one side; with two sides the reversal is included."""
     single = max(float(2.0 * COVERAGE * np.max(side.s)) for side in sides)
     if len(sides) == 1:
         return single
@@ -184,7 +184,7 @@ def _figure(
     fewest: int = 2,
     scatter: bool = False,
 ) -> Figure:
-    """Figure over the targets that have what it needs, or the reason why there are too few."""
+    """Compute a figure over the targets with sufficient readings, or give the reason why they are too few."""
     words, targets = sides[0].words, sides[0].mean.size
     if scatter:
         kept = np.logical_and.reduce([side.scattered for side in sides])
@@ -202,7 +202,7 @@ def _figure(
 
 
 def _reversals(targets: Sequence[Target], by_cycle: Sequence[Sequence[float]]) -> dict[str, Figure]:
-    """B and its mean; the mean's uncertainty from the scatter of the cycles' own means where there are two."""
+    """Reversal B and its mean; the mean's uncertainty from the scatter of the cycles' means where there are two."""
     known = [t for t in targets if t.reversal_mm is not None]
     if not known:
         reason = "no target was approached from both sides"
@@ -224,7 +224,7 @@ def _reversals(targets: Sequence[Target], by_cycle: Sequence[Sequence[float]]) -
 
 
 def _notes(targets: Sequence[Target]) -> tuple[str, ...]:
-    """What a reader of the figures must know: fewer targets or cycles than the standard asks for, one side missing."""
+    """Remarks on the figures: fewer targets or cycles than the standard requires, or one side missing."""
     notes = []
     if len(targets) < FEWEST_TARGETS:
         notes.append(f"ISO 230-2 asks for at least {FEWEST_TARGETS} targets; there are {len(targets)}.")

@@ -1,6 +1,7 @@
-"""Figures of positioning accuracy: symbols and definitions of ISO 230-2:2014, and the nouns that hold them.
+"""Figures of positioning accuracy: symbols and definitions of ISO 230-2:2014, and their data classes.
 
-Arrows of the standard are written `up` (target approached from below, the input increasing) and `down` (from above).
+The arrows of the standard are written `up` (target approached from below, the input increasing) and `down` (from
+above).
 
 References
 ----------
@@ -50,7 +51,10 @@ class Visits:
 
 @dataclass(frozen=True, slots=True)
 class Target:
-    """A target with its readings from either side; its reversal B_i = up - down, its uncertainty and their freedom."""
+    """A target with its readings from either side.
+
+    Reversal B_i = up - down with its uncertainty and degrees of freedom.
+    """
 
     target_mm: float
     up: Visits | None
@@ -62,9 +66,10 @@ class Target:
 
 @dataclass(frozen=True, slots=True)
 class Figure:
-    """A figure of the axis: value and standard uncertainty where it is known, or the reason why there is no value.
+    """A figure of the axis: value and standard uncertainty where known, or the reason why there is no value.
 
-    With five cycles an uncertainty has four degrees of freedom: a 95 % interval is 2.8 of it to either side, not 2.
+    With five cycles an uncertainty has four degrees of freedom: a 95 % interval extends by 2.8 times the uncertainty to
+    either side, not 2.
     """
 
     symbol: str
@@ -76,7 +81,7 @@ class Figure:
 
     @property
     def interval_mm(self) -> float | None:
-        """Half a 95 % interval (Student's t); None where the uncertainty is not known."""
+        """Half of a 95 % interval (Student's t) in mm; None where the uncertainty is unknown."""
         if self.u_mm is None or self.degrees_of_freedom is None:
             return None
         return float(stdtrit(self.degrees_of_freedom, 0.975)) * self.u_mm
@@ -84,14 +89,14 @@ class Figure:
 
 @dataclass(frozen=True, slots=True)
 class PositioningAccuracy:
-    """All figures of an axis by symbol, the targets that they are taken from, and what a reader must know of them."""
+    """All figures of an axis by symbol, the targets from which they are computed, and remarks."""
 
     targets: tuple[Target, ...]
     figures: Mapping[str, Figure]
     notes: tuple[str, ...]
 
     def value_mm(self, symbol: str) -> float:
-        """Value of a figure that there is; a figure without a value is a programming error."""
+        """Value of a figure that exists (mm); asking for one without a value is a programming error."""
         value = self.figures[symbol].value_mm
         if value is None:
             message = f"{symbol} has no value: {self.figures[symbol].reason}."

@@ -1,4 +1,4 @@
-"""Positioning figures of a measured table beside its model, and what report.json and report.html tell of them."""
+"""Positioning figures of a measured table compared with its model, as given in report.json and report.html."""
 
 from html import escape
 
@@ -20,7 +20,7 @@ from fingervision.domain.effect import Array
 
 
 def positioning_of_data(data: Observations, answer: Settings) -> PositioningReport | NoRepeatedTargets:
-    """Positioning figures of a measured table beside its model and an answer, or why it has none.
+    """Positioning figures of a measured table compared with its model and a diagnosis, or why there are none.
 
     Parameters
     ----------
@@ -46,14 +46,14 @@ def positioning_of_data(data: Observations, answer: Settings) -> PositioningRepo
 
 
 def positioning_section(found: PositioningReport | NoRepeatedTargets) -> dict[str, object]:
-    """Section `iso230` of report.json; `figures` is null, with the reason, where the table has no repeated targets."""
+    """Section `iso230` of report.json; `figures` is null, with the reason, where no targets are repeated."""
     if isinstance(found, NoRepeatedTargets):
         return {"standard": STANDARD, "figures": None, "reason": found.reason}
     return positioning_document(found)
 
 
 def positioning_html(found: PositioningReport | NoRepeatedTargets) -> str | None:
-    """Section of report.html: sentences, table, notes; None where the table has no repeated targets."""
+    """Section of report.html: sentences, table, notes; None where no targets are repeated."""
     if isinstance(found, NoRepeatedTargets):
         return None
     head, rows = positioning_rows(found)

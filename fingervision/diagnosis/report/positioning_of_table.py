@@ -1,4 +1,4 @@
-"""The positioning figures of a measured table beside its model and the answer of a diagnosis: one call for a report."""
+"""Positioning figures of a measured table compared with its model and the result of a diagnosis, in one call."""
 
 from collections.abc import Callable, Mapping, Sequence
 
@@ -28,11 +28,11 @@ def positioning_of_table(
     predict_mm: Callable[[Mapping[str, Values]], Array],
     answer: Mapping[str, Values],
 ) -> PositioningReport | NoRepeatedTargets:
-    """Positioning figures where the table has repeated targets.
+    """Compute the positioning figures where the table has repeated targets.
 
-    Where the model's gap follows the input one to one, as on a stage, deviations are measured gap minus recorded
-    input, as in an ISO 230-2 report; the share that the model predicts is reported beside those of the effects.
-    Anywhere else they are measured minus simulated gap. A constant between the two (a rest gap) changes no figure.
+    If the model's gap follows the input one to one, as on a stage, a deviation is measured gap minus recorded input, as
+    in an ISO 230-2 report. The share of the model's prediction is then reported beside those of the effects. Otherwise
+    a deviation is measured minus simulated gap. A constant added to all deviations (a rest gap) changes no figure.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""The positioning figures of a diagnosis: as measured, after the answer, and the share of each named effect."""
+"""Positioning figures of a diagnosis: as measured, with the named effects corrected, and the share of each effect."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -13,7 +13,7 @@ from fingervision.domain.effect import Array, Values
 
 @dataclass(frozen=True, slots=True)
 class PositioningReport:
-    """Positioning figures before and after the answer, and with each effect's predicted change taken out.
+    """Positioning figures before and after the correction, and with the predicted change of each effect subtracted.
 
     Parameters
     ----------
@@ -39,16 +39,16 @@ class PositioningReport:
     slope_sign: int = 1
 
     def share_mm(self, effect: str, symbol: str) -> float | None:
-        """Figure as measured minus figure without the effect; negative where the effect hides a part of it.
+        """Figure as measured minus figure without the effect (mm); negative where the effect hides a part of it.
 
-        Figures are ranges and maxima, so shares need not add up to the figure; those of B_mean do.
+        Figures are ranges and maxima, so that shares need not add up to the figure; those of B_mean do.
         """
         whole, rest = self.measured.figures[symbol].value_mm, self.without[effect].figures[symbol].value_mm
         return None if whole is None or rest is None else whole - rest
 
     @property
     def cycles(self) -> tuple[int, int]:
-        """Fewest and most visits of a target from one side."""
+        """Smallest and largest number of visits of a target from one side."""
         counts = [v.n for t in self.measured.targets for v in (t.up, t.down) if v is not None]
         return (min(counts), max(counts)) if counts else (0, 0)
 
@@ -56,7 +56,7 @@ class PositioningReport:
 def effect_changes(
     predict_mm: Callable[[Mapping[str, Values]], Array], answer: Mapping[str, Values]
 ) -> dict[str, Array]:
-    """Change of the prediction that each effect of an answer makes beside the others.
+    """Change of the prediction by each named effect, with the others present.
 
     Parameters
     ----------
@@ -80,7 +80,7 @@ def positioning_report(
     reference: str = "target",
     slope_sign: int = 1,
 ) -> PositioningReport:
-    """Compute the figures as measured, after the answer, and without each effect.
+    """Compute the figures as measured, corrected, and without each effect.
 
     Parameters
     ----------

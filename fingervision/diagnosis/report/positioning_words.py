@@ -29,7 +29,7 @@ SIDES = {"up": "approached from below", "down": "approached from above"}
 
 
 def positioning_document(report: PositioningReport) -> dict[str, object]:
-    """Section `iso230` of report.json: every figure with unit and definition, what remains of it, shares by effect."""
+    """Section `iso230` of report.json: every figure with unit and definition, its residual, and shares by effect."""
     figures = {}
     for symbol, figure in report.measured.figures.items():
         after = None if report.after is None else report.after.figures[symbol].value_mm
@@ -67,7 +67,7 @@ def positioning_document(report: PositioningReport) -> dict[str, object]:
 
 
 def positioning_rows(report: PositioningReport) -> tuple[list[str], list[list[str]]]:
-    """Head and rows of the table in report.html; lengths in um."""
+    """Head and rows of the table in report.html; lengths in µm."""
     effects = list(report.without)
     after = [] if report.after is None else ["after the answer, um"]
     head = ["figure", "measured, um", *after, *(f"share of {effect}, um" for effect in effects), "definition"]
@@ -84,7 +84,7 @@ def positioning_rows(report: PositioningReport) -> tuple[list[str], list[list[st
 
 
 def positioning_notes(report: PositioningReport) -> tuple[str, ...]:
-    """What deviations and shares are, what was assumed of the cycle, what the standard asks for and the table lacks."""
+    """Notes: definition of deviations and shares, assumptions on the cycle, and what the standard would need."""
     shares = (SHARES,) if report.without else ()
     return (REFERENCES[report.reference], *shares, *report.assumed, *report.measured.notes)
 
@@ -126,7 +126,7 @@ def _sentence(report: PositioningReport, symbol: str, value: float) -> str:
 
 
 def _side_words(figure: Figure, slope_sign: int) -> str:
-    """Say which approach gives smaller readings and whether play explains it; empty within the uncertainty."""
+    """Sentence on which approach gives smaller readings, and whether play explains it; empty within the uncertainty."""
     value, interval = figure.value_mm or 0.0, figure.interval_mm
     if not value or (interval is not None and abs(value) <= interval):
         return ""
@@ -143,7 +143,7 @@ def _visits(visits: Visits | None) -> dict[str, float | None] | None:
 
 
 def _um(value_mm: float | None) -> str:
-    """Micrometres to a hundredth: the last digit that published reports print."""
+    """Micrometres with two decimals, as in published reports."""
     # Adding zero takes the sign from what rounds to zero.
     return "-" if value_mm is None else f"{round(1e3 * value_mm, 2) + 0.0:.2f}"
 

@@ -1,4 +1,4 @@
-"""report.html: the whole answer on one self-contained page."""
+"""report.html: the whole result on one self-contained page."""
 
 import base64
 from collections.abc import Sequence
@@ -42,7 +42,7 @@ SIMULATION, CORRECTED = "simulation", "corrected model"
 
 
 def curves_of(diagnosis: Diagnosis) -> GapCurves:
-    """Measurement, simulation and, where effects were named, the corrected model."""
+    """Curves of measurement, simulation and, where effects were named, the corrected model."""
     data = diagnosis.data
     predictions = {SIMULATION: data.stacked_mm - diagnosis.before_mm}
     if diagnosis.report.effects:
@@ -51,7 +51,7 @@ def curves_of(diagnosis: Diagnosis) -> GapCurves:
 
 
 def report_page(diagnosis: Diagnosis, made: Provenance, frames: str) -> str:
-    """Write the report as HTML; `frames` is the strip of frames at the turning points, as HTML."""
+    """Compose the report as HTML; `frames` is the HTML of the frames at the reversals."""
     report = diagnosis.report
     history = diagnosis.data.chain.history
     n = history.input_mm.size
@@ -124,7 +124,7 @@ def _how_much(report: DiagnosisReport) -> str:
 
 
 def _mechanisms(report: DiagnosisReport) -> str:
-    """Each named effect in words, with its law, its source and how it looks alone in a residual."""
+    """Each named effect in words, with its formula, its source and its typical residual."""
     if not report.effects:
         return "<p>Nothing.</p>"
     known = catalogue()
@@ -141,7 +141,7 @@ def _mechanisms(report: DiagnosisReport) -> str:
 
 
 def _apart(alternatives: Sequence[Sequence[str]]) -> str:
-    """List the explanations of the ambiguity set."""
+    """List of the explanations in the ambiguity set."""
     if len(alternatives) < 2:
         return "<p>Nothing: no other explanation of the catalogue comes near.</p>"
     return bullets([" + ".join(names) for names in alternatives])

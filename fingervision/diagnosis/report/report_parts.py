@@ -1,4 +1,4 @@
-"""Sections that other distributions add to the report: entry points of the group `fingervision.report_parts`."""
+"""Report sections added by other distributions: entry points of the group `fingervision.report_parts`."""
 
 import logging
 from typing import Protocol, cast
@@ -16,7 +16,7 @@ class ReportPart(Protocol):
     TITLE: str
 
     def html(self, diagnosis: Diagnosis) -> str | None:
-        """Write the section's content as HTML that fetches nothing; None where there is nothing to say."""
+        """Return the section's content as HTML that loads nothing; None where the section is empty."""
         ...
 
 
@@ -35,7 +35,7 @@ REGISTRY: Registry[ReportPart] = Registry("fingervision.report_parts", "report p
 
 
 def added_sections(diagnosis: Diagnosis) -> list[tuple[str, str]]:
-    """Give title and content of every section that is added; one that fails is left out and said."""
+    """Title and content of every added section; one that fails is left out and reported."""
     sections = []
     for entry in REGISTRY.entries():
         try:

@@ -1,4 +1,4 @@
-"""A residual split into its channels, and where in them it cannot be noise."""
+"""A residual split into its channels, and the regions where it cannot be noise."""
 
 import numpy as np
 
@@ -10,7 +10,7 @@ from fingervision.domain.report import Place
 
 
 def by_channel(data: Observations, stacked: Array) -> dict[str, Array]:
-    """Split a stacked residual into gap and, where they were measured, left, right and midline."""
+    """Split a stacked residual into gap and, where measured, left, right and midline."""
     n = data.chain.history.input_mm.size
     gap = stacked[:n]
     out = {"gap": gap}

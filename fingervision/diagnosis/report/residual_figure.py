@@ -1,4 +1,4 @@
-"""Residuals before and after, over the input and over time."""
+"""Figure of the residuals before and after the correction, over the input and over time."""
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -16,7 +16,7 @@ NAMES = {
 
 
 def residual_figure(before: dict[str, Array], after: dict[str, Array] | None, history: History) -> Figure:
-    """Draw measured minus predicted, a row a channel, over the input and (where there are times) over time.
+    """Draw measured minus predicted, one row per channel, over the input and (where there are times) over time.
 
     Parameters
     ----------

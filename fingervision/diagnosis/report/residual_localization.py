@@ -1,4 +1,4 @@
-"""Where measurement and model disagree: regions whose residual cannot be noise, each said once, in a sentence."""
+"""Find where measurement and model disagree: regions whose residual cannot be noise, each described once."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -34,7 +34,7 @@ SHARES = {
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Axis:
-    """A variable that the residual is looked at over: name, unit, values, and the samples in parts along it."""
+    """A variable over which the residual is examined: name, unit, values, and the samples in parts along it."""
 
     name: str
     unit: str
@@ -42,11 +42,11 @@ class Axis:
     parts: tuple[np.ndarray[tuple[int], np.dtype[np.intp]], ...]
 
     def scores(self, residual: Array, sd: float) -> Array:
-        """Sum of the residual over each part, in its own standard deviations."""
+        """Sum of the residual over each part, divided by its standard deviation."""
         return np.array([residual[p].sum() / (sd * np.sqrt(p.size)) for p in self.parts])
 
     def inside(self, residual: Array, first: int, last: int) -> np.ndarray[tuple[int], np.dtype[np.intp]]:
-        """Samples from part `first` to `last`, their ends moved within the parts there to where the sum is largest."""
+        """Samples from part `first` to `last`, with the ends moved within these parts to maximise the sum."""
         order = np.concatenate(self.parts)
         total = np.concatenate([[0.0], np.cumsum(residual[order])])
         bounds = np.concatenate([[0], np.cumsum([p.size for p in self.parts])])
@@ -61,7 +61,7 @@ class Axis:
 
 
 def _scan(score: Array) -> tuple[Array, Array, Array]:
-    """Largest absolute sum over a stretch, in standard deviations, and the stretch; shapes (...,) of (..., n)."""
+    """Largest absolute sum over a stretch, in standard deviations, and that stretch; shapes (...,) from (..., n)."""
     n = score.shape[-1]
     total = np.concatenate([np.zeros((*score.shape[:-1], 1)), np.cumsum(score, axis=-1)], axis=-1)
     first, end = np.triu_indices(n + 1, 1)
@@ -71,7 +71,7 @@ def _scan(score: Array) -> tuple[Array, Array, Array]:
 
 
 def _axes(history: History, aside: Flags) -> list[Axis]:
-    """Input (both ways, opening, closing), time and speed, plainest first."""
+    """Axes: input (both directions, opening, closing), time and speed, the simplest first."""
     n = history.input_mm.size
     variables: list[tuple[str, str, Array, Flags]] = [("input", "mm", history.input_mm, np.ones(n, dtype=bool))]
     if history.time_s is not None:
@@ -114,7 +114,7 @@ def _words(place: Place, axis: Axis, everywhere: bool, runs: str) -> str:
 
 
 def _standard_deviations(noises: Mapping[str, Noise]) -> dict[str, float]:
-    """By channel, of one sample of a mean over many: correlated noise averages out less well."""
+    """Standard deviation per channel of one sample in a mean over many; correlated noise averages out less."""
     out = {}
     for channel, noise in noises.items():
         stretch = (1.0 + noise.correlation) / (1.0 - noise.correlation)
@@ -131,10 +131,10 @@ def where(
     aside: Flags,
     rng: np.random.Generator,
 ) -> tuple[Place, ...]:
-    """Find the regions over input (both ways, opening, closing), time and speed whose residual cannot be noise.
+    """Find the regions over input (both directions, opening, closing), time and speed whose residual cannot be noise.
 
-    A disagreement shows in several channels and over several variables. It is told where it is sharpest, then taken
-    out of all channels, and what is left is looked at again.
+    A disagreement is visible in several channels and over several variables. It is reported where it is most
+    significant, then subtracted from all channels, and the rest is searched again.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""The answer in sentences: what the model lacks, what remains, which rows were set aside."""
+"""The result in sentences: what the model lacks, what remains, which rows were excluded."""
 
 import numpy as np
 
@@ -17,7 +17,7 @@ FEW_ROWS = 60
 
 
 def phrase(effect: NamedEffect) -> str:
-    """Name an effect with its parameters, by their display names, and their expanded uncertainties (k = 2)."""
+    """Name an effect with its parameters, by display names, and their expanded uncertainties (k = 2)."""
     parts = []
     for key, e in effect.parameters.items():
         unit = f" {e.unit}" if e.unit else ""
@@ -34,7 +34,7 @@ def answer(
     alternatives: tuple[tuple[str, ...], ...],
     d: Disagreement,
 ) -> str:
-    """Say the whole answer in one or two sentences."""
+    """The whole result in one or two sentences."""
     fall = f"the disagreement falls from {d.before_rms_mm:.3g} to {d.after_rms_mm:.3g} mm RMS"
     fall += f" at a random noise of {d.noise_rms_mm:.2g} mm"
     what = " and ".join(phrase(effect) for effect in effects)
@@ -53,7 +53,7 @@ def answer(
 
 
 def remaining(stands: Standing, left_over: str | None, scatter_mm: tuple[float, ...]) -> str:
-    """Say what is left after the answer."""
+    """Sentence about the residual that remains."""
     if stands.is_noise:
         words = f"The remaining difference is {stands.after_mm:.3g} mm RMS: random noise only"
     else:
@@ -69,7 +69,7 @@ def remaining(stands: Standing, left_over: str | None, scatter_mm: tuple[float, 
 
 
 def outliers(data: Observations, problem: Problem, after: Array) -> tuple[str, ...]:
-    """Say how many rows were set aside, and in a short table which rows lie off."""
+    """Sentence with the number of excluded rows, and in a short table which rows are off."""
     n = data.chain.history.input_mm.size
     aside = np.flatnonzero(problem.whitener.aside[:n])
     out = [f"{aside.size} of {n} samples were set aside as outliers."] if aside.size else []
@@ -85,7 +85,7 @@ def outliers(data: Observations, problem: Problem, after: Array) -> tuple[str, .
 
 
 def rows_beyond_model(data: Observations, best: Explanation) -> tuple[str, ...]:
-    """Say for how many rows the model was extended beyond its inputs."""
+    """Sentence with the number of rows at which the model was extrapolated."""
     low, high = data.model.input_range_mm
     moved = data.chain.driven_mm(best.values)
     rows = int(np.sum((moved < low) | (moved > high)))
@@ -93,7 +93,7 @@ def rows_beyond_model(data: Observations, best: Explanation) -> tuple[str, ...]:
 
 
 def input_dominates(data: Observations, problem: Problem) -> tuple[str, ...]:
-    """Say so where the recorded input's own error is the larger part of the noise."""
+    """Sentence where the recorded input's error is the larger part of the noise."""
     error = float(np.median(data.recorded.error_mm))
     if error > problem.whitener.noises[0].total_mm:
         return (f"the recorded input's own error ({error:.2g} mm of gap) is larger than the measurement's.",)

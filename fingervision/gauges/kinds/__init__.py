@@ -1,4 +1,4 @@
-"""Kinds of gauges, one a file: `KEYS`, `QUANTITIES` and `read(section)`, which gives what `Kind` asks for."""
+"""Kinds of gauges, one per file: `KEYS`, `QUANTITIES` and `read(section)`, which returns a `Spec`."""
 
 import importlib
 import pkgutil
@@ -11,7 +11,7 @@ from fingervision.storage.toml_section import Section
 
 
 class Follower(Protocol):
-    """Measures one gauge in the frames of one recording, in order; it remembers where the thing was."""
+    """Measures one gauge in the frames of one recording, in order; it stores the last position of the object."""
 
     def measured(self, picture: Picture) -> Reading:
         """Measure the next frame."""
@@ -19,11 +19,11 @@ class Follower(Protocol):
 
 
 class Spec(Protocol):
-    """What a gauge's keys say; frozen."""
+    """The settings of one gauge, from its keys; frozen."""
 
     @property
     def middle_px(self) -> tuple[float, float]:
-        """Where it is in the first frame."""
+        """Centre of the gauge in the first frame (pixels)."""
         ...
 
     def follower(self) -> Follower:
@@ -32,13 +32,13 @@ class Spec(Protocol):
 
 
 class Kind(Protocol):
-    """A module of this package."""
+    """Protocol of a module that defines a kind of gauge."""
 
     KEYS: tuple[str, ...]
     QUANTITIES: tuple[tuple[str, str], ...]
 
     def read(self, section: Section) -> Spec:
-        """Read the keys of one gauge; a sentence says what cannot be meant."""
+        """Read the keys of one gauge; an error states which value is not allowed."""
         ...
 
 
@@ -55,7 +55,10 @@ def kind_named(name: str) -> Kind:
 
 
 def measured_together(followers: Sequence[Follower], picture: Picture) -> list[Reading]:
-    """Measure several gauges in one frame; a kind whose followers have `measured_with` is asked once for all."""
+    """Measure several gauges in one frame.
+
+    A kind whose followers have `measured_with` measures all of its gauges in one call.
+    """
     readings: dict[int, Reading] = {}
     for number, follower in enumerate(followers):
         if number in readings:

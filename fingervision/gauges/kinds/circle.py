@@ -8,7 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fingervision.gauges import common_keys
-from fingervision.gauges.edge_follower import (
+from fingervision.gauges.picture import Picture
+from fingervision.gauges.quantities import Distance, Position
+from fingervision.gauges.reading import Mark, Reading
+from fingervision.gauges.status import GaugeStatus
+from fingervision.gauges.straight_edge import (
     CONTRAST_FLOOR,
     GUARD,
     LARGEST_BLUR_PX,
@@ -19,15 +23,11 @@ from fingervision.gauges.edge_follower import (
     MOST_OF_KNOWN,
     MOST_TIMES,
 )
-from fingervision.gauges.picture import Picture
-from fingervision.gauges.quantities import Distance, Position
-from fingervision.gauges.reading import Mark, Reading
-from fingervision.gauges.status import GaugeStatus
 from fingervision.storage.toml_section import Section
 from fingervision.vision.circle_fit import Circle, NoCircleFitError, fit_circle
 from fingervision.vision.response_shift import edge_shift_px
 from fingervision.vision.straight_edge_fit import reach_px
-from fingervision.vision.template_search import BEYOND_PX, best_match
+from fingervision.vision.template_search import BEYOND_PX, Template
 
 KEYS = ("x_px", "y_px", "diameter_px", "reach_px", "polarity")
 QUANTITIES = (("x", "length"), ("y", "length"), ("diameter", "length"))
@@ -46,7 +46,7 @@ MOST_UNROUND = 0.05
 
 @dataclass(frozen=True, slots=True)
 class CircleSpec:
-    """Keys of a circle: its centre and diameter in the first frame, how far it may move, and its tone."""
+    """Settings of a circle gauge: centre and diameter in the first frame, how far it may move, and its tone."""
 
     middle_px: tuple[float, float]
     diameter_px: float
@@ -59,7 +59,7 @@ class CircleSpec:
 
 
 def read(section: Section) -> CircleSpec:
-    """Read one gauge's keys."""
+    """Read the keys of one gauge."""
     return CircleSpec(
         common_keys.middle(section),
         section.number("diameter_px", low=SMALLEST_PX, high=LARGEST_PX),
@@ -69,7 +69,7 @@ def read(section: Section) -> CircleSpec:
 
 
 class FollowedCircle:
-    """One disc in the frames of one recording."""
+    """Measures one disc or hole in the frames of one recording."""
 
     def __init__(self, spec: CircleSpec) -> None:
         self._spec = spec
@@ -153,7 +153,7 @@ class FollowedCircle:
         return None
 
     def _start(self, picture: Picture) -> tuple[float, float, float, float] | tuple[GaugeStatus, str]:
-        """Coarse centre and radius, and how far off they may be."""
+        """Rough centre and radius in the next frame, and their uncertainty."""
         x, y, radius = self._at
         tried = TRIED if self._known is None else (1.0,)
         by = max(1, int(radius / SEARCH_RADIUS_PX))
@@ -176,7 +176,7 @@ class FollowedCircle:
             places = half - template.shape[0] // 2 - ceil(reach / by)
             beyond = max(min(places, half - template.shape[0] // 2 - 1), 1)
             for tone in (1, -1) if sign == 0 else (sign,):
-                match = best_match(small, tone * template, beyond)
+                match = Template(tone * template).best_match(small, beyond)
                 if best is None or match.correlation > best[0].correlation:
                     best = (match, share)
         assert best is not None  # noqa: S101 - there are diameters to try
@@ -191,7 +191,7 @@ class FollowedCircle:
 
 
 def _disc(radius: float) -> NDArray[np.float32]:
-    """A soft disc with its surroundings."""
+    """Template of a disc with soft edge and its surroundings."""
     half = ceil(radius * (1.0 + SURROUNDINGS)) + 1
     y, x = np.mgrid[-half : half + 1, -half : half + 1]
     disc = np.clip(radius + 0.5 - np.hypot(x, y), 0.0, 1.0).astype(np.float32)
@@ -199,7 +199,7 @@ def _disc(radius: float) -> NDArray[np.float32]:
 
 
 def _displaced_px(picture: Picture, found: Circle) -> float:
-    """What the codec may have done to the centre and radius, where two sides of the outline err each by itself."""
+    """Uncertainty of centre and radius from the codec, where each of two sides of the outline has its own error."""
     half = found.radius_px + reach_px(found.blur_px)
     # The fit's levels are not kept; an outline of this contrast in the middle of the scale stands for it.
     inside = 0.5 * (picture.top - found.contrast)
@@ -207,7 +207,7 @@ def _displaced_px(picture: Picture, found: Circle) -> float:
 
 
 def _u_response(picture: Picture, found: Circle) -> float:
-    """What an unknown camera response leaves open of the outline."""
+    """Uncertainty of the outline from the unknown camera response."""
     other = picture.settings.other_response
     if other is None:
         return 0.0

@@ -1,4 +1,4 @@
-"""The gap between two fingers in a region, as `measure` measures it in the whole picture."""
+"""The gap between two fingers in a region, measured as `measure` does in the whole picture."""
 
 from dataclasses import dataclass, replace
 from math import ceil
@@ -21,7 +21,7 @@ SMALLEST_PX = 16.0
 
 @dataclass(frozen=True, slots=True)
 class GapSpec:
-    """Keys of a gap: the middle of its region, and the region's size."""
+    """Settings of a gap gauge: centre and size of its region."""
 
     middle_px: tuple[float, float]
     width_px: float
@@ -33,13 +33,13 @@ class GapSpec:
 
 
 def read(section: Section) -> GapSpec:
-    """Read one gauge's keys."""
+    """Read the keys of one gauge."""
     width, height = (section.number(key, low=SMALLEST_PX, high=common_keys.LONGEST_PX) for key in KEYS[2:])
     return GapSpec(common_keys.middle(section), width, height)
 
 
 class FollowedGap:
-    """One gap in the frames of one recording; the region moves with the middle between the fingers."""
+    """Measures one gap in the frames of one recording; the region follows the midline of the fingers."""
 
     def __init__(self, spec: GapSpec) -> None:
         self._spec = spec
@@ -69,7 +69,7 @@ class FollowedGap:
         return Reading(GaugeStatus.OK, (quantity,), (Mark((first, second)),), zone)
 
     def _region(self, picture: Picture) -> Region | None:
-        """The region where it is now, as far as it lies in the picture."""
+        """The present region, cut to the picture."""
         spec, (width, height) = self._spec, picture.size_px
         left = round(spec.middle_px[0] - 0.5 * (spec.width_px - 1.0)) + self._moved[0]
         top = round(spec.middle_px[1] - 0.5 * (spec.height_px - 1.0)) + self._moved[1]

@@ -1,4 +1,4 @@
-"""Where a printed mark is: a dot, a cross, or a corner of a chessboard."""
+"""Position of a printed mark: a dot, a cross, or a corner of a chessboard."""
 
 from dataclasses import dataclass
 from math import ceil, hypot, sqrt
@@ -7,15 +7,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fingervision.gauges import common_keys
-from fingervision.gauges.edge_follower import CONTRAST_FLOOR, GUARD, MOST_TIMES
 from fingervision.gauges.picture import Picture
 from fingervision.gauges.quantities import Position
 from fingervision.gauges.reading import Mark, Reading
 from fingervision.gauges.status import GaugeStatus
+from fingervision.gauges.straight_edge import CONTRAST_FLOOR, GUARD, MOST_TIMES
 from fingervision.storage.toml_section import Section
 from fingervision.vision.symmetry_fit import BEYOND_PX as WINDOW_BEYOND_PX
 from fingervision.vision.symmetry_fit import NoSymmetryError, Symmetric, fit_symmetry
-from fingervision.vision.template_search import BEYOND_PX, best_match
+from fingervision.vision.template_search import BEYOND_PX, Template
 
 KEYS = ("x_px", "y_px", "size_px", "shape", "reach_px")
 QUANTITIES = (("x", "length"), ("y", "length"))
@@ -36,7 +36,7 @@ LEAST_SURE_PX = 0.5
 
 @dataclass(frozen=True, slots=True)
 class MarkerSpec:
-    """Keys of a mark: its middle in the first frame, a window that holds it, its shape, how far it may move."""
+    """Settings of a marker gauge: centre in the first frame, window size, shape, and how far the mark may move."""
 
     middle_px: tuple[float, float]
     size_px: float
@@ -49,7 +49,7 @@ class MarkerSpec:
 
 
 def read(section: Section) -> MarkerSpec:
-    """Read one gauge's keys."""
+    """Read the keys of one gauge."""
     return MarkerSpec(
         common_keys.middle(section),
         section.number("size_px", low=SMALLEST_PX, high=LARGEST_PX),
@@ -59,13 +59,13 @@ def read(section: Section) -> MarkerSpec:
 
 
 class FollowedMarker:
-    """One mark in the frames of one recording."""
+    """Measures one mark in the frames of one recording."""
 
     def __init__(self, spec: MarkerSpec) -> None:
         self._spec = spec
         self._half = max(int(spec.size_px) // 2, 3)
         self._at = spec.middle_px
-        self._template: NDArray[np.float32] | None = None
+        self._template: Template | None = None
         self._times = 1.0
 
     def _zone(self) -> Mark:
@@ -114,7 +114,7 @@ class FollowedMarker:
         return place, found.covariance
 
     def _near(self, picture: Picture) -> list[tuple[float, float]] | tuple[GaugeStatus, str]:
-        """First guesses of the middle."""
+        """Initial estimates of the centre."""
         x, y = self._at
         if self._template is None:
             step = max(NEAR * self._spec.size_px * 0.7, 1.0)
@@ -126,7 +126,7 @@ class FollowedMarker:
         least = 2 * (self._half + BEYOND_PX) + 3
         if min(levels.shape) < least:
             return GaugeStatus.OUT_OF_VIEW, ""
-        match = best_match(levels.astype(np.float32), self._template)
+        match = self._template.best_match(levels.astype(np.float32))
         is_cut = levels.shape != (2 * half + 1, 2 * half + 1)
         if match.correlation < LEAST_CORRELATION:
             return (GaugeStatus.OUT_OF_VIEW if is_cut else GaugeStatus.NOT_FOUND), ""
@@ -171,16 +171,16 @@ class FollowedMarker:
         return found.quarter_turn < -LEAST_QUARTER
 
     def _taken(self, picture: Picture, place: tuple[float, float]) -> tuple[GaugeStatus, str] | None:
-        """Keep what it looks like, unless another like it is within reach."""
+        """Store a template of the mark, unless a similar mark is within reach."""
         half = self._half + ceil(GUARD * self._spec.reach_px) + BEYOND_PX
         x, y = round(place[0]), round(place[1])
         own, _ = picture.part(x - self._half, y - self._half, 2 * self._half + 1, 2 * self._half + 1)
         if own.shape != (2 * self._half + 1, 2 * self._half + 1):
             return GaugeStatus.OUT_OF_VIEW, ""
         levels, _ = picture.part(x - half, y - half, 2 * half + 1, 2 * half + 1)
-        template = own.astype(np.float32)
+        template = Template(own.astype(np.float32))
         if min(levels.shape) >= 2 * (self._half + BEYOND_PX) + 3:
-            match = best_match(levels.astype(np.float32), template)
+            match = template.best_match(levels.astype(np.float32))
             if not match.is_alone:
                 return GaugeStatus.AMBIGUOUS, "another mark like it lies within 1.5 reach_px"
         self._template = template

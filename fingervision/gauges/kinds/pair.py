@@ -1,14 +1,16 @@
-"""How far two parallel edges are apart along a direction: the width of a bar, slot or link."""
+"""Distance of two parallel edges along a direction: the width of a bar, slot or link."""
 
 from dataclasses import dataclass
 from math import hypot, sqrt
 
 from fingervision.gauges import common_keys
-from fingervision.gauges.edge_follower import Axes, EdgeFollower, EdgeFound, NotFound, fit_near
+from fingervision.gauges.edge_fit import fit_near
+from fingervision.gauges.edge_follower import EdgeFollower
 from fingervision.gauges.picture import Picture
 from fingervision.gauges.quantities import Distance
 from fingervision.gauges.reading import Mark, Reading
 from fingervision.gauges.status import GaugeStatus
+from fingervision.gauges.straight_edge import Axes, EdgeFound, NotFound
 from fingervision.storage.toml_section import Section
 from fingervision.vision.edge_search import StepCandidate
 from fingervision.vision.straight_edge_fit import reach_px
@@ -26,7 +28,7 @@ SAME_PX = 1.5
 
 @dataclass(frozen=True, slots=True)
 class PairSpec:
-    """Keys of a pair: the middle between its edges, the direction across them, how far they are apart at first."""
+    """Settings of a pair gauge: centre between the edges, direction across them, and their initial distance."""
 
     middle_px: tuple[float, float]
     direction_rad: float
@@ -41,7 +43,7 @@ class PairSpec:
 
 
 def read(section: Section) -> PairSpec:
-    """Read one gauge's keys."""
+    """Read the keys of one gauge."""
     return PairSpec(
         common_keys.middle(section),
         common_keys.angle(section, "direction_deg"),
@@ -53,7 +55,7 @@ def read(section: Section) -> PairSpec:
 
 
 class FollowedPair:
-    """Two edges in the frames of one recording; those that are near each other are fitted together."""
+    """Measures two edges in the frames of one recording; edges near each other are fitted together."""
 
     def __init__(self, spec: PairSpec) -> None:
         axes = Axes(*spec.middle_px, spec.direction_rad)

@@ -1,4 +1,4 @@
-"""How far a textured piece of surface has moved and turned since the first frame."""
+"""Displacement and rotation of a textured piece of surface since the first frame."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -21,7 +21,7 @@ from fingervision.vision.patch_registration import (
     reference_covariance,
     register,
 )
-from fingervision.vision.template_search import BEYOND_PX, best_match, chance_correlation, high_pass_noise
+from fingervision.vision.template_search import BEYOND_PX, Template, chance_correlation, high_pass_noise
 
 KEYS = ("x_px", "y_px", "width_px", "height_px", "reach_px")
 QUANTITIES = (("shift_x", "length"), ("shift_y", "length"), ("rotation", "angle"))
@@ -49,7 +49,7 @@ Floats = NDArray[np.float32]
 
 @dataclass(frozen=True, slots=True)
 class PatchSpec:
-    """Keys of a patch: its middle and size in the first frame, and how far it may move."""
+    """Settings of a patch gauge: centre and size in the first frame, and how far the patch may move."""
 
     middle_px: tuple[float, float]
     width_px: float
@@ -62,20 +62,20 @@ class PatchSpec:
 
 
 def read(section: Section) -> PatchSpec:
-    """Read one gauge's keys."""
+    """Read the keys of one gauge."""
     width, height = (section.number(key, low=SMALLEST_PX, high=LARGEST_PX) for key in ("width_px", "height_px"))
     return PatchSpec(common_keys.middle(section), width, height, common_keys.reach(section))
 
 
 class FollowedPatch:
-    """One patch in the frames of one recording."""
+    """Measures one patch in the frames of one recording."""
 
     def __init__(self, spec: PatchSpec) -> None:
         self._spec = spec
         self.half = (max(int(spec.width_px) // 2, 4), max(int(spec.height_px) // 2, 4))
         self.reference: PatchReference | None = None
         self._around: Floats | None = None
-        self._template: Floats | None = None
+        self._template: Template | None = None
         self._template_turn = 0.0
         self._least_correlation, self._aliased_px = LEAST_CORRELATION, 0.0
         self._refused: Reading | None = None
@@ -124,7 +124,7 @@ class FollowedPatch:
         return Mark(tuple((x + cos(turn) * u - sin(turn) * v, y + sin(turn) * u + cos(turn) * v) for u, v in corners))
 
     def _never(self, status: GaugeStatus, words: str) -> Reading:
-        """The first frame shows nothing to register against: there will be no number in this recording."""
+        """Record that the first frame has no texture to register against: no frame of this recording gives a number."""
         self._refused = Reading(status, zone=self._zone(), words=words)
         return self._refused
 
@@ -133,7 +133,7 @@ class FollowedPatch:
         return Reading(status, zone=self._zone(), words=words)
 
     def begun(self, picture: Picture) -> Reading:
-        """Take the reference from the first frame that could be read; a later one would be another zero."""
+        """Take the reference from the first readable frame; a later one would change the zero."""
         if self._refused is not None:
             return self._refused
         (a, b), (x, y) = self.half, self._spec.middle_px
@@ -152,18 +152,19 @@ class FollowedPatch:
         chance = chance_correlation(reference.template)
         if chance > MOST_BY_CHANCE:
             return self._never(GaugeStatus.LOW_CONTRAST, "its texture is too coarse for its size: enlarge it")
-        if not best_match(part[MARGIN_PX:-MARGIN_PX, MARGIN_PX:-MARGIN_PX], reference.template).is_alone:
+        template = Template(reference.template)
+        if not template.best_match(part[MARGIN_PX:-MARGIN_PX, MARGIN_PX:-MARGIN_PX]).is_alone:
             return self._never(GaugeStatus.AMBIGUOUS, "its pattern repeats within 1.5 reach_px: lower reach_px")
         self._least_correlation = max(LEAST_CORRELATION, chance)
         self._aliased_px = ALIASED_PX * min(max((reference.fine - FROM_FINE) / (TO_FINE - FROM_FINE), 0.0), 1.0)
         self.reference = reference
-        self._around, self._template = part, reference.template
+        self._around, self._template = part, template
         self._at = (float(column), float(row), 0.0)
         zero = (Shift((x, y), (x, y), 0.0, 0.0), Shift((x, y), (x, y), 0.5 * np.pi, 0.0), Angle((x, y), 0.0, 0.0, True))
         return Reading(GaugeStatus.OK, zero, (Mark(((x, y),)),), self._zone())
 
     def sought(self, picture: Picture) -> tuple[Floats, tuple[int, int], NDArray[np.float64]] | Reading:
-        """Find the patch coarsely; the part of the picture to register it in, and the first guess."""
+        """Locate the patch roughly: the part of the picture in which to register it, and the initial estimate."""
         a, b = self.half
         x, y, turn = self._at
         reach = ceil(GUARD * self._spec.reach_px * self._times) + BEYOND_PX
@@ -173,7 +174,7 @@ class FollowedPatch:
         )
         if levels.shape[0] < 2 * (b + BEYOND_PX) + 3 or levels.shape[1] < 2 * (a + BEYOND_PX) + 3:
             return self._failed(GaugeStatus.OUT_OF_VIEW)
-        match = best_match(levels.astype(np.float32), self._turned(turn))
+        match = self._turned(turn).best_match(levels.astype(np.float32))
         away = hypot(left + match.x_px - x, top + match.y_px - y)
         is_cut = levels.shape != (2 * (b + reach) + 1, 2 * (a + reach) + 1)
         if match.correlation < 0.8 * self._least_correlation or away > self._spec.reach_px * self._times + 1.0:
@@ -187,8 +188,8 @@ class FollowedPatch:
         part = _padded(picture, *corner, 2 * (a + more) + 1, 2 * (b + more) + 1)
         return part, corner, np.array([left + match.x_px, top + match.y_px, turn])
 
-    def _turned(self, turn: float) -> Floats:
-        """The template, turned as the patch was in the last frame."""
+    def _turned(self, turn: float) -> Template:
+        """The template, rotated as the patch was in the previous frame."""
         assert self._template is not None  # noqa: S101 - there is a reference
         assert self._around is not None  # noqa: S101 - likewise
         if abs(turn - self._template_turn) > TURN_AT:
@@ -200,14 +201,14 @@ class FollowedPatch:
                 borderMode=cv2.BORDER_REFLECT_101,
             )  # fmt: skip
             row, column = int(middle[1]), int(middle[0])
-            self._template = np.ascontiguousarray(turned[row - b : row + b + 1, column - a : column + a + 1])
+            self._template = Template(np.ascontiguousarray(turned[row - b : row + b + 1, column - a : column + a + 1]))
             self._template_turn = turn
         return self._template
 
     def taken(
         self, place: tuple[float, float, float], covariance: NDArray[np.float64], correlation: float, settled: bool
     ) -> Reading:
-        """Judge what the registration found, and remember it."""
+        """Accept or reject the registration's result, and store it."""
         x, y, turn = place
         if not settled or correlation < self._least_correlation:
             return self._failed(GaugeStatus.NOT_FOUND)
@@ -231,7 +232,10 @@ class FollowedPatch:
 
 
 def _padded(picture: Picture, x: int, y: int, width: int, height: int) -> Floats:
-    """Light of a rectangle; beyond the picture's border it is reflected, which only interpolation's tails feel."""
+    """Light in a rectangle.
+
+    Beyond the picture's border it is reflected, which affects only the tails of the interpolation.
+    """
     levels, (left, top) = picture.part(x, y, width, height)
     part = levels.astype(np.float32)
     if part.shape == (height, width):

@@ -1,1 +1,4 @@
-"""One limit of a set-up a file; each has `find(sample) -> Finding`. Adding one adds a file (`inspection.catalogue`)."""
+"""Findings, one limit of a set-up per file; each file has `find(sample) -> Finding`.
+
+A new finding is one new file (`inspection.catalogue` collects them).
+"""

@@ -4,7 +4,8 @@ import numpy as np
 
 from fingervision.inspection.blocks import BLOCK_PX, BLOCKY, HEAVY
 from fingervision.inspection.finding import Finding, weighed, without
-from fingervision.inspection.sample import CAMERA_NOISE, Look, Sample
+from fingervision.inspection.look import CAMERA_NOISE, Look
+from fingervision.inspection.sample import Sample
 
 REMEDY = "Record losslessly (raw or FFV1; PNG or TIFF for pictures), or at several times the bit rate."
 FORMULA = (
@@ -14,7 +15,7 @@ FORMULA = (
 
 
 def find(sample: Sample) -> Finding | None:
-    """Look for a codec's blocks, and compare the stated uncertainty to that of the camera alone."""
+    """Look for a codec's blocks, and compare the stated uncertainty to that from the camera's noise alone."""
     if not sample.looks:
         return None
     blocks = sample.blockiness
@@ -30,6 +31,6 @@ def find(sample: Sample) -> Finding | None:
 
 
 def _cost_px(look: Look, top: int) -> float:
-    """The fit's own residual is the codec's error; its share above the camera's noise goes away."""
+    """Cost of the codec: its share, above the camera's noise, of the residuals of the edge fits (pixels)."""
     camera = min(look.edges.noise, max(look.edges.noise_flat, CAMERA_NOISE * top / 255.0))
     return without(look.outcome.u_gap_px, look.u_camera_px * camera / max(look.edges.noise, 1e-9))

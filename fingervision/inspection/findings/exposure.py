@@ -1,4 +1,4 @@
-"""Exposure: levels cut off at the end of the scale, or only a small part of the scale used."""
+"""Exposure: levels clipped at the end of the scale, or only a small part of the scale used."""
 
 from math import hypot
 
@@ -20,7 +20,7 @@ OVER = "the shift that a step cut off at the end of the scale suffers, as u_shif
 
 
 def find(sample: Sample) -> Finding | None:
-    """Read the plateaus beside the edges."""
+    """Judge the exposure from the levels on both sides of the edges."""
     refused = refusing(sample, "exposure", (Status.SATURATED,), LESS) or refusing(
         sample, "exposure", (Status.LOW_CONTRAST,), MORE
     )

@@ -1,11 +1,12 @@
-"""Motion: fingers that move while the shutter is open."""
+"""Motion: fingers that move during the exposure."""
 
 import numpy as np
 
 from fingervision.domain.status import Status
 from fingervision.inspection.finding import MOSTLY_REFUSED, Finding, refusing, weighed, without
+from fingervision.inspection.look import Look
 from fingervision.inspection.noise_bound import GOOD_BLUR_PX
-from fingervision.inspection.sample import Look, Sample
+from fingervision.inspection.sample import Sample
 from fingervision.vision.profile_choice import MOTION_RADIUS_PX
 
 REMEDY = "Expose shorter (with more light, or flashes), or move slower while frames are taken."
@@ -16,7 +17,7 @@ FORMULA = (
 
 
 def find(sample: Sample) -> Finding | None:
-    """Compare the flanks' spread to the tips': motion across the fingers spreads flanks alone."""
+    """Compare the blur of the flanks to that of the tips: motion across the fingers blurs only the flanks."""
     refused = refusing(sample, "motion", (Status.BLURRED,), REMEDY) if sample.is_smeared else None
     if not sample.looks or (refused is not None and refused.share_refused > MOSTLY_REFUSED):
         return refused

@@ -1,4 +1,4 @@
-"""Surroundings of the edges: a side wall in view, a soft shadow, glare, a bright rim."""
+"""Structures beside the edges: a side wall in view, a soft shadow, glare, a bright rim."""
 
 from fingervision.inspection.blocks import HEAVY
 from fingervision.inspection.finding import Finding, weighed
@@ -14,7 +14,7 @@ FORMULA = "u_shift_px: how far what stands beside the edges may have moved them 
 
 
 def find(sample: Sample) -> Finding | None:
-    """Take what the measuring itself states of the edges' surroundings."""
+    """Report what the measurement found beside the edges."""
     if not sample.looks:
         return None
     cost_px = sample.u_shift_px if sample.shows_surroundings and sample.blockiness < HEAVY else 0.0

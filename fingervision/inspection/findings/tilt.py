@@ -1,4 +1,4 @@
-"""Tilt: a camera that is turned against the fingers, in its own plane or out of it."""
+"""Tilt: a camera turned against the fingers, about its optical axis or out of the plane."""
 
 from math import atan, cos, degrees, hypot, radians, sqrt
 from typing import NamedTuple
@@ -8,7 +8,8 @@ import numpy as np
 from calib.limits import Limits, rectangular
 from calib.measured_scale import Calibration
 from fingervision.inspection.finding import Finding, weighed, without
-from fingervision.inspection.sample import Look, Sample
+from fingervision.inspection.look import Look
+from fingervision.inspection.sample import Sample
 from fingervision.vision.profile_lines import INNER, ROWS
 
 TURN = "Turn the camera about its own axis until the fingers stand straight in the picture."
@@ -33,7 +34,7 @@ ALIKE = 3.0
 
 
 def find(sample: Sample) -> Finding | None:
-    """Ask the inner edges for the turn, and the fingers' breadths for the tilt."""
+    """Estimate the turn from the inner edges, and the tilt from the fingers' widths."""
     if not sample.looks:
         return None
     turns = [turn_deg(look) for look in sample.looks]
@@ -55,7 +56,10 @@ def find(sample: Sample) -> Finding | None:
 
 
 def turn_deg(look: Look) -> float:
-    """Mean direction of both inner flanks against the picture's axis (degrees); what fingers spread is not in it."""
+    """Mean direction of both inner flanks against the picture's axis (degrees).
+
+    A symmetric spread of the fingers cancels.
+    """
     slopes = []
     for side in range(2):
         real = np.flatnonzero(look.edges.lines.weight[side, :INNER] > 0)
@@ -67,7 +71,7 @@ def turn_deg(look: Look) -> float:
 
 
 def _slant_px(look: Look, turn: float) -> float:
-    """How much longer the gap between the two measuring points is than at right angles to the turned edges."""
+    """Distance of the two measuring points minus the gap at right angles to the turned edges (pixels)."""
     m = look.outcome
     dx, dy = m.right.x_px - m.left.x_px, m.right.y_px - m.left.y_px
     across, along = (dx, dy) if m.direction.is_vertical else (dy, dx)
@@ -78,11 +82,12 @@ def _slant_px(look: Look, turn: float) -> float:
 
 
 def corner_px(look: Look, below_px: float) -> float:
-    """How far the turn moves one measuring point along a round corner.
+    """How far the turn moves one measuring point along a round corner (pixels).
 
-    Turned, one finger's outer corner is its highest point: its inner edge is then measured higher up the fillet than
-    the other finger's. On a circle of radius R an edge of slope m lies R (1 - m / sqrt(1 + m^2)) below the top, which
-    is the measuring height for the finger with the inner corner on top, and R (1 - 1 / sqrt(1 + m^2)) inside its flank.
+    In a turned picture, one finger's outer corner is its highest point: its inner edge is then measured higher up the
+    fillet than the other finger's. On a circle of radius R an edge of slope m lies R (1 - m / sqrt(1 + m^2)) below the
+    top, which is the measuring height for the finger with the inner corner on top, and R (1 - 1 / sqrt(1 + m^2)) inside
+    its flank.
     """
     slopes = sorted(abs(m) for m in (look.outcome.left.slope, look.outcome.right.slope))
     radius_px = below_px / (1.0 - slopes[0] / hypot(1.0, slopes[0]))
@@ -90,7 +95,10 @@ def corner_px(look: Look, below_px: float) -> float:
 
 
 def tilt_deg(sample: Sample) -> float | None:
-    """Angle at which the camera looks from the side, from how much broader one finger looks; None where not told."""
+    """Angle at which the camera looks from the side, from the ratio of the fingers' widths.
+
+    None where it is unknown.
+    """
     ratios, spreads, apart = [], [], []
     for look in sample.looks:
         left, right = (_breadth(look, side) for side in range(2))
@@ -110,7 +118,7 @@ def tilt_deg(sample: Sample) -> float | None:
 
 
 class _Breadth(NamedTuple):
-    """Breadth of a finger (pixels), its standard uncertainty, and the place of its middle across the fingers."""
+    """Width of a finger (pixels), its standard uncertainty, and the position of its middle across the fingers."""
 
     px: float
     u_px: float
@@ -118,10 +126,10 @@ class _Breadth(NamedTuple):
 
 
 def _breadth(look: Look, side: int) -> _Breadth | None:
-    """Breadth of a finger where both flanks are seen.
+    """Width of a finger whose two flanks are visible.
 
-    What shifts rows of one flank together (a pattern on the ground, the fit's own phase error) is the same in every
-    frame: the scatter of one frame's rows counts, as if few of them were independent.
+    Errors common to the rows of one flank (a pattern on the background, the fit's phase error) are the same in every
+    frame. The scatter of the rows of one frame is therefore taken as if few of them were independent.
     """
     edges = look.edges
     lines, variance = [], 0.0

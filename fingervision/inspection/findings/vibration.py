@@ -1,4 +1,4 @@
-"""Vibration: a camera or stand that shakes, by registration of the ground against the first frame."""
+"""Vibration: a camera or stand that shakes, found by registration of the background against the first frame."""
 
 import numpy as np
 
@@ -21,7 +21,7 @@ SIGMAS = 3.0
 
 
 def find(sample: Sample) -> Finding | None:
-    """Ask the ground, or where it is plain both fingers together."""
+    """Estimate the vibration from the background, or where that has no texture from both fingers together."""
     if not sample.looks:
         return None
     ground = sample.ground
@@ -41,7 +41,7 @@ def find(sample: Sample) -> Finding | None:
 
 
 def _common_jitter(sample: Sample) -> tuple[float, float] | None:
-    """Jitter that both fingers share, from second differences of their middle, and the measurement's own."""
+    """Jitter common to both fingers, from second differences of their midline, and the measurement's own noise."""
     track = sample.track
     if len(track) < FEWEST:
         return None

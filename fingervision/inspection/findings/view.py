@@ -14,7 +14,7 @@ REMEDY = (
 
 
 def find(sample: Sample) -> Finding | None:
-    """Count the frames without fingers."""
+    """Count the frames in which no fingers were found."""
     refused = refusing(sample, "view", WITHOUT_FINGERS, REMEDY)
     # Where noise or blur has taken the outlines away, light and focus say so.
     is_told = sample.is_lost_in_blur or (not sample.looks and sample.is_lost_in_noise)

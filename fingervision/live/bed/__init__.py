@@ -1,1 +1,1 @@
-"""A test bed in the page: its camera is the source, and its motor obeys whoever may move it."""
+"""A test bed in the page: its camera is the source, and its motor is controlled by users with permission."""

@@ -1,4 +1,4 @@
-"""The bed's own thread: it looks frame by frame, and does what is asked of it between two frames."""
+"""Thread of the bed: it takes frame after frame, and executes requested tasks between two frames."""
 
 from collections import deque
 from collections.abc import Callable, Iterator
@@ -35,14 +35,14 @@ Say = Callable[[str, str], None]
 
 @dataclass(frozen=True, slots=True)
 class Task:
-    """Something that the bed does: its name for the page, and how."""
+    """An action of the bed: its name for the page, and its function."""
 
     name: str
     act: Callable[[], str]
 
 
 class Bench:
-    """A bed as a live source, with one thread that alone touches camera and motor.
+    """A bed as a live source, with one thread that alone uses camera and motor.
 
     Parameters
     ----------
@@ -79,7 +79,7 @@ class Bench:
 
     # ---- a live source
     def received(self) -> Iterator[Received]:
-        """Frames with the stage's place at their exposure, until the bed is closed or fails."""
+        """Yield frames with the stage's position at their exposure, until the bed is closed or fails."""
         self._thread.start()
         while True:
             try:
@@ -93,7 +93,7 @@ class Bench:
             yield following
 
     def close(self) -> None:
-        """Stop the motor first, then let go of the bed."""
+        """Stop the motor first, then close the bed."""
         if self._ending.is_set():
             return
         self.stop()
@@ -104,7 +104,7 @@ class Bench:
 
     # ---- what may be asked; from any thread
     def stop(self) -> None:
-        """Stop the motor at once, whatever it does, and forget what was asked."""
+        """Stop the motor at once, whatever it does, and discard the requested tasks."""
         self._stop_asked = True
         if self._controls is not None:
             self._controls.stop()
@@ -174,7 +174,7 @@ class Bench:
         return Looking(self._look, lambda: self.position_mm, lambda: self.force_n)
 
     def _look(self) -> None:
-        """Look once; a frame waits until the stage's place between the encoder's steps is known."""
+        """Take one frame; it waits until the stage's interpolated position is known."""
         look = self._sight.look()
         self.position_mm, self.force_n = look.encoder_mm, look.force_now_n
         item = look.shot.item()

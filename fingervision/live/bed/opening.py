@@ -1,4 +1,4 @@
-"""From a bed's name to the capture of its camera."""
+"""Open a bed by name as the capture of its camera."""
 
 from dataclasses import replace
 
@@ -11,7 +11,7 @@ from fingervision.testbed.simulation.parse_injected_effects import hidden_from
 
 
 def opened_bed(name: str, hide: tuple[str, ...], choices: Choices) -> tuple[Capture, Choices]:
-    """Open a bed; a simulated one takes the time that it would take.
+    """Open a bed; a simulated bed runs in real time.
 
     Parameters
     ----------
@@ -24,7 +24,7 @@ def opened_bed(name: str, hide: tuple[str, ...], choices: Choices) -> tuple[Capt
 
     Raises
     ------
-    FingervisionError
+    DataError, InputFileError, UsageError
         It cannot be opened, or has neither camera nor scale.
     """
     hidden = hidden_from(hide)

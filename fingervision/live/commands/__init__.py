@@ -1,4 +1,4 @@
-"""What the page may ask for, a concern a file: each request is checked, done, and answered with a sentence."""
+"""Requests of the page, one file per topic: each is checked, executed, and answered by a sentence."""
 
 import importlib
 import pkgutil
@@ -15,10 +15,10 @@ __all__ = ["Answer", "Request", "harmless", "modules", "obey", "section"]
 
 @cache
 def modules() -> tuple[ModuleType, ...]:
-    """Files of this package that have `COMMANDS`: adding one adds requests, and touches no other file.
+    """Modules of this package that have `COMMANDS`: a new file adds its requests, and no other file changes.
 
-    A file may also have `HARMLESS`, the names of its requests that change nothing and that a viewer may make, and
-    `section(view)`, which gives what it adds to the state that every page is told.
+    A module may also have `HARMLESS`, the names of its requests that change nothing and are allowed to viewers, and
+    `section(view)`, which returns its part of the state sent to every page.
     """
     names = sorted(module.name for module in pkgutil.iter_modules(__path__))
     found = (importlib.import_module(f"{__name__}.{name}") for name in names)
@@ -37,11 +37,11 @@ def harmless() -> frozenset[str]:
 
 
 def obey(view: View, request: Request) -> Answer:
-    """Do what the page asks.
+    """Execute a request of the page.
 
     Raises
     ------
-    FingervisionError
+    UsageError
         It cannot be done, or is nothing that can be asked.
     """
     name = request.get("do")
@@ -52,7 +52,7 @@ def obey(view: View, request: Request) -> Answer:
 
 
 def section(view: View) -> dict[str, Any]:
-    """What the concerns add to the state that the page is told."""
+    """State of all topics, for the page."""
     told: dict[str, Any] = {}
     for module in modules():
         if hasattr(module, "section"):

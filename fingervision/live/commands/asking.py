@@ -1,4 +1,4 @@
-"""What a request holds, checked value by value, and what it is answered with."""
+"""Checks of the values in a request, and its answer."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
@@ -17,7 +17,7 @@ MOST_LETTERS = 1000
 
 @dataclass(frozen=True, slots=True)
 class Answer:
-    """What became of a request.
+    """Result of a request.
 
     Parameters
     ----------
@@ -39,11 +39,11 @@ Command = Callable[[View, Request], Answer]
 
 
 def seen_of(view: View) -> Seen:
-    """The picture that is shown.
+    """The frame that is shown, with its measurement; refused where there is none.
 
     Raises
     ------
-    FingervisionError
+    StateError
         There is none yet.
     """
     if view.seen is None:
@@ -52,7 +52,7 @@ def seen_of(view: View) -> Seen:
 
 
 def number(request: Request, name: str) -> float:
-    """A number of a request.
+    """Read a number from a request.
 
     Raises
     ------
@@ -66,12 +66,12 @@ def number(request: Request, name: str) -> float:
 
 
 def number_or_none(request: Request, name: str) -> float | None:
-    """A number of a request, or None where it gives none."""
+    """Read a number from a request; None where it has none."""
     return None if request.get(name) is None else number(request, name)
 
 
 def whole(request: Request, name: str) -> int:
-    """A whole number of a request.
+    """Read a whole number from a request.
 
     Raises
     ------
@@ -85,7 +85,7 @@ def whole(request: Request, name: str) -> int:
 
 
 def words(request: Request, name: str) -> str:
-    """A text of a request.
+    """Read a text from a request.
 
     Raises
     ------
@@ -99,7 +99,7 @@ def words(request: Request, name: str) -> str:
 
 
 def shown(value: Any) -> str:
-    """Shorten a received value for a message; a number may have more digits than Python writes."""
+    """Shorten a received value for an error message; a number may have more digits than Python prints."""
     if value is None or value == "":
         return "empty"
     if isinstance(value, int) and not isinstance(value, bool) and abs(value) > GREATEST:
@@ -108,7 +108,7 @@ def shown(value: Any) -> str:
 
 
 def box(request: Request) -> Region:
-    """A part of the picture.
+    """Read a rectangle of the picture from a request.
 
     Raises
     ------

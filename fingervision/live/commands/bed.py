@@ -1,4 +1,4 @@
-"""The test bed: home, move, jog, run a recipe, stop; for whoever started the live view with `--allow-motion`."""
+"""Requests to the test bed: home, move, jog, run a recipe, stop; allowed where `--allow-motion` was given."""
 
 from datetime import UTC, datetime
 from pathlib import Path
@@ -66,7 +66,7 @@ def _run(view: View, request: Request) -> Answer:
 
 
 def _inside(view: View, name: str) -> Path:
-    """A file that a page may name: below the folder in which the live view was started, or below its output folder."""
+    """Path of a file that a page may name: below the start folder of the live view, or below its output folder."""
     path = Path(name).resolve()
     if not any(path.is_relative_to(folder.resolve()) for folder in (Path.cwd(), view.out)):
         raise UsageError(
@@ -76,7 +76,7 @@ def _inside(view: View, name: str) -> Path:
 
 
 def section(view: View) -> dict[str, Any]:
-    """Where the bed stands, and what it does."""
+    """State of the bed: position and present task."""
     bench = view.features.get(BED)
     if not isinstance(bench, Bench):
         return {"bed": None}

@@ -1,4 +1,4 @@
-"""Gauges of one's own on a recording or a live picture: opened, added, changed, removed, loaded, saved."""
+"""Requests about user-defined gauges: open, add, change, remove, load, save."""
 
 from collections.abc import Mapping
 from dataclasses import asdict
@@ -50,7 +50,7 @@ def _said(view: View, sentence: str = "") -> Answer:
 
 
 def _kinds(view: View, request: Request) -> Answer:
-    """What there is to draw, as the kinds themselves say."""
+    """Kinds of gauges with their keys, for the page."""
     return Answer(
         more={
             "kinds": {name: [{**asdict(field), "usual": field.usual} for field in fields_of(name)] for name in kinds()}
@@ -97,7 +97,7 @@ def _save(view: View, request: Request) -> Answer:
 
 
 def section(view: View) -> dict[str, Any]:
-    """The gauges, and what they say of the frame that is shown."""
+    """The gauges, and their readings in the frame that is shown."""
     found = view.features.get(GAUGES)
     if not isinstance(found, GaugesBeside):
         return {"gauges": {"is_open": False} if isinstance(view, Playback | Session) else None}

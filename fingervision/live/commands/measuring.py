@@ -1,4 +1,4 @@
-"""What is measured and how it is shown: region, tips, height, scale, zero, tolerance; the steps as pictures."""
+"""Requests about measurement and display: region, tips, height, scale, zero, tolerance, step pictures."""
 
 from dataclasses import replace
 from datetime import UTC, datetime
@@ -47,7 +47,7 @@ def _fingers(view: View, request: Request) -> Answer:
 
 
 def _height_at(view: View, request: Request) -> Answer:
-    """Measure at the height of a place in the picture."""
+    """Measure at the height of a point in the picture."""
     outcome, scale = seen_of(view).outcome, view.choices.scale
     if scale is None or not isinstance(outcome, GapMeasurement):
         raise StateError("The height is counted from the tips, which this frame does not show: mend the view.")
@@ -113,7 +113,7 @@ def _calibrate(view: View, request: Request) -> Answer:
 
 
 def _free_name(folder: Path, stem: str) -> Path:
-    """Take a name of its own: a calibration that lies there is somebody's, also one of this second."""
+    """Choose an unused file name, so that no existing calibration is overwritten."""
     for again in count(1):
         path = folder / (f"{stem}.json" if again == 1 else f"{stem}-{again}.json")
         try:

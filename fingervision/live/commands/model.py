@@ -1,4 +1,4 @@
-"""The model beside the measurement, and an input that somebody types."""
+"""Requests about the model for comparison, and about a typed input."""
 
 from typing import Any
 

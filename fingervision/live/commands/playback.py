@@ -1,4 +1,4 @@
-"""A recording: scrub, step, play, mark a range, measure it."""
+"""Requests about a recording: seek, step, play, mark a range, measure it."""
 
 from typing import Any
 
@@ -52,7 +52,7 @@ def _measure(view: View, request: Request) -> Answer:
 
 
 def section(view: View) -> dict[str, Any]:
-    """Where the recording stands."""
+    """State of the playback."""
     if not isinstance(view, Playback):
         return {"playback": None}
     measuring = view.features.get(RANGE)

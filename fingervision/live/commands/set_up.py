@@ -1,4 +1,4 @@
-"""The set-up: findings with their remedies, meters of focus and light, the scale's budget, settings kept in a file."""
+"""Requests about the set-up: findings with remedies, focus and light, uncertainty budget, saved settings."""
 
 from pathlib import Path
 from typing import Any
@@ -105,7 +105,7 @@ def _meters(view: View) -> dict[str, float | None]:
 
 
 def _budget(view: View) -> list[list[Any]] | None:
-    """Contributions to the gap that is shown, the largest first: source, micrometres (k = 1), what was taken."""
+    """Contributions to the uncertainty of the shown gap, the largest first: source, micrometres (k = 1), assumption."""
     seen, scale = view.seen, view.choices.scale
     if seen is None or not isinstance(scale, Calibration) or not isinstance(seen.outcome, GapMeasurement):
         return None

@@ -1,4 +1,4 @@
-"""A model beside the measurement: the feature `model` of a view."""
+"""Comparison of the live measurement with a model: the feature `model` of a view."""
 
 from collections import deque
 from collections.abc import Sequence
@@ -20,7 +20,7 @@ ROWS_BETWEEN = 25
 
 
 class Comparison:
-    """Holds rows with a known input against a model.
+    """Compares rows whose input is known with a model.
 
     Parameters
     ----------
@@ -47,11 +47,11 @@ class Comparison:
         self._total = self._moved = self._still = 0
 
     def predicted_mm(self, rows: Sequence[GapRow]) -> list[float | None]:
-        """The model's gap at rows; None where their input is not known."""
+        """The model's gap for rows (mm); None where their input is unknown."""
         return self._prediction.predicted_mm(rows)
 
     def add(self, row: GapRow, arrived_s: float = 0.0) -> None:
-        """Take in a row as it is measured."""
+        """Add a row as soon as it is measured."""
         if row.input_mm is None or row.time_s is None:
             return
         self._take(row)
@@ -59,7 +59,7 @@ class Comparison:
             self.verdicts.consider(tuple(self._rows), self._moved, at_rest=self._still >= ROWS_BETWEEN)
 
     def add_all(self, rows: Sequence[GapRow]) -> None:
-        """Take in a recording that is measured to its end."""
+        """Add the rows of a recording that is completely measured."""
         self._rows.clear()
         self._recent.clear()
         self._prediction.clear()
@@ -70,7 +70,10 @@ class Comparison:
         self.verdicts.consider(tuple(self._rows), self._moved, at_rest=True)
 
     def _take(self, row: GapRow) -> None:
-        """Keep a row; of a long rest one in so many, since it would outweigh the motion and say nothing new."""
+        """Keep a row.
+
+        Of a long stop only some rows, which would otherwise outweigh the motion without adding information.
+        """
         stands = bool(self._recent) and self._recent[-1].input_mm == row.input_mm
         self._still = self._still + 1 if stands else 0
         self._recent.append(row)
@@ -80,11 +83,11 @@ class Comparison:
             self._rows.append(row)
 
     def stop(self) -> None:
-        """Seek no more verdicts."""
+        """Stop requesting verdicts."""
         self.verdicts.stop()
 
     def state(self) -> dict[str, Any]:
-        """What the page is told."""
+        """State of the comparison, for the page."""
         rows = list(self._recent)
         pairs = [
             (row.gap_mm - gap_mm, row.u_random_mm if row.u_gap_mm is None else row.u_gap_mm)

@@ -1,4 +1,4 @@
-"""The gap that a model predicts for each row whose input is known, in the order in which they come."""
+"""The gap that a model predicts for each row with a known input, in order of arrival."""
 
 from collections import OrderedDict, deque
 from collections.abc import Sequence
@@ -18,7 +18,7 @@ PREDICTIONS_KEPT = 20_000
 
 
 class Prediction:
-    """Predicts, each row once.
+    """Predicts the gap of each row once.
 
     Parameters
     ----------
@@ -38,13 +38,13 @@ class Prediction:
         self._lock = Lock()
 
     def clear(self) -> None:
-        """Forget everything: rows are counted anew."""
+        """Discard all predictions, because the rows are counted from the beginning."""
         with self._lock:
             self._known.clear()
             self._path.clear()
 
     def predicted_mm(self, rows: Sequence[GapRow]) -> list[float | None]:
-        """Gap of each row; None where its input is not known, or lies beyond the model's.
+        """Predicted gap of each row (mm); None where its input is unknown, or outside the model's range.
 
         Parameters
         ----------

@@ -1,4 +1,4 @@
-"""A first verdict of `diagnose` while measuring goes on: the command, in a process of its own."""
+"""A first verdict by the command `diagnose`, in a process of its own while the measurement continues."""
 
 import csv
 import json
@@ -52,7 +52,7 @@ class Verdict:
 
 
 class VerdictSeeker:
-    """Asks for verdicts as rows come in.
+    """Requests verdicts as rows arrive.
 
     Parameters
     ----------
@@ -81,11 +81,11 @@ class VerdictSeeker:
 
     @property
     def is_busy(self) -> bool:
-        """Whether a verdict is being sought."""
+        """Whether a verdict is being computed."""
         return self._thread is not None and self._thread.is_alive()
 
     def consider(self, rows: Sequence[GapRow], moved: int, *, at_rest: bool) -> None:
-        """Seek a verdict if there is enough to judge by, and more than the last time.
+        """Request a verdict if there are enough rows, and more than the last time.
 
         Parameters
         ----------
@@ -137,7 +137,7 @@ class VerdictSeeker:
 
 
 def turns(rows: Sequence[GapRow], least_mm: float) -> int:
-    """How often the input turned, after ways of at least `least_mm`."""
+    """Number of reversals of the input, between motions of at least `least_mm`."""
     count, way, extreme = 0, 0, None
     for row in rows:
         at = row.input_mm
@@ -171,7 +171,7 @@ def _cell(value: float | str | None) -> str:
 
 
 def read_verdict(folder: Path, rows: int) -> Verdict:
-    """Read what `diagnose` left in its folder."""
+    """Read the result of `diagnose` from its folder."""
     report: dict[str, Any] = json.loads((folder / "report.json").read_text(encoding="utf-8"))
     proposal = report.get("next_run") or {}
     return Verdict(

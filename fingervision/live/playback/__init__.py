@@ -1,1 +1,1 @@
-"""A recording looked through in the page: scrubbed, stepped, played, and measured by the command `measure`."""
+"""Playback of a recording in the page: seek, step, play, and measurement by the command `measure`."""

@@ -1,4 +1,4 @@
-"""One frame of a recording by its number, as fast as the recording allows, and never another one."""
+"""Read one frame of a recording by its number, as fast as the recording allows, and never a wrong one."""
 
 from collections import OrderedDict
 from collections.abc import Callable, Iterator
@@ -17,8 +17,8 @@ Item = Frame | LostFrame
 class FrameReader:
     """Reads frames in any order.
 
-    A frame is found by its time where the recording's table tells it and the source can be sought in; a frame that is
-    not found so is read from the beginning on, by counting, as `measure` does.
+    A frame is accessed by its time if the recording's table states it and the source allows random access; otherwise
+    the recording is read from its beginning and counted, as `measure` does.
 
     Parameters
     ----------
@@ -36,7 +36,7 @@ class FrameReader:
         self._seeking: Seeking | None = seeking(name)
 
     def at(self, index: int, time_s: float | None) -> Item | None:
-        """Frame of a number.
+        """Frame with a given number.
 
         Parameters
         ----------

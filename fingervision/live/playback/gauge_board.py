@@ -1,4 +1,4 @@
-"""The gauges that a page works on: added, changed and removed one by one, read from their file and saved to it."""
+"""The gauges edited by a page: added, changed and removed one by one, read from their file and saved to it."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -17,7 +17,7 @@ PLACE = ("x_px", "y_px")
 
 
 class FieldError(FingervisionError):
-    """A value that cannot be meant, with the key that it stands in.
+    """A value of a gauge is not allowed; the error carries its key.
 
     Parameters
     ----------
@@ -33,12 +33,12 @@ class FieldError(FingervisionError):
 
 
 class ChangedMeanwhileError(FingervisionError):
-    """Somebody else has written the file since it was read."""
+    """The gauge file was changed by another program since it was read."""
 
 
 @dataclass(frozen=True, slots=True)
 class _Typed(Section):
-    """A table that was typed or drawn: it stands in no line of a file."""
+    """A table of keys that was typed or drawn, and so has no line in a file."""
 
     def refuse(self, key: str | None, words: str) -> NoReturn:
         raise FieldError(key, f"{self.header if key is None else key} {words}")
@@ -52,7 +52,7 @@ class _Entry:
 
 
 class GaugeBoard:
-    """Gauges of one recording, and the file that they are kept in.
+    """Gauges of one recording, and the file in which they are stored.
 
     Parameters
     ----------
@@ -84,26 +84,26 @@ class GaugeBoard:
 
     @property
     def tables(self) -> list[Mapping[str, Any]]:
-        """Their keys as they stand in the file, or will."""
+        """Keys of the gauges as they are stored in the file, or will be."""
         return [entry.table for entry in self._entries]
 
     @property
     def is_saved(self) -> bool:
-        """Whether the file was given just these gauges."""
+        """Whether the file contains exactly these gauges."""
         return self.tables == self._kept
 
     def snapshot(self) -> tuple[int, tuple[Gauge, ...]]:
-        """Version and gauges, of one moment."""
+        """Version and gauges at one moment."""
         with self._lock:
             return self.version, self.gauges
 
     # ---- the file
     def load(self) -> None:
-        """Read the file; what was not saved is dropped. Where there is no file there are no gauges.
+        """Read the file; unsaved changes are dropped. If there is no file, there are no gauges.
 
         Raises
         ------
-        FingervisionError
+        DataError, InputFileError
             It cannot be read, or holds what cannot be meant for these frames; the gauges then stay as they are.
         """
         before = text_of(self.path)
@@ -133,7 +133,7 @@ class GaugeBoard:
         ------
         ChangedMeanwhileError
             Somebody else has.
-        FingervisionError
+        DataError, InputFileError, OutputError
             There is no gauge, or the file cannot be written; what was there stays.
         """
         with self._lock:
@@ -162,7 +162,7 @@ class GaugeBoard:
 
         Raises
         ------
-        FingervisionError
+        DataError, FieldError, StateError
             A value cannot be meant; a `FieldError` says in which key.
         """
         with self._lock:
@@ -172,7 +172,7 @@ class GaugeBoard:
             self.version += 1
 
     def change(self, name: str, changes: Mapping[str, Any]) -> None:
-        """Give a gauge other values, also another name.
+        """Change the values of a gauge, including its name.
 
         Parameters
         ----------
@@ -183,7 +183,7 @@ class GaugeBoard:
 
         Raises
         ------
-        FingervisionError
+        DataError, FieldError, StateError
             There is no such gauge, or a value cannot be meant; the gauge then stays as it was.
         """
         with self._lock:
@@ -200,7 +200,7 @@ class GaugeBoard:
 
         Raises
         ------
-        FingervisionError
+        StateError
             There is none of that name.
         """
         with self._lock:

@@ -1,4 +1,4 @@
-"""Gauges followed from the first frame on, as far as the frame that is shown: the numbers of `measure --gauges`."""
+"""Gauges measured from the first frame up to the one that is shown, with the numbers of `measure --gauges`."""
 
 import json
 import zlib
@@ -13,9 +13,9 @@ from fingervision.gauges.gauge_file import Gauge
 from fingervision.gauges.kinds import measured_together
 from fingervision.gauges.picture import picture_of
 from fingervision.gauges.plane_scale import PlaneScale
-from fingervision.gauges.reading import Mark, Reading
+from fingervision.gauges.reading import Mark, Reading, unread
 from fingervision.gauges.recording import cells_of
-from fingervision.gauges.status import MEANING, GaugeStatus
+from fingervision.gauges.status import MEANING
 from fingervision.live.playback.gauge_board import GaugeBoard
 from fingervision.live.playback.playback import Playback
 from fingervision.measuring.frame_loop import Prepared, coded, prepared
@@ -30,11 +30,11 @@ NO_SCALE = "The scale is not known: gauges can be drawn, and are read once it is
 
 
 class GaugeFollowing:
-    """Reads a board's gauges in a thread of its own.
+    """Measures a board's gauges in a thread of its own.
 
-    A gauge follows its thing from frame to frame, and a patch counts from the first: the reading of a frame is that of
-    a follower which has seen all frames before. What a frame's picture is worth (damaged, repeated) is the table's
-    word, as in `measure`. Any change of gauges, scale or settings begins anew.
+    A gauge follows its object from frame to frame, and a patch counts from the first frame; the reading in a frame
+    therefore requires that all earlier frames were measured. Whether a frame is damaged or repeated is taken from the
+    table, as in `measure`. Any change of gauges, scale or settings starts the measurement again.
 
     Parameters
     ----------
@@ -66,11 +66,11 @@ class GaugeFollowing:
 
     @property
     def frames(self) -> int:
-        """Frames that are read."""
+        """Number of frames measured so far."""
         return len(self._told)
 
     def readings(self, frame: int, version: int) -> list[dict[str, Any]] | None:
-        """Give what the gauges of a version of the board say of a frame; None as long as that is not known."""
+        """Readings of one version of the board's gauges in a frame; None until they are known."""
         key, told = self._key, self._told
         if key != (version, self._playback.identity) or not 0 <= frame < len(told):
             return None
@@ -112,8 +112,7 @@ class GaugeFollowing:
                 return
             readings: Sequence[Reading]
             if isinstance(item, LostFrame) or status in (Status.DAMAGED, Status.DUPLICATE):
-                words = item.words if isinstance(item, LostFrame) else ""
-                readings = [Reading(GaugeStatus(status.value), words=words)] * len(gauges)
+                readings = unread(item, status, len(gauges))
             else:
                 if self.first is None:
                     self.first = item.index
@@ -123,7 +122,10 @@ class GaugeFollowing:
             self._told.append(_packed(gauges, readings, plane))
 
     def _status(self, frame: int, key: tuple[int, str]) -> Status | None:
-        """Wait until a frame is near enough, and the table has it; None where there is nothing to follow any more."""
+        """Wait until a frame is requested and in the table, and return its status.
+
+        None where there is nothing left to measure.
+        """
         playback = self._playback
         while not self._stopped.is_set() and key == self._now():
             if frame <= playback.frame + AHEAD_FRAMES:
@@ -137,7 +139,7 @@ class GaugeFollowing:
 
 
 def _packed(gauges: Sequence[Gauge], readings: Sequence[Reading], plane: PlaneScale) -> bytes:
-    """Readings as the page shows them, in few bytes: a recording has many frames."""
+    """Readings as the page shows them, in compact form because a recording has many frames."""
     return zlib.compress(json.dumps(told(gauges, readings, plane)).encode())
 
 

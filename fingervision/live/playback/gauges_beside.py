@@ -1,4 +1,4 @@
-"""Gauges of the recording on the page: the list that is edited, and the thread that reads them."""
+"""Gauges of a recording in the page: the list that is edited, and the thread that measures them."""
 
 from pathlib import Path
 from typing import Any, Protocol
@@ -12,30 +12,30 @@ GAUGES = "gauges"
 
 
 class Follows(Protocol):
-    """Reads a board's gauges in the frames of a recording or of a camera."""
+    """Measures a board's gauges in the frames of a recording or a camera."""
 
     @property
     def first(self) -> int | None:
-        """Number of the frame that gauges are drawn in."""
+        """Number of the frame in which gauges are drawn."""
         ...
 
     @property
     def frames(self) -> int:
-        """Frames that are read."""
+        """Number of frames measured so far."""
         ...
 
     @property
     def trouble(self) -> str:
-        """Why there are no readings."""
+        """Reason why there are no readings."""
         ...
 
     def readings(self, frame: int, version: int) -> list[dict[str, Any]] | None:
-        """Give what the gauges of a version of the board say of a frame; None where that is not known."""
+        """Readings of one version of the board's gauges in a frame; None where they are unknown."""
         ...
 
 
 class GaugesBeside:
-    """What the page's panel of gauges works with.
+    """Data for the page's panel of gauges.
 
     Parameters
     ----------
@@ -57,11 +57,11 @@ class GaugesBeside:
 
 
 def put_gauges_beside(playback: Playback, path: Path, *, is_asked_for: bool = False) -> GaugesBeside:
-    """Put gauges beside a recording, and begin to read them.
+    """Add gauges to a recording, and begin to measure them.
 
     Raises
     ------
-    FingervisionError
+    DataError, InputFileError
         The file exists and cannot be meant for these frames.
     """
     description = playback.description

@@ -1,4 +1,4 @@
-"""A range of a recording, measured by the command and kept."""
+"""Measurement of a range of a recording, by the command `measure`; the result is kept."""
 
 import json
 from pathlib import Path
@@ -15,7 +15,7 @@ LOOK_EVERY_S = 0.1
 
 
 class RangeMeasurement:
-    """One run of `fingervision measure`, in a process of its own.
+    """One execution of `fingervision measure`, in a process of its own.
 
     Parameters
     ----------
@@ -52,7 +52,7 @@ class RangeMeasurement:
 
     @property
     def is_running(self) -> bool:
-        """Whether it goes on."""
+        """Whether the command still runs."""
         return self._thread.is_alive()
 
     def stop(self) -> None:
@@ -71,7 +71,7 @@ class RangeMeasurement:
 
 
 def _plain(name: str) -> str:
-    """A folder's name of letters, digits, dots and dashes."""
+    """Convert a folder's name to letters, digits, dots and dashes."""
     return "".join(sign if sign.isalnum() or sign in "._-" else "_" for sign in name).strip(".") or "recording"
 
 

@@ -1,4 +1,4 @@
-"""A recording in the page: one frame after the other, or any; its table grows beside it as `measure` makes it."""
+"""A recording in the page: frames in sequence or any single frame, while its table is measured in the background."""
 
 import secrets
 from collections import Counter, deque
@@ -32,7 +32,7 @@ SPEEDS = (0.01, 100.0)
 
 
 class Playback:
-    """Looks through a recording in a thread of its own.
+    """Plays a recording in a thread of its own.
 
     Parameters
     ----------
@@ -88,18 +88,18 @@ class Playback:
 
     # ---- what the page asks for
     def seek(self, frame: int) -> None:
-        """Show a frame; beyond the ends, the end."""
+        """Show a frame; beyond the ends, the first or last one."""
         with self._changed:
             self.is_playing = False
             self.frame = max(0, min(frame, self.frame_count - 1))
             self._changed.notify_all()
 
     def play(self, *, on: bool, speed: float) -> None:
-        """Play on from the frame that is shown, from the beginning where that is the last; or stand.
+        """Play from the shown frame, or from the beginning if it is the last; or pause.
 
         Raises
         ------
-        FingervisionError
+        LimitError
             No recording is played so fast or slow.
         """
         if not SPEEDS[0] <= speed <= SPEEDS[1]:
@@ -113,11 +113,11 @@ class Playback:
             self._changed.notify_all()
 
     def mark(self, first: int | None, last: int | None) -> None:
-        """Mark a range of frames, or none.
+        """Mark a range of frames, or clear the mark.
 
         Raises
         ------
-        FingervisionError
+        LimitError
             It is no range of this recording.
         """
         if first is None or last is None:
@@ -130,11 +130,11 @@ class Playback:
         self.range = (first, last)
 
     def choose(self, **changes: Any) -> None:
-        """Change what is measured or shown; where it changes the measurement, all of it is measured anew.
+        """Change settings; if they affect the measurement, the recording is measured again.
 
         Raises
         ------
-        FingervisionError
+        DataError, UsageError
             It cannot be meant for these frames.
         """
         chosen, unzeroed = self.choices.changed(**changes)
@@ -148,53 +148,53 @@ class Playback:
     # ---- what the page is told
     @property
     def identity(self) -> str:
-        """Changes when the recording is measured anew."""
+        """A number that changes when the recording is measured again."""
         return f"{self._identity}-{self._generation}"
 
     @property
     def messages(self) -> deque[Message]:
-        """What was said last."""
+        """The latest messages."""
         return self._messages.kept
 
     @property
     def on_message(self) -> list[MessageListener]:
-        """Who is told what is said."""
+        """Listeners that receive every message."""
         return self._messages.listeners
 
     def say(self, name: str, words: str) -> None:
-        """Tell everybody who looks."""
+        """Send a message to all users."""
         self._messages.say(name, words)
 
     in_a_hurry = False
 
     @property
     def table(self) -> Path | None:
-        """The whole recording's gaps.csv; None until it is whole."""
+        """The whole recording's gaps.csv; None until it is complete."""
         track = self._track
         return track.table if track is not None and track.is_whole else None
 
     @property
     def row_count(self) -> int:
-        """Rows that are measured."""
+        """Number of rows measured so far."""
         track = self._track
         return 0 if track is None else len(track.rows)
 
     oldest_row = shown_from = 0
 
     def rows(self, first: int, last: int) -> Iterator[GapRow]:
-        """Rows from frame `first` up to, and without, frame `last`."""
+        """Rows from frame `first` up to but excluding frame `last`."""
         track = self._track
         return iter(() if track is None else track.rows[first:last])
 
     @property
     def frame_count(self) -> int:
-        """Frames of the recording, as far as they are known."""
+        """Number of frames of the recording, as far as it is known."""
         if self.table is not None:
             return max(1, self.row_count)
         return max(1, self.description.frame_count or 0, self.row_count)
 
     def state(self) -> dict[str, Any]:
-        """What is known of the recording, for the page."""
+        """State of the recording, for the page."""
         counts = Counter(row.status for row in self.rows(0, self.row_count))
         description = self.description
         return {
@@ -219,7 +219,7 @@ class Playback:
 
     @property
     def failure(self) -> str:
-        """Why the recording could not be measured; empty where it could."""
+        """Reason why the recording could not be measured; empty where it could."""
         return "" if self._track is None else self._track.failure
 
     # ---- the thread
@@ -269,7 +269,7 @@ class Playback:
             self.on_table(track.rows)
 
     def _advance(self) -> None:
-        """Go on as far as the time says; frames that cannot be shown in time are passed over."""
+        """Advance as far as the time requires; frames that cannot be shown in time are skipped."""
         if not self.is_playing:
             return
         began_s, from_s = self._began
@@ -293,7 +293,7 @@ class Playback:
             self.say("failed", self.trouble)
 
     def _own_time(self, frame: int, row: GapRow | None) -> float | None:
-        """Time of a frame, or None where it has no picture or a neighbour has the same time."""
+        """Time of a frame; None where it has no picture or a neighbour has the same time."""
         if row is None or row.time_s is None or row.status in (Status.DAMAGED, Status.DUPLICATE):
             return None
         neighbours = [self._row(frame - 1) if frame else None, self._row(frame + 1)]

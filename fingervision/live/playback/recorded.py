@@ -1,4 +1,4 @@
-"""From a recording's name, or a run's folder, to what is looked through and how it was measured."""
+"""Open a recording, or a run's folder, for playback with the settings with which it was measured."""
 
 import json
 from dataclasses import dataclass
@@ -17,7 +17,7 @@ from fingervision.storage.run_files import RUN
 
 @dataclass(frozen=True, slots=True)
 class Recorded:
-    """A recording that is looked through.
+    """A recording for playback.
 
     Parameters
     ----------
@@ -38,7 +38,7 @@ class Recorded:
 
 
 def is_recording(name: str) -> bool:
-    """Whether a source ends: a file, images, a run's folder; cameras and streams go on."""
+    """Whether a source ends (a file, images, a run's folder), unlike cameras and streams."""
     path = Path(name)
     if (path / RUN).is_file():
         return True
@@ -63,7 +63,7 @@ def recorded(name: str, rate_hz: float | None, choices: Choices, drive: tuple[st
 
     Raises
     ------
-    FingervisionError
+    DataError, InputFileError, UsageError
         It cannot be opened, or the run's folder has no video.
     """
     path = Path(name)
@@ -94,7 +94,7 @@ def _about(folder: Path) -> dict[str, Any]:
 
 
 def _as_in_run(folder: Path, about: dict[str, Any], choices: Choices) -> Choices:
-    """Scale and settings of the run; what cannot be read is left to the user."""
+    """Scale and settings of the run; those that cannot be read are left to the user."""
     try:
         scale, settings = about["scale"], about["settings"]
         file = scale.get("calibration")

@@ -1,4 +1,4 @@
-"""One frame of a recording with what the table says of it, and what is seen in it by itself."""
+"""One frame of a recording with its table row, and with a measurement of that frame alone."""
 
 from dataclasses import replace
 

@@ -1,4 +1,4 @@
-"""The table of a recording as `fingervision measure` makes it, followed while it grows."""
+"""The table of a recording made by `fingervision measure`, read while it grows."""
 
 import tempfile
 from pathlib import Path
@@ -14,7 +14,7 @@ GAPS = "gaps.csv"
 
 
 def arguments_of(recording: str, choices: Choices, more: tuple[str, ...]) -> tuple[str, ...]:
-    """What `fingervision measure` is given for a recording and what was chosen.
+    """Arguments of `fingervision measure` for a recording and the chosen settings.
 
     Parameters
     ----------
@@ -59,7 +59,7 @@ class Track:
         self._command: BackgroundCommand | None = BackgroundCommand(*arguments, "--out", self._folder.name)
 
     def refresh(self) -> bool:
-        """Take in what came; True where the rows are to be counted anew, since the drive's inputs have joined them."""
+        """Read new rows; True where all rows must be read again, because the drive's inputs were added to them."""
         if self._command is None:
             return False
         ended = self._command.exit_code
@@ -79,7 +79,7 @@ class Track:
         return is_other
 
     def close(self) -> None:
-        """End measuring, and take the table away."""
+        """End the measurement, and delete the table."""
         if self._command is not None:
             self._command.stop()
             self._command = None

@@ -1,1 +1,1 @@
-"""One clock for the recording and the stage's log: their offset, found from the motion that both show."""
+"""One clock for the recording and the stage's log: the offset between them, found from the motion that both record."""

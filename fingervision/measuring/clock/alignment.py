@@ -1,4 +1,4 @@
-"""The offset between the recording's clock and the stage's log, found from the motion that both show."""
+"""Offset between the recording's clock and the stage log's clock, found from the motion that both record."""
 
 from dataclasses import replace
 
@@ -77,14 +77,17 @@ def find_clock_offset(time_s: Array, gap_mm: Array, drive: DriveHistory) -> Cloc
 
 
 def _creeping(motion: Motion, found: Fit) -> tuple[Motion, Fit]:
-    """Let the gap creep, where that explains it better than chance would."""
+    """Allow the gap to creep, where that explains it better than chance would."""
     creeping = replace(motion, creeps=True)
     slow = fit(creeping, found.at, free_play=found.at.play_mm > 0.0)
     return (creeping, slow) if (found.squares - slow.squares) / slow.variance_mm2 > CREEP_GAIN else (motion, found)
 
 
 def _information(motion: Motion, found: Fit) -> float:
-    """Logarithm of the likelihood ratio to a gap that stands: more frames explained as well count more."""
+    """Log likelihood ratio against a constant gap.
+
+    It grows with the number of frames that are explained equally well.
+    """
     around = motion.gap_mm - motion.gap_mm.mean()
     return float(motion.time_s.size * np.log(max(float(around @ around), 1e-30) / max(found.squares, 1e-30)))
 

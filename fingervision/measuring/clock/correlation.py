@@ -1,4 +1,4 @@
-"""Where a recording and a stage's log could lie on each other: correlation over every offset at which they overlap."""
+"""Candidate offsets between a recording and a stage's log: correlation at every offset at which they overlap."""
 
 from dataclasses import dataclass
 from itertools import pairwise
@@ -26,7 +26,7 @@ NEAR_BEST = 0.5
 
 @dataclass(frozen=True, slots=True)
 class Candidate:
-    """One way to lay the two records on each other.
+    """One candidate for the offset between the two records.
 
     Parameters
     ----------
@@ -110,7 +110,7 @@ def _known(grid_s: Array, log_s: Array, drive: DriveHistory) -> Array:
 
 
 def _overlap_correlation(gap: Array, seen: Array, inputs: Array, known: Array) -> Array:
-    """Pearson's correlation at every lag of the log against the recording; 0 where too little motion is shared."""
+    """Pearson's correlation at every lag of the log against the recording; 0 where they share too little motion."""
     size = gap.size + inputs.size - 1
     length = next_fast_len(size, real=True)
     weight_gap, weight_input = float(seen.sum()), float(known.sum())
@@ -141,7 +141,7 @@ def _overlap_correlation(gap: Array, seen: Array, inputs: Array, known: Array) -
 
 
 def _peaks(correlation: Array) -> list[int]:
-    """Largest local maxima of the correlation's size, not more than can be of use."""
+    """Largest local maxima of the absolute correlation, limited in number."""
     size = np.abs(correlation)
     inner = np.flatnonzero((size >= np.r_[0.0, size[:-1]]) & (size >= np.r_[size[1:], 0.0]) & (size > 0.0))
     if not inner.size:
@@ -152,7 +152,7 @@ def _peaks(correlation: Array) -> list[int]:
 
 
 def _parabola(correlation: Array, peak: int, lags: Array) -> float:
-    """Where the parabola through a peak and its neighbours is highest."""
+    """Position of the vertex of the parabola through a peak and its neighbours."""
     if peak == 0 or peak == correlation.size - 1:
         return float(lags[peak])
     left, top, right = np.abs(correlation[peak - 1 : peak + 2])
@@ -161,7 +161,7 @@ def _parabola(correlation: Array, peak: int, lags: Array) -> float:
 
 
 def _apart(found: list[Candidate], least_s: float) -> list[Candidate]:
-    """Keep the best of those that are the same offset at neighbouring rates; found is sorted, best first."""
+    """Keep the best of candidates with the same offset at neighbouring rates; `found` is sorted, best first."""
     kept: list[Candidate] = []
     for one in found:
         if len(kept) == MOST_CANDIDATES or one.correlation**2 < NEAR_BEST * kept[0].correlation ** 2 if kept else False:

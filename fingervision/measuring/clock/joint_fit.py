@@ -1,4 +1,4 @@
-"""Offset and rate of two clocks, play, start and scale fitted together: variable projection over the motion."""
+"""Joint fit of offset and rate of two clocks, play, initial state and scale, by variable projection."""
 
 from dataclasses import dataclass, replace
 
@@ -33,7 +33,7 @@ OFFSET_STEP_S, RATE_STEP, START_STEP, PLAY_STEP = 1e-4, 1e-7, 0.02, 1e-5
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Fit:
-    """A fit of the motion.
+    """A fit of the gap's motion to the log.
 
     Parameters
     ----------
@@ -65,7 +65,7 @@ class Fit:
 
 
 def fit(motion: Motion, start: Alignment, *, free_play: bool) -> Fit:
-    """Fit offset, rate, start state (and play) by Gauss-Newton; scale and bend are solved for on the way.
+    """Fit offset, rate, initial state (and play) by Gauss-Newton; scale and bends are solved for in each step.
 
     Parameters
     ----------
@@ -116,11 +116,11 @@ def squares_at(motion: Motion, at: Alignment) -> float:
 
 
 def inflation(motion: Motion, at: Alignment) -> Array:
-    """Ratio by which offset, rate and play scatter more than independent residuals would make them, as variances.
+    """Ratio of the variance of offset, rate and play to its value for independent residuals.
 
-    An input that is off stays off while the stage stands, or until it turns, and the motion's form is never quite the
-    model's: the residual's pull on the parameters is summed over stretches of the recording, and the scatter of these
-    sums taken for what it is (White 1980, doi:10.2307/1912934, for clusters).
+    An error of the input persists while the stage stands, or until it reverses, and the model of the motion is never
+    exact. The residuals' contributions to the parameters are therefore summed over stretches of the recording, and the
+    variance follows from the scatter of these sums (White 1980, doi:10.2307/1912934, for clusters).
     """
     solved = _solve(motion, at)
     rows = solved.white.size - solved.weights.size + 2
@@ -152,9 +152,11 @@ def _change(to: Alignment, since: Alignment) -> Array:
 
 
 def shift_by_turns(motion: Motion, found: Fit) -> Array:
-    """Change of offset, rate and play if all turns of the log went further by their uncertainty; shape (3,).
+    """Change of offset, rate and play (s, 1, mm) if all reversals of the log went further by their uncertainty.
 
-    In s, 1 and mm. A stage at one speed shows its play by how long it stands at a turn, and by nothing else.
+    Shape (3,).
+
+    At constant speed of the stage, only the duration of the gap's stop at a reversal shows the play.
     """
     path = motion.path
     drive = replace(path.drive, input_mm=path.turned_mm)
@@ -167,7 +169,7 @@ def _prior(size: int) -> Array:
 
 
 def _information(motion: Motion, at: Alignment, solved: "_Solved", *, free_play: bool) -> tuple[Array, Array]:
-    """Normal matrix over the residual's variance, priors included, and the jacobian."""
+    """Normal matrix divided by the residual's variance, priors included, and the Jacobian."""
     jacobian = _jacobian(motion, at, solved, free_play=free_play)
     variance = solved.squares / max(solved.degrees, 1)
     return jacobian.T @ jacobian / variance + _prior(jacobian.shape[1]), jacobian
@@ -184,7 +186,7 @@ class _Solved:
 
 
 def _solve(motion: Motion, at: Alignment) -> _Solved:
-    """Solve for scale and bend, the bend held small beside the scale."""
+    """Solve for scale and bends, with a prior that keeps the bends small compared with the scale."""
     design = motion.design(at)
     white_design, white_gap = motion.whitened(design), motion.whitened(motion.gap_mm)
     straight = np.linalg.lstsq(white_design[:, :2], white_gap, rcond=None)[0]
@@ -209,7 +211,7 @@ def _solve(motion: Motion, at: Alignment) -> _Solved:
 
 
 def _jacobian(motion: Motion, at: Alignment, solved: _Solved, *, free_play: bool) -> Array:
-    """Change of the whitened prediction, without what scale and bend take up; shape (m + knots, 3 or 4)."""
+    """Derivatives of the whitened prediction, after projection on scale and bends; shape (m + knots, 3 or 4)."""
     columns = []
     for name, step in (
         ("offset_s", OFFSET_STEP_S),

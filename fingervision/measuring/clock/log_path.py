@@ -1,4 +1,4 @@
-"""The stage between two rows of its log, and how well that is known."""
+"""Path of the stage between the rows of its log, with its uncertainty."""
 
 from dataclasses import dataclass
 from itertools import groupby, pairwise
@@ -38,7 +38,7 @@ STANDS = 0.1
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SharedErrors:
-    """Stretches of the log that may be off by one and the same error each.
+    """Stretches of the log, each of which may have one common error.
 
     Parameters
     ----------
@@ -57,7 +57,7 @@ class SharedErrors:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LogPath:
-    """The way of the input through the log's rows.
+    """Path of the input through the log's rows.
 
     Parameters
     ----------
@@ -84,9 +84,12 @@ class LogPath:
 
     @classmethod
     def of(cls, log: DriveHistory) -> "LogPath":
-        """Smooth the rows as far as their error is random, and draw Akima's curve through them, which keeps corners.
+        """Smooth the rows as far as their error is random, and draw Akima's curve through them.
 
-        A play follows every peak of a noisy record, and would seem to lead by two standard deviations of it.
+        Akima's curve preserves corners.
+
+        Without smoothing, the play would follow every peak of a noisy record, and would seem to lead by two standard
+        deviations of the noise.
         """
         names = log.run or ("",) * log.time_s.size
         lengths = [len(list(group)) for _, group in groupby(names)]
@@ -115,12 +118,13 @@ class LogPath:
 def _shared_errors(
     time_s: Array, input_mm: Array, smooth_mm: Array, u_mm: Array, leverage: Array, still_mm: float, step_mm: float
 ) -> tuple[SharedErrors, Array]:
-    """Split an encoder's rounding into what neighbours share and what scatters from row to row.
+    """Split an encoder's rounding error into a part common to neighbouring rows and a random part.
 
-    Rounding does not average as noise does: a stage that stands lies anywhere within a step, one that moves by whole
-    steps from row to row is rounded alike in each, and of one that is slower only the crossings of its lines count. The
-    path may be shifted as far as every row keeps within half a step of it; where the rounding errors spread over the
-    step nothing is left of that. Where a stroke begins or ends, the stage moves unseen within a step.
+    Rounding errors do not average out like noise. A stage at rest lies anywhere within a step. A stage that moves by
+    whole steps from row to row is rounded equally in each row. Of a slower stage only the crossings of lines are
+    informative. The path may be shifted as long as every row stays within half a step of it; where the rounding errors
+    cover the whole step, no such shift is possible. At the beginning and the end of a stroke, motion within one step is
+    invisible.
 
     Returns
     -------
@@ -199,7 +203,7 @@ def _piece(time_s: Array, input_mm: Array, u_mm: Array) -> tuple[Array, Array, A
 
 
 def _corners(time_s: Array, input_mm: Array, second: Array, u_mm: Array) -> tuple[NDArray[np.intp], Array, Array]:
-    """Intervals in which two straight lines meet, and where they do: a turn lies between two rows, and not on one."""
+    """Intervals in which two straight lines meet, and the point where they do: a reversal lies between two rows."""
     k = np.arange(2, time_s.size - 3)
     bend, beside = second[k] + second[k + 1], second[k - 1] + second[k + 2]
     speed = np.diff(input_mm) / np.diff(time_s)
@@ -215,9 +219,9 @@ def _corners(time_s: Array, input_mm: Array, second: Array, u_mm: Array) -> tupl
 
 
 def _standing_step(input_mm: Array, sigma_mm: float, leverage: Array) -> float:
-    """Step from row to row below which the stage stands; 0 where it never moves.
+    """Step from row to row below which the stage is at rest; 0 where it never moves (mm).
 
-    A smoothed record of k rows scatters from one to the next by the k-th part of its own scatter.
+    In a record smoothed over k rows, the scatter from one row to the next is 1/k of its own scatter.
     """
     steps = np.abs(np.diff(input_mm))
     scatter = sigma_mm * np.minimum(leverage[:-1], leverage[1:]) ** 1.5
@@ -226,9 +230,9 @@ def _standing_step(input_mm: Array, sigma_mm: float, leverage: Array) -> float:
 
 
 def _flattened(input_mm: Array, sigma_mm: float, leverage: Array) -> Array:
-    """Where the stage stands, put it at one place, and keep what leads there from overshooting it.
+    """Set the stage to one position while it is at rest, and keep the path to it from overshooting it.
 
-    A smoothed corner overshoots by some standard deviations of a row, and a play remembers each overshoot.
+    Smoothing makes corners overshoot by some standard deviations of a row, and a play remembers each overshoot.
     """
     still = _standing_step(input_mm, sigma_mm, leverage)
     if still == 0.0:
@@ -251,9 +255,10 @@ def _flattened(input_mm: Array, sigma_mm: float, leverage: Array) -> Array:
 
 
 def _curve(time_s: Array, input_mm: Array, fine_s: Array, interval: NDArray[np.intp]) -> Array:
-    """Draw Akima's curve; beside an interval in which the stage stands it stays between its rows.
+    """Draw Akima's curve; next to an interval in which the stage is at rest it stays between its rows.
 
-    A stage that arrives and stands has not been beyond the place where it stands, and a play remembers where it was.
+    A stage that arrives and stops has not been beyond its position of rest, and the play depends on the extreme
+    position.
     """
     curve = np.asarray(Akima1DInterpolator(time_s, input_mm)(fine_s), dtype=np.float64)
     steps = np.abs(np.diff(input_mm))

@@ -1,4 +1,4 @@
-"""Noise of the gap beside a fitted motion: its correlation from frame to frame, and where the input is known badly."""
+"""Noise of the gap around a fitted motion: its autocorrelation, and its growth where the input is uncertain."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +17,7 @@ LARGEST_ROOT = 0.98
 
 
 def autoregression(residual_mm: Array) -> Array:
-    """Fit an autoregression by Burg's method, its order by Akaike's criterion with Hurvich's correction.
+    """Fit an autoregression by Burg's method, with its order by Akaike's criterion with Hurvich's correction.
 
     Parameters
     ----------
@@ -62,10 +62,10 @@ CLIPPED = 9.0
 
 
 def noise_of(motion: Motion, found: Fit) -> Noise:
-    """Estimate the noise that a fit leaves.
+    """Estimate the noise from the residuals of a fit.
 
-    The variance of a frame is that of the vision's noise, the same in all frames, and the square of what the input's
-    uncertainty between two rows of the log makes of it. The first is the one that makes the residuals most likely.
+    The variance of a frame is the variance of the measured gap, equal in all frames, plus the squared effect of the
+    input's uncertainty between two rows of the log. The first is estimated by maximum likelihood of the residuals.
     """
     log_s = motion.log_time_s(found.at)
     after = np.clip(np.searchsorted(motion.drive.time_s, log_s), 0, motion.path.u_mm.size - 1)
@@ -98,9 +98,9 @@ SEEN_SHARED = 0.5
 
 
 def _stretch_of(motion: Motion, found: Fit, log_s: Array) -> NDArray[np.intp]:
-    """Stretch of the log whose error each frame has: while a play is crossed, that of the halt before.
+    """Stretch of the log whose error each frame has: while a play is crossed, that of the previous stop.
 
-    Shape (n,), never falling.
+    Shape (n,), never decreasing.
     """
     shared, drive, at = motion.path.shared, motion.drive, found.at
     own = np.searchsorted(shared.begin_s, log_s, side="right")
@@ -123,7 +123,7 @@ FEWEST_SHARED = 8
 
 
 def _without_shared(residual_mm: Array, stretch: NDArray[np.intp], shared_mm: Array) -> tuple[Array, float]:
-    """Residual without the mean of each stretch that may be off as a whole, and what that takes from its variance."""
+    """Residual minus the mean of each stretch that may have a common error, and the variance that this removes."""
     out = residual_mm.copy()
     means = 0
     spread_mm = 1.4826 * float(np.median(np.abs(residual_mm)))
@@ -136,9 +136,9 @@ def _without_shared(residual_mm: Array, stretch: NDArray[np.intp], shared_mm: Ar
 
 
 def _even_variance(squares: Array, input_mm2: Array) -> float:
-    """Find the variance beside `input_mm2` that makes the residuals most likely, wrong frames clipped.
+    """Maximum-likelihood variance in addition to `input_mm2`; outlying frames are clipped.
 
-    Frames whose input is known well tell it; a median over all would not see them where the others are more.
+    Frames with a well-known input determine it; a median over all frames would miss them where they are fewer.
     """
     high = max(float(np.median(squares)) / MEDIAN_CHI_SQUARE, 1e-18)
     tried = high * np.geomspace(1e-4, 4.0, TRIED)
@@ -148,7 +148,7 @@ def _even_variance(squares: Array, input_mm2: Array) -> float:
 
 
 def _least_variance(residual_mm: Array) -> float:
-    """Variance that the frames' own noise has at least, from second differences, in which slow errors vanish."""
+    """Lower bound of the frames' own variance, from second differences, in which slow errors cancel."""
     if residual_mm.size < FEWEST_SHARED:
         return 0.0
     spread_mm = float(np.median(np.abs(np.diff(residual_mm, 2)))) / float(np.sqrt(MEDIAN_CHI_SQUARE))
@@ -156,7 +156,7 @@ def _least_variance(residual_mm: Array) -> float:
 
 
 def _explained(terms: Array, residual: Array) -> float:
-    """Share of the variance that an autoregression foretells."""
+    """Fraction of the variance that an autoregression predicts."""
     if not terms.size:
         return 0.0
     order = terms.size

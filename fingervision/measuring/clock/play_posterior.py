@@ -1,4 +1,4 @@
-"""Offset and rate of two clocks over every play that the motion leaves possible."""
+"""Offset and rate of two clocks, marginalised over every play that the motion allows."""
 
 from dataclasses import dataclass, replace
 
@@ -27,7 +27,7 @@ NODES = 15
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Posterior:
-    """Offset and rate with their uncertainty, whatever the play.
+    """Offset and rate with their uncertainty, marginalised over the play.
 
     Parameters
     ----------
@@ -50,10 +50,10 @@ class Posterior:
 
 
 def most_likely(motion: Motion, start: Alignment, plays: tuple[float, ...] = FIRST_PLAYS) -> Fit:
-    """Fit from several starting values of the play and keep the best; `plays` are shares of the largest one.
+    """Fit from several starting values of the play and keep the best; `plays` are fractions of the largest play.
 
-    Play and offset trade with each other along narrow valleys, in which a search at a fixed play halts beside the
-    lowest place: the best two of them, and where the search began, are followed with the play free.
+    Play and offset are correlated along narrow valleys, in which a search at a fixed play stops beside the minimum. The
+    best two fits, and the starting point, are therefore continued with the play free.
     """
     longest_mm = _longest_mm(motion)
     held = [fit(motion, replace(start, play_mm=share * longest_mm), free_play=False) for share in plays]
@@ -79,10 +79,11 @@ def beside(motion: Motion, found: Fit, plays: tuple[float, ...]) -> Fit:
 
 
 def posterior(motion: Motion, best: Fit) -> Posterior:
-    """Integrate over the play, from where its likelihood has vanished to where it has again.
+    """Integrate over the play, across the whole range in which its likelihood is not negligible.
 
-    Small plays and offsets cannot be told apart where a stage goes at one speed, and the likelihood is then far from
-    normal: it is taken as it is, one play after the other, with the Student distribution of the residual's variance.
+    At constant speed of the stage, small plays and offsets are indistinguishable, and the likelihood is far from
+    normal. It is therefore evaluated at each value of the play, with the Student distribution of the residual's
+    variance.
     """
     longest_mm, degrees = _longest_mm(motion), best.degrees
     known: dict[float, Fit] = {}

@@ -1,4 +1,4 @@
-"""How a drawn gripper itself obeys effects of the catalogue, one a file: a module that states its EFFECT is a law."""
+"""Effects of the catalogue computed by the physics of a drawn gripper, one per file; each states its EFFECT."""
 
 import importlib
 import pkgutil
@@ -14,6 +14,6 @@ def _modules() -> list[ModuleType]:
 
 
 def laws_of(drawn: DrawnAnswer) -> dict[str, PhysicalLaw]:
-    """Work out the laws that a drawing obeys, by the effect's name; those that it cannot show are left out."""
+    """Compute the laws of a drawing, by the effect's name; effects that the drawing cannot show are omitted."""
     laws = {module.EFFECT: module.law(drawn) for module in _modules()}
     return {name: law for name, law in laws.items() if law is not None}

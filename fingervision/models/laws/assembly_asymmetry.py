@@ -1,4 +1,4 @@
-"""Unequal halves: a link of one half has another length, so that this finger opens by more or less than drawn."""
+"""Unequal halves: a link of one half has another length, so that its finger opens by more or less than drawn."""
 
 from dataclasses import replace
 
@@ -17,11 +17,11 @@ _LEAST = 0.1
 
 
 def law(drawn: DrawnAnswer) -> PhysicalLaw | None:
-    """Change the links of the halves so that the right one has the stated share of the opening.
+    """Change the links of the halves so that the right half has the stated share of the opening.
 
-    With shares 1/2 + share and 1/2 - share of an opening G times the drawn one, the right half alone is changed where
-    the left keeps its own: G (1 - 2 share) = 1; the left alone where G (1 + 2 share) = 1. Between them, G follows
-    1 / (1 - 2 changed_half share); at 0 the gap does not change, as with a table.
+    The shares are 1/2 + share and 1/2 - share of an opening that is G times the drawn one. Only the right half is
+    changed if the left keeps its length: G (1 - 2 share) = 1; only the left one if G (1 + 2 share) = 1. Between the
+    two, G = 1 / (1 - 2 changed_half share); at changed_half = 0 the gap does not change, as with a table.
     """
     curves = drawn.lever
     if curves is None:

@@ -1,4 +1,4 @@
-"""Fingers that meet: Signorini's condition on the tips of the drawn body, and the force that it takes to close on."""
+"""Finger contact: Signorini's condition at the tips of the drawn body, and the force needed to close further."""
 
 from dataclasses import replace
 
@@ -19,10 +19,10 @@ _RIGID = 0.05
 
 
 def law(drawn: DrawnAnswer) -> PhysicalLaw | None:
-    """Hold the fingers back as the drawn body does, and press the drive with what that takes.
+    """Stop the fingers as the drawn body does, and add the corresponding force at the drive.
 
-    The measuring point lies beside the point that touches, so that a share of the closing goes on there
-    (`remaining_slope`) even between rigid faces; soft faces let more of it go on and take less force, in proportion.
+    The measuring point lies beside the contact point, so that a fraction of the closing continues there
+    (`remaining_slope`) even between rigid faces; soft faces let more of it continue and need less force, in proportion.
     """
     body, (lowest_mm, highest_mm) = drawn.body, drawn.input_range_mm
     touch_mm = body.first_touch_mm()

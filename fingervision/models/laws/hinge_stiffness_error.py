@@ -1,4 +1,4 @@
-"""Hinges of another thickness, or a material of another modulus: the force changes, the gap a little or not at all."""
+"""Hinges of another thickness, or a material of another modulus: the force changes, the gap little or not at all."""
 
 from dataclasses import replace
 
@@ -18,10 +18,10 @@ _LEAST = 1e-3
 
 
 def law(drawn: DrawnAnswer) -> PhysicalLaw | None:
-    """Change all hinges' thickness so that the force is in the stated ratio.
+    """Change the thickness of all hinges so that the force has the stated ratio.
 
-    A share p of the change is the thickness, (1 + ratio)^p, the rest the modulus, (1 + ratio)^(1 - p), which leaves
-    the gap alone. For the paper's sample hinges 0.1 mm thinner open 0.17 % wider with 22 % less force.
+    The thickness contributes the factor (1 + ratio)^p, and the modulus, which does not affect the gap, the rest, (1 +
+    ratio)^(1 - p). For the published gripper, hinges thinner by 0.1 mm open 0.17 % wider with 22 % less force.
     """
     thickness_mm = drawn.gripper.hinge.thickness_mm
     curves = ratio_curves(

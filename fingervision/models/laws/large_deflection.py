@@ -26,12 +26,12 @@ _AS_DRAWN = 0.05
 
 
 def law(drawn: DrawnAnswer) -> PhysicalLaw | None:
-    """Follow the drawn body's own equilibria, with the arc that they come nearest to as the catalogue's parameters.
+    """Use the drawn body's own equilibria; the catalogue's parameters are those of the arc nearest to them.
 
-    A body n times as large, `reach_mm` with it, moves on the same curve n times as large; what `cross` differs by from
-    the drawn body's own adds that share of the arc's height. So the drawn physics itself lies at the drawn arc's
-    parameters, and a straight line at an infinite reach. For the paper's sample: 126 mm and 0.12, and the arc alone is
-    within 0.3 um of the equilibria.
+    A body n times as large, with `reach_mm` n times as large, moves on the same curve n times as large. The difference
+    of `cross` from the drawn body's own value adds that fraction of the arc's height. The drawn physics thus lies at
+    the drawn arc's parameters, and a straight line at an infinite reach. For the published gripper these are 126 mm and
+    0.12, and the arc alone deviates from the equilibria by less than 0.3 µm.
     """
     try:
         opening_mm, bent_mm, force_ratio = _equilibria(drawn)
@@ -73,7 +73,7 @@ def _arc(opening_mm: Array, reach_mm: float, cross: float) -> Array:
 
 
 def _equilibria(drawn: DrawnAnswer) -> tuple[Array, Array, Array]:
-    """Opening without and with large rotation, and the ratio of the forces, over the inputs of the model."""
+    """Opening with and without large rotation, and the ratio of the forces, over the inputs of the model."""
     body, (lowest_mm, highest_mm) = drawn.body, drawn.input_range_mm
     paths = []
     for end_mm, count in ((lowest_mm, _BELOW), (highest_mm, _ABOVE)):

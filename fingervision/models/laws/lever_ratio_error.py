@@ -1,4 +1,4 @@
-"""A link of another length: with l2 the amplification changes, and the force by nearly twice as much."""
+"""A link of another length: changing l2 alters the amplification, and the force nearly twice as much."""
 
 from dataclasses import replace
 
@@ -11,7 +11,7 @@ EFFECT = "lever_ratio_error"
 
 
 def law(drawn: DrawnAnswer) -> PhysicalLaw | None:
-    """Change the link by as much as gives the ratio of the openings that the catalogue's parameter states."""
+    """Change the link so that the openings have the ratio stated by the catalogue's parameter."""
     curves = drawn.lever
     if curves is None:
         return None

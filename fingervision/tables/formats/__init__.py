@@ -1,4 +1,4 @@
-"""Formats that tables come in, one a file: each tells its files by their first bytes and reads them raw."""
+"""File formats of tables, one per file: each recognises its files by their first bytes and reads them raw."""
 
 import importlib
 import pkgutil
@@ -39,9 +39,9 @@ class Format:
 
 @cache
 def formats() -> tuple[Format, ...]:
-    """All formats: a module of this package with `ORDER`, `recognises` and `read` is one.
+    """All formats: every module of this package with `ORDER`, `recognises` and `read`.
 
-    One with `IN_OWN_PROCESS` is read by libraries that may crash, and so in a process of its own.
+    One with `IN_OWN_PROCESS` uses libraries that may crash, and is therefore run in a process of its own.
     """
     found = []
     for module in pkgutil.iter_modules(__path__):
@@ -54,11 +54,11 @@ def formats() -> tuple[Format, ...]:
 
 
 def read_raw(path: Path, given: Entry) -> RawTable:
-    """Read a table of any format, without saying what its columns mean.
+    """Read a table of any format, without interpreting its columns.
 
     Raises
     ------
-    FingervisionError
+    DataError, InputFileError
         The file cannot be read, or holds no table.
     """
     if path.exists() and not path.is_file():

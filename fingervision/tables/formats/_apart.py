@@ -1,6 +1,7 @@
-"""Reading in a process of its own: libraries in C may crash on a damaged file, and that becomes a sentence.
+"""Reading in a process of its own: if a C library crashes on a damaged file, the user gets an error message.
 
-scipy 1.17 ends with a segmentation fault on some MATLAB files with a few wrong bytes (tests/tables/test_bad_files.py).
+For example, scipy 1.17 ends with a segmentation fault on some MATLAB files with a few wrong bytes
+(tests/tables/test_bad_files.py).
 """
 
 import pickle
@@ -32,7 +33,7 @@ def read_apart(name: str, path: Path, given: Entry) -> RawTable:
 
     Raises
     ------
-    FingervisionError
+    DataError
         The file cannot be read, or its reader crashed.
     OpenQuestionError
         As the format's reader.

@@ -21,7 +21,7 @@ PER_SECOND = {"s": 1.0, "ms": 1e3, "us": 1e6, "ns": 1e9}
 
 
 def recognises(path: Path, head: bytes) -> bool:
-    """Tell the file by its first bytes."""
+    """Recognise the file by its first bytes."""
     return head.startswith(b"PAR1")
 
 
@@ -50,7 +50,7 @@ def read(path: Path, given: Entry) -> RawTable:
 
 
 def _check_size(path: Path, rows: int, unpacked_bytes: int) -> None:
-    """Refuse a table before its values are read."""
+    """Refuse a table that is too large, before its values are read."""
     if rows > MOST_ROWS or unpacked_bytes > MOST_UNPACKED_BYTES:
         raise DataError(
             f"{path} must have at most {MOST_ROWS} rows and unpack to {MOST_UNPACKED_BYTES / 1e9:g} GB, but has {rows} "

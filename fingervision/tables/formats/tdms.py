@@ -25,12 +25,12 @@ UNIT_KEYS = ("unit_string", "NI_UnitDescription", "Unit", "unit")
 
 
 def recognises(path: Path, head: bytes) -> bool:
-    """Tell the file by its first bytes."""
+    """Recognise the file by its first bytes."""
     return head.startswith(b"TDSm")
 
 
 def read(path: Path, given: Entry) -> RawTable:
-    """Read a group's channels; their times are written as a channel, or follow from the waveform's rate."""
+    """Read a group's channels; times are a channel, or follow from the waveform's rate."""
     library = needed_library("nptdms", path, "a TDMS file")
     warned: list[str] = []
     try:
@@ -61,7 +61,7 @@ def read(path: Path, given: Entry) -> RawTable:
 
 @contextmanager
 def _warnings(into: list[str]) -> Iterator[None]:
-    """Collect what npTDMS logs of damage, which would else go to the terminal."""
+    """Collect damage that npTDMS logs, instead of printing it to the terminal."""
     # It gives each of its modules a logger with a handler of its own.
     loggers = [log for name, log in logging.root.manager.loggerDict.items() if name.startswith("nptdms.")]
     kept = [(log, log.handlers, log.propagate) for log in loggers if isinstance(log, logging.Logger)]
@@ -77,7 +77,7 @@ def _warnings(into: list[str]) -> Iterator[None]:
 
 
 def _check_size(path: Path, values: int) -> None:
-    """Refuse a file before its values are read."""
+    """Refuse a file that is too large, before its values are read."""
     if values > MOST_VALUES:
         raise DataError(f"{path} must have at most {MOST_VALUES} values, but has {values}: split it.")
 

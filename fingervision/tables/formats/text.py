@@ -1,4 +1,4 @@
-"""Any text with a row a line: CSV of every habit, COMSOL's `%` tables, columns between blanks."""
+"""Any text with one row per line: all variants of CSV, COMSOL's `%` tables, columns separated by blanks."""
 
 from pathlib import Path
 
@@ -22,7 +22,7 @@ OTHERS = {
 
 
 def recognises(path: Path, head: bytes) -> bool:
-    """Take every file that no other format has taken."""
+    """Accept every file that no other format has recognised."""
     return True
 
 

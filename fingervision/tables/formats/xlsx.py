@@ -1,4 +1,4 @@
-"""Excel workbooks (.xlsx, .xlsm): the values of one sheet; no macro is run and no formula is calculated."""
+"""Excel workbooks (.xlsx, .xlsm): the values of one sheet; no macro is executed and no formula is computed."""
 
 import zipfile
 from collections.abc import Sequence
@@ -27,7 +27,7 @@ EPOCH = datetime(1900, 1, 1)
 
 
 def recognises(path: Path, head: bytes) -> bool:
-    """Tell a workbook by what its archive holds."""
+    """Recognise a workbook by the content of its archive."""
     if not head.startswith(b"PK"):
         return False
     try:
@@ -38,7 +38,7 @@ def recognises(path: Path, head: bytes) -> bool:
 
 
 def read(path: Path, given: Entry) -> RawTable:
-    """Read the sheet that is meant."""
+    """Read the selected sheet."""
     library = needed_library("openpyxl", path, "an Excel workbook")
     try:
         _check_archive(path)
@@ -65,7 +65,7 @@ def read(path: Path, given: Entry) -> RawTable:
 
 
 def _check_archive(path: Path) -> None:
-    """Refuse archives that unpack to more than a table, and XML with definitions of its own."""
+    """Refuse archives that unpack to more than a table, and XML with its own definitions."""
     with zipfile.ZipFile(path) as archive:
         infos = archive.infolist()
         total = sum(info.file_size for info in infos)
@@ -91,12 +91,12 @@ def _is_value(cell: object) -> bool:
 
 
 def _first_row(rows: Sequence[tuple[Any, ...]]) -> int | None:
-    """First row with two values or more."""
+    """First row with at least two values."""
     return next((at for at, row in enumerate(rows) if sum(map(_is_value, row)) >= 2), None)
 
 
 def _best_names(rows: Sequence[tuple[Any, ...]]) -> list[str]:
-    """Names above the first row of a sheet; the numbers of its columns where there are none."""
+    """Names above the first row of a sheet; column numbers where there are none."""
     first = _first_row(rows)
     if first is None:
         return []
@@ -108,7 +108,7 @@ def _best_names(rows: Sequence[tuple[Any, ...]]) -> list[str]:
 
 
 class _Sheet:
-    """What openpyxl's quick reader does not tell of a sheet: merged cells, and formulas without a value."""
+    """Information that openpyxl's fast reader omits: merged cells, and formulas without a value."""
 
     def __init__(self, path: Path, title: str, place: int, library: Any) -> None:
         self.path, self.title, self._place, self._library = path, title, place, library
@@ -155,8 +155,8 @@ def _table(path: Path, rows: Sequence[tuple[Any, ...]], title: str, given: Entry
     for r0, r1, c0, c1 in sheet.merged():
         if r1 > first and any(c0 - 1 <= k <= c1 - 1 for k in places) and (r1 > r0 or c1 > c0):
             raise DataError(
-                f"Sheet '{title}' of {path} must have a cell a value, but rows {r0} to {r1}, columns {c0} to {c1} are "
-                "merged into one: take the merging apart, so that each row says its own."
+                f"Sheet '{title}' of {path} must have one cell per value, but rows {r0} to {r1}, columns {c0} to {c1} "
+                "are merged into one: unmerge them, so that each row has its own value."
             )
     body, lines, blank, headers = [], [], 0, []
     for at in range(first, len(rows)):
@@ -216,7 +216,7 @@ def _header(rows: Sequence[tuple[Any, ...]], first: int, given: Entry) -> tuple[
 
 
 def _column(name: str, unit: str, cells: Sequence[Any]) -> RawColumn:
-    """Numbers as numbers, dates and times as seconds, anything else as text."""
+    """Numbers stay numbers, dates and times become seconds, everything else becomes text."""
     kinds = {type(cell) for cell in cells if cell is not None and cell != ""}
     present = np.array([cell is not None and cell != "" for cell in cells], dtype=np.bool_)
     if kinds and kinds <= {int, float}:
@@ -233,7 +233,7 @@ def _column(name: str, unit: str, cells: Sequence[Any]) -> RawColumn:
 
 
 def _seconds(cell: datetime | date | time | timedelta) -> float:
-    """Seconds since 1900, of the day, or of the length of time."""
+    """Seconds since 1900, of the day, or of a duration."""
     if isinstance(cell, datetime):
         return (cell.replace(tzinfo=None) - EPOCH).total_seconds()
     if isinstance(cell, date):

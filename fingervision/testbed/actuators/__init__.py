@@ -1,1 +1,1 @@
-"""Actuators, one a file: a module with `KEYS` and `build(section, context)` is a kind."""
+"""Actuators, one per file: a module with `KEYS` and `build(section, context)` is a kind."""

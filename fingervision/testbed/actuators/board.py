@@ -1,4 +1,4 @@
-"""A motor controller on the parallel lines of a board: it runs the step data that it keeps."""
+"""Actuator on the parallel input lines of a motor controller, which runs its stored step data."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -35,7 +35,7 @@ CLOSES_WITHIN_S = 1.0
 
 @dataclass(frozen=True, slots=True)
 class Routes:
-    """Which moves the step data allow, without the board.
+    """Motions that the step data allow, computed without the board.
 
     Parameters
     ----------
@@ -56,9 +56,10 @@ class Routes:
 
 
 class BoardActuator:
-    """The stage behind the board.
+    """The stage driven by the board's motor controller.
 
-    Parallel lines tell no position: it is where the steps lead, as their profiles say, within the stage's accuracy.
+    Parallel lines report no position: it is computed from the profiles of the executed steps, within the stage's
+    accuracy.
 
     Parameters
     ----------
@@ -100,7 +101,7 @@ class BoardActuator:
 
     @property
     def alarm(self) -> Alarm | None:
-        """The controller's alarm line, or why a motion was broken off."""
+        """The controller's alarm line, or the reason why a motion was aborted."""
         if wire.Levels.ALARM in self._board.levels:
             return Alarm("alarm", "the motor controller's alarm line is active: clear the alarm there, then home")
         if self._board.dropped is not None and self._board.dropped_code != "h":
@@ -110,7 +111,7 @@ class BoardActuator:
         return None
 
     def home(self) -> None:
-        """Return to the reference, by its own code or an absolute step to 0; clears what stopped it before."""
+        """Return to the reference, by its own code or an absolute step to 0; clears the reason of an earlier stop."""
         self._stand()
         if wire.Levels.ALARM in self._board.levels:
             raise DeviceError("The motor controller must have no alarm, but its alarm line is active: clear it there.")
@@ -132,7 +133,7 @@ class BoardActuator:
         Routes(self._data, self.limits).check(from_mm, to_mm, speed_mm_s)
 
     def move(self, to_mm: float, speed_mm_s: float) -> None:
-        """Begin to move, by the steps that lead there."""
+        """Begin to move, by the sequence of steps that leads to the target."""
         check_move(self.limits, to_mm, speed_mm_s)
         self._ready()
         at_mm = self._at_mm() if self._motions.known else None
@@ -160,11 +161,11 @@ class BoardActuator:
         self._begin_steps((number,))
 
     def stop(self) -> None:
-        """Drop the drive line at once; it may be called from a signal handler."""
+        """Release the drive line at once; may be called from a signal handler."""
         self._motions.stop()
 
     def readings(self) -> tuple[Reading, ...]:
-        """Positions since the last call, where it was sent: on the host's clock, since the host works them out."""
+        """Positions since the last call, computed by the host on its own clock from the executed steps."""
         self._board.check()
         now_s = self._clock.now_s()
         times = [*self._motions.path.times_of_motion_s(self._read_s, now_s, READ_EVERY_S).tolist(), now_s]
@@ -172,7 +173,7 @@ class BoardActuator:
         return tuple(Reading(at_s, at_s, at_s, self._motions.path.at_mm(at_s)) for at_s in times)
 
     def close(self) -> None:
-        """Stop and let go of the board."""
+        """Stop and release the board."""
         if self._closed:
             return
         self._closed = True
@@ -226,17 +227,17 @@ class BoardActuator:
 
 
 def holder(section: Section, folder: Path) -> int | None:
-    """Process of another fingervision that has its board's port open; None if none is seen."""
+    """Process of another fingervision that has the board's port open; None if none is found."""
     return fingervision_at(read_board(folder / section.word(KEY)).port)
 
 
 def without_hardware(section: Section, folder: Path) -> Routes:
-    """What the stage can do, for a plan that is checked away from the bed."""
+    """Limits of the stage, for checking a plan without the bed."""
     return Routes(read_steps(folder / section.word("steps")), stage_limits(section))
 
 
 def build(section: Section, context: BuildContext) -> BoardActuator:
-    """Build it from its section of the configuration."""
+    """Build the actuator from its section of the configuration."""
     data = read_steps(context.folder / section.word("steps"))
     codes, waits = codes_of(section, data), waits_of(section)
     board = board_of(section, context)

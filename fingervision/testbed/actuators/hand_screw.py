@@ -1,4 +1,4 @@
-"""A micrometer screw that a person turns, typing in what it reads."""
+"""A micrometer screw that a person turns, typing in its readings."""
 
 from math import isfinite
 from pathlib import Path
@@ -26,7 +26,7 @@ AN_INSTANT_S = 1e-4
 
 
 class HandScrew:
-    """Positions are asked for on the terminal; a move lasts until they are typed.
+    """Positions are asked for on the terminal; a motion lasts until its reading is typed.
 
     Parameters
     ----------
@@ -50,38 +50,40 @@ class HandScrew:
         self._turned: list[Reading] = []
 
     def home(self) -> None:
-        """Ask for the screw to be set to its zero."""
+        """Ask the user to set the screw to its zero."""
         self._ask_for("Turn the screw to where the gripper rests, set its reading to zero, and type that reading", 0.0)
 
     def check(self, from_mm: float, to_mm: float, speed_mm_s: float) -> None:
-        """Refuse what is beyond the limits."""
+        """Refuse motions beyond the limits."""
         check_move(self.limits, to_mm, speed_mm_s)
 
     def move(self, to_mm: float, speed_mm_s: float) -> None:
-        """Ask for the screw to be turned; a hand's speed is its own."""
+        """Ask the user to turn the screw; the speed is up to the user."""
         check_move(self.limits, to_mm, speed_mm_s)
         self._ask_for(f"Turn the screw to {to_mm:.3f} mm and type its reading in mm", to_mm)
 
     def jog(self, speed_mm_s: float) -> None:
-        """Refuse: nobody can say when a hand shall stop."""
-        raise LimitError(f"A hand screw must be moved to positions, but was to jog at {speed_mm_s:g} mm/s: use move.")
+        """Refuse: a hand-turned screw cannot be stopped by command."""
+        raise LimitError(
+            f"A hand screw can only be moved to positions, but a jog at {speed_mm_s:g} mm/s was asked: use move."
+        )
 
     def run_step(self, number: int) -> None:
-        """Refuse: step data live in a motor controller."""
+        """Refuse: step data exist only in a motor controller."""
         raise LimitError(f"Step {number} must be kept by a motor controller, but a hand screw has none: use move.")
 
     def stop(self) -> None:
-        """Nothing moves by itself."""
+        """Do nothing: the screw does not move by itself."""
 
     def readings(self) -> tuple[Reading, ...]:
-        """What was typed, each with the reading before it up to that instant, and what stands now."""
+        """Typed positions, each preceded by the earlier position up to that time, and the present one."""
         turned, self._turned = self._turned, []
         now_s = self._clock.now_s()
         earlier = [reading for reading in turned if reading.device_s < now_s]
         return (*earlier, Reading(now_s, now_s, now_s, self._at_mm))
 
     def close(self) -> None:
-        """Nothing to let go of."""
+        """Do nothing: there is no hardware to release."""
 
     def _ask_for(self, words: str, wanted_mm: float) -> None:
         for _ in range(ASK_AT_MOST):
@@ -129,10 +131,10 @@ def _limits(section: Section) -> StageLimits:
 
 
 def without_hardware(section: Section, folder: Path) -> FreeMoves:
-    """What the stage can do, for a plan that is checked away from the bed."""
+    """Limits of the stage, for checking a plan without the bed."""
     return FreeMoves(_limits(section))
 
 
 def build(section: Section, context: BuildContext) -> HandScrew:
-    """Build it from its section of the configuration; the terminal is asked."""
+    """Build the actuator from its section of the configuration; readings are asked for on the terminal."""
     return HandScrew(_limits(section), context.clock, TERMINAL)

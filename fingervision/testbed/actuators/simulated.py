@@ -1,4 +1,4 @@
-"""A simulated actuator: the paper's, with its encoder, its accuracy and its play."""
+"""A simulated actuator modelled on that of Hricko & Havlik (2015), with its encoder, its accuracy and its play."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -35,7 +35,7 @@ Array = NDArray[np.float64]
 
 
 class SimulatedActuator:
-    """The stage behind a board with its own clock.
+    """The simulated stage behind a board with its own clock.
 
     Parameters
     ----------
@@ -67,7 +67,7 @@ class SimulatedActuator:
 
     @property
     def alarm(self) -> Alarm | None:
-        """Why it refuses to move."""
+        """Reason why the actuator refuses to move."""
         return self._alarm
 
     def raise_alarm(self, alarm: Alarm | None) -> None:
@@ -77,12 +77,12 @@ class SimulatedActuator:
             self.stop()
 
     def home(self) -> None:
-        """Go to the reference and make it position 0."""
+        """Go to the reference and define it as position 0."""
         self._ready()
         self._stage.home(self._clock.now_s(), HOMING_MM_S)
 
     def check(self, from_mm: float, to_mm: float, speed_mm_s: float) -> None:
-        """Refuse what is beyond the limits."""
+        """Refuse motions beyond the limits."""
         check_move(self.limits, to_mm, speed_mm_s)
 
     def move(self, to_mm: float, speed_mm_s: float) -> None:
@@ -100,7 +100,7 @@ class SimulatedActuator:
             self._stage.go(self._clock.now_s(), end_mm, abs(speed_mm_s))
 
     def run_step(self, number: int) -> None:
-        """Refuse: step data live in a motor controller."""
+        """Refuse: step data exist only in a motor controller."""
         raise LimitError(
             f"Step {number} must be kept by a motor controller, but the simulated actuator has none: use move."
         )
@@ -110,7 +110,7 @@ class SimulatedActuator:
         self._stage.halt(self._clock.now_s())
 
     def readings(self) -> tuple[Reading, ...]:
-        """Positions since the last call: at the board's own rate, about every edge, and as of now."""
+        """Positions since the last call: at the board's sampling times, around every edge of a signal, and now."""
         asked_s = self._clock.now_s()
         answer_s = ANSWER_S + SLOW_ANSWER_S * float(self._rng.random())
         self._clock.wait_until(asked_s + answer_s)
@@ -126,12 +126,12 @@ class SimulatedActuator:
         return (*streamed[:-1], replace(streamed[-1], asked_s=asked_s))
 
     def _ticks_s(self, began_s: float) -> Array:
-        """Times since the last answer at which the board looked by itself."""
+        """Sampling times of the board since the last reading (s)."""
         first, last = (self._board.shows_s(at_s) * RATE_HZ for at_s in (began_s, self._read_until_s))
         return np.array([self._board.bed_s(tick / RATE_HZ) for tick in range(int(first) + 1, int(last) + 1)])
 
     def _edges_s(self, began_s: float) -> Array:
-        """Times shortly before and after every edge of the encoder's and the BUSY line since the last answer."""
+        """Times just before and after every edge of the encoder's and the BUSY signal since the last reading (s)."""
         edges_s = self._stage.turns_s(began_s, self._read_until_s)
         if self._step_mm > 0.0:
             edges_s += self._borders_s(began_s)
@@ -139,7 +139,7 @@ class SimulatedActuator:
         return np.array([at_s for at_s in around_s if began_s < at_s < self._read_until_s])
 
     def _borders_s(self, began_s: float) -> list[float]:
-        """Times at which the stage passed from one step of the encoder to the next, by bisection."""
+        """Times at which the stage passed from one encoder step to the next, by bisection (s)."""
         grid_s = np.linspace(began_s, self._read_until_s, int((self._read_until_s - began_s) / EDGE_GRID_S) + 2)
         cells = self._stage.at_mm(grid_s) / self._step_mm + 0.5
         low_s, high_s, border = [], [], []
@@ -190,12 +190,12 @@ def _limits(section: Section) -> StageLimits:
 
 
 def without_hardware(section: Section, folder: Path) -> FreeMoves:
-    """What the stage can do, for a plan that is checked away from the bed."""
+    """Limits of the stage, for checking a plan without the bed."""
     return FreeMoves(_limits(section))
 
 
 def build(section: Section, context: BuildContext) -> SimulatedActuator:
-    """Build it from its section of the configuration."""
+    """Build the actuator from its section of the configuration."""
     limits = _limits(section)
     rng = np.random.default_rng([context.seed, 1])
     # A controller knows the bed's limits as its own: not even its inaccuracy takes the stage beyond them.

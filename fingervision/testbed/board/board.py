@@ -1,4 +1,4 @@
-"""A board that is set up: its lines, its force channel, its clock."""
+"""A board after its set-up: its lines, its force channel, its clock."""
 
 import random
 from collections import deque
@@ -30,14 +30,14 @@ DROPPED = {
 
 @dataclass(frozen=True, slots=True)
 class ForceSample:
-    """Level of the force channel, 0 to 1023, at the board's time."""
+    """Level of the force channel, 0 to 1023, with the board's time."""
 
     board_s: float
     level: int
 
 
 class Board:
-    """One board; made with `opened`. Several parts may share it.
+    """A board, opened by `opened`. Several parts of a bed may share it.
 
     Parameters
     ----------
@@ -64,40 +64,46 @@ class Board:
 
     @property
     def levels(self) -> wire.Levels:
-        """Output lines of the controller that are active, as last reported."""
+        """Active output lines of the controller, as last reported."""
         self._link.check()
         return self._levels
 
     @property
     def dropped(self) -> str | None:
-        """Why the drive line was dropped, in words; None if it was not."""
+        """Reason why the drive line was released, in words; None if it was not."""
         words = DROPPED.get(self._cause)
         return None if words is None else words.format(silence_ms=self.settings.silence_ms)
 
     @property
     def dropped_code(self) -> str:
-        """Code of the board for why the drive line was dropped."""
+        """The board's code for the reason why the drive line was released."""
         return self._cause
 
     @property
     def clock(self) -> JoinedClock:
-        """Its clock, joined to the host's."""
+        """The board's clock, synchronised with the host's."""
         joined = self._link.joined
         assert joined is not None  # noqa: S101 - a board is opened only with its clock joined
         return joined
 
     @property
     def damaged_lines(self) -> int:
-        """Lines that came with a wrong checksum."""
+        """Number of lines received with a wrong checksum."""
         return self._link.damaged_lines
 
     @property
     def driven_board_s(self) -> float | None:
-        """When the drive line last rose; None if it was not seen since the last `run`."""
+        """Time of the drive line's last rising edge on the board's clock (s).
+
+        None if there was none since the last `run`.
+        """
         return self._driven_board_s
 
     def run(self, code: int, at_most_s: float) -> None:
-        """Set the select lines, let them settle, raise the drive line; the board drops it after the longest time."""
+        """Set the select lines, let them settle, raise the drive line.
+
+        The board releases it at the latest after `at_most_s`.
+        """
         self._driven_board_s = None
         self._do(f"R {code:X} {ceil(1e3 * at_most_s):X}")
 
@@ -106,36 +112,36 @@ class Board:
         self._do("X")
 
     def stop(self) -> None:
-        """Drop drive and enable line, raise hold, within milliseconds; moves are refused until `clear`.
+        """Release drive and enable line and raise the hold line within milliseconds; motions are refused until `clear`.
 
-        It does not wait for the board, and may be called from a signal handler.
+        The call does not wait for the board, and is allowed in a signal handler.
         """
         self._link.stop()
 
     def wait_for_stop(self) -> None:
-        """Wait until a stop that was asked for has been done."""
+        """Wait until a requested stop has been executed."""
         while self._link.stopping:
             self.wait(ASK_EVERY_S)
 
     def check(self) -> None:
-        """Raise a sentence if the board is lost."""
+        """Raise an error if the board is lost."""
         self._link.check()
 
     @property
     def ready(self) -> bool:
-        """Whether a move may begin: not dropped, and enabled if there is a line for it."""
+        """Whether a motion may begin: the drive line was not released by a fault, and any enable line is up."""
         enabled = Role.ENABLE not in self.settings.lines or wire.Levels.ENABLE in self.levels
         return enabled and self.dropped is None
 
     def clear(self) -> None:
-        """Allow moves, first of all and after a stop: hold down, enable up."""
+        """Allow motions, initially and after a stop: release the hold line, raise the enable line."""
         self._do("K")
         self._cause = wire.GOING
         if Role.ENABLE in self.settings.lines:
             self._do("E 1")
 
     def wait(self, seconds: float) -> None:
-        """Wait until something has come from the board, or for so long."""
+        """Wait until a message has come from the board, at most for so many seconds."""
         self._link.wait(seconds)
         self._link.check()
 
@@ -149,12 +155,12 @@ class Board:
         return taken
 
     def hold(self) -> "Board":
-        """Count one more part that uses it."""
+        """Register one more part that uses the board."""
         self._users += 1
         return self
 
     def close(self) -> None:
-        """Count one part less; with the last one drop all lines and let go of the port."""
+        """Unregister one part; with the last one, release all lines and close the port."""
         self._users -= 1
         if self._users != 0:
             return
@@ -166,17 +172,17 @@ class Board:
             self._link.close()
 
     def on_state(self, answer: wire.Answer) -> None:
-        """Take the state (called by the link)."""
+        """Receive the board's state (called by the link)."""
         self._levels, self._cause = answer.levels, answer.cause
 
     def on_change(self, change: wire.Change, board_s: float) -> None:
-        """Take changed lines (called by the link)."""
+        """Receive changed lines (called by the link)."""
         if change.levels & ~self._levels & wire.Levels.DRIVE:
             self._driven_board_s = board_s
         self._levels = change.levels
 
     def on_sample(self, sample: wire.Sample, board_s: float) -> None:
-        """Take a force sample (called by the link)."""
+        """Receive a force sample (called by the link)."""
         number = self._numbers.of(sample.number)
         if self._next_number is not None:
             self.lost_samples += max(number - self._next_number, 0)
@@ -203,11 +209,11 @@ class Board:
 
 
 def opened(settings: BoardSettings, clock: Clock) -> Board:
-    """Open a board and set it up; who uses it says so with `hold`.
+    """Open a board and set it up; each user registers with `hold`.
 
     Raises
     ------
-    FingervisionError
+    DeviceError
         There is no such port, another program has it, nothing answers, it has another firmware, or it is wired
         otherwise than its sketch can drive.
     """

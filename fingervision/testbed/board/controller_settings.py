@@ -1,4 +1,4 @@
-"""What differs from motor controller to motor controller: its codes on the select lines, and the time that it needs."""
+"""Differences between motor controllers: their codes on the select lines, and the time that they need."""
 
 from dataclasses import dataclass
 
@@ -12,7 +12,7 @@ HOME_WITHIN_S, BUSY_WITHIN_S, ENABLE_S, LONGEST_S = 10.0, 0.5, 0.5, 60.0
 
 @dataclass(frozen=True, slots=True)
 class Codes:
-    """Codes by which the select lines of the controller name its steps.
+    """Codes by which the select lines of the controller select its steps.
 
     Parameters
     ----------
@@ -28,7 +28,7 @@ class Codes:
 
 @dataclass(frozen=True, slots=True)
 class Waits:
-    """What the controller is given time for.
+    """Time limits for the controller's signals.
 
     Parameters
     ----------
@@ -46,7 +46,7 @@ class Waits:
 
 
 def codes_of(section: Section, data: StepData) -> Codes:
-    """Read the codes, which must name all steps on four lines."""
+    """Read the codes, which must address all steps by four lines."""
     first = section.whole("first_code", 1, low=0, high=HIGHEST_CODE)
     if first + max(data.steps) - 1 > HIGHEST_CODE:
         section.refuse(

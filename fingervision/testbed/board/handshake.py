@@ -1,4 +1,4 @@
-"""One motion on parallel lines: select, settle, drive, busy, not busy; each step with its own patience."""
+"""One motion by parallel lines: select, settle, drive, busy, not busy; each phase with its own time limit."""
 
 import gc
 from collections.abc import Callable, Iterator
@@ -18,9 +18,9 @@ WAIT_S = 0.01
 
 @contextmanager
 def _no_collection() -> Iterator[None]:
-    """Keep Python's cyclic garbage for later: with large libraries loaded its collection stops all threads for 0.1 s.
+    """Suspend Python's cyclic garbage collection: with large libraries loaded it stops all threads for 0.1 s.
 
-    The board would take that for silence and stop the motor.
+    The board would take such a pause for a lost computer and stop the motor.
     """
     was_on = gc.isenabled()
     gc.disable()
@@ -33,7 +33,7 @@ def _no_collection() -> Iterator[None]:
 
 @dataclass(frozen=True, slots=True)
 class Handshake:
-    """The lines of one board.
+    """The signal lines of one board.
 
     Parameters
     ----------
@@ -53,7 +53,7 @@ class Handshake:
     stopped: Event
 
     def run(self, code: int, at_most_s: float, on_driven: Callable[[float], None]) -> bool:
-        """Run the step of a code to its end; False where it was stopped, or dropped by the board.
+        """Run the step of a code to its end; return False where it was stopped, or ended by the board.
 
         Parameters
         ----------
@@ -66,7 +66,7 @@ class Handshake:
 
         Raises
         ------
-        FingervisionError
+        DeviceError
             A step of the handshake did not come; the drive line is down then.
         """
         with _no_collection():

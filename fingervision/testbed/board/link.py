@@ -1,7 +1,7 @@
-"""The connection to a board: commands and their answers, what it streams, and what keeps it awake.
+"""Connection to a board: commands and their answers, streamed messages, and the board's watchdog.
 
-A thread of the link reads all the time. It also asks for the state every few milliseconds, which tells the board that
-the computer lives, tells the link that the board does, and joins their clocks.
+A thread of the link reads all the time. It also requests the state every few milliseconds. This tells the board that
+the computer is alive, tells the link that the board is alive, and synchronises their clocks.
 """
 
 import random
@@ -35,7 +35,7 @@ NUMBERS = 128
 
 
 class BoardRefusalError(FingervisionError):
-    """The board did not do a command; `reason` is its word for why."""
+    """The board did not execute a command; `reason` is its word for the cause."""
 
     def __init__(self, port: str | None, reason: str) -> None:
         super().__init__(f"The board on {port} refused a command ({reason}).")
@@ -43,10 +43,10 @@ class BoardRefusalError(FingervisionError):
 
 
 class Listener(Protocol):
-    """Who wants to know what the board says by itself; called by the link's thread."""
+    """Receiver of the board's unsolicited messages; called by the link's thread."""
 
     def on_state(self, answer: wire.Answer) -> None:
-        """The state, some fifty times a second."""
+        """Receive the state, about fifty times a second."""
         ...
 
     def on_change(self, change: wire.Change, board_s: float) -> None:
@@ -91,37 +91,37 @@ class BoardLink:
 
     @property
     def joined(self) -> JoinedClock | None:
-        """The board's clock on the host's; None in the first moments."""
+        """The board's clock relative to the host's; None in the first moments."""
         return self._joined
 
     @property
     def stopping(self) -> bool:
-        """Whether a stop was asked for that the board has not yet confirmed."""
+        """Whether a stop was requested that the board has not yet confirmed."""
         return self._stopping
 
     def keep_awake(self, session: int, listener: Listener) -> None:
-        """From now on, ask for the state, tell a listener what comes, and fail if the board is lost or was reset."""
+        """Begin to request the state and to pass messages to a listener; fail if the board is lost or was reset."""
         self._session, self._listener = session, listener
         self._last_heard_s = self._clock.now_s()
         self._awake = True
 
     def check(self) -> None:
-        """Raise a sentence if the connection is lost."""
+        """Raise an error if the connection is lost."""
         if self._failure is not None:
             raise DeviceError(self._failure)
 
     def wait(self, seconds: float) -> None:
-        """Wait until something has come from the board, or for so long."""
+        """Wait until a message has come from the board, at most for so many seconds."""
         with self._news:
             if self._failure is None:
                 self._news.wait(seconds)
 
     def command(self, words: str, within_s: float = ANSWER_WITHIN_S) -> wire.Answer | wire.Identity:
-        """Send a command, again if its answer is lost, and give the answer. The board does it once.
+        """Send a command, repeat it if its answer is lost, and return the answer. The board executes it only once.
 
         Raises
         ------
-        FingervisionError
+        DeviceError
             The connection is lost.
         BoardRefusalError
             The board did not do it.
@@ -144,14 +144,14 @@ class BoardLink:
         )
 
     def stop(self) -> None:
-        """Let the link's thread tell the board to stop, now and until the board has done it.
+        """Let the link's thread tell the board to stop, repeatedly until the board confirms.
 
-        It only sets a flag, so that a signal handler may call it whatever the program was doing.
+        The call only sets a flag, so that a signal handler may use it at any time.
         """
         self._stopping = True
 
     def close(self) -> None:
-        """Let go of the port; closing twice is allowed."""
+        """Close the port; closing twice is allowed."""
         self._closed = True
         self._thread.join(timeout=1.0)
         with suppress(OSError, serial.SerialException):

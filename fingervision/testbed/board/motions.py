@@ -1,4 +1,4 @@
-"""Motions behind a board, one handshake after the other in a thread of their own, and where they lead."""
+"""Motions through a board, one handshake after another in a thread of its own, and the resulting position."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -19,7 +19,7 @@ STILL = MotionProfile(0.0, 0.0, 0.0, 0.0, 0.0)
 
 @dataclass(frozen=True, slots=True)
 class Run:
-    """One handshake: a code, how long it may take, and what it does to the position; None goes to the reference."""
+    """One handshake: a code, its time limit, and its change of position; None stands for the reference."""
 
     code: int
     at_most_s: float
@@ -27,7 +27,7 @@ class Run:
 
 
 class Motions:
-    """Runs them, and follows the position by their profiles: parallel lines tell none.
+    """Runs handshakes, and computes the position from their profiles, because parallel lines report none.
 
     Parameters
     ----------
@@ -58,16 +58,16 @@ class Motions:
         return self._worker is not None and self._worker.is_alive()
 
     def forget_stop(self) -> None:
-        """Take no notice of stops until now."""
+        """Ignore stops requested until now."""
         self._stopped.clear()
 
     def stop(self) -> None:
-        """Drop the drive line at once; it may be called from a signal handler."""
+        """Release the drive line at once; may be called from a signal handler."""
         self._stopped.set()
         self._board.stop()
 
     def begin(self, runs: Sequence[Run]) -> None:
-        """Begin to run them, one after the other."""
+        """Begin to run handshakes, one after another."""
         if not runs:
             return
         self._board.wait_for_stop()
@@ -78,7 +78,7 @@ class Motions:
         self._worker.start()
 
     def wait(self, seconds: float) -> None:
-        """Wait for the end of what is under way, for so long."""
+        """Wait for the end of the present motions, at most for so many seconds."""
         if self._worker is not None:
             self._worker.join(timeout=seconds)
 

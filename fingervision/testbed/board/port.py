@@ -1,4 +1,4 @@
-"""The serial port that a board hangs on."""
+"""The serial port to which a board is connected."""
 
 import errno
 import os
@@ -19,12 +19,12 @@ WRITE_TIMEOUT_S = 1.0
 
 
 def found_ports() -> tuple[tuple[str, str], ...]:
-    """Names of this machine's serial ports, each with what hangs on it."""
+    """Names of this machine's serial ports, each with the device connected to it."""
     return tuple(sorted((port.device, port.description) for port in comports()))
 
 
 def holders_of(name: str) -> tuple[int, ...]:
-    """Other processes of this user that have a port open; none are seen on other systems than Linux."""
+    """Other processes of this user that have a port open; on systems other than Linux none are found."""
     port = Path(name).resolve()
     holders = []
     for folder in Path("/proc").glob("[0-9]*/fd"):
@@ -38,7 +38,7 @@ def holders_of(name: str) -> tuple[int, ...]:
 
 
 def fingervision_at(name: str) -> int | None:
-    """Process of another fingervision that has a port open, which may be asked to end; None if there is none."""
+    """Process of another fingervision that has a port open, and may be asked to end; None if there is none."""
     for process in holders_of(name):
         try:
             words = Path(f"/proc/{process}/cmdline").read_bytes().split(b"\0")
@@ -50,11 +50,11 @@ def fingervision_at(name: str) -> int | None:
 
 
 def opened_port(name: str) -> serial.Serial:
-    """Open a serial port for this program alone.
+    """Open a serial port for exclusive use.
 
     Raises
     ------
-    FingervisionError
+    DeviceError
         There is no such port, another program has it, or this user may not open it.
     """
     try:

@@ -9,11 +9,11 @@ KEY = "board"
 
 
 def board_of(section: Section, context: BuildContext) -> Board:
-    """Give the board that a part's section names in its key `board`, opened once.
+    """Return the board named by the key `board` of a part's section, opened once.
 
     Raises
     ------
-    FingervisionError
+    DataError, DeviceError, InputFileError
         Its file cannot be meant, or it cannot be opened.
     """
     path = context.folder / section.word(KEY)

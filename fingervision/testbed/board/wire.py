@@ -1,6 +1,6 @@
-"""Messages between computer and board, one a line, as the board's sketch speaks them (`firmware/README.md`).
+"""Messages between computer and board, one per line, as in the board's sketch (`firmware/README.md`).
 
-`words*CRC`, ended by a line feed; the CRC is CRC-16/XMODEM of the words, in four hexadecimal digits.
+A line is `words*CRC` with a line feed; the CRC is CRC-16/XMODEM of the words, in four hexadecimal digits.
 """
 
 from binascii import crc_hqx
@@ -15,7 +15,7 @@ GOING = "-"
 
 
 class Levels(IntFlag):
-    """Lines that say yes."""
+    """Lines that are active."""
 
     DRIVE = 1
     ENABLE = 2
@@ -28,7 +28,7 @@ class Levels(IntFlag):
 
 @dataclass(frozen=True, slots=True)
 class Identity:
-    """What a board says it is."""
+    """Identity that a board reports."""
 
     number: int
     name: str
@@ -38,7 +38,7 @@ class Identity:
 
 @dataclass(frozen=True, slots=True)
 class Answer:
-    """A command was done, and this is the state after it.
+    """A command was executed; this is the state after it.
 
     Parameters
     ----------
@@ -66,7 +66,7 @@ class Answer:
 
 @dataclass(frozen=True, slots=True)
 class Refusal:
-    """A command was not done, for a reason in one word."""
+    """A command was not executed, for a reason in one word."""
 
     number: int
     reason: str
@@ -74,7 +74,7 @@ class Refusal:
 
 @dataclass(frozen=True, slots=True)
 class Sample:
-    """The force channel's level, numbered (wrapping at 65536), at the board's time."""
+    """Level of the force channel, numbered (modulo 65536), with the board's time."""
 
     number: int
     time_us: int
@@ -83,7 +83,7 @@ class Sample:
 
 @dataclass(frozen=True, slots=True)
 class Change:
-    """Lines have changed to these levels; numbered (wrapping at 256), at the board's time."""
+    """New levels of the lines after a change, numbered (modulo 256), with the board's time."""
 
     number: int
     time_us: int
@@ -94,7 +94,7 @@ Message = Identity | Answer | Refusal | Sample | Change
 
 
 def encoded(words: str) -> bytes:
-    r"""Give the line of a message.
+    r"""Encode a message as a line.
 
     Examples
     --------
@@ -106,7 +106,7 @@ def encoded(words: str) -> bytes:
 
 
 def decoded(line: bytes) -> Message | None:
-    r"""Give the message of a line without its line feed, or None if it was damaged.
+    r"""Decode a line without its line feed; None if it is damaged.
 
     Examples
     --------
@@ -141,7 +141,7 @@ _READERS: dict[str, Callable[..., Message]] = {
 
 
 class Unwrapped:
-    """A counter that wraps, counted on: each value is taken as the one nearest to the last.
+    """Unwraps a counter: each value is taken as the one nearest to the previous value.
 
     Parameters
     ----------
@@ -154,7 +154,7 @@ class Unwrapped:
         self._last: int | None = None
 
     def of(self, value: int) -> int:
-        """Give the count that a wrapped value stands for."""
+        """Unwrapped count for a wrapped value."""
         if self._last is None:
             self._last = value
         ahead = (value - self._last + self._turn // 2) % self._turn - self._turn // 2

@@ -1,1 +1,1 @@
-"""Cameras of the bed, one a file: a module with `KEYS` and `build(section, context)` is a kind."""
+"""Cameras of the bed, one per file: a module with `KEYS` and `build(section, context)` is a kind."""

@@ -1,4 +1,4 @@
-"""A simulated camera: it draws the fingers as they truly stand at the time of the exposure."""
+"""A simulated camera, which draws the fingers in their true positions at the time of exposure."""
 
 from dataclasses import dataclass
 from math import hypot
@@ -38,7 +38,7 @@ SHIFT_MM = 0.5
 
 @dataclass(frozen=True, slots=True)
 class Placed:
-    """How the part lies before the camera: turned, shifted, or a slot in its place."""
+    """Placement of the part in front of the camera: rotated, shifted, or replaced by a slot."""
 
     turned: bool = False
     shift_mm: float = 0.0
@@ -47,7 +47,7 @@ class Placed:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SimulatedShot:
-    """A frame that is drawn when it is asked for, as it was seen."""
+    """A frame that is drawn when its picture is requested."""
 
     index: int
     exposure: int
@@ -63,7 +63,7 @@ class SimulatedShot:
 
 
 class SimulatedCamera:
-    """A camera before the simulated gripper, with a clock of its own.
+    """A camera in front of the simulated gripper, with a clock of its own.
 
     Parameters
     ----------
@@ -109,7 +109,7 @@ class SimulatedCamera:
         gripper.looked_at(self._own.bed_s(self._exposure / rate_hz), 1.0 / (rate_hz * self._own.rate))
 
     def next(self) -> SimulatedShot:
-        """Wait for the next frame; those that nobody waited for are gone."""
+        """Wait for the next frame; frames that nobody waited for are lost."""
         while True:
             device_s = self._exposure / self._rate_hz
             exposed_s = self._own.bed_s(device_s)
@@ -123,14 +123,14 @@ class SimulatedCamera:
         return SimulatedShot(self._index - 1, self._exposure - 1, device_s, arrived_s, exposed_s, self.placed, self)
 
     def place(self, placed: Placed) -> None:
-        """Lay the part otherwise."""
+        """Change the placement of the part."""
         self.placed = placed
 
     def close(self) -> None:
-        """Nothing to let go of."""
+        """Do nothing: there is no hardware to release."""
 
     def draw(self, shot: SimulatedShot) -> np.ndarray[tuple[int, ...], np.dtype[np.uint8]]:
-        """Draw what the shot saw."""
+        """Draw the picture of a shot."""
         optics, placed = self._optics, shot.placed
         if placed.slot_mm is not None:
             scene = self._slot(self._gripper.slot_at(placed.slot_mm, shot.exposed_s - optics.late_s))
@@ -171,7 +171,7 @@ class SimulatedCamera:
 
 
 def build(section: Section, context: BuildContext) -> SimulatedCamera:
-    """Build it from its section of the configuration."""
+    """Build the camera from its section of the configuration."""
     if context.gripper is None:
         raise DataError(
             f"A simulated camera ({section.at('kind')}) must have a simulated gripper, but the bed has none: "

@@ -1,4 +1,4 @@
-"""Any live source of frames as the bed's camera: a camera at this machine, or a network stream."""
+"""Any live source of frames as the bed's camera: a camera of this machine, or a network stream."""
 
 from collections import deque
 from dataclasses import dataclass, replace
@@ -38,7 +38,7 @@ class SourceShot:
 
 
 class SourceCamera:
-    """Reads a source in a thread of its own and hands over frames as the bed asks.
+    """Reads a source in a thread of its own, and delivers frames on request.
 
     Parameters
     ----------
@@ -77,7 +77,7 @@ class SourceCamera:
         return SourceShot(index, device_s, received.arrived_s, replace(received.item, index=index, time_s=device_s))
 
     def close(self) -> None:
-        """Let go of the source."""
+        """Release the source."""
         self._source.close()
 
     def _read(self) -> None:
@@ -95,7 +95,7 @@ class SourceCamera:
 
 
 def build(section: Section, context: BuildContext) -> SourceCamera:
-    """Open it as its section of the configuration says."""
+    """Open the source as its section of the configuration states."""
     name = section.word("source")
     size = None
     if "width_px" in section.values or "height_px" in section.values:

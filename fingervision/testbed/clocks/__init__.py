@@ -1,1 +1,1 @@
-"""The bed's clock, and the clocks of cameras and boards joined to it."""
+"""The bed's clock, and its synchronisation with the clocks of cameras and boards."""

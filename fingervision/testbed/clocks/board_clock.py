@@ -1,9 +1,9 @@
-"""The board's clock joined to the host's: offset and rate, with their uncertainty.
+"""Synchronisation of the board's clock with the host's: offset and rate, with their uncertainty.
 
-The board stamps the moment at which it has a command; that moment lies between the sending of the command and the
-coming of its answer (Cristian, "Probabilistic clock synchronization", Distributed Computing 3, 1989). Many exchanges
-narrow the interval: the rate is fitted to their midpoints, and the offset is the midpoint of the intersection of
-their intervals.
+The board stamps the time at which it receives a command; that time lies between the sending of the command and the
+arrival of its answer (Cristian, "Probabilistic clock synchronization", Distributed Computing 3, 1989). Many exchanges
+narrow the interval: the rate is fitted to their midpoints, and the offset is the midpoint of the intersection of their
+intervals.
 """
 
 from collections import deque
@@ -25,7 +25,7 @@ UNKNOWN_RATE = 0.008
 
 @dataclass(frozen=True, slots=True)
 class JoinedClock:
-    """Host time as a straight line over the board's time, near the exchanges that it was fitted to.
+    """Host time as a linear function of the board's time, near the exchanges to which it was fitted.
 
     Parameters
     ----------
@@ -48,27 +48,27 @@ class JoinedClock:
     u_rate: float
 
     def host_at(self, board_s: float) -> float:
-        """Host time of a time of the board."""
+        """Host time at a time of the board (s)."""
         return self.host_s + self.rate * (board_s - self.board_s)
 
     def u_at(self, board_s: float) -> float:
-        """Standard uncertainty of `host_at`: an even distribution within the bounds, and that of the rate."""
+        """Standard uncertainty of `host_at` (s): uniform within the bounds, combined with that of the rate."""
         return hypot(self.within_s / sqrt(3.0), self.u_rate * (board_s - self.board_s))
 
     def bounds_at(self, board_s: float) -> tuple[float, float]:
-        """Host times between which a time of the board lies (the rate's part with a coverage factor of 3)."""
+        """Bounds of the host time at a time of the board (s), with three standard uncertainties of the rate."""
         half_s = self.within_s + 3.0 * self.u_rate * abs(board_s - self.board_s)
         return self.host_at(board_s) - half_s, self.host_at(board_s) + half_s
 
 
 class ClockJoin:
-    """Collects exchanges and fits the clock to the newest."""
+    """Collects exchanges and fits the clock to the newest ones."""
 
     def __init__(self) -> None:
         self._exchanges: deque[tuple[float, float, float]] = deque()
 
     def add(self, board_s: float, earliest_s: float, latest_s: float) -> None:
-        """Take an exchange: the board's stamp, and host times between which it was made."""
+        """Add an exchange: the board's time stamp, and the host times between which it was taken."""
         self._exchanges.append((board_s, earliest_s, max(latest_s, earliest_s)))
         while self._exchanges[-1][1] - self._exchanges[0][1] > WINDOW_S:
             self._exchanges.popleft()

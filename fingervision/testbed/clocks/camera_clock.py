@@ -1,8 +1,8 @@
-"""Map a camera's clock to the bed's from the arrival times of its frames.
+"""Synchronisation of a camera's clock with the bed's, from the arrival times of its frames.
 
-A frame arrives no sooner than its exposure and the least latency, and now and then hardly later: the earliest arrivals
-lie on a line, whose slope is the rate and whose height is the offset plus the least latency. Arrivals alone cannot tell
-the two apart, so the least latency must be known (`Latency` of the camera).
+A frame arrives no sooner than its exposure plus the least latency, and occasionally hardly later. The earliest arrivals
+therefore lie on a line, whose slope is the rate and whose height is the offset plus the least latency. Arrival times
+alone cannot separate these two, so the least latency must be known (`Latency` of the camera).
 """
 
 from dataclasses import dataclass
@@ -24,7 +24,7 @@ FIRST_SCATTER_S = 1e-3
 
 @dataclass(frozen=True, slots=True)
 class CameraClock:
-    """The bed's time as a straight line over the camera's.
+    """The bed's time as a linear function of the camera's time.
 
     Parameters
     ----------
@@ -42,12 +42,12 @@ class CameraClock:
     u_s: float
 
     def bed_at(self, camera_s: float) -> float:
-        """Time of the bed at a stamp of the camera."""
+        """Time on the bed's clock at a time stamp of the camera (s)."""
         return self.bed_s + self.rate * (camera_s - self.camera_s)
 
 
 class ArrivalClock:
-    """Collects arrivals and fits the clock to the earliest.
+    """Collects arrival times and fits the clock to the earliest.
 
     Parameters
     ----------
@@ -69,7 +69,7 @@ class ArrivalClock:
             self._bins[-1] = (self._bins[-1][0], camera_s, delay_s)
 
     def joined(self) -> CameraClock:
-        """Fit the clock to what came until now."""
+        """Fit the clock to all arrivals until now."""
         _, at_s, delay_s = np.array(self._bins).T
         about_s = float(at_s[-1])
         since_s = at_s - at_s.mean()

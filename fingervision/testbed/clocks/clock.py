@@ -8,19 +8,19 @@ MOST_HURRY_S = 0.05
 
 
 class Clock(Protocol):
-    """The bed's time; every `asked_s`, `got_s` and `arrived_s` is on it."""
+    """The bed's time, to which every `asked_s`, `got_s` and `arrived_s` refers."""
 
     def now_s(self) -> float:
-        """Seconds since some fixed instant."""
+        """Seconds since a fixed instant."""
         ...
 
     def wait_until(self, time_s: float) -> None:
-        """Return at that time, or at once if it is past."""
+        """Return at that time, or at once if it is in the past."""
         ...
 
 
 class HostClock:
-    """The host's monotonic clock: of any bed with a real part."""
+    """The host's monotonic clock, used for any bed with a real part."""
 
     def now_s(self) -> float:
         """Seconds on the host's monotonic clock."""
@@ -34,9 +34,9 @@ class HostClock:
 
 
 class VirtualClock:
-    """Time of a bed without any real part: it passes only while somebody waits.
+    """Clock of a bed without any real part: its time passes only while somebody waits.
 
-    With a pace it goes no faster than that; what was missed, by a pause or a busy machine, is not hurried after.
+    With a pace, it passes no faster than that; time lost by a pause or a busy machine is not made up for.
 
     Parameters
     ----------
@@ -52,11 +52,11 @@ class VirtualClock:
         self._host_began_s: float | None = None
 
     def now_s(self) -> float:
-        """Seconds of the bed."""
+        """Seconds on the bed's clock."""
         return self._now_s
 
     def wait_until(self, time_s: float) -> None:
-        """Let time pass until then."""
+        """Let time pass until `time_s`."""
         self._now_s = max(self._now_s, time_s)
         if self._pace > 0.0:
             if self._host_began_s is None:

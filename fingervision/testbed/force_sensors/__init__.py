@@ -1,1 +1,1 @@
-"""Force sensors, one a file: a module with `KEYS` and `build(section, context)` is a kind."""
+"""Force sensors, one per file: a module with `KEYS` and `build(section, context)` is a kind."""

@@ -1,4 +1,4 @@
-"""A force sensor with an analogue output, on the board's converter."""
+"""A force sensor with an analogue output, read by the board's converter."""
 
 from collections.abc import Sequence
 from itertools import pairwise
@@ -23,7 +23,7 @@ WAIT_S = 0.005
 
 
 class BoardForceSensor:
-    """Volts turned into newtons by a table that was measured.
+    """Converts volts to newtons by a measured table.
 
     Parameters
     ----------
@@ -56,7 +56,7 @@ class BoardForceSensor:
 
         Raises
         ------
-        FingervisionError
+        DeviceError
             The board is lost, or sends no samples.
         """
         until_s = self._clock.now_s() + 1e-3 * self._board.settings.force_period_ms + ON_ITS_WAY_S
@@ -72,7 +72,7 @@ class BoardForceSensor:
         )
 
     def force_n(self, level: int) -> float:
-        """Force at a level of the converter, which stands for the middle of its step."""
+        """Force at a level of the converter, taken at the centre of its step (N)."""
         volts, newtons = self._volts, self._newtons
         at_v = (level + 0.5) * self._reference_v / CONVERTER_STEPS
         if volts[0] <= at_v <= volts[-1]:
@@ -82,14 +82,14 @@ class BoardForceSensor:
         return float(newtons[a] + slope * (at_v - volts[a]))
 
     def close(self) -> None:
-        """Let go of the board."""
+        """Release the board."""
         if not self._closed:
             self._closed = True
             self._board.close()
 
 
 def build(section: Section, context: BuildContext) -> BoardForceSensor:
-    """Build it from its section of the configuration."""
+    """Build the sensor from its section of the configuration."""
     volts, newtons = _column(section, "volts"), _column(section, "newtons")
     if len(newtons) != len(volts):
         section.refuse("newtons", f"must have as many values as volts ({len(volts)}), but has {len(newtons)}.")

@@ -1,4 +1,4 @@
-"""A simulated force sensor: the force of the simulated gripper, through a converter with steps and noise."""
+"""A simulated force sensor: the force of the simulated gripper, with the converter's quantisation and noise."""
 
 import numpy as np
 
@@ -59,7 +59,7 @@ class SimulatedForceSensor:
         self._answered_s = clock.now_s()
 
     def readings(self) -> tuple[Reading, ...]:
-        """Samples since the last call, and one as of now."""
+        """Samples since the last call, and one taken now."""
         asked_s = self._clock.now_s()
         self._clock.wait_until(asked_s + ANSWER_S)
         got_s = self._clock.now_s()
@@ -71,7 +71,7 @@ class SimulatedForceSensor:
         return (*streamed, Reading(now_s, asked_s, got_s, self._force_n(now_s)))
 
     def close(self) -> None:
-        """Nothing to let go of."""
+        """Do nothing: there is no hardware to release."""
 
     def _force_n(self, device_s: float) -> float:
         true = self._gripper.at(self._board.bed_s(device_s)).force_n
@@ -80,7 +80,7 @@ class SimulatedForceSensor:
 
 
 def build(section: Section, context: BuildContext) -> SimulatedForceSensor:
-    """Build it from its section of the configuration."""
+    """Build the sensor from its section of the configuration."""
     if context.gripper is None:
         raise DataError(
             f"A simulated force sensor ({section.at('kind')}) must have a simulated gripper, but the bed has none: "

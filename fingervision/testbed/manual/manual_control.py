@@ -1,4 +1,4 @@
-"""Single motions on request, watched until they end and stopped at a limit."""
+"""Single motions on request, monitored until they end and stopped at a limit."""
 
 import signal
 import threading
@@ -17,12 +17,12 @@ WARNING_S = 0.1
 
 
 class Interrupted(BaseException):
-    """Ctrl-C, or a request to end; the motor was stopped before it was raised."""
+    """Ctrl-C or a request to end; the motor was stopped before it was raised."""
 
 
 @dataclass(frozen=True, slots=True)
 class Looking:
-    """How a motion is looked at while it lasts: as a rule by its instruments alone, in the page frame by frame.
+    """How a motion is monitored: normally by the bed's instruments alone, on the page also by every frame.
 
     Parameters
     ----------
@@ -38,7 +38,7 @@ class Looking:
 
 
 def by_instruments(bed: Bed) -> Looking:
-    """Look at a motion by the bed's own readings."""
+    """Monitor a motion by the bed's own readings."""
     return Looking(
         lambda: bed.clock.wait_until(bed.clock.now_s() + LOOK_EVERY_S),
         lambda: bed.actuator.readings()[-1].value,
@@ -48,7 +48,7 @@ def by_instruments(bed: Bed) -> Looking:
 
 @contextmanager
 def motor_stops_first(stop: Callable[[], None]) -> Iterator[None]:
-    """Let Ctrl-C and SIGTERM stop the motor before anything else; signals are the main thread's alone."""
+    """Let Ctrl-C and SIGTERM stop the motor before anything else; signals reach the main thread only."""
     if threading.current_thread() is not threading.main_thread():
         yield
         return
@@ -66,16 +66,16 @@ def motor_stops_first(stop: Callable[[], None]) -> Iterator[None]:
 
 
 def home(bed: Bed, looking: Looking | None = None) -> float:
-    """Go to the reference; give the position then."""
+    """Go to the reference; return the position afterwards (mm)."""
     return _watched(bed, bed.actuator.home, looking=looking)
 
 
 def move(bed: Bed, to_mm: float, speed_mm_s: float, looking: Looking | None = None) -> float:
-    """Move within the bed's limits; give the position then.
+    """Move within the bed's limits; return the position afterwards (mm).
 
     Raises
     ------
-    FingervisionError
+    DeviceError, LimitError, StateError
         The target or the speed is beyond a limit (nothing was moved), or the motion was broken off.
     """
     limits = bed.limits
@@ -92,7 +92,7 @@ def move(bed: Bed, to_mm: float, speed_mm_s: float, looking: Looking | None = No
 
 
 def jog(bed: Bed, speed_mm_s: float, for_s: float = inf, looking: Looking | None = None) -> float:
-    """Move at a signed speed until stopped, for a time, or to the bed's limit; give the position then."""
+    """Move at a signed speed until stopped, for a time, or to the bed's limit; return the position afterwards (mm)."""
     _check_speed(bed, abs(speed_mm_s))
     end_mm = bed.limits.upper_mm if speed_mm_s > 0.0 else bed.limits.lower_mm
     # A block that has begun goes to its end unless it is stopped in time.
@@ -105,7 +105,7 @@ def jog(bed: Bed, speed_mm_s: float, for_s: float = inf, looking: Looking | None
 
 
 def run_step(bed: Bed, number: int) -> float:
-    """Run a step data block; give the position then."""
+    """Run a step data block; return the position afterwards (mm)."""
     return _watched(bed, lambda: bed.actuator.run_step(number))
 
 

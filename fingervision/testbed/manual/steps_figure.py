@@ -1,4 +1,4 @@
-"""A sequence of steps over time: position and speed, as a picture."""
+"""Figure of a sequence of steps: position and speed over time."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -21,11 +21,11 @@ TITLE_PAD_POINTS = 30.0
 
 
 def draw_steps(path: Path, name: str, motions: Sequence[PlannedMotion], limits: StageLimits) -> None:
-    """Draw position and speed of a sequence over time, each motion with its number, pushing ones shaded.
+    """Draw position and speed of a sequence over time, with each motion numbered and pushing ones shaded.
 
     Raises
     ------
-    FingervisionError
+    OutputError
         The picture cannot be written.
     """
     figure = Figure(figsize=SIZE_INCHES, layout="constrained")
@@ -56,7 +56,7 @@ def draw_steps(path: Path, name: str, motions: Sequence[PlannedMotion], limits: 
 
 
 def _draw_motion(upper: Axes, lower: Axes, planned: PlannedMotion, begin_s: float, standing_s: float) -> float:
-    """Draw one motion and the stand after it; give the time of its end."""
+    """Draw one motion and the pause after it; return the time of its end (s)."""
     motion = planned.motion
     end_s = begin_s + motion.seconds
     since_s = np.append(np.linspace(0.0, motion.seconds, POINTS_PER_MOTION), motion.seconds + standing_s)

@@ -12,7 +12,7 @@ HEADER = (
 
 
 def steps_table(motions: Sequence[PlannedMotion]) -> str:
-    """Give one line a motion, columns aligned to the right."""
+    """Format one line per motion, with columns aligned to the right."""
     rows = [HEADER, *(_row(motion) for motion in motions)]
     widths = [max(len(row[column]) for row in rows) for column in range(len(HEADER))]
     return "\n".join(

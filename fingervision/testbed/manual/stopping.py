@@ -1,4 +1,4 @@
-"""Stopping a bed, also one that another process drives."""
+"""Stop a bed, also one that is driven by another process."""
 
 import os
 import signal
@@ -13,7 +13,7 @@ LOOK_EVERY_S = 0.02
 
 
 def stop_bed(name: str) -> str:
-    """Stop a bed's motor, and say what was done.
+    """Stop a bed's motor, and return a sentence on what was done.
 
     Parameters
     ----------
@@ -22,7 +22,7 @@ def stop_bed(name: str) -> str:
 
     Raises
     ------
-    FingervisionError
+    DataError, DeviceError, InputFileError, UsageError
         The bed cannot be opened, or the other process does not let go of it.
     """
     if name == SIMULATED:

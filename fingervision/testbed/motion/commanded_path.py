@@ -1,4 +1,4 @@
-"""Position over time of an actuator without a readable encoder, from its motion profiles."""
+"""Position over time of an actuator without a readable encoder, computed from its motion profiles."""
 
 from dataclasses import dataclass
 
@@ -20,7 +20,7 @@ class _Piece:
 
 
 class CommandedPath:
-    """Position over time; between motions it stands.
+    """Position over time; constant between motions.
 
     Parameters
     ----------
@@ -32,15 +32,15 @@ class CommandedPath:
         self._pieces: list[_Piece] = [_Piece(-np.inf, at_mm, MotionProfile(0.0, 0.0, 0.0, 0.0, 0.0), np.inf)]
 
     def begin(self, begin_s: float, motion: MotionProfile) -> None:
-        """A motion begins where the last one ended."""
+        """Begin a motion where the last one ended."""
         self._pieces.append(_Piece(begin_s, self.at_mm(begin_s), motion, np.inf))
 
     def jump(self, time_s: float, to_mm: float) -> None:
-        """From then on it is known to stand elsewhere: homed, or turned by hand."""
+        """Set the position from a time on: after homing, or after a turn by hand."""
         self._pieces.append(_Piece(time_s, to_mm, MotionProfile(0.0, 0.0, 0.0, 0.0, 0.0), np.inf))
 
     def break_off(self, time_s: float) -> None:
-        """The motion under way ends then."""
+        """End the present motion at a time."""
         last = self._pieces[-1]
         self._pieces[-1] = _Piece(last.begin_s, last.from_mm, last.motion, max(time_s, last.begin_s))
 
@@ -51,7 +51,7 @@ class CommandedPath:
         return piece.from_mm + float(piece.motion.travelled_mm(np.array([since_s]))[0])
 
     def times_of_motion_s(self, from_s: float, to_s: float, every_s: float) -> Floats:
-        """Times, so far apart, between two times at which it moves.
+        """Times at intervals of `every_s`, between two times, at which the stage moves.
 
         Returns
         -------

@@ -1,10 +1,10 @@
-"""Position of a stage between the steps of its encoder, from the times of its edges.
+"""Interpolation of a stage's position between the steps of its encoder, from the times of its edges.
 
-An encoder resolves the position to one step; at the moment of a transition the stage is exactly on the border of two
-steps. Between two borders a stage moves evenly, and where it stops follows from its speed until the controller says
-that the motion is over. A step of 30 um by itself leaves 9 um (30 / sqrt 12), 67 um of gap, and a play would keep
-that through a whole hold; edges stamped to 4 us leave nanometres, and readings 200 times a second at 0.5 mm/s leave 1
-um.
+An encoder resolves the position to one step; at a transition the stage is exactly at the border of two steps. Between
+two borders the stage is assumed to move at constant speed; where it stops follows from its speed until the controller
+reports the end of the motion. Without interpolation, an encoder step of 30 µm leaves 9 µm (30 / sqrt 12), which is 67
+µm of gap, and play would keep that error during a whole stop. Edges with time stamps to 4 µs leave nanometres; readings
+200 times a second at 0.5 mm/s leave 1 µm.
 """
 
 from bisect import bisect_right
@@ -24,14 +24,14 @@ MOST_KNOTS = 4000
 
 @dataclass(frozen=True, slots=True)
 class Knot:
-    """A place and time that are known, on the instrument's clock."""
+    """A known position and its time on the instrument's clock."""
 
     device_s: float
     position_mm: float
 
 
 class StageTrack:
-    """Follows a stage by its readings.
+    """Computes the stage's position from its readings.
 
     Parameters
     ----------
@@ -50,7 +50,7 @@ class StageTrack:
         self._lost = False
 
     def add(self, reading: Reading) -> None:
-        """Take a reading; older ones than the last are not looked at."""
+        """Add a reading; readings older than the last one are ignored."""
         last, self._last = self._last, reading
         if last is None:
             self._note(Knot(reading.device_s, reading.value))
@@ -76,7 +76,7 @@ class StageTrack:
                 self._note(Knot(between_s, self._onwards_mm(between_s, reading.value)))
 
     def at_mm(self, device_s: float, *, at_once: bool = False) -> float | None:
-        """Position at a time of the instrument's clock.
+        """Position at a time on the instrument's clock (mm).
 
         Parameters
         ----------
@@ -107,7 +107,7 @@ class StageTrack:
         return a.position_mm + share * (b.position_mm - a.position_mm)
 
     def _onwards_mm(self, device_s: float, cell_mm: float) -> float:
-        """Go on from the last border at the motion's speed, but not out of the cell that the encoder tells."""
+        """Extrapolate from the last border at the motion's speed, within the cell that the encoder reports."""
         if len(self._borders) < 2:
             return cell_mm
         first, last = self._borders[0], self._borders[-1]

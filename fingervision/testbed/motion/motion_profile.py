@@ -1,9 +1,9 @@
 """Trapezoidal speed profile of one motion: acceleration, constant speed, deceleration.
 
 The formulas are those of uniformly accelerated motion. With equal accelerations the triangle of distance s and time T
-has its peak at v = 2 s / T with a = 4 s / T^2; the trapezoid of top speed v takes T = s / v + v / a. Which shape a real
-controller gives a block in cycle-time entry is not published: here it is the one with the least acceleration, hence
-the least force, that keeps the top speed.
+has its peak at v = 2 s / T with a = 4 s / T^2; the trapezoid of top speed v takes T = s / v + v / a. The shape that a
+real controller uses for a block in cycle-time entry is not published. Here it is the one with the least acceleration,
+hence the least force, that respects the top speed.
 """
 
 from dataclasses import dataclass
@@ -39,21 +39,21 @@ class MotionProfile:
 
     @property
     def seconds(self) -> float:
-        """Time from stand to stand."""
+        """Duration from rest to rest."""
         return self.speeding_s + self.cruising_s + self.slowing_s
 
     @property
     def acceleration_mm_s2(self) -> float:
-        """Acceleration while speeding up; 0 without a motion."""
+        """Acceleration at the beginning (mm/s²); 0 without a motion."""
         return self.speed_mm_s / self.speeding_s if self.speeding_s > 0.0 else 0.0
 
     @property
     def deceleration_mm_s2(self) -> float:
-        """Deceleration while slowing down; 0 without a motion."""
+        """Deceleration at the end (mm/s²); 0 without a motion."""
         return self.speed_mm_s / self.slowing_s if self.slowing_s > 0.0 else 0.0
 
     def speeds_mm_s(self, time_s: Floats) -> Floats:
-        """Signed speed at times from the start; 0 before and after.
+        """Signed speed at times since the start (mm/s); 0 before and after the motion.
 
         Parameters
         ----------
@@ -68,7 +68,7 @@ class MotionProfile:
         return np.interp(time_s, knots_s, knots_mm_s)
 
     def travelled_mm(self, time_s: Floats) -> Floats:
-        """Signed way gone at times from the start: the integral of the speed.
+        """Signed distance covered at times since the start (mm): the integral of the speed.
 
         Parameters
         ----------
@@ -94,7 +94,7 @@ class MotionProfile:
 
 
 def shortest_s(distance_mm: float, top_speed_mm_s: float, top_acceleration_mm_s2: float) -> float:
-    """Least time from stand to stand within a top speed and a top acceleration.
+    """Least duration from rest to rest within a top speed and a top acceleration (s).
 
     Examples
     --------
@@ -108,7 +108,7 @@ def shortest_s(distance_mm: float, top_speed_mm_s: float, top_acceleration_mm_s2
 
 
 def profile(distance_mm: float, entry: CycleTime | SpeedEntry, top_speed_mm_s: float) -> MotionProfile:
-    """Profile of a motion as its block asks for it.
+    """Profile of a motion as specified by its block.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Check a requested move against the limits of the stage."""
+"""Check a requested motion against the limits of the stage."""
 
 from dataclasses import dataclass
 
@@ -7,11 +7,11 @@ from fingervision.testbed.actuator import StageLimits
 
 
 def check_move(limits: StageLimits, to_mm: float, speed_mm_s: float) -> None:
-    """Refuse a target beyond the stroke, and a speed that is none or too high.
+    """Refuse a target beyond the stroke, and a speed that is not positive or too high.
 
     Raises
     ------
-    FingervisionError
+    LimitError
         The sentence says the limit and what was asked for.
     """
     if not limits.lower_mm <= to_mm <= limits.upper_mm:
@@ -29,7 +29,7 @@ def check_speed(limits: StageLimits, speed_mm_s: float) -> None:
 
     Raises
     ------
-    FingervisionError
+    LimitError
         The sentence says the limit and what was asked for.
     """
     if not 0.0 <= speed_mm_s <= limits.speed_mm_s:
@@ -40,7 +40,7 @@ def check_speed(limits: StageLimits, speed_mm_s: float) -> None:
 
 @dataclass(frozen=True, slots=True)
 class FreeMoves:
-    """A stage that goes anywhere within its limits.
+    """A stage that can go anywhere within its limits.
 
     Parameters
     ----------
@@ -52,5 +52,5 @@ class FreeMoves:
     has_steps: bool = False
 
     def check(self, from_mm: float, to_mm: float, speed_mm_s: float) -> None:
-        """Refuse what is beyond the limits."""
+        """Refuse motions beyond the limits."""
         check_move(self.limits, to_mm, speed_mm_s)

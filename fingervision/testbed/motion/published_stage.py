@@ -1,4 +1,4 @@
-"""The stage of the published test bed: section 3 of the paper."""
+"""Limits of the stage of the published test bed (Hricko & Havlik, 2015, section 3)."""
 
 from fingervision.storage.toml_section import Section
 from fingervision.testbed.actuator import StageLimits
@@ -9,7 +9,7 @@ KEYS = ("lower_mm", "upper_mm", "speed_mm_s", "force_n", "accuracy_mm")
 
 
 def stage_limits(section: Section) -> StageLimits:
-    """Limits of a stage as its section of the configuration states them, the published ones where it does not."""
+    """Limits of a stage from its section of the configuration, with the published ones as defaults."""
     lower_mm = section.number("lower_mm", PUBLISHED.lower_mm)
     return StageLimits(
         lower_mm=lower_mm,

@@ -1,4 +1,4 @@
-"""Soft limits: what a recipe or a jog may ask for, within what the actuator can do."""
+"""Soft limits: the range allowed for recipes and jogs, within the limits of the actuator."""
 
 from dataclasses import dataclass, replace
 
@@ -7,7 +7,7 @@ from fingervision.testbed.actuator import StageLimits
 
 @dataclass(frozen=True, slots=True)
 class SoftLimits:
-    """Limits of one bed; checked before anything moves, and watched while it moves.
+    """Limits of one bed, checked before any motion and monitored during it.
 
     Parameters
     ----------
@@ -28,7 +28,7 @@ class SoftLimits:
     gap_mm: float = 0.0
 
     def within(self, able: StageLimits) -> "SoftLimits":
-        """Limit them further to what an actuator can do."""
+        """Narrow the limits to those of an actuator."""
         return replace(
             self,
             lower_mm=max(self.lower_mm, able.lower_mm),

@@ -1,4 +1,4 @@
-"""What a stage can do, as the [actuator] section of a bed file states it for a controller that does not tell."""
+"""Limits of a stage from the [actuator] section of a bed file, for a controller that does not report them."""
 
 from fingervision.storage.toml_section import Section
 from fingervision.testbed.actuator import StageLimits
@@ -11,7 +11,10 @@ ENDLESS_N = 1e9
 
 
 def stated_limits(section: Section) -> StageLimits:
-    """Read the keys of `KEYS`; without accuracy, encoder step, repeatability and settling the stage is exact."""
+    """Read the keys of `KEYS`.
+
+    Without accuracy, encoder step, repeatability and settling the stage is taken as exact.
+    """
     lower_mm = section.number("lower_mm")
     return StageLimits(
         lower_mm=lower_mm,

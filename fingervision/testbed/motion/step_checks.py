@@ -1,4 +1,4 @@
-"""Whether a stage can execute a sequence of step data; checked before anything moves."""
+"""Check whether a stage can execute a sequence of step data, before anything moves."""
 
 from dataclasses import dataclass
 
@@ -39,7 +39,7 @@ class PlannedMotion:
 
 
 def planned(number: int, step: Step, from_mm: float, limits: StageLimits) -> PlannedMotion:
-    """One motion as the stage will do it.
+    """Compute one motion as the stage will execute it.
 
     Parameters
     ----------
@@ -54,7 +54,7 @@ def planned(number: int, step: Step, from_mm: float, limits: StageLimits) -> Pla
 
     Raises
     ------
-    FingervisionError
+    LimitError
         The motion leaves the stroke, is faster than the stage, or needs more force; the sentence says which and by how
         much, and for a time that is too short the shortest.
     """
@@ -100,14 +100,14 @@ def _check_speed(number: int, step: Step, way_mm: float, limits: StageLimits) ->
 
 
 def _rounded_up(seconds: float) -> float:
-    """A time to a tenth of a millisecond that is surely long enough."""
+    """Round a duration up to a tenth of a millisecond."""
     return (int(seconds * 1e4) + 1) / 1e4
 
 
 def planned_sequence(data: StepData, limits: StageLimits, from_mm: float | None = None) -> tuple[PlannedMotion, ...]:
-    """All motions of the sequence, one after the other.
+    """Compute all motions of the sequence, one after another.
 
-    A block outside the sequence is checked when it is run: before that, nobody knows where it starts.
+    A block outside the sequence is checked when it is run, because its start position is unknown before that.
 
     Parameters
     ----------
@@ -120,7 +120,7 @@ def planned_sequence(data: StepData, limits: StageLimits, from_mm: float | None 
 
     Raises
     ------
-    FingervisionError
+    LimitError
         A motion cannot be done.
     """
     motions: list[PlannedMotion] = []

@@ -1,6 +1,6 @@
-"""The sequence of step data blocks that leads to a position.
+"""Find the sequence of step data blocks that leads to a position.
 
-A controller on parallel lines knows no other targets than those of its blocks.
+A controller on parallel lines can reach only the targets of its blocks.
 """
 
 from collections.abc import Iterator, Mapping
@@ -17,7 +17,7 @@ MOST_BLOCKS = 200
 
 
 def nominal_speed_mm_s(step: Step, way_mm: float, top_speed_mm_s: float) -> float:
-    """Speed that a block states, or that its positioning time asks for."""
+    """Speed stated by a block, or resulting from its positioning time (mm/s)."""
     if isinstance(step.entry, CycleTime):
         return profile(way_mm, step.entry, top_speed_mm_s).speed_mm_s
     return step.entry.speed_mm_s
@@ -26,10 +26,10 @@ def nominal_speed_mm_s(step: Step, way_mm: float, top_speed_mm_s: float) -> floa
 def route(
     steps: Mapping[int, Step], at_mm: float | None, to_mm: float, speed_mm_s: float, top_speed_mm_s: float
 ) -> tuple[int, ...]:
-    """Numbers of the moving blocks that lead to a position without being faster than asked.
+    """Numbers of the moving blocks that lead to a position without exceeding the requested speed.
 
-    An absolute block is taken before a repeated relative one, that before an absolute block with relative ones after
-    it; of several the fastest, with the fewest blocks.
+    An absolute block is preferred to a repeated relative one, and that to an absolute block followed by relative ones;
+    among several the fastest is chosen, with the fewest blocks.
 
     Parameters
     ----------
@@ -46,7 +46,7 @@ def route(
 
     Raises
     ------
-    FingervisionError
+    LimitError
         No blocks lead there, or only faster ones.
     """
     if at_mm is not None and abs(to_mm - at_mm) <= SAME_MM:
@@ -77,7 +77,7 @@ def _moving(steps: Mapping[int, Step]) -> dict[int, Step]:
 def _routes(
     steps: Mapping[int, Step], at_mm: float | None, to_mm: float, top_speed_mm_s: float
 ) -> Iterator[tuple[tuple[int, ...], float, int]]:
-    """Each way there: blocks, its highest speed, and how roundabout its kind is."""
+    """Each possible sequence: its blocks, its highest speed, and the rank of its kind."""
     moving = _moving(steps)
     absolute = {n: step for n, step in moving.items() if step.coordinates is Coordinates.ABSOLUTE}
     starts: list[tuple[tuple[int, ...], float, float, int]] = []
@@ -99,11 +99,11 @@ def _routes(
 
 
 def jog_step(steps: Mapping[int, Step], speed_mm_s: float, top_speed_mm_s: float) -> int:
-    """Number of the relative block to repeat for a jog: the fastest in that direction that is not too fast.
+    """Number of the relative block to repeat for a jog: the fastest in that direction within the requested speed.
 
     Raises
     ------
-    FingervisionError
+    LimitError
         There is none.
     """
     speeds = {

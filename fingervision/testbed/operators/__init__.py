@@ -1,1 +1,1 @@
-"""The operator, who does the manual steps of a recipe, and the terminal through which she is asked."""
+"""The operator, who performs the manual steps of a recipe, and the terminal that asks for them."""

@@ -1,4 +1,4 @@
-"""The kinds of operators: a person at the terminal, or nobody where the device is simulated."""
+"""Kinds of operators: a person at the terminal, or an immediate action where the camera is simulated."""
 
 from dataclasses import replace
 
@@ -10,7 +10,7 @@ from fingervision.testbed.terminal import TERMINAL
 
 
 class AtTheBed:
-    """A person who is asked on the terminal, and says when it is done."""
+    """A person who is asked on the terminal, and confirms when the step is done."""
 
     def turn_part(self) -> None:
         """Ask for it."""
@@ -37,7 +37,7 @@ class AtTheBed:
 
 
 class AtTheSimulation:
-    """Nobody: the simulated part is laid otherwise at once.
+    """Operator of a simulated bed: the placement of the simulated part changes at once.
 
     Parameters
     ----------
@@ -54,12 +54,12 @@ class AtTheSimulation:
         self._camera.place(replace(placed, turned=not placed.turned))
 
     def shift_picture(self) -> None:
-        """Shift it, and the next time back."""
+        """Shift the part, and shift it back the next time."""
         placed = self._camera.placed
         self._camera.place(replace(placed, shift_mm=SHIFT_MM - placed.shift_mm))
 
     def put_in_slot(self, size_mm: float) -> None:
-        """Draw a slot instead."""
+        """Draw a slot in place of the fingers."""
         self._camera.place(replace(self._camera.placed, slot_mm=size_mm))
 
     def take_out_slot(self) -> None:
@@ -68,5 +68,5 @@ class AtTheSimulation:
 
 
 def operator_of(camera: BedCamera | None) -> Operator:
-    """Choose who works at a simulated bed."""
+    """Choose the operator of a bed by its camera."""
     return AtTheSimulation(camera) if isinstance(camera, SimulatedCamera) else AtTheBed()

@@ -1,4 +1,4 @@
-"""Kinds of a recipe's steps, one a file: `KEYS` and `acts(section, at_mm)`, which says what the bed does for it."""
+"""Kinds of recipe steps, one per file: `KEYS` and `acts(section, at_mm)`, which returns the bed's actions."""
 
 import importlib
 import pkgutil
@@ -15,12 +15,12 @@ Asked = tuple[Act, str]
 
 
 class StepKind(Protocol):
-    """A module of this package."""
+    """Protocol of a module that defines a kind of recipe step."""
 
     KEYS: tuple[str, ...]
 
     def acts(self, section: Section, at_mm: float) -> Iterator[Asked]:
-        """Say what the bed does for a step that begins at a position."""
+        """Actions of the bed for a step that begins at a given position."""
         ...
 
 
@@ -30,7 +30,7 @@ def step_kinds() -> tuple[str, ...]:
 
 
 def kind_of(section: Section) -> StepKind:
-    """Find the kind of a step, and refuse keys that it does not know."""
+    """Find the kind of a step, and refuse keys that the kind does not know."""
     name = section.word("kind", of=step_kinds())
     kind: StepKind = importlib.import_module(f"{__name__}.{name}")
     section.only(("kind", *kind.KEYS))
@@ -38,7 +38,7 @@ def kind_of(section: Section) -> StepKind:
 
 
 def frames_of(section: Section) -> Frames:
-    """Read `frames`: the word continuous, or a number for each point."""
+    """Read `frames`: the word continuous, or a number per point."""
     value = section.values.get("frames", CONTINUOUS)
     if value == CONTINUOUS:
         return None

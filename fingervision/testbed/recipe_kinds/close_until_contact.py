@@ -1,4 +1,4 @@
-"""Close until the fingers meet something, with a limit of force."""
+"""Recipe step: close until the fingers meet an object or each other, with a force limit."""
 
 from collections.abc import Iterator
 
@@ -10,6 +10,6 @@ KEYS = ("speed_mm_s", "below_force_n")
 
 
 def acts(section: Section, at_mm: float) -> Iterator[Asked]:
-    """One motion that ends by what is felt and seen."""
+    """One motion, which ends when force or picture shows contact."""
     speed, force_n = section.number("speed_mm_s", above=0.0), section.number("below_force_n", above=0.0)
     yield Close(speed, force_n), "below_force_n"

@@ -1,4 +1,4 @@
-"""Move to a position."""
+"""Recipe step: move to a position."""
 
 from collections.abc import Iterator
 
@@ -10,5 +10,5 @@ KEYS = ("to_mm", "speed_mm_s", "frames")
 
 
 def acts(section: Section, at_mm: float) -> Iterator[Asked]:
-    """One motion; with a number of frames they are taken at its end."""
+    """One motion; frames, if requested by number, are taken at its end."""
     yield Go(section.number("to_mm"), section.number("speed_mm_s", above=0.0), frames_of(section)), "to_mm"

@@ -1,4 +1,4 @@
-"""Measure a slot of known width in the gripper's place."""
+"""Recipe step: measure a slot of known width in place of the gripper."""
 
 from collections.abc import Iterator
 
@@ -10,5 +10,5 @@ KEYS = ("size_mm", "u_size_mm")
 
 
 def acts(section: Section, at_mm: float) -> Iterator[Asked]:
-    """Have it put in, measure, have it taken out."""
+    """Have the slot put in, measure it, and have it taken out."""
     yield Slot(section.number("size_mm", above=0.0), section.number("u_size_mm", 0.0, low=0.0)), "size_mm"

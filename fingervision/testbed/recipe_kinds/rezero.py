@@ -1,4 +1,4 @@
-"""Reference the stage anew."""
+"""Recipe step: reference the stage again."""
 
 from collections.abc import Iterator
 
@@ -10,5 +10,5 @@ KEYS = ()
 
 
 def acts(section: Section, at_mm: float) -> Iterator[Asked]:
-    """Once; a new run begins with it."""
+    """One action, with which a new run begins."""
     yield Rezero(), "kind"

@@ -1,4 +1,4 @@
-"""Shift the picture, so that the fingers stand elsewhere in it."""
+"""Recipe step: shift the picture, so that the fingers appear elsewhere in it."""
 
 from collections.abc import Iterator
 
@@ -10,5 +10,5 @@ KEYS = ()
 
 
 def acts(section: Section, at_mm: float) -> Iterator[Asked]:
-    """Once; a new run begins with it."""
+    """One action, with which a new run begins."""
     yield Shift(), "kind"

@@ -1,4 +1,4 @@
-"""A sine about a mean."""
+"""Recipe step: a sinusoidal motion about a mean position."""
 
 from collections.abc import Iterator
 
@@ -12,7 +12,7 @@ SLOWEST_APPROACH_MM_S = 0.05
 
 
 def acts(section: Section, at_mm: float) -> Iterator[Asked]:
-    """To the mean, then swing."""
+    """Move to the mean position, then oscillate."""
     mean_mm, amplitude_mm = section.number("mean_mm"), section.number("amplitude_mm", above=0.0)
     frequency_hz = section.number("frequency_hz", above=0.0, high=10.0)
     cycles = section.number("cycles", 1.0, above=0.0)
@@ -25,5 +25,5 @@ def acts(section: Section, at_mm: float) -> Iterator[Asked]:
 
 
 def fastest_mm_s(swing: Swing) -> float:
-    """Speed through the mean: 2 pi f A."""
+    """Highest speed, at the mean position: 2 pi f A (mm/s)."""
     return 6.283185307179586 * swing.frequency_hz * swing.amplitude_mm

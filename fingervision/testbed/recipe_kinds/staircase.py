@@ -1,4 +1,4 @@
-"""Equal steps from one position to another, with a dwell on each level."""
+"""Recipe step: equal increments from one position to another, with a dwell at each level."""
 
 from collections.abc import Iterator
 
@@ -10,7 +10,7 @@ KEYS = ("from_mm", "to_mm", "steps", "dwell_s", "speed_mm_s", "frames")
 
 
 def acts(section: Section, at_mm: float) -> Iterator[Asked]:
-    """One level after the other, the first and the last included."""
+    """One level after another, including the first and the last."""
     from_mm, to_mm = section.number("from_mm"), section.number("to_mm")
     steps, dwell_s = section.whole("steps", low=1, high=10000), section.number("dwell_s", 0.0, low=0.0)
     speed, frames = section.number("speed_mm_s", above=0.0), frames_of(section)

@@ -1,4 +1,4 @@
-"""Turn the part by 180 degrees in the picture."""
+"""Recipe step: turn the part by 180 degrees in the picture."""
 
 from collections.abc import Iterator
 
@@ -10,5 +10,5 @@ KEYS = ()
 
 
 def acts(section: Section, at_mm: float) -> Iterator[Asked]:
-    """Once; a new run begins with it."""
+    """One action, with which a new run begins."""
     yield Turn(), "kind"

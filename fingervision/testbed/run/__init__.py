@@ -1,1 +1,1 @@
-"""A recipe on a bed: planned, checked, watched while it moves, recorded."""
+"""Execution of a recipe on a bed: planned, checked, monitored during motion, recorded."""

@@ -1,4 +1,4 @@
-"""Pause, go on, stop: by Ctrl-C, by a request to terminate, or by a letter on the terminal."""
+"""Controls of a run (pause, continue, stop) by Ctrl-C, SIGTERM, or a letter on the terminal."""
 
 import signal
 import threading
@@ -12,17 +12,17 @@ PAUSE_LETTER, STOP_LETTER = "p", "q"
 
 
 class Controls:
-    """What the user wants, from any thread.
+    """The user's commands, from any thread.
 
-    Plain flags, each set in one instruction: a signal handler that had to wait for a lock would wait for the program
-    that it interrupted.
+    They are plain flags, each set in one instruction, because a signal handler that waited for a lock would block the
+    program that it interrupted.
 
     Attributes
     ----------
     stopped, paused : bool
         Whether the run shall end, or wait.
     halted : bool
-        Whether a pause has stopped the motor since somebody last set it to False.
+        Whether a pause has stopped the motor since the flag was last set to False.
     """
 
     def __init__(self) -> None:
@@ -31,7 +31,7 @@ class Controls:
 
     @property
     def waits(self) -> bool:
-        """Whether nothing shall happen for now."""
+        """Whether the run is paused."""
         return self.paused and not self.stopped
 
     def stop(self) -> None:
@@ -40,7 +40,7 @@ class Controls:
         self._stop_motor()
 
     def toggle_pause(self) -> None:
-        """Pause, which stops the motor at once, or go on."""
+        """Pause, which stops the motor at once, or continue."""
         if self.paused:
             self.paused = False
             return
@@ -49,7 +49,7 @@ class Controls:
 
     @contextmanager
     def listening(self, stop_motor: Callable[[], None]) -> Iterator[None]:
-        """Turn Ctrl-C and SIGTERM into a stop while a run is under way, and letters on a terminal into pauses.
+        """While a run lasts, turn Ctrl-C and SIGTERM into a stop, and letters on the terminal into pauses.
 
         Parameters
         ----------

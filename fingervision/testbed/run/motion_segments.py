@@ -1,4 +1,4 @@
-"""Motion segments: the elementary motions that a recipe's steps consist of."""
+"""Motion segments: the elementary actions into which a recipe's steps are divided."""
 
 from dataclasses import dataclass
 
@@ -10,7 +10,7 @@ Frames = int | None
 
 @dataclass(frozen=True, slots=True)
 class Go:
-    """Move to a position; with a number of frames, take them there."""
+    """Move to a position; frames, if requested by number, are taken there."""
 
     to_mm: float
     speed_mm_s: float
@@ -19,7 +19,7 @@ class Go:
 
 @dataclass(frozen=True, slots=True)
 class Stand:
-    """Stand so long; with a number of frames, take them after it."""
+    """Stand for a time; frames, if requested by number, are taken after it."""
 
     seconds: float
     frames: Frames = None
@@ -27,7 +27,7 @@ class Stand:
 
 @dataclass(frozen=True, slots=True)
 class Swing:
-    """A sine about a mean, from the mean towards opening."""
+    """Oscillate as a sine about a mean, starting from the mean towards opening."""
 
     mean_mm: float
     amplitude_mm: float
@@ -37,7 +37,7 @@ class Swing:
 
 @dataclass(frozen=True, slots=True)
 class Close:
-    """Close until the force is reached, the fingers touch, or the bed's limit."""
+    """Close until the force limit is reached, the fingers touch, or the bed's limit is reached."""
 
     speed_mm_s: float
     below_force_n: float
@@ -45,17 +45,17 @@ class Close:
 
 @dataclass(frozen=True, slots=True)
 class Rezero:
-    """Reference the stage anew; another run begins."""
+    """Reference the stage again; a new run begins."""
 
 
 @dataclass(frozen=True, slots=True)
 class Turn:
-    """Have the part turned by 180 degrees in the picture; another run begins."""
+    """Have the part turned by 180 degrees in the picture; a new run begins."""
 
 
 @dataclass(frozen=True, slots=True)
 class Shift:
-    """Have the picture shifted; another run begins."""
+    """Have the picture shifted; a new run begins."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,7 +71,7 @@ Act = Go | Stand | Swing | Close | Rezero | Turn | Shift | Slot
 
 @dataclass(frozen=True, slots=True)
 class Leg:
-    """One thing to do, and where the recipe asks for it.
+    """One segment, and the recipe step to which it belongs.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""From a recipe to its motion segments, checked as a whole before anything moves."""
+"""Convert a recipe to motion segments, all checked before anything moves."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -24,7 +24,7 @@ LONGEST_S = 30.0 * 86400.0
 
 @dataclass(frozen=True, slots=True)
 class Plan:
-    """What the bed will do.
+    """The segments that the bed will execute.
 
     Parameters
     ----------
@@ -69,7 +69,7 @@ def plan(
 
     Raises
     ------
-    FingervisionError
+    DataError
         A step is beyond a limit, or makes no sense: which line, and by how much.
     """
     if recipe.below_force_n > limits.force_n:
@@ -109,7 +109,7 @@ def timed_segments(
 
     Raises
     ------
-    FingervisionError
+    DataError
         The step makes no sense by itself.
     """
     for act, key in kind_of(section).acts(section, at_mm):
@@ -121,7 +121,7 @@ def timed_segments(
 
 
 def _lasts(leg: Leg, at_mm: float, limits: SoftLimits, rate_hz: float) -> tuple[float, float]:
-    """Time of a leg and where the stage is after it."""
+    """Duration of a segment (s), and position of the stage after it (mm)."""
     match leg.act:
         case Go(to_mm, speed, frames):
             return abs(to_mm - at_mm) / speed + _points_s(frames, rate_hz), to_mm

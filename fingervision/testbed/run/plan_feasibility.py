@@ -1,4 +1,4 @@
-"""Whether the actuator can make every move of a plan from where the one before ends."""
+"""Check that the actuator can make every motion of a plan from the end of the previous one."""
 
 from math import tau
 
@@ -10,11 +10,11 @@ from fingervision.testbed.run.plan import Plan
 
 
 def check_moves(plan: Plan, actuator: MoveCheck, limits: SoftLimits, at_mm: float) -> None:
-    """Refuse a plan that the actuator cannot follow: a motor controller goes only where its step data lead.
+    """Refuse a plan that the actuator cannot follow: a motor controller can go only to the targets of its step data.
 
     Raises
     ------
-    FingervisionError
+    LimitError
         With the line of the recipe, and the actuator's reason.
     """
     for leg in plan.legs:

@@ -1,4 +1,4 @@
-"""Run a plan segment by segment; on any failure the motor is stopped first."""
+"""Execute a plan segment by segment; on any failure the motor is stopped first."""
 
 from collections.abc import Callable
 from contextlib import suppress
@@ -25,10 +25,10 @@ Progress = Callable[[float, float], None]
 
 @dataclass(slots=True)
 class Runner:
-    """Runs a plan from where the record's rows end.
+    """Executes a plan, starting where the recorded rows end.
 
-    A bed that replays is taken through the whole plan again; what is in the folder already is not drawn, measured or
-    written a second time. On any other bed the interrupted motion segment is repeated, as a run of its own.
+    A bed that can replay executes the whole plan again; rows that are in the folder already are not drawn, measured or
+    written a second time. On any other bed the interrupted motion segment is repeated, as a new run.
 
     Parameters
     ----------
@@ -46,20 +46,20 @@ class Runner:
     _slots: list[dict[str, float]] = field(default_factory=list)
 
     def follow(self, last: SampleRow) -> None:
-        """Go on from the last row of an earlier run; to be called first."""
+        """Continue after the last row of an earlier run; must be called first."""
         if self.watch.bed.replays:
             self.watch.record.follow_replayed(last)
         else:
             self.watch.record.follow(last, self.watch.bed.clock.now_s())
 
     def execute(self) -> Counts:
-        """Run it to its end.
+        """Execute the plan to its end.
 
         Raises
         ------
         StoppedError
             The user ended it.
-        FingervisionError
+        DeviceError, LimitError, StateError
             A limit was met, an instrument failed, or no fingers are in view; the motor stands then.
         """
         watch, actuator, replays = self.watch, self.watch.bed.actuator, self.watch.bed.replays
@@ -77,7 +77,7 @@ class Runner:
         return watch.record.counts
 
     def found(self) -> dict[str, Any]:
-        """What run.json says of the run at its end."""
+        """Results of the run for run.json."""
         counts = self.watch.record.counts
         return {
             "frames": counts.recorded,
@@ -114,7 +114,7 @@ class Runner:
         record.event("ended", f"{record.counts.recorded} frames.")
 
     def _first_leg(self) -> int:
-        """Leg to begin with: 0, or the one in which a bed that cannot replay broke off."""
+        """Index of the first segment to execute: 0, or the one at which a bed that cannot replay was interrupted."""
         folder = self.watch.record.folder
         if self.watch.bed.replays or not folder.resumed:
             return 0
@@ -150,7 +150,7 @@ class Runner:
         self._rest(leg + 1)
 
     def _rest(self, leg: int) -> None:
-        """Record the rest that a run begins with, if what follows is recorded continuously."""
+        """Record the pause at the beginning of a run, if the following segment is recorded continuously."""
         following = self.plan.legs[leg].act if leg < len(self.plan.legs) else None
         moves_on = isinstance(following, Swing | Close)
         if moves_on or (isinstance(following, Go | Stand) and following.frames is None):

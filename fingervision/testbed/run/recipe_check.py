@@ -1,4 +1,4 @@
-"""Check a recipe against a bed away from it: what would be driven, how long it takes, and what does not fit."""
+"""Check a recipe against a bed without using it: its motions, its duration, and what is not possible."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -20,7 +20,7 @@ POSITIONS = 41
 
 @dataclass(frozen=True, slots=True)
 class CheckedStep:
-    """One step of a recipe, as the bed would do it.
+    """One step of a recipe, as the bed would execute it.
 
     Parameters
     ----------
@@ -59,7 +59,7 @@ class CheckedStep:
 
 @dataclass(frozen=True, slots=True)
 class RecipeCheck:
-    """A recipe on a bed, as planned.
+    """Result of checking a recipe for a bed.
 
     Parameters
     ----------
@@ -83,12 +83,12 @@ class RecipeCheck:
 
     @property
     def refusals(self) -> tuple[str, ...]:
-        """Why the bed refuses the recipe; empty where it can be run."""
+        """Reasons why the bed refuses the recipe; empty where it can be run."""
         return tuple(step.refusal for step in self.steps if step.refusal is not None)
 
 
 def check_recipe(recipe: Recipe[Section], bed: PlannedBed) -> RecipeCheck:
-    """Plan a recipe step by step; what one step is refused for does not hide what the next one is.
+    """Plan a recipe step by step; a refused step does not hide errors of the following ones.
 
     Parameters
     ----------
@@ -155,7 +155,7 @@ def _speed_mm_s(leg: Leg) -> float:
 
 
 def _foretold(lower_mm: float, upper_mm: float, bed: PlannedBed) -> tuple[tuple[float, float] | None, float | None]:
-    """Gap and force that the bed's gripper predicts over the way; None where it covers none of it."""
+    """Gap and force that the bed's gripper predicts over a motion; None where its range does not include the motion."""
     if bed.model is None:
         return None, None
     try:

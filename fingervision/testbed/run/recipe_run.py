@@ -22,7 +22,7 @@ from fingervision.testbed.simulation.injected_effects import NOTHING, Hidden
 
 @dataclass(frozen=True, slots=True)
 class RunDone:
-    """A run that came to its end.
+    """Result of a completed run.
 
     Parameters
     ----------
@@ -52,7 +52,7 @@ def run_recipe(
     on_plan: Callable[[Plan], None] = lambda planned: None,
     on_row: OnRow = lambda row, picture: None,
 ) -> RunDone:
-    """Run a recipe; nothing moves before all of it is checked against the limits and the fingers are seen.
+    """Run a recipe; nothing moves before all of it is checked against the limits and both fingers are visible.
 
     Parameters
     ----------

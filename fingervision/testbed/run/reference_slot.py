@@ -1,4 +1,4 @@
-"""Measure a reference slot of known width in the gripper's place, to check the scale."""
+"""Measure a reference slot of known width in place of the gripper, to check the scale."""
 
 from collections.abc import Sequence
 from math import sqrt
@@ -32,7 +32,7 @@ def measured_slot(frames: Sequence[Frame], size_mm: float, scale: Scale) -> dict
 
     Raises
     ------
-    FingervisionError
+    DeviceError
         No slot is seen.
     """
     pictures = [KnownSize(f"frame {frame.index}", "slot", size_mm, 0.0, to_grey(frame.pixels)) for frame in frames]

@@ -1,4 +1,4 @@
-"""State of an earlier run's folder: empty, resumable, or finished and not to be touched."""
+"""State of an earlier run's folder: empty, resumable, or finished and not to be changed."""
 
 import json
 from dataclasses import dataclass
@@ -17,7 +17,7 @@ from fingervision.testbed.run.run_metadata import KIND, SAMPLES
 
 @dataclass(frozen=True, slots=True)
 class Remains:
-    """A run that broke off.
+    """A run that was interrupted.
 
     Parameters
     ----------
@@ -35,23 +35,23 @@ class Remains:
 
 
 def contents(path: Path) -> list[str]:
-    """Names of what lies in a folder, sorted; hidden files do not count."""
+    """Names of the files in a folder, sorted; hidden files are ignored."""
     return sorted(item.name for item in path.iterdir() if not item.name.startswith("."))
 
 
 def refuse_others(path: Path, held: str) -> NoReturn:
-    """Say that a folder holds something that would be lost among what is to be written."""
+    """Refuse a folder with other files, among which the run's files would be lost."""
     raise OutputError(f"--out must be a new or empty folder, but {path} holds {held}: name another.")
 
 
 def remains(path: Path, recipe: Recipe[Section], digest: str) -> Remains | None:
-    """Find what a run of this recipe on this bed left; None where there is nothing to go on with.
+    """Find the interrupted run of this recipe on this bed; None where there is nothing to continue.
 
-    The table is cut to the rows whose pictures are in the video, the events to whole lines.
+    The table is truncated to the rows whose pictures are in the video, the events to complete lines.
 
     Raises
     ------
-    FingervisionError
+    DataError, OutputError
         The folder holds something else, a finished run, or one of another recipe or bed.
     """
     held = contents(path)

@@ -1,4 +1,4 @@
-"""The folder of a run, written so that a run may end at any moment and be resumed."""
+"""Folder of a run, written so that a run may end at any time and be resumed."""
 
 import shutil
 from collections.abc import Mapping, Sequence
@@ -37,7 +37,7 @@ BYTES_PER_PX = 0.8
 
 
 class BedRunFolder:
-    """Writes a run while it happens, and finds out how far an earlier one came.
+    """Writes a run while it is executed, and finds out how far an earlier one came.
 
     Parameters
     ----------
@@ -97,7 +97,7 @@ class BedRunFolder:
             self._files.event({"time_s": self._last_s, "event": "resumed", "words": f"After {len(self.rows)} frames."})
 
     def needs_room(self, frames: float, size_px: tuple[int, int]) -> None:
-        """Refuse a run that the disk has no room for."""
+        """Refuse a run for which the disk has no space."""
         needed = int(frames * size_px[0] * size_px[1] * BYTES_PER_PX)
         free = shutil.disk_usage(self.path).free
         if needed > free:
@@ -107,7 +107,7 @@ class BedRunFolder:
             )
 
     def add_picture(self, frame: Frame, time_s: float) -> None:
-        """Write a frame's picture, at its time in the run."""
+        """Write a frame's picture, with its time in the run."""
         self._video.add(replace(frame, time_s=time_s), ())
 
     def add_row(self, row: SampleRow) -> None:
@@ -116,12 +116,12 @@ class BedRunFolder:
         self._last_s = row.time_s
 
     def event(self, number: int, name: str, words: str, **more: object) -> None:
-        """Append an event; those that were written before the run broke off are not written again."""
+        """Append an event; events that were written before an interruption are not written again."""
         if number >= len(self.events_done):
             self._files.event({"n": number, "time_s": round(self._last_s, 6), "event": name, "words": words, **more})
 
     def finish(self, found: Mapping[str, Any]) -> None:
-        """End a run that came to its end."""
+        """Close the folder of a completed run."""
         self._end()
         if self.before:
             write_rows(self.path / JOINED, [*self.before, *read_samples(self.path / SAMPLES)])
@@ -134,7 +134,7 @@ class BedRunFolder:
         self._lock.release()
 
     def break_off(self, why: str) -> None:
-        """End a run that did not; what is in the folder stays valid, and may be gone on with."""
+        """Close the folder of an interrupted run; its content stays valid, and the run may be continued."""
         with suppress(FingervisionError):
             self._files.event({"time_s": round(self._last_s, 6), "event": "stopped", "words": why})
         with suppress(FingervisionError):
@@ -149,11 +149,11 @@ class BedRunFolder:
 
 
 def rows_before(path: Path) -> list[SampleRow]:
-    """Rows of a finished run, with those of the runs that it followed.
+    """Rows of a finished run, with those of the runs that it continued.
 
     Raises
     ------
-    FingervisionError
+    DataError
         There is no finished run in the folder.
     """
     table = path / (JOINED if (path / JOINED).exists() else SAMPLES)
@@ -164,7 +164,7 @@ def rows_before(path: Path) -> list[SampleRow]:
 
 
 def times_of(rows: Sequence[SampleRow]) -> tuple[float, float] | None:
-    """Times of the first row of a step (those before it are at rest) and of the last; None without rows."""
+    """Times of a step's first row (earlier rows are at rest) and of the last row (s); None without rows."""
     if not rows:
         return None
     began_s = next((row.arrived_s for row in rows if row.step > 0), rows[0].arrived_s)

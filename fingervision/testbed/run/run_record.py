@@ -1,4 +1,4 @@
-"""Record of a run: one row and one picture a frame, in order, written as soon as they are final."""
+"""Record of a run: one row and one picture per frame, in order, written as soon as they are final."""
 
 from collections import deque
 from collections.abc import Callable
@@ -32,7 +32,7 @@ class Counts:
 
 
 class RunRecord:
-    """Numbers runs and frames, and writes them once.
+    """Numbers runs and frames, and writes each of them once.
 
     Parameters
     ----------
@@ -56,26 +56,26 @@ class RunRecord:
 
     @property
     def counts(self) -> Counts:
-        """What became of the frames until now."""
+        """Number of frames so far by status."""
         return Counts(self._rows, self._with_gap, self._lost)
 
     # How it begins.
 
     def follow_replayed(self, last: SampleRow) -> None:
-        """Go on from the last row of an earlier run on a bed whose camera's clock goes on from there."""
+        """Continue after the last row of an earlier run, on a bed whose camera clock continues from there."""
         self._run = _run_number(last) + 1
         self._zero_s = last.camera_s - last.time_s
 
     def follow(self, last: SampleRow, now_s: float) -> None:
-        """Go on from the last row of an earlier run on a bed whose camera's clock began anew.
+        """Continue after the last row of an earlier run, on a bed whose camera clock has started again.
 
-        What has passed between is known as well as the host's clock, and needs no better.
+        The time in between is known to the accuracy of the host's clock, which suffices.
         """
         self._run = _run_number(last) + 1
         self._base_s = last.time_s + max(PAUSE_S, now_s - last.arrived_s)
 
     def go_on(self, since_began_s: float) -> None:
-        """Go on after all rows and events that are there, as a run of its own."""
+        """Continue after all existing rows and events, as a new run."""
         self._events = len(self.folder.events_done)
         self._rows = len(self.folder.rows)
         self._with_gap = sum(row.gap_mm is not None for row in self.folder.rows)
@@ -87,18 +87,18 @@ class RunRecord:
 
     @property
     def label(self) -> str:
-        """The run's name: its number, and what a diagnosis must know of how it came about."""
+        """Name of the run: its number, and what a diagnosis must know about it."""
         words = [str(self._run), *([TURNED] if self.turned else []), *([REZEROED] if self._rezeroed else [])]
         return " ".join(words)
 
     def new_run(self, *, turned: bool, rezeroed: bool = False) -> None:
-        """Begin another run of the same folder; what was re-zeroed stays so."""
+        """Begin another run in the same folder; the label of a re-zeroing is kept."""
         self._run, self.turned, self._rezeroed = self._run + 1, turned, self._rezeroed or rezeroed
 
     # Frames.
 
     def there_already(self) -> GapRow | None:
-        """Take the next frame from the folder, if it is there already; None if it is yet to be seen."""
+        """Take the next frame from the folder if it was recorded before; None if it must be taken now."""
         if self._rows >= len(self.folder.rows):
             return None
         row = self.folder.rows[self._rows]
@@ -107,7 +107,7 @@ class RunRecord:
         return GapRow(0, row.time_s, row.status, gap_mm=row.gap_mm, u_random_mm=row.u_random_mm)
 
     def add(self, look: Look, picture: Frame, measured: GapRow, step: int) -> None:
-        """Take a frame that was seen; its row waits until the stage's place is known."""
+        """Add a frame; its row waits until the stage's position is known."""
         if self._zero_s is None:
             self._zero_s = look.shot.device_s - self._base_s
         row = SampleRow(
@@ -136,7 +136,7 @@ class RunRecord:
         self._lost += 1
 
     def write(self, *, at_once: bool = False) -> None:
-        """Write the rows whose place between the encoder's steps is known by now, or all."""
+        """Write the rows whose interpolated stage position is known by now, or all rows."""
         while self._waiting:
             row, exposed_s, picture = self._waiting[0]
             input_mm = self._place_at(exposed_s, at_once)

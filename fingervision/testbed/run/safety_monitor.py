@@ -1,4 +1,4 @@
-"""Check every frame of a motion against the limits, and stop the motor where one is exceeded."""
+"""Monitor every frame of a motion against the limits, and stop the motor when one is exceeded."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -28,7 +28,7 @@ class StoppedError(FingervisionError):
 
 @dataclass(slots=True)
 class Watch:
-    """Looks, measures, records, and stops where it must.
+    """Takes frames, measures, records, and stops the motor at a limit.
 
     Parameters
     ----------
@@ -68,7 +68,7 @@ class Watch:
         ------
         StoppedError
             The user ended the run.
-        FingervisionError
+        DeviceError, LimitError
             The actuator has an alarm, or the force is beyond a limit.
         """
         self._end_if_stopped()
@@ -85,11 +85,11 @@ class Watch:
         return look
 
     def see(self, *, record: bool) -> tuple[Look, GapRow]:
-        """Look, measure, and record.
+        """Take a frame, measure it, and record it.
 
         Raises
         ------
-        FingervisionError
+        DeviceError, LimitError, StoppedError
             As `look`, or the gap is beyond its limit.
         """
         look = self.look()
@@ -111,7 +111,7 @@ class Watch:
         return look, measured
 
     def find_fingers(self) -> None:
-        """Refuse to go on where the camera does not see both fingers."""
+        """Refuse to continue where the camera does not see both fingers."""
         words = ""
         for _ in range(FRAMES_TO_FIND_FINGERS):
             measured, words = self.sight.measure(self.look().shot.item())
@@ -128,7 +128,7 @@ class Watch:
 
     @property
     def _closes(self) -> bool:
-        """Whether force and touching fingers are what is looked for."""
+        """Whether the present segment ends at a force or at contact."""
         return self.leg is not None and isinstance(self.leg.act, Close)
 
     # Motions.
@@ -136,7 +136,7 @@ class Watch:
     def follow(
         self, begin: Callable[[], None], *, record: bool, until: Callable[[Look, GapRow], bool] | None = None
     ) -> None:
-        """Begin a motion and look on until the stage stands; where a pause stopped it, it is begun again.
+        """Begin a motion and monitor it until the stage stands; after a pause the motion is begun again.
 
         Parameters
         ----------
@@ -165,7 +165,7 @@ class Watch:
                 return
 
     def wait_while_paused(self, *, record: bool) -> bool:
-        """Wait while the user pauses; whether there was a pause."""
+        """Wait while the run is paused; return whether there was a pause."""
         if not self.controls.paused:
             return False
         self.say("Paused: p and Enter go on, q and Enter end the run.")

@@ -57,7 +57,7 @@ def swing(watch: Watch, act: Swing) -> None:
 
 
 def close(watch: Watch, act: Close) -> None:
-    """Close until the force is reached, the fingers touch, or the bed's limit."""
+    """Close until the force limit is reached, the fingers touch, or the bed's limit is reached."""
     felt: list[str] = []
 
     def met(look: Look, row: GapRow) -> bool:
@@ -74,13 +74,13 @@ def close(watch: Watch, act: Close) -> None:
 
 
 def rezero(watch: Watch) -> None:
-    """Reference the stage anew, and rest."""
+    """Reference the stage again, and pause."""
     watch.follow(watch.bed.actuator.home, record=False)
     stand(watch, Stand(REST_AFTER_HOMING_S, frames=0))
 
 
 def slot(watch: Watch, act: Slot) -> dict[str, float]:
-    """Have a reference slot put in, measure it, and have it taken out; what run.json says of it."""
+    """Have a reference slot put in, measure it, and have it taken out; return the result for run.json."""
     operator, scale = watch.bed.operator, watch.bed.scale
     operator.put_in_slot(act.size_mm)
     watch.look()
@@ -100,7 +100,7 @@ def slot(watch: Watch, act: Slot) -> dict[str, float]:
 
 
 def _point(watch: Watch, frames: Frames) -> None:
-    """Take so many frames of a still picture."""
+    """Take the requested number of frames of a picture at rest."""
     if not frames:
         return
     _settle(watch)
@@ -110,7 +110,7 @@ def _point(watch: Watch, frames: Frames) -> None:
 
 
 def _settle(watch: Watch) -> None:
-    """Wait until the picture is still."""
+    """Wait until the picture is at rest."""
     since = _Since(watch)
     last: list[GapRow] = []
     while since.s < STILL_WITHIN_S:
@@ -123,7 +123,7 @@ def _settle(watch: Watch) -> None:
 
 
 def _still(rows: list[GapRow]) -> bool:
-    """Whether frames in a row show the same gap, or none."""
+    """Whether successive frames show the same gap, or none."""
     gaps = [row.gap_mm for row in rows if row.gap_mm is not None]
     if len(gaps) < len(rows):
         return not gaps
@@ -132,7 +132,7 @@ def _still(rows: list[GapRow]) -> bool:
 
 
 class _Since:
-    """Time since it was made, without pauses."""
+    """Time since its creation, without pauses."""
 
     def __init__(self, watch: Watch) -> None:
         self._watch, self._began_s = watch, self._now_s(watch)

@@ -1,4 +1,4 @@
-"""For each camera frame, the stage position and the force at the frame's time."""
+"""Stage position and force at the time of each camera frame."""
 
 from collections import deque
 from dataclasses import dataclass
@@ -25,7 +25,7 @@ READINGS_KEPT = 2000
 
 
 class JoinedInstrument:
-    """An instrument whose clock is joined to the bed's by every answer.
+    """An instrument whose clock is synchronised with the bed's by every answer.
 
     Parameters
     ----------
@@ -39,7 +39,7 @@ class JoinedInstrument:
         self.newest = 0.0
 
     def read(self) -> tuple[Reading, ...]:
-        """Take what came since the last time."""
+        """Take the readings since the last call."""
         readings = self._source.readings()
         asked = readings[-1]
         self.clock.add(asked.device_s, asked.asked_s, asked.got_s)
@@ -47,27 +47,27 @@ class JoinedInstrument:
         return readings
 
     def device_at(self, bed_s: float) -> float:
-        """Time of the instrument at a time of the bed; the bed's own before the clocks are joined."""
+        """Convert a bed time to the instrument's clock; before the clocks are synchronised, the bed time itself."""
         joined = self.clock.joined()
         return bed_s if joined is None else joined.board_s + (bed_s - joined.host_s) / joined.rate
 
 
 class Position(JoinedInstrument):
-    """The stage's place, between the steps of its encoder."""
+    """Position of the stage, interpolated between the steps of its encoder."""
 
     def __init__(self, actuator: Actuator) -> None:
         super().__init__(actuator)
         self._track = StageTrack(actuator.limits.encoder_step_mm)
 
     def read(self) -> tuple[Reading, ...]:
-        """Take what came since the last time."""
+        """Take the readings since the last call."""
         readings = super().read()
         for reading in readings:
             self._track.add(reading)
         return readings
 
     def at(self, bed_s: float, *, at_once: bool = False) -> float | None:
-        """Place at a time of the bed; None where later readings will tell it better (see `StageTrack`)."""
+        """Position at a bed time (mm); None where later readings will determine it better (see `StageTrack`)."""
         return self._track.at_mm(self.device_at(bed_s), at_once=at_once)
 
 
@@ -80,7 +80,7 @@ class Force(JoinedInstrument):
         self._force_n: deque[float] = deque(maxlen=READINGS_KEPT)
 
     def read(self) -> tuple[Reading, ...]:
-        """Take what came since the last time."""
+        """Take the readings since the last call."""
         readings = super().read()
         for reading in readings:
             if not self._device_s or reading.device_s > self._device_s[-1]:
@@ -89,13 +89,13 @@ class Force(JoinedInstrument):
         return readings
 
     def at(self, bed_s: float) -> float:
-        """Force at a time of the bed, linear between readings."""
+        """Force at a bed time, interpolated linearly between readings (N)."""
         return float(np.interp(self.device_at(bed_s), self._device_s, self._force_n))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Look:
-    """One frame, and the bed when it was exposed.
+    """One frame, with the state of the bed at its exposure.
 
     Parameters
     ----------
@@ -163,7 +163,7 @@ class Sight:
         return Look(shot, exposed_s, self.position.newest, force_n, force_now_n)
 
     def clocks(self) -> dict[str, dict[str, float]]:
-        """How each instrument's clock is joined to the bed's, for run.json."""
+        """Relation of each instrument's clock to the bed's, for run.json."""
         camera = self.camera_clock.joined()
         clocks = {"camera": {"offset_s": camera.bed_s - camera.camera_s, "rate": camera.rate, "u_s": camera.u_s}}
         for name, instrument in (("actuator", self.position), ("force_sensor", self.force)):
@@ -174,7 +174,7 @@ class Sight:
         return clocks
 
     def measure(self, item: Frame | LostFrame) -> tuple[GapRow, str]:
-        """Measure a picture: its row, and where there is no number the reason in a sentence."""
+        """Measure a picture: return its row, and where there is no number the reason in a sentence."""
         outcome = item if isinstance(item, LostFrame) else measure_frame(item, self._settings)
         (row,) = self._rows.rows((Result(item.index, item.time_s, outcome),))
         return row, outcome.words if isinstance(outcome, NoGap | LostFrame) else ""

@@ -1,1 +1,1 @@
-"""What simulated parts are made of: stage, gripper, clocks, optics. No hardware and no diagnosis knows of them."""
+"""Components of simulated parts: stage, gripper, clocks, optics. Neither hardware nor diagnosis imports them."""

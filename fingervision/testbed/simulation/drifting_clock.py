@@ -1,4 +1,4 @@
-"""An instrument's own clock: it began at some other time than the bed's, and runs a little fast or slow."""
+"""An instrument's own clock, with another start than the bed's and a slightly different rate."""
 
 from dataclasses import dataclass
 
@@ -11,7 +11,7 @@ BEGAN_WITHIN_S = 1000.0
 
 @dataclass(frozen=True, slots=True)
 class OwnClock:
-    """A clock that nobody has joined to the bed's yet.
+    """A clock that is not yet synchronised with the bed's.
 
     Parameters
     ----------
@@ -26,7 +26,7 @@ class OwnClock:
 
     @staticmethod
     def drawn(rng: np.random.Generator) -> "OwnClock":
-        """Draw one as it comes from the shelf."""
+        """Draw a clock with random offset and rate."""
         began_s = rng.uniform(-BEGAN_WITHIN_S, 0.0)
         return OwnClock(float(began_s), float(1.0 + rng.uniform(-LARGEST_RATE_ERROR, LARGEST_RATE_ERROR)))
 
@@ -35,5 +35,5 @@ class OwnClock:
         return (bed_s - self.began_s) * self.rate
 
     def bed_s(self, shown_s: float) -> float:
-        """Time of the bed at which it shows this."""
+        """Bed time at which the clock shows a given time (s)."""
         return self.began_s + shown_s / self.rate

@@ -1,4 +1,4 @@
-"""A gripper on a stage: where its measuring points truly are, with everything that is hidden in drive and mechanism."""
+"""A gripper on a stage: the true positions of its measuring points, with all hidden effects of drive and mechanism."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
@@ -56,8 +56,8 @@ class Motion:
 class SimulatedGripper:
     """The mechanism, driven by a stage.
 
-    Effects act by their own definitions over the whole history of the stage since the bed began, in the catalogue's
-    order; camera effects that have a form in the picture are left to the camera.
+    Effects act by their own formulas over the whole history of the stage since the bed was opened, in the catalogue's
+    order; camera effects that are visible in the picture's form are left to the camera.
 
     Parameters
     ----------
@@ -89,14 +89,14 @@ class SimulatedGripper:
         self._known: tuple[object, Array, Response] | None = None
 
     def looked_at(self, begin_s: float, period_s: float) -> None:
-        """Say when the camera looks: at one time of the bed, and every period before and after."""
+        """Set when the camera exposes: at one bed time, and every period before and after."""
         self._begin_s, self._period_s = begin_s, period_s
         self._known = None
 
     def at(self, time_s: float) -> Response:
-        """Where the points are at one time of the bed, and the force; arrays of one element.
+        """Positions of the points at one bed time, and the force; arrays of one element.
 
-        Times before that give its state at rest.
+        Before the first motion it is the state at rest.
         """
         began_s = self._motion.began_s()
         version = (self._motion.version(), len(self._motion.homed_s()), began_s)
@@ -109,7 +109,7 @@ class SimulatedGripper:
         return Response(np.interp(at, grid_s, known.left_mm), np.interp(at, grid_s, known.right_mm), force)
 
     def slot_at(self, width_mm: float, time_s: float) -> Response:
-        """Where the edges of a slot in the gripper's place are for the camera, with what moves its whole picture."""
+        """Positions of a slot in place of the gripper as seen by the camera, with effects that move the picture."""
         began_s = self._motion.began_s() if self._since_s is None else self._since_s
         times_s = np.array([min(began_s, time_s - self._period_s), time_s])
         half = np.full(2, 0.5 * width_mm)
@@ -123,7 +123,7 @@ class SimulatedGripper:
         return Response(edges.left_mm[1:], edges.right_mm[1:])
 
     def _grid_s(self, time_s: float, since_s: float) -> Array:
-        """Times to follow the stage at, for a time that is asked for; none before anything has happened."""
+        """Times at which to compute the stage for a requested time; none before the first motion."""
         until_s = time_s
         if since_s > time_s:
             since_s = time_s

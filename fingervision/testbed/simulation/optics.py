@@ -1,4 +1,4 @@
-"""Camera effects in the picture itself: what lens and tilt do to a scene, and when it is seen."""
+"""Camera effects in the picture itself: what lens and tilt do to a scene, and when it is exposed."""
 
 from dataclasses import dataclass, replace
 from math import asin, degrees
@@ -13,7 +13,7 @@ TILT_SINE = 0.01
 
 @dataclass(frozen=True, slots=True)
 class Optics:
-    """How a frame is seen.
+    """Optical settings with which a frame is drawn.
 
     Parameters
     ----------
@@ -49,15 +49,15 @@ def _tilt(optics: Optics, k_per_mm: float) -> Optics:
 def in_the_picture(name: str) -> bool:
     """Whether an effect changes the picture itself.
 
-    All other camera effects move the scene before the camera: for drifts and scales that is the same thing. Light that
-    blooms over round tips moves the gap by less than both edges (the tip goes down as well), and would be no
-    `edge_bias` as the catalogue defines it: that, too, moves the fingers.
+    All other camera effects move the scene in front of the camera, which for drifts and scale errors is equivalent.
+    Light that blooms over round tips moves the gap by less than two straight edges (because the tip moves down as
+    well), which would not be `edge_bias` as defined in the catalogue; therefore this effect, too, moves the fingers.
     """
     return catalogue()[name].in_picture is not None
 
 
 def hidden_in(optics: Optics, hidden: Hidden) -> Optics:
-    """Add what is hidden in the camera."""
+    """Add the hidden effects of the camera."""
     for name, values in hidden.of_stage("camera").items():
         form_of = catalogue()[name].in_picture
         if form_of is None:

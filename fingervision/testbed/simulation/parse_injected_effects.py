@@ -1,4 +1,4 @@
-"""Read injected effects from command-line words or from a sealed file."""
+"""Read injected effects from command-line arguments or from a sealed file."""
 
 import difflib
 from pathlib import Path
@@ -20,13 +20,14 @@ USUAL_INPUTS_MM, USUAL_STEP_MM = (-0.45, 1.45), 0.002
 def hidden_from(words: tuple[str, ...]) -> Hidden:
     """Read every `EFFECT[:PARAMETER=VALUE,...]` or sealed file.
 
-    A sealed file is like a corrected model's: `[[effect]]` with `name` and `[effect.parameters]` of plain numbers.
+    A sealed file has the form of a corrected model's: `[[effect]]` with `name` and `[effect.parameters]` of plain
+    numbers.
 
     Raises
     ------
     UsageError
         An effect or parameter is not in the catalogue, or a value is no number.
-    FingervisionError
+    DataError, InputFileError
         A file cannot be read or makes no sense.
     """
     effects: dict[str, dict[str, float]] = {}
@@ -40,7 +41,7 @@ def hidden_from(words: tuple[str, ...]) -> Hidden:
 
 
 def usual_values(effect: Effect) -> dict[str, float]:
-    """Sizes for an effect that is named without any: large enough to show, well inside its bounds."""
+    """Parameter values for an effect that is named without any: large enough to be visible, well inside the bounds."""
     inputs = np.arange(*USUAL_INPUTS_MM, USUAL_STEP_MM)
     history = History(
         input_mm=inputs,

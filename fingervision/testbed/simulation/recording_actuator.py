@@ -11,7 +11,7 @@ Array = NDArray[np.float64]
 
 
 class Followed:
-    """An actuator that remembers what it read.
+    """An actuator that stores its readings.
 
     Parameters
     ----------
@@ -33,7 +33,7 @@ class Followed:
 
     @property
     def limits(self) -> StageLimits:
-        """What it can do."""
+        """Limits of the actuator."""
         return self._actuator.limits
 
     @property
@@ -43,7 +43,7 @@ class Followed:
 
     @property
     def alarm(self) -> Alarm | None:
-        """Why it refuses to move."""
+        """Reason why the actuator refuses to move."""
         return self._actuator.alarm
 
     @property
@@ -53,7 +53,7 @@ class Followed:
 
     @property
     def motion(self) -> Motion:
-        """The stage as far as it was read."""
+        """Position of the stage over time, as far as it was read."""
         return Motion(
             self._at_mm, self._known_until_s, lambda: len(self._time_s), lambda: list(self._homed_s), self._began_s
         )
@@ -64,7 +64,7 @@ class Followed:
         self._homing = True
 
     def check(self, from_mm: float, to_mm: float, speed_mm_s: float) -> None:
-        """Refuse a move that cannot be done."""
+        """Refuse a motion that is not possible."""
         self._actuator.check(from_mm, to_mm, speed_mm_s)
 
     def move(self, to_mm: float, speed_mm_s: float) -> None:
@@ -84,11 +84,11 @@ class Followed:
         self._actuator.stop()
 
     def close(self) -> None:
-        """Stop and let go."""
+        """Stop and release the hardware."""
         self._actuator.close()
 
     def readings(self) -> tuple[Reading, ...]:
-        """Positions since the last call; kept."""
+        """Positions since the last call, which are also stored."""
         readings = self._actuator.readings()
         newest = readings[-1]
         for reading in readings:

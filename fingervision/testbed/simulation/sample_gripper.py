@@ -1,11 +1,11 @@
-"""The paper's physical sample as a drawing: what a simulated bed moves unless it is told otherwise."""
+"""Drawing of the published physical sample: the default gripper of a simulated bed."""
 
 from fingervision.domain.gripper import Body, Gripper, Material
 from fingervision.models.reference_mesh import REFERENCE_HINGE, REFERENCE_LEVER, REFERENCE_LINKS
 
 
 def sample_gripper() -> Gripper:
-    """Give the drawing; figures of material and body are the paper's, the rest as in sample_frames/paper."""
+    """Return the drawing; data of material and body are published, the others are those of sample_frames/paper."""
     return Gripper(
         material=Material("PA2200", 1650.0, 0.34, 930.0, 48.0),
         body=Body(80.0, 100.0, 3.0, 4.0, 0.3),

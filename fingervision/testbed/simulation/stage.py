@@ -1,4 +1,4 @@
-"""A stage as it moves: pieces of constant acceleration, one after the other."""
+"""Motion of a stage as pieces of constant acceleration, one after another."""
 
 from math import copysign, sqrt
 
@@ -16,7 +16,7 @@ LEAD_PERIODS_MM, LEAD_SHARES = (7.3, 2.9, 1.1), (0.55, 0.3, 0.15)
 
 
 class SimulatedStage:
-    """Where the stage truly is, for all times until now and as planned.
+    """True position of the stage, for all times until now and as planned.
 
     Parameters
     ----------
@@ -39,17 +39,17 @@ class SimulatedStage:
 
     @property
     def planned_until_s(self) -> float:
-        """When the motion under way ends; before the first, minus infinity."""
+        """End of the present motion (s); minus infinity before the first."""
         begin_s, _, _, _, duration_s = self._pieces[-1]
         return begin_s + duration_s
 
     @property
     def began_s(self) -> float:
-        """When it first moved; infinity before that."""
+        """Time of the first motion (s); infinity before it."""
         return self._pieces[1][0] if len(self._pieces) > 1 else float("inf")
 
     def lands_at_mm(self, target_mm: float) -> float:
-        """Position at which the stage stops when it is sent to a target."""
+        """Position at which the stage stops when it is sent to a target (mm)."""
         waves = sum(
             share * np.sin(2.0 * np.pi * target_mm / period_mm + phase)
             for period_mm, share, phase in zip(LEAD_PERIODS_MM, LEAD_SHARES, self._phases, strict=True)
@@ -60,7 +60,7 @@ class SimulatedStage:
         return min(max(landed_mm, self.lower_mm), self.upper_mm)
 
     def go(self, now_s: float, target_mm: float, speed_mm_s: float) -> None:
-        """Begin to move; whatever was under way is broken off first."""
+        """Begin a motion; a motion under way is ended first."""
         self.halt(now_s)
         begin_s = max(now_s, self.planned_until_s)
         from_mm = float(self.at_mm(np.array([begin_s]))[0])
@@ -81,7 +81,7 @@ class SimulatedStage:
         self.version += 1
 
     def halt(self, now_s: float) -> None:
-        """Break off the motion under way as fast as the stage can."""
+        """End the present motion as fast as the stage can."""
         if now_s >= self.planned_until_s:
             return
         begun = [piece for piece in self._pieces if piece[0] <= now_s]
@@ -98,7 +98,7 @@ class SimulatedStage:
         self.version += 1
 
     def home(self, now_s: float, speed_mm_s: float) -> None:
-        """Go to the reference; there a new run begins, and the zero is right."""
+        """Go to the reference; a new run begins there, with the correct zero."""
         self.go(now_s, 0.0, speed_mm_s)
         self.homed_s.append(max(now_s, self.planned_until_s))
         self.version += 1
@@ -110,12 +110,12 @@ class SimulatedStage:
         return sorted({at for piece in ends for at in piece if at not in joined and after_s < at <= until_s})
 
     def moves(self, time_s: Array) -> NDArray[np.bool_]:
-        """Whether a motion is under way at times of the bed, shape (n,)."""
+        """Whether the stage moves at the given bed times, shape (n,)."""
         rows = self._pieces_at(time_s)
         return np.asarray(time_s < rows[:, 0] + rows[:, 4], dtype=np.bool_)
 
     def at_mm(self, time_s: Array) -> Array:
-        """True positions at times of the bed, shape (n,)."""
+        """True positions at the given bed times, shape (n,) (mm)."""
         rows = self._pieces_at(time_s)
         rows[:, 0] = np.where(np.isfinite(rows[:, 0]), rows[:, 0], time_s)
         since_s = np.minimum(time_s - rows[:, 0], rows[:, 4])

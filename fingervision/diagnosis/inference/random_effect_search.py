@@ -1,0 +1,201 @@
+"""Search with random effects added: gains that differ from run to run, and a map of position errors."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import TypeVar
+
+import numpy as np
+
+from fingervision.diagnosis.inference.explanation_candidates import different
+from fingervision.diagnosis.inference.hypothesis import Explanation, Problem
+from fingervision.diagnosis.inference.hypothesis_fit import fit
+from fingervision.diagnosis.inference.map_imitators import imitating_effects, imitating_parts
+from fingervision.diagnosis.inference.map_repeatability import foretells_other_passes
+from fingervision.diagnosis.inference.position_map import NAME, PositionMap, likeliest_map, why_no_map
+from fingervision.diagnosis.inference.random_effect import LEAST_GAIN
+from fingervision.diagnosis.inference.run_gains import FEWEST_RUNS, RunGains, likeliest_gains
+from fingervision.diagnosis.inference.search import Findings
+from fingervision.diagnosis.inference.searched import Look, Searched
+from fingervision.diagnosis.inference.verdict import standing_of
+from fingervision.diagnosis.input.observations import Observations
+from fingervision.diagnosis.noise.whitening import RunOffsets
+
+BESIDE = 3
+"""Likeliest single effects beside which gains of runs and maps are tried: a hundredth of a search each."""
+ROUNDS = 2
+"""Times that effects and a random effect are fitted in turn: the second moves either by little."""
+
+Effected = TypeVar("Effected", bound=RunGains | PositionMap)
+
+
+def beside_gains(state: Searched, look: Look) -> Searched:
+    """Search beside gains that differ from run to run, and keep what is found where it is the far likelier one.
+
+    Such gains are a nuisance beside an effect that does more than they do; alone they are structure with no name. If
+    further effects are not far more probable than such gains, the gains are kept: naming an effect claims more than
+    stating a scatter.
+    """
+    found = state.found
+    if len(state.data.chain.history.runs) < FEWEST_RUNS:
+        return state
+    explained = found.unknown is None and standing_of(state.data, found).is_little
+    if explained:
+        likelier = _likelier(found, likeliest_gains, -LEAST_GAIN) if len(found.best.names) > 1 else None
+        if likelier is None:
+            return state
+        known, gains = likelier
+    else:
+        tried = [likeliest_gains(found.problem, one) for one in (found.best, *found.singles[:BESIDE])]
+        gains, gain = max(tried, key=lambda one: one[1])
+        if gain < LEAST_GAIN:
+            return state
+        known = found.best if found.best.names else None
+    beside = look.again(replace(state.data, run_gains=gains), known)
+    stands = standing_of(beside.data, beside.found)
+    if not stands.is_little:
+        # What all runs share is an effect, and was taken for their scatter.
+        apart = look.again(replace(state.data, run_gains=gains.without_mean()), known)
+        if standing_of(apart.data, apart.found).after_mm < stands.after_mm:
+            beside = apart
+    if not _does_more(beside):
+        return state
+    fewer = len(beside.found.best.names) < len(found.best.names)
+    least = -LEAST_GAIN if explained and fewer else LEAST_GAIN
+    return beside if _gained(state, beside, gains) > least else state
+
+
+def beside_map(state: Searched, look: Look) -> Searched:
+    """Search beside a map of position errors, and keep what is found where it is the far likelier explanation.
+
+    The map competes only where something remains that the other effects do not explain, and at the price of its
+    freedom; where an effect with a few numbers does as well, it stays.
+    """
+    history, found = state.data.chain.history, state.found
+    reason = why_no_map(history, state.data.chain.path)
+    asked = NAME in look.forced
+    if reason is not None:
+        excluded = {**state.data.excluded, NAME: reason}
+        return replace(state, data=replace(state.data, excluded=excluded))
+    known: Explanation | None = found.best
+    if not asked and found.unknown is None:
+        likelier = _likelier(found, likeliest_map, LEAST_GAIN)
+        if likelier is None:
+            return state
+        known, first = likelier
+    else:
+        first, gain = likeliest_map(found.problem, found.best)
+        if gain < LEAST_GAIN and found.best.names:
+            # What was named may itself stand for a part of the map.
+            first, gain = likeliest_map(found.problem, found.nothing)
+        if gain < LEAST_GAIN and not asked:
+            return state
+    imitating = imitating_effects(found.problem, first)
+    kept = known if known is not None and not set(known.names) & set(imitating) else None
+    beside = look.again(_excluding(replace(state.data, position_map=first), imitating), kept)
+    plain = _without(beside.found.problem, first)
+    parts = imitating_parts(plain, first, beside.found.best)
+    if parts and not parts.keys() & look.forced:
+        # The map was estimated beside what stands for a part of it.
+        names = tuple(name for name in beside.found.best.names if name not in parts)
+        rest = fit(plain, names, beside.found.best.values, iterations=20) if names else plain.nothing()
+        first, _ = likeliest_map(plain, rest)
+        beside = look.again(_excluding(replace(beside.data, position_map=first), parts))
+        plain = _without(beside.found.problem, first)
+    rest = _left(plain, beside.found.best)
+    second, _ = likeliest_map(plain, rest)
+    if not (asked or foretells_other_passes(plain, rest, second)):
+        return state
+    if first.is_like(second):
+        second = first
+    else:
+        beside = look.again(replace(beside.data, position_map=second), beside.found.best)
+    if asked:
+        return beside
+    # Beside effects that explain the data, a map that takes none of their places is what their forms leave over.
+    stays = found.unknown is None and set(found.best.names) <= set(beside.found.best.names)
+    worse = found.unknown is None and beside.found.unknown is not None
+    return beside if not (stays or worse) and _gained(state, beside, second) > LEAST_GAIN else state
+
+
+def _likelier(
+    found: Findings, estimated: Callable[[Problem, Explanation], tuple[Effected, float]], least: float
+) -> tuple[Explanation | None, Effected] | None:
+    """Find a random effect, added to few effects, that gains `least` over the answer; return it with these, or None.
+
+    Two or three effects can imitate much: a map that was measured from one side only, or runs of different gain.
+    """
+    problem = found.problem
+    rows = max(2, int(problem.measured.size - problem.whitener.aside.sum()))
+    singles = different(problem, list(found.singles), BESIDE)
+    tried = []
+    begins = (found.nothing, _line(problem), *singles, *([found.best] if least > 0.0 else []))
+    for begin in {e.names: e for e in begins if len(e.names) <= len(found.best.names)}.values():
+        known, (effect, _) = begin, estimated(problem, begin)
+        for _ in range(ROUNDS):
+            # What the effects stood in for is the random effect's now.
+            known = _refitted(_beside(problem, effect), known)
+            effect, _ = estimated(problem, _left(problem, known))
+        known = _refitted(_beside(problem, effect), known)
+        tried.append((known.bic(rows) + effect.price, known, effect))
+    cost, known, effect = min(tried, key=lambda one: one[0])
+    if cost > found.best.bic(rows) - least:
+        return None
+    return (known if known.names else None), effect
+
+
+def _line(problem: Problem) -> Explanation:
+    """Fit a straight line over the input, as an offset and a ratio where both can be named.
+
+    With a map there is no such line.
+    """
+    names = tuple(name for name in ("rest_gap_error", "lever_ratio_error") if name in problem.effects)
+    return fit(problem, names, {name: {} for name in names}, iterations=5) if names else problem.nothing()
+
+
+def _beside(problem: Problem, effect: RunGains | PositionMap) -> Problem:
+    """Add the columns of a random effect to those that are refitted for every explanation."""
+    drawn = problem.whitener.drawing
+    columns = effect.columns_mm if drawn is None else np.hstack([effect.columns_mm, drawn])
+    return replace(problem, offsets=RunOffsets.of(replace(problem.whitener, drawing=columns)))
+
+
+def _refitted(problem: Problem, one: Explanation) -> Explanation:
+    return fit(problem, one.names, one.values, iterations=10) if one.names else problem.nothing()
+
+
+def _does_more(beside: Searched) -> bool:
+    """Whether the named effects change the prediction by more than the scatter of the runs' gains does."""
+    best, gains = beside.found.best, beside.data.run_gains
+    if gains is None or not best.names:
+        return False
+    scatter_mm = gains.refitted(beside.found.problem, best, beside.data.behind(gains)).scatter_mm
+    changed_mm = beside.data.chain.stacked(best.values) - beside.data.chain.stacked({})
+    return bool(np.linalg.norm(changed_mm) > np.linalg.norm(scatter_mm))
+
+
+def _gained(state: Searched, beside: Searched, effect: RunGains | PositionMap) -> float:
+    """By how much -2 log of the likelihood falls by a random effect and what was found beside it, the price paid."""
+    best = state.found.best
+    plain = replace(_without(beside.found.problem, effect), effects=state.found.problem.effects)
+    rows = max(2, int(plain.measured.size - plain.whitener.aside.sum()))
+    rival = fit(plain, best.names, best.values, iterations=20) if best.names else plain.nothing()
+    return rival.bic(rows) - beside.found.best.bic(rows) - effect.price
+
+
+def _excluding(data: Observations, reasons: dict[str, str]) -> Observations:
+    """Leave effects out of the search, each for its reason."""
+    kept = {name: effect for name, effect in data.effects.items() if name not in reasons}
+    return replace(data, effects=kept, excluded={**data.excluded, **reasons})
+
+
+def _left(problem: Problem, explanation: Explanation) -> Explanation:
+    """Judge an explanation as it stands by another observation model."""
+    residual = problem.measured - problem.whitened(explanation.values)
+    return replace(explanation, residual=residual, sigma_mm=problem.offsets.spread(residual)[0])
+
+
+def _without(problem: Problem, effect: RunGains | PositionMap) -> Problem:
+    """The same problem without a random effect's columns, which are the first ones where it was added last."""
+    count, drawing = effect.coefficients.size, problem.whitener.drawing
+    kept = None if drawing is None or drawing.shape[1] == count else drawing[:, count:]
+    return replace(problem, offsets=RunOffsets.of(replace(problem.whitener, drawing=kept)))

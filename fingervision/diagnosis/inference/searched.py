@@ -1,0 +1,43 @@
+"""A finished search, and the settings of searches."""
+
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+
+from fingervision.diagnosis.inference.explanation_candidates import Progress
+from fingervision.diagnosis.inference.hypothesis import Explanation, Problem
+from fingervision.diagnosis.inference.reference_gauge import consistent_with_gauges
+from fingervision.diagnosis.inference.search import Findings, search
+from fingervision.diagnosis.input.observations import Observations
+
+
+def problem_of(data: Observations, explanation: Explanation | None) -> Problem:
+    """Estimate the noise from the residual of an explanation, or from the disagreement where there is none yet."""
+    values = {} if explanation is None else explanation.values
+    free = 0 if explanation is None else explanation.free
+    return data.problem(data.stacked_mm - data.chain.stacked(values), free, explained=explanation is not None)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Searched:
+    """A search that was made: measurement and model, what was found, and what slots of known width said."""
+
+    data: Observations
+    found: Findings
+    said: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Look:
+    """How searches are made."""
+
+    rng: np.random.Generator
+    forced: frozenset[str]
+    progress: Progress
+
+    def again(self, data: Observations, known: Explanation | None = None) -> Searched:
+        """Search once more, the noise estimated beside what is known already."""
+        found = search(partial(problem_of, data), self.rng, self.forced, self.progress, known)
+        found, said = consistent_with_gauges(data, found)
+        return Searched(data, found, said)

@@ -1,0 +1,211 @@
+"""Find pictures of a file that depend on a missing one, for codecs that do not count their pictures.
+
+H.264 counts them (see `reference_chain`), HEVC names the references, MPEG-2 has a constant rate (`transport_stream`).
+Other codecs are decoded without an error when a whole packet is missing: the differences of the next picture are added
+to an older one, and a moving finger is shown in an old position. Four signs are used, all read before decoding:
+
+* AV1 numbers the pictures in the order in which they are shown. An omitted number means a missing picture; consecutive
+  numbers prove that none is missing, whatever the times are.
+* MPEG-4 part 2 toggles a bit with every P picture, which counts them modulo two. One missing picture is visible in it;
+  if the bit fits, an odd number of missing times was never coded.
+* In MPEG-4 part 2 a B picture lies between two others in time. A B picture presented after all pictures received so far
+  depends on a missing one.
+* Times. In a file with equidistant times (coded at a rate, instead of as a camera delivered the frames), a hole of
+  whole steps is a missing picture. If times are irregular, or holes are frequent, the camera or the coder omitted
+  pictures, and a hole means nothing: there a missing VP8 or VP9 picture, or two of MPEG-4, stay undetected.
+
+AVI is not judged by times, because it counts frames and marks omitted ones by an empty chunk.
+"""
+
+from bisect import bisect_right
+from collections import Counter
+from itertools import pairwise
+from pathlib import Path
+from statistics import fmean, median
+
+import av
+
+from fingervision.frames.coded_times import CodedTime, coded_times
+
+COUNTED_CODECS = frozenset({"h264", "hevc", "vvc", "mpeg1video", "mpeg2video"})
+"""Codecs, by FFmpeg's names, whose pictures tell by themselves, or are followed elsewhere."""
+ADAPTING_CODECS = frozenset({"ffv1"})
+"""Codecs of whole pictures, of which all but key frames are read with the statistics of those before them."""
+INTRA_PROPERTY = 1  # FFmpeg's AV_CODEC_PROP_INTRA_ONLY
+TIMED_CONTAINERS = ("mov", "matroska", "flv", "asf", "ogg")
+# An even row: so many single steps at least, and nearly all steps a whole number of the usual one. A camera's own times
+# scatter by far more than a tick in far more than a fiftieth of the steps; a few false times are damage of the file.
+EVEN_STEPS, EVEN_SHARE = 8, 0.98
+# Containers round a time to their tick, and a step has two ends.
+TICKS = 1.01
+# With more holes than one in five steps pictures are left out by habit: programs do not code what does not change. A
+# network or disk that loses so much is noticed.
+MOST_HOLES = 0.2
+# A step is a hole beside so many on each side; cameras that are short of light go on at half the rate.
+BESIDE = 4
+# A bit that turns by chance does so in half of the pictures: nineteen in twenty, of ten at least, are no chance.
+FEWEST_TURNS, TURNING_SHARE = 10, 0.95
+
+OWN_RECORDING = "Recorded by fingervision, with a list of its lost frames beside it."
+"""Comment of a container whose packets were judged when they came, and whose marks are kept with it."""
+
+NUMBER_LEFT_OUT = "A picture that it hangs on is missing: the numbers of the coded pictures leave one out."
+BIT_NOT_TURNED = (
+    "A picture that it hangs on is missing: the bit that turns with every coded picture (vop_rounding_type) did not."
+)
+SHOWN_TOO_LATE = "A picture that it hangs on is missing: it should be shown between two, and only one came."
+TIME_LEFT_OUT = (
+    "It is coded with the help of a picture that is missing: the recording's times, otherwise an even row, leave out "
+    "{count} before it. If the camera itself skipped there, convert the file with "
+    "`ffmpeg -i IN -c:v ffv1 -g 1 OUT.mkv` and measure that."
+)
+
+
+def missing_references(path: Path, stream: av.VideoStream, container_format: str) -> dict[int, str]:
+    """Read the packets of a file without decoding, and return before which of them a picture is missing.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    stream : av.VideoStream
+        The video in it, opened elsewhere.
+    container_format : str
+        FFmpeg's name.
+
+    Returns
+    -------
+    dict of int to str
+        By the number of the packet in the order of decoding, from 0: why what follows, until a key frame, is damaged.
+    """
+    codec = stream.codec
+    is_whole = codec.properties & INTRA_PROPERTY and codec.canonical_name not in ADAPTING_CODECS
+    if is_whole or codec.canonical_name in COUNTED_CODECS:
+        return {}
+    return judged(coded_times(path, stream), are_timed=any(name in container_format for name in TIMED_CONTAINERS))
+
+
+def judged(packets: list[CodedTime], *, are_timed: bool) -> dict[int, str]:
+    """Find the packets that depend on a missing picture before them.
+
+    Parameters
+    ----------
+    packets : list of CodedTime
+        All of a video, in the order of decoding.
+    are_timed : bool
+        Whether the container gives every picture a time of its own.
+    """
+    if sum(packet.order is not None for packet in packets) > len(packets) // 2:
+        return _by_number(packets)
+    found = _by_turn(packets)
+    if are_timed:
+        found = _by_time(packets, found) | found
+        found |= {number: SHOWN_TOO_LATE for number in _shown_too_late(packets) if number not in found}
+    return found
+
+
+def _by_number(packets: list[CodedTime]) -> dict[int, str]:
+    """Check AV1's numbers; removed temporal layers leave the same step between all numbers."""
+    numbered = [(number, packet) for number, packet in enumerate(packets) if packet.order is not None]
+    steps = [
+        (number, (packet.order - before.order) % packet.modulus)
+        for (_, before), (number, packet) in pairwise(numbered)
+        if packet.order is not None and packet.modulus is not None and before.order is not None and not packet.is_key
+    ]
+    usual = Counter(step for _, step in steps).most_common(1)[0][0] if steps else 1
+    return {number: NUMBER_LEFT_OUT for number, step in steps if step != usual}
+
+
+def _by_turn(packets: list[CodedTime]) -> dict[int, str]:
+    """Check MPEG-4's bit where it toggles with every P picture, and starts with the same value after I pictures."""
+    needed = [(number, packet) for number, packet in enumerate(packets) if packet.is_needed]
+    pairs = [(number, before, packet) for (_, before), (number, packet) in pairwise(needed) if packet.turn is not None]
+    inner = [(number, packet.turn != before.turn) for number, before, packet in pairs if before.turn is not None]
+    first = [(number, packet.turn) for number, before, packet in pairs if before.is_key]
+    found = [number for number, turns in inner if not turns]
+    if len(inner) < FEWEST_TURNS or len(found) > (1.0 - TURNING_SHARE) * len(inner):
+        return {}
+    usual, often = Counter(turn for _, turn in first).most_common(1)[0] if first else (None, 0)
+    if often >= TURNING_SHARE * len(first):
+        found += [number for number, turn in first if turn != usual]
+    return dict.fromkeys(found, BIT_NOT_TURNED)
+
+
+def _shown_too_late(packets: list[CodedTime]) -> list[int]:
+    latest: int | None = None
+    found = []
+    for number, packet in enumerate(packets):
+        if packet.tick is None:
+            continue
+        if packet.is_needed:
+            latest = packet.tick if latest is None else max(latest, packet.tick)
+        elif latest is not None and packet.tick > latest:
+            found.append(number)
+    return found
+
+
+def _by_time(packets: list[CodedTime], unturned: dict[int, str]) -> dict[int, str]:
+    """Find the holes in equidistant times, and the packets that may depend on what is missing there."""
+    shown = sorted({packet.tick for packet in packets if packet.is_shown and packet.tick is not None})
+    steps = [after - before for before, after in pairwise(shown)]
+    usual = _usual(steps)
+    if usual is None:
+        return {}
+    holes = [(shown[k], step) for k, step in enumerate(steps) if step > usual + TICKS and _sticks_out(steps, k)]
+    if len(holes) > MOST_HOLES * len(steps):
+        return {}
+    needed = sorted((each.tick, k) for k, each in enumerate(packets) if each.is_needed and each.tick is not None)
+    keys = [each.tick for each in packets if each.is_key and each.tick is not None]
+    found = {}
+    for at, step in holes:
+        count = round(step / usual) - 1
+        if count < 1 or not _is_whole(step, usual):
+            continue  # a pause, after which times begin anew
+        # What is missing was coded after the last picture before it on which others hang.
+        last = bisect_right(needed, (at, len(packets)))
+        number = needed[last - 1][1] + 1 if last else 0
+        if number >= len(packets) or packets[number].is_key:
+            continue
+        if count % 2 and _turns_on(packets, number, unturned) and not _key_is_due(keys, at, count * usual):
+            continue  # the bit counts none
+        found[number] = TIME_LEFT_OUT.format(count=count)
+    return found
+
+
+def _turns_on(packets: list[CodedTime], number: int, unturned: dict[int, str]) -> bool:
+    """Whether the bit is in use, and the next P picture toggles it as if nothing were missing."""
+    before = next((each for each in reversed(packets[:number]) if each.is_needed), None)
+    following = next((k for k in range(number, len(packets)) if packets[k].is_needed), None)
+    if before is None or before.turn is None or following is None or packets[following].turn is None:
+        return False
+    return following not in unturned and before.turn != packets[following].turn
+
+
+def _key_is_due(keys: list[int], at: int, missing_ticks: float) -> bool:
+    """Whether a key frame, which resets the bit, may be missing after a time."""
+    before = bisect_right(keys, at)
+    every = min((b - a for a, b in pairwise(keys)), default=None)
+    return every is None or before == 0 or at + missing_ticks + TICKS >= keys[before - 1] + every
+
+
+def _sticks_out(steps: list[int], k: int) -> bool:
+    """Whether a step is longer than the usual ones before and after it, unlike at a change of rate."""
+    before, behind = steps[max(0, k - BESIDE) : k], steps[k + 1 : k + 1 + BESIDE]
+    return all(steps[k] > median(some) + TICKS for some in (before, behind) if some)
+
+
+def _is_whole(step: int, usual: float) -> bool:
+    return abs(step - max(1, round(step / usual)) * usual) <= TICKS
+
+
+def _usual(steps: list[int]) -> float | None:
+    """Step of equidistant times, in ticks; None where they are not equidistant."""
+    if not steps:
+        return None
+    middle = sorted(steps)[len(steps) // 2]
+    single = [step for step in steps if abs(step - middle) <= 2 * TICKS]
+    if middle <= 0 or len(single) < EVEN_STEPS:
+        return None
+    usual = fmean(single)
+    even = sum(_is_whole(step, usual) for step in steps)
+    return usual if even >= EVEN_SHARE * len(steps) else None

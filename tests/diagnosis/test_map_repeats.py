@@ -1,0 +1,53 @@
+"""A map of position errors is the same in every run, or it is none."""
+
+import numpy as np
+import pytest
+
+from fingervision.diagnosis.inference.map_repeatability import foretells_other_passes
+from fingervision.diagnosis.inference.position_map import likeliest_map
+from fingervision.diagnosis.input.preparation import prepare
+from fingervision.domain.measured_table import MeasuredTable
+from fingervision.models.corrected import CorrectedModel
+from fingervision.models.table import TableModel
+
+NOISE_MM = 0.002
+ROWS = 60
+
+
+def loops(reaches_mm: tuple[float, ...], seed: int) -> tuple[np.ndarray, tuple[slice, ...], np.ndarray]:
+    """Runs there and back, two loops each; with the noise of a reading."""
+    shape = 0.5 - 0.5 * np.cos(np.linspace(0.0, 4.0 * np.pi, ROWS))
+    input_mm = np.concatenate([reach * shape for reach in reaches_mm])
+    runs = tuple(slice(ROWS * k, ROWS * (k + 1)) for k in range(len(reaches_mm)))
+    return input_mm, runs, NOISE_MM * np.random.default_rng(seed).standard_normal(input_mm.size)
+
+
+def mapped(
+    input_mm: np.ndarray, runs: tuple[slice, ...], error_mm: np.ndarray, noise_mm: np.ndarray
+) -> tuple[bool, float]:
+    """Whether a map foretells what it has not seen, and what it gains."""
+    time_s = 0.5 * np.arange(input_mm.size)
+    names = tuple(str(k) for k in range(len(runs)))
+    table = MeasuredTable(input_mm, 5.0 + 2.0 * input_mm + error_mm + noise_mm, None, time_s, runs, names)
+    at = np.array([-1.0, 12.0])
+    model = CorrectedModel("line", TableModel("line", at, -2.5 - at, 2.5 + at), "line.csv", (-1.0, 12.0), {})
+    data = prepare(table, model)
+    problem = data.problem(noise_mm, 0, explained=True)
+    found, gain = likeliest_map(problem, problem.nothing())
+    return foretells_other_passes(problem, problem.nothing(), found), gain
+
+
+@pytest.mark.parametrize("runs", [1, 3])
+def test_a_map_that_repeats_foretells_the_other_passes(runs: int) -> None:
+    input_mm, parts, noise_mm = loops((10.0,) * runs, 3)
+    repeats, gain = mapped(input_mm, parts, 0.02 * np.sin(2.0 * np.pi * input_mm / 7.0), noise_mm)
+    assert repeats
+    assert gain > 10.0
+
+
+def test_runs_of_different_gain_and_reach_are_no_map() -> None:
+    input_mm, parts, noise_mm = loops((4.0, 7.0, 10.0), 4)
+    gains = np.repeat([0.02, -0.015, 0.01], ROWS)
+    repeats, gain = mapped(input_mm, parts, 2.0 * gains * input_mm, noise_mm)
+    assert gain > 10.0, "the curve gains more than its price, and must be refused for another reason"
+    assert not repeats

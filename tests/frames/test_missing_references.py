@@ -1,0 +1,170 @@
+"""Whole packets missing where the codec counts nothing: what hangs on them is damaged, and no sound frame is."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import av
+import numpy as np
+import pytest
+
+from fingervision.frames.coded_times import CodedTime
+from fingervision.frames.missing_references import judged, missing_references
+from tests.frames.test_missing_pictures import COUNT, coded, statuses, without, wrong
+
+KINDS: dict[str, tuple[str, str, dict[str, str]]] = {
+    "mpeg4": ("mpeg4", ".mp4", {"g": "20", "bf": "0"}),
+    "mpeg4 between": ("mpeg4", ".mkv", {"g": "20", "bf": "2"}),
+    "vp8": ("libvpx", ".webm", {"g": "20", "deadline": "realtime", "cpu-used": "8", "lag-in-frames": "0"}),
+    "vp9": ("libvpx-vp9", ".webm", {"g": "20", "cpu-used": "8"}),
+    "vp9 resilient": (
+        "libvpx-vp9",
+        ".mp4",
+        {"g": "20", "deadline": "realtime", "cpu-used": "8", "error-resilient": "1"},
+    ),
+    "ffv1": ("ffv1", ".mkv", {"g": "20", "level": "3", "slicecrc": "1"}),
+    "av1": ("libsvtav1", ".mp4", {"g": "20", "preset": "10"}),
+    "av1 in order": ("libsvtav1", ".mkv", {"g": "20", "preset": "10", "svtav1-params": "pred-struct=1"}),
+}
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_no_frame_that_hangs_on_a_missing_packet_is_whole(tmp_path: Path, kind: str) -> None:
+    coder, suffix, options = KINDS[kind]
+    path = tmp_path / f"clip{suffix}"
+    truth = coded(path, coder, **options)
+    assert statuses(path) == "." * COUNT
+    rng = np.random.default_rng(len(kind))
+    for gone in ({1}, {20}, {21}, *({int(k) for k in rng.choice(np.arange(1, COUNT - 2), 3)} for _ in range(2))):
+        fewer = without(path, gone)
+        assert wrong(fewer, truth) == [], gone
+        assert statuses(fewer).count(".") >= (20 if len(gone) > 1 else COUNT - 20), gone
+
+
+def test_numbers_prove_that_nothing_is_missing_whatever_the_times_say(tmp_path: Path) -> None:
+    path = tmp_path / "clip.mkv"
+    coded(path, "libsvtav1", ticks=[k + (k > 30) + 2 * (k > 50) for k in range(COUNT)], g="40", preset="10")
+    assert statuses(path) == "." * COUNT
+
+
+def test_a_picture_that_the_camera_skipped_is_no_damage_where_the_bit_counts_none(tmp_path: Path) -> None:
+    path = tmp_path / "clip.mp4"
+    coded(path, "mpeg4", ticks=[k + (k > 27) + (k > 50) for k in range(COUNT)], g="20", bf="0")
+    assert statuses(path) == "." * COUNT
+
+
+def test_the_bit_tells_where_times_do_not(tmp_path: Path) -> None:
+    # Written anew one after the other, as programs do that know a rate and no times.
+    path, other = tmp_path / "clip.mp4", tmp_path / "other.mp4"
+    coded(path, "mpeg4", g="20", bf="0")
+    with av.open(str(path)) as whole, av.open(str(other), "w") as container:
+        stream = whole.streams.video[0]
+        copied = container.add_stream_from_template(stream)
+        packets = [packet for number, packet in enumerate(whole.demux(stream)) if packet.size and number != 31]
+        for number, packet in enumerate(packets):
+            assert packet.duration is not None
+            packet.pts = packet.dts = number * packet.duration
+            packet.stream = copied
+            container.mux(packet)
+    # What came before the missing picture is right, and so is what comes from the next key frame on.
+    assert statuses(other) == "." * 31 + "x" * 8 + "." * (COUNT - 40)
+
+
+def test_a_picture_between_two_others_costs_no_other(tmp_path: Path) -> None:
+    path = tmp_path / "clip.mkv"
+    coded(path, "mpeg4", g="60", bf="2")
+    with av.open(str(path)) as container:
+        packets = [bytes(packet) for packet in container.demux(video=0) if packet.size]
+    # vop_coding_type 2 stands behind the start code of a picture (ISO/IEC 14496-2, 6.2.5).
+    between = [k for k, packet in enumerate(packets) if packet[packet.index(b"\0\0\1\xb6") + 4] >> 6 == 2]
+    gone = {next(k for k in between if k > 20), next(k for k in between if k > 40)}
+    found = statuses(without(path, gone))
+    # The one that is decoded next may hang on what is missing as far as is known then.
+    assert found.count(".") >= COUNT - len(gone) - 2
+
+
+def row(ticks: "np.ndarray", key_every: int = 30) -> list[CodedTime]:
+    """Packets without numbers, as VP9 has them."""
+    return [CodedTime(int(tick), number % key_every == 0) for number, tick in enumerate(np.round(ticks))]
+
+
+def variable_rates() -> dict[str, "np.ndarray"]:
+    """Times of sound recordings in ticks of 1/90000 s, or of a millisecond."""
+    rng, k = np.random.default_rng(11), np.arange(900)
+    kept = k[rng.random(900) > 0.02]
+    return {
+        "phone": 3000.0 * kept + rng.normal(0.0, 27.0, kept.size),
+        "quiet phone": 3000.0 * kept + rng.normal(0.0, 3.0, kept.size),
+        "browser": 33.333 * kept + rng.normal(0.0, 2.0, kept.size),
+        "some late": 40.0 * kept + np.where(rng.random(kept.size) < 0.05, 6.0, 0.0),
+        "low light": np.cumsum(np.where(k // 100 % 2, 6000.0, 3000.0)),
+        "exposure": np.cumsum(np.where(k // 150 % 2, 3750.0, 3000.0)),
+        "still scenes left out": 40.0 * k[rng.random(900) > 0.5],
+        "pause": 33.333 * k + np.where(k > 450, 3217.0, 0.0),
+        "29.97 Hz": k * 1001.0 / 30.0,
+        "240 Hz": k * 1000.0 / 240.0,
+    }
+
+
+@pytest.mark.parametrize("kind", variable_rates())
+def test_sound_recordings_of_variable_rate_have_no_false_alarm(kind: str) -> None:
+    assert judged(row(variable_rates()[kind]), are_timed=True) == {}
+
+
+def test_a_missing_key_frame_sets_no_bit_right() -> None:
+    # The bit is 0 at each I picture, and 1 behind it, as if the one that is missing had never been coded.
+    turns = [None if k % 15 == 0 else k % 15 % 2 for k in range(90)]
+    packets = [CodedTime(40 * k, k % 15 == 0, turn=turns[k]) for k in range(90)]
+    assert judged(packets, are_timed=True) == {}
+    assert sorted(judged(packets[:45] + packets[46:], are_timed=True)) == [45]
+    assert sorted(judged(packets[:40] + packets[41:], are_timed=True)) == [40]
+
+
+def test_a_picture_between_two_of_which_one_came_hangs_on_a_missing_one() -> None:
+    # Shown after all that came, with the last P picture of the file missing: no hole is left in the times.
+    shown = [0, 3, 1, 2, 6, 4, 5, 9, 7, 8, 12, 10, 11, 15, 13, 14]
+    packets = [CodedTime(40 * k, k == 0, is_needed=k % 3 == 0) for k in shown]
+    assert judged(packets, are_timed=True) == {}
+    assert sorted(judged([each for each in packets if each.tick != 600], are_timed=True)) == [13, 14]
+
+
+@pytest.mark.parametrize("step", [40.0, 1000.0 / 30.0, 1000.0 / 240.0, 3003.0])
+def test_every_hole_of_an_even_row_is_found(step: float) -> None:
+    ticks = np.delete(np.arange(900) * step, [1, 47, 48, 300, 500, 501, 502])
+    assert sorted(judged(row(ticks, 1000), are_timed=True)) == [1, 46, 297, 496]
+    assert judged(row(ticks, 1000), are_timed=False) == {}
+
+
+@pytest.mark.parametrize("lost", [None, 39])
+def test_hidden_pictures_take_no_time(tmp_path: Path, lost: int | None) -> None:
+    # VP8 codes some pictures only for others to hang on (RFC 6386, 9.1): times between the even ones are no damage.
+    path, other = tmp_path / "clip.webm", tmp_path / "other.webm"
+    coded(path, "libvpx", g="60", **{"cpu-used": "8", "deadline": "realtime"})
+    hidden = {9, 29, 49}
+    with av.open(str(path)) as whole, av.open(str(other), "w") as container:
+        copied = container.add_stream_from_template(whole.streams.video[0])
+        seen = 0
+        for number, packet in enumerate(packet for packet in whole.demux(video=0) if packet.size):
+            content = bytearray(bytes(packet))
+            content[0] &= 0xFF if number not in hidden else 0xEF
+            new = av.Packet(bytes(content))
+            new.pts = new.dts = 40 * seen - (7 if number in hidden else 0)
+            new.time_base, new.stream, new.is_keyframe = packet.time_base, copied, packet.is_keyframe
+            if number != lost:
+                container.mux(new)
+            seen += number not in hidden
+    damaged = 0 if lost is None else 60 - lost - 1 - len([k for k in hidden if k > lost])
+    assert statuses(other).count("x") == damaged
+
+
+def test_a_hole_before_a_key_frame_harms_nothing() -> None:
+    packets = row(np.delete(np.arange(100) * 40.0, 47), 1000)
+    packets[47] = replace(packets[47], is_key=True)
+    assert judged(packets, are_timed=True) == {}
+
+
+def test_codecs_that_count_are_left_to_their_numbers(tmp_path: Path) -> None:
+    path = tmp_path / "clip.mp4"
+    coded(path, g="20", bf="0")
+    fewer = without(path, {30})
+    with av.open(str(fewer)) as container:
+        assert missing_references(fewer, container.streams.video[0], container.format.name) == {}
