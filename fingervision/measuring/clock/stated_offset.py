@@ -92,8 +92,8 @@ def stated(motion: Motion, at: Posterior, best: Fit, frame_s: float) -> ClockOff
         )
     if motion.creeps:
         notes.append(
-            "The gap seems to creep after the drive: in a slow motion a creep looks like a delay, and the offset may hold "
-            "a part of it that is more than a frame."
+            "The gap seems to creep after the drive: in a slow motion a creep looks like a delay, and the offset may "
+            "hold a part of it that is more than a frame."
         )
     if u_time_s > 0.5 * frame_s:
         notes.append(
