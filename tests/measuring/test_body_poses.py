@@ -132,5 +132,5 @@ def test_points_of_another_scale_or_at_one_place_are_refused() -> None:
     with pytest.raises(UsageError, match="px/mm"):
         by_points(points(PLACE, (31, 0), (10, 90)), 8.0)
     same = GivenPoint(10.0, 10.0, 1.0, 1.0)
-    with pytest.raises(UsageError, match="one"):
+    with pytest.raises(UsageError, match="same"):
         by_points((same, same), SCALE)
