@@ -144,6 +144,12 @@ def with_profile(
     outer = [_profile(upright, edges, light, k, slice(INNER, ROWS), REACH_PX) for k in range(2)]
     if outer[0] is None or outer[1] is None:
         is_wall = not is_step and left[WALL] < enough and _are_of_size(wall, -1.0)
+        is_strip = [
+            each[STEP].squares > max(MODEL_LEAVES * profile.t.size, MODEL_TIMES * each[WALL].squares)
+            for each, (profile, _, _) in zip(fits, profiles, strict=True)
+        ]
+        if is_strip[0] != is_strip[1]:
+            return replace(edges, beside=STRIP)
         if not is_wall and is_unlike_tip:
             # Flanks that are broader than the tips: by a wall, or by motion, and nothing here tells which.
             wall = [
@@ -171,6 +177,14 @@ def with_profile(
     ]
     if is_one_sided[0] != is_one_sided[1]:
         return replace(edges, beside=STRIP)
+    # Light from one side casts a shadow beside one finger's inner flank and the other finger's outer one, and nothing
+    # else does. Up to two pixels broad it only widens them: a strip of two equal steps by half of its breadth.
+    wider = [each[STEP].blur ** 2 - width**2 for each, width in zip(fits, widths, strict=True)]
+    if (
+        min(wider) < -ONE_SIDED * min(fits[0][STEP].blur, fits[1][STEP].blur) ** 2
+        and max(wider) > ONE_SIDED * min(widths) ** 2
+    ):
+        return _unsure(edges, [2.0 * np.sqrt(max(more, 0.0)) for more in wider], "shadow")
     if all(each[STEP].blur ** 2 > (1.0 + WIDER) * width**2 for each, width in zip(fits, widths, strict=True)):
         narrow = [_best(WALL, p, weight, width, True) for p, width in zip(inner, widths, strict=True) if p]
         remains = sum(fit.squares for fit in narrow)
