@@ -47,6 +47,8 @@ CLEARLY = 16.0
 # The integral of what a Gaussian step leaves of a disc of defocus, squared, is at most 0.0017 contrast^2 blur (of a box
 # 0.0038): what leaves more than this is two steps, or a line between them, even where it is alike to both sides.
 DISC_LEAVES = 0.002
+# Glare that is fitted to a disc of defocus lies 1.0 to 1.1 of its own blurs inside, however large the disc is.
+DISC_BREADTH = 1.12
 # What stands beside an edge makes this share of the contrast: less is texture, more is no finger's edge.
 SHARES = (0.05, 0.85)
 # Levels within so many standard deviations of the end of the scale are cut off now and then.
@@ -195,6 +197,10 @@ def with_profile(
     widened = np.maximum(flanks - (1.0 + WIDER) * tips, 0.0).tolist()
     if any(widened):
         return _unsure(edges, [0.5 * more / MOTION_RADIUS_PX for more in widened], "motion")
+    if not (is_step or is_lopsided) and left[GLARE] < enough and _are_of_size(glare, 1.0):
+        if min(fit.breadth / fit.blur for fit in glare) > DISC_BREADTH:  # a line of light hides in such optics, or none
+            return _unsure(edges, [abs(fit.position) for fit in glare], "glare")
+        return edges
     is_resolved = all(fit.breadth > RESOLVED_BLURS * fit.blur for fit in wall)
     if not is_lopsided or left[GLARE] > enough or not is_resolved or not _are_of_size(glare, 1.0):
         return edges
