@@ -1,4 +1,4 @@
-"""How far flexures work as they are meant to: notches bent at their necks, leaves bent, neither of them stretched."""
+"""How far notches work as they are meant to: bent at their necks, neither sheared nor stretched."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,7 +9,7 @@ Array = NDArray[np.float64]
 
 
 def misused_energy(span: FlexureSpan, end_loads: Array, compliances: Array, plate_mm: float) -> tuple[float, float]:
-    """Strain energy of a flexure that is not in its working direction, and all of it, in N mm.
+    """Strain energy of a flexure outside its intended deformation, and its total strain energy (N mm).
 
     Parameters
     ----------
@@ -27,9 +27,8 @@ def misused_energy(span: FlexureSpan, end_loads: Array, compliances: Array, plat
     shear = -(first + second) / np.diff(stations)
     loads = np.column_stack([tension, shear, second])
     whole = 0.5 * float(np.einsum("mi,mij,mj->", loads, compliances, loads))
-    stretched = 0.5 * float(np.sum(tension**2 * compliances[:, 0, 0]))
-    if not span.flexure.is_notch:
-        return stretched, whole
+    if not span.flexure.is_notch:  # as a beam in every direction
+        return 0.0, whole
     at_neck = float(np.interp(0.0, stations, np.append(-first, second[-1])))
     bent = 0.5 * at_neck**2 * float(np.sum(compliances[:, 2, 2]))
     return max(whole - bent, 0.0), whole

@@ -19,7 +19,6 @@ from fingervision.models.modal_model import FreeModes, ModalModel, Observable
 from fingervision.models.planar_region import PlanarRegion, sharp_corners_mm
 from fingervision.models.plane_stress import PlaneStressPlate
 from fingervision.models.triangulate import PlaneMesh, triangulate
-from fingervision.models.width_effect import force_uncertainty
 
 Array = NDArray[np.float64]
 
@@ -140,11 +139,11 @@ class MechanismPlate:
     @property
     def force_error(self) -> float:
         """Relative error of the force, from the mesh and the width effect."""
-        return 0.005 + 2.0 * force_uncertainty(self.mechanism.material)
+        return 0.005 + self.mechanism.width_error
 
     @property
     def stress_error(self) -> float:
-        """Relative model error of the stress in the flexures: of the mesh."""
+        """Relative error of the stress in the flexures, from the mesh."""
         return _STRESS_ERROR
 
     def touch_input_mm(self) -> dict[str, float]:
