@@ -10,6 +10,7 @@ from fingervision.models.generalized_alpha import integrate
 from fingervision.models.lumped import LumpedGripper
 from fingervision.models.modal_model import gripper_modes
 from fingervision.models.modal_response import modal_motion
+from fingervision.models.mode_shapes import ModesWanted, gripper_mode_shapes
 from fingervision.models.physics import Physics
 from fingervision.models.stepped_response import stepped_motion
 
@@ -129,3 +130,12 @@ def test_fingers_driven_together_do_not_pass_through(lumped: LumpedGripper) -> N
     assert gap.min() > -0.03
     assert force[-1] < -2.0
     assert through[-1] == pytest.approx(4.0 - 0.57 * 7.73, abs=0.05)
+
+
+def test_a_film_s_mirrored_halves_meet_and_do_not_pass_through_each_other(lumped: LumpedGripper) -> None:
+    shapes = gripper_mode_shapes(lumped, ModesWanted(2))
+    for shape in shapes:
+        right = np.arange(len(shape.lines_mm) // 2)
+        closed = (shape.lines_mm - shape.swing * shape.shift_mm)[right, :, 0]
+        assert shape.family.startswith("swaying") or closed.min() > -1e-6
+    assert any(shape.swing < 1.0 for shape in shapes)
