@@ -2,7 +2,7 @@
 
 Run as `python -m tests.benchmarks.page_memory [--minutes 15]` from the top; the live view is simulated, at 25 Hz.
 Printed: megabytes of the script heap, elements of the document, listeners, and pictures shown so far. The chart keeps
-two minutes of rows, and messages are few, so that after those minutes all of them must stay as they are.
+ten minutes of rows, and messages are few, so that after those minutes all of them must stay as they are.
 """
 
 import argparse

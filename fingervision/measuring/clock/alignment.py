@@ -13,7 +13,7 @@ from fingervision.measuring.clock.joint_fit import Fit, fit
 from fingervision.measuring.clock.log_path import LogPath
 from fingervision.measuring.clock.motion_model import Motion
 from fingervision.measuring.clock.noise_of_motion import noise_of
-from fingervision.measuring.clock.play_posterior import most_likely, posterior
+from fingervision.measuring.clock.play_posterior import beside, most_likely, posterior
 from fingervision.measuring.clock.refusals import FEWEST_FRAMES, ambiguous, only_set_points, too_little, unlike
 from fingervision.measuring.clock.rivals import QUICK_PLAYS, fitted, only, unrefuted
 from fingervision.measuring.clock.stated_offset import stated
@@ -56,6 +56,7 @@ def find_clock_offset(time_s: Array, gap_mm: Array, drive: DriveHistory) -> Cloc
     if not fits:
         return NoClockOffset("fewer than 12 frames with a gap lie within the drive's times: record longer.")
     best, motion, whole = max(fits, key=lambda entry: _information(entry[1], entry[2]))
+    whole = beside(motion, whole, QUICK_PLAYS)
     for _ in range(REFINEMENTS):
         kept = _inliers(whole.residual_mm)
         motion, near = only(motion, kept), replace(whole, residual_mm=whole.residual_mm[kept])
@@ -76,7 +77,7 @@ def find_clock_offset(time_s: Array, gap_mm: Array, drive: DriveHistory) -> Cloc
 
 
 def _creeping(motion: Motion, found: Fit) -> tuple[Motion, Fit]:
-    """Let the gap creep, where that explains it better than chance would."""
+    """Allow the gap to creep, where that explains it better than chance would."""
     creeping = replace(motion, creeps=True)
     slow = fit(creeping, found.at, free_play=found.at.play_mm > 0.0)
     return (creeping, slow) if (found.squares - slow.squares) / slow.variance_mm2 > CREEP_GAIN else (motion, found)
